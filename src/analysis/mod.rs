@@ -1,0 +1,3 @@
+//! Windows, calibration laws and updraft estimates.
+
+pub mod result;

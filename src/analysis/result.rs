@@ -1,0 +1,250 @@
+//! What an analysis says, as written to `analysis.json` and drawn by the report.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::base::estimate::Estimate;
+use crate::flight::Clock;
+use crate::mission::plan::{Kind, Purpose};
+
+/// Name and version of the analysis format.
+pub const ANALYSIS_SCHEMA: &str = "updraft.analysis/1";
+
+/// The analysis of one or several flights of a fleet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Analysis {
+    /// Format name and version: `updraft.analysis/1`.
+    pub schema: String,
+    /// Program and version that made it.
+    pub made_by: String,
+    /// Title for people.
+    pub title: String,
+    /// The flights, calibration first.
+    pub flights: Vec<FlightAnalysis>,
+    /// What is doubtful about the whole.
+    pub warnings: Vec<String>,
+}
+
+/// One flight of the fleet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FlightAnalysis {
+    /// Short name: `calibration`, `hover`, or the input's file name.
+    pub name: String,
+    /// What it was for.
+    pub purpose: Purpose,
+    /// Whether windows came from a plan (else from the log's desired velocity).
+    pub planned: bool,
+    /// The true vertical air speed in this flight, m/s, when it was simulated in uniform air.
+    pub true_updraft_mps: Option<f64>,
+    /// Analysed drones, in slot order.
+    pub drones: Vec<DroneAnalysis>,
+    /// Slots of the plan without a usable log: (slot, reason).
+    pub missing: Vec<Missing>,
+    /// Fits to the windows of all drones averaged (the paper's flock mapping), for calibrations.
+    pub flock: Option<Laws>,
+    /// Statistics over drones of the fitted parameters (Tables I and II).
+    pub table: Vec<TableRow>,
+    /// The map of the air, for measurements.
+    pub map: Option<UpdraftMap>,
+}
+
+/// A drone that the plan has and the analysis has not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Missing {
+    /// Slot number.
+    pub slot: u16,
+    /// Why.
+    pub reason: String,
+}
+
+/// One drone of one flight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DroneAnalysis {
+    /// Slot number, if the log was matched to a plan.
+    pub slot: Option<u16>,
+    /// Label: slot name or file stem.
+    pub name: String,
+    /// Log file, relative to the campaign folder where possible.
+    pub source: String,
+    /// Home in the show frame, m (x forward, y left), if planned.
+    pub home_m: Option<[f64; 2]>,
+    /// How its clock was aligned.
+    pub clock: Clock,
+    /// Windows, in time order.
+    pub windows: Vec<WindowStats>,
+    /// Fitted laws, for calibrations.
+    pub laws: Option<Laws>,
+    /// Thinned traces for figures.
+    pub trace: Trace,
+    /// What is doubtful about this drone.
+    pub warnings: Vec<String>,
+}
+
+/// Statistics of one window.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WindowStats {
+    /// Kind of the segment.
+    pub kind: Kind,
+    /// Label: `up 0.5 m/s`.
+    pub label: String,
+    /// Show time of the window, s.
+    pub start_s: f64,
+    /// Show time of the end, s.
+    pub end_s: f64,
+    /// Commanded vertical velocity, m/s, up positive.
+    pub commanded_mps: f64,
+    /// Mean height above home, m.
+    pub height_m: f64,
+    /// Vertical velocity V_U, m/s.
+    pub velocity_mps: SampleStats,
+    /// Rotor control pulse width u, us.
+    pub pulse_us: SampleStats,
+    /// Tilt-corrected pulse width u_phi, us.
+    pub pulse_phi_us: SampleStats,
+    /// Tilt from the vertical, degrees.
+    pub tilt_deg: SampleStats,
+    /// Estimated slow offset subtracted before fitting (field mode), us.
+    pub offset_us: Option<f64>,
+    /// Why the window is not used in fits; empty: it is used (if it is of the fitted kind).
+    pub rejected: Vec<Rejection>,
+}
+
+/// Why a window is not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Rejection {
+    /// A motor output touched its limit.
+    Saturated,
+    /// The vehicle did not follow the command (|V_U - commanded| > 0.3 m/s).
+    NotFollowing,
+    /// The log has a gap or too few samples.
+    Gap,
+    /// The log ends before the window does.
+    Incomplete,
+}
+
+/// Location and spread of the samples in a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SampleStats {
+    /// Median.
+    pub median: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation of the samples.
+    pub sd: f64,
+    /// Number of samples.
+    pub n: usize,
+}
+
+/// The laws fitted to one set of windows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Laws {
+    /// `u = A f(V - W) + u0`, f(x) = x|x|, W free.
+    pub signed_quadratic: Option<Fit>,
+    /// The same with A and u0 held from a reference, only W fitted.
+    pub signed_quadratic_held: Option<Fit>,
+    /// `u = A' V + u0`.
+    pub linear: Option<Fit>,
+}
+
+/// A fitted law.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Fit {
+    /// Parameters in the law's order: `A`, `u0`, `W` or `A'`, `u0`.
+    pub parameters: Vec<Parameter>,
+    /// Covariance of the free parameters, row-major over all parameters (0 where held).
+    pub covariance: Vec<f64>,
+    /// Points fitted.
+    pub points: usize,
+    /// Sum of squared residuals over sigma.
+    pub chi2: f64,
+    /// chi2 over the degrees of freedom; `None` without any.
+    pub chi2_reduced: Option<f64>,
+    /// Degrees of freedom.
+    pub dof: usize,
+    /// Unweighted rms residual, us.
+    pub rms_us: f64,
+    /// Other local minima within a chi2 of 4 of the best: their parameters.
+    pub other_minima: Vec<Vec<f64>>,
+    /// What is doubtful about this fit.
+    pub warnings: Vec<String>,
+}
+
+/// One fitted or held parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Parameter {
+    /// Symbol: `A`, `u0`, `W`, `A'`.
+    pub name: String,
+    /// Unit: `us/(m/s)²`, `us`, `m/s`, `us/(m/s)`.
+    pub unit: String,
+    /// Value and standard error.
+    pub estimate: Estimate,
+    /// Held, not fitted.
+    pub held: bool,
+}
+
+/// One row of Table I or II: a parameter over the fleet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TableRow {
+    /// Law: `signed quadratic` or `linear`.
+    pub law: String,
+    /// Parameter symbol, or `chi2_nu`.
+    pub parameter: String,
+    /// Unit.
+    pub unit: String,
+    /// Mean over drones.
+    pub mean: f64,
+    /// Standard deviation between drones.
+    pub sd: f64,
+    /// Mean of the drones' own standard errors.
+    pub mean_se: f64,
+    /// Drones.
+    pub n: usize,
+    /// The paper's value and error where it has one.
+    pub paper: Option<Estimate>,
+}
+
+/// Thinned traces of one drone, for figures.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Trace {
+    /// Show time, s.
+    pub time_s: Vec<f64>,
+    /// Height above home, m.
+    pub height_m: Vec<f64>,
+    /// Vertical velocity, m/s.
+    pub velocity_mps: Vec<f64>,
+    /// Tilt-corrected pulse width, us.
+    pub pulse_phi_us: Vec<f64>,
+}
+
+/// Estimated vertical air speed of the fleet over time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct UpdraftMap {
+    /// Law used for the inversion: `linear` or `signed quadratic`.
+    pub law: String,
+    /// Common times of all drones, show time s, 1 s apart.
+    pub time_s: Vec<f64>,
+    /// The drones' estimates.
+    pub drones: Vec<DroneUpdraft>,
+}
+
+/// One drone's estimate of the vertical air speed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DroneUpdraft {
+    /// Slot number, if planned.
+    pub slot: Option<u16>,
+    /// Label.
+    pub name: String,
+    /// Position in the show frame, m (x forward, y left).
+    pub position_m: Option<[f64; 2]>,
+    /// Height above home, m.
+    pub height_m: f64,
+    /// Mapping used: `own` or `flock`.
+    pub mapping: String,
+    /// Mean over the hover with its standard error, m/s, up positive.
+    pub mean: Estimate,
+    /// Running 10 s estimate at each of [`UpdraftMap::time_s`], m/s; null where the log has none.
+    pub updraft_mps: Vec<Option<f64>>,
+    /// True value at the same times, when it is known.
+    pub truth_mps: Option<Vec<f64>>,
+}

@@ -1,0 +1,141 @@
+//! Writing files so that nothing half-written is ever taken for whole.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+use thiserror::Error;
+
+/// Marks our unfinished files, so that a later step can recognise and sweep them.
+pub const PARTIAL_PREFIX: &str = ".partial-";
+
+/// A file could not be read or written.
+#[derive(Debug, Error)]
+#[error("failed to {action} {}", path.display())]
+pub struct FileError {
+    /// What was being done ("read", "write", "create the folder").
+    pub action: &'static str,
+    /// The file or folder.
+    pub path: PathBuf,
+    /// The operating system's reason.
+    #[source]
+    pub source: io::Error,
+}
+
+impl FileError {
+    /// Wraps an I/O error with what was being done to which path.
+    pub fn new(action: &'static str, path: &Path, source: io::Error) -> Self {
+        Self { action, path: path.to_owned(), source }
+    }
+}
+
+/// Writes a whole file: temporary file beside it, flush to disk, rename.
+///
+/// A reader sees the old content or the new one, never a part. Missing parent folders are created.
+pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    write_with(path, |out| out.write_all(content))
+}
+
+/// Like [`write_whole`], with the content streamed by `fill`.
+///
+/// When `fill` fails, the temporary file is removed and `path` is untouched.
+pub fn write_with(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
+) -> Result<(), FileError> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    create_folder(folder)?;
+    let fail = |source| FileError::new("write", path, source);
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o644));
+    }
+    let mut temporary: NamedTempFile =
+        builder.prefix(PARTIAL_PREFIX).tempfile_in(folder).map_err(fail)?;
+    {
+        let mut out = BufWriter::with_capacity(1 << 16, temporary.as_file_mut());
+        fill(&mut out).and_then(|()| out.flush()).map_err(fail)?;
+    }
+    temporary.as_file().sync_all().map_err(fail)?;
+    temporary.persist(path).map_err(|error| fail(error.error))?;
+    // The rename itself is durable only once the folder is on disk; not every file system allows it.
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
+}
+
+/// Creates a folder and its parents.
+pub fn create_folder(path: &Path) -> Result<(), FileError> {
+    fs::create_dir_all(path).map_err(|source| FileError::new("create the folder", path, source))
+}
+
+/// Reads a whole file, refusing one larger than `limit_bytes`.
+pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FileError> {
+    let fail = |source| FileError::new("read", path, source);
+    let size = fs::metadata(path).map_err(fail)?.len();
+    if size > limit_bytes {
+        return Err(fail(io::Error::new(
+            io::ErrorKind::FileTooLarge,
+            format!("the file has {size} bytes, more than the {limit_bytes} allowed here"),
+        )));
+    }
+    fs::read(path).map_err(fail)
+}
+
+/// Removes temporary files that a killed run left in `folder` (not in its subfolders).
+pub fn sweep_partial(folder: &Path) -> Result<usize, FileError> {
+    let fail = |source| FileError::new("clean", folder, source);
+    let mut swept = 0;
+    for entry in fs::read_dir(folder).map_err(fail)? {
+        let entry = entry.map_err(fail)?;
+        if entry.file_name().to_string_lossy().starts_with(PARTIAL_PREFIX) {
+            fs::remove_file(entry.path()).map_err(fail)?;
+            swept += 1;
+        }
+    }
+    Ok(swept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_no_rubbish() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_whole(&path, b"old").unwrap();
+        let failed = write_with(&path, |out| {
+            out.write_all(b"half of the new")?;
+            Err(io::Error::other("disk full"))
+        });
+        assert!(failed.unwrap_err().to_string().contains("a.txt"));
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn sweeps_only_what_a_killed_run_left() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(".partial-abc"), b"half").unwrap();
+        fs::write(folder.path().join("01.BIN"), b"whole").unwrap();
+        assert_eq!(sweep_partial(folder.path()).unwrap(), 1);
+        assert!(folder.path().join("01.BIN").exists());
+    }
+
+    #[test]
+    fn refuses_a_file_over_the_limit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("big");
+        fs::write(&path, [0_u8; 20]).unwrap();
+        assert!(read_whole(&path, 10).is_err());
+        assert_eq!(read_whole(&path, 20).unwrap().len(), 20);
+    }
+}

@@ -1,0 +1,8 @@
+//! What every room uses: frames, time, checksums, estimates, random streams, whole files.
+
+pub mod crc;
+pub mod estimate;
+pub mod file;
+pub mod frame;
+pub mod rng;
+pub mod time;

@@ -1,0 +1,1 @@
+//! Exact safety checks of a show against its limits.

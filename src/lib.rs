@@ -1,0 +1,37 @@
+//! **updraft** measures the vertical motion of the air with a swarm of show drones.
+//!
+//! The data's way through the house is one-directional, and so are the dependencies:
+//!
+//! ```text
+//! mission -> show -> check -> sim | fleet -> log -> flight -> analysis -> gap -> report
+//! ```
+//!
+//! * [`mission`]: TOML templates become a [`mission::plan::Plan`], the timetable that everything
+//!   downstream reads.
+//! * [`show`]: plans become trajectories and Skybrush files (`.skyc`, `.skyb`, zipped CSV), and back.
+//! * [`check`]: exact safety checks on the trajectory pieces.
+//! * [`sim`]: the embedded simulator flies a show and writes the same `.BIN` logs as a drone.
+//! * [`log`]: the ArduPilot DataFlash format, reader and writer.
+//! * [`flight`]: one drone's log as time series in show time.
+//! * [`analysis`]: windows, calibration laws, updraft estimates.
+//! * [`report`]: figures, tables and the HTML page.
+//! * [`campaign`]: names of the files in a campaign folder.
+//!
+//! # Conventions
+//!
+//! SI units in `f64`; the unit is in the name (`_m`, `_mps`, `_us`, `_s`, `_ms`). Vertical velocity
+//! and updraft are positive **up** in every public type; NED exists only inside log and wire
+//! formats and is converted at that border. Rotor control pulse widths are microseconds.
+
+pub mod analysis;
+pub mod base;
+pub mod campaign;
+pub mod check;
+pub mod cli;
+pub mod flight;
+pub mod log;
+pub mod mission;
+pub mod report;
+pub mod show;
+pub mod sim;
+pub mod vehicle;

@@ -1,0 +1,1 @@
+//! The messages that the simulator writes, as the firmware defines them.

@@ -1,0 +1,3 @@
+//! The `updraft` command: see [`updraft::cli`].
+
+fn main() {}

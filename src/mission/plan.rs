@@ -1,0 +1,234 @@
+//! The plan: a versioned timetable of one flight that everything downstream reads.
+//!
+//! Written as `plan.json`; its JSON schema is `docs/schema/plan.schema.json`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::base::frame::{Geodetic, ShowFrame};
+use crate::vehicle::Limits;
+
+/// Name and version of the plan format.
+pub const PLAN_SCHEMA: &str = "updraft.plan/1";
+
+/// One flight of a fleet: slots, command groups with their segments, limits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Format name and version: `updraft.plan/1`.
+    pub schema: String,
+    /// Short name of the flight, used for folders: `calibration`, `hover`.
+    pub name: String,
+    /// Title for people.
+    pub title: String,
+    /// What the flight is for.
+    pub purpose: Purpose,
+    /// Name of the vehicle file the plan was made for.
+    pub vehicle: String,
+    /// Where the show frame is.
+    pub site: Site,
+    /// Limits that the plan is checked against.
+    pub limits: Limits,
+    /// Fence around the show, show frame.
+    pub fence: Fence,
+    /// How the grid was laid out; absent for plans recovered from a show file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grid: Option<Grid>,
+    /// Every drone's place, in slot order.
+    pub slots: Vec<Slot>,
+    /// Command groups: all drones of a group fly the same segments, each from its own home.
+    pub groups: Vec<Group>,
+    /// End of the last segment of any group, show time, ms.
+    pub duration_ms: u64,
+    /// What the crew must prepare or know, one sentence each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub briefing: Vec<String>,
+}
+
+/// What a flight is for, which decides how it is analysed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Purpose {
+    /// A speed ladder that relates rotor effort to vertical air velocity.
+    Calibration,
+    /// A hover (or scan) that measures the air.
+    Measurement,
+}
+
+/// Where the show frame is on the globe.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Site {
+    /// Latitude of the show origin, degrees.
+    pub origin_lat_deg: f64,
+    /// Longitude of the show origin, degrees.
+    pub origin_lon_deg: f64,
+    /// Ground height at the origin above mean sea level, m. Used for air density; drones fly heights
+    /// relative to home.
+    pub ground_amsl_m: f64,
+    /// Degrees clockwise from north to the show's x axis.
+    pub orientation_deg: f64,
+}
+
+impl Site {
+    /// The show frame of this site.
+    pub fn frame(&self) -> ShowFrame {
+        ShowFrame {
+            origin: Geodetic {
+                lat_deg: self.origin_lat_deg,
+                lon_deg: self.origin_lon_deg,
+                amsl_m: self.ground_amsl_m,
+            },
+            orientation_deg: self.orientation_deg,
+        }
+    }
+}
+
+/// The fence around the show: a box of the show frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fence {
+    /// Corners of the inclusion polygon, show x and y, m, counter-clockwise, not repeated.
+    pub polygon_m: Vec<[f64; 2]>,
+    /// Highest altitude above ground, m.
+    pub max_altitude_m: f64,
+    /// Distance that trajectories must keep from the fence, m.
+    pub margin_m: f64,
+}
+
+/// Layout of a rectangular grid.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Rows, along show x.
+    pub rows: u32,
+    /// Columns, along show y (to the left).
+    pub columns: u32,
+    /// Distance between neighbours, m.
+    pub spacing_m: f64,
+}
+
+/// One drone's place on the ground.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Slot {
+    /// Number of the slot, from 1.
+    pub slot: u16,
+    /// Label, for example `Drone 1`.
+    pub name: String,
+    /// Row in the grid, from 0 (along show x).
+    pub row: u32,
+    /// Column in the grid, from 0 (along show y).
+    pub column: u32,
+    /// Home on the ground, show frame, m.
+    pub home_m: [f64; 3],
+    /// Index into [`Plan::groups`].
+    pub group: u16,
+}
+
+/// Drones that fly the same segments at the same times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Group {
+    /// Name of the group: `all`, `even`, `odd`.
+    pub name: String,
+    /// How much later than the plan's steps this group flies, ms.
+    pub offset_ms: u64,
+    /// What the group flies, without gaps from show time 0.
+    pub segments: Vec<Segment>,
+}
+
+/// One segment of a group's flight: constant commanded velocity, or a ramp between two velocities.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Segment {
+    /// What the segment is.
+    pub kind: Kind,
+    /// Label for people: `up 0.5 m/s`.
+    pub label: String,
+    /// Start, show time, ms.
+    pub start_ms: u64,
+    /// End, show time, ms.
+    pub end_ms: u64,
+    /// Position at the start relative to home, show frame, m.
+    pub from_m: [f64; 3],
+    /// Position at the end relative to home, show frame, m.
+    pub to_m: [f64; 3],
+    /// Commanded velocity, show frame, m/s: constant, or that at the end of a ramp.
+    pub velocity_mps: [f64; 3],
+    /// Velocity at the start, for a ramp of constant acceleration; absent: constant velocity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_velocity_mps: Option<[f64; 3]>,
+    /// Where the analysis looks; absent: not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub window: Option<Window>,
+}
+
+/// Kind of a segment.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Standing on the ground before take-off (a group's time offset).
+    Wait,
+    /// First vertical climb from the ground.
+    Takeoff,
+    /// Vertical transfer to a height; not analysed.
+    Climb,
+    /// Vertical transfer down; not analysed.
+    Descend,
+    /// A rung of the ladder, upwards.
+    LegUp,
+    /// A rung of the ladder, downwards.
+    LegDown,
+    /// Commanded velocity zero.
+    Hover,
+    /// Horizontal leg at constant speed.
+    Horizontal,
+    /// Change of velocity at constant acceleration.
+    Ramp,
+    /// Last vertical descent before the autopilot lands the drone.
+    Landing,
+}
+
+impl Kind {
+    /// Whether the commanded velocity is zero (the paper's 0-windows).
+    pub fn is_hover(self) -> bool {
+        self == Self::Hover
+    }
+
+    /// Whether this is a rung of the speed ladder.
+    pub fn is_leg(self) -> bool {
+        matches!(self, Self::LegUp | Self::LegDown)
+    }
+}
+
+/// An interval of show time, start included, end excluded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Window {
+    /// Start, show time, ms.
+    pub start_ms: u64,
+    /// End, show time, ms.
+    pub end_ms: u64,
+}
+
+impl Window {
+    /// Duration, s.
+    pub fn duration_s(self) -> f64 {
+        self.end_ms.saturating_sub(self.start_ms) as f64 / 1000.0
+    }
+}
+
+impl Plan {
+    /// The slot with this number (slots count from 1).
+    pub fn slot(&self, slot: u16) -> Option<&Slot> {
+        self.slots.iter().find(|candidate| candidate.slot == slot)
+    }
+
+    /// The segments that a slot flies.
+    pub fn segments(&self, slot: &Slot) -> &[Segment] {
+        self.groups.get(usize::from(slot.group)).map_or(&[], |group| &group.segments)
+    }
+}

@@ -1,0 +1,86 @@
+//! Shows: what each drone flies, and the files that carry it.
+
+pub mod trajectory;
+
+use nalgebra::Vector3;
+
+use crate::base::frame::ShowFrame;
+pub use trajectory::{Path, Segment, Trajectory};
+
+/// A show: trajectories, lights and settings of all drones, in the show frame.
+///
+/// This is what `.skyc` files hold, whoever made them; a single `.skyb` is a show of one drone.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Show {
+    /// Identifier of the show (`meta.id`), if any.
+    pub id: Option<String>,
+    /// Title of the show (`meta.title`), if any.
+    pub title: Option<String>,
+    /// Place of the show frame on the globe, if known. Without AMSL the origin's altitude is 0 and
+    /// [`Show::has_amsl`] is false.
+    pub frame: Option<ShowFrame>,
+    /// Whether the altitude in [`Show::frame`] is meant (show heights then are AMSL-referenced).
+    pub has_amsl: bool,
+    /// The drones, in the order of their slots.
+    pub drones: Vec<ShowDrone>,
+    /// Named instants, for people's timelines.
+    pub cues: Vec<Cue>,
+    /// Limits that Skybrush's own tools check and draw (`settings.validation`).
+    pub validation: Option<Validation>,
+    /// Proposed geofence: one inclusion polygon, show x and y in metres.
+    pub fence_polygon_m: Vec<[f64; 2]>,
+    /// End of take-off, start of landing and end of the show, s (`meta.segments`).
+    pub phases_s: Option<[f64; 3]>,
+}
+
+/// One drone of a show.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShowDrone {
+    /// Label of the drone or slot, for example `Drone 1`.
+    pub name: String,
+    /// Ground position at the start, show frame, m.
+    pub home_m: Option<Vector3<f64>>,
+    /// Planned landing position, show frame, m.
+    pub land_at_m: Option<Vector3<f64>>,
+    /// What it flies. Starts at show time 0.
+    pub trajectory: Trajectory,
+    /// Light program in Skybrush bytecode; empty: none.
+    pub lights: Vec<u8>,
+    /// Yaw program, if any.
+    pub yaw: Option<YawControl>,
+}
+
+/// A yaw program, as `.skyb` block 5 and `yawControl` in `.skyc` hold it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct YawControl {
+    /// Whether the heading follows the direction of motion.
+    pub auto: bool,
+    /// Offset added to all setpoints, degrees clockwise.
+    pub offset_deg: f64,
+    /// (show time s, degrees clockwise from the show's x axis), linear in between.
+    pub setpoints: Vec<(f64, f64)>,
+}
+
+/// A named instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cue {
+    /// Show time, s.
+    pub time_s: f64,
+    /// Label.
+    pub name: String,
+}
+
+/// Limits drawn and checked by Skybrush Live and Viewer.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Validation {
+    /// Highest altitude, m.
+    pub max_altitude_m: Option<f64>,
+    /// Largest horizontal speed, m/s.
+    pub max_velocity_xy_mps: Option<f64>,
+    /// Largest vertical speed (downward, and upward unless given apart), m/s.
+    pub max_velocity_z_mps: Option<f64>,
+    /// Largest upward speed, m/s.
+    pub max_velocity_z_up_mps: Option<f64>,
+    /// Smallest distance between drones, m.
+    pub min_distance_m: Option<f64>,
+}

@@ -1,0 +1,1 @@
+//! The embedded simulator: flies a show and writes one DataFlash log per drone.

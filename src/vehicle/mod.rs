@@ -1,0 +1,103 @@
+//! Vehicles: flight limits, airframe and autopilot settings, one TOML file each in
+//! `templates/vehicles/`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A vehicle as its TOML file states it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Vehicle {
+    /// Short name, the file's stem: `airsim-generic-quad`.
+    pub name: String,
+    /// One line for people.
+    pub title: String,
+    /// Where the numbers come from.
+    pub source: String,
+    /// What the vehicle may be asked to do.
+    pub limits: Limits,
+    /// Mass, geometry, rotors and drag.
+    pub airframe: Airframe,
+    /// Autopilot parameters that shape the pulse.
+    pub autopilot: Autopilot,
+}
+
+/// What a vehicle may be asked to do; plans are checked against it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Largest horizontal speed, m/s.
+    pub max_speed_xy_mps: f64,
+    /// Largest upward speed, m/s.
+    pub max_speed_up_mps: f64,
+    /// Largest downward speed, m/s.
+    pub max_speed_down_mps: f64,
+    /// Largest acceleration within a piece, m/s².
+    pub max_acceleration_mps2: f64,
+    /// Largest jump of velocity between two pieces, m/s.
+    pub max_velocity_step_mps: f64,
+    /// Highest altitude above ground, m.
+    pub max_altitude_m: f64,
+    /// Smallest distance between any two drones in the air, m.
+    pub min_distance_m: f64,
+    /// Time a full battery carries the vehicle in hover, s.
+    pub endurance_s: f64,
+    /// Share of the endurance that must be left after landing, 0..1.
+    pub endurance_reserve: f64,
+}
+
+/// Mass, geometry, rotors and drag of AirSim's multirotor model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Airframe {
+    /// Total mass, kg.
+    pub mass_kg: f64,
+    /// Mass of one motor with rotor, kg (for the inertia).
+    pub motor_mass_kg: f64,
+    /// Body box: length x, width y, height z, m.
+    pub body_m: [f64; 3],
+    /// Distance of each rotor from the centre, m.
+    pub arm_m: f64,
+    /// Height of the rotors above the centre, m.
+    pub rotor_z_m: f64,
+    /// Rotor diameter, m.
+    pub rotor_diameter_m: f64,
+    /// Height of a rotor's side face, for horizontal drag, m.
+    pub rotor_height_m: f64,
+    /// Thrust coefficient C_T (thrust = C_T rho n² D⁴, n in rev/s).
+    pub thrust_coefficient: f64,
+    /// Power coefficient C_P (torque = C_P rho n² D⁵ / 2 pi).
+    pub power_coefficient: f64,
+    /// Largest rotor speed, rev/min.
+    pub max_rpm: f64,
+    /// Time constant of the motor's first-order response, s.
+    pub motor_time_constant_s: f64,
+    /// Linear drag coefficient of the box faces (AirSim: 1.3 / 4).
+    pub drag_coefficient: f64,
+}
+
+/// Autopilot parameters, by their ArduPilot names, that shape the pulse.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Autopilot {
+    /// MOT_THST_EXPO: curve of thrust against throttle, 0 linear.
+    pub mot_thst_expo: f64,
+    /// MOT_SPIN_MIN: lowest output in flight, 0..1.
+    pub mot_spin_min: f64,
+    /// MOT_SPIN_MAX: highest output, 0..1.
+    pub mot_spin_max: f64,
+    /// MOT_THST_HOVER: hover throttle at the start, 0..1.
+    pub mot_thst_hover: f64,
+    /// PSC_POSZ_P, 1/s.
+    pub psc_posz_p: f64,
+    /// PSC_VELZ_P, 1/s.
+    pub psc_velz_p: f64,
+    /// PSC_ACCZ_P.
+    pub psc_accz_p: f64,
+    /// PSC_ACCZ_I.
+    pub psc_accz_i: f64,
+    /// WPNAV_SPEED_UP, m/s (take-off).
+    pub wpnav_speed_up_mps: f64,
+    /// SHOW_VEL_FF_GAIN.
+    pub show_vel_ff_gain: f64,
+}
