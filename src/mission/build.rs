@@ -158,9 +158,5 @@ fn fence(
         Some(value) => source.in_range(value, "fence altitude", "m", 10.0..=3000.0)?,
         None => ((top_m + room_m) * 10.0).ceil() / 10.0,
     };
-    Ok(Fence {
-        polygon_m: vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]],
-        max_altitude_m,
-        margin_m,
-    })
+    Ok(Fence { polygon_m: vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]], max_altitude_m, margin_m })
 }

@@ -48,9 +48,7 @@ impl TemplateError {
                     .path(&self.path)
                     .annotation(AnnotationKind::Primary.span(span.clone())),
             ),
-            _ => {
-                Group::with_title(title).element(Level::NOTE.message(format!("in {}", self.path)))
-            }
+            _ => Group::with_title(title).element(Level::NOTE.message(format!("in {}", self.path))),
         };
         if let Some(help) = &self.help {
             group = group.element(Level::HELP.message(help));

@@ -40,10 +40,9 @@ pub(super) fn lay_out(source: &Source<'_>) -> Result<(Grid, Vec<Slot>), Template
     };
     let place = grid.drones.as_ref().or(grid.rows.as_ref()).and_then(span_of);
     if drones > rows * columns {
-        return Err(source.error(
-            place,
-            format!("{drones} drones do not fit in {rows} rows of {columns}"),
-        ));
+        return Err(
+            source.error(place, format!("{drones} drones do not fit in {rows} rows of {columns}"))
+        );
     }
     if drones > MAX_DRONES {
         return Err(source
@@ -72,10 +71,7 @@ pub(super) fn lay_out(source: &Source<'_>) -> Result<(Grid, Vec<Slot>), Template
 }
 
 /// Puts every slot into a group; each slot must be in exactly one.
-pub(super) fn assign_groups(
-    source: &Source<'_>,
-    slots: &mut [Slot],
-) -> Result<(), TemplateError> {
+pub(super) fn assign_groups(source: &Source<'_>, slots: &mut [Slot]) -> Result<(), TemplateError> {
     let groups = &source.template.groups;
     if groups.is_empty() {
         return Ok(());

@@ -12,5 +12,8 @@ pub mod resolve;
 pub mod steps;
 pub mod template;
 
+#[cfg(test)]
+mod tests;
+
 pub use error::TemplateError;
 pub use plan::Plan;

@@ -137,8 +137,8 @@ fn load(name: &str, relative_to: Option<&Path>) -> Result<(String, String), Miss
     };
     if path.is_file() {
         let bytes = read_whole(&path, MAX_TEMPLATE_BYTES)?;
-        let text = String::from_utf8(bytes)
-            .map_err(|_| MissionError::NotText { path: path.clone() })?;
+        let text =
+            String::from_utf8(bytes).map_err(|_| MissionError::NotText { path: path.clone() })?;
         return Ok((path.display().to_string(), text));
     }
     let plain = name.strip_prefix("templates/").unwrap_or(name);
@@ -310,13 +310,9 @@ fn resolve_flight(
     Ok((ResolvedFlight { template_text: resolved_text, vehicle, plan }, used))
 }
 
-fn vehicle_of(
-    path: &str,
-    text: &str,
-    template: &FlightTemplate,
-) -> Result<Vehicle, MissionError> {
+fn vehicle_of(path: &str, text: &str, template: &FlightTemplate) -> Result<Vehicle, MissionError> {
     let name = template.vehicle.get_ref();
-    crate::vehicle::load(name).map_err(|error| match error {
+    crate::vehicle::library::load(name).map_err(|error| match error {
         VehicleError::Unknown { .. } => {
             TemplateError::new(path, text, span_of(&template.vehicle), error.to_string()).into()
         }
@@ -326,8 +322,7 @@ fn vehicle_of(
 
 /// Sets one value. `Ok(false)`: the template has no place for it.
 fn apply(table: &mut Table, item: &Override) -> Result<bool, MissionError> {
-    let refused =
-        |reason: String| MissionError::Override { key: item.key.clone(), reason };
+    let refused = |reason: String| MissionError::Override { key: item.key.clone(), reason };
     // A bare name that is a parameter means that parameter.
     if let Some(Toml::Table(parameters)) = table.get_mut("parameters")
         && parameters.contains_key(&item.key)

@@ -181,11 +181,7 @@ impl WindowRule {
                 .error(span_of(&window.trim_s), "window trim must be shorter than its length")
                 .with_help(format!("the window is {length_s} s long before trimming")));
         }
-        Ok(Self {
-            length_ms: to_ms(length_s),
-            trim_ms: to_ms(trim_s),
-            settle_ms: to_ms(settle_s),
-        })
+        Ok(Self { length_ms: to_ms(length_s), trim_ms: to_ms(trim_s), settle_ms: to_ms(settle_s) })
     }
 
     /// Window of a segment, or none if too short.
@@ -235,10 +231,8 @@ impl<'a> Timeline<'a> {
             velocity_mps: Vector3::zeros(),
             segments: Vec::new(),
         };
-        let staggered = template
-            .steps
-            .iter()
-            .any(|step| *step.get_ref().kind.get_ref() == StepKind::Stagger);
+        let staggered =
+            template.steps.iter().any(|step| *step.get_ref().kind.get_ref() == StepKind::Stagger);
         if offset.own_ms > 0 && !staggered {
             timeline.constant(Kind::Wait, "wait", Vector3::zeros(), offset.own_ms, None)?;
         }
@@ -283,14 +277,14 @@ impl<'a> Timeline<'a> {
                 let to_m = self.required(step.to_m.as_ref(), "to_m", step)?;
                 let to_m = self.source.number(to_m, "height", "m", 0.0..=MAX_ALTITUDE_M)?;
                 let speed = self.speed(step, speed_mps)?;
-                let kind =
-                    if to_m >= self.position_m.z { Kind::Climb } else { Kind::Descend };
+                let kind = if to_m >= self.position_m.z { Kind::Climb } else { Kind::Descend };
                 self.vertical_to(kind, to_m, speed, span)
             }
             StepKind::Leg => {
                 let duration_ms = self.duration(step)?;
                 let speed = self.speed(step, speed_mps)?;
-                let direction = *self.required(step.direction.as_ref(), "direction", step)?.get_ref();
+                let direction =
+                    *self.required(step.direction.as_ref(), "direction", step)?.get_ref();
                 let (kind, word, sign) = match direction {
                     Direction::Up => (Kind::LegUp, "up", 1.0),
                     Direction::Down => (Kind::LegDown, "down", -1.0),
@@ -353,10 +347,9 @@ impl<'a> Timeline<'a> {
                 }
                 Ok(())
             }
-            _ => Err(self.source.error(
-                span_of(&step.kind),
-                "a repeat needs either `speeds_mps` or `times`",
-            )),
+            _ => Err(self
+                .source
+                .error(span_of(&step.kind), "a repeat needs either `speeds_mps` or `times`")),
         }
     }
 
@@ -368,7 +361,11 @@ impl<'a> Timeline<'a> {
             ("speed_mps", step.speed_mps.is_some(), step.speed_mps.as_ref().and_then(span_of)),
             ("duration_s", step.duration_s.is_some(), step.duration_s.as_ref().and_then(span_of)),
             ("direction", step.direction.is_some(), step.direction.as_ref().and_then(span_of)),
-            ("heading_deg", step.heading_deg.is_some(), step.heading_deg.as_ref().and_then(span_of)),
+            (
+                "heading_deg",
+                step.heading_deg.is_some(),
+                step.heading_deg.as_ref().and_then(span_of),
+            ),
             ("speeds_mps", step.speeds_mps.is_some(), step.speeds_mps.as_ref().and_then(span_of)),
             ("times", step.times.is_some(), step.times.as_ref().and_then(span_of)),
             ("steps", step.steps.is_some(), span_of(&step.kind)),
@@ -550,11 +547,16 @@ impl<'a> Timeline<'a> {
         let landing = &self.source.template.landing;
         let end_m =
             self.source.in_range(&landing.end_altitude_m, "end of the show", "m", 0.0..=100.0)?;
-        let speed =
-            self.source.in_range(&landing.speed_mps, "landing speed", "m/s", 0.1..=MAX_SPEED_MPS)?;
+        let speed = self.source.in_range(
+            &landing.speed_mps,
+            "landing speed",
+            "m/s",
+            0.1..=MAX_SPEED_MPS,
+        )?;
         let span = span_of(&landing.end_altitude_m);
         if self.position_m.z <= end_m {
-            let last = self.source.template.steps.last().and_then(|step| span_of(&step.get_ref().kind));
+            let last =
+                self.source.template.steps.last().and_then(|step| span_of(&step.get_ref().kind));
             return Err(self
                 .source
                 .error(

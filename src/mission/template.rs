@@ -434,8 +434,14 @@ impl Template {
     }
 }
 
+/// The reader's message in the words of people who write templates.
 fn first_line(message: &str) -> String {
-    message.lines().next().unwrap_or_default().to_owned()
+    let line = message.lines().next().unwrap_or_default();
+    line.replace("expected f64", "expected a number")
+        .replace("expected i64", "expected a whole number")
+        .replace("unknown field", "unknown key")
+        .replace("missing field", "missing key")
+        .replace("unknown variant", "unknown value")
 }
 
 /// Span of a value, or `None` for a default that stands nowhere in the text.

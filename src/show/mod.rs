@@ -1,5 +1,6 @@
 //! Shows: what each drone flies, and the files that carry it.
 
+pub mod from_plan;
 pub mod trajectory;
 
 use nalgebra::Vector3;
