@@ -11,6 +11,7 @@ pub mod plan;
 pub mod resolve;
 pub mod steps;
 pub mod template;
+pub mod window;
 
 #[cfg(test)]
 mod tests;

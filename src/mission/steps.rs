@@ -6,10 +6,11 @@ use nalgebra::Vector3;
 use toml::Spanned;
 
 use super::error::TemplateError;
-use super::plan::{Kind, Segment, Window};
+use super::plan::{Kind, Segment};
 use super::template::{
     Direction, FlightTemplate, Quantity, StepKind, StepTemplate, WindowTemplate, span_of,
 };
+use super::window::WindowRule;
 
 /// Most segments in one flight: far above any sensible show, far below what exhausts memory.
 const MAX_SEGMENTS: usize = 20_000;
@@ -150,17 +151,6 @@ pub(super) struct Offset {
     pub(super) largest_ms: u64,
 }
 
-/// The window rule of the template, in ms.
-#[derive(Clone, Copy)]
-struct WindowRule {
-    length_ms: u64,
-    trim_ms: u64,
-    settle_ms: u64,
-}
-
-/// Shortest window worth analysing, ms.
-const MIN_WINDOW_MS: u64 = 2_000;
-
 /// Converts seconds to whole milliseconds.
 fn to_ms(seconds: f64) -> u64 {
     (seconds * 1000.0).round() as u64
@@ -170,33 +160,22 @@ fn to_s(ms: u64) -> f64 {
     ms as f64 / 1000.0
 }
 
-impl WindowRule {
-    fn new(source: &Source<'_>, window: &WindowTemplate) -> Result<Self, TemplateError> {
-        let seconds = |value, what| source.in_range(value, what, "s", 0.0..=MAX_DURATION_S);
-        let length_s = seconds(&window.length_s, "window length")?;
-        let trim_s = seconds(&window.trim_s, "window trim")?;
-        let settle_s = seconds(&window.settle_s, "settling time")?;
-        if trim_s >= length_s {
-            return Err(source
-                .error(span_of(&window.trim_s), "window trim must be shorter than its length")
-                .with_help(format!("the window is {length_s} s long before trimming")));
-        }
-        Ok(Self { length_ms: to_ms(length_s), trim_ms: to_ms(trim_s), settle_ms: to_ms(settle_s) })
+/// Reads the template's window rule.
+fn window_rule(source: &Source<'_>, window: &WindowTemplate) -> Result<WindowRule, TemplateError> {
+    let seconds = |value, what| source.in_range(value, what, "s", 0.0..=MAX_DURATION_S);
+    let length_s = seconds(&window.length_s, "window length")?;
+    let trim_s = seconds(&window.trim_s, "window trim")?;
+    let settle_s = seconds(&window.settle_s, "settling time")?;
+    if trim_s >= length_s {
+        return Err(source
+            .error(span_of(&window.trim_s), "window trim must be shorter than its length")
+            .with_help(format!("the window is {length_s} s long before trimming")));
     }
-
-    /// Window of a segment, or none if too short.
-    fn of(self, kind: Kind, start_ms: u64, end_ms: u64) -> Option<Window> {
-        let earliest = start_ms + self.settle_ms;
-        let start_ms = match kind {
-            Kind::LegUp | Kind::LegDown | Kind::Horizontal => {
-                end_ms.saturating_sub(self.length_ms).max(earliest)
-            }
-            Kind::Hover => earliest,
-            _ => return None,
-        };
-        let end_ms = end_ms.saturating_sub(self.trim_ms);
-        (end_ms >= start_ms + MIN_WINDOW_MS).then_some(Window { start_ms, end_ms })
-    }
+    Ok(WindowRule {
+        length_ms: to_ms(length_s),
+        trim_ms: to_ms(trim_s),
+        settle_ms: to_ms(settle_s),
+    })
 }
 
 /// Rounds away the last digits that binary fractions leave, so that files read as written.
@@ -224,7 +203,7 @@ impl<'a> Timeline<'a> {
                 "m/s²",
                 0.0..=50.0,
             )?,
-            window: WindowRule::new(source, &template.window)?,
+            window: window_rule(source, &template.window)?,
             offset,
             at_ms: 0,
             position_m: Vector3::zeros(),

@@ -1,6 +1,7 @@
 //! Shows: what each drone flies, and the files that carry it.
 
 pub mod from_plan;
+pub mod to_plan;
 pub mod trajectory;
 
 use nalgebra::Vector3;
