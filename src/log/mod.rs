@@ -6,7 +6,9 @@
 
 pub mod catalog;
 pub mod definition;
+mod letter;
 pub mod reader;
+pub mod units;
 pub mod writer;
 
 pub use definition::MessageDef;
