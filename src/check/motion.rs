@@ -1,0 +1,116 @@
+//! Speed, acceleration, velocity steps and altitude of every drone.
+
+use nalgebra::Vector3;
+
+use super::report::Severity;
+use super::track::{Track, curve_of};
+use super::watch::{Quantity, Watch};
+use super::{CheckInput, TOLERANCE_M, TOLERANCE_MPS, TOLERANCE_MPS2};
+
+/// The quantities of [`watch`], in its order.
+pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
+    let limits = input.limits;
+    let base = Quantity {
+        check: "",
+        quantity: "",
+        verb: "",
+        unit: "m/s",
+        severity: Severity::Error,
+        remedy: "fly the piece slower, or choose a vehicle that is faster",
+        limit: 0.0,
+        tolerance: TOLERANCE_MPS,
+        squared: false,
+        least: false,
+    };
+    [
+        Quantity {
+            check: "speed-horizontal",
+            quantity: "fastest horizontally",
+            verb: "flies horizontally at",
+            limit: limits.max_speed_xy_mps,
+            squared: true,
+            ..base
+        },
+        Quantity {
+            check: "speed-up",
+            quantity: "fastest climb",
+            verb: "climbs at",
+            limit: limits.max_speed_up_mps,
+            ..base
+        },
+        Quantity {
+            check: "speed-down",
+            quantity: "fastest descent",
+            verb: "descends at",
+            limit: limits.max_speed_down_mps,
+            ..base
+        },
+        Quantity {
+            check: "acceleration",
+            quantity: "hardest acceleration",
+            verb: "accelerates at",
+            unit: "m/s²",
+            limit: limits.max_acceleration_mps2,
+            tolerance: TOLERANCE_MPS2,
+            squared: true,
+            remedy: "stretch the piece, or make its curve gentler",
+            ..base
+        },
+        Quantity {
+            check: "velocity-step",
+            quantity: "largest velocity step",
+            verb: "changes its velocity at once by",
+            limit: limits.max_velocity_step_mps,
+            remedy: "put a ramp of finite acceleration between the two pieces",
+            ..base
+        },
+        Quantity {
+            check: "altitude-max",
+            quantity: "highest point",
+            verb: "reaches an altitude of",
+            unit: "m",
+            limit: limits.max_altitude_m,
+            tolerance: TOLERANCE_M,
+            remedy: "lower the show, or get permission to fly higher",
+            ..base
+        },
+        Quantity {
+            check: "altitude-min",
+            quantity: "lowest point above ground",
+            verb: "is, above its own ground, at",
+            unit: "m",
+            limit: -input.options.ground_tolerance_m,
+            tolerance: TOLERANCE_M,
+            least: true,
+            remedy: "raise the trajectory: it leads into the ground",
+            ..base
+        },
+    ]
+}
+
+/// Watches one drone.
+pub(super) fn watch(track: &Track<'_>, quantities: [Quantity; 7]) -> [Watch; 7] {
+    let mut watches = quantities.map(Watch::new);
+    let [horizontal, up, down, acceleration, step, highest, lowest] = &mut watches;
+    let mut before_mps = Vector3::zeros();
+    highest.feed_instant(track.start_m.z, 0.0);
+    lowest.feed_instant(track.start_m.z - track.ground_m, 0.0);
+    for piece in &track.pieces {
+        let (start_s, duration_s) = (piece.start_ms as f64 / 1000.0, piece.duration_s());
+        let curve = curve_of(piece);
+        let velocity = curve.rate(duration_s);
+        horizontal.feed(&velocity.horizontal_squared(), start_s, duration_s);
+        let climb = velocity.axis(2);
+        up.feed(&climb, start_s, duration_s);
+        down.feed(&climb.times(-1.0), start_s, duration_s);
+        let second = velocity.rate(duration_s);
+        acceleration.feed(&second.norm_squared(), start_s, duration_s);
+        step.feed_instant((velocity.first() - before_mps).norm(), start_s);
+        before_mps = velocity.last();
+        let height = curve.axis(2);
+        highest.feed(&height, start_s, duration_s);
+        lowest.feed(&height.plus(-track.ground_m), start_s, duration_s);
+    }
+    step.feed_instant(before_mps.norm(), track.end_ms as f64 / 1000.0);
+    watches
+}
