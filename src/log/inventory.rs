@@ -161,7 +161,7 @@ impl Visitor for Count {
         true
     }
 
-    fn message(&mut self, id: u8, message: &[u8]) {
+    fn message(&mut self, id: u8, message: &[u8], _start: usize) {
         let tally = &mut self.tallies[usize::from(id)];
         tally.count += 1;
         tally.bytes += message.len() as u64;

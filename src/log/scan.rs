@@ -50,8 +50,9 @@ pub(super) trait Visitor {
     /// A type was defined, or defined anew: does the visitor want its messages?
     fn defined(&mut self, id: u8, format: &Format) -> bool;
 
-    /// A wanted message, header included, as long as its format says.
-    fn message(&mut self, id: u8, message: &[u8]);
+    /// A wanted message, header included, as long as its format says; `start` is its place in the
+    /// log.
+    fn message(&mut self, id: u8, message: &[u8], start: usize);
 }
 
 /// What the log says about units.
@@ -256,7 +257,7 @@ impl Walk {
             }
         }
         if kind.flags & WANTED != 0 {
-            visitor.message(id, message);
+            visitor.message(id, message, position);
         }
         if kind.flags & (FORMAT | UNITS) != 0 {
             self.learn(kind, id, message, visitor);
