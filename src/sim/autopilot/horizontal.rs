@@ -1,0 +1,75 @@
+//! Horizontal control: position to velocity to acceleration (AC_PosControl).
+
+use nalgebra::Vector2;
+
+use super::params as p;
+use super::shaping::{Approach, Kinematics};
+use crate::sim::plant::GRAVITY;
+use crate::sim::sensors::Estimate;
+
+/// The horizontal controller, show frame. Fields that are logged are public.
+#[derive(Clone, Copy, Debug)]
+pub struct Horizontal {
+    /// The shaped target.
+    pub target: Kinematics<2>,
+    /// Target of the velocity loop, m/s.
+    pub velocity_target: Vector2<f64>,
+    /// Acceleration asked of the attitude, m/s².
+    pub acceleration_target: Vector2<f64>,
+    error: Vector2<f64>,
+    derivative: Vector2<f64>,
+    integral: Vector2<f64>,
+    smoothing: f64,
+    limit_mps2: f64,
+    dt_s: f64,
+}
+
+impl Horizontal {
+    /// At rest at a place.
+    pub fn new(position_m: Vector2<f64>, dt_s: f64) -> Self {
+        let constant_s = 1.0 / (std::f64::consts::TAU * p::PSC_VEL_FLT);
+        Self {
+            target: Kinematics::at(position_m),
+            velocity_target: Vector2::zeros(),
+            acceleration_target: Vector2::zeros(),
+            error: Vector2::zeros(),
+            derivative: Vector2::zeros(),
+            integral: Vector2::zeros(),
+            smoothing: dt_s / (dt_s + constant_s),
+            limit_mps2: GRAVITY * p::ANGLE_MAX_DEG.to_radians().tan(),
+            dt_s,
+        }
+    }
+
+    /// One step: the acceleration wanted, show frame, m/s².
+    pub fn update(&mut self, goal: &Kinematics<2>, estimate: &Estimate) -> Vector2<f64> {
+        let approach =
+            Approach { speed: p::WPNAV_SPEED, acceleration: p::WPNAV_ACCEL, jerk: p::PSC_JERK };
+        self.target.advance(self.dt_s);
+        self.target.approach(goal, &approach, self.dt_s);
+
+        let position = estimate.position_m.xy();
+        self.velocity_target =
+            self.target.velocity + (self.target.position - position) * p::PSC_POSXY_P;
+        let raw = self.velocity_target - estimate.velocity_mps.xy();
+        let before = self.error;
+        self.error += (raw - self.error) * self.smoothing;
+        let slope = (self.error - before) / self.dt_s;
+        self.derivative += (slope - self.derivative) * self.smoothing;
+        self.integral += self.error * (p::PSC_VELXY_I * self.dt_s);
+        let size = self.integral.norm();
+        if size > p::PSC_VELXY_IMAX {
+            self.integral *= p::PSC_VELXY_IMAX / size;
+        }
+        let mut wanted = self.target.acceleration
+            + self.error * p::PSC_VELXY_P
+            + self.integral
+            + self.derivative * p::PSC_VELXY_D;
+        let size = wanted.norm();
+        if size > self.limit_mps2 {
+            wanted *= self.limit_mps2 / size;
+        }
+        self.acceleration_target = wanted;
+        wanted
+    }
+}

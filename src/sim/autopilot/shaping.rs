@@ -1,0 +1,122 @@
+//! Targets that a vehicle can follow: approach a moving point with limited speed, acceleration and
+//! jerk, as ArduPilot's position controller does with what a show asks for.
+
+use nalgebra::SVector;
+
+/// Position, velocity and acceleration in N dimensions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kinematics<const N: usize> {
+    /// m.
+    pub position: SVector<f64, N>,
+    /// m/s.
+    pub velocity: SVector<f64, N>,
+    /// m/s².
+    pub acceleration: SVector<f64, N>,
+}
+
+/// Limits of the approach.
+#[derive(Clone, Copy, Debug)]
+pub struct Approach {
+    /// Largest speed for making up a position error, m/s.
+    pub speed: f64,
+    /// Largest acceleration for making up a velocity error, m/s².
+    pub acceleration: f64,
+    /// Largest jerk, m/s³.
+    pub jerk: f64,
+}
+
+impl<const N: usize> Kinematics<N> {
+    /// Standing at a point.
+    pub fn at(position: SVector<f64, N>) -> Self {
+        Self { position, velocity: SVector::zeros(), acceleration: SVector::zeros() }
+    }
+
+    /// Moves on at the present acceleration.
+    pub fn advance(&mut self, dt_s: f64) {
+        self.position += (self.velocity + self.acceleration * (dt_s / 2.0)) * dt_s;
+        self.velocity += self.acceleration * dt_s;
+    }
+
+    /// Turns the acceleration towards meeting `goal` in position and velocity.
+    pub fn approach(&mut self, goal: &Self, limits: &Approach, dt_s: f64) {
+        // Half the acceleration and jerk are kept for the velocity loop inside.
+        let stiffness = 0.5 * limits.jerk / limits.acceleration;
+        let error = goal.position - self.position;
+        let catch_up =
+            square_root_law(error, stiffness, 0.5 * limits.acceleration, dt_s, limits.speed);
+        self.approach_velocity(&(catch_up + goal.velocity), &goal.acceleration, limits, dt_s);
+    }
+
+    /// Turns the acceleration towards a velocity.
+    pub fn approach_velocity(
+        &mut self,
+        velocity: &SVector<f64, N>,
+        feed_forward: &SVector<f64, N>,
+        limits: &Approach,
+        dt_s: f64,
+    ) {
+        let stiffness = limits.jerk / limits.acceleration;
+        let error = velocity - self.velocity;
+        let wanted = square_root_law(error, stiffness, limits.jerk, dt_s, limits.acceleration)
+            + feed_forward;
+        self.acceleration += limited(wanted - self.acceleration, limits.jerk * dt_s);
+    }
+}
+
+/// Rate that takes an error to zero: proportional near zero, and further out what a constant
+/// deceleration of `brake` can still stop. Never overshoots within one step.
+fn square_root_law<const N: usize>(
+    error: SVector<f64, N>,
+    stiffness: f64,
+    brake: f64,
+    dt_s: f64,
+    limit: f64,
+) -> SVector<f64, N> {
+    let size = error.norm();
+    if size <= f64::EPSILON {
+        return SVector::zeros();
+    }
+    let linear_to = brake / (stiffness * stiffness);
+    let rate = if size > linear_to {
+        (2.0 * brake * (size - linear_to / 2.0)).sqrt()
+    } else {
+        size * stiffness
+    };
+    error * (rate.min(size / dt_s).min(limit) / size)
+}
+
+fn limited<const N: usize>(vector: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
+    let size = vector.norm();
+    if size > limit { vector * (limit / size) } else { vector }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector2;
+    use proptest::prelude::*;
+
+    const LIMITS: Approach = Approach { speed: 10.0, acceleration: 5.0, jerk: 30.0 };
+    const DT_S: f64 = 0.0025;
+
+    proptest! {
+        #[test]
+        fn meets_a_moving_goal_within_its_limits(
+            x in -20.0..20.0, y in -20.0..20.0, vx in -3.5..3.5, vy in -3.5..3.5,
+        ) {
+            let mut goal = Kinematics::at(Vector2::new(x, y));
+            goal.velocity = Vector2::new(vx, vy);
+            let mut target = Kinematics::at(Vector2::zeros());
+            for _ in 0..8_000 {
+                let before = target.acceleration;
+                target.approach(&goal, &LIMITS, DT_S);
+                prop_assert!(target.acceleration.norm() <= LIMITS.acceleration * 1.5);
+                prop_assert!((target.acceleration - before).norm() <= LIMITS.jerk * DT_S + 1e-12);
+                target.advance(DT_S);
+                goal.advance(DT_S);
+            }
+            prop_assert!((goal.position - target.position).norm() < 0.02);
+            prop_assert!((goal.velocity - target.velocity).norm() < 0.02);
+        }
+    }
+}
