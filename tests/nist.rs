@@ -35,9 +35,7 @@ const MODELS: &[(&str, Model)] = &[
     ("Gauss2", gauss),
     ("Gauss3", gauss),
     ("Hahn1", cubic_ratio),
-    ("Kirby2", |b, x| {
-        (b[0] + x[0] * (b[1] + x[0] * b[2])) / (1.0 + x[0] * (b[3] + x[0] * b[4]))
-    }),
+    ("Kirby2", |b, x| (b[0] + x[0] * (b[1] + x[0] * b[2])) / (1.0 + x[0] * (b[3] + x[0] * b[4]))),
     ("Lanczos1", lanczos),
     ("Lanczos2", lanczos),
     ("Lanczos3", lanczos),
@@ -109,7 +107,8 @@ fn read(name: &str) -> Dataset {
             set.errors.push(row[3]);
         } else if line.starts_with("Residual Sum of Squares:") {
             set.sum_of_squares = numbers(line)[0];
-        } else if words.first() == Some(&"Data:") && words.get(1).is_some_and(|w| w.starts_with(['y', 'l']))
+        } else if words.first() == Some(&"Data:")
+            && words.get(1).is_some_and(|w| w.starts_with(['y', 'l']))
         {
             in_data = true;
         }

@@ -197,11 +197,11 @@ mod tests {
     fn a_line_through_exact_points_is_found_with_its_errors() {
         let x = [0.0, 1.0, 2.0, 3.0];
         let sigma = 0.5;
-        let fit =
-            minimize(|p| x.iter().map(|x| (p[0] * x + p[1] - (2.0 * x + 1.0)) / sigma).collect(), &[
-                0.0, 0.0,
-            ])
-            .unwrap();
+        let fit = minimize(
+            |p| x.iter().map(|x| (p[0] * x + p[1] - (2.0 * x + 1.0)) / sigma).collect(),
+            &[0.0, 0.0],
+        )
+        .unwrap();
         assert!((fit.parameters[0] - 2.0).abs() < 1e-12 && (fit.parameters[1] - 1.0).abs() < 1e-12);
         // sigma² / sum (x - mean)² = 0.25 / 5
         assert!((fit.errors()[0] - 0.05_f64.sqrt()).abs() < 1e-9, "{:?}", fit.errors());

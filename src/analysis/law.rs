@@ -112,9 +112,8 @@ impl Law {
 
     /// The law in a fit's parameters; `None` if they are not those of a law.
     pub fn from_fit(fit: &Fit) -> Option<Self> {
-        let value = |name: &str| {
-            fit.parameters.iter().find(|p| p.name == name).map(|p| p.estimate.value)
-        };
+        let value =
+            |name: &str| fit.parameters.iter().find(|p| p.name == name).map(|p| p.estimate.value);
         let u0_us = value("u0")?;
         match (value("A"), value("A'")) {
             (Some(a), _) => Some(Self::SignedQuadratic { a, u0_us, w_mps: value("W")? }),
@@ -164,8 +163,7 @@ pub fn signed_quadratic(points: &[Point], scale: ErrorScale) -> Result<Fit, FitE
     })?;
     let law = law_of(&found.best);
     let names = [("A", "us/(m/s)²"), ("u0", "us"), ("W", "m/s")];
-    let mut fit =
-        describe(points, &sigmas, law, &found.best, &names, &[true, true, true], scale);
+    let mut fit = describe(points, &sigmas, law, &found.best, &names, &[true, true, true], scale);
     fit.other_minima = found
         .others
         .iter()
@@ -199,9 +197,7 @@ pub fn signed_quadratic_held(
         let chi2 = |w: f64| sum_of_squares(&residuals(points, sigmas, held(w)));
         let profile: Vec<f64> = grid().map(chi2).collect();
         let mut minima: Vec<Solution> = minima_of(&profile)
-            .filter_map(|start| {
-                minimize(|p| residuals(points, sigmas, held(p[0])), &[start]).ok()
-            })
+            .filter_map(|start| minimize(|p| residuals(points, sigmas, held(p[0])), &[start]).ok())
             .collect();
         minima.sort_by(|left, right| left.chi2.total_cmp(&right.chi2));
         minima.dedup_by(|later, earlier| {
@@ -220,7 +216,8 @@ pub fn signed_quadratic_held(
         .map(|other| vec![a, u0_us, other.parameters[0]])
         .collect();
     if best.parameters[0].abs() >= W_LIMIT_MPS {
-        fit.warnings.push(format!("W is at or beyond the edge of the searched range, ±{W_LIMIT_MPS} m/s"));
+        fit.warnings
+            .push(format!("W is at or beyond the edge of the searched range, ±{W_LIMIT_MPS} m/s"));
     }
     Ok(fit)
 }
@@ -250,8 +247,7 @@ fn with_effective_variance<T>(
     if points.iter().any(|point| point.velocity_sigma_mps > 0.0) {
         for _ in 0..VARIANCE_ROUNDS {
             for (sigma, point) in sigmas.iter_mut().zip(points) {
-                let from_velocity =
-                    result.1.slope(point.velocity_mps) * point.velocity_sigma_mps;
+                let from_velocity = result.1.slope(point.velocity_mps) * point.velocity_sigma_mps;
                 *sigma = point.sigma_us.hypot(from_velocity);
             }
             result = fit(&sigmas)?;
