@@ -142,7 +142,7 @@ fn a_line_is_reported_as_the_wrong_shape() {
     let (cubes, fourths) = rungs()
         .fold((0.0, 0.0), |(cubes, fourths), v| (cubes + v.abs().powi(3), fourths + v.powi(4)));
     let ratio = fit.parameters[0].estimate.value / (26.4 * cubes / fourths);
-    assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+    assert!((ratio - 1.0).abs() < 0.1, "{ratio} {fit:?}");
 }
 
 #[test]
