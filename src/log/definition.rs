@@ -1,5 +1,7 @@
 //! What a DataFlash message is: name, field letters, labels, units and multipliers.
 
+use super::letter::Letter;
+
 /// Definition of one message type, as FMT and FMTU rows carry it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MessageDef {
@@ -19,13 +21,5 @@ pub struct MessageDef {
 
 /// Bytes that a field letter takes; `None` for an unknown letter.
 pub fn letter_size(letter: u8) -> Option<usize> {
-    Some(match letter {
-        b'b' | b'B' | b'M' => 1,
-        b'h' | b'H' | b'c' | b'C' => 2,
-        b'i' | b'I' | b'e' | b'E' | b'f' | b'L' | b'n' => 4,
-        b'd' | b'q' | b'Q' => 8,
-        b'N' => 16,
-        b'Z' | b'a' => 64,
-        _ => return None,
-    })
+    Letter::from_byte(letter).map(Letter::size)
 }

@@ -5,10 +5,18 @@
 //! applied on top of them.
 
 pub mod catalog;
+mod columns;
 pub mod definition;
+mod format;
+mod inventory;
+mod letter;
 pub mod reader;
+mod scan;
+pub mod units;
 pub mod writer;
 
 pub use definition::MessageDef;
-pub use reader::{Log, LogError, ScanStats, Select, Table};
+pub use inventory::{FieldInventory, Inventory, MessageInventory};
+pub use reader::{Column, Log, LogError, Select, Table};
+pub use scan::{ScanStats, TimeJump};
 pub use writer::{LogWriter, Value};

@@ -1,13 +1,31 @@
 //! Reading: memory-mapped, one pass, only the wanted columns are decoded.
 
+use std::fmt;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
+use memmap2::Mmap;
 use thiserror::Error;
 
+use super::columns::Columns;
+use super::format::{FMT_ID, Format};
+use super::inventory::{self, Inventory};
+use super::scan::{ScanStats, scan};
+use super::writer::MAGIC;
+
+/// A log must start within this many bytes.
+const SEARCHED_BYTES: usize = 4096;
+
 /// A DataFlash log, mapped from a file or held in memory.
-#[derive(Debug)]
+///
+/// A mapped file must not be cut short by another process while it is being read.
 pub struct Log {
-    _private: (),
+    bytes: Bytes,
+}
+
+enum Bytes {
+    Mapped(Mmap),
+    Held(Vec<u8>),
 }
 
 /// One message type and the fields wanted of it.
@@ -20,6 +38,9 @@ pub struct Select<'a> {
 }
 
 /// The wanted columns of one message type, one row per message, in file order.
+///
+/// Where types of one name differ in their fields (a log may define a type anew), rows without a
+/// field have NaN or an empty text in its column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     /// Message name.
@@ -30,6 +51,20 @@ pub struct Table {
     pub numbers: Vec<(String, Vec<f64>)>,
     /// Text columns by label.
     pub texts: Vec<(String, Vec<String>)>,
+    /// What the log says about the columns that were found, in the order of the selection.
+    pub columns: Vec<Column>,
+}
+
+/// Unit and multiplier of a column, from the log's UNIT, MULT and FMTU rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Column {
+    /// Label.
+    pub field: String,
+    /// `m`, `deg`, ...; absent in old logs and for plain numbers.
+    pub unit: Option<String>,
+    /// Scale of the stored number. Already applied for the letters `c C e E L`, never applied for
+    /// others, and wrong for some fields (`SHOW.HDist`).
+    pub multiplier: Option<f64>,
 }
 
 impl Table {
@@ -42,21 +77,20 @@ impl Table {
     pub fn text(&self, field: &str) -> Option<&[String]> {
         self.texts.iter().find(|(name, _)| name == field).map(|(_, column)| column.as_slice())
     }
-}
 
-/// What a scan met besides good messages.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ScanStats {
-    /// Bytes skipped because no known message started there.
-    pub bad_bytes: u64,
-    /// Messages whose type no FMT row defines.
-    pub unknown: u64,
-    /// FMT rows refused because their length does not fit their letters.
-    pub rejected_formats: u64,
-    /// Bytes of an unfinished message at the end of the file.
-    pub truncated_bytes: u64,
-    /// Times at which TimeUS went back or jumped ahead by more than a minute.
-    pub time_jumps: u64,
+    /// Unit label of a column, if the log gives one.
+    pub fn unit(&self, field: &str) -> Option<&str> {
+        self.column(field)?.unit.as_deref()
+    }
+
+    /// Multiplier of a column, if the log gives one; see [`Column::multiplier`].
+    pub fn multiplier(&self, field: &str) -> Option<f64> {
+        self.column(field)?.multiplier
+    }
+
+    fn column(&self, field: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.field == field)
+    }
 }
 
 /// A log could not be read.
@@ -84,20 +118,94 @@ pub enum LogError {
 
 impl Log {
     /// Maps a log file.
+    ///
+    /// # Errors
+    /// [`LogError::Open`] if the file cannot be read, [`LogError::NotALog`] if no message
+    /// definition is near its start.
     pub fn open(path: &Path) -> Result<Self, LogError> {
-        let _ = path;
-        Ok(Self { _private: () })
+        let fail = |source| LogError::Open { path: path.to_owned(), source };
+        let file = File::open(path).map_err(fail)?;
+        let metadata = file.metadata().map_err(fail)?;
+        if metadata.is_dir() {
+            return Err(fail(std::io::ErrorKind::IsADirectory.into()));
+        }
+        let bytes = if metadata.len() == 0 {
+            Bytes::Held(Vec::new())
+        } else {
+            Bytes::Mapped(map(&file).map_err(fail)?)
+        };
+        let log = Self { bytes };
+        match log.why_not_a_log() {
+            None => Ok(log),
+            Some(reason) => Err(LogError::NotALog { path: path.to_owned(), reason }),
+        }
     }
 
-    /// A log in memory.
+    /// A log in memory; anything goes, also bytes that are no log.
     pub fn from_bytes(bytes: Vec<u8>) -> Self {
-        let _ = bytes;
-        Self { _private: () }
+        Self { bytes: Bytes::Held(bytes) }
     }
 
     /// Reads the wanted columns in one pass; one table per entry of `wanted`, in its order.
+    ///
+    /// Damage is never an error: what is readable is read, the rest is in the [`ScanStats`].
     pub fn select(&self, wanted: &[Select<'_>]) -> (Vec<Table>, ScanStats) {
-        let _ = wanted;
-        (Vec::new(), ScanStats::default())
+        let mut columns = Columns::new(wanted);
+        let scan = scan(self.bytes(), &mut columns);
+        (columns.finish(&scan.units), scan.stats)
     }
+
+    /// What is in the log: messages, times, firmware, damage.
+    pub fn inventory(&self) -> Inventory {
+        inventory::take(self.bytes())
+    }
+
+    /// Size of the log.
+    pub fn size_bytes(&self) -> u64 {
+        self.bytes().len() as u64
+    }
+
+    fn bytes(&self) -> &[u8] {
+        match &self.bytes {
+            Bytes::Mapped(map) => map,
+            Bytes::Held(bytes) => bytes,
+        }
+    }
+
+    fn why_not_a_log(&self) -> Option<String> {
+        let bytes = self.bytes();
+        let start = &bytes[..bytes.len().min(SEARCHED_BYTES)];
+        let header = [MAGIC[0], MAGIC[1], FMT_ID];
+        let is_format = |at: usize| {
+            start[at..].starts_with(&header)
+                && bytes.get(at..at + 89).and_then(Format::from_row).is_some()
+        };
+        if (0..start.len()).any(is_format) {
+            return None;
+        }
+        Some(if bytes.is_empty() {
+            "it is empty".into()
+        } else if start.starts_with(b"FMT, ") {
+            "it is the text form of a log (.log); use the .BIN from the vehicle".into()
+        } else if start.starts_with(b"PK") {
+            "it is a ZIP archive; unpack it, or is it a .skyc show?".into()
+        } else if start.starts_with(b"skyb") {
+            "it is a .skyb show".into()
+        } else {
+            format!("its first {} bytes define no message (no valid FMT row)", start.len())
+        })
+    }
+}
+
+impl fmt::Debug for Log {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Log").field("size_bytes", &self.size_bytes()).finish()
+    }
+}
+
+#[expect(unsafe_code, reason = "memory-mapping a file has no safe form")]
+fn map(file: &File) -> std::io::Result<Mmap> {
+    // SAFETY: the map is read-only and private to this type; that no other process cuts the file
+    // short meanwhile is the documented condition of `Log`.
+    unsafe { Mmap::map(file) }
 }

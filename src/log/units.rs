@@ -1,0 +1,62 @@
+//! Unit and multiplier letters of FMTU rows, as the firmware's UNIT and MULT rows explain them.
+
+/// Unit letters and their labels, in the firmware's order.
+pub static UNITS: [(u8, &str); 36] = [
+    (b'-', ""),
+    (b'?', "UNKNOWN"),
+    (b'A', "A"),
+    (b'a', "Ah"),
+    (b'd', "deg"),
+    (b'b', "B"),
+    (b'k', "deg/s"),
+    (b'D', "deglatitude"),
+    (b'e', "deg/s/s"),
+    (b'E', "rad/s"),
+    (b'G', "Gauss"),
+    (b'h', "degheading"),
+    (b'i', "A.s"),
+    (b'J', "W.s"),
+    (b'l', "l"),
+    (b'L', "rad/s/s"),
+    (b'm', "m"),
+    (b'n', "m/s"),
+    (b'o', "m/s/s"),
+    (b'O', "degC"),
+    (b'%', "%"),
+    (b'S', "satellites"),
+    (b's', "s"),
+    (b'q', "rpm"),
+    (b'r', "rad"),
+    (b'U', "deglongitude"),
+    (b'u', "ppm"),
+    (b'v', "V"),
+    (b'P', "Pa"),
+    (b'w', "Ohm"),
+    (b'W', "Watt"),
+    (b'X', "W.h"),
+    (b'y', "l/s"),
+    (b'Y', "us"),
+    (b'z', "Hz"),
+    (b'#', "instance"),
+];
+
+/// Multiplier letters and their values, in the firmware's order.
+///
+/// `-` (0.0) marks a field to which no multiplier applies.
+pub static MULTIPLIERS: [(u8, f64); 15] = [
+    (b'-', 0.0),
+    (b'?', 1.0),
+    (b'2', 100.0),
+    (b'1', 10.0),
+    (b'0', 1.0),
+    (b'A', 0.1),
+    (b'B', 0.01),
+    (b'C', 0.001),
+    (b'D', 0.0001),
+    (b'E', 1e-05),
+    (b'F', 1e-06),
+    (b'G', 1e-07),
+    (b'I', 1e-09),
+    (b'!', 3.6),
+    (b'/', 3600.0),
+];
