@@ -11,6 +11,8 @@
 //!   analysis.json  report/index.html
 //! ```
 
+pub mod write;
+
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -56,6 +58,8 @@ pub struct FlightRecord {
     pub seed: u64,
     /// Vehicle flown.
     pub vehicle: String,
+    /// SHA-256 of the vehicle's numbers.
+    pub vehicle_sha256: String,
     /// True uniform motion of the air, towards east, north and up, m/s.
     pub air_mps: [f64; 3],
     /// Whether the firmware's whole default set of messages was logged.
