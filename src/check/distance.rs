@@ -172,7 +172,7 @@ fn search_slab(search: &mut Search<'_, '_>, slab_ms: (f64, f64)) {
     let mut done = 0;
     while let Some((from_ms, to_ms)) = parts.pop() {
         done += 1;
-        if search.full() || done > MOST_PARTS {
+        if done > MOST_PARTS {
             search.incomplete = true;
             return;
         }
@@ -183,7 +183,11 @@ fn search_slab(search: &mut Search<'_, '_>, slab_ms: (f64, f64)) {
         let kept = search.records.as_ref().map_or(0, Vec::len);
         let items = items(tracks, frame, from_ms, to_ms);
         Tree::new(&items).pairs(search);
-        if search.work > search.work_limit && !search.full() {
+        if search.full() {
+            search.incomplete = true;
+            return;
+        }
+        if search.work > search.work_limit {
             if shortest {
                 search.incomplete = true;
                 continue;

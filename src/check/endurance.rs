@@ -10,7 +10,7 @@ pub(super) fn quantity(input: &CheckInput<'_>) -> Quantity {
     let limits = input.limits;
     Quantity {
         check: "endurance",
-        quantity: "longest flight, landing included",
+        label: "longest flight, landing included",
         verb: "flies, landing included, for",
         unit: "s",
         severity: Severity::Error,

@@ -18,7 +18,7 @@ const OUTSIDE_STEPS: usize = 4096;
 pub(super) fn quantities(fence: &Fence) -> [Quantity; 2] {
     let polygon = Quantity {
         check: "fence",
-        quantity: "closest to the fence (negative: outside)",
+        label: "closest to the fence (negative: outside)",
         verb: "has a clearance (negative: outside) from the fence of",
         unit: "m",
         severity: Severity::Error,
@@ -30,7 +30,7 @@ pub(super) fn quantities(fence: &Fence) -> [Quantity; 2] {
     };
     let altitude = Quantity {
         check: "fence-altitude",
-        quantity: "highest below the fence's top less its margin",
+        label: "highest below the fence's top less its margin",
         verb: "is at an altitude of",
         remedy: "lower the show, or raise the top of the fence",
         limit: fence.max_altitude_m - fence.margin_m,

@@ -46,6 +46,7 @@ impl Default for Firmware {
 
 /// What the firmware derives from one trajectory, show time in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "the unit is part of a name")]
 pub(super) struct Derived {
     /// The trajectory first reaches the take-off altitude.
     pub(super) reaches_s: f64,

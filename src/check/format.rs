@@ -107,27 +107,6 @@ pub(super) fn check(tracks: &[Track<'_>], collector: &mut Collector) {
                 track.index,
                 finding(severity, check, None, value, limit, unit, message, remedy),
             );
-        } else if need.rounding.0 > FINE_MM + 1e-6 {
-            let message = format!(
-                "is stored in units of {} mm, which moves a point by {:.1} mm",
-                need.scale, need.rounding.0
-            );
-            let remedy =
-                "put the origin near the middle of the show, or way-points on a 10 mm grid";
-            let (value, time_s) = need.rounding;
-            collector.add(
-                track.index,
-                finding(
-                    Severity::Warning,
-                    "skyb-unit",
-                    Some(time_s),
-                    value,
-                    FINE_MM,
-                    "mm",
-                    message,
-                    remedy,
-                ),
-            );
         }
         let lights = track.drone.lights.len() as u64;
         let blocks = [("trajectory", need.body), ("light program", lights)];
@@ -160,7 +139,41 @@ pub(super) fn check(tracks: &[Track<'_>], collector: &mut Collector) {
             collector.add(track.index, finding);
         }
     }
+    coarse_units(tracks, &needs, collector);
     margins(tracks, &needs, collector);
+}
+
+/// One warning for the whole show: large shows have coarse units, and it is the same for all drones.
+fn coarse_units(tracks: &[Track<'_>], needs: &[Need], collector: &mut Collector) {
+    let coarse = |need: &Need| need.scale <= MAX_SCALE && need.rounding.0 > FINE_MM + 1e-6;
+    let mut worst: Option<(&Track<'_>, &Need)> = None;
+    for (track, need) in tracks.iter().zip(needs).filter(|(_, need)| coarse(need)) {
+        if worst.is_none_or(|(_, most)| need.rounding.0 > most.rounding.0 + 1e-9) {
+            worst = Some((track, need));
+        }
+    }
+    let Some((track, need)) = worst else { return };
+    let others = match needs.iter().filter(|need| coarse(need)).count() {
+        1 => String::new(),
+        count => format!("; {count} drones are rounded more than at 1 mm"),
+    };
+    let (error_mm, time_s) = need.rounding;
+    let finding = Finding {
+        severity: Severity::Warning,
+        check: "skyb-unit",
+        drones: vec![track.name()],
+        time_s: Some(time_s),
+        end_s: None,
+        value: Some(error_mm),
+        limit: Some(FINE_MM),
+        unit: "mm",
+        message: format!(
+            "is stored in units of {} mm at least, which moves a point by {error_mm:.1} mm{others}",
+            need.scale
+        ),
+        remedy: "put the origin near the middle of the show, or way-points on a 10 mm grid",
+    };
+    collector.add(track.index, finding);
 }
 
 fn margins(tracks: &[Track<'_>], needs: &[Need], collector: &mut Collector) {

@@ -17,7 +17,7 @@ const JOINT_S: f64 = 1e-6;
 pub(super) fn quantity(input: &CheckInput<'_>) -> Quantity {
     Quantity {
         check: "low-lateral",
-        quantity: "largest sideways motion below the take-off altitude",
+        label: "largest sideways motion below the take-off altitude",
         verb: "moves sideways below the take-off altitude, by",
         unit: "m",
         severity: Severity::Error,

@@ -158,7 +158,7 @@ fn watch_drones(input: &CheckInput<'_>, tracks: &[Track<'_>], collector: &mut Co
     let watched: Vec<Vec<Watch>> = tracks
         .par_iter()
         .map(|track| {
-            let mut watches = motion::watch(track, motion).to_vec();
+            let mut watches = motion::watch(track, &motion).to_vec();
             watches.push(lateral::watch(track, lateral, firmware.takeoff_alt_m));
             watches.push(endurance::watch(track, endurance, firmware.land_speed_mps));
             if let Some((polygon, quantities)) = &fence {

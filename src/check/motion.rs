@@ -12,7 +12,7 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
     let limits = input.limits;
     let base = Quantity {
         check: "",
-        quantity: "",
+        label: "",
         verb: "",
         unit: "m/s",
         severity: Severity::Error,
@@ -25,7 +25,7 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
     [
         Quantity {
             check: "speed-horizontal",
-            quantity: "fastest horizontally",
+            label: "fastest horizontally",
             verb: "flies horizontally at",
             limit: limits.max_speed_xy_mps,
             squared: true,
@@ -33,21 +33,21 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
         },
         Quantity {
             check: "speed-up",
-            quantity: "fastest climb",
+            label: "fastest climb",
             verb: "climbs at",
             limit: limits.max_speed_up_mps,
             ..base
         },
         Quantity {
             check: "speed-down",
-            quantity: "fastest descent",
+            label: "fastest descent",
             verb: "descends at",
             limit: limits.max_speed_down_mps,
             ..base
         },
         Quantity {
             check: "acceleration",
-            quantity: "hardest acceleration",
+            label: "hardest acceleration",
             verb: "accelerates at",
             unit: "m/s²",
             limit: limits.max_acceleration_mps2,
@@ -58,7 +58,7 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
         },
         Quantity {
             check: "velocity-step",
-            quantity: "largest velocity step",
+            label: "largest velocity step",
             verb: "changes its velocity at once by",
             limit: limits.max_velocity_step_mps,
             remedy: "put a ramp of finite acceleration between the two pieces",
@@ -66,7 +66,7 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
         },
         Quantity {
             check: "altitude-max",
-            quantity: "highest point",
+            label: "highest point",
             verb: "reaches an altitude of",
             unit: "m",
             limit: limits.max_altitude_m,
@@ -76,7 +76,7 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
         },
         Quantity {
             check: "altitude-min",
-            quantity: "lowest point above ground",
+            label: "lowest point above ground",
             verb: "is, above its own ground, at",
             unit: "m",
             limit: -input.options.ground_tolerance_m,
@@ -89,7 +89,7 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
 }
 
 /// Watches one drone.
-pub(super) fn watch(track: &Track<'_>, quantities: [Quantity; 7]) -> [Watch; 7] {
+pub(super) fn watch(track: &Track<'_>, quantities: &[Quantity; 7]) -> [Watch; 7] {
     let mut watches = quantities.map(Watch::new);
     let [horizontal, up, down, acceleration, step, highest, lowest] = &mut watches;
     let mut before_mps = Vector3::zeros();

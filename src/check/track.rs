@@ -11,9 +11,7 @@ use crate::show::trajectory::Piece;
 /// air or wholly on the ground.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Span {
-    /// Show time, ms.
-    pub(super) start_ms: f64,
-    /// Show time, ms.
+    /// End, show time in ms; the start is the end of the span before it, or 0.
     pub(super) end_ms: f64,
     /// Index of the piece; none after the end of the trajectory.
     pub(super) piece: Option<u32>,
@@ -114,12 +112,11 @@ impl<'a> Track<'a> {
             let mut at_ms = start_ms;
             let mut add = |to_ms: f64, airborne| {
                 if to_ms > at_ms {
-                    spans.push(Span { start_ms: at_ms, end_ms: to_ms, piece, airborne });
+                    spans.push(Span { end_ms: to_ms, piece, airborne });
                     at_ms = to_ms;
                 }
             };
             if height.lower_bound() < airborne_z_m {
-                // "Below or at": a drone that stands at the threshold is on the ground.
                 for (from, to) in height.below(airborne_z_m) {
                     add(start_ms + from * (end_ms - start_ms), true);
                     add(start_ms + to * (end_ms - start_ms), false);
@@ -128,7 +125,6 @@ impl<'a> Track<'a> {
             add(end_ms, height.upper_bound() > airborne_z_m);
         }
         spans.push(Span {
-            start_ms: self.end_ms as f64,
             end_ms: horizon_ms.max(self.end_ms as f64),
             piece: None,
             airborne: self.end_m.z > airborne_z_m,
@@ -205,14 +201,16 @@ mod tests {
             ..ShowDrone::default()
         };
         let track = Track::new(0, &drone, 0.5, 30_000);
-        let spans: Vec<_> =
-            track.spans.iter().map(|s| (s.start_ms, s.end_ms.round(), s.airborne)).collect();
-        assert_eq!(spans[0], (0.0, 2_000.0, false));
-        assert_eq!(spans[1], (2_000.0, 2_500.0, false));
-        assert_eq!((spans[2].1, spans[2].2), (12_000.0, true));
-        assert_eq!((spans[3].1, spans[3].2), (21_596.0, true));
-        assert_eq!((spans[4].1, spans[4].2), (22_000.0, false));
-        assert_eq!(spans[5], (22_000.0, 30_000.0, false));
+        let spans: Vec<_> = track.spans.iter().map(|s| (s.end_ms.round(), s.airborne)).collect();
+        let expected = [
+            (2_000.0, false),
+            (2_500.0, false),
+            (12_000.0, true),
+            (21_596.0, true),
+            (22_000.0, false),
+            (30_000.0, false),
+        ];
+        assert_eq!(spans, expected);
         let last = track.place(&track.spans[5], 25_000.0, 26_000.0);
         assert!((last.depth_m - 0.1).abs() < 1e-12);
     }

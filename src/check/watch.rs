@@ -15,7 +15,7 @@ pub(super) struct Quantity {
     /// Name of the check.
     pub(super) check: &'static str,
     /// The quantity for margins: `fastest climb`.
-    pub(super) quantity: &'static str,
+    pub(super) label: &'static str,
     /// The quantity in a sentence: `climbs at`.
     pub(super) verb: &'static str,
     pub(super) unit: &'static str,
@@ -173,7 +173,7 @@ pub(super) fn report<'t>(
         let sign = if what.least { -1.0 } else { 1.0 };
         collector.margin(Margin {
             check: what.check,
-            quantity: what.quantity,
+            quantity: what.label,
             value: sign * value,
             limit: Some(what.limit),
             unit: what.unit,
