@@ -251,10 +251,7 @@ pub fn flock(drones: &[DroneAnalysis], options: &FitOptions) -> Result<Laws, Cal
             let key = (format!("{:?} {}", window.kind, window.label), command);
             let count = seen.entry(key.clone()).or_default();
             if is_used(window, options) {
-                groups
-                    .entry((key.0, key.1, *count))
-                    .or_default()
-                    .push(point(window, options));
+                groups.entry((key.0, key.1, *count)).or_default().push(point(window, options));
             }
             *count += 1;
         }

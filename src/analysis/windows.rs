@@ -171,9 +171,12 @@ fn steady_runs(desired: &Series) -> Vec<Run> {
                 (times.get(start), before, window.get(window.len() / 2))
             {
                 // The command held until the row that says otherwise, unless the log was silent.
-                let end_s = current.map_or(last, |(time, _)| {
-                    if time - last <= GAP_S { time } else { last }
-                });
+                let end_s = current.map_or(
+                    last,
+                    |(time, _)| {
+                        if time - last <= GAP_S { time } else { last }
+                    },
+                );
                 runs.push(Run { start_s: *start_s, end_s, velocity_mps: round_mmps(*median) });
             }
             start = index;
@@ -283,9 +286,7 @@ fn measure_one(
     {
         rejected.push(Rejection::Gap);
     }
-    if velocity.n > 0
-        && (velocity.mean - target.commanded_mps).abs() > options.follow_limit_mps
-    {
+    if velocity.n > 0 && (velocity.mean - target.commanded_mps).abs() > options.follow_limit_mps {
         rejected.push(Rejection::NotFollowing);
     }
     WindowStats {
