@@ -1,161 +1,164 @@
-//! The wanted columns of the wanted messages: a plan per type byte, run at each message.
+//! The wanted columns of the wanted messages.
+//!
+//! The walk through the log only notes where wanted messages start. Columns are decoded after it,
+//! one at a time: each into memory of its final size, by a loop made for its letter.
 
 use super::format::Format;
 use super::letter::{Letter, field_text};
 use super::reader::{Column, Select, Table};
 use super::scan::{Units, Visitor};
 
-/// Builds the tables of a selection.
-pub(super) struct Columns<'a> {
+/// Notes the messages of a selection.
+pub(super) struct Notes<'a> {
     wanted: &'a [Select<'a>],
-    tables: Vec<Building>,
-    /// By type byte.
+    /// One per entry of the selection.
+    rows: Vec<Rows>,
+    /// By type byte: what its messages are noted for.
     plans: Vec<Vec<Plan>>,
 }
 
-/// A table in the making.
-struct Building {
-    rows: usize,
+/// The messages of one table.
+#[derive(Default)]
+struct Rows {
+    starts: Vec<usize>,
+    /// Stretches of messages of one definition.
+    runs: Vec<Run>,
+    layouts: Vec<Layout>,
+}
+
+struct Run {
+    first_row: usize,
+    layout: usize,
+}
+
+/// Where a definition has the wanted fields.
+struct Layout {
+    id: u8,
     /// One per wanted field.
-    columns: Vec<Cells>,
-    /// Type byte and field index that a column was first seen with.
-    sources: Vec<Option<(u8, usize)>>,
+    places: Vec<Option<Place>>,
 }
 
-enum Cells {
-    /// No format had this field so far.
-    Unseen,
-    Numbers(Vec<f64>),
-    Texts(Vec<String>),
-}
-
-/// What a message of one type adds to one table.
-struct Plan {
-    table: usize,
-    steps: Vec<Step>,
-    /// Columns that this type lacks though another one of the same name has them.
-    gaps: Vec<usize>,
-}
-
-struct Step {
-    column: usize,
+#[derive(Clone, Copy)]
+struct Place {
+    /// Index of the field in the message.
+    index: usize,
     offset: usize,
     letter: Letter,
 }
 
-impl<'a> Columns<'a> {
+struct Plan {
+    table: usize,
+    layout: usize,
+}
+
+impl<'a> Notes<'a> {
     pub(super) fn new(wanted: &'a [Select<'a>]) -> Self {
-        let tables = wanted
-            .iter()
-            .map(|select| Building {
-                rows: 0,
-                columns: select.fields.iter().map(|_| Cells::Unseen).collect(),
-                sources: vec![None; select.fields.len()],
-            })
-            .collect();
-        Self { wanted, tables, plans: (0..256).map(|_| Vec::new()).collect() }
+        let rows = wanted.iter().map(|_| Rows::default()).collect();
+        Self { wanted, rows, plans: (0..256).map(|_| Vec::new()).collect() }
     }
 
-    /// The finished tables, in the order of the selection.
-    pub(super) fn finish(self, units: &Units) -> Vec<Table> {
-        let mut tables = Vec::with_capacity(self.tables.len());
-        for (select, building) in self.wanted.iter().zip(self.tables) {
-            let mut table = Table {
-                message: select.message.to_owned(),
-                rows: building.rows,
-                ..Table::default()
-            };
-            let parts = select.fields.iter().zip(building.columns).zip(building.sources);
-            for ((&field, cells), source) in parts {
-                let Some((id, index)) = source else { continue };
-                table.columns.push(Column {
-                    field: field.to_owned(),
-                    unit: units.label(id, index).map(str::to_owned),
-                    multiplier: units.multiplier(id, index),
-                });
-                match cells {
-                    Cells::Numbers(numbers) => table.numbers.push((field.to_owned(), numbers)),
-                    Cells::Texts(texts) => table.texts.push((field.to_owned(), texts)),
-                    Cells::Unseen => {}
-                }
-            }
-            tables.push(table);
-        }
-        tables
+    /// The tables, in the order of the selection.
+    pub(super) fn decode(&self, bytes: &[u8], units: &Units) -> Vec<Table> {
+        let tables = self.wanted.iter().zip(&self.rows);
+        tables.map(|(select, rows)| rows.decode(select, bytes, units)).collect()
     }
 }
 
-impl Visitor for Columns<'_> {
+impl Visitor for Notes<'_> {
     fn defined(&mut self, id: u8, format: &Format) -> bool {
         let mut plans = Vec::new();
-        for (table, (select, building)) in self.wanted.iter().zip(&mut self.tables).enumerate() {
-            if select.message != format.name {
-                continue;
+        for (table, (select, rows)) in self.wanted.iter().zip(&mut self.rows).enumerate() {
+            if select.message == format.name {
+                plans.push(Plan { table, layout: rows.layouts.len() });
+                rows.layouts.push(Layout::new(id, select, format));
             }
-            let mut steps = Vec::new();
-            for (column, label) in select.fields.iter().enumerate() {
-                let Some((index, field)) = format.field(label) else { continue };
-                if field.letter == Letter::Samples {
-                    continue;
-                }
-                let cells = &mut building.columns[column];
-                match (&cells, field.letter.is_text()) {
-                    (Cells::Unseen, true) => {
-                        *cells = Cells::Texts(vec![String::new(); building.rows]);
-                    }
-                    (Cells::Unseen, false) => {
-                        *cells = Cells::Numbers(vec![f64::NAN; building.rows]);
-                    }
-                    (Cells::Texts(_), true) | (Cells::Numbers(_), false) => {}
-                    // The field turned from text to number or back: nothing to add.
-                    _ => continue,
-                }
-                building.sources[column].get_or_insert((id, index));
-                steps.push(Step { column, offset: field.offset, letter: field.letter });
-            }
-            plans.push(Plan { table, steps, gaps: Vec::new() });
         }
+        let wanted = !plans.is_empty();
         self.plans[usize::from(id)] = plans;
-        self.find_gaps();
-        !self.plans[usize::from(id)].is_empty()
+        wanted
     }
 
     #[inline]
-    fn message(&mut self, id: u8, message: &[u8]) {
+    fn message(&mut self, id: u8, _message: &[u8], start: usize) {
         for plan in &self.plans[usize::from(id)] {
-            let Some(building) = self.tables.get_mut(plan.table) else { continue };
-            building.rows += 1;
-            for step in &plan.steps {
-                let bytes = message.get(step.offset..).unwrap_or_default();
-                match building.columns.get_mut(step.column) {
-                    Some(Cells::Numbers(numbers)) => numbers.push(step.letter.number(bytes)),
-                    Some(Cells::Texts(texts)) => {
-                        let field = bytes.get(..step.letter.size()).unwrap_or_default();
-                        texts.push(field_text(field));
-                    }
-                    _ => {}
-                }
+            let Some(rows) = self.rows.get_mut(plan.table) else { continue };
+            if rows.runs.last().is_none_or(|run| run.layout != plan.layout) {
+                rows.runs.push(Run { first_row: rows.starts.len(), layout: plan.layout });
             }
-            for &gap in &plan.gaps {
-                match building.columns.get_mut(gap) {
-                    Some(Cells::Numbers(numbers)) => numbers.push(f64::NAN),
-                    Some(Cells::Texts(texts)) => texts.push(String::new()),
-                    _ => {}
-                }
-            }
+            rows.starts.push(start);
         }
     }
 }
 
-impl Columns<'_> {
-    /// Types of one name may differ in their fields, and a new column must not stay shorter.
-    fn find_gaps(&mut self) {
-        for plan in self.plans.iter_mut().flatten() {
-            let columns = &self.tables[plan.table].columns;
-            plan.gaps = (0..columns.len())
-                .filter(|&column| !matches!(columns[column], Cells::Unseen))
-                .filter(|&column| plan.steps.iter().all(|step| step.column != column))
-                .collect();
+impl Layout {
+    fn new(id: u8, select: &Select<'_>, format: &Format) -> Self {
+        let place = |label: &&str| {
+            let (index, field) = format.field(label)?;
+            let place = Place { index, offset: field.offset, letter: field.letter };
+            // Arrays have no place in a table.
+            (field.letter != Letter::Samples).then_some(place)
+        };
+        Self { id, places: select.fields.iter().map(place).collect() }
+    }
+}
+
+impl Rows {
+    fn decode(&self, select: &Select<'_>, bytes: &[u8], units: &Units) -> Table {
+        let mut table = Table {
+            message: select.message.to_owned(),
+            rows: self.starts.len(),
+            ..Table::default()
+        };
+        for (column, &field) in select.fields.iter().enumerate() {
+            let found = |layout: &Layout| Some((layout.id, (*layout.places.get(column)?)?));
+            // A definition counts although none of its messages came: the column is empty then.
+            let Some((id, place)) = self.layouts.iter().find_map(found) else { continue };
+            table.columns.push(Column {
+                field: field.to_owned(),
+                unit: units.label(id, place.index).map(str::to_owned),
+                multiplier: units.multiplier(id, place.index),
+            });
+            if place.letter.is_text() {
+                table.texts.push((field.to_owned(), self.texts(column, bytes)));
+            } else {
+                table.numbers.push((field.to_owned(), self.numbers(column, bytes)));
+            }
         }
+        table
+    }
+
+    fn numbers(&self, column: usize, bytes: &[u8]) -> Vec<f64> {
+        let mut numbers = Vec::with_capacity(self.starts.len());
+        for (starts, place) in self.runs(column) {
+            match place {
+                Some(place) => place.letter.column(bytes, starts, place.offset, &mut numbers),
+                None => numbers.resize(numbers.len() + starts.len(), f64::NAN),
+            }
+        }
+        numbers
+    }
+
+    fn texts(&self, column: usize, bytes: &[u8]) -> Vec<String> {
+        let mut texts = Vec::with_capacity(self.starts.len());
+        for (starts, place) in self.runs(column) {
+            texts.extend(starts.iter().map(|start| {
+                let field = place.filter(|place| place.letter.is_text()).and_then(|place| {
+                    let offset = start + place.offset;
+                    bytes.get(offset..offset + place.letter.size())
+                });
+                field.map(field_text).unwrap_or_default()
+            }));
+        }
+        texts
+    }
+
+    /// The stretches of rows with the place of a column in each.
+    fn runs(&self, column: usize) -> impl Iterator<Item = (&[usize], Option<Place>)> {
+        self.runs.iter().enumerate().map(move |(index, run)| {
+            let end = self.runs.get(index + 1).map_or(self.starts.len(), |next| next.first_row);
+            let starts = self.starts.get(run.first_row..end).unwrap_or_default();
+            let layout = self.layouts.get(run.layout);
+            (starts, layout.and_then(|layout| *layout.places.get(column)?))
+        })
     }
 }

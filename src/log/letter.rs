@@ -87,29 +87,38 @@ impl Letter {
 
     /// The number at the start of `bytes`, in engineering units; NaN for a text, an array or too
     /// few bytes. 64-bit integers beyond 2^53 lose their last digits.
-    #[inline]
     pub(super) fn number(self, bytes: &[u8]) -> f64 {
-        fn take<const N: usize>(bytes: &[u8], value: impl Fn([u8; N]) -> f64) -> f64 {
-            bytes.first_chunk::<N>().map_or(f64::NAN, |chunk| value(*chunk))
-        }
+        self.decode(One { bytes })
+    }
+
+    /// Appends the numbers at `offset` of the messages that start at `starts`, as
+    /// [`Letter::number`] gives them.
+    pub(super) fn column(self, bytes: &[u8], starts: &[usize], offset: usize, out: &mut Vec<f64>) {
+        self.decode(Many { bytes, starts, offset, out });
+    }
+
+    /// Hands the letter's conversion to `sink`, which thus is compiled for each letter apart.
+    fn decode<S: Sink>(self, sink: S) -> S::Output {
         match self {
-            Self::I8 => take(bytes, |b| f64::from(i8::from_le_bytes(b))),
-            Self::U8 => take(bytes, |b| f64::from(u8::from_le_bytes(b))),
-            Self::I16 => take(bytes, |b| f64::from(i16::from_le_bytes(b))),
-            Self::U16 => take(bytes, |b| f64::from(u16::from_le_bytes(b))),
-            Self::I32 => take(bytes, |b| f64::from(i32::from_le_bytes(b))),
-            Self::U32 => take(bytes, |b| f64::from(u32::from_le_bytes(b))),
-            Self::I64 => take(bytes, |b| i64::from_le_bytes(b) as f64),
-            Self::U64 => take(bytes, |b| u64::from_le_bytes(b) as f64),
-            Self::F16 => take(bytes, |b| half(u16::from_le_bytes(b))),
-            Self::F32 => take(bytes, |b| f64::from(f32::from_le_bytes(b))),
-            Self::F64 => take(bytes, f64::from_le_bytes),
-            Self::CentiI16 => take(bytes, |b| f64::from(i16::from_le_bytes(b)) / 100.0),
-            Self::CentiU16 => take(bytes, |b| f64::from(u16::from_le_bytes(b)) / 100.0),
-            Self::CentiI32 => take(bytes, |b| f64::from(i32::from_le_bytes(b)) / 100.0),
-            Self::CentiU32 => take(bytes, |b| f64::from(u32::from_le_bytes(b)) / 100.0),
-            Self::Degrees => take(bytes, |b| f64::from(i32::from_le_bytes(b)) / 1e7),
-            Self::Text4 | Self::Text16 | Self::Text64 | Self::Samples => f64::NAN,
+            Self::I8 => sink.numbers(|b| f64::from(i8::from_le_bytes(b))),
+            Self::U8 => sink.numbers(|b| f64::from(u8::from_le_bytes(b))),
+            Self::I16 => sink.numbers(|b| f64::from(i16::from_le_bytes(b))),
+            Self::U16 => sink.numbers(|b| f64::from(u16::from_le_bytes(b))),
+            Self::I32 => sink.numbers(|b| f64::from(i32::from_le_bytes(b))),
+            Self::U32 => sink.numbers(|b| f64::from(u32::from_le_bytes(b))),
+            Self::I64 => sink.numbers(|b| i64::from_le_bytes(b) as f64),
+            Self::U64 => sink.numbers(|b| u64::from_le_bytes(b) as f64),
+            Self::F16 => sink.numbers(|b| half(u16::from_le_bytes(b))),
+            Self::F32 => sink.numbers(|b| f64::from(f32::from_le_bytes(b))),
+            Self::F64 => sink.numbers(f64::from_le_bytes),
+            Self::CentiI16 => sink.numbers(|b| f64::from(i16::from_le_bytes(b)) / 100.0),
+            Self::CentiU16 => sink.numbers(|b| f64::from(u16::from_le_bytes(b)) / 100.0),
+            Self::CentiI32 => sink.numbers(|b| f64::from(i32::from_le_bytes(b)) / 100.0),
+            Self::CentiU32 => sink.numbers(|b| f64::from(u32::from_le_bytes(b)) / 100.0),
+            Self::Degrees => sink.numbers(|b| f64::from(i32::from_le_bytes(b)) / 1e7),
+            Self::Text4 | Self::Text16 | Self::Text64 | Self::Samples => {
+                sink.numbers(|_: [u8; 0]| f64::NAN)
+            }
         }
     }
 
@@ -168,6 +177,44 @@ impl Letter {
             Self::Text64 => text::<64>(value, out),
             Self::F16 | Self::Samples => false,
         }
+    }
+}
+
+/// Takes decoded numbers.
+trait Sink {
+    type Output;
+
+    /// `value` turns the stored bytes into the number.
+    fn numbers<const N: usize>(self, value: impl Fn([u8; N]) -> f64) -> Self::Output;
+}
+
+struct One<'a> {
+    bytes: &'a [u8],
+}
+
+impl Sink for One<'_> {
+    type Output = f64;
+
+    fn numbers<const N: usize>(self, value: impl Fn([u8; N]) -> f64) -> f64 {
+        self.bytes.first_chunk().map_or(f64::NAN, |chunk| value(*chunk))
+    }
+}
+
+struct Many<'a> {
+    bytes: &'a [u8],
+    starts: &'a [usize],
+    offset: usize,
+    out: &'a mut Vec<f64>,
+}
+
+impl Sink for Many<'_> {
+    type Output = ();
+
+    fn numbers<const N: usize>(self, value: impl Fn([u8; N]) -> f64) {
+        self.out.extend(self.starts.iter().map(|start| {
+            let field = self.bytes.get(start + self.offset..).and_then(<[u8]>::first_chunk);
+            field.map_or(f64::NAN, |chunk| value(*chunk))
+        }));
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use memmap2::Mmap;
 use thiserror::Error;
 
-use super::columns::Columns;
+use super::columns::Notes;
 use super::format::{FMT_ID, Format};
 use super::inventory::{self, Inventory};
 use super::scan::{ScanStats, scan};
@@ -150,9 +150,9 @@ impl Log {
     ///
     /// Damage is never an error: what is readable is read, the rest is in the [`ScanStats`].
     pub fn select(&self, wanted: &[Select<'_>]) -> (Vec<Table>, ScanStats) {
-        let mut columns = Columns::new(wanted);
-        let scan = scan(self.bytes(), &mut columns);
-        (columns.finish(&scan.units), scan.stats)
+        let mut notes = Notes::new(wanted);
+        let scan = scan(self.bytes(), &mut notes);
+        (notes.decode(self.bytes(), &scan.units), scan.stats)
     }
 
     /// What is in the log: messages, times, firmware, damage.
