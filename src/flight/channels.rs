@@ -54,7 +54,30 @@ pub(super) struct Messages {
 
 impl Messages {
     pub(super) fn read(log: &Log) -> Self {
-        let (tables, scan) = log.select(WANTED);
+        Self::select(log, WANTED)
+    }
+
+    /// Only what tells drones apart: parameters and places.
+    pub(super) fn read_identity(log: &Log) -> Self {
+        let wanted: Vec<Select<'static>> = WANTED
+            .iter()
+            .filter(|select| matches!(select.message, "PARM" | "GPS"))
+            .copied()
+            .collect();
+        Self::select(log, &wanted)
+    }
+
+    /// MAVLink system id.
+    pub(super) fn system_id(&self) -> Option<u8> {
+        ["SYSID_THISMAV", "MAV_SYSID"]
+            .iter()
+            .find_map(|name| self.parameters.get(*name))
+            .filter(|id| (1.0..=255.0).contains(*id))
+            .map(|id| *id as u8)
+    }
+
+    fn select(log: &Log, wanted: &[Select<'_>]) -> Self {
+        let (tables, scan) = log.select(wanted);
         let mut messages = Self { scan, ..Self::default() };
         for table in &tables {
             if table.message == "PARM" {

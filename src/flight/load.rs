@@ -84,7 +84,12 @@ pub(super) fn load(
     );
 
     let cut = |series: Series| to_show_time(&series, flight, clock.offset_s);
-    let ground_m = ground_height_m(&ekf.height, flight.0);
+    // A log that begins in the air does not know the ground; the filter's origin stands in.
+    let starts_in_air = pulse
+        .between(flight.0 - 1.0, flight.0 + 1.0)
+        .first()
+        .is_some_and(|first| *first > pulse_limits_us.0 + IDLE_US);
+    let ground_m = if starts_in_air { 0.0 } else { ground_height_m(&ekf.height, flight.0) };
     let mut height_m = cut(ekf.height);
     for height in &mut height_m.value {
         *height -= ground_m;
@@ -107,12 +112,7 @@ pub(super) fn load(
     let place = messages.places().into_iter().find(|(time, ..)| *time >= flight.0 - MARGIN_S);
     Ok(Flight {
         source: source.to_owned(),
-        system_id: messages
-            .parameters
-            .get("SYSID_THISMAV")
-            .or_else(|| messages.parameters.get("MAV_SYSID"))
-            .filter(|id| (1.0..=255.0).contains(*id))
-            .map(|id| *id as u8),
+        system_id: messages.system_id(),
         velocity_up_mps: cut(ekf.velocity_up),
         height_m,
         north_m: cut(ekf.north),

@@ -134,6 +134,22 @@ pub enum FlightError {
     },
 }
 
+/// What a log says about who wrote it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Identity {
+    /// MAVLink system id, if the log has the parameter.
+    pub system_id: Option<u8>,
+    /// First place with a 3-D fix: (latitude, longitude), degrees. Logging begins at arming.
+    pub first_fix_deg: Option<(f64, f64)>,
+}
+
+/// Reads only what tells drones apart.
+pub fn identify(log: &Log) -> Identity {
+    let messages = channels::Messages::read_identity(log);
+    let first_fix_deg = messages.places().first().map(|(_, lat, lon)| (*lat, *lon));
+    Identity { system_id: messages.system_id(), first_fix_deg }
+}
+
 impl Flight {
     /// Reads one flight of a log.
     ///
