@@ -1,5 +1,7 @@
 //! Shows: what each drone flies, and the files that carry it.
 
+mod bezier;
+pub mod skyb;
 pub mod trajectory;
 
 use nalgebra::Vector3;
