@@ -1,6 +1,7 @@
 //! Shows: what each drone flies, and the files that carry it.
 
 mod bezier;
+pub mod lights;
 pub mod skyb;
 pub mod trajectory;
 
