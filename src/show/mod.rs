@@ -3,6 +3,7 @@
 mod bezier;
 pub mod lights;
 pub mod skyb;
+pub mod skyc;
 pub mod trajectory;
 
 use nalgebra::Vector3;
