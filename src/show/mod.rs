@@ -1,6 +1,10 @@
 //! Shows: what each drone flies, and the files that carry it.
 
+mod bezier;
 pub mod from_plan;
+pub mod lights;
+pub mod skyb;
+pub mod skyc;
 pub mod to_plan;
 pub mod trajectory;
 
