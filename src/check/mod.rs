@@ -100,11 +100,48 @@ pub struct CheckInput<'a> {
     pub options: Options,
 }
 
+/// Names of all checks, as findings carry them.
+pub const NAMES: &[&str] = &[
+    "acceleration",
+    "altitude-max",
+    "altitude-min",
+    "distance",
+    "endurance",
+    "fence",
+    "fence-altitude",
+    "firmware-climb",
+    "firmware-end",
+    "firmware-landing",
+    "firmware-start",
+    "firmware-takeoff",
+    "ground-distance",
+    "home",
+    "low-lateral",
+    "mixed-starts",
+    "same-home",
+    "same-start",
+    "skyb-duration",
+    "skyb-range",
+    "skyb-size",
+    "skyb-unit",
+    "speed-down",
+    "speed-horizontal",
+    "speed-up",
+    "validity",
+    "velocity-step",
+];
+
 impl<'a> CheckInput<'a> {
     /// A show and limits, without a fence, with default firmware and options.
     pub fn new(show: &'a Show, limits: &'a Limits) -> Self {
         let (firmware, options) = (Firmware::default(), Options::default());
         Self { show, limits, fence: None, firmware, options }
+    }
+
+    /// The same with a fence, if there is one.
+    #[must_use]
+    pub fn with_fence(self, fence: Option<&'a Fence>) -> Self {
+        Self { fence, ..self }
     }
 }
 

@@ -9,7 +9,7 @@ use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::load::{Loaded, load_shows};
-use crate::check::{CheckInput, CheckReport, Severity, check};
+use crate::check::{CheckInput, CheckReport, NAMES, Severity, check};
 use crate::mission::Plan;
 use crate::show::Show;
 use crate::vehicle::library;
@@ -95,11 +95,10 @@ pub(super) fn checked(
     plan: &Plan,
     allow: &[String],
 ) -> Result<CheckReport, CommandError> {
-    let names = crate::check::names();
-    if let Some(unknown) = allow.iter().find(|name| !names.contains(&name.as_str())) {
+    if let Some(unknown) = allow.iter().find(|name| !NAMES.contains(&name.as_str())) {
         return Err(CommandError::Usage(format!(
             "there is no check \"{unknown}\"; there are {}",
-            names.join(", ")
+            NAMES.join(", ")
         )));
     }
     let fence = (plan.fence.polygon_m.len() >= 3).then_some(&plan.fence);

@@ -8,13 +8,17 @@ use serde::Serialize;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::load::{has_extension, read_show};
+use super::load::{LoadError, MAX_SKYB_BYTES, has_extension, read_show};
+use super::show_text::{describe_show, describe_skyb};
 use super::timetable;
+use crate::base::file::read_whole;
 use crate::campaign::{self, FlightFolder};
 use crate::log::inventory::Inventory;
 use crate::log::{Log, ScanStats};
 use crate::mission::Plan;
-use crate::show::summary::{ShowSummary, summarise_file};
+use crate::show::derive::DeriveParams;
+use crate::show::skyb;
+use crate::show::summary::{ShowSummary, SkybSummary, summarise, summarise_skyb};
 
 /// Arguments of `updraft inspect`.
 #[derive(Debug, Args)]
@@ -34,6 +38,7 @@ pub(super) struct InspectArgs {
 enum InspectOutput {
     Log(Box<Inventory>),
     Show(Box<ShowSummary>),
+    Skyb(Box<SkybSummary>),
     Plans(Vec<Plan>),
 }
 
@@ -45,8 +50,13 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
         InspectOutput::Plans(plans)
     } else if has_extension(path, "json") {
         InspectOutput::Plans(vec![campaign::read_json(path)?])
-    } else if ["skyc", "skyb", "zip"].iter().any(|wanted| has_extension(path, wanted)) {
-        InspectOutput::Show(Box::new(inspect_show(path)?))
+    } else if has_extension(path, "skyb") {
+        let bytes = read_whole(path, MAX_SKYB_BYTES)?;
+        let contents =
+            skyb::read(&bytes).map_err(|source| LoadError::Skyb { path: path.clone(), source })?;
+        InspectOutput::Skyb(Box::new(summarise_skyb(&contents, &DeriveParams::default())))
+    } else if ["skyc", "zip"].iter().any(|wanted| has_extension(path, wanted)) {
+        InspectOutput::Show(Box::new(summarise(&read_show(path)?, &DeriveParams::default())))
     } else {
         InspectOutput::Log(Box::new(Log::open(path)?.inventory()))
     };
@@ -55,18 +65,14 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
     } else {
         context.print(&match &found {
             InspectOutput::Log(inventory) => describe_log(path, inventory),
-            InspectOutput::Show(summary) => format!("{}\n{summary}", path.display()),
+            InspectOutput::Show(show) => format!("{}: {}", path.display(), describe_show(show)),
+            InspectOutput::Skyb(file) => format!("{}: {}", path.display(), describe_skyb(file)),
             InspectOutput::Plans(plans) => {
                 plans.iter().map(timetable::describe).collect::<Vec<_>>().join("\n")
             }
         })?;
     }
     Ok(Exit::Done)
-}
-
-fn inspect_show(path: &Path) -> Result<ShowSummary, CommandError> {
-    let show = read_show(path)?;
-    Ok(summarise_file(&show))
 }
 
 fn describe_log(path: &Path, log: &Inventory) -> String {

@@ -13,7 +13,7 @@ use crate::vehicle::Vehicle;
 /// Largest show file that is read, bytes.
 const MAX_SHOW_BYTES: u64 = 256 << 20;
 /// Largest binary show that is read, bytes.
-const MAX_SKYB_BYTES: u64 = 4 << 20;
+pub(super) const MAX_SKYB_BYTES: u64 = 4 << 20;
 
 /// A show could not be read.
 #[derive(Debug, Error)]

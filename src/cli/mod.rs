@@ -11,6 +11,7 @@ mod mission_args;
 mod plan;
 mod progress;
 mod run;
+mod show_text;
 mod simulate;
 mod timetable;
 pub mod tools;
