@@ -304,8 +304,8 @@ fn refuses_points_that_cannot_be_flown() {
 #[test]
 fn refuses_broken_archives_and_references() {
     let text = |bytes: &[u8]| skyc::read(bytes).unwrap_err().to_string();
-    insta::assert_snapshot!(text(b"skyb"), @"not a usable .skyc file (ZIP archive): invalid Zip archive: Could not find EOCD");
-    insta::assert_snapshot!(text(&archive(&[("a.json", "{}")])), @"not a usable .skyc file (ZIP archive): it has no show.json");
+    insta::assert_snapshot!(text(b"skyb"), @"not a usable show archive (ZIP): invalid Zip archive: Could not find EOCD");
+    insta::assert_snapshot!(text(&archive(&[("a.json", "{}")])), @"not a usable show archive (ZIP): it has no show.json");
     insta::assert_snapshot!(text(&archive(&[("show.json", "{\"version\":")])), @"show.json: it is not valid JSON: EOF while parsing a value at line 1 column 11");
     insta::assert_snapshot!(text(&archive(&[("show.json", &"[".repeat(100))])), @"show.json: its JSON is nested deeper than 64 levels");
     let reference = |target: &str| refusal(&inline(json!({"$ref": target})));
@@ -334,11 +334,11 @@ fn refuses_hostile_archives() {
         let files = [("show.json", good.as_str()), (stand_in.as_str(), "{}")];
         skyc::read(&patched(&files, stand_in.as_bytes(), name.as_bytes())).unwrap_err().to_string()
     };
-    insta::assert_snapshot!(named("../../evil.json"), @r#"not a usable .skyc file (ZIP archive): entry "../../evil.json" has ".." in its path; it may be meant to do harm"#);
-    insta::assert_snapshot!(named("/etc/evil"), @r#"not a usable .skyc file (ZIP archive): entry "/etc/evil" has an absolute path; it may be meant to do harm"#);
-    insta::assert_snapshot!(named("..\\evil.json"), @r#"not a usable .skyc file (ZIP archive): entry "..\\evil.json" has a backslash in its name; it may be meant to do harm"#);
-    insta::assert_snapshot!(named("C:evil.json"), @r#"not a usable .skyc file (ZIP archive): entry "C:evil.json" has a colon in its name; it may be meant to do harm"#);
-    insta::assert_snapshot!(named("show.json"), @"not a usable .skyc file (ZIP archive): two entries have the same name");
+    insta::assert_snapshot!(named("../../evil.json"), @r#"not a usable show archive (ZIP): entry "../../evil.json" has ".." in its path; it may be meant to do harm"#);
+    insta::assert_snapshot!(named("/etc/evil"), @r#"not a usable show archive (ZIP): entry "/etc/evil" has an absolute path; it may be meant to do harm"#);
+    insta::assert_snapshot!(named("..\\evil.json"), @r#"not a usable show archive (ZIP): entry "..\\evil.json" has a backslash in its name; it may be meant to do harm"#);
+    insta::assert_snapshot!(named("C:evil.json"), @r#"not a usable show archive (ZIP): entry "C:evil.json" has a colon in its name; it may be meant to do harm"#);
+    insta::assert_snapshot!(named("show.json"), @"not a usable show archive (ZIP): two entries have the same name");
 
     let text =
         |bytes: &[u8], limits: Limits| skyc::read_with(bytes, limits).unwrap_err().to_string();
@@ -351,7 +351,7 @@ fn refuses_hostile_archives() {
     let limits = Limits { ratio: 10_000, total_bytes: 1 << 20, ..Limits::default() };
     insta::assert_snapshot!(text(&bomb, limits), @"the file unpacks to more than the 1048576 bytes allowed here; it may be a ZIP bomb");
     let limits = Limits { entries: 1, ..Limits::default() };
-    insta::assert_snapshot!(text(&archive(&[("show.json", &good), ("b", "")]), limits), @"not a usable .skyc file (ZIP archive): it has 2 entries, more than the 1 allowed");
+    insta::assert_snapshot!(text(&archive(&[("show.json", &good), ("b", "")]), limits), @"not a usable show archive (ZIP): it has 2 entries, more than the 1 allowed");
     let limits = Limits { values: 10, ..Limits::default() };
     insta::assert_snapshot!(text(&archive(&[("show.json", &good)]), limits), @"show.json: it has more than 10 JSON values");
 

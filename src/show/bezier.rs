@@ -31,6 +31,20 @@ impl Scalar {
         &self.values[..=self.degree]
     }
 
+    /// The curve over [0, 1/2] and over [1/2, 1].
+    pub(crate) fn halves(self) -> (Self, Self) {
+        let (mut left, mut right) = (self, self);
+        let mut work = self.values;
+        for i in 0..=self.degree {
+            left.values[i] = work[0];
+            right.values[self.degree - i] = work[self.degree - i];
+            for j in 0..self.degree - i {
+                work[j] = f64::midpoint(work[j], work[j + 1]);
+            }
+        }
+        (left, right)
+    }
+
     /// The same curve written with more control points (`degree` at most 7).
     pub(crate) fn elevated(mut self, degree: usize) -> Self {
         while self.degree < degree.min(7) {

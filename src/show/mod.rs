@@ -1,11 +1,17 @@
 //! Shows: what each drone flies, and the files that carry it.
 
+mod archive;
 mod bezier;
 pub mod from_plan;
+pub mod csv;
+pub mod derive;
 pub mod lights;
+mod number;
+pub mod quantise;
 pub mod skyb;
 pub mod skyc;
 pub mod to_plan;
+pub mod summary;
 pub mod trajectory;
 
 use nalgebra::Vector3;

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::SkycError;
-use super::archive::Archive;
 use super::trajectory::short;
+use crate::show::archive::Archive;
 
 /// Name of the entry everything starts from.
 pub(super) const ROOT: &str = "show.json";

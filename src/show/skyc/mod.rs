@@ -4,9 +4,7 @@
 //! times on whole milliseconds, three-element points. [`read`] takes everything the format allows and
 //! refuses, naming entry, drone and point, what the official loader refuses or what cannot be flown.
 
-mod archive;
 mod documents;
-mod number;
 mod read;
 mod trajectory;
 mod write;
@@ -60,7 +58,7 @@ impl Default for Limits {
 #[derive(Debug, Error)]
 pub enum SkycError {
     /// The archive itself is unusable.
-    #[error("not a usable .skyc file (ZIP archive): {problem}")]
+    #[error("not a usable show archive (ZIP): {problem}")]
     Archive {
         /// What is wrong.
         problem: String,

@@ -10,11 +10,11 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde_json::Value;
 
-use super::archive::Archive;
 use super::documents::{Documents, Node, ROOT, Target, parse, reference};
 use super::trajectory::{self, Problem, short};
 use super::{Limits, MAX_DRONES, SkycError};
 use crate::base::frame::{Geodetic, ShowFrame};
+use crate::show::archive::Archive;
 use crate::show::{Cue, Show, ShowDrone, Validation, YawControl};
 
 /// Reads a `.skyc` file with the default [`Limits`].

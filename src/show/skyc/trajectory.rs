@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use serde_json::Value;
 
-use super::number::{push_m, push_ms};
 use super::{MAX_COORDINATE_M, MAX_TIME_S};
 use crate::show::bezier::path_through;
+use crate::show::number::{push_m, push_ms};
 use crate::show::{Path, Segment, Trajectory};
 
 /// What is wrong, and where in the object.

@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use zip::ZipArchive;
 
-use super::{Limits, SkycError};
+use super::skyc::{Limits, SkycError};
 
 /// Entries smaller than this may be compressed as well as they like, bytes.
 const SMALL: u64 = 1 << 20;
 
 /// An archive whose names have been checked.
-pub(super) struct Archive<'a> {
+pub(crate) struct Archive<'a> {
     zip: ZipArchive<Cursor<&'a [u8]>>,
     entries: BTreeMap<String, usize>,
     limits: Limits,
@@ -20,7 +20,7 @@ pub(super) struct Archive<'a> {
 }
 
 impl<'a> Archive<'a> {
-    pub(super) fn open(bytes: &'a [u8], limits: Limits) -> Result<Self, SkycError> {
+    pub(crate) fn open(bytes: &'a [u8], limits: Limits) -> Result<Self, SkycError> {
         let broken = |problem: String| SkycError::Archive { problem };
         let zip = ZipArchive::new(Cursor::new(bytes)).map_err(|error| broken(error.to_string()))?;
         if zip.len() > limits.entries {
@@ -45,16 +45,21 @@ impl<'a> Archive<'a> {
         Ok(Self { zip, entries, limits, unpacked: AtomicU64::new(0) })
     }
 
-    pub(super) fn limits(&self) -> &Limits {
+    pub(crate) fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    pub(super) fn contains(&self, name: &str) -> bool {
+    /// Names of the files, sorted.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.entries.keys().map(String::as_str)
+    }
+
+    pub(crate) fn contains(&self, name: &str) -> bool {
         self.entries.contains_key(name)
     }
 
     /// Unpacks one entry. What counts is how many bytes come out, not what the header says.
-    pub(super) fn unpack(&self, name: &str) -> Result<Vec<u8>, SkycError> {
+    pub(crate) fn unpack(&self, name: &str) -> Result<Vec<u8>, SkycError> {
         let fail = |problem: String| SkycError::Entry { entry: name.to_owned(), problem };
         let index = *self
             .entries
@@ -88,7 +93,7 @@ impl<'a> Archive<'a> {
     }
 
     /// Counts bytes against the limit for the whole file.
-    pub(super) fn charge(&self, bytes: u64) -> Result<(), SkycError> {
+    pub(crate) fn charge(&self, bytes: u64) -> Result<(), SkycError> {
         let before = self.unpacked.fetch_add(bytes, Ordering::Relaxed);
         let limit = self.limits.total_bytes;
         if before.saturating_add(bytes) > limit {

@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 
 /// Appends milliseconds as seconds, exactly.
-pub(super) fn push_ms(text: &mut String, ms: u64) {
+pub(crate) fn push_ms(text: &mut String, ms: u64) {
     push_scaled(text, false, ms, 3);
 }
 
 /// Appends a length in metres: to the millimetre if it is a whole number of them (within 1 nm), else
 /// to 0.1 µm. The caller has checked that it is finite and below 1e9.
-pub(super) fn push_m(text: &mut String, value_m: f64) {
+pub(crate) fn push_m(text: &mut String, value_m: f64) {
     let magnitude = value_m.abs();
     let mm = (magnitude * 1e3).round();
     if (mm / 1e3 - magnitude).abs() < 1e-9 {
