@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::air::{Atmosphere, Surroundings, density_ratio};
 use super::autopilot::Autopilot;
-use super::autopilot::director::Stage;
+use super::autopilot::director::{Stage, takeoff_time_s};
 use super::autopilot::motors::Spool;
 use super::autopilot::params as p;
 use super::error::SimError;
@@ -102,7 +102,10 @@ pub struct FlightSummary {
 /// See [`SimError`].
 pub fn fly<W: Write>(setup: &FlightSetup<'_>, out: W) -> Result<FlightSummary, SimError> {
     let log_error = |source| SimError::Log { drone: setup.drone, source };
-    let mut recorder = LogRecorder::new(out, setup).map_err(log_error)?;
+    validate(setup)?;
+    let takeoff_s = takeoff_time_s(setup.trajectory, setup.vehicle.autopilot.wpnav_speed_up_mps)
+        .ok_or(SimError::NoTakeoff { drone: setup.drone, height_m: p::SHOW_TAKEOFF_ALT })?;
+    let mut recorder = LogRecorder::new(out, setup, armed_at_us(takeoff_s)).map_err(log_error)?;
     let mut summary = fly_with(setup, &mut recorder)?;
     summary.log_rows = recorder.finish().map_err(log_error)?;
     Ok(summary)
@@ -152,6 +155,10 @@ pub fn fly_with<R: Recorder>(
                 air_velocity_mps: setup.atmosphere.air_velocity(place, time_s),
                 density_ratio: density_ratio(setup.frame.origin.amsl_m + place.z),
             };
+            // Checked here, as the drag's dead band would take NaN for no wind.
+            if !around.air_velocity_mps.iter().all(|speed| speed.is_finite()) {
+                return Err(SimError::Diverged { drone, time_s });
+            }
         }
         if step % STEPS_PER_LOOK == 0 {
             look(setup, &plant, time_s, takeoff_s, end_s)?;

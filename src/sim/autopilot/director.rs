@@ -169,9 +169,9 @@ impl<'a> Director<'a> {
 
     fn land(&mut self, estimate: &Estimate, motors: &mut Motors) {
         let still = estimate.velocity_mps.norm() < 1.0;
-        self.at_limit_s =
-            if motors.limits.lower && still { self.at_limit_s + self.dt_s } else { 0.0 };
-        self.land_maybe = self.at_limit_s >= LAND_MAYBE_S;
+        let change_s = if motors.limits.lower && still { self.dt_s } else { -2.0 * self.dt_s };
+        self.at_limit_s = (self.at_limit_s + change_s).max(0.0);
+        self.land_maybe |= self.at_limit_s >= LAND_MAYBE_S;
         self.land_complete |= self.at_limit_s >= LAND_COMPLETE_S;
         if self.land_complete {
             self.landed_s += self.dt_s;
