@@ -83,13 +83,28 @@ pub fn p_value(chi2: f64, dof: usize) -> Option<f64> {
 /// Finds the minimum of the sum of squares near `start`.
 ///
 /// `residuals` gets the parameters and gives the residuals, always equally many. Derivatives are
-/// central differences.
+/// central differences; a parameter that starts at 0 is taken to be of order 1.
 ///
 /// # Errors
 ///
 /// [`FitError`] when there are too few residuals, when something is not finite at the start, or when
 /// the minimum does not determine all parameters.
 pub fn minimize<F>(residuals: F, start: &[f64]) -> Result<Solution, FitError>
+where
+    F: Fn(&[f64]) -> Vec<f64>,
+{
+    minimize_with(residuals, None, start)
+}
+
+/// Derivatives of the residuals (rows) by the parameters (columns).
+pub type Jacobian<'a> = &'a dyn Fn(&[f64]) -> DMatrix<f64>;
+
+/// [`minimize`] with exact derivatives, of as many rows as there are residuals.
+pub fn minimize_with<F>(
+    residuals: F,
+    jacobian: Option<Jacobian<'_>>,
+    start: &[f64],
+) -> Result<Solution, FitError>
 where
     F: Fn(&[f64]) -> Vec<f64>,
 {
@@ -100,12 +115,18 @@ where
     if !start.iter().chain(&first).all(|value| value.is_finite()) {
         return Err(FitError::NotFinite);
     }
-    let problem = Problem { residuals, at: DVector::from_column_slice(start), count: first.len() };
+    let problem = Problem {
+        residuals,
+        jacobian,
+        at: DVector::from_column_slice(start),
+        start: start.to_vec(),
+        count: first.len(),
+    };
     let (problem, report) = LevenbergMarquardt::new().with_patience(1000).minimize(problem);
     // `NoImprovementPossible` is a minimum found to the last bit, with tolerances out of reach.
     let converged = report.termination.was_successful()
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
-    let jacobian = problem.differences();
+    let jacobian = problem.derivatives();
     let found = (problem.residuals)(problem.at.as_slice());
     let covariance = inverse_gram(&jacobian).ok_or(FitError::Singular)?;
     Ok(Solution {
@@ -139,20 +160,34 @@ fn inverse_gram(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// The crate's view of a problem: owned parameters, dynamic sizes.
-struct Problem<F> {
+struct Problem<'a, F> {
     residuals: F,
+    jacobian: Option<Jacobian<'a>>,
     at: DVector<f64>,
+    start: Vec<f64>,
     count: usize,
 }
 
-impl<F: Fn(&[f64]) -> Vec<f64>> Problem<F> {
+impl<F: Fn(&[f64]) -> Vec<f64>> Problem<'_, F> {
+    fn derivatives(&self) -> DMatrix<f64> {
+        match self.jacobian {
+            Some(jacobian) => jacobian(self.at.as_slice()),
+            None => self.differences(),
+        }
+    }
+
     fn differences(&self) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.count, self.at.len());
         let mut at = self.at.clone();
         for column in 0..self.at.len() {
             let centre = self.at[column];
+            // The size of the start keeps the step from vanishing with a parameter that goes to 0.
+            let size = match self.start.get(column) {
+                Some(start) if *start != 0.0 => centre.abs().max(start.abs() * 1e-3),
+                _ => centre.abs().max(1.0),
+            };
             // The cube root of the machine's precision balances truncation and rounding.
-            let step = f64::EPSILON.cbrt() * if centre == 0.0 { 1.0 } else { centre.abs() };
+            let step = f64::EPSILON.cbrt() * size;
             at[column] = centre + step;
             let above = (self.residuals)(at.as_slice());
             at[column] = centre - step;
@@ -166,7 +201,7 @@ impl<F: Fn(&[f64]) -> Vec<f64>> Problem<F> {
     }
 }
 
-impl<F: Fn(&[f64]) -> Vec<f64>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<F> {
+impl<F: Fn(&[f64]) -> Vec<f64>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, F> {
     type ParameterStorage = Owned<f64, Dyn>;
     type ResidualStorage = Owned<f64, Dyn>;
     type JacobianStorage = Owned<f64, Dyn, Dyn>;
@@ -185,7 +220,7 @@ impl<F: Fn(&[f64]) -> Vec<f64>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<F
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        Some(self.differences())
+        Some(self.derivatives())
     }
 }
 
@@ -207,6 +242,15 @@ mod tests {
         assert!((fit.errors()[0] - 0.05_f64.sqrt()).abs() < 1e-9, "{:?}", fit.errors());
         assert_eq!(fit.dof, 2);
         assert!(fit.p_value().unwrap() > 0.999);
+    }
+
+    #[test]
+    fn a_parameter_that_vanishes_is_still_determined() {
+        // Ends within 1e-14 of 0, where a purely relative step would see no change at all.
+        let fit = minimize(|p| vec![p[0] + p[1] - 1.0, p[0] - p[1] - 1.0, p[1]], &[3.0, 0.0]);
+        let fit = fit.unwrap();
+        assert!(fit.parameters[1].abs() < 1e-12, "{fit:?}");
+        assert!((fit.errors()[1] - 1.0 / 3.0_f64.sqrt()).abs() < 1e-6, "{fit:?}");
     }
 
     #[test]

@@ -9,7 +9,9 @@
 //! Errors of the velocities count by the effective variance `sigma_u² + (du/dV)² sigma_V²`
 //! (York et al. 2004), with the slope of the fit before.
 
-use super::fit::{FitError, Solution, minimize, p_value};
+use nalgebra::DMatrix;
+
+use super::fit::{FitError, Solution, minimize, minimize_with, p_value};
 use super::result::{Fit, Parameter};
 use crate::base::estimate::Estimate;
 
@@ -330,14 +332,16 @@ fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
     let profiled: Vec<_> = grid().map(at).collect();
     let chi2: Vec<f64> =
         profiled.iter().map(|entry| entry.map_or(f64::INFINITY, |(chi2, _)| chi2)).collect();
+    let law = |p: &[f64]| Law::SignedQuadratic { a: p[0], u0_us: p[1], w_mps: p[2] };
+    let derivatives = |p: &[f64]| {
+        DMatrix::from_fn(points.len(), 3, |row, column| {
+            let air = points[row].velocity_mps - p[2];
+            let derivative = [signed_square(air), 1.0, -2.0 * p[0] * air.abs()][column];
+            -derivative / sigmas[row]
+        })
+    };
     let polish = |start: [f64; 3]| {
-        minimize(
-            |p| {
-                let law = Law::SignedQuadratic { a: p[0], u0_us: p[1], w_mps: p[2] };
-                residuals(points, sigmas, law)
-            },
-            &start,
-        )
+        minimize_with(|p| residuals(points, sigmas, law(p)), Some(&derivatives), &start)
     };
     let mut minima: Vec<Solution> = minima_of(&chi2)
         .filter_map(|w| at(w))

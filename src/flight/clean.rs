@@ -113,7 +113,7 @@ mod tests {
             message: "X".into(),
             rows: times_us.len(),
             numbers: vec![("TimeUS".into(), times_us.to_vec()), ("A".into(), values)],
-            texts: Vec::new(),
+            ..Table::default()
         })
     }
 
