@@ -270,3 +270,15 @@ fn a_big_fleet_stays_readable_for_a_browser() {
     let drawn = report.figures.iter().filter(|(name, _)| name.starts_with("fig3-")).count();
     assert_eq!(drawn, 180);
 }
+
+#[test]
+fn dollars_in_names_are_no_mathematics() {
+    let flights = ["$x^2$ a", "$x^2$ b"].map(|name| {
+        let mut flight = calibration(name, 1, 0.0, &[]);
+        flight.true_updraft_mps = None;
+        flight
+    });
+    let report = made(&Analysis { flights: flights.into(), ..empty() });
+    let (_, laws) = &report.figures[0];
+    assert!(laws.contains(">$x^2$ a</text>"), "the legend changed the name");
+}

@@ -114,8 +114,14 @@ pub(super) struct DroneLaws {
 pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
     let quadratic = drone.laws.as_ref().and_then(law::signed_quadratic);
     let linear = drone.laws.as_ref().and_then(|laws| laws.linear.as_ref());
-    let of =
-        |fit, name| parameter(fit, name).map_or_else(|| NONE.to_owned(), |p| estimate(p.estimate));
+    let of = |fit, name| {
+        parameter(fit, name).map_or_else(
+            || NONE.to_owned(),
+            |p| {
+                if p.held { format!("{} held", estimate(p.estimate)) } else { estimate(p.estimate) }
+            },
+        )
+    };
     let chi2 = |fit: Option<&Fit>| {
         fit.and_then(|fit| fit.chi2_reduced).map_or_else(|| NONE.to_owned(), |chi2| fixed(chi2, 2))
     };

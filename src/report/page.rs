@@ -14,8 +14,8 @@ use super::compare::{
 use super::figure_air::{self, mean_truth};
 use super::figure_drone::{self, Axes, drawable};
 use super::text::{
-    NONE, clean, count, estimate, fixed, kind, parameter, purpose, signed, slug, unit, usable,
-    value_of,
+    NONE, clean, count, estimate, fixed, kind, parameter, purpose, shortened, signed, slug, unit,
+    usable, value_of,
 };
 use super::{Figure, Provenance, Report, ReportError, figure_laws, figure_map, law};
 
@@ -216,7 +216,8 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
     let mut bytes = 0;
     let mut choices = Vec::new();
     let mut shown = None;
-    let mut left_out = flight.drones.len() - wanted.len();
+    let undrawn = flight.drones.len() - wanted.len();
+    let mut left_out = 0;
     for index in wanted {
         let (Some(drone), Some(figure)) =
             (flight.drones.get(index), figure_drone::figure(flight, key, index, &axes))
@@ -247,7 +248,7 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
             figures.files.push((figure.name, figure.svg));
         }
     }
-    Some(context! { shown => shown?, choices, left_out })
+    Some(context! { shown => shown?, choices, left_out, undrawn })
 }
 
 /// How many windows of each kind all drones have: `14 up × …` as words.
@@ -288,9 +289,8 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("χ²/ν linear", true),
         ("windows", true),
         ("clock", false),
-        ("notes", false),
     ];
-    let rows: Vec<(Vec<String>, bool)> = flight
+    let rows: Vec<(Vec<String>, String)> = flight
         .drones
         .iter()
         .map(|drone| {
@@ -299,10 +299,9 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 map.drones.iter().find(|air| air.slot == drone.slot && air.name == drone.name)
             });
             let none = || NONE.to_owned();
-            let notes = flags(drone);
             let cells = vec![
                 drone.slot.map_or_else(none, |slot| slot.to_string()),
-                clean(&drone.name),
+                shortened(&drone.name, 28),
                 air.map_or_else(none, |air| estimate(air.mean)),
                 air.and_then(mean_truth).map_or_else(none, |truth| fixed(truth, 3)),
                 air.map_or_else(none, |air| clean(&air.mapping)),
@@ -315,9 +314,8 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 laws.linear_chi2,
                 if drone.windows.is_empty() { none() } else { windows_used(drone) },
                 clock(drone).to_owned(),
-                notes.join("; "),
             ];
-            (cells, !notes.is_empty())
+            (cells, flags(drone).join("; "))
         })
         .collect();
     let filled: Vec<bool> = (0..heads.len())
@@ -334,12 +332,12 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         .collect();
     let rows = rows
         .iter()
-        .map(|(cells, flagged)| {
+        .map(|(cells, note)| {
             let cells: Vec<Value> = kept()
                 .filter_map(|column| Some((cells.get(column)?, heads.get(column)?.1)))
                 .map(|(cell, number)| context! { text => cell.clone(), number })
                 .collect();
-            context! { cells, flagged => *flagged }
+            context! { cells, note => note.clone() }
         })
         .collect();
     (head, rows)

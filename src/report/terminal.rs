@@ -179,7 +179,7 @@ impl Output {
         let columns = [
             column("slot", Align::Right, 0),
             column("name", Align::Left, 3),
-            column("A", Align::Right, 0),
+            column("A", Align::Right, 1),
             column("u₀", Align::Right, 2),
             column("W*", Align::Right, 0),
             column("χ²/ν", Align::Right, 6),
@@ -187,7 +187,7 @@ impl Output {
             column("u₀ (linear)", Align::Right, 5),
             column("windows", Align::Right, 4),
             column("clock", Align::Left, 7),
-            column("notes", Align::Left, 1),
+            column("notes", Align::Left, 0),
         ];
         // In a measurement the map says it all; only what is doubtful is worth a line.
         let fitted = flight.drones.iter().any(|drone| drone.laws.is_some());
