@@ -1,5 +1,7 @@
 //! Panels with axes, drawn by `kuva`, and sheets that put panels side by side in one SVG.
 
+use std::fmt::Write as _;
+
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::legend::{LegendEntry, LegendPosition, LegendShape};
 use kuva::plot::scatter::{MarkerShape, ScatterPlot};
@@ -19,6 +21,13 @@ use super::text::{clean, fixed, usable};
 pub(super) const FONT: &str =
     "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif";
 
+/// Distances of ticks on a time axis.
+const TIME_STEPS_S: [f64; 12] =
+    [1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0, 7200.0];
+
+/// Pixels right of a panel with a right axis.
+const RIGHT_AXIS_MARGIN: f64 = 62.0;
+
 /// Prefix of the clip ids that `kuva` numbers through the whole process.
 const KUVA_CLIP: &str = "kuva-clip-";
 
@@ -36,27 +45,23 @@ impl Axis {
     pub(super) fn around(label: &str, values: impl Iterator<Item = f64>, span: f64) -> Self {
         let (low, high) = extent(values, span);
         let step = nice_step((high - low) / 5.0);
-        Self::new(label, low, high, step)
+        // Room between the data and the frame.
+        let pad = 0.03 * (high - low);
+        let min = ((low - pad) / step).floor() * step;
+        let max = ((high + pad) / step).ceil() * step;
+        Self { label: label.to_owned(), min, max, step }
     }
 
     /// A time axis in seconds, not starting before the data.
     pub(super) fn time(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values, 10.0);
-        const STEPS: [f64; 12] =
-            [1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0, 7200.0];
         let wanted = (high - low) / 7.0;
-        let step = STEPS
+        let step = TIME_STEPS_S
             .into_iter()
             .find(|&step| step >= wanted)
             .unwrap_or_else(|| nice_step(wanted));
         let min = if low > 0.0 && low < step { 0.0 } else { low };
         Self { label: "show time (s)".to_owned(), min, max: high, step }
-    }
-
-    fn new(label: &str, low: f64, high: f64, step: f64) -> Self {
-        let min = (low / step).floor() * step;
-        let max = (high / step).ceil() * step;
-        Self { label: label.to_owned(), min, max, step }
     }
 
     /// Tick labels with just the decimals that the step needs.
@@ -126,6 +131,8 @@ pub(super) struct Panel {
     bars: Vec<(Vec<Mark>, String)>,
     legend: Vec<LegendEntry>,
     legend_position: LegendPosition,
+    legend_box: bool,
+    right_margin: f64,
 }
 
 impl Panel {
@@ -140,6 +147,8 @@ impl Panel {
             bars: Vec::new(),
             legend: Vec::new(),
             legend_position: LegendPosition::InsideTopLeft,
+            legend_box: true,
+            right_margin: 16.0,
         }
     }
 
@@ -148,9 +157,26 @@ impl Panel {
         self.legend_position = position;
     }
 
+    /// Lets what is drawn show behind the legend.
+    pub(super) fn clear_legend(&mut self) {
+        self.legend_box = false;
+    }
+
+    /// Puts the legend right of the panel, so many pixels wide.
+    pub(super) fn legend_outside(&mut self, width: f64) {
+        self.legend_position = LegendPosition::OutsideRightTop;
+        self.right_margin = width;
+    }
+
+    /// Leaves room on the right, as a panel with a right axis does, so that both line up.
+    pub(super) fn leave_room_right(&mut self) {
+        self.right_margin = RIGHT_AXIS_MARGIN;
+    }
+
     /// A second axis on the right, with its own lines.
     pub(super) fn right_axis(&mut self, axis: Axis, lines: Vec<Plot>) {
         self.right = Some((axis, lines));
+        self.leave_room_right();
     }
 
     /// An entry of the legend.
@@ -200,7 +226,6 @@ impl Panel {
 
     /// Draws the panel.
     pub(super) fn draw(self, width: f64, height: f64) -> Scene {
-        let right_margin = if self.right.is_some() { 62.0 } else { 16.0 };
         let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
             .with_width(width)
             .with_height(height)
@@ -214,8 +239,8 @@ impl Panel {
             .with_y_tick_step(self.y.step)
             .with_x_tick_format(self.x.format())
             .with_y_tick_format(self.y.format())
-            .with_force_margins(66.0, right_margin)
-            .with_force_margins_y(30.0, 50.0)
+            .with_force_margins(66.0, self.right_margin)
+            .with_force_margins_y(30.0, 46.0)
             .with_label_size(13)
             .with_tick_size(12)
             .with_body_size(12)
@@ -224,7 +249,8 @@ impl Panel {
         if !self.legend.is_empty() {
             layout = layout
                 .with_legend_entries(self.legend)
-                .with_legend_position(self.legend_position);
+                .with_legend_position(self.legend_position)
+                .with_legend_box(self.legend_box);
         }
         let mut scene;
         if let Some((axis, lines)) = self.right {
@@ -311,12 +337,12 @@ fn insert_bars(scene: &mut Scene, computed: &ComputedLayout, bars: &[(Vec<Mark>,
             if usable(mark.x_error) && mark.x_error > 0.0 {
                 let from = computed.map_x(mark.x - mark.x_error).clamp(left, right);
                 let to = computed.map_x(mark.x + mark.x_error).clamp(left, right);
-                d.push_str(&format!("M{from:.1} {y:.1}H{to:.1}"));
+                let _ = write!(d, "M{from:.1} {y:.1}H{to:.1}");
             }
             if usable(mark.y_error) && mark.y_error > 0.0 {
                 let from = computed.map_y(mark.y - mark.y_error).clamp(top, bottom);
                 let to = computed.map_y(mark.y + mark.y_error).clamp(top, bottom);
-                d.push_str(&format!("M{x:.1} {from:.1}V{to:.1}"));
+                let _ = write!(d, "M{x:.1} {from:.1}V{to:.1}");
             }
         }
         if !d.is_empty() {
@@ -414,7 +440,7 @@ fn renumbered(svg: &str, name: &str) -> String {
             seen.push(number);
             seen.len() - 1
         });
-        out.push_str(&format!("{name}-clip{index}{rest}"));
+        let _ = write!(out, "{name}-clip{index}{rest}");
     }
     out
 }

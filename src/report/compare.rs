@@ -44,7 +44,11 @@ pub(super) fn comparison(row: &TableRow) -> Comparison {
         } else {
             estimate(Estimate::new(row.mean, 0.0))
         },
-        mean_se: if usable(row.mean_se) { significant(row.mean_se) } else { NONE.to_owned() },
+        mean_se: if usable(row.mean_se) && row.mean_se > 0.0 {
+            significant(row.mean_se)
+        } else {
+            NONE.to_owned()
+        },
         n: row.n,
         paper: paper.map_or_else(|| NONE.to_owned(), estimate),
         difference: gap.map_or_else(|| NONE.to_owned(), |gap| signed(gap, decimals(paper))),
@@ -60,9 +64,6 @@ fn decimals(paper: Option<Estimate>) -> usize {
 
 /// A positive number with two significant digits.
 fn significant(value: f64) -> String {
-    if value <= 0.0 {
-        return fixed(value, 0);
-    }
     fixed(value, (1 - value.log10().floor() as i32).clamp(0, 6) as usize)
 }
 
@@ -114,11 +115,15 @@ pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
     let quadratic = drone.laws.as_ref().and_then(law::signed_quadratic);
     let linear = drone.laws.as_ref().and_then(|laws| laws.linear.as_ref());
     let of = |fit, name| {
-        parameter(fit, name).map_or_else(|| NONE.to_owned(), |p| estimate(p.estimate))
+        parameter(fit, name).map_or_else(
+            || NONE.to_owned(),
+            |p| {
+                if p.held { format!("{} held", estimate(p.estimate)) } else { estimate(p.estimate) }
+            },
+        )
     };
     let chi2 = |fit: Option<&Fit>| {
-        fit.and_then(|fit| fit.chi2_reduced)
-            .map_or_else(|| NONE.to_owned(), |chi2| fixed(chi2, 2))
+        fit.and_then(|fit| fit.chi2_reduced).map_or_else(|| NONE.to_owned(), |chi2| fixed(chi2, 2))
     };
     DroneLaws {
         a: of(quadratic, "A"),

@@ -77,6 +77,7 @@ pub(super) fn figure(flight: &FlightAnalysis, key: &str, map: &UpdraftMap) -> Op
     let y = Axis::around("updraft W* (m/s, up positive)", reach.chain([0.0]), 0.1);
     let mut panel = Panel::new("(a) Fleet mean over time", time, y);
     panel.legend_at(LegendPosition::InsideTopRight);
+    panel.clear_legend();
     let band: Vec<(f64, f64, f64)> =
         instants.iter().map(|i| (i.time_s, i.mean - i.sd, i.mean + i.sd)).collect();
     panel.band(&band, BLUE);

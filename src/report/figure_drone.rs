@@ -35,14 +35,14 @@ impl Axes {
         Self {
             time: Axis::time(traces().flat_map(|trace| trace.time_s.iter().copied()).chain(ends)),
             velocity: Axis::around(
-                "V_U (m/s)",
+                "velocity (m/s)",
                 traces()
                     .flat_map(|trace| trace.velocity_mps.iter().copied())
                     .chain(windows().map(|window| window.velocity_mps.median)),
                 1.0,
             ),
             pulse: Axis::around(
-                "uᵩ (µs)",
+                "u cos φ (µs)",
                 traces()
                     .flat_map(|trace| trace.pulse_phi_us.iter().copied())
                     .chain(windows().map(|window| window.pulse_phi_us.median)),
@@ -98,9 +98,9 @@ pub(super) fn figure(
 }
 
 fn velocity_panel(drone: &DroneAnalysis, axes: &Axes) -> Panel {
-    let mut panel =
-        Panel::new("(a) Vertical velocity", axes.time.clone(), axes.velocity.clone());
+    let mut panel = Panel::new("(a) Vertical velocity", axes.time.clone(), axes.velocity.clone());
     let trace = trace(&drone.trace.time_s, &drone.trace.velocity_mps);
+    panel.leave_room_right();
     panel.line(&trace, GREEN, 1.0, "");
     segments(&mut panel, drone, axes, |window| window.velocity_mps.median);
     panel

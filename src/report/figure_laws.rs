@@ -13,9 +13,9 @@ use super::law;
 use super::text::{clean, count, parameter, shortened, signed, usable};
 
 /// Label of the pulse-width axis.
-pub(super) const PULSE_LABEL: &str = "tilt-corrected pulse width uᵩ (µs)";
+pub(super) const PULSE_LABEL: &str = "tilt-corrected pulse width u cos φ (µs)";
 /// Label of the velocity axis.
-pub(super) const VELOCITY_LABEL: &str = "vertical velocity V_U (m/s, up positive)";
+pub(super) const VELOCITY_LABEL: &str = "vertical velocity (m/s, up positive)";
 
 /// Longest legend; more flights are drawn without an entry.
 const LEGEND_LIMIT: usize = 12;
@@ -42,6 +42,9 @@ pub(super) fn figure(analysis: &Analysis) -> Option<Figure> {
     if let [flight] = flights.as_slice() {
         one_flight(&mut panel, flight, &v);
     } else {
+        if flights.len() > 5 {
+            panel.legend_outside(110.0);
+        }
         for (index, (flight, colour)) in flights.iter().zip(&colours).enumerate() {
             several_flights(&mut panel, flight, colour, &v, index < LEGEND_LIMIT);
         }
@@ -60,7 +63,8 @@ pub(super) fn figure(analysis: &Analysis) -> Option<Figure> {
          the flock."
             .to_owned()
     } else {
-        "Colour tells the flights apart; dashed lines are the signed-quadratic law of each.".to_owned()
+        "Colour tells the flights apart; dashed lines are the signed-quadratic law of each."
+            .to_owned()
     };
     let name = "fig2-laws".to_owned();
     let title = "Rotor pulse width against vertical velocity".to_owned();
@@ -138,8 +142,11 @@ fn several_flights(
 
 /// Estimated against true updraft; or, where the truth does not vary, W* of each drone.
 fn side_panel(flights: &[&FlightAnalysis], colours: &[String]) -> (Option<Panel>, String) {
-    let mut truths: Vec<f64> =
-        flights.iter().filter_map(|flight| flight.true_updraft_mps).filter(|&w| usable(w)).collect();
+    let mut truths: Vec<f64> = flights
+        .iter()
+        .filter_map(|flight| flight.true_updraft_mps)
+        .filter(|&w| usable(w))
+        .collect();
     truths.sort_by(f64::total_cmp);
     truths.dedup();
     if truths.len() > 1 { against_truth(flights, colours) } else { by_drone(flights) }
@@ -170,9 +177,10 @@ fn against_truth(flights: &[&FlightAnalysis], colours: &[String]) -> (Option<Pan
     for (marks, colour) in &groups {
         panel.marks(marks, colour, 4.2, MarkerShape::Circle);
     }
-    let caption = "(b) The fitted updraft W* of each drone against the true one; on the dashed line \
+    let caption =
+        "(b) The fitted updraft W* of each drone against the true one; on the dashed line \
                    they agree."
-        .to_owned();
+            .to_owned();
     (Some(panel), caption)
 }
 
@@ -193,7 +201,8 @@ fn by_drone(flights: &[&FlightAnalysis]) -> (Option<Panel>, String) {
     }
     let truth = flight.true_updraft_mps.filter(|&truth| usable(truth));
     let mut x = Axis::around("slot", marks.iter().map(|mark| mark.x), 4.0);
-    x.min = 0.0;
+    let last = marks.iter().map(|mark| mark.x).filter(|&x| usable(x)).fold(1.0, f64::max);
+    (x.min, x.max) = (0.0, last + 1.0);
     let reach = marks.iter().flat_map(|mark| [mark.y - mark.y_error, mark.y + mark.y_error]);
     let y = Axis::around("fitted updraft W* (m/s)", reach.chain(truth), 0.02);
     let mut panel = Panel::new("(b) Updraft that each drone's fit implies", x.clone(), y);

@@ -1,6 +1,6 @@
 //! The map of the air: the grid seen from above, coloured by the estimated vertical air speed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis, UpdraftMap};
 
@@ -28,9 +28,10 @@ impl Projection {
     /// Fits all positions, half a cell around, in a box of pixels; `None` without positions.
     fn new(positions: &[[f64; 2]], origin: [f64; 2], size: [f64; 2]) -> Option<Self> {
         let range = |axis: usize| {
-            positions.iter().map(|p| p[axis]).fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| {
-                (r.0.min(v), r.1.max(v))
-            })
+            positions
+                .iter()
+                .map(|p| p[axis])
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)))
         };
         let (forward, left) = (range(0), range(1));
         if forward.0 > forward.1 {
@@ -101,10 +102,31 @@ fn empty_places(analysis: &Analysis, flight: &FlightAnalysis) -> Vec<(u16, [f64;
         .filter_map(|drone| Some((drone.slot?, drone.home_m?)))
         .filter(|(_, home)| usable(home[0]) && usable(home[1]))
         .collect();
-    let missing = flight.missing.iter().filter_map(|missing| {
-        homes.get(&missing.slot).map(|&home| (missing.slot, home))
-    });
+    let missing = flight
+        .missing
+        .iter()
+        .filter_map(|missing| homes.get(&missing.slot).map(|&home| (missing.slot, home)));
     missing.collect()
+}
+
+/// Places of a rectangular grid that none of these positions takes; empty where they form no grid.
+fn holes(positions: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    // Half metres: surveyed homes are not exactly on the grid.
+    let key = |v: f64| (v * 2.0).round() as i64;
+    let axis = |axis: usize| -> BTreeMap<i64, f64> {
+        positions.iter().map(|p| (key(p[axis]), p[axis])).collect()
+    };
+    let (forward, left) = (axis(0), axis(1));
+    if forward.len() * left.len() > 2 * positions.len() {
+        return Vec::new();
+    }
+    let taken: BTreeSet<(i64, i64)> = positions.iter().map(|p| (key(p[0]), key(p[1]))).collect();
+    forward
+        .iter()
+        .flat_map(|(row, x)| left.iter().map(move |(column, y)| ((*row, *column), [*x, *y])))
+        .filter(|(cell, _)| !taken.contains(cell))
+        .map(|(_, place)| place)
+        .collect()
 }
 
 /// The map of mean updrafts; `None` if no drone has a position. `key` names the flight in files.
@@ -114,41 +136,30 @@ pub(super) fn mean_map(
     key: &str,
     map: &UpdraftMap,
 ) -> Option<Figure> {
-    let empty = empty_places(analysis, flight);
     let mut positions: Vec<[f64; 2]> = map.drones.iter().filter_map(position).collect();
     if positions.is_empty() {
         return None;
     }
-    positions.extend(empty.iter().map(|(_, home)| *home));
+    let known = empty_places(analysis, flight);
+    positions.extend(known.iter().map(|(_, home)| *home));
+    let mut empty: Vec<(Option<u16>, [f64; 2])> =
+        known.into_iter().map(|(slot, home)| (Some(slot), home)).collect();
+    let unknown = holes(&positions);
+    positions.extend(&unknown);
+    empty.extend(unknown.into_iter().map(|place| (None, place)));
     let projection = Projection::new(&positions, [70.0, 16.0], [800.0, 620.0])?;
     let [width, height] = projection.size();
     let limit = limit(map.drones.iter().map(|drone| drone.mean.value));
     let sheet_width = (70.0 + width + 130.0).max(380.0);
     let mut drawing = Drawing::new(sheet_width, height.max(220.0) + 74.0);
+    let with_text = positions.len() <= TEXT_LIMIT;
     for (slot, home) in &empty {
-        let [x, y, w, h] = projection.cell(*home);
-        drawing.open(&format!("slot {slot}: no data"));
-        drawing.rect(
-            [x + 2.0, y + 2.0, w - 4.0, h - 4.0],
-            "#fafbfc",
-            &format!("stroke=\"{FAINT}\" stroke-dasharray=\"4 3\""),
-        );
-        if positions.len() <= TEXT_LIMIT {
-            let style = TextStyle {
-                size: (w * 0.16).clamp(6.0, 12.0),
-                bold: false,
-                colour: MUTED,
-                anchor: Anchor::Middle,
-            };
-            drawing.text([x + w / 2.0, y + h * 0.46], &slot.to_string(), style, 0.0);
-            drawing.text([x + w / 2.0, y + h * 0.68], "no data", style, 0.0);
-        }
-        drawing.close();
+        empty_cell(&mut drawing, *slot, projection.cell(*home), with_text);
     }
     for drone in &map.drones {
         if let Some(place) = position(drone) {
             let cell = projection.cell(place);
-            mean_cell(&mut drawing, drone, cell, limit, positions.len() <= TEXT_LIMIT);
+            mean_cell(&mut drawing, drone, cell, limit, with_text);
         }
     }
     axes(&mut drawing, &projection);
@@ -169,6 +180,27 @@ pub(super) fn mean_map(
             count(positions.len() - empty.len(), "drone"),
         ),
     })
+}
+
+fn empty_cell(drawing: &mut Drawing, slot: Option<u16>, [x, y, w, h]: [f64; 4], with_text: bool) {
+    let label = slot.map(|slot| slot.to_string());
+    drawing
+        .open(&label.as_ref().map_or("no data".to_owned(), |slot| format!("slot {slot}: no data")));
+    drawing.rect(
+        [x + 2.0, y + 2.0, w - 4.0, h - 4.0],
+        "#fafbfc",
+        &format!("stroke=\"{FAINT}\" stroke-dasharray=\"4 3\""),
+    );
+    if with_text {
+        let style = |size, anchor| TextStyle { size, bold: false, colour: MUTED, anchor };
+        let middle = [x + w / 2.0, y + h * 0.56];
+        drawing.text(middle, "no data", style((w * 0.155).min(13.0), Anchor::Middle), 0.0);
+        if let Some(label) = label {
+            let corner = [x + w * 0.07, y + h * 0.2];
+            drawing.text(corner, &label, style((w * 0.13).min(10.0), Anchor::Start), 0.0);
+        }
+    }
+    drawing.close();
 }
 
 fn mean_cell(
@@ -218,8 +250,7 @@ fn error_decimals(se: f64) -> usize {
 fn axes(drawing: &mut Drawing, projection: &Projection) {
     let [width, height] = projection.size();
     let (left, bottom) = (projection.origin[0], projection.origin[1] + height);
-    let style =
-        |size, colour, anchor| TextStyle { size, bold: false, colour, anchor };
+    let style = |size, colour, anchor| TextStyle { size, bold: false, colour, anchor };
     for tick in ticks(projection.left_m) {
         let x = projection.across(tick);
         drawing.line([x, bottom, x, bottom + 5.0], MUTED);
@@ -244,6 +275,13 @@ fn ticks((low, high): (f64, f64)) -> Vec<f64> {
     (first..=last).map(|i| i as f64 * step).collect()
 }
 
+/// No data: white would look like still air.
+fn cross(drawing: &mut Drawing, [x, y, w, h]: [f64; 4]) {
+    let (left, right, top, bottom) = (x + 0.3 * w, x + 0.7 * w, y + 0.3 * h, y + 0.7 * h);
+    drawing.line([left, top, right, bottom], FAINT);
+    drawing.line([left, bottom, right, top], FAINT);
+}
+
 /// A vertical colour bar with ticks and label.
 fn colour_bar(drawing: &mut Drawing, [x, y, w, h]: [f64; 4], limit: f64, label: &str) {
     const STEPS: u32 = 80;
@@ -258,8 +296,7 @@ fn colour_bar(drawing: &mut Drawing, [x, y, w, h]: [f64; 4], limit: f64, label: 
     for part in [-1.0, -0.5, 0.0, 0.5, 1.0] {
         let at = y + h * (1.0 - part) / 2.0;
         drawing.line([x + w, at, x + w + 4.0, at], MUTED);
-        let style =
-            TextStyle { size: 12.0, bold: false, colour: INK, anchor: Anchor::Start };
+        let style = TextStyle { size: 12.0, bold: false, colour: INK, anchor: Anchor::Start };
         drawing.text([x + w + 8.0, at + 4.0], &signed(part * limit, decimals), style, 0.0);
     }
     let style = TextStyle { size: 13.0, bold: false, colour: INK, anchor: Anchor::Middle };
@@ -267,11 +304,7 @@ fn colour_bar(drawing: &mut Drawing, [x, y, w, h]: [f64; 4], limit: f64, label: 
 }
 
 /// Small maps at evenly spaced times; `None` without positions or times.
-pub(super) fn time_maps(
-    flight: &FlightAnalysis,
-    key: &str,
-    map: &UpdraftMap,
-) -> Option<Figure> {
+pub(super) fn time_maps(flight: &FlightAnalysis, key: &str, map: &UpdraftMap) -> Option<Figure> {
     let filled: Vec<usize> = (0..map.time_s.len())
         .filter(|&time| {
             let present = map.drones.iter().filter(|drone| at(drone, time).is_some()).count();
@@ -285,8 +318,8 @@ pub(super) fn time_maps(
         .filter_map(|i| filled.get((2 * i + 1) * filled.len() / (2 * SLICES)).copied())
         .collect();
     let positions: Vec<[f64; 2]> = map.drones.iter().filter_map(position).collect();
-    let limit =
-        limit(chosen.iter().flat_map(|&t| map.drones.iter().filter_map(move |d| at(d, t))));
+    let limit = limit(chosen.iter().flat_map(|&t| map.drones.iter().filter_map(move |d| at(d, t))));
+    let absent = holes(&positions);
     let size = 140.0;
     let tall = Projection::new(&positions, [0.0, 0.0], [size, size])?.size()[1];
     let mut drawing = Drawing::new(1040.0, tall.max(130.0) + 44.0);
@@ -297,9 +330,17 @@ pub(super) fn time_maps(
         let seconds = map.time_s.get(time).copied().unwrap_or(f64::NAN);
         drawing.text([origin[0], 20.0], &format!("{} s", fixed(seconds, 0)), style, 0.0);
         for drone in &map.drones {
-            let (Some(place), Some(w)) = (position(drone), at(drone, time)) else { continue };
-            let [x, y, w_px, h_px] = projection.cell(place);
-            drawing.rect([x, y, w_px + 0.3, h_px + 0.3], &diverging(w / limit), "");
+            let Some(place) = position(drone) else { continue };
+            match at(drone, time) {
+                Some(w) => {
+                    let [x, y, w_px, h_px] = projection.cell(place);
+                    drawing.rect([x, y, w_px + 0.3, h_px + 0.3], &diverging(w / limit), "");
+                }
+                None => cross(&mut drawing, projection.cell(place)),
+            }
+        }
+        for place in &absent {
+            cross(&mut drawing, projection.cell(*place));
         }
         let [w, h] = projection.size();
         drawing.rect([origin[0], origin[1], w, h], "none", &format!("stroke=\"{FAINT}\""));
@@ -313,7 +354,7 @@ pub(super) fn time_maps(
         name,
         title,
         caption: "The same grid at six show times: running 10 s estimates of the vertical air \
-                  speed, one common colour scale."
+                  speed, one common colour scale; crosses where there is no data."
             .to_owned(),
     })
 }

@@ -1,7 +1,7 @@
 //! Figures, tables and the HTML report.
 //!
 //! [`render`] turns an [`Analysis`] into one self-contained page (no network, no external fonts or
-//! scripts) and its figures as single SVG files; [`write`] puts them in a folder;
+//! scripts) and its figures as single SVG files; [`write()`] puts them in a folder;
 //! [`terminal_summary`] says the same in a terminal. All are pure functions of their input: equal
 //! input gives equal bytes.
 //!

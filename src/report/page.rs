@@ -1,5 +1,7 @@
 //! The HTML page: what goes where; the words and the look are in `templates/report/`.
 
+use std::fmt::Write as _;
+
 use minijinja::value::Value;
 use minijinja::{Environment, UndefinedBehavior, context};
 
@@ -7,14 +9,13 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::base::estimate::Estimate;
 
 use super::compare::{
-    clock, comparison, drone_laws, drones_of, fit_line, flags, fleet_air, flock_lines,
-    windows_used,
+    clock, comparison, drone_laws, drones_of, fit_line, flags, fleet_air, flock_lines, windows_used,
 };
 use super::figure_air::{self, mean_truth};
 use super::figure_drone::{self, Axes, drawable};
 use super::text::{
-    NONE, clean, count, estimate, fixed, kind, parameter, purpose, signed, slug, unit, usable,
-    value_of,
+    NONE, clean, count, estimate, fixed, kind, parameter, purpose, shortened, signed, slug, unit,
+    usable, value_of,
 };
 use super::{Figure, Provenance, Report, ReportError, figure_laws, figure_map, law};
 
@@ -26,15 +27,20 @@ const SCRIPT: &str = include_str!("../../templates/report/script.js");
 const DRONE_FIGURE_BYTES: usize = 2_300_000;
 /// Drones that get a drawing at all, in one flight.
 const DRONE_FIGURE_LIMIT: usize = 400;
+/// More flights than this are summed up at the top of the page.
+const SUMMED_FLIGHTS: usize = 3;
 /// Lists that are longer than this start folded.
 const OPEN_LIMIT: usize = 6;
 
 /// Makes the page and the figures.
-pub(super) fn render(
-    analysis: &Analysis,
-    provenance: &Provenance,
-) -> Result<Report, ReportError> {
+pub(super) fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Report, ReportError> {
     let mut figures = Gallery::default();
+    let air: Vec<Value> = analysis
+        .flights
+        .iter()
+        .enumerate()
+        .filter_map(|(index, flight)| air_section(analysis, flight, index, &mut figures))
+        .collect();
     let laws = figure_laws::figure(analysis).map(|figure| figures.show(figure));
     let flights: Vec<Value> = analysis
         .flights
@@ -69,6 +75,7 @@ pub(super) fn render(
         tiles => tiles(analysis),
         warnings_open => warnings.len() <= OPEN_LIMIT,
         warnings,
+        air,
         laws,
         flights,
         kuva => kuva::VERSION,
@@ -98,6 +105,27 @@ impl Gallery {
     }
 }
 
+/// The maps of a flight, which the page shows first: they are what the fleet was flown for.
+fn air_section(
+    analysis: &Analysis,
+    flight: &FlightAnalysis,
+    index: usize,
+    figures: &mut Gallery,
+) -> Option<Value> {
+    let map = flight.map.as_ref()?;
+    let key = flight_key(analysis, index);
+    let maps: Vec<Value> = [
+        figure_map::mean_map(analysis, flight, &key, map),
+        figure_air::figure(flight, &key, map),
+        figure_map::time_maps(flight, &key, map),
+    ]
+    .into_iter()
+    .flatten()
+    .map(|figure| figures.show(figure))
+    .collect();
+    Some(context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), maps })
+}
+
 fn flight_section(
     analysis: &Analysis,
     flight: &FlightAnalysis,
@@ -106,19 +134,6 @@ fn flight_section(
 ) -> Value {
     let key = flight_key(analysis, index);
     let drones = drone_gallery(flight, &key, figures);
-    let maps: Vec<Value> = flight
-        .map
-        .iter()
-        .flat_map(|map| {
-            [
-                figure_map::mean_map(analysis, flight, &key, map),
-                figure_map::time_maps(flight, &key, map),
-                figure_air::figure(flight, &key, map),
-            ]
-        })
-        .flatten()
-        .map(|figure| figures.show(figure))
-        .collect();
     let map_law = flight.map.as_ref().map(|map| clean(&map.law));
     let table: Vec<Value> = flight
         .table
@@ -137,10 +152,8 @@ fn flight_section(
         .iter()
         .map(|missing| context! { slot => missing.slot, reason => clean(&missing.reason) })
         .collect();
-    let flock: Vec<Value> = flock_lines(flight)
-        .into_iter()
-        .map(|(law, line)| context! { law, line })
-        .collect();
+    let flock: Vec<Value> =
+        flock_lines(flight).into_iter().map(|(law, line)| context! { law, line }).collect();
     let own = match flight.drones.as_slice() {
         [drone] if flight.flock.is_none() => drone.laws.as_ref(),
         _ => None,
@@ -166,8 +179,6 @@ fn flight_section(
         own,
         windows => window_kinds(flight),
         gallery => drones,
-        maps,
-        has_map => flight.map.is_some(),
         map_law,
         head,
         rows_open => rows.len() <= 10,
@@ -205,7 +216,8 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
     let mut bytes = 0;
     let mut choices = Vec::new();
     let mut shown = None;
-    let mut left_out = flight.drones.len() - wanted.len();
+    let undrawn = flight.drones.len() - wanted.len();
+    let mut left_out = 0;
     for index in wanted {
         let (Some(drone), Some(figure)) =
             (flight.drones.get(index), figure_drone::figure(flight, key, index, &axes))
@@ -236,7 +248,7 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
             figures.files.push((figure.name, figure.svg));
         }
     }
-    Some(context! { shown => shown?, choices, left_out })
+    Some(context! { shown => shown?, choices, left_out, undrawn })
 }
 
 /// How many windows of each kind all drones have: `14 up × …` as words.
@@ -277,9 +289,8 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("χ²/ν linear", true),
         ("windows", true),
         ("clock", false),
-        ("notes", false),
     ];
-    let rows: Vec<(Vec<String>, bool)> = flight
+    let rows: Vec<(Vec<String>, String)> = flight
         .drones
         .iter()
         .map(|drone| {
@@ -288,10 +299,9 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 map.drones.iter().find(|air| air.slot == drone.slot && air.name == drone.name)
             });
             let none = || NONE.to_owned();
-            let notes = flags(drone);
             let cells = vec![
                 drone.slot.map_or_else(none, |slot| slot.to_string()),
-                clean(&drone.name),
+                shortened(&drone.name, 28),
                 air.map_or_else(none, |air| estimate(air.mean)),
                 air.and_then(mean_truth).map_or_else(none, |truth| fixed(truth, 3)),
                 air.map_or_else(none, |air| clean(&air.mapping)),
@@ -304,9 +314,8 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 laws.linear_chi2,
                 if drone.windows.is_empty() { none() } else { windows_used(drone) },
                 clock(drone).to_owned(),
-                notes.join("; "),
             ];
-            (cells, !notes.is_empty())
+            (cells, flags(drone).join("; "))
         })
         .collect();
     let filled: Vec<bool> = (0..heads.len())
@@ -323,12 +332,12 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         .collect();
     let rows = rows
         .iter()
-        .map(|(cells, flagged)| {
+        .map(|(cells, note)| {
             let cells: Vec<Value> = kept()
                 .filter_map(|column| Some((cells.get(column)?, heads.get(column)?.1)))
                 .map(|(cell, number)| context! { text => cell.clone(), number })
                 .collect();
-            context! { cells, flagged => *flagged }
+            context! { cells, note => note.clone() }
         })
         .collect();
     (head, rows)
@@ -337,35 +346,69 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
 /// The numbers at a glance.
 fn tiles(analysis: &Analysis) -> Vec<Value> {
     let mut tiles = Vec::new();
-    let mut tile = |value: String, unit: &str, label: String, note: String| {
-        tiles.push(context! { value, unit => unit.to_owned(), label, note });
+    let mut tile = |value: String, label: String, note: String| {
+        tiles.push(context! { value, label, note });
     };
-    for flight in analysis.flights.iter().take(2) {
-        let all = flight.drones.len() + flight.missing.len();
-        let note = if flight.missing.is_empty() {
-            "none missing".to_owned()
-        } else {
-            format!("{} missing", flight.missing.len())
-        };
-        let label = format!("drones, {}", clean(&flight.name));
-        tile(format!("{}/{all}", flight.drones.len()), "", label, note);
-    }
-    if let Some(flight) = analysis.flights.iter().find(|flight| !fleet_values(flight).is_empty()) {
-        for (symbol, of, unit_text) in fleet_values(flight) {
-            let note = format!("± {}", error_of(of));
-            tile(value_of(of), &unit_text, symbol, note);
+    let logs = |flights: &[FlightAnalysis]| {
+        let have: usize = flights.iter().map(|flight| flight.drones.len()).sum();
+        let missing: usize = flights.iter().map(|flight| flight.missing.len()).sum();
+        let note =
+            if missing == 0 { "none missing".to_owned() } else { format!("{missing} missing") };
+        (format!("{have}/{}", have + missing), note)
+    };
+    if analysis.flights.len() > SUMMED_FLIGHTS {
+        let (value, note) = logs(&analysis.flights);
+        tile(value, format!("logs, {}", count(analysis.flights.len(), "flight")), note);
+    } else {
+        for flight in &analysis.flights {
+            let (value, note) = logs(std::slice::from_ref(flight));
+            tile(value, format!("drones, {}", clean(&flight.name)), note);
         }
+    }
+    let mut fitted = analysis.flights.iter().map(fleet_values).filter(|values| !values.is_empty());
+    if let (Some(values), None) = (fitted.next(), fitted.next()) {
+        for (label, of, unit) in values {
+            tile(value_of(of), label, format!("± {} {unit}", error_of(of)));
+        }
+    }
+    if let Some((rms, fits)) = fit_error(analysis) {
+        let note = format!("m/s, {}", count(fits, "fit"));
+        tile(fixed(rms, 3), "rms of W* − true W".to_owned(), note);
     }
     for flight in &analysis.flights {
         let Some(air) = flight.map.as_ref().and_then(fleet_air) else { continue };
-        let note = format!("± {} between drones", fixed(air.sd, 2));
-        tile(signed(air.mean, 2), "m/s", format!("mean updraft, {}", clean(&flight.name)), note);
+        let note = format!("± {} m/s between drones", fixed(air.sd, 2));
+        tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
         if let Some(rms) = air.rms_error {
-            let note = count(air.n, "drone");
-            tile(fixed(rms, 3), "m/s", "rms error against the truth".to_owned(), note);
+            let note = format!("m/s, {}", count(air.n, "drone"));
+            tile(fixed(rms, 3), "rms error of the map".to_owned(), note);
         }
     }
     tiles
+}
+
+/// Root mean square of fitted minus true updraft over all fits of several calibrations, and their
+/// number.
+fn fit_error(analysis: &Analysis) -> Option<(f64, usize)> {
+    let calibrations: Vec<&FlightAnalysis> = analysis
+        .flights
+        .iter()
+        .filter(|flight| flight.true_updraft_mps.is_some() && flight.map.is_none())
+        .collect();
+    if calibrations.len() < 2 {
+        return None;
+    }
+    let errors = || {
+        calibrations.iter().flat_map(|flight| {
+            let truth = flight.true_updraft_mps.unwrap_or(f64::NAN);
+            flight.drones.iter().filter_map(move |drone| {
+                let fit = law::signed_quadratic(drone.laws.as_ref()?);
+                let error = parameter(fit, "W")?.estimate.value - truth;
+                usable(error).then_some(error * error)
+            })
+        })
+    };
+    figure_air::mean(errors()).map(|mean| (mean.sqrt(), errors().count()))
 }
 
 fn error_of(of: Estimate) -> String {
@@ -403,30 +446,41 @@ fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
         .collect()
 }
 
-/// One sentence for each flight.
+/// One sentence for each flight, or one for many.
 fn verdict(analysis: &Analysis) -> Vec<String> {
     if analysis.flights.is_empty() {
         return vec!["There is no flight in this analysis.".to_owned()];
+    }
+    if analysis.flights.len() > SUMMED_FLIGHTS {
+        let drones = || analysis.flights.iter().flat_map(|flight| &flight.drones);
+        let fitted = drones().filter(|drone| drone.laws.is_some()).count();
+        return vec![format!(
+            "{} with {} analysed, laws fitted for {fitted}.",
+            count(analysis.flights.len(), "flight"),
+            count(drones().count(), "log"),
+        )];
     }
     analysis
         .flights
         .iter()
         .map(|flight| {
-            let mut text = format!("{}: {} analysed", capitalised(&clean(&flight.name)), drones_of(flight));
+            let name = capitalised(&clean(&flight.name));
+            let mut text = format!("{name}: {} analysed", drones_of(flight));
             let fitted = flight.drones.iter().filter(|drone| drone.laws.is_some()).count();
             if fitted > 0 {
-                text.push_str(&format!(", laws fitted for {fitted}"));
+                let _ = write!(text, ", laws fitted for {fitted}");
             }
             if let Some(air) = flight.map.as_ref().and_then(fleet_air) {
-                text.push_str(&format!(
+                let _ = write!(
+                    text,
                     ", vertical air speed from {} to {} m/s over the grid",
                     signed(air.lowest, 2),
                     signed(air.highest, 2),
-                ));
+                );
             }
             let noted = flight.drones.iter().filter(|drone| !flags(drone).is_empty()).count();
             if noted > 0 {
-                text.push_str(&format!(", {} with notes", count(noted, "drone")));
+                let _ = write!(text, ", {} with notes", count(noted, "drone"));
             }
             text.push('.');
             text

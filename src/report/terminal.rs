@@ -3,15 +3,14 @@
 use std::fmt::Write as _;
 
 use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
+use crate::mission::plan::Purpose;
 
 use super::compare::{
     clock, comparison, drone_laws, drones_of, flags, fleet_air, flock_lines, windows_used,
 };
 use super::figure_air::mean_truth;
 use super::table::{Align, Column, lines};
-use super::text::{
-    NONE, clean, count, fixed, purpose, shortened, signed, usable,
-};
+use super::text::{NONE, clean, count, fixed, purpose, shortened, signed, usable};
 
 /// Above so many drones the table of drones shows only those with flags.
 const DRONE_LIMIT: usize = 64;
@@ -133,7 +132,7 @@ impl Output {
         }
         let columns = [
             column("law", Align::Left, 0),
-            column("parameter", Align::Left, 0),
+            column("par.", Align::Left, 0),
             column("fleet mean ± s.d.", Align::Right, 0),
             column("unit", Align::Left, 1),
             column("mean s.e.", Align::Right, 4),
@@ -180,7 +179,7 @@ impl Output {
         let columns = [
             column("slot", Align::Right, 0),
             column("name", Align::Left, 3),
-            column("A", Align::Right, 0),
+            column("A", Align::Right, 1),
             column("u₀", Align::Right, 2),
             column("W*", Align::Right, 0),
             column("χ²/ν", Align::Right, 6),
@@ -188,9 +187,12 @@ impl Output {
             column("u₀ (linear)", Align::Right, 5),
             column("windows", Align::Right, 4),
             column("clock", Align::Left, 7),
-            column("notes", Align::Left, 1),
+            column("notes", Align::Left, 0),
         ];
-        let all = flight.drones.len() <= DRONE_LIMIT;
+        // In a measurement the map says it all; only what is doubtful is worth a line.
+        let fitted = flight.drones.iter().any(|drone| drone.laws.is_some());
+        let calibration = fitted || flight.purpose == Purpose::Calibration;
+        let all = calibration && flight.drones.len() <= DRONE_LIMIT;
         let rows: Vec<Vec<String>> = flight
             .drones
             .iter()
@@ -208,29 +210,27 @@ impl Output {
                     laws.chi2,
                     laws.slope,
                     laws.linear_u0,
-                    windows_used(drone),
+                    if drone.windows.is_empty() { NONE.to_owned() } else { windows_used(drone) },
                     clock(drone).to_owned(),
                     flags.join("; "),
                 ]
             })
             .collect();
-        self.line("", "");
         if flight.drones.is_empty() {
+            self.line("", "");
             self.line(YELLOW, "  No drone of this flight could be analysed.");
-            return;
-        }
-        if !all {
-            let shown = rows.len();
-            self.line(
-                DIM,
-                &format!("  {shown} of {} with notes; all are in the report", flight.drones.len()),
-            );
         }
         if !rows.is_empty() {
+            self.line("", "");
+            if !all {
+                let n = flight.drones.len();
+                let more = if calibration { "; all are in the report" } else { "" };
+                self.line(DIM, &format!("  {} of {n} drones have notes{more}", rows.len()));
+            }
             self.table(&columns, &rows);
         }
-        if flight.flock.is_none() && flight.drones.iter().all(|drone| drone.laws.is_none()) {
-            self.line(DIM, "  no laws were fitted in this flight");
+        if calibration && !fitted && flight.flock.is_none() {
+            self.line(YELLOW, "  No laws were fitted in this flight.");
         }
     }
 
@@ -257,7 +257,11 @@ impl Output {
             let known = map.drones.iter().filter(|drone| mean_truth(drone).is_some()).count();
             self.line(
                 "",
-                &format!("  rms error against the truth: {} m/s ({})", fixed(rms, 3), count(known, "drone")),
+                &format!(
+                    "  rms error against the truth: {} m/s ({})",
+                    fixed(rms, 3),
+                    count(known, "drone")
+                ),
             );
         }
         self.grid(map, air.lowest.abs().max(air.highest.abs()));
@@ -271,7 +275,8 @@ impl Output {
             .filter_map(|drone| {
                 let [x, y] = drone.position_m.filter(|p| usable(p[0]) && usable(p[1]))?;
                 let cell = [(x * 2.0).round() as i64, (y * 2.0).round() as i64];
-                usable(drone.mean.value).then(|| (cell, drone.mean.value, signed(drone.mean.value, 2)))
+                usable(drone.mean.value)
+                    .then(|| (cell, drone.mean.value, signed(drone.mean.value, 2)))
             })
             .collect();
         let distinct = |axis: usize| {

@@ -19,7 +19,9 @@ pub(super) fn usable(value: f64) -> bool {
 /// in XML and drive terminals.
 pub(super) fn clean(text: &str) -> String {
     text.chars()
-        .map(|c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { '\u{fffd}' } else { c })
+        .map(
+            |c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { '\u{fffd}' } else { c },
+        )
         .collect()
 }
 
@@ -29,9 +31,8 @@ pub(super) fn shortened(text: &str, limit: usize) -> String {
     if text.chars().count() <= limit {
         return text;
     }
-    let mut cut: String = text.chars().take(limit.saturating_sub(1)).collect();
-    cut.push('…');
-    cut
+    let cut: String = text.chars().take(limit.saturating_sub(1)).collect();
+    format!("{}…", cut.trim_end())
 }
 
 /// A file name part of lower-case letters, digits and hyphens; never empty, never a path.
@@ -79,7 +80,10 @@ pub(super) fn estimate(estimate: Estimate) -> String {
     if !usable(estimate.se) {
         return format!("{} ± unknown", fixed(estimate.value, 3));
     }
-    minus(&estimate.to_string())
+    // An error in the last bits of a double is none.
+    let negligible = estimate.se < 1e-9 * estimate.value.abs();
+    let shown = if negligible { Estimate::new(estimate.value, 0.0) } else { estimate };
+    minus(&shown.to_string())
 }
 
 /// A value without its error, to the digit that the error supports.

@@ -2,8 +2,7 @@
 //!
 //! Deterministic, and independent of the analysis code: the report is tested against it alone.
 
-// Each test binary uses a part of this.
-#![expect(dead_code, reason = "shared by several test binaries")]
+#![allow(dead_code, clippy::allow_attributes, reason = "each test binary uses a part")]
 
 use std::f64::consts::TAU;
 
@@ -43,9 +42,13 @@ impl Noise {
 }
 
 /// 49 drones, calibration and hover, some logs missing.
-pub fn campaign() -> Analysis {
-    let missing = [(7, "no log was found"), (18, "the log ends 41 s before take-off"),
-        (33, "no log was found"), (41, "the file is not a DataFlash log")];
+pub(crate) fn campaign() -> Analysis {
+    let missing = [
+        (7, "no log was found"),
+        (18, "the log ends 41 s before take-off"),
+        (33, "no log was found"),
+        (41, "the file is not a DataFlash log"),
+    ];
     let calibration = calibration("calibration", 49, 0.0, &missing);
     Analysis {
         schema: ANALYSIS_SCHEMA.to_owned(),
@@ -60,7 +63,7 @@ pub fn campaign() -> Analysis {
 }
 
 /// One drone flown in eleven updrafts, as for the paper's Figure 2.
-pub fn updraft_series() -> Analysis {
+pub(crate) fn updraft_series() -> Analysis {
     let flights = (-5..=5)
         .map(|i| {
             let w = f64::from(i) * 0.7;
@@ -76,7 +79,7 @@ pub fn updraft_series() -> Analysis {
     }
 }
 
-pub fn provenance() -> Provenance {
+pub(crate) fn provenance() -> Provenance {
     Provenance {
         program: "updraft 0.1.0".to_owned(),
         command: "updraft run --grid 7x7 --spacing 7 --seed 2024 -o my-campaign".to_owned(),
@@ -96,7 +99,12 @@ fn home(slot: u16) -> [f64; 2] {
     [(f64::from(row) - 3.0) * SPACING_M, (f64::from(column) - 3.0) * SPACING_M]
 }
 
-pub fn calibration(name: &str, drones: u16, truth: f64, missing: &[(u16, &str)]) -> FlightAnalysis {
+pub(crate) fn calibration(
+    name: &str,
+    drones: u16,
+    truth: f64,
+    missing: &[(u16, &str)],
+) -> FlightAnalysis {
     let gone: Vec<u16> = missing.iter().map(|(slot, _)| *slot).collect();
     let analysed: Vec<DroneAnalysis> = (1..=drones)
         .filter(|slot| !gone.contains(slot))
@@ -148,7 +156,7 @@ fn law(v: f64, w: f64) -> f64 {
 
 fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
     let mut noise = Noise::of(slot, Stream::Sensors);
-    let bias = 0.8 * noise.normal();
+    let bias = 0.06 * noise.normal();
     let w = truth + W_BIAS;
     let mut windows = Vec::new();
     let mut trace = Trace::default();
@@ -191,11 +199,13 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
         }
     }
     let (slope, u0) = straight_line(&windows);
+    let chi2 = 0.98 + 0.3 * noise.normal().clamp(-2.0, 2.0);
     let mut quadratic = fit(&[
         ("A", "us/(m/s)²", A + 0.02 * noise.normal(), 0.021),
-        ("u0", "us", U0 + bias, 0.19),
+        ("u0", "us", U0 + bias, 0.051),
         ("W", "m/s", w + 0.004 * noise.normal(), 0.0043),
     ]);
+    quadratic.chi2_reduced = Some(chi2);
     let mut warnings = Vec::new();
     if slot == 12 {
         warnings.push("no SHOW rows in the log; clock aligned with the plan".to_owned());
@@ -230,16 +240,14 @@ fn straight_line(windows: &[WindowStats]) -> (f64, f64) {
         .map(|window| (window.velocity_mps.median, window.pulse_phi_us.median))
         .collect();
     let n = moving.len() as f64;
-    let (mx, my) = (
-        moving.iter().map(|p| p.0).sum::<f64>() / n,
-        moving.iter().map(|p| p.1).sum::<f64>() / n,
-    );
+    let (mx, my) =
+        (moving.iter().map(|p| p.0).sum::<f64>() / n, moving.iter().map(|p| p.1).sum::<f64>() / n);
     let slope = moving.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
         / moving.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
     (slope, my - slope * mx)
 }
 
-pub fn fit(parameters: &[(&str, &str, f64, f64)]) -> Fit {
+pub(crate) fn fit(parameters: &[(&str, &str, f64, f64)]) -> Fit {
     Fit {
         parameters: parameters
             .iter()
@@ -309,10 +317,13 @@ fn air(position: [f64; 2], time_s: f64) -> f64 {
         + 0.16 * (TAU * time_s / 240.0 + position[0] / 25.0).sin()
 }
 
-pub fn hover() -> FlightAnalysis {
+pub(crate) fn hover() -> FlightAnalysis {
     let missing: [(u16, &str); 6] = [
-        (3, "no log was found"), (7, "no log was found"), (18, "no log was found"),
-        (26, "the log has no EKF velocity"), (33, "no log was found"),
+        (3, "no log was found"),
+        (7, "no log was found"),
+        (18, "no log was found"),
+        (26, "the log has no EKF velocity"),
+        (33, "no log was found"),
         (45, "the log ends after 212 s of 600 s"),
     ];
     let slots = (1..=49).filter(|slot| !missing.iter().any(|(gone, _)| gone == slot));
@@ -354,7 +365,11 @@ pub fn hover() -> FlightAnalysis {
             windows: Vec::new(),
             laws: None,
             trace: Trace::default(),
-            warnings: if slot == 20 { vec!["gap of 290 s in the log".to_owned()] } else { Vec::new() },
+            warnings: if slot == 20 {
+                vec!["gap of 290 s in the log".to_owned()]
+            } else {
+                Vec::new()
+            },
         });
     }
     FlightAnalysis {
