@@ -1,109 +1,24 @@
-//! Panels with axes, drawn by `kuva`, and sheets that put panels side by side in one SVG.
+//! Panels with axes, drawn by `kuva`.
 
 use std::fmt::Write as _;
 
-use kuva::backend::svg::SvgBackend;
 use kuva::plot::legend::{LegendEntry, LegendPosition, LegendShape};
 use kuva::plot::scatter::{MarkerShape, ScatterPlot};
 use kuva::plot::{BandPlot, LinePlot};
-use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
+use kuva::render::layout::{ComputedLayout, Layout};
 use kuva::render::plots::Plot;
 use kuva::render::render::{
     PathData, Primitive, Scene, TextAnchor, render_multiple, render_twin_y,
 };
 use kuva::render::theme::Theme;
 
+use super::axis::Axis;
 use super::colour::{INK, RULE};
-use super::svg::escape;
-use super::text::{clean, fixed, usable};
-
-/// Font of figures; all are found on the reader's machine or replaced there.
-pub(super) const FONT: &str =
-    "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif";
-
-/// Distances of ticks on a time axis.
-const TIME_STEPS_S: [f64; 12] =
-    [1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0, 7200.0];
+use super::sheet::FONT;
+use super::text::{clean, usable};
 
 /// Pixels right of a panel with a right axis.
 const RIGHT_AXIS_MARGIN: f64 = 62.0;
-
-/// Prefix of the clip ids that `kuva` numbers through the whole process.
-const KUVA_CLIP: &str = "kuva-clip-";
-
-/// A linear axis: label with unit, range, distance of its ticks.
-#[derive(Clone, Debug)]
-pub(super) struct Axis {
-    pub(super) label: String,
-    pub(super) min: f64,
-    pub(super) max: f64,
-    pub(super) step: f64,
-}
-
-impl Axis {
-    /// An axis around all usable values, at least `span` wide, ending on ticks.
-    pub(super) fn around(label: &str, values: impl Iterator<Item = f64>, span: f64) -> Self {
-        let (low, high) = extent(values, span);
-        let step = nice_step((high - low) / 5.0);
-        // Room between the data and the frame.
-        let pad = 0.03 * (high - low);
-        let min = ((low - pad) / step).floor() * step;
-        let max = ((high + pad) / step).ceil() * step;
-        Self { label: label.to_owned(), min, max, step }
-    }
-
-    /// A time axis in seconds, not starting before the data.
-    pub(super) fn time(values: impl Iterator<Item = f64>) -> Self {
-        let (low, high) = extent(values, 10.0);
-        let wanted = (high - low) / 7.0;
-        let step = TIME_STEPS_S
-            .into_iter()
-            .find(|&step| step >= wanted)
-            .unwrap_or_else(|| nice_step(wanted));
-        let min = if low > 0.0 && low < step { 0.0 } else { low };
-        Self { label: "show time (s)".to_owned(), min, max: high, step }
-    }
-
-    /// Tick labels with just the decimals that the step needs.
-    fn format(&self) -> TickFormat {
-        let decimals = decimals_of(self.step);
-        TickFormat::Custom(std::sync::Arc::new(move |value| fixed(value, decimals)))
-    }
-}
-
-/// Decimals that tell two multiples of `step` apart.
-pub(super) fn decimals_of(step: f64) -> usize {
-    (0..6)
-        .find(|&decimals| {
-            let scaled = step * 10_f64.powi(decimals);
-            (scaled - scaled.round()).abs() < 1e-6 * scaled.abs().max(1.0)
-        })
-        .unwrap_or(6) as usize
-}
-
-/// The smallest of 1, 2, 2.5, 5 times a power of ten that is not below `raw`.
-pub(super) fn nice_step(raw: f64) -> f64 {
-    if !(raw.is_finite() && raw > 0.0) {
-        return 1.0;
-    }
-    let power = 10_f64.powf(raw.log10().floor());
-    [1.0, 2.0, 2.5, 5.0, 10.0]
-        .into_iter()
-        .map(|factor| factor * power)
-        .find(|&step| step >= raw * (1.0 - 1e-9))
-        .unwrap_or(10.0 * power)
-}
-
-fn extent(values: impl Iterator<Item = f64>, span: f64) -> (f64, f64) {
-    let (low, high) = values
-        .filter(|&value| usable(value))
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    if low > high {
-        return (0.0, span);
-    }
-    let lacking = (span - (high - low)).max(0.0) / 2.0;
-    (low - lacking, high + lacking)
-}
 
 /// A point with half lengths of its error bars.
 #[derive(Clone, Copy, Debug)]
@@ -381,131 +296,9 @@ fn theme() -> Theme {
     }
 }
 
-/// A drawing that panels are put on.
-pub(super) struct Sheet {
-    scene: Scene,
-}
-
-impl Sheet {
-    /// An empty white sheet, pixels.
-    pub(super) fn new(width: f64, height: f64) -> Self {
-        let mut scene = Scene::new(width, height);
-        scene.font_family = Some(FONT.to_owned());
-        scene.text_color = Some(INK.to_owned());
-        Self { scene }
-    }
-
-    /// Puts a panel at (x, y).
-    pub(super) fn place(&mut self, panel: Scene, x: f64, y: f64) {
-        self.scene.defs.extend(panel.defs);
-        self.scene.elements.push(Primitive::GroupStart {
-            transform: Some(format!("translate({x},{y})")),
-            title: None,
-            extra_attrs: None,
-        });
-        self.scene.elements.extend(panel.elements);
-        self.scene.elements.push(Primitive::GroupEnd);
-    }
-
-    /// The SVG. `name` makes ids unique in a page with several figures; `title` is read aloud.
-    pub(super) fn svg(&self, name: &str, title: &str) -> String {
-        let drawn = SvgBackend::new().render_scene(&self.scene);
-        let body = drawn.split_once('>').map_or("", |(_, body)| body);
-        let head = svg_head(self.scene.width, self.scene.height, title);
-        format!("{head}{}", tidied(&renumbered(body, name)))
-    }
-}
-
-/// Opening tag and title of a figure.
-pub(super) fn svg_head(width: f64, height: f64, title: &str) -> String {
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-         width=\"{width}\" height=\"{height}\" role=\"img\" font-family=\"{}\" fill=\"{INK}\">\
-         <title>{}</title>",
-        escape(FONT),
-        escape(&clean(title)),
-    )
-}
-
-/// Clip ids by order in the figure: the process-wide numbers would make each repeat differ.
-fn renumbered(svg: &str, name: &str) -> String {
-    let mut seen: Vec<&str> = Vec::new();
-    let mut pieces = svg.split(KUVA_CLIP);
-    let mut out = String::with_capacity(svg.len());
-    out.push_str(pieces.next().unwrap_or(""));
-    for piece in pieces {
-        let digits = piece.find(|c: char| !c.is_ascii_digit()).unwrap_or(piece.len());
-        let (number, rest) = piece.split_at(digits);
-        let index = seen.iter().position(|&known| known == number).unwrap_or_else(|| {
-            seen.push(number);
-            seen.len() - 1
-        });
-        let _ = write!(out, "{name}-clip{index}{rest}");
-    }
-    out
-}
-
-/// Coordinates to a tenth of a pixel, which nobody sees and which saves a third of the size. Touches
-/// numbers inside tags only, and only those that have more digits than they need.
-fn tidied(svg: &str) -> String {
-    let mut out = String::with_capacity(svg.len());
-    let mut rest = svg;
-    let mut in_tag = false;
-    while let Some(c) = rest.chars().next() {
-        let digits = if in_tag { number_length(rest) } else { 0 };
-        if digits > 0 {
-            let (number, tail) = rest.split_at(digits);
-            out.push_str(&rounded(number));
-            rest = tail;
-            continue;
-        }
-        match c {
-            '<' => in_tag = true,
-            '>' => in_tag = false,
-            _ => {}
-        }
-        out.push(c);
-        rest = rest.get(c.len_utf8()..).unwrap_or("");
-    }
-    out
-}
-
-/// Length of the decimal number at the start of `text`; 0 if there is none.
-fn number_length(text: &str) -> usize {
-    text.bytes().position(|byte| !(byte.is_ascii_digit() || byte == b'.')).unwrap_or(text.len())
-}
-
-fn rounded(number: &str) -> String {
-    let decimals = number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
-    match number.parse::<f64>() {
-        Ok(value) if decimals > 1 && value >= 10.0 => {
-            let text = format!("{value:.1}");
-            text.strip_suffix(".0").unwrap_or(&text).to_owned()
-        }
-        Ok(value) if decimals > 3 => format!("{value:.2}"),
-        _ => number.to_owned(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn axes_end_on_round_numbers() {
-        let axis = Axis::around("u (us)", [1498.7, 1702.3].into_iter(), 10.0);
-        assert_eq!((axis.min, axis.max, axis.step), (1450.0, 1750.0, 50.0));
-        assert_eq!(decimals_of(0.25), 2);
-        assert_eq!(decimals_of(50.0), 0);
-    }
-
-    #[test]
-    fn nothing_and_nonsense_still_make_an_axis() {
-        for values in [vec![], vec![f64::NAN], vec![f64::INFINITY, 1e300], vec![3.0, 3.0]] {
-            let axis = Axis::around("x", values.into_iter(), 1.0);
-            assert!(axis.max > axis.min && axis.step > 0.0, "{axis:?}");
-        }
-    }
 
     #[test]
     fn thinning_keeps_the_extremes_in_time_order() {
@@ -516,21 +309,5 @@ mod tests {
         assert!(thin.len() <= 100);
         assert!(thin.contains(&(503.0, 9.0)) && thin.contains(&(507.0, -9.0)));
         assert!(thin.windows(2).all(|pair| pair[0].0 <= pair[1].0));
-    }
-
-    #[test]
-    fn only_coordinates_are_rounded() {
-        assert_eq!(
-            tidied("<a d=\"M 112.25000000000001 7.449 \" o=\"0.85\">112.2500001</a>"),
-            "<a d=\"M 112.3 7.449 \" o=\"0.85\">112.2500001</a>"
-        );
-        assert_eq!(tidied("<a x=\"16.00000001\"/>"), "<a x=\"16\"/>");
-        assert_eq!(tidied("1.2.3 <b c=\"1.2.3\"/>"), "1.2.3 <b c=\"1.2.3\"/>");
-    }
-
-    #[test]
-    fn clip_ids_depend_on_the_figure_only() {
-        let one = renumbered("<a id=\"kuva-clip-17\"/><b u=\"#kuva-clip-17\"/>", "f");
-        assert_eq!(one, "<a id=\"f-clip0\"/><b u=\"#f-clip0\"/>");
     }
 }

@@ -6,8 +6,10 @@ use kuva::plot::scatter::MarkerShape;
 use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
 
 use super::Figure;
-use super::chart::{Axis, Mark, Panel, Sheet};
+use super::axis::Axis;
+use super::chart::{Mark, Panel};
 use super::colour::{BLUE, VERMILLION};
+use super::sheet::Sheet;
 use super::text::{clean, usable};
 
 /// Mean and standard deviation between drones at one time, and the mean truth.

@@ -6,10 +6,12 @@ use kuva::plot::scatter::MarkerShape;
 use crate::analysis::result::{DroneAnalysis, FlightAnalysis, WindowStats};
 
 use super::Figure;
-use super::chart::{Axis, Panel, Sheet, lines, thinned};
+use super::axis::Axis;
+use super::chart::{Panel, lines, thinned};
 use super::colour::{FAINT, GREEN, INK, MUTED, sequential};
 use super::figure_laws::{PULSE_LABEL, VELOCITY_LABEL};
 use super::law;
+use super::sheet::Sheet;
 use super::text::{clean, slug, usable};
 
 /// A trace keeps two samples of each of so many stretches.

@@ -7,9 +7,11 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::base::estimate::Estimate;
 
 use super::Figure;
-use super::chart::{Axis, Mark, Panel, Sheet};
+use super::axis::Axis;
+use super::chart::{Mark, Panel};
 use super::colour::{BLUE, INK, MUTED, VERMILLION, sequential};
 use super::law;
+use super::sheet::Sheet;
 use super::text::{clean, count, parameter, shortened, signed, usable};
 
 /// Label of the pulse-width axis.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis, UpdraftMap};
 
 use super::Figure;
-use super::chart::{decimals_of, nice_step};
+use super::axis::{decimals_of, nice_step};
 use super::colour::{FAINT, INK, MUTED, diverging, ink_on_diverging};
 use super::svg::{Anchor, Drawing, TextStyle};
 use super::text::{clean, count, estimate, fixed, signed, usable};

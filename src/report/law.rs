@@ -2,7 +2,8 @@
 
 use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, WindowStats};
 
-use super::chart::{Axis, Mark};
+use super::axis::Axis;
+use super::chart::Mark;
 use super::text::{parameter, usable};
 
 /// Samples of a drawn curve.

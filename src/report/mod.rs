@@ -9,6 +9,7 @@
 //! logs and plans (names, warnings) is treated as hostile: it is escaped for HTML and SVG and its
 //! control characters are replaced.
 
+mod axis;
 mod chart;
 mod colour;
 mod compare;
@@ -16,8 +17,10 @@ mod figure_air;
 mod figure_drone;
 mod figure_laws;
 mod figure_map;
+mod glance;
 mod law;
 mod page;
+mod sheet;
 mod svg;
 mod table;
 mod terminal;

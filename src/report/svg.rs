@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::chart::svg_head;
+use super::sheet::svg_head;
 use super::text::clean;
 
 /// Escapes text for XML and HTML, in text and in attributes.
