@@ -248,7 +248,8 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
         for folder in campaign::flights(path)? {
             let flight = found_flight(&folder)?;
             if work.title.is_empty() {
-                work.title = flight.plan.as_ref().map_or_else(String::new, |plan| plan.title.clone());
+                work.title =
+                    flight.plan.as_ref().map_or_else(String::new, |plan| plan.title.clone());
             }
             work.flights.push(flight);
         }
@@ -279,10 +280,9 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
             .iter()
             .map(|log| LogInput { slot: Some(log.slot), path: folder.logs().join(&log.file) })
             .collect(),
-        None if folder.logs().is_dir() => logs_in(&folder.logs())?
-            .into_iter()
-            .map(|path| LogInput { slot: None, path })
-            .collect(),
+        None if folder.logs().is_dir() => {
+            logs_in(&folder.logs())?.into_iter().map(|path| LogInput { slot: None, path }).collect()
+        }
         None => Vec::new(),
     };
     Ok(Found {
@@ -372,10 +372,8 @@ fn provenance(work: &Work, output: &Path) -> Result<Provenance, CommandError> {
         .par_iter()
         .map(|path| {
             // A log that cannot be read is already named as missing by the analysis.
-            let sha256 = read_whole(path, MAX_LOG_BYTES).map_or_else(
-                |error| format!("not read: {error}"),
-                |bytes| sha256(&bytes),
-            );
+            let sha256 = read_whole(path, MAX_LOG_BYTES)
+                .map_or_else(|error| format!("not read: {error}"), |bytes| sha256(&bytes));
             let shown = path.strip_prefix(&work.root).unwrap_or(path);
             InputFile { path: shown.display().to_string(), sha256 }
         })

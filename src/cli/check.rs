@@ -85,7 +85,8 @@ pub(super) fn run(context: &Context, args: &CheckArgs) -> Result<Exit, CommandEr
                 .collect(),
         })?;
     }
-    context.say(&format!("{} in {watch}", if safe { "Safe: checked" } else { "Not safe: checked" }));
+    context
+        .say(&format!("{} in {watch}", if safe { "Safe: checked" } else { "Not safe: checked" }));
     Ok(if safe { Exit::Done } else { Exit::Unsafe })
 }
 

@@ -11,21 +11,21 @@ use super::exit::CommandError;
 
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
-pub struct Context {
+pub(super) struct Context {
     /// Say only what went wrong.
-    pub quiet: bool,
+    pub(super) quiet: bool,
     /// One JSON object on standard output instead of tables.
-    pub json: bool,
+    pub(super) json: bool,
     /// Whether standard output takes colours.
-    pub color: bool,
+    pub(super) color: bool,
     /// Whether progress bars make sense.
-    pub interactive: bool,
+    pub(super) interactive: bool,
     stop: Arc<AtomicBool>,
 }
 
 impl Context {
     /// From the global options and the terminal.
-    pub fn new(global: &Global) -> Self {
+    pub(super) fn new(global: &Global) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let raised = Arc::clone(&stop);
         // The second Ctrl-C ends at once: unfinished files are temporary and swept later.
@@ -54,17 +54,17 @@ impl Context {
     }
 
     /// The flag that Ctrl-C raises.
-    pub fn stop_flag(&self) -> &AtomicBool {
+    pub(super) fn stop_flag(&self) -> &AtomicBool {
         &self.stop
     }
 
     /// Ends the command if Ctrl-C was pressed.
-    pub fn check_stop(&self) -> Result<(), CommandError> {
+    pub(super) fn check_stop(&self) -> Result<(), CommandError> {
         if self.stop.load(Ordering::SeqCst) { Err(CommandError::Interrupted) } else { Ok(()) }
     }
 
     /// Data, on standard output.
-    pub fn print(&self, text: &str) -> Result<(), CommandError> {
+    pub(super) fn print(&self, text: &str) -> Result<(), CommandError> {
         let mut out = io::stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
         match written {
@@ -77,7 +77,7 @@ impl Context {
     }
 
     /// Data as one JSON object, on standard output.
-    pub fn print_json<T: Serialize>(&self, value: &T) -> Result<(), CommandError> {
+    pub(super) fn print_json<T: Serialize>(&self, value: &T) -> Result<(), CommandError> {
         let mut text = serde_json::to_string_pretty(value)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
         text.push('\n');
@@ -85,20 +85,20 @@ impl Context {
     }
 
     /// Talk, on standard error, unless quiet.
-    pub fn say(&self, text: &str) {
+    pub(super) fn say(&self, text: &str) {
         if !self.quiet {
             let _ = writeln!(io::stderr().lock(), "{text}");
         }
     }
 
     /// A warning, on standard error, always.
-    pub fn warn(&self, text: &str) {
+    pub(super) fn warn(&self, text: &str) {
         self.warn_as("warning", text);
     }
 
     /// Something that must be said even when quiet: `error: ...`, `warning: ...`.
     #[expect(clippy::unused_self, reason = "talks like the other methods")]
-    pub fn warn_as(&self, level: &str, text: &str) {
+    pub(super) fn warn_as(&self, level: &str, text: &str) {
         let _ = writeln!(io::stderr().lock(), "{level}: {text}");
     }
 }

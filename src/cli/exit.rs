@@ -4,12 +4,12 @@ use std::process::ExitCode;
 
 use thiserror::Error;
 
-use crate::base::file::FileError;
 use super::load::LoadError;
+use crate::base::file::FileError;
 use crate::campaign::CampaignError;
 use crate::campaign::write::WriteError;
-use crate::mission::resolve::MissionError;
 use crate::log::LogError;
+use crate::mission::resolve::MissionError;
 use crate::report::ReportError;
 use crate::sim::SimError;
 use crate::vehicle::VehicleError;
@@ -99,7 +99,9 @@ impl CommandError {
             | Self::Sim(_)
             | Self::Report(_)
             | Self::Failed(_) => Exit::Failed,
-            Self::Mission(_) | Self::Vehicle(_) | Self::Campaign(_)
+            Self::Mission(_)
+            | Self::Vehicle(_)
+            | Self::Campaign(_)
             | Self::Load(_)
             | Self::Log(_)
             | Self::Usage(_) => Exit::Usage,

@@ -13,8 +13,8 @@ use super::show_text::{describe_show, describe_skyb};
 use super::timetable;
 use crate::base::file::read_whole;
 use crate::campaign::{self, FlightFolder};
-use crate::log::inventory::Inventory;
-use crate::log::{Log, ScanStats};
+
+use crate::log::{Inventory, Log, ScanStats};
 use crate::mission::Plan;
 use crate::show::derive::DeriveParams;
 use crate::show::skyb;
@@ -45,8 +45,10 @@ enum InspectOutput {
 pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, CommandError> {
     let path = &args.file;
     let found = if path.is_dir() {
-        let plans =
-            campaign::flights(path)?.iter().map(FlightFolder::read_plan).collect::<Result<_, _>>()?;
+        let plans = campaign::flights(path)?
+            .iter()
+            .map(FlightFolder::read_plan)
+            .collect::<Result<_, _>>()?;
         InspectOutput::Plans(plans)
     } else if has_extension(path, "json") {
         InspectOutput::Plans(vec![campaign::read_json(path)?])
@@ -89,7 +91,7 @@ fn describe_log(path: &Path, log: &Inventory) -> String {
     let _ = writeln!(text, "\n\n{:<6} {:>9} {:>9} {:>8}  fields", "type", "count", "kB", "Hz");
     for message in &log.messages {
         let rate = message.rate_hz().map_or(String::new(), |rate| format!("{rate:.1}"));
-        let fields: Vec<_> = message.fields.iter().map(|field| field.name.as_str()).collect();
+        let fields: Vec<_> = message.fields.iter().map(|field| field.label.as_str()).collect();
         let _ = writeln!(
             text,
             "{:<6} {:>9} {:>9.1} {:>8}  {}",

@@ -130,7 +130,8 @@ fn read_skyb(path: &Path) -> Result<crate::show::ShowDrone, LoadError> {
         skyb::read(&bytes).map_err(|source| LoadError::Skyb { path: path.to_owned(), source })?;
     let mut drone = contents.drone;
     if drone.name.is_empty() {
-        drone.name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into());
+        drone.name =
+            path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into());
     }
     Ok(drone)
 }
@@ -155,8 +156,8 @@ fn load_flight(folder: &FlightFolder) -> Result<Loaded, LoadError> {
         for (slot, there) in plan.slots.iter().zip(&planned.drones) {
             let path = folder.skyb(slot.slot, plan.slots.len());
             let bytes = read_whole(&path, MAX_SKYB_BYTES)?;
-            let contents =
-                skyb::read(&bytes).map_err(|source| LoadError::Skyb { path: path.clone(), source })?;
+            let contents = skyb::read(&bytes)
+                .map_err(|source| LoadError::Skyb { path: path.clone(), source })?;
             let unit_m = f64::from(contents.scale_mm) / 1000.0;
             if let Some(how) = contents.drone.trajectory.difference(&there.trajectory, unit_m) {
                 mismatches.push(format!("{} does not fly the plan: {how}", path.display()));

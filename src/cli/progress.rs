@@ -13,7 +13,7 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Counts units of work; may be shared between threads.
 #[derive(Debug)]
-pub struct Progress {
+pub(super) struct Progress {
     bar: ProgressBar,
     what: String,
     watch: Stopwatch,
@@ -23,7 +23,7 @@ pub struct Progress {
 
 impl Progress {
     /// Progress over `total` units; `what` is a short verb phrase: `flying`.
-    pub fn new(context: &Context, what: &str, total: u64) -> Self {
+    pub(super) fn new(context: &Context, what: &str, total: u64) -> Self {
         let target = if context.interactive {
             ProgressDrawTarget::stderr()
         } else {
@@ -46,7 +46,7 @@ impl Progress {
     }
 
     /// One more unit is done.
-    pub fn advance(&self) {
+    pub(super) fn advance(&self) {
         self.bar.inc(1);
         if let Some(context) = &self.lines {
             let period = self.watch.elapsed().as_secs() / LINE_EVERY.as_secs();
@@ -58,7 +58,7 @@ impl Progress {
     }
 
     /// Removes the bar.
-    pub fn finish(&self) {
+    pub(super) fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }

@@ -35,11 +35,20 @@ pub(super) fn describe_show(show: &ShowSummary) -> String {
         "; up {:.2}, down {:.2}, horizontal {:.2} m/s at most",
         speeds.up_mps, speeds.down_mps, speeds.horizontal_mps
     );
-    let _ = writeln!(text, "{} cues, fence of {} corners", show.cues.len(), show.fence_polygon_m.len());
+    let _ =
+        writeln!(text, "{} cues, fence of {} corners", show.cues.len(), show.fence_polygon_m.len());
     let _ = writeln!(
         text,
         "\n{:<14} {:>24} {:>9} {:>7} {:>6} {:>6} {:>9} {:>15} {:>15}",
-        "drone", "start m", "lasts s", "pieces", "skyb B", "unit", "error mm", "4.4 take-off s", "4.6 take-off s"
+        "drone",
+        "start m",
+        "lasts s",
+        "pieces",
+        "skyb B",
+        "unit",
+        "error mm",
+        "4.4 take-off s",
+        "4.6 take-off s"
     );
     for drone in show.drones.iter().take(MAX_DRONES) {
         describe_drone(&mut text, drone);
@@ -51,7 +60,7 @@ pub(super) fn describe_show(show: &ShowSummary) -> String {
         for reason in &drone.derived_44.reasons {
             let _ = writeln!(text, "{}: {reason}", drone.name);
         }
-        if let Err(reason) = &drone.skyb {
+        if let Some(reason) = &drone.skyb_problem {
             let _ = writeln!(text, "{}: {reason}", drone.name);
         }
     }
@@ -64,12 +73,12 @@ fn describe_drone(text: &mut String, drone: &DroneSummary) {
         time.map_or("refused".to_owned(), |time| format!("{time:.2}..{landing:.1}"))
     };
     let (bytes, unit, error) = match &drone.skyb {
-        Ok(file) => (
+        Some(file) => (
             file.file_bytes.to_string(),
             format!("{} mm", file.scale_mm),
             format!("{:.2}", file.deviation.max_position_m * 1000.0),
         ),
-        Err(_) => ("none".to_owned(), String::new(), String::new()),
+        None => ("none".to_owned(), String::new(), String::new()),
     };
     let _ = writeln!(
         text,
@@ -89,7 +98,13 @@ pub(super) fn describe_skyb(file: &SkybSummary) -> String {
     let crc = if file.has_crc { "checksum correct" } else { "without checksum" };
     let _ = writeln!(text, "version {}, {crc}, {} mm per unit", file.version, file.scale_mm);
     for block in &file.blocks {
-        let _ = writeln!(text, "block {}: {} bytes at {}", block.kind.name(), block.length, block.offset);
+        let _ = writeln!(
+            text,
+            "block {}: {} bytes at {}",
+            block.kind.name(),
+            block.bytes,
+            block.offset
+        );
     }
     if let Some(comment) = &file.comment {
         let _ = writeln!(text, "comment: {comment}");

@@ -12,7 +12,9 @@ use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::progress::Progress;
-use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole, write_with};
+use crate::base::file::{
+    FileError, create_folder, read_whole, sweep_partial, write_whole, write_with,
+};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
 use crate::mission::Plan;
@@ -256,7 +258,11 @@ pub(super) fn simulate(
         plan.name,
         wanted.len() - failed.len(),
         bytes as f64 / 1e6,
-        if kept > 0 && kept < wanted.len() { format!(" ({kept} were there)") } else { String::new() }
+        if kept > 0 && kept < wanted.len() {
+            format!(" ({kept} were there)")
+        } else {
+            String::new()
+        }
     ));
     Ok(Flown {
         flight: plan.name.clone(),
@@ -364,7 +370,9 @@ fn present_logs(folder: &FlightFolder, plan: &Plan) -> Result<Vec<LogRecord>, Co
         match std::fs::metadata(&path) {
             Ok(metadata) => logs.push(LogRecord {
                 slot: slot.slot,
-                file: path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into()),
+                file: path
+                    .file_name()
+                    .map_or_else(String::new, |name| name.to_string_lossy().into()),
                 bytes: metadata.len(),
             }),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}

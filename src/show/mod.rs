@@ -2,16 +2,16 @@
 
 mod archive;
 mod bezier;
-pub mod from_plan;
 pub mod csv;
 pub mod derive;
+pub mod from_plan;
 pub mod lights;
 mod number;
 pub mod quantise;
 pub mod skyb;
 pub mod skyc;
-pub mod to_plan;
 pub mod summary;
+pub mod to_plan;
 pub mod trajectory;
 
 use nalgebra::Vector3;
