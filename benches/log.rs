@@ -90,7 +90,7 @@ fn main() {
 
 #[divan::bench]
 fn select_38_columns(bencher: Bencher<'_, '_>) {
-    let bytes = flight(600);
+    let bytes = flight(850);
     let size = bytes.len();
     let log = Log::from_bytes(bytes);
     bencher.counter(BytesCount::new(size)).bench(|| log.select(&WANTED));
@@ -98,7 +98,7 @@ fn select_38_columns(bencher: Bencher<'_, '_>) {
 
 #[divan::bench]
 fn select_nothing(bencher: Bencher<'_, '_>) {
-    let bytes = flight(600);
+    let bytes = flight(850);
     let size = bytes.len();
     let log = Log::from_bytes(bytes);
     bencher.counter(BytesCount::new(size)).bench(|| log.select(&[]));
@@ -106,7 +106,7 @@ fn select_nothing(bencher: Bencher<'_, '_>) {
 
 #[divan::bench]
 fn inventory(bencher: Bencher<'_, '_>) {
-    let bytes = flight(600);
+    let bytes = flight(850);
     let size = bytes.len();
     let log = Log::from_bytes(bytes);
     bencher.counter(BytesCount::new(size)).bench(|| log.inventory());
