@@ -1,5 +1,7 @@
 //! Distances between drones: known cases, and properties against dense sampling.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 mod check_support;
 
 use check_support::*;

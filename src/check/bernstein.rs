@@ -253,8 +253,8 @@ impl Poly {
     }
 
     /// The intervals of [0, 1] on which the polynomial is below `level`, in order, joined where they
-    /// touch. Their ends are roots to better than 1e-9; where rounding leaves doubt a place counts
-    /// as below.
+    /// touch. Their ends are roots to better than 1e-9. A polynomial that equals the level but for
+    /// rounding is not below it; where a search is cut short, the place counts as below.
     pub fn below(&self, level: f64) -> Vec<(f64, f64)> {
         let mut found: Vec<(f64, f64)> = Vec::new();
         let rounding = 1e-14

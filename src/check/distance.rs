@@ -29,7 +29,7 @@ const INSTANTS: usize = 16;
 /// A slab is not halved below this duration, ms.
 const SHORTEST_MS: f64 = 20.0;
 /// Box comparisons per drone after which a slab is halved.
-const COMPARISONS: usize = 400;
+const COMPARISONS: usize = 200;
 /// The same for the shortest slabs, after which the check gives up.
 const MOST_COMPARISONS: usize = 10_000;
 /// Violations that one slab keeps, and parts into which it is halved, before the check gives up.
@@ -155,8 +155,19 @@ fn items(tracks: &[Track<'_>], frame: &Track<'_>, from_ms: f64, to_ms: f64) -> V
     let item = |track: &Track<'_>| {
         let mut item = Item { bounds: Bounds::EMPTY, airborne: false, grounded: false };
         overlap(track, frame, from_ms, to_ms, |span, seen_from, from_ms, to_ms| {
-            let origin = frame.place(seen_from, from_ms, to_ms).curve;
-            item.bounds.join(&track.place(span, from_ms, to_ms).bounds(&origin));
+            let ends = track.straight(span, from_ms, to_ms);
+            let seen = ends.zip(frame.straight(seen_from, from_ms, to_ms));
+            let mut way = if let Some(([a, b], [from, to])) = seen {
+                let mut way = Bounds::EMPTY;
+                way.include(&(a - from));
+                way.include(&(b - to));
+                way
+            } else {
+                let origin = frame.place(seen_from, from_ms, to_ms).curve;
+                track.place(span, from_ms, to_ms).curve.minus(&origin).bounds()
+            };
+            way.low.z -= track.depth_m(span);
+            item.bounds.join(&way);
             item.airborne |= span.airborne;
             item.grounded |= !span.airborne;
         });

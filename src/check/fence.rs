@@ -2,7 +2,7 @@
 
 use super::TOLERANCE_M;
 use super::bernstein::Poly;
-use super::curve::Curve;
+use super::curve::{Bounds, Curve};
 use super::report::Severity;
 use super::track::{Track, curve_of};
 use super::watch::{Quantity, Stretch, Watch};
@@ -101,9 +101,8 @@ impl<'a> Polygon<'a> {
 }
 
 impl Side {
-    /// Lower bound of the distance of a curve, from its box.
-    fn bound_m(&self, curve: &Curve) -> f64 {
-        let bounds = curve.bounds();
+    /// Lower bound of the distance of anything in a box.
+    fn bound_m(&self, bounds: &Bounds) -> f64 {
         let mut sum = 0.0;
         for axis in 0..2 {
             let (a, b) = (self.from[axis], self.from[axis] + self.along[axis] * self.length_m);
@@ -159,10 +158,13 @@ pub(super) fn watch(track: &Track<'_>, polygon: &Polygon<'_>, what: [Quantity; 2
     for piece in &track.pieces {
         let (start_s, duration_s) = (piece.start_ms as f64 / 1000.0, piece.duration_s());
         let curve = curve_of(piece);
-        altitude.feed(&curve.axis(2), start_s, duration_s);
+        let bounds = curve.bounds();
+        if !altitude.is_dull(bounds.high.z) {
+            altitude.feed(&curve.axis(2), start_s, duration_s);
+        }
         let first = curve.first();
         let known_m = clearance.worst().unwrap_or(f64::INFINITY).max(polygon.margin_m);
-        let far = polygon.sides.iter().all(|side| side.bound_m(&curve) > known_m);
+        let far = polygon.sides.iter().all(|side| side.bound_m(&bounds) > known_m);
         if far && polygon.contains(first.x, first.y) {
             continue;
         }

@@ -39,6 +39,9 @@ pub(super) fn watch(track: &Track<'_>, what: Quantity, takeoff_alt_m: f64) -> Wa
     for piece in &track.pieces {
         let (start_s, duration_s) = (piece.start_ms as f64 / 1000.0, piece.duration_s());
         let curve = curve_of(piece);
+        if curve.bounds().low.z >= low_z_m {
+            continue;
+        }
         for (from, to) in curve.axis(2).below(low_z_m) {
             let part = curve.restrict(from, to);
             let from_s = start_s + from * duration_s;

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::curve::Curve;
 use super::report::Severity;
 use super::track::{Track, curve_of};
 use super::watch::{Quantity, Watch};
@@ -99,17 +100,33 @@ pub(super) fn watch(track: &Track<'_>, quantities: &[Quantity; 7]) -> [Watch; 7]
         let (start_s, duration_s) = (piece.start_ms as f64 / 1000.0, piece.duration_s());
         let curve = curve_of(piece);
         let velocity = curve.rate(duration_s);
-        horizontal.feed(&velocity.horizontal_squared(), start_s, duration_s);
-        let climb = velocity.axis(2);
-        up.feed(&climb, start_s, duration_s);
-        down.feed(&climb.times(-1.0), start_s, duration_s);
         let second = velocity.rate(duration_s);
-        acceleration.feed(&second.norm_squared(), start_s, duration_s);
+        let climb = velocity.bounds();
+        let height = curve.bounds();
+        // Most pieces cannot break a record or a limit: their control points already say so.
+        let greatest = |curve: &Curve, size: fn(&Vector3<f64>) -> f64| {
+            curve.points().iter().map(size).fold(0.0, f64::max)
+        };
+        if !horizontal.is_dull(greatest(&velocity, |v| v.x.hypot(v.y))) {
+            horizontal.feed(&velocity.horizontal_squared(), start_s, duration_s);
+        }
+        if !up.is_dull(climb.high.z) {
+            up.feed(&velocity.axis(2), start_s, duration_s);
+        }
+        if !down.is_dull(-climb.low.z) {
+            down.feed(&velocity.axis(2).times(-1.0), start_s, duration_s);
+        }
+        if !acceleration.is_dull(greatest(&second, Vector3::norm)) {
+            acceleration.feed(&second.norm_squared(), start_s, duration_s);
+        }
+        if !highest.is_dull(height.high.z) {
+            highest.feed(&curve.axis(2), start_s, duration_s);
+        }
+        if !lowest.is_dull(height.low.z - track.ground_m) {
+            lowest.feed(&curve.axis(2).plus(-track.ground_m), start_s, duration_s);
+        }
         step.feed_instant((velocity.first() - before_mps).norm(), start_s);
         before_mps = velocity.last();
-        let height = curve.axis(2);
-        highest.feed(&height, start_s, duration_s);
-        lowest.feed(&height.plus(-track.ground_m), start_s, duration_s);
     }
     step.feed_instant(before_mps.norm(), track.end_ms as f64 / 1000.0);
     watches

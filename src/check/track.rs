@@ -3,9 +3,9 @@
 
 use nalgebra::Vector3;
 
-use super::curve::{Bounds, Curve};
-use crate::show::ShowDrone;
+use super::curve::Curve;
 use crate::show::trajectory::Piece;
+use crate::show::{Path, ShowDrone};
 
 /// Part of a drone's time that lies in one piece (or after the last one) and is either wholly in the
 /// air or wholly on the ground.
@@ -47,15 +47,6 @@ pub(super) struct Place {
     pub(super) curve: Curve,
     /// How far below the curve it may be, m; 0 while it flies the trajectory.
     pub(super) depth_m: f64,
-}
-
-impl Place {
-    /// Box of the place as seen from a point that moves along `frame`.
-    pub(super) fn bounds(&self, frame: &Curve) -> Bounds {
-        let mut bounds = self.curve.minus(frame).bounds();
-        bounds.low.z -= self.depth_m;
-        bounds
-    }
 }
 
 /// Name of a drone, or its number when it has none.
@@ -153,10 +144,44 @@ impl<'a> Track<'a> {
         }
     }
 
+    /// First and last position in a part of a span, if it is flown in a straight line.
+    pub(super) fn straight(
+        &self,
+        span: &Span,
+        from_ms: f64,
+        to_ms: f64,
+    ) -> Option<[Vector3<f64>; 2]> {
+        let Some(piece) = span.piece.and_then(|number| self.pieces.get(number as usize)) else {
+            return Some([self.end_m; 2]);
+        };
+        match piece.path {
+            Path::Hold => Some([piece.from_m; 2]),
+            Path::Line(to_m) => {
+                let way = to_m - piece.from_m;
+                let (start_ms, whole_ms) =
+                    (piece.start_ms as f64, (piece.end_ms - piece.start_ms) as f64);
+                Some(
+                    [from_ms, to_ms].map(|ms| {
+                        piece.from_m + way * ((ms - start_ms) / whole_ms).clamp(0.0, 1.0)
+                    }),
+                )
+            }
+            Path::Cubic(_) | Path::Septic(_) => None,
+        }
+    }
+
+    /// How far below its place the drone may be during a span, m.
+    pub(super) fn depth_m(&self, span: &Span) -> f64 {
+        if span.piece.is_none() { self.end_m.z - self.landed_z_m } else { 0.0 }
+    }
+
     /// Position at a show time in ms.
     pub(super) fn position(&self, time_ms: f64) -> Vector3<f64> {
         let span = self.spans[self.span_at(time_ms)];
-        self.place(&span, time_ms, time_ms).curve.first()
+        match self.straight(&span, time_ms, time_ms) {
+            Some([position_m, _]) => position_m,
+            None => self.place(&span, time_ms, time_ms).curve.first(),
+        }
     }
 }
 

@@ -58,17 +58,19 @@ impl Watch {
         if self.what.least { -self.what.limit } else { self.what.limit }
     }
 
+    /// Whether nothing new can come of values that are at most (with `least`, at least) this.
+    pub(super) fn is_dull(&self, bound: f64) -> bool {
+        let bound = if self.what.least { -bound } else { bound };
+        bound <= self.signed_limit() + self.what.tolerance
+            && self.worst.is_some_and(|(most, _)| bound <= most)
+    }
+
     /// Looks at a polynomial over [0, 1] that takes `duration_s` from `start_s`.
     pub(super) fn feed(&mut self, poly: &Poly, start_s: f64, duration_s: f64) {
         let poly = if self.what.least { poly.times(-1.0) } else { *poly };
         let squared = self.what.squared;
         let plain = |value: f64| if squared { value.max(0.0).sqrt() } else { value };
         let limit = self.signed_limit();
-        let bound = plain(poly.upper_bound());
-        if bound <= limit + self.what.tolerance && self.worst.is_some_and(|(most, _)| bound <= most)
-        {
-            return;
-        }
         let most = poly.maximum(|value| {
             if squared { PRECISION * (2.0 * plain(value) + PRECISION) } else { PRECISION }
         });
