@@ -72,22 +72,22 @@ fn square_root_law<const N: usize>(
     dt_s: f64,
     limit: f64,
 ) -> SVector<f64, N> {
-    let size = error.norm();
-    if size <= f64::EPSILON {
-        return SVector::zeros();
-    }
     let linear_to = brake / (stiffness * stiffness);
-    let rate = if size > linear_to {
-        (2.0 * brake * (size - linear_to / 2.0)).sqrt()
-    } else {
-        size * stiffness
-    };
+    let square = error.norm_squared();
+    if square <= linear_to * linear_to {
+        // Most of the time: no square root needed.
+        let gain = stiffness.min(1.0 / dt_s);
+        return limited(error * gain, limit);
+    }
+    let size = square.sqrt();
+    let rate = (2.0 * brake * (size - linear_to / 2.0)).sqrt();
     error * (rate.min(size / dt_s).min(limit) / size)
 }
 
-fn limited<const N: usize>(vector: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
-    let size = vector.norm();
-    if size > limit { vector * (limit / size) } else { vector }
+/// A vector cut to a length.
+pub(super) fn limited<const N: usize>(vector: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
+    let square = vector.norm_squared();
+    if square > limit * limit { vector * (limit / square.sqrt()) } else { vector }
 }
 
 #[cfg(test)]
