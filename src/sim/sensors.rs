@@ -92,12 +92,11 @@ impl Sensors {
             *value += slope;
         }
         let [x, y, z, vx, vy, vz, forward, left, up] = self.value;
-        let turn = Vector3::new(forward, left, up).cross_matrix();
         Estimate {
             position_m: truth.position_m + Vector3::new(x, y, z),
             velocity_mps: truth.velocity_mps + Vector3::new(vx, vy, vz),
             acceleration_mps2: truth.acceleration_mps2 + self.white(ACCELERATION_MPS2),
-            rotation: truth.rotation + truth.rotation * turn,
+            rotation: slightly_turned(&truth.rotation, forward, left, up),
             rate_radps: truth.rate_radps + self.white(RATE_RADPS),
         }
     }
@@ -122,6 +121,16 @@ impl Sensors {
         };
         Vector3::new(one(0), one(21), one(42))
     }
+}
+
+/// A rotation turned further by small angles about its own axes, to first order.
+fn slightly_turned(rotation: &Matrix3<f64>, forward: f64, left: f64, up: f64) -> Matrix3<f64> {
+    let [x, y, z] = [0, 1, 2].map(|axis| rotation.column(axis));
+    Matrix3::from_columns(&[
+        x + y * up - z * left,
+        y - x * up + z * forward,
+        z + x * left - y * forward,
+    ])
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ pub struct Horizontal {
     derivative: Vector2<f64>,
     integral: Vector2<f64>,
     smoothing: f64,
+    limits: Approach,
     limit_mps2: f64,
     dt_s: f64,
     per_dt: f64,
@@ -37,6 +38,7 @@ impl Horizontal {
             derivative: Vector2::zeros(),
             integral: Vector2::zeros(),
             smoothing: dt_s / (dt_s + constant_s),
+            limits: Approach::new(p::WPNAV_SPEED, p::WPNAV_ACCEL, p::PSC_JERK, dt_s),
             limit_mps2: GRAVITY * p::ANGLE_MAX_DEG.to_radians().tan(),
             dt_s,
             per_dt: 1.0 / dt_s,
@@ -45,10 +47,8 @@ impl Horizontal {
 
     /// One step: the acceleration wanted, show frame, m/s².
     pub fn update(&mut self, goal: &Kinematics<2>, estimate: &Estimate) -> Vector2<f64> {
-        let approach =
-            Approach { speed: p::WPNAV_SPEED, acceleration: p::WPNAV_ACCEL, jerk: p::PSC_JERK };
         self.target.advance(self.dt_s);
-        self.target.approach(goal, &approach, self.dt_s);
+        self.target.approach(goal, &self.limits, self.dt_s);
 
         let position = estimate.position_m.xy();
         self.velocity_target =
