@@ -39,7 +39,8 @@ fn ladder(speeds_mps: &[f64]) -> (Trajectory, Vec<(f64, f64)>) {
     (Trajectory { start_m: Vector3::zeros(), segments }, legs)
 }
 
-/// Time (s), vertical speed (up) and corrected pulse (u cos phi) at 10 Hz, as a log has them.
+/// Time (s), vertical speed (up) and corrected pulse (u cos phi) at 10 Hz, as a log has them, and
+/// the true lean of the body along the wind (show x).
 #[derive(Default)]
 struct Channels(Vec<(f64, f64, f64, f64)>);
 
@@ -48,9 +49,10 @@ impl Recorder for Channels {
         if moment.step % 40 == 0 {
             let pulses = moment.pilot.motors.pulses_us.map(f64::from);
             let cos_tilt = moment.estimate.rotation[(2, 2)];
+            let lean = moment.plant.motion().rotation[(0, 2)];
             let up_mps = moment.estimate.velocity_mps.z;
             let mean = pulses.iter().sum::<f64>() / 4.0;
-            self.0.push((moment.time_us as f64 * 1e-6, up_mps, mean * cos_tilt, cos_tilt));
+            self.0.push((moment.time_us as f64 * 1e-6, up_mps, mean * cos_tilt, lean));
         }
         Ok(())
     }
@@ -97,8 +99,10 @@ fn flown(speeds_mps: &[f64], wind_mps: Vector3<f64>, seed: u64) -> Flown {
             (speed, median(inside(from_s).map(|row| row.2).collect()))
         })
         .collect();
-    let cos_tilt = median(inside(legs[0].0).map(|row| row.3).collect());
-    Flown { summary, windows, tilt_deg: cos_tilt.acos().to_degrees() }
+    let leans: Vec<f64> =
+        legs.iter().flat_map(|&(from_s, _)| inside(from_s).map(|row| row.3)).collect();
+    let lean = leans.iter().sum::<f64>() / leans.len() as f64;
+    Flown { summary, windows, tilt_deg: -lean.asin().to_degrees() }
 }
 
 /// Least-squares A and u0 of `u = u0 + A f(V - W)`, f(x) = x|x|, and the sum of squares.
@@ -152,11 +156,52 @@ fn reproduces_table_one() {
     assert!((a - 8.14).abs() <= 0.02, "A {a}");
     assert!((u0 - 1598.6).abs() <= 0.5, "u0 {u0}");
     assert!((air + 0.035).abs() <= 0.005, "W {air}");
-    assert_eq!(still.summary.saturated_share, 0.0);
+    // Only while it catches up with the steps of 3 and 3.5 m/s.
+    assert!(still.summary.saturated_share < 0.02, "{:?}", still.summary);
     for ((shift, tilt_deg), (expected, tilt)) in
         shifts.iter().zip([(-0.010, 0.236), (-0.075, 0.945)])
     {
         assert!((shift - expected).abs() <= 0.005, "W shift {shift} instead of {expected}");
-        assert!((tilt_deg - tilt).abs() <= 0.03, "tilt {tilt_deg} instead of {tilt}");
+        assert!((tilt_deg - tilt).abs() <= 0.01, "tilt {tilt_deg} instead of {tilt}");
     }
+}
+
+#[test]
+fn an_updraft_shifts_the_law_by_its_velocity() {
+    let speeds = [1.0, 2.0, 3.0];
+    let still = flown(&speeds, Vector3::zeros(), 2);
+    let air = best_air(|air| law_given_air(&still.windows, air).2);
+    let (a, u0, _) = law_given_air(&still.windows, air);
+    for updraft_mps in [-0.5, 0.8] {
+        let lifted = flown(&speeds, Vector3::new(0.0, 0.0, updraft_mps), 3);
+        let found = best_air(|air| {
+            let miss = |&(v, u): &(f64, f64)| u - u0 - a * (v - air) * (v - air).abs();
+            lifted.windows.iter().map(|window| miss(window).powi(2)).sum()
+        });
+        // The density gradient leans on the shift by some hundredths, as on the still air's own.
+        assert!((found - air - updraft_mps).abs() < 0.03, "{found} for {updraft_mps}");
+    }
+}
+
+#[test]
+fn a_fast_climb_in_a_downdraft_saturates_and_is_flagged() {
+    let flown = flown(&[3.5], Vector3::new(0.0, 0.0, -3.5), 1);
+    let (up, down) = (flown.windows[0], flown.windows[1]);
+    assert!((3.0..3.3).contains(&up.0), "climbs at {} instead of 3.5 m/s", up.0);
+    assert!((down.0 + 3.5).abs() < 0.02, "descends at {}", down.0);
+    assert!(up.1 > 1947.0 && up.1 <= 1950.0, "{}", up.1);
+    assert!(flown.summary.saturated_share > 0.15, "{:?}", flown.summary);
+}
+
+#[test]
+fn velocity_steps_settle_before_the_window() {
+    let (_, legs) = ladder(&SPEEDS_MPS);
+    let flown = flown(&SPEEDS_MPS, Vector3::zeros(), 4);
+    for ((_, speed), window) in legs.iter().zip(&flown.windows) {
+        assert!((window.0 - speed).abs() < 0.02, "{} instead of {speed}", window.0);
+    }
+    // The firmware's own simulator: 2.7 m at most, 0.1 m sideways.
+    assert!((2.0..4.0).contains(&flown.summary.max_error_z_m), "{:?}", flown.summary);
+    assert!(flown.summary.max_error_xy_m < 0.15);
+    assert!((flown.summary.landed_s - flown.summary.landing_s - 8.3).abs() < 3.0);
 }

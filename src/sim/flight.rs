@@ -251,6 +251,7 @@ fn look(
 struct Tally {
     summary: FlightSummary,
     stage: Option<Stage>,
+    max_square_m2: f64,
     performing_steps: u64,
     saturated_steps: u64,
 }
@@ -272,7 +273,7 @@ impl Tally {
         summary.max_height_m = summary.max_height_m.max(position.z - ground_m);
         if stage == Stage::Performing && pilot.motors.spool == Spool::Flying {
             let error = position - pilot.director.target.position;
-            summary.max_error_xy_m = summary.max_error_xy_m.max(error.xy().norm());
+            self.max_square_m2 = self.max_square_m2.max(error.xy().norm_squared());
             summary.max_error_z_m = summary.max_error_z_m.max(error.z.abs());
             self.performing_steps += 1;
             self.saturated_steps += u64::from(pilot.saturated());
@@ -280,6 +281,7 @@ impl Tally {
     }
 
     fn finish(mut self) -> FlightSummary {
+        self.summary.max_error_xy_m = self.max_square_m2.sqrt();
         if self.performing_steps > 0 {
             self.summary.saturated_share =
                 self.saturated_steps as f64 / self.performing_steps as f64;

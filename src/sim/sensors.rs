@@ -51,7 +51,6 @@ pub struct Sensors {
     decay: [f64; ERRORS],
     kick: [f64; ERRORS],
     countdown: u32,
-    quiet: bool,
 }
 
 impl Sensors {
@@ -79,16 +78,7 @@ impl Sensors {
             let draw: f64 = StandardNormal.sample(&mut rng);
             deviation * draw
         });
-        Self { rng, value, slope: [0.0; ERRORS], decay, kick, countdown: 0, quiet: false }
-    }
-
-    /// Perfect sensors, for tests of what flies under them.
-    pub fn perfect() -> Self {
-        let mut sensors = Self::new(0, 0, 1.0);
-        sensors.value = [0.0; ERRORS];
-        sensors.kick = [0.0; ERRORS];
-        sensors.quiet = true;
-        sensors
+        Self { rng, value, slope: [0.0; ERRORS], decay, kick, countdown: 0 }
     }
 
     /// One step: the estimate of the present motion.
@@ -102,12 +92,11 @@ impl Sensors {
             *value += slope;
         }
         let [x, y, z, vx, vy, vz, forward, left, up] = self.value;
-        let turn = Vector3::new(forward, left, up).cross_matrix();
         Estimate {
             position_m: truth.position_m + Vector3::new(x, y, z),
             velocity_mps: truth.velocity_mps + Vector3::new(vx, vy, vz),
             acceleration_mps2: truth.acceleration_mps2 + self.white(ACCELERATION_MPS2),
-            rotation: truth.rotation + truth.rotation * turn,
+            rotation: slightly_turned(&truth.rotation, forward, left, up),
             rate_radps: truth.rate_radps + self.white(RATE_RADPS),
         }
     }
@@ -120,22 +109,28 @@ impl Sensors {
         }
     }
 
-    /// Three independent values near to normal: each the sum of four uniform ones, from one draw.
+    /// Three independent values near to normal: sums of uniform ones, all from one draw.
     fn white(&mut self, deviation: f64) -> Vector3<f64> {
-        if self.quiet {
-            return Vector3::zeros();
-        }
-        // A sum of four uniform whole numbers below 2^16 has mean 2 (2^16 - 1) and s.d. 2^16 / sqrt(3).
-        const MEAN: f64 = 131_070.0;
-        let scale = deviation * 3.0_f64.sqrt() / 65_536.0;
-        let mut one = || {
-            let bits = self.rng.next_u64();
-            let sum =
-                (bits & 0xFFFF) + (bits >> 16 & 0xFFFF) + (bits >> 32 & 0xFFFF) + (bits >> 48);
-            (sum as f64 - MEAN) * scale
+        // The sum of three uniform whole numbers below 2^7: mean 190.5, variance 3 (2^14 - 1) / 12.
+        let scale = deviation / 63.998;
+        let bits = self.rng.next_u64();
+        let one = |shift: u32| {
+            let part = bits >> shift;
+            let sum = (part & 0x7F) + (part >> 7 & 0x7F) + (part >> 14 & 0x7F);
+            (sum as f64 - 190.5) * scale
         };
-        Vector3::new(one(), one(), one())
+        Vector3::new(one(0), one(21), one(42))
     }
+}
+
+/// A rotation turned further by small angles about its own axes, to first order.
+fn slightly_turned(rotation: &Matrix3<f64>, forward: f64, left: f64, up: f64) -> Matrix3<f64> {
+    let [x, y, z] = [0, 1, 2].map(|axis| rotation.column(axis));
+    Matrix3::from_columns(&[
+        x + y * up - z * left,
+        y - x * up + z * forward,
+        z + x * left - y * forward,
+    ])
 }
 
 #[cfg(test)]

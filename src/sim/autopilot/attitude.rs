@@ -22,9 +22,9 @@ impl RatePid {
         Self { gain, target: filter, slope: filter, error: 0.0, integral: 0.0 }
     }
 
-    fn update(&mut self, target_radps: f64, rate_radps: f64, dt_s: f64) -> f64 {
+    fn update(&mut self, target_radps: f64, rate_radps: f64, dt_s: f64, per_dt: f64) -> f64 {
         let error = self.target.apply(target_radps) - rate_radps;
-        let slope = self.slope.apply((error - self.error) / dt_s);
+        let slope = self.slope.apply((error - self.error) * per_dt);
         self.error = error;
         self.integral =
             (self.integral + self.gain[1] * error * dt_s).clamp(-p::ATC_RAT_IMAX, p::ATC_RAT_IMAX);
@@ -45,6 +45,7 @@ pub struct Attitude {
     pub output: Vector3<f64>,
     rate: [RatePid; 3],
     dt_s: f64,
+    per_dt: f64,
 }
 
 impl Attitude {
@@ -59,6 +60,7 @@ impl Attitude {
             output: Vector3::zeros(),
             rate: [tilt, tilt, yaw],
             dt_s,
+            per_dt: 1.0 / dt_s,
         }
     }
 
@@ -81,6 +83,7 @@ impl Attitude {
                 self.rate_target[axis],
                 estimate.rate_radps[axis],
                 self.dt_s,
+                self.per_dt,
             );
         }
         self.output

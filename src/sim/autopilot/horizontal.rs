@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::params as p;
-use super::shaping::{Approach, Kinematics};
+use super::shaping::{Approach, Kinematics, limited};
 use crate::sim::plant::GRAVITY;
 use crate::sim::sensors::Estimate;
 
@@ -20,8 +20,10 @@ pub struct Horizontal {
     derivative: Vector2<f64>,
     integral: Vector2<f64>,
     smoothing: f64,
+    limits: Approach,
     limit_mps2: f64,
     dt_s: f64,
+    per_dt: f64,
 }
 
 impl Horizontal {
@@ -36,17 +38,17 @@ impl Horizontal {
             derivative: Vector2::zeros(),
             integral: Vector2::zeros(),
             smoothing: dt_s / (dt_s + constant_s),
+            limits: Approach::new(p::WPNAV_SPEED, p::WPNAV_ACCEL, p::PSC_JERK, dt_s),
             limit_mps2: GRAVITY * p::ANGLE_MAX_DEG.to_radians().tan(),
             dt_s,
+            per_dt: 1.0 / dt_s,
         }
     }
 
     /// One step: the acceleration wanted, show frame, m/s².
     pub fn update(&mut self, goal: &Kinematics<2>, estimate: &Estimate) -> Vector2<f64> {
-        let approach =
-            Approach { speed: p::WPNAV_SPEED, acceleration: p::WPNAV_ACCEL, jerk: p::PSC_JERK };
         self.target.advance(self.dt_s);
-        self.target.approach(goal, &approach, self.dt_s);
+        self.target.approach(goal, &self.limits, self.dt_s);
 
         let position = estimate.position_m.xy();
         self.velocity_target =
@@ -54,22 +56,15 @@ impl Horizontal {
         let raw = self.velocity_target - estimate.velocity_mps.xy();
         let before = self.error;
         self.error += (raw - self.error) * self.smoothing;
-        let slope = (self.error - before) / self.dt_s;
+        let slope = (self.error - before) * self.per_dt;
         self.derivative += (slope - self.derivative) * self.smoothing;
         self.integral += self.error * (p::PSC_VELXY_I * self.dt_s);
-        let size = self.integral.norm();
-        if size > p::PSC_VELXY_IMAX {
-            self.integral *= p::PSC_VELXY_IMAX / size;
-        }
-        let mut wanted = self.target.acceleration
+        self.integral = limited(self.integral, p::PSC_VELXY_IMAX);
+        let wanted = self.target.acceleration
             + self.error * p::PSC_VELXY_P
             + self.integral
             + self.derivative * p::PSC_VELXY_D;
-        let size = wanted.norm();
-        if size > self.limit_mps2 {
-            wanted *= self.limit_mps2 / size;
-        }
-        self.acceleration_target = wanted;
-        wanted
+        self.acceleration_target = limited(wanted, self.limit_mps2);
+        self.acceleration_target
     }
 }

@@ -8,6 +8,9 @@ use super::shaping::{Approach, Kinematics};
 use crate::sim::sensors::Estimate;
 use crate::vehicle;
 
+/// Largest downward acceleration that the firmware shapes a target with, m/s².
+const MAX_ACCELERATION: f64 = 7.5;
+
 /// What the vertical axis is asked to do.
 #[derive(Clone, Copy, Debug)]
 pub enum Goal {
@@ -41,6 +44,8 @@ pub struct Vertical {
     velocity_error: LowPass,
     acceleration_error: LowPass,
     integral: f64,
+    limits: Approach,
+    learning: f64,
     dt_s: f64,
 }
 
@@ -56,6 +61,8 @@ impl Vertical {
             velocity_error: LowPass::new(p::PSC_VEL_FLT, dt_s),
             acceleration_error: LowPass::new(p::PSC_ACCZ_FLTE, dt_s),
             integral: 0.0,
+            limits: Approach::new(p::WPNAV_SPEED_DN, p::WPNAV_ACCEL_Z, p::PSC_JERK, dt_s),
+            learning: dt_s / (dt_s + p::HOVER_LEARN_S),
             dt_s,
         }
     }
@@ -88,9 +95,9 @@ impl Vertical {
     pub fn learn_hover(&mut self, throttle: f64, estimate: &Estimate) {
         let level = estimate.rotation[(2, 2)] > 0.996;
         if level && estimate.velocity_mps.z.abs() < 0.6 && throttle > 0.0 {
-            let share = self.dt_s / (self.dt_s + p::HOVER_LEARN_S);
-            self.hover_throttle = (self.hover_throttle + share * (throttle - self.hover_throttle))
-                .clamp(p::HOVER_RANGE.0, p::HOVER_RANGE.1);
+            let step = self.learning * (throttle - self.hover_throttle);
+            self.hover_throttle =
+                (self.hover_throttle + step).clamp(p::HOVER_RANGE.0, p::HOVER_RANGE.1);
         }
     }
 
@@ -105,20 +112,24 @@ impl Vertical {
         if stuck {
             target.position = held;
         }
-        let mut approach =
-            Approach { speed: 0.0, acceleration: p::WPNAV_ACCEL_Z, jerk: p::PSC_JERK };
         match goal {
             Goal::Follow(wanted) => {
                 let up = wanted.position.x > target.position.x;
-                approach.speed = if up { self.gains.wpnav_speed_up_mps } else { p::WPNAV_SPEED_DN };
-                // Beyond the nominal speed the firmware allows proportionally more acceleration.
-                let over = (target.velocity.x / approach.speed).abs().max(1.0);
-                approach.acceleration = (approach.acceleration * over).min(7.5);
-                target.approach(wanted, &approach, self.dt_s);
+                let speed = if up { self.gains.wpnav_speed_up_mps } else { p::WPNAV_SPEED_DN };
+                if target.velocity.x.abs() > speed {
+                    // Beyond its nominal speed the firmware allows proportionally more.
+                    let over = target.velocity.x.abs() / speed;
+                    let acceleration = (p::WPNAV_ACCEL_Z * over).min(MAX_ACCELERATION);
+                    let limits = Approach::new(speed, acceleration, p::PSC_JERK, self.dt_s);
+                    target.approach(wanted, &limits, self.dt_s);
+                } else {
+                    self.limits.speed = speed;
+                    target.approach(wanted, &self.limits, self.dt_s);
+                }
             }
             Goal::Move(speed) => {
                 let none = Vector1::zeros();
-                target.approach_velocity(&Vector1::new(*speed), &none, &approach, self.dt_s);
+                target.approach_velocity(&Vector1::new(*speed), &none, &self.limits, self.dt_s);
             }
         }
     }

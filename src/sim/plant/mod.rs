@@ -47,8 +47,9 @@ pub struct Motion {
 /// The simulated body with its rotors.
 #[derive(Clone, Copy, Debug)]
 pub struct Plant {
-    mass_kg: f64,
+    per_mass: f64,
     inertia: Vector3<f64>,
+    per_inertia: Vector3<f64>,
     dt_s: f64,
     ground_z_m: f64,
     rotors: Rotors,
@@ -61,9 +62,11 @@ impl Plant {
     /// A body at rest on the ground at `home_m` (show frame), heading along show x, for steps of
     /// `dt_s`.
     pub fn new(airframe: &Airframe, home_m: Vector3<f64>, dt_s: f64) -> Self {
+        let inertia = inertia_kgm2(airframe);
         Self {
-            mass_kg: airframe.mass_kg,
-            inertia: inertia_kgm2(airframe),
+            per_mass: 1.0 / airframe.mass_kg,
+            inertia,
+            per_inertia: inertia.map(|moment| 1.0 / moment),
             dt_s,
             ground_z_m: home_m.z,
             rotors: Rotors::new(airframe, dt_s),
@@ -111,10 +114,10 @@ impl Plant {
         let relative = now.rotation.tr_mul(&(middle_mps - around.air_velocity_mps));
         self.drag.add_loads(&relative, around.density_ratio, &mut loads);
 
-        let mut acceleration = now.rotation * (loads.force_n / self.mass_kg);
+        let mut acceleration = now.rotation * (loads.force_n * self.per_mass);
         acceleration.z -= GRAVITY;
         let spin = now.rate_radps.cross(&now.rate_radps.component_mul(&self.inertia));
-        let angular = (loads.torque_nm - spin).component_div(&self.inertia);
+        let angular = (loads.torque_nm - spin).component_mul(&self.per_inertia);
 
         let next = &mut self.motion;
         next.velocity_mps += (next.acceleration_mps2 + acceleration) * half_s;
@@ -156,7 +159,10 @@ fn turned(attitude: UnitQuaternion<f64>, turn_rad: Vector3<f64>) -> UnitQuaterni
     let vector = half * (1.0 - square / 6.0);
     let step =
         Quaternion::new(1.0 - square / 2.0 + square * square / 24.0, vector.x, vector.y, vector.z);
-    UnitQuaternion::new_normalize(attitude.into_inner() * step)
+    let product = attitude.into_inner() * step;
+    // One step of Newton's iteration for 1/norm: the product's norm is off 1 by rounding only.
+    let correction = 1.5 - 0.5 * product.norm_squared();
+    UnitQuaternion::new_unchecked(product * correction)
 }
 
 /// Moments of inertia about forward, left and up: the box, and the motors as points.
