@@ -14,5 +14,6 @@ pub mod updraft;
 pub mod windows;
 
 pub use analyze::{
-    AnalysisError, AnalysisOptions, FlightInput, LogInput, Progress, analyze, analyze_flight,
+    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, Progress, analyze,
+    analyze_flight,
 };

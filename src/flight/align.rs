@@ -191,8 +191,8 @@ fn match_plan(evidence: &Evidence<'_>, segments: &[Segment]) -> Option<Clock> {
     if !(null > 0.0 && lowest < MATCH_LIMIT * null) {
         return None;
     }
-    let (offset_s, residual_s) = refine_by_height(evidence.height, segments, offset_s)
-        .unwrap_or((offset_s, UNREFINED_S));
+    let (offset_s, residual_s) =
+        refine_by_height(evidence.height, segments, offset_s).unwrap_or((offset_s, UNREFINED_S));
     Some(Clock { method: Alignment::Plan, offset_s, residual_s, start: None })
 }
 
@@ -214,8 +214,7 @@ fn refine_by_height(height: &Series, segments: &[Segment], offset_s: f64) -> Opt
             let since = time - offset_s - segment.start_ms as f64 / 1000.0;
             segment.from_m[2] + segment.velocity_mps[2] * since
         };
-        let sum: f64 =
-            times.iter().zip(logged).map(|(time, height)| height - planned(*time)).sum();
+        let sum: f64 = times.iter().zip(logged).map(|(time, height)| height - planned(*time)).sum();
         if times.len() >= 5 {
             points.push((segment.velocity_mps[2], sum / times.len() as f64));
         }

@@ -58,9 +58,12 @@ impl Timetable {
 
 /// The ladder that the fixtures flew; `sign` -1 flies it upside down (a wrong plan).
 pub(crate) fn ladder(sign: f64) -> Vec<Segment> {
-    let mut table = Timetable::default()
-        .add(Kind::Takeoff, "climb", 2.0, 10.0)
-        .add(Kind::Hover, "hover", 0.0, 10.0);
+    let mut table = Timetable::default().add(Kind::Takeoff, "climb", 2.0, 10.0).add(
+        Kind::Hover,
+        "hover",
+        0.0,
+        10.0,
+    );
     for rung in 1..=7 {
         let speed = 0.5 * f64::from(rung);
         table = table
