@@ -2,6 +2,8 @@
 //! with window errors of 15 us looks, fitted with the signed-quadratic law, as the paper's field
 //! flights do (scattered W, reduced chi² of 2).
 
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "this is test code")]
+
 use rand::Rng;
 use rand_distr::{Distribution, Normal};
 use updraft::analysis::law::{

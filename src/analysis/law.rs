@@ -344,7 +344,7 @@ fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
         minimize_with(|p| residuals(points, sigmas, law(p)), Some(&derivatives), &start)
     };
     let mut minima: Vec<Solution> = minima_of(&chi2)
-        .filter_map(|w| at(w))
+        .filter_map(at)
         .filter(|(_, start)| start[0] > 0.0)
         .filter_map(|(_, start)| polish(start).ok())
         .filter(|solution| solution.parameters[2].abs() <= W_LIMIT_MPS)
