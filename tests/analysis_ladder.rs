@@ -365,3 +365,75 @@ fn flights_that_cannot_calibrate_are_told_apart() {
     );
     assert!(saturated.contains("no ladder") && saturated.contains("8 rejected"), "{saturated}");
 }
+
+/// The whole logs of the firmware's flights, where a checkout has them beside it.
+#[test]
+fn whole_logs_agree_with_the_fixtures() {
+    let Ok(folder) = std::env::var("UPDRAFT_SHARED_DATA") else { return };
+    let log = |name: &str| [Path::new(&folder).join("arducopter-4.4").join(name)];
+    for plan in both_ways() {
+        let flight = run(plan.as_ref(), &log("square-law-ladder-still.BIN"), &paper());
+        let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.clone().unwrap();
+        let found = values(&fit);
+        println!("planned {}: {found:?} rms {:.3}", flight.planned, fit.rms_us);
+        assert!((found[0] - 4.963).abs() < 0.002 && (found[2] + 0.044).abs() < 0.003);
+
+        let still = run(plan.as_ref(), &log("ladder-still.BIN"), &AnalysisOptions::default());
+        let windy = run(plan.as_ref(), &log("ladder-wind5.BIN"), &AnalysisOptions::default());
+        let base = |flight: &FlightAnalysis| {
+            let window = flight.drones[0].windows[4].clone();
+            assert!(window.kind.is_hover() && window.height_m < 21.0);
+            (window.pulse_us.mean, window.pulse_phi_us.mean, window.tilt_deg.mean)
+        };
+        let ((u, u_phi, _), (wind_u, wind_u_phi, tilt)) = (base(&still), base(&windy));
+        println!("wind: u {:+.2} u_phi {:+.2} us, tilt {tilt:.2}", wind_u - u, wind_u_phi - u_phi);
+        assert!((wind_u - u - 2.7).abs() < 0.1);
+        assert!((tilt - 11.7).abs() < 0.1);
+        // Tilt takes u cos(phi) - u = -33 us off the pulse itself.
+        assert!((wind_u_phi - wind_u + 33.0).abs() < 0.1);
+    }
+}
+
+#[test]
+fn the_oldest_command_message_suffices_to_find_the_windows() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.BIN");
+    let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
+    // Without PSCD only CTUN's desired climb rate is left, here once a second and in whole cm/s.
+    fs::write(&path, analysis_support::renamed(&bytes, *b"PSCD", *b"PSCX")).unwrap();
+    let flight = run(None, &[path], &paper());
+    assert_eq!(legs(&flight.drones[0].windows).len(), 14);
+    let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.clone().unwrap();
+    assert!((values(&fit)[0] - 4.963).abs() < 0.01, "{:?}", values(&fit));
+}
+
+#[test]
+fn damaged_logs_never_stop_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
+    let plan = plan(Purpose::Calibration, ladder(1.0), 13);
+    let mut paths = vec![folder.path().join("1.BIN")];
+    fs::write(&paths[0], &bytes).unwrap();
+    for seed in 2..=13_usize {
+        let mut damaged = bytes.clone();
+        for step in 0..seed * 60 {
+            let at = (seed * 7919 + step * 104_729 + step * step * 31) % damaged.len();
+            damaged[at] = damaged[at].wrapping_add(1 << (step % 8));
+        }
+        damaged.truncate(bytes.len() - seed * 30_011);
+        paths.push(folder.path().join(format!("{seed}.BIN")));
+        fs::write(&paths[seed - 1], damaged).unwrap();
+    }
+    for plan in [Some(&plan), None] {
+        let flight = run(plan, &paths, &AnalysisOptions::default());
+        let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
+        assert!((values(fit)[0] - 4.963).abs() < 0.01, "the whole log is unharmed");
+        assert_eq!(flight.drones.len() + flight.missing.len() + flight.warnings.len(), 13);
+        let json = serde_json::to_string(&flight).unwrap();
+        let back: FlightAnalysis = serde_json::from_str(&json).unwrap();
+        assert_eq!(back, flight, "every number is finite, so JSON holds all of it");
+        let repaired = flight.drones.iter().filter(|drone| !drone.warnings.is_empty()).count();
+        println!("{} drones, {repaired} with warnings", flight.drones.len());
+        assert!(repaired > 0);
+    }
+}

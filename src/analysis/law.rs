@@ -347,7 +347,9 @@ fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
         .filter_map(at)
         .filter(|(_, start)| start[0] > 0.0)
         .filter_map(|(_, start)| polish(start).ok())
-        .filter(|solution| solution.parameters[2].abs() <= W_LIMIT_MPS)
+        .filter(|solution| {
+            solution.parameters[0] > 0.0 && solution.parameters[2].abs() <= W_LIMIT_MPS
+        })
         .collect();
     minima.sort_by(|left, right| left.chi2.total_cmp(&right.chi2));
     minima.dedup_by(|later, earlier| {

@@ -71,8 +71,10 @@ const TRANSFER_SHARE: f64 = 0.6;
 const STEADY_MPS: f64 = 0.03;
 /// A command below this is a hover, m/s.
 const HOVER_MPS: f64 = 0.05;
-/// A silence longer than this breaks a window or a run, s.
+/// A silence longer than this breaks a window, s.
 const GAP_S: f64 = 1.0;
+/// A silence longer than this breaks a run of commands (some logs have them once a second), s.
+const RUN_GAP_S: f64 = 1.5;
 /// Fewest samples in a usable window.
 const FEWEST_SAMPLES: usize = 5;
 /// A commanded velocity further than this from the plan's is another plan's, m/s.
@@ -180,7 +182,7 @@ fn steady_runs(desired: &Series) -> Vec<Run> {
         let mean = sum / (index - start).max(1) as f64;
         let goes_on = match (current, before) {
             (Some((time, value)), Some(before)) if index > start => {
-                time - before <= GAP_S && (value - mean).abs() <= STEADY_MPS
+                time - before <= RUN_GAP_S && (value - mean).abs() <= STEADY_MPS
             }
             (Some(_), _) => true,
             (None, _) => false,
@@ -192,12 +194,8 @@ fn steady_runs(desired: &Series) -> Vec<Run> {
                 (times.get(start), before, window.get(window.len() / 2))
             {
                 // The command held until the row that says otherwise, unless the log was silent.
-                let end_s = current.map_or(
-                    last,
-                    |(time, _)| {
-                        if time - last <= GAP_S { time } else { last }
-                    },
-                );
+                let end_s = current
+                    .map_or(last, |(time, _)| if time - last <= RUN_GAP_S { time } else { last });
                 let velocity_mps = round_mmps(*median);
                 runs.push(Run { start_s: *start_s, steady_s: *start_s, end_s, velocity_mps });
             }
