@@ -433,7 +433,10 @@ fn damaged_logs_never_stop_the_others() {
         let back: FlightAnalysis = serde_json::from_str(&json).unwrap();
         assert_eq!(back, flight, "every number is finite, so JSON holds all of it");
         let repaired = flight.drones.iter().filter(|drone| !drone.warnings.is_empty()).count();
-        println!("{} drones, {repaired} with warnings", flight.drones.len());
+        for drone in &flight.drones {
+            let fit = drone.laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
+            assert!((values(fit)[0] - 4.963).abs() < 0.05, "{}: {:?}", drone.name, values(fit));
+        }
         assert!(repaired > 0);
     }
 }
