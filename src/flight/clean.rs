@@ -144,9 +144,10 @@ mod tests {
         assert_eq!(small.time_s, [1.0, 2.0, 3.0, 4.0, 6.0, 7.0, 8.0], "within seconds too");
         assert_eq!(dropped, 2);
 
-        let (rebooted, dropped) = rows(&[100e6, 101e6, 5e6, 6e6]);
+        let times: Vec<f64> = (100..110).chain(5..15).map(|time| f64::from(time) * 1e6).collect();
+        let (rebooted, dropped) = rows(&times);
         assert_eq!(dropped, 0);
-        assert_eq!(rebooted.boots(), vec![0..2, 2..4]);
+        assert_eq!(rebooted.boots(), vec![0..10, 10..20]);
     }
 
     #[test]
