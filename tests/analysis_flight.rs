@@ -1,6 +1,8 @@
 //! Logs of the real show firmware as flights: channels, alignment, and what happens when messages
 //! are missing.
 
+#![expect(clippy::unwrap_used, reason = "this is test code")]
+
 mod analysis_support;
 
 use std::fs;
@@ -49,7 +51,7 @@ fn a_show_log_is_read_with_its_own_clock() {
 fn without_show_rows_the_start_comes_from_gps_time() {
     let start = GpsTime { week: 2445, tow_ms: LADDER_START_S * 1000 };
     let options = FlightOptions { start: Some(start), ..FlightOptions::default() };
-    let flight = load(renamed(&bytes(), b"SHOW", b"SHOX"), options).unwrap();
+    let flight = load(renamed(&bytes(), *b"SHOW", *b"SHOX"), options).unwrap();
     assert_eq!(flight.clock.method, Alignment::GpsTime);
     assert!((flight.clock.offset_s - OFFSET_S).abs() < 0.05, "{:?}", flight.clock);
     assert_eq!(flight.clock.start, Some(start));
@@ -59,7 +61,7 @@ fn without_show_rows_the_start_comes_from_gps_time() {
 fn a_start_time_of_another_day_is_refused() {
     let start = GpsTime { week: 2400, tow_ms: 0 };
     let options = FlightOptions { start: Some(start), ..FlightOptions::default() };
-    let flight = load(renamed(&bytes(), b"SHOW", b"SHOX"), options).unwrap();
+    let flight = load(renamed(&bytes(), *b"SHOW", *b"SHOX"), options).unwrap();
     assert_eq!(flight.clock.method, Alignment::Takeoff);
     assert!(flight.warnings.iter().any(|w| w.contains("away from this flight")));
 }
@@ -68,7 +70,7 @@ fn a_start_time_of_another_day_is_refused() {
 fn without_any_clock_the_plan_is_matched() {
     let segments = ladder(1.0);
     let options = FlightOptions { segments: Some(&segments), ..FlightOptions::default() };
-    let hidden = renamed(&renamed(&bytes(), b"SHOW", b"SHOX"), b"GPS\0", b"GPX\0");
+    let hidden = renamed(&renamed(&bytes(), *b"SHOW", *b"SHOX"), *b"GPS\0", *b"GPX\0");
     let flight = load(hidden.clone(), options).unwrap();
     assert_eq!(flight.clock.method, Alignment::Plan);
     let error = flight.clock.offset_s - OFFSET_S;
@@ -76,7 +78,7 @@ fn without_any_clock_the_plan_is_matched() {
     assert!(error.abs() < 0.1, "{error}");
     assert!(flight.clock.residual_s < 0.1, "{:?}", flight.clock);
 
-    let measured = renamed(&renamed(&hidden, b"PSCD", b"PSCX"), b"CTUN", b"CTUX");
+    let measured = renamed(&renamed(&hidden, *b"PSCD", *b"PSCX"), *b"CTUN", *b"CTUX");
     let flight = load(measured, options).unwrap();
     assert_eq!(flight.clock.method, Alignment::Plan);
     assert!(flight.desired_up_mps.is_none());
@@ -89,7 +91,7 @@ fn without_any_clock_the_plan_is_matched() {
 fn a_plan_that_was_not_flown_is_not_matched() {
     let segments = ladder(-1.0);
     let options = FlightOptions { segments: Some(&segments), ..FlightOptions::default() };
-    let hidden = renamed(&renamed(&bytes(), b"SHOW", b"SHOX"), b"GPS\0", b"GPX\0");
+    let hidden = renamed(&renamed(&bytes(), *b"SHOW", *b"SHOX"), *b"GPS\0", *b"GPX\0");
     let flight = load(hidden, options).unwrap();
     assert_eq!(flight.clock.method, Alignment::Takeoff);
     assert!(flight.warnings.iter().any(|w| w.contains("does not match the plan")), "{flight:?}");
@@ -99,7 +101,7 @@ fn a_plan_that_was_not_flown_is_not_matched() {
 
 #[test]
 fn older_message_names_are_read() {
-    let old = renamed(&renamed(&bytes(), b"XKF1", b"NKF1"), b"BAT\0", b"CURR");
+    let old = renamed(&renamed(&bytes(), *b"XKF1", *b"NKF1"), *b"BAT\0", *b"CURR");
     let flight = load(old, FlightOptions::default()).unwrap();
     assert!((flight.velocity_up_mps.at(395.0, 1.0).unwrap() - 3.5).abs() < 0.02);
     assert!((flight.voltage_v.unwrap().at(100.0, 2.0).unwrap() - 12.588).abs() < 0.01);
@@ -112,7 +114,8 @@ fn a_missing_message_is_named_with_its_remedy() {
         (b"XKF1", "vertical velocity of the position filter (XKF1, NKF1 or EKF1)", "LOG_BITMASK"),
         (b"ATT\0", "attitude (ATT)", "LOG_BITMASK"),
     ] {
-        let error = load(renamed(&bytes(), hidden, b"XXXX"), FlightOptions::default()).unwrap_err();
+        let error =
+            load(renamed(&bytes(), *hidden, *b"XXXX"), FlightOptions::default()).unwrap_err();
         let text = error.to_string();
         assert!(text.contains("07.BIN") && text.contains(named), "{text}");
         assert!(text.contains(remedy), "{text}");

@@ -2,6 +2,8 @@
 //! with window errors of 15 us looks, fitted with the signed-quadratic law, as the paper's field
 //! flights do (scattered W, reduced chi² of 2).
 
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "this is test code")]
+
 use rand::Rng;
 use rand_distr::{Distribution, Normal};
 use updraft::analysis::law::{
@@ -156,4 +158,36 @@ fn both_inverses_return_the_air_velocity() {
             assert!((back - velocity).abs() < 1e-6, "{law:?} {velocity} {back}");
         }
     }
+}
+
+/// ISA density ratio to sea level (the stock simulator's atmosphere).
+fn density_ratio(amsl_m: f64) -> f64 {
+    let kelvin = 288.15 - 0.0065 * amsl_m;
+    let pascal = 101_325.0 * (288.15 / kelvin).powf(-5.255_877);
+    pascal / (287.053 * kelvin) / 1.225
+}
+
+#[test]
+fn density_along_the_ladder_explains_table_i() {
+    // The stock simulator's steady law: 8.0552 us/(m/s)² of drag, 586.6 us of thrust at sea level
+    // density. Climbs are measured higher than descents, in thinner air: that widens A and fakes a
+    // downdraft. Table I has A 8.207 ± 0.020, u0 1598.656 ± 0.039, W -0.0589 ± 0.0031.
+    let home_amsl_m = 190.0;
+    let points: Vec<Point> = rungs()
+        .map(|velocity_mps| {
+            // Mean height in the window from 10 s to 19 s of a 20 s leg, from 20 m or from its top.
+            let speed = velocity_mps.abs();
+            let above = if velocity_mps > 0.0 { 14.5 * speed } else { 20.0 * speed - 14.5 * speed };
+            let thrust = 586.6 / density_ratio(home_amsl_m + 20.0 + above);
+            let drag = 8.0552 * velocity_mps * speed;
+            let pulse_us = 1000.0 + thrust + drag;
+            Point { velocity_mps, pulse_us, sigma_us: 0.3, velocity_sigma_mps: 0.0 }
+        })
+        .collect();
+    let fit = signed_quadratic(&points, ErrorScale::Scaled).unwrap();
+    let [a, u0, w] = [0, 1, 2].map(|index| fit.parameters[index].estimate);
+    println!("A {a}  u0 {u0}  W {w}");
+    assert!((a.value - 8.14).abs() < 0.01, "{a}");
+    assert!((u0.value - 1598.6).abs() < 0.2, "{u0}");
+    assert!((w.value + 0.035).abs() < 0.003, "{w}");
 }

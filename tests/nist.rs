@@ -5,6 +5,8 @@
 //! algorithm does not solve from NIST's far start are listed, not skipped: when they begin to pass,
 //! the test says so.
 
+#![expect(clippy::unwrap_used, reason = "this is test code")]
+
 use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;

@@ -7,20 +7,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::calibrate::{self, CalibrationError, FitOptions, Hold, PaperTable};
+use super::calibrate::{self, FitOptions, PaperTable};
+use super::drone::{One, Shared, law_fit, one};
 use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::matching::{self, Candidate};
-use super::result::{
-    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, Fit, FlightAnalysis, Laws, Missing,
-    Trace, UpdraftMap,
-};
+use super::result::{ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, Missing, UpdraftMap};
 use super::stats::mean_sd;
 use super::updraft::{self, DroneSeries};
-use super::windows::{self, Corrected, WindowOptions};
+use super::windows::WindowOptions;
 use crate::base::time::GpsTime;
-use crate::flight::{Alignment, Flight, FlightOptions, identify};
+use crate::flight::{Identity, identify};
 use crate::log::Log;
-use crate::mission::plan::{Plan, Purpose, Segment, Slot};
+use crate::mission::plan::{Plan, Purpose};
 
 /// One log of a flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -183,7 +181,7 @@ pub fn analyze_flight(
     let mut warnings = Vec::new();
     let slots = match_slots(input, &mut warnings);
     let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
-    let map_law = options.map_law.or_else(|| better_law(reference?));
+    let map_law = options.map_law.or_else(|| reference.map(better_law));
     let shared = Shared { input, options, reference, planned_purpose, map_law };
 
     let done = AtomicUsize::new(0);
@@ -230,21 +228,6 @@ pub fn analyze_flight(
     Ok(finish(&shared, ones, &reasons, warnings))
 }
 
-struct Shared<'a> {
-    input: &'a FlightInput<'a>,
-    options: &'a AnalysisOptions,
-    reference: Option<&'a FlightAnalysis>,
-    planned_purpose: Option<Purpose>,
-    map_law: Option<MapLaw>,
-}
-
-/// What one log gave.
-struct One {
-    drone: DroneAnalysis,
-    calibration: Result<Laws, CalibrationError>,
-    updraft: Option<(DroneSeries, &'static str)>,
-}
-
 enum SlotMatch {
     Slot(u16),
     Unplanned,
@@ -260,11 +243,11 @@ fn match_slots(input: &FlightInput<'_>, warnings: &mut Vec<String>) -> Vec<SlotM
         .logs
         .par_iter()
         .map(|log| {
-            let identity = match log.slot {
-                Some(_) => None,
-                None => Log::open(&log.path).ok().map(|log| identify(&log)),
-            }
-            .unwrap_or_default();
+            let identity = if log.slot.is_some() {
+                Identity::default()
+            } else {
+                Log::open(&log.path).map(|log| identify(&log)).unwrap_or_default()
+            };
             Candidate {
                 given: log.slot,
                 system_id: identity.system_id,
@@ -308,119 +291,8 @@ fn with_name(reason: &str, path: &Path) -> String {
     if reason.contains(&name) { reason.to_owned() } else { format!("{name}: {reason}") }
 }
 
-/// Error text with its causes.
-fn chain(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        let cause_text = cause.to_string();
-        if !text.contains(&cause_text) {
-            text = format!("{text}: {cause_text}");
-        }
-        source = cause.source();
-    }
-    text
-}
-
-/// Everything about one log.
-fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Result<One, String> {
-    let Shared { input, options, .. } = shared;
-    let slot: Option<(&Slot, &[Segment])> = slot.and_then(|number| {
-        let plan = input.plan?;
-        let slot = plan.slot(number)?;
-        Some((slot, plan.segments(slot)))
-    });
-    let flight_options =
-        FlightOptions { start: input.start, segments: slot.map(|(_, segments)| segments) };
-    let flight = Flight::open(&log.path, flight_options).map_err(|error| chain(&error))?;
-    let mut warnings = flight.warnings.clone();
-
-    let targets = match slot {
-        Some((_, segments)) => {
-            let targets = windows::planned(segments);
-            if targets.is_empty() {
-                return Err("the plan has no analysis windows for this slot".to_owned());
-            }
-            if flight.clock.method == Alignment::Takeoff {
-                warnings.push(
-                    "times count from take-off: windows may be shifted against the plan".to_owned(),
-                );
-            }
-            if let Some(reason) = windows::contradiction(&flight, &targets) {
-                return Err(reason);
-            }
-            targets
-        }
-        None => {
-            if flight.desired_up_mps.is_none() {
-                return Err(
-                    "without a plan the windows come from the log's desired velocity, and \
-                            it has none (GUIP, PSCD or CTUN); give the plan"
-                        .to_owned(),
-                );
-            }
-            windows::inferred(&flight)
-        }
-    };
-    let corrected = windows::correct_tilt(&flight, options.windows.tilt);
-    let stats = windows::measure(&flight, &corrected, &targets, &options.windows);
-
-    let name = match slot {
-        Some((slot, _)) => slot.name.clone(),
-        None => log.path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-    };
-    let number = slot.map(|(slot, _)| slot.slot);
-    let reference = shared.reference.and_then(|reference| laws_for(reference, number, &name));
-    let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _)| laws)?));
-    let calibration = calibrate::calibrate(&stats, &FitOptions { hold, ..options.fit });
-    let updraft = reference.and_then(|(laws, mapping)| {
-        let fit = law_fit(laws, shared.map_law?)?;
-        let hover = updraft::hover(&targets)?;
-        Some((updraft::estimate(&flight, &corrected.pulse_phi_us, hover, fit)?, mapping))
-    });
-    let source = input
-        .folder
-        .and_then(|folder| log.path.strip_prefix(folder).ok())
-        .unwrap_or(&log.path)
-        .display()
-        .to_string();
-    let drone = DroneAnalysis {
-        slot: number,
-        name,
-        source,
-        home_m: slot.map(|(slot, _)| [slot.home_m[0], slot.home_m[1]]),
-        clock: flight.clock.clone(),
-        windows: stats,
-        laws: None,
-        trace: trace(&flight, &corrected, options.trace_points),
-        warnings,
-    };
-    Ok(One { drone, calibration, updraft })
-}
-
-/// The laws of a drone in a reference calibration: its own, else the flock's.
-fn laws_for<'a>(
-    reference: &'a FlightAnalysis,
-    slot: Option<u16>,
-    name: &str,
-) -> Option<(&'a Laws, &'static str)> {
-    let same = |drone: &&DroneAnalysis| match (slot, drone.slot) {
-        (Some(slot), Some(other)) => slot == other,
-        _ => drone.name == name,
-    };
-    let own = reference.drones.iter().find(same).and_then(|drone| drone.laws.as_ref());
-    own.map(|laws| (laws, "own")).or_else(|| Some((reference.flock.as_ref()?, "flock")))
-}
-
-fn law_fit(laws: &Laws, law: MapLaw) -> Option<&Fit> {
-    match law {
-        MapLaw::Linear => laws.linear.as_ref(),
-        MapLaw::SignedQuadratic => laws.signed_quadratic.as_ref(),
-    }
-}
-
 /// The law whose fits to the reference's drones have the lower mean reduced chi².
-fn better_law(reference: &FlightAnalysis) -> Option<MapLaw> {
+fn better_law(reference: &FlightAnalysis) -> MapLaw {
     let reduced = |law: MapLaw| {
         let values: Vec<f64> = reference
             .drones
@@ -430,9 +302,9 @@ fn better_law(reference: &FlightAnalysis) -> Option<MapLaw> {
         (!values.is_empty()).then(|| mean_sd(&values).0)
     };
     match (reduced(MapLaw::Linear), reduced(MapLaw::SignedQuadratic)) {
-        (Some(linear), Some(quadratic)) if quadratic < linear => Some(MapLaw::SignedQuadratic),
-        (None, Some(_)) => Some(MapLaw::SignedQuadratic),
-        _ => Some(MapLaw::Linear),
+        (Some(linear), Some(quadratic)) if quadratic < linear => MapLaw::SignedQuadratic,
+        (None, Some(_)) => MapLaw::SignedQuadratic,
+        _ => MapLaw::Linear,
     }
 }
 
@@ -537,27 +409,4 @@ fn map(updrafts: Vec<NamedUpdraft>, law: Option<MapLaw>, truth_mps: Option<f64>)
         time_s: times.iter().map(|time| *time as f64).collect(),
         drones,
     }
-}
-
-/// Traces for figures: means over equal time steps.
-fn trace(flight: &Flight, corrected: &Corrected, points: usize) -> Trace {
-    let Some((start, end)) = flight.velocity_up_mps.span() else { return Trace::default() };
-    let step = ((end - start) / points.max(1) as f64).max(0.1);
-    let mut trace = Trace::default();
-    for index in 0..points {
-        let (from, to) = (start + index as f64 * step, start + (index + 1) as f64 * step);
-        let mean = |values: &[f64]| (!values.is_empty()).then(|| mean_sd(values).0);
-        let (Some(height), Some(velocity), Some(pulse)) = (
-            mean(flight.height_m.between(from, to)),
-            mean(flight.velocity_up_mps.between(from, to)),
-            mean(corrected.pulse_phi_us.between(from, to)),
-        ) else {
-            continue;
-        };
-        trace.time_s.push(f64::midpoint(from, to));
-        trace.height_m.push(height);
-        trace.velocity_mps.push(velocity);
-        trace.pulse_phi_us.push(pulse);
-    }
-    trace
 }

@@ -309,9 +309,11 @@ impl PaperTable {
 /// Name of the law with A and u0 held, in tables.
 pub const SIGNED_QUADRATIC_HELD: &str = "signed quadratic, A and u0 held";
 
+type FitOf = fn(&Laws) -> Option<&Fit>;
+
 /// Statistics over drones of the fitted parameters, in the rows of Tables I and II.
 pub fn table(drones: &[DroneAnalysis], paper: PaperTable) -> Vec<TableRow> {
-    let laws: [(&str, fn(&Laws) -> Option<&Fit>); 3] = [
+    let laws: [(&str, FitOf); 3] = [
         (law::SIGNED_QUADRATIC, |laws| laws.signed_quadratic.as_ref()),
         (SIGNED_QUADRATIC_HELD, |laws| laws.signed_quadratic_held.as_ref()),
         (law::LINEAR, |laws| laws.linear.as_ref()),

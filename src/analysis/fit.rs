@@ -128,6 +128,9 @@ where
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
     let jacobian = problem.derivatives();
     let found = (problem.residuals)(problem.at.as_slice());
+    if !problem.at.iter().chain(&found).all(|value| value.is_finite()) {
+        return Err(FitError::NotFinite);
+    }
     let covariance = inverse_gram(&jacobian).ok_or(FitError::Singular)?;
     Ok(Solution {
         parameters: problem.at.as_slice().to_vec(),

@@ -344,10 +344,12 @@ fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
         minimize_with(|p| residuals(points, sigmas, law(p)), Some(&derivatives), &start)
     };
     let mut minima: Vec<Solution> = minima_of(&chi2)
-        .filter_map(|w| at(w))
+        .filter_map(at)
         .filter(|(_, start)| start[0] > 0.0)
         .filter_map(|(_, start)| polish(start).ok())
-        .filter(|solution| solution.parameters[2].abs() <= W_LIMIT_MPS)
+        .filter(|solution| {
+            solution.parameters[0] > 0.0 && solution.parameters[2].abs() <= W_LIMIT_MPS
+        })
         .collect();
     minima.sort_by(|left, right| left.chi2.total_cmp(&right.chi2));
     minima.dedup_by(|later, earlier| {

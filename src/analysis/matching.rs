@@ -26,6 +26,8 @@ pub(super) fn file_number(path: &Path) -> Option<u16> {
     head.get(start..)?.parse().ok()
 }
 
+type Way<'a> = &'a dyn Fn(&Candidate) -> Option<u16>;
+
 /// Slot of each log. Given slots stand. For the others the first of these ways that gives every one
 /// of them its own slot of the plan is taken: system id, number in the file name, nearest home.
 /// Without such a way each log takes the first way that leads to a slot still free.
@@ -36,7 +38,7 @@ pub(super) fn slots(plan: &Plan, logs: &[Candidate]) -> Vec<Option<u16>> {
     let by_id = |log: &Candidate| log.system_id.map(u16::from).filter(|s| plan.slot(*s).is_some());
     let by_name = |log: &Candidate| log.file_number.filter(|slot| plan.slot(*slot).is_some());
     let by_place = |log: &Candidate| nearest_home(plan, log.first_fix_deg?);
-    let ways: [&dyn Fn(&Candidate) -> Option<u16>; 3] = [&by_id, &by_name, &by_place];
+    let ways: [Way<'_>; 3] = [&by_id, &by_name, &by_place];
     for way in ways {
         let found: Vec<Option<u16>> = open.iter().map(|index| way(&logs[*index])).collect();
         let mut all = taken.clone();

@@ -5,6 +5,7 @@
 
 mod analyze;
 pub mod calibrate;
+mod drone;
 pub mod fit;
 pub mod law;
 mod matching;

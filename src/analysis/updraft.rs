@@ -18,6 +18,8 @@ const GAP_S: f64 = 1.0;
 const FEWEST_PER_BIN: usize = 3;
 /// Blocks for the error of the mean: twice the running window, so that blocks are nearly independent.
 const BLOCK_S: f64 = 20.0;
+/// No map is longer, whatever times a damaged log claims, s.
+const LONGEST_S: usize = 200_000;
 /// Below this air velocity the inverse of the signed-quadratic law is too steep to propagate errors
 /// through; this velocity's slope stands in, m/s.
 const STEEP_MPS: f64 = 0.05;
@@ -70,7 +72,7 @@ pub fn estimate(
     }
     let (first, last) = values.span()?;
     let first_s = first.round() as i64;
-    let seconds = usize::try_from(last.round() as i64 - first_s + 1).ok()?;
+    let seconds = usize::try_from(last.round() as i64 - first_s + 1).ok()?.min(LONGEST_S);
     let bin = |index: usize| {
         let centre = (first_s + index as i64) as f64;
         let values = values.between(centre - 0.5, centre + 0.5);
@@ -124,7 +126,6 @@ struct Running<'a> {
     times: &'a [f64],
     /// Integral of the piecewise linear signal up to each sample.
     integral: Vec<f64>,
-    values: &'a [f64],
     /// Index of the last gap's end at or before each sample.
     gap_before: Vec<usize>,
 }
@@ -137,18 +138,20 @@ impl<'a> Running<'a> {
         let mut integral = Vec::with_capacity(times.len());
         let mut gap_before = Vec::with_capacity(times.len());
         let (mut sum, mut gap) = (0.0, 0);
-        for index in 0..times.len() {
-            if let Some(before) = index.checked_sub(1) {
-                let step = times[index] - times[before];
-                sum += step * f64::midpoint(values[index], values[before]);
+        let mut before: Option<(f64, f64)> = None;
+        for (index, (time, value)) in times.iter().zip(values).enumerate() {
+            if let Some((last, last_value)) = before {
+                let step = time - last;
+                sum += step * f64::midpoint(*value, last_value);
                 if step > GAP_S {
                     gap = index;
                 }
             }
+            before = Some((*time, *value));
             integral.push(sum);
             gap_before.push(gap);
         }
-        Self { times, integral, values, gap_before }
+        Self { times, integral, gap_before }
     }
 
     /// Mean over the full window centred on a time; `None` across gaps and beyond the ends.
@@ -163,9 +166,6 @@ impl<'a> Running<'a> {
         if start - (centre_s - half) > GAP_S || (centre_s + half) - end > GAP_S {
             return None;
         }
-        if self.values.len() != self.times.len() {
-            return None;
-        }
         Some((self.integral.get(last)? - self.integral.get(first)?) / (end - start))
     }
 }
@@ -175,7 +175,7 @@ pub fn common_times(drones: &[DroneSeries]) -> Vec<i64> {
     let first = drones.iter().map(|drone| drone.first_s).min();
     let last = drones.iter().map(|drone| drone.first_s + drone.updraft_mps.len() as i64).max();
     match (first, last) {
-        (Some(first), Some(last)) => (first..last).collect(),
+        (Some(first), Some(last)) => (first..last).take(LONGEST_S).collect(),
         _ => Vec::new(),
     }
 }

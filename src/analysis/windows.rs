@@ -61,16 +61,24 @@ const END_CUT_S: f64 = 1.0;
 const START_CUT_S: f64 = 3.0;
 /// Shortest constant command that is a leg or hover, s.
 const SHORTEST_RUN_S: f64 = 8.0;
+/// Shortest stretch of a logged command that counts as steady, s.
+const SHORTEST_STEADY_S: f64 = 4.0;
+/// Longest time that a vehicle takes from one steady command to the next, s.
+const LONGEST_TRANSITION_S: f64 = 5.0;
 /// Legs shorter than this share of the longest one are transfers, not rungs.
 const TRANSFER_SHARE: f64 = 0.6;
 /// Wobble of a constant command, m/s (firmware adds its own corrections in some messages).
 const STEADY_MPS: f64 = 0.03;
 /// A command below this is a hover, m/s.
 const HOVER_MPS: f64 = 0.05;
-/// A silence longer than this breaks a window or a run, s.
+/// A silence longer than this breaks a window, s.
 const GAP_S: f64 = 1.0;
+/// A silence longer than this breaks a run of commands (some logs have them once a second), s.
+const RUN_GAP_S: f64 = 1.5;
 /// Fewest samples in a usable window.
 const FEWEST_SAMPLES: usize = 5;
+/// A commanded velocity further than this from the plan's is another plan's, m/s.
+const WRONG_MPS: f64 = 0.3;
 /// Pulse quantum, us: a motor within it of its limit is at the limit.
 const QUANTUM_US: f64 = 1.0;
 
@@ -98,14 +106,20 @@ pub fn planned(segments: &[Segment]) -> Vec<Target> {
 /// than the longest (climbs to height, descents to land) are not rungs and are left out.
 pub fn inferred(flight: &Flight) -> Vec<Target> {
     let Some(desired) = &flight.desired_up_mps else { return Vec::new() };
-    let runs: Vec<Run> = steady_runs(desired)
-        .into_iter()
-        .filter(|run| run.end_s - run.start_s >= SHORTEST_RUN_S && flies(flight, run))
-        .collect();
+    let mut runs: Vec<Run> = steady_runs(desired);
+    runs.retain(|run| run.duration_s() >= SHORTEST_STEADY_S);
+    let mut last_end = f64::NEG_INFINITY;
+    for run in &mut runs {
+        if run.steady_s - last_end <= LONGEST_TRANSITION_S {
+            run.start_s = last_end;
+        }
+        last_end = run.end_s;
+    }
+    runs.retain(|run| run.duration_s() >= SHORTEST_RUN_S && flies(flight, run));
     let longest_leg = runs
         .iter()
         .filter(|run| run.velocity_mps.abs() > HOVER_MPS)
-        .map(|run| run.end_s - run.start_s)
+        .map(Run::duration_s)
         .fold(0.0, f64::max);
     let target = |run: &Run| {
         let velocity = run.velocity_mps;
@@ -119,12 +133,12 @@ pub fn inferred(flight: &Flight) -> Vec<Target> {
             return Some(Target {
                 kind: if moves { Kind::Horizontal } else { Kind::Hover },
                 label: if moves { format!("level {speed:.1} m/s") } else { "hover".to_owned() },
-                start_s: run.start_s + START_CUT_S,
+                start_s: (run.start_s + START_CUT_S).max(run.steady_s),
                 end_s: run.end_s - END_CUT_S,
                 commanded_mps: 0.0,
             });
         }
-        if run.end_s - run.start_s < TRANSFER_SHARE * longest_leg {
+        if run.duration_s() < TRANSFER_SHARE * longest_leg {
             return None;
         }
         let (kind, word) =
@@ -132,7 +146,7 @@ pub fn inferred(flight: &Flight) -> Vec<Target> {
         Some(Target {
             kind,
             label: format!("{word} {} m/s", velocity.abs()),
-            start_s: (run.end_s - LEG_USED_S).max(run.start_s + START_CUT_S),
+            start_s: (run.end_s - LEG_USED_S).max(run.start_s + START_CUT_S).max(run.steady_s),
             end_s: run.end_s - END_CUT_S,
             commanded_mps: velocity,
         })
@@ -141,9 +155,18 @@ pub fn inferred(flight: &Flight) -> Vec<Target> {
 }
 
 struct Run {
+    /// When the command was given: where the run before ended, if the time between is a transition.
     start_s: f64,
+    /// From when on the logged command is steady (firmware rounds off the plan's steps).
+    steady_s: f64,
     end_s: f64,
     velocity_mps: f64,
+}
+
+impl Run {
+    fn duration_s(&self) -> f64 {
+        self.end_s - self.start_s
+    }
 }
 
 /// Stretches over which the command stays put. A run ends where the next command begins.
@@ -159,7 +182,7 @@ fn steady_runs(desired: &Series) -> Vec<Run> {
         let mean = sum / (index - start).max(1) as f64;
         let goes_on = match (current, before) {
             (Some((time, value)), Some(before)) if index > start => {
-                time - before <= GAP_S && (value - mean).abs() <= STEADY_MPS
+                time - before <= RUN_GAP_S && (value - mean).abs() <= STEADY_MPS
             }
             (Some(_), _) => true,
             (None, _) => false,
@@ -171,13 +194,10 @@ fn steady_runs(desired: &Series) -> Vec<Run> {
                 (times.get(start), before, window.get(window.len() / 2))
             {
                 // The command held until the row that says otherwise, unless the log was silent.
-                let end_s = current.map_or(
-                    last,
-                    |(time, _)| {
-                        if time - last <= GAP_S { time } else { last }
-                    },
-                );
-                runs.push(Run { start_s: *start_s, end_s, velocity_mps: round_mmps(*median) });
+                let end_s = current
+                    .map_or(last, |(time, _)| if time - last <= RUN_GAP_S { time } else { last });
+                let velocity_mps = round_mmps(*median);
+                runs.push(Run { start_s: *start_s, steady_s: *start_s, end_s, velocity_mps });
             }
             start = index;
             sum = 0.0;
@@ -193,7 +213,8 @@ fn flies(flight: &Flight, run: &Run) -> bool {
     let middle = f64::midpoint(run.start_s, run.end_s);
     let armed = flight.armed_s.iter().any(|(start, end)| (*start..=*end).contains(&middle));
     let pulses = flight.pulse_us.between(run.start_s, run.end_s);
-    let spins = mean(pulses) > flight.pulse_limits_us.0;
+    // Standing, the motors idle well below the lowest output in flight.
+    let spins = mean(pulses) > flight.pulse_limits_us.0 - QUANTUM_US;
     (armed || flight.armed_s.is_empty()) && spins
 }
 
@@ -305,26 +326,33 @@ fn measure_one(
     }
 }
 
-/// Whether the log contradicts the plan: the share of windows in which the logged command (or, when
-/// the log has none, the measured velocity) is not the planned one, if that is more than half.
+/// Whether the log contradicts the plan: what was flown instead, if more than half of the plan's legs
+/// (or of its hovers, when it has no legs) were commanded otherwise. A log without commands is
+/// judged by its measured velocity.
 pub fn contradiction(flight: &Flight, targets: &[Target]) -> Option<String> {
     let series = flight.desired_up_mps.as_ref().unwrap_or(&flight.velocity_up_mps);
+    let flown = |target: &Target| {
+        let values = series.between(target.start_s, target.end_s);
+        (!values.is_empty()).then(|| mean(values))
+    };
+    let has_legs = targets.iter().any(|target| target.kind.is_leg() && flown(target).is_some());
     let compared: Vec<(&Target, f64)> = targets
         .iter()
-        .filter(|target| !series.between(target.start_s, target.end_s).is_empty())
-        .map(|target| (target, mean(series.between(target.start_s, target.end_s))))
+        .filter(|target| !has_legs || target.kind.is_leg())
+        .filter_map(|target| Some((target, flown(target)?)))
         .collect();
     let wrong: Vec<&(&Target, f64)> = compared
         .iter()
-        .filter(|(target, flown)| (flown - target.commanded_mps).abs() > 0.3)
+        .filter(|(target, flown)| (flown - target.commanded_mps).abs() > WRONG_MPS)
         .collect();
     let (target, flown) = wrong.first().filter(|_| 2 * wrong.len() > compared.len())?;
     Some(format!(
-        "this log does not belong to the plan: {} of {} windows were flown at another vertical \
-         speed (first: `{}` at {:.0} s, planned {} m/s, flown {flown:.2} m/s); check that the logs \
-         are in the folder of their own flight",
+        "this log does not belong to the plan: {} of {} {} were flown at another vertical speed \
+         (first: `{}` at {:.0} s, planned {} m/s, flown {flown:.2} m/s); check that the logs are \
+         in the folder of their own flight",
         wrong.len(),
         compared.len(),
+        if has_legs { "legs" } else { "windows" },
         target.label,
         target.start_s,
         target.commanded_mps,

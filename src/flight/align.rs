@@ -181,7 +181,9 @@ fn match_plan(evidence: &Evidence<'_>, segments: &[Segment]) -> Option<Clock> {
     if latest - earliest > 7200.0 || duration > 7200.0 {
         return None;
     }
-    let (_, coarse) = best_of(earliest, latest, COARSE_S, 0.5)?;
+    // A thousand samples tell where a plan lies; a step of it must not fall between them, though.
+    let sampling = (duration / 1000.0).clamp(0.5, 5.0);
+    let (_, coarse) = best_of(earliest, latest, COARSE_S, sampling)?;
     let (lowest, offset_s) =
         best_of(coarse - 2.0 * COARSE_S, coarse + 2.0 * COARSE_S, FINE_S, 0.1)?;
     // Standing still all the time is the null match.

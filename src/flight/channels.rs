@@ -10,6 +10,10 @@ use crate::log::{Log, ScanStats, Select, Table};
 const GUIDED_WITH_VELOCITY: [f64; 2] = [3.0, 4.0];
 /// A median above this is centivolts (no show drone flies on 100 V).
 const HIGHEST_VOLTAGE_V: f64 = 100.0;
+/// Pulse widths that a motor output can have, us; unused outputs are 0, and damage makes others.
+const PULSES_US: std::ops::RangeInclusive<f64> = 500.0..=2500.0;
+/// No multirotor is faster, m/s: what is was damaged in the log.
+const FASTEST_MPS: f64 = 100.0;
 /// Rows below which a desired-velocity message is not worth having.
 const FEWEST_DESIRED: usize = 20;
 
@@ -153,7 +157,7 @@ impl Messages {
             rows.retain(|index| cores.get(index) == Some(&core));
         }
         Some(Ekf {
-            velocity_up: rows.series("VD", |down| -down)?,
+            velocity_up: rows.series("VD", |down| within(-down, FASTEST_MPS))?,
             height: rows.series("PD", |down| -down)?,
             north: rows.series("PN", |north| north).unwrap_or_default(),
             east: rows.series("PE", |east| east).unwrap_or_default(),
@@ -184,7 +188,7 @@ impl Messages {
             let outputs = motors
                 .iter()
                 .filter_map(|motor| motor.get(row).copied())
-                .filter(|pulse| pulse.is_finite() && *pulse > 0.0);
+                .filter(|pulse| PULSES_US.contains(pulse));
             let (mut sum, mut count) = (0.0, 0);
             let (mut largest, mut smallest) = (f64::NEG_INFINITY, f64::INFINITY);
             for pulse in outputs {
@@ -305,6 +309,11 @@ impl Messages {
             .filter(|(_, one, two)| one.is_finite() && two.is_finite())
             .collect()
     }
+}
+
+/// The value, or NaN (which channels leave out) when it is larger than anything possible.
+fn within(value: f64, limit: f64) -> f64 {
+    if value.abs() <= limit { value } else { f64::NAN }
 }
 
 /// What the position filter says, over board time.

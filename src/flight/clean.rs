@@ -8,8 +8,8 @@ use crate::log::Table;
 
 /// A time step back by more than this is a reboot, s (messages of one boot may swap by less).
 const REBOOT_S: f64 = 1.0;
-/// A single row further than this from both neighbours is a glitch, s.
-const GLITCH_S: f64 = 60.0;
+/// Rows ahead that vote on whether a time is a glitch.
+const VOTERS: usize = 4;
 
 /// Number columns of one message over board time.
 #[derive(Clone, Debug, Default)]
@@ -20,26 +20,15 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// From a table with a `TimeUS` (or the older `TimeMS`) column; empty without one. Rows with
-    /// impossible or glitched times are dropped; returns how many.
+    /// From a table with a `TimeUS` (or the older `TimeMS`) column; empty without one. Rows whose
+    /// time the rows around them contradict are dropped; returns how many.
     pub(super) fn from_table(table: &Table) -> (Self, usize) {
         let times: Vec<f64> = match (table.number("TimeUS"), table.number("TimeMS")) {
             (Some(micro), _) => micro.iter().map(|time| time / 1e6).collect(),
             (None, Some(milli)) => milli.iter().map(|time| time / 1e3).collect(),
             (None, None) => return (Self::default(), 0),
         };
-        let keep = |index: usize| {
-            let time = times.get(index).copied().unwrap_or(f64::NAN);
-            if !time.is_finite() || time < 0.0 {
-                return false;
-            }
-            let far = |other: Option<&f64>| other.is_none_or(|o| (time - o).abs() > GLITCH_S);
-            let before = index.checked_sub(1).and_then(|before| times.get(before));
-            let after = times.get(index + 1);
-            let glitch = (before.is_some() || after.is_some()) && far(before) && far(after);
-            !glitch || (before.is_none() || after.is_none()) && times.len() <= 2
-        };
-        let kept: Vec<usize> = (0..times.len()).filter(|index| keep(*index)).collect();
+        let kept = plausible(&times);
         let pick = |column: &[f64]| -> Vec<f64> {
             kept.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
         };
@@ -103,6 +92,33 @@ impl Rows {
     }
 }
 
+/// Indices of the rows with credible times. Time runs on, or starts again after a reboot: a row that
+/// jumps while most of the next few rows go on from where time was before has a damaged time.
+fn plausible(times: &[f64]) -> Vec<usize> {
+    let possible = |time: f64| time.is_finite() && time >= 0.0;
+    let mut kept = Vec::with_capacity(times.len());
+    let mut last = 0.0;
+    for (index, time) in times.iter().enumerate().filter(|(_, time)| possible(**time)) {
+        let ahead = times.get(index + 1..).unwrap_or_default();
+        let (mut voters, mut against) = (0, 0);
+        for next in ahead.iter().filter(|next| possible(**next)).take(VOTERS) {
+            // A row that itself lies before the last one has no say on a jump ahead.
+            let has_say = *time < last || *next >= last;
+            let goes_on = *next >= last && (*time < last || next < time);
+            voters += usize::from(has_say);
+            against += usize::from(goes_on);
+        }
+        let alone_and_back = voters == 0 && *time < last;
+        if 2 * against > voters || alone_and_back {
+            continue;
+        }
+        // Rows that swapped places within a boot do not set time back.
+        last = if *time < last - REBOOT_S { *time } else { time.max(last) };
+        kept.push(index);
+    }
+    kept
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,9 +140,14 @@ mod tests {
         assert_eq!(glitched.column("A").unwrap(), &[0.0, 1.0, 3.0, 5.0]);
         assert_eq!(glitched.boots(), vec![0..4]);
 
-        let (rebooted, dropped) = rows(&[100e6, 101e6, 5e6, 6e6]);
+        let (small, dropped) = rows(&[1e6, 2e6, 9e6, 3e6, 4e6, 6e6, 1.5e6, 7e6, 8e6]);
+        assert_eq!(small.time_s, [1.0, 2.0, 3.0, 4.0, 6.0, 7.0, 8.0], "within seconds too");
+        assert_eq!(dropped, 2);
+
+        let times: Vec<f64> = (100..110).chain(5..15).map(|time| f64::from(time) * 1e6).collect();
+        let (rebooted, dropped) = rows(&times);
         assert_eq!(dropped, 0);
-        assert_eq!(rebooted.boots(), vec![0..2, 2..4]);
+        assert_eq!(rebooted.boots(), vec![0..10, 10..20]);
     }
 
     #[test]

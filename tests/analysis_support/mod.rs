@@ -1,6 +1,7 @@
 //! Plans and logs for the analysis tests.
 
 #![expect(dead_code, reason = "each test file uses its own part")]
+#![expect(clippy::unwrap_used, reason = "this is test code")]
 
 use std::path::PathBuf;
 
@@ -120,13 +121,13 @@ pub(crate) fn plan(purpose: Purpose, segments: Vec<Segment>, slots: u16) -> Plan
 }
 
 /// The bytes of a fixture with a message renamed in its definition, which hides it from readers.
-pub(crate) fn renamed(bytes: &[u8], from: &[u8; 4], to: &[u8; 4]) -> Vec<u8> {
+pub(crate) fn renamed(bytes: &[u8], from: [u8; 4], to: [u8; 4]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let mut count = 0;
     for start in 0..bytes.len().saturating_sub(9) {
         // FMT row: header A3 95 80, type, length, then the name.
-        if bytes[start..].starts_with(&[0xA3, 0x95, 0x80]) && &bytes[start + 5..start + 9] == from {
-            bytes[start + 5..start + 9].copy_from_slice(to);
+        if bytes[start..].starts_with(&[0xA3, 0x95, 0x80]) && bytes[start + 5..start + 9] == from {
+            bytes[start + 5..start + 9].copy_from_slice(&to);
             count += 1;
         }
     }
