@@ -23,8 +23,8 @@ pub enum Firmware {
     V46,
 }
 
-/// Parameters of the drone that matter. Defaults: the fork's own, with the take-off speed and
-/// acceleration of the swarm launcher's parameter file.
+/// Parameters of the drone that matter. Defaults: the fork's own, with the take-off speed of the swarm
+/// launcher's parameter file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeriveParams {
     /// `SHOW_TAKEOFF_ALT`, m.
@@ -44,7 +44,7 @@ impl Default for DeriveParams {
         Self {
             takeoff_alt_m: 2.5,
             speed_up_mps: 5.5,
-            accel_z_mps2: 2.5,
+            accel_z_mps2: 1.0,
             spool_s: 0.5,
             vertical_within_m: 0.05,
         }
@@ -117,10 +117,10 @@ pub fn derive(trajectory: &Trajectory, firmware: Firmware, params: &DeriveParams
         Some(_) => {}
     }
     let takeoff_s = takeoff_s.map(|s| s.max(0.0));
-    if takeoff_s.is_some_and(|takeoff_s| landing_s <= takeoff_s) {
+    if takeoff_s.is_some_and(|takeoff_s| landing_s < takeoff_s) {
         reasons.push("it would land before it takes off".to_owned());
     }
-    let valid = takeoff_s.is_some_and(|takeoff_s| landing_s > takeoff_s);
+    let valid = takeoff_s.is_some_and(|takeoff_s| landing_s >= takeoff_s);
     let lands_from_m = trajectory.state_at(landing_s).position_m.z - start_z_m;
     Derived { reaches_takeoff_alt_s: reaches, takeoff_s, landing_s, lands_from_m, valid, reasons }
 }

@@ -32,7 +32,7 @@ fn push_scaled(text: &mut String, negative: bool, units: u64, decimals: u32) {
         return;
     }
     let mut width = decimals as usize;
-    while rest % 10 == 0 {
+    while rest.is_multiple_of(10) {
         rest /= 10;
         width -= 1;
     }

@@ -110,7 +110,7 @@ pub(crate) fn deviation(
     let gaps = &gaps[..=degree];
     let rate = degree as f64 * 1000.0 / f64::from(duration_ms.max(1));
     Quantisation {
-        max_position_m: gaps.iter().map(|gap| gap.norm()).fold(0.0, f64::max),
+        max_position_m: gaps.iter().map(Vector3::norm).fold(0.0, f64::max),
         max_speed_mps: gaps
             .windows(2)
             .map(|pair| (pair[1] - pair[0]).norm() * rate)

@@ -16,7 +16,7 @@ pub(crate) fn encode(program: &YawControl) -> Result<Vec<u8>, SkybError> {
     let tenths = |angle_deg: f64| (angle_deg * 10.0).round();
     let fail = |setpoint, problem| SkybError::Yaw { setpoint, problem };
     let start = tenths(program.offset_deg + first_deg);
-    if !(start.abs() <= f64::from(i16::MAX)) {
+    if !start.is_finite() || start.abs() > f64::from(i16::MAX) {
         return Err(fail(1, "the first angle is not within ±3276.7 degrees"));
     }
     body.extend((start as i16).to_le_bytes());

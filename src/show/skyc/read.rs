@@ -273,7 +273,7 @@ impl Reader<'_> {
             }
         };
         let (home_m, land_at_m) = (place("home")?, place("landAt")?);
-        Ok(ShowDrone { home_m, land_at_m, trajectory, lights, yaw, name })
+        Ok(ShowDrone { name, home_m, land_at_m, trajectory, lights, yaw })
     }
 
     fn charge_points(&self, count: usize) -> Result<(), SkycError> {

@@ -129,7 +129,7 @@ pub(super) fn vector(value: &Value) -> Result<Vector3<f64>, String> {
     let mut vector = Vector3::zeros();
     for (to, from) in vector.iter_mut().zip([x, y, z]) {
         *to = from.as_f64().ok_or_else(wrong)?;
-        if !(to.abs() <= MAX_COORDINATE_M) {
+        if !to.is_finite() || to.abs() > MAX_COORDINATE_M {
             return Err(format!("a coordinate of {to:e} m is absurd"));
         }
     }
