@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::lights::{self, LightStep, Rgb};
 use super::{Cue, Path, Segment, Show, ShowDrone, Trajectory, Validation};
 use crate::mission::plan::{self, Kind, Plan, Slot};
 
@@ -40,9 +41,43 @@ fn path(segment: &plan::Segment, home: Vector3<f64>) -> Path {
     }
 }
 
+/// Colour that tells people on the ground what a drone is doing.
+fn color(kind: Kind) -> Rgb {
+    match kind {
+        Kind::Wait => [0, 0, 0],
+        Kind::LegUp => [255, 96, 0],
+        Kind::LegDown => [0, 96, 255],
+        Kind::Hover => [0, 160, 0],
+        Kind::Horizontal => [200, 0, 200],
+        Kind::Takeoff | Kind::Climb | Kind::Descend | Kind::Ramp | Kind::Landing => [96, 96, 96],
+    }
+}
+
+/// Lights of a group: one colour per kind of segment, a ramp in that of the segment it leads to.
+fn lights(segments: &[plan::Segment]) -> Vec<u8> {
+    let mut steps: Vec<LightStep> = Vec::new();
+    let mut ramp_ms = 0;
+    for segment in segments {
+        let duration_ms = (segment.end_ms - segment.start_ms) as u32;
+        if segment.kind == Kind::Ramp {
+            ramp_ms += duration_ms;
+            continue;
+        }
+        let color = color(segment.kind);
+        match steps.last_mut() {
+            Some(last) if last.color == color => last.duration_ms += ramp_ms + duration_ms,
+            _ => steps.push(LightStep { duration_ms: ramp_ms + duration_ms, color, fade: false }),
+        }
+        ramp_ms = 0;
+    }
+    steps.push(LightStep { duration_ms: 1000, color: [0, 0, 0], fade: true });
+    lights::encode(&steps)
+}
+
 impl Show {
     /// The show of a plan.
     pub fn of_plan(plan: &Plan) -> Self {
+        let programs: Vec<_> = plan.groups.iter().map(|group| lights(&group.segments)).collect();
         let drones = plan
             .slots
             .iter()
@@ -54,6 +89,7 @@ impl Show {
                     home_m: Some(Vector3::from(slot.home_m)),
                     land_at_m: Some(Vector3::new(end.x, end.y, slot.home_m[2])),
                     trajectory,
+                    lights: programs.get(usize::from(slot.group)).cloned().unwrap_or_default(),
                     ..ShowDrone::default()
                 }
             })

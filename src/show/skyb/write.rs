@@ -13,8 +13,11 @@ use crate::show::{Segment, ShowDrone, Trajectory};
 /// How to choose the size of the unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// The finest one that holds all coordinates.
+    /// The finest one that holds all coordinates without rounding any; if none does, the finest one
+    /// that holds them.
     #[default]
+    Exact,
+    /// The finest one that holds all coordinates.
     Smallest,
     /// The finest of 1, 2, 5, 10, 20, 50 and 100 mm that holds them: round coordinates stay exact.
     Nice,
@@ -35,7 +38,7 @@ pub struct SkybOptions {
 
 impl Default for SkybOptions {
     fn default() -> Self {
-        Self { scale: Scale::Smallest, comment: None, longest_piece_ms: 60_000 }
+        Self { scale: Scale::default(), comment: None, longest_piece_ms: 60_000 }
     }
 }
 
@@ -140,16 +143,25 @@ fn cut(trajectory: &Trajectory, longest_ms: u32) -> Result<Vec<Segment>, SkybErr
 }
 
 fn choose_scale(start_m: Vector3<f64>, pieces: &[Segment], choice: Scale) -> Result<u8, SkybError> {
-    let mut value_m = start_m.amax();
+    let mut points = vec![start_m];
     let mut buffer = [Vector3::zeros(); 8];
     for piece in pieces {
-        for point in piece.path.control_points(start_m, &mut buffer).iter().skip(1) {
-            value_m = value_m.max(point.amax());
-        }
+        points.extend(piece.path.control_points(start_m, &mut buffer).iter().skip(1));
     }
+    let value_m = points.iter().map(Vector3::amax).fold(0.0, f64::max);
     let fits = |scale_mm: &u8| to_unit(value_m, *scale_mm).is_some();
+    let whole = |scale_mm: &u8| {
+        let unit_m = f64::from(*scale_mm) / 1000.0;
+        let is_whole = |value: &f64| (value / unit_m - (value / unit_m).round()).abs() < 1e-6;
+        points.iter().all(|point| point.iter().all(is_whole))
+    };
+    let smallest = || (1..=MAX_SCALE_MM).find(fits);
     let (found, coarsest) = match choice {
-        Scale::Smallest => ((1..=MAX_SCALE_MM).find(fits), MAX_SCALE_MM),
+        Scale::Exact => {
+            let exact = (1..=MAX_SCALE_MM).filter(fits).find(whole);
+            (exact.or_else(smallest), MAX_SCALE_MM)
+        }
+        Scale::Smallest => (smallest(), MAX_SCALE_MM),
         Scale::Nice => ([1, 2, 5, 10, 20, 50, 100].into_iter().find(fits), 100),
         Scale::Fixed(scale_mm @ 1..=MAX_SCALE_MM) => (Some(scale_mm).filter(fits), scale_mm),
         Scale::Fixed(other) => return Err(SkybError::BadScale(other)),
