@@ -1,17 +1,15 @@
 //! `.skyc`: there and back, what other writers make, every refusal, hostile files.
 
-mod show_common;
+use std::fmt::Write as _;
+use std::io::{Cursor, Read as _};
 
-use std::io::{Cursor, Read, Write};
-
+use crate::common::{archive, hold, line, septic, trajectory, worked_example};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use show_common::{hold, line, septic, trajectory, worked_example};
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::show::skyc::{self, Limits};
 use updraft::show::{Cue, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl};
-use zip::write::SimpleFileOptions;
 
 fn full_show() -> Show {
     let mut second = worked_example();
@@ -53,16 +51,6 @@ fn full_show() -> Show {
         fence_polygon_m: vec![[-10.0, -10.0], [40.0, -10.0], [40.0, 20.5]],
         phases_s: Some([10.0, 65.0, 73.0]),
     }
-}
-
-/// A ZIP of these files.
-fn archive(files: &[(&str, &str)]) -> Vec<u8> {
-    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, text) in files {
-        zip.start_file(*name, SimpleFileOptions::default()).unwrap();
-        zip.write_all(text.as_bytes()).unwrap();
-    }
-    zip.finish().unwrap().into_inner()
 }
 
 /// Like [`archive`], with names and sizes exactly as given, which the ZIP library would not write.
@@ -141,7 +129,7 @@ fn the_files_look_as_expected() {
     let mut text = String::new();
     for index in 0..zip.len() {
         let mut file = zip.by_index(index).unwrap();
-        text.push_str(&format!("--- {}\n", file.name().unwrap()));
+        writeln!(text, "--- {}", file.name().unwrap()).unwrap();
         file.read_to_string(&mut text).unwrap();
     }
     insta::assert_snapshot!(text);
@@ -179,13 +167,13 @@ fn reads_references_in_all_forms() {
 #[test]
 fn reads_references_anywhere_and_relative_to_their_file() {
     let files = [
-        ("show.json", r##"{"$ref":"main/real.json#"}"##),
+        ("show.json", r#"{"$ref":"main/real.json#"}"#),
         (
             "main/real.json",
             r##"{"version":1,"swarm":{"$ref":"swarm.json"},"meta":{"$ref":"#/x"},"x":{"id":"i"}}"##,
         ),
-        ("main/swarm.json", r##"{"drones":[{"$ref":"d.json"},{"$ref":"d.json"}]}"##),
-        ("main/d.json", r##"{"settings":{"$ref":"../main/d.json#/inner"},"inner":{}}"##),
+        ("main/swarm.json", r#"{"drones":[{"$ref":"d.json"},{"$ref":"d.json"}]}"#),
+        ("main/d.json", r#"{"settings":{"$ref":"../main/d.json#/inner"},"inner":{}}"#),
     ];
     let error = skyc::read(&archive(&files)).unwrap_err().to_string();
     assert_eq!(
