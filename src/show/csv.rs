@@ -22,7 +22,7 @@ use super::{Show, ShowDrone};
 
 const HEADER: &str = "Time [msec],x [m],y [m],z [m],Red,Green,Blue";
 
-/// Choices for [`write`].
+/// Choices for [`write()`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CsvOptions {
     /// Straight lines between samples may miss a curve by this much, m.

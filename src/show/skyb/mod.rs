@@ -1,7 +1,7 @@
 //! `.skyb`: the binary show file of one drone, as its firmware reads it.
 //!
 //! Little-endian. Magic `skyb`, version 1 or 2, in version 2 feature bits and (bit 0) a CRC-32, then
-//! blocks of type (u8), length (u16) and body. [`write`] makes version 2 with CRC; [`read`] takes
+//! blocks of type (u8), length (u16) and body. [`write()`] makes version 2 with CRC; [`read`] takes
 //! both. Coordinates are whole units of 1 to 127 mm, durations whole milliseconds.
 
 mod read;

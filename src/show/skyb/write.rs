@@ -25,7 +25,7 @@ pub enum Scale {
     Fixed(u8),
 }
 
-/// Choices for [`write`].
+/// Choices for [`write()`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SkybOptions {
     /// Size of the unit.

@@ -1,6 +1,6 @@
 //! `.skyc`: the compiled show, a ZIP of JSON files with the trajectories and lights of all drones.
 //!
-//! [`write`] makes what every reader accepts: straight lines and cubic curves, `takeoffTime` 0,
+//! [`write()`] makes what every reader accepts: straight lines and cubic curves, `takeoffTime` 0,
 //! times on whole milliseconds, three-element points. [`read`] takes everything the format allows and
 //! refuses, naming entry, drone and point, what the official loader refuses or what cannot be flown.
 

@@ -1,13 +1,16 @@
 //! Shows and generators that several test files use.
-#![expect(dead_code, reason = "each test binary uses a part of it")]
+
+use std::io::{Cursor, Write as _};
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use updraft::base::crc::ap_crc32;
 use updraft::show::{Path, Segment, ShowDrone, Trajectory};
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
 
 /// Writes the right checksum into a version 2 `.skyb` file.
-pub fn fix_crc(bytes: &mut [u8]) {
+pub(crate) fn fix_crc(bytes: &mut [u8]) {
     if bytes.len() >= 10 {
         bytes[6..10].fill(0);
         let crc = ap_crc32(bytes);
@@ -15,15 +18,15 @@ pub fn fix_crc(bytes: &mut [u8]) {
     }
 }
 
-pub fn hold(duration_ms: u32) -> Segment {
+pub(crate) fn hold(duration_ms: u32) -> Segment {
     Segment { duration_ms, path: Path::Hold }
 }
 
-pub fn line(duration_ms: u32, x: f64, y: f64, z: f64) -> Segment {
+pub(crate) fn line(duration_ms: u32, x: f64, y: f64, z: f64) -> Segment {
     Segment { duration_ms, path: Path::Line(Vector3::new(x, y, z)) }
 }
 
-pub fn septic(duration_ms: u32) -> Segment {
+pub(crate) fn septic(duration_ms: u32) -> Segment {
     let points = [1, 5, 2, 9, 3, 8, 4].map(|i| {
         let v = f64::from(i);
         Vector3::new(v, 2.0 * v, 10.0 - v)
@@ -32,7 +35,7 @@ pub fn septic(duration_ms: u32) -> Segment {
 }
 
 /// Drone 1 of the worked example of the formats note.
-pub fn worked_example() -> ShowDrone {
+pub(crate) fn worked_example() -> ShowDrone {
     let segments = vec![
         line(10_000, 0.0, 0.0, 10.0),
         hold(5_000),
@@ -55,7 +58,7 @@ fn point(reach_m: f64) -> impl Strategy<Value = Vector3<f64>> {
 }
 
 /// Random trajectories: holds, lines and curves up to 200 s each, up to ±4000 m.
-pub fn trajectory(with_septic: bool) -> impl Strategy<Value = Trajectory> {
+pub(crate) fn trajectory(with_septic: bool) -> impl Strategy<Value = Trajectory> {
     let reach = prop::sample::select(vec![3.0, 30.0, 150.0, 4000.0]);
     reach.prop_flat_map(move |reach_m| {
         let kinds = if with_septic { 0..4_usize } else { 0..3 };
@@ -73,4 +76,14 @@ pub fn trajectory(with_septic: bool) -> impl Strategy<Value = Trajectory> {
         (point(reach_m), prop::collection::vec(segment, 1..12))
             .prop_map(|(start_m, segments)| Trajectory { start_m, segments })
     })
+}
+
+/// A ZIP of these files.
+pub(crate) fn archive(files: &[(&str, &str)]) -> Vec<u8> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, text) in files {
+        zip.start_file(*name, SimpleFileOptions::default()).unwrap();
+        zip.write_all(text.as_bytes()).unwrap();
+    }
+    zip.finish().unwrap().into_inner()
 }

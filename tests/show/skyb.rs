@@ -1,10 +1,8 @@
 //! `.skyb`: the worked example bit for bit, random shows there and back, and every refusal.
 
-mod show_common;
-
+use crate::common::{fix_crc, hold, line, septic, trajectory, worked_example};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use show_common::{fix_crc, hold, line, septic, trajectory, worked_example};
 use updraft::show::skyb::{self, BlockKind, Scale, SkybOptions};
 use updraft::show::{Path, Segment, ShowDrone, Trajectory, YawControl};
 
@@ -111,7 +109,7 @@ fn skips_unknown_blocks_and_takes_the_first_of_each_type() {
 fn brings_axes_of_different_degree_to_one_path() {
     // x cubic, y linear, z of 7th degree, yaw linear.
     let mut body = EMPTY_TRAJECTORY.to_vec();
-    body[0] = 0x80 | 10;
+    body[0] = 0x80 | 0x0a;
     body.push(0b01_11_01_10);
     body.extend(2000_u16.to_le_bytes());
     for value in [0_i16, 300, 300, 700, 100, 200, 300, 400, 500, 600, 700, 900] {
@@ -245,7 +243,7 @@ fn refuses_broken_files_and_says_where() {
     insta::assert_snapshot!(refusal(&file(&[(1, EMPTY_TRAJECTORY), (5, &[0, 0, 0, 1])])), @"byte 28: a yaw control entry is cut off: 4 bytes are needed, 1 are left");
     insta::assert_snapshot!(refusal(&file(&[(1, EMPTY_TRAJECTORY), (5, &[0])])), @"byte 25: the yaw control header is cut off: 3 bytes are needed, 1 are left");
     insta::assert_snapshot!(refusal(&file(&[(1, EMPTY_TRAJECTORY), (6, &[0; 13])])), @"byte 35: an event is cut off: 10 bytes are needed, 3 are left");
-    insta::assert_snapshot!(refusal(&[b"skyb\x01".as_slice(), &[0; 9 << 20]].concat()), @"the file has 9437189 bytes; a .skyb file larger than 8388608 bytes is refused");
+    insta::assert_snapshot!(refusal(&[b"skyb\x01".as_slice(), &vec![0; 9 << 20]].concat()), @"the file has 9437189 bytes; a .skyb file larger than 8388608 bytes is refused");
 }
 
 #[test]

@@ -1,27 +1,15 @@
 //! Zipped CSV: there and back, and what is refused. Also what `inspect` says about a show.
 
-mod show_common;
+use std::io::{Cursor, Read as _};
 
-use std::io::{Cursor, Read, Write};
-
+use crate::common::{archive, trajectory, worked_example};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use show_common::{trajectory, worked_example};
 use updraft::show::csv::{self, CsvOptions};
 use updraft::show::derive::DeriveParams;
 use updraft::show::skyb::{self, SkybOptions};
 use updraft::show::summary::{summarise, summarise_skyb};
 use updraft::show::{Show, ShowDrone, lights, quantise};
-use zip::write::SimpleFileOptions;
-
-fn archive(files: &[(&str, &str)]) -> Vec<u8> {
-    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, text) in files {
-        zip.start_file(*name, SimpleFileOptions::default()).unwrap();
-        zip.write_all(text.as_bytes()).unwrap();
-    }
-    zip.finish().unwrap().into_inner()
-}
 
 fn show_of(drone: ShowDrone) -> Show {
     Show { drones: vec![drone], ..Show::default() }

@@ -1,17 +1,15 @@
 //! `.skyc`: there and back, what other writers make, every refusal, hostile files.
 
-mod show_common;
+use std::fmt::Write as _;
+use std::io::{Cursor, Read as _};
 
-use std::io::{Cursor, Read, Write};
-
+use crate::common::{archive, hold, line, septic, trajectory, worked_example};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use show_common::{hold, line, septic, trajectory, worked_example};
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::show::skyc::{self, Limits};
 use updraft::show::{Cue, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl};
-use zip::write::SimpleFileOptions;
 
 fn full_show() -> Show {
     let mut second = worked_example();
@@ -55,16 +53,6 @@ fn full_show() -> Show {
     }
 }
 
-/// A ZIP of these files.
-fn archive(files: &[(&str, &str)]) -> Vec<u8> {
-    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, text) in files {
-        zip.start_file(*name, SimpleFileOptions::default()).unwrap();
-        zip.write_all(text.as_bytes()).unwrap();
-    }
-    zip.finish().unwrap().into_inner()
-}
-
 /// Like [`archive`], with names and sizes exactly as given, which the ZIP library would not write.
 fn patched(files: &[(&str, &str)], from: &[u8], to: &[u8]) -> Vec<u8> {
     let mut bytes = archive(files);
@@ -84,11 +72,11 @@ fn points() -> Value {
     json!([[0, [0, 0, 0], []], [10, [0, 0, 10], []]])
 }
 
-fn with_points(points: Value) -> Value {
+fn with_points(points: &Value) -> Value {
     json!({"version": 1, "points": points})
 }
 
-fn inline(trajectory: Value) -> Value {
+fn inline(trajectory: &Value) -> Value {
     json!({"version": 1, "swarm": {"drones": [{"settings": {"trajectory": trajectory}}]}})
 }
 
@@ -101,7 +89,7 @@ fn refusal(show: &Value) -> String {
 }
 
 fn point_refusal(points: Value) -> String {
-    refusal(&inline(with_points(points)))
+    refusal(&inline(&with_points(&points)))
 }
 
 fn climb() -> Trajectory {
@@ -141,7 +129,7 @@ fn the_files_look_as_expected() {
     let mut text = String::new();
     for index in 0..zip.len() {
         let mut file = zip.by_index(index).unwrap();
-        text.push_str(&format!("--- {}\n", file.name().unwrap()));
+        writeln!(text, "--- {}", file.name().unwrap()).unwrap();
         file.read_to_string(&mut text).unwrap();
     }
     insta::assert_snapshot!(text);
@@ -149,7 +137,7 @@ fn the_files_look_as_expected() {
 
 #[test]
 fn reads_references_in_all_forms() {
-    let flown = with_points(points()).to_string();
+    let flown = with_points(&points()).to_string();
     for reference in [
         "./drones/Drone 1/t.json#",
         "./drones/Drone 1/t.json",
@@ -159,9 +147,9 @@ fn reads_references_in_all_forms() {
         "all.json#/drones/0/a~1b",
     ] {
         let key = if reference.ends_with("#/") { "" } else { "trajectory" };
-        let show = inline(json!({"$ref": reference})).to_string();
+        let show = inline(&json!({"$ref": reference})).to_string();
         let nested = if key.is_empty() {
-            json!({"": with_points(points())}).to_string()
+            json!({"": with_points(&points())}).to_string()
         } else {
             flown.clone()
         };
@@ -179,13 +167,13 @@ fn reads_references_in_all_forms() {
 #[test]
 fn reads_references_anywhere_and_relative_to_their_file() {
     let files = [
-        ("show.json", r##"{"$ref":"main/real.json#"}"##),
+        ("show.json", r#"{"$ref":"main/real.json#"}"#),
         (
             "main/real.json",
             r##"{"version":1,"swarm":{"$ref":"swarm.json"},"meta":{"$ref":"#/x"},"x":{"id":"i"}}"##,
         ),
-        ("main/swarm.json", r##"{"drones":[{"$ref":"d.json"},{"$ref":"d.json"}]}"##),
-        ("main/d.json", r##"{"settings":{"$ref":"../main/d.json#/inner"},"inner":{}}"##),
+        ("main/swarm.json", r#"{"drones":[{"$ref":"d.json"},{"$ref":"d.json"}]}"#),
+        ("main/d.json", r#"{"settings":{"$ref":"../main/d.json#/inner"},"inner":{}}"#),
     ];
     let error = skyc::read(&archive(&files)).unwrap_err().to_string();
     assert_eq!(
@@ -241,14 +229,14 @@ fn many_drones_may_share_one_document() {
         .map(|i| json!({"settings": {"trajectory": {"$ref": format!("all.json#/{}", i % 7)}}}))
         .collect();
     let show = json!({"version": 1, "swarm": {"drones": drones}}).to_string();
-    let all = Value::Array(vec![with_points(points()); 7]).to_string();
+    let all = Value::Array(vec![with_points(&points()); 7]).to_string();
     let read = skyc::read(&archive(&[("show.json", &show), ("all.json", &all)])).unwrap();
     assert_eq!(read.drones[2999].trajectory, climb());
 }
 
 #[test]
 fn refuses_what_the_official_loader_refuses() {
-    let good = inline(with_points(points()));
+    let good = inline(&with_points(&points()));
     let with = |pointer: &str, value: Value| {
         let mut show = good.clone();
         show["environment"] = json!({"type": "outdoor"});
@@ -308,7 +296,7 @@ fn refuses_broken_archives_and_references() {
     insta::assert_snapshot!(text(&archive(&[("a.json", "{}")])), @"not a usable show archive (ZIP): it has no show.json");
     insta::assert_snapshot!(text(&archive(&[("show.json", "{\"version\":")])), @"show.json: it is not valid JSON: EOF while parsing a value at line 1 column 11");
     insta::assert_snapshot!(text(&archive(&[("show.json", &"[".repeat(100))])), @"show.json: its JSON is nested deeper than 64 levels");
-    let reference = |target: &str| refusal(&inline(json!({"$ref": target})));
+    let reference = |target: &str| refusal(&inline(&json!({"$ref": target})));
     insta::assert_snapshot!(reference("nowhere.json"), @r#"show.json: the reference "nowhere.json" points to nothing"#);
     insta::assert_snapshot!(reference("#/nowhere"), @r##"show.json: the reference "#/nowhere" points to nothing"##);
     insta::assert_snapshot!(reference("../../etc/passwd"), @r#"show.json: the reference "../../etc/passwd" has ".." in its path; that is not followed"#);
@@ -319,7 +307,7 @@ fn refuses_broken_archives_and_references() {
     insta::assert_snapshot!(reference("show.json#anchor"), @r#"show.json: the reference "show.json#anchor" has something else than a JSON pointer after the #"#);
     insta::assert_snapshot!(reference("#/swarm/drones/0/settings/trajectory"), @r##"show.json: the reference "#/swarm/drones/0/settings/trajectory" goes round in circles"##);
     let chain = archive(&[
-        ("show.json", &inline(json!({"$ref": "a.json"})).to_string()),
+        ("show.json", &inline(&json!({"$ref": "a.json"})).to_string()),
         ("a.json", r#"{"$ref":"b.json"}"#),
         ("b.json", r#"{"$ref":"a.json#"}"#),
     ]);
@@ -328,7 +316,7 @@ fn refuses_broken_archives_and_references() {
 
 #[test]
 fn refuses_hostile_archives() {
-    let good = inline(with_points(points())).to_string();
+    let good = inline(&with_points(&points())).to_string();
     let named = |name: &str| {
         let stand_in = "x".repeat(name.len());
         let files = [("show.json", good.as_str()), (stand_in.as_str(), "{}")];
@@ -368,7 +356,7 @@ fn refuses_hostile_archives() {
     // One shared document, used by many drones, multiplies.
     let drones = vec![json!({"settings": {"trajectory": {"$ref": "t.json"}}}); 100];
     let show = json!({"version": 1, "swarm": {"drones": drones}}).to_string();
-    let shared = archive(&[("show.json", &show), ("t.json", &with_points(points()).to_string())]);
+    let shared = archive(&[("show.json", &show), ("t.json", &with_points(&points()).to_string())]);
     let limits = Limits { points: 199, ..Limits::default() };
     insta::assert_snapshot!(text(&shared, limits), @"the file unpacks to more than the 199 trajectory points allowed here; it may be a ZIP bomb");
 }
@@ -414,7 +402,7 @@ fn broken_json_is_survived() {
     let mut zip = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
     let mut text = String::new();
     zip.by_name("drones/drone_02/trajectory.json").unwrap().read_to_string(&mut text).unwrap();
-    let root = inline(json!({"$ref": "t.json"})).to_string();
+    let root = inline(&json!({"$ref": "t.json"})).to_string();
     let mut refused = 0;
     for i in 0..text.len() {
         for byte in [b'0', b'9', b'-', b'e', b',', b'[', b']', b'"', b' ', b'n'] {
