@@ -274,3 +274,42 @@ fn a_log_without_units_is_read() {
     assert_eq!(tables[0].number("Roll"), Some(&[0.37][..]));
     assert_eq!((tables[0].unit("Roll"), tables[0].multiplier("Roll")), (None, None));
 }
+
+#[test]
+fn a_message_cut_short_does_not_swallow_the_next() {
+    let (header, rows) = parts();
+    let cut = &rows[1][..20];
+    let bytes = [header, rows[0].clone(), cut.to_vec(), rows[2..].concat()].concat();
+    let (found, stats) = tables(&bytes);
+    let (clean, _) = tables(&whole());
+    assert_eq!(found[1].rows, 59);
+    assert_eq!(found[1].number("C1"), clean[1].number("C1").map(|column| &column[1..]));
+    assert_eq!((&found[0], &found[2], &found[3]), (&clean[0], &clean[2], &clean[3]));
+    assert_eq!(stats.bad_bytes, 20);
+}
+
+#[test]
+fn a_header_by_chance_makes_no_message() {
+    let (header, rows) = parts();
+    let junk = [vec![0xA3, 0x95, catalog::ATT.id], Noise(4).bytes(60)].concat();
+    let bytes = [header.clone(), rows[0].clone(), junk, rows[1..].concat()].concat();
+    let (found, stats) = tables(&bytes);
+    assert_eq!(found, tables(&whole()).0);
+    assert_eq!((stats.bad_bytes, stats.time_jumps), (63, 0));
+    // One that would reach beyond the end of the file.
+    let chance = [0xA3, 0x95, catalog::MSG.id].to_vec();
+    let (found, stats) = tables(&[header, chance, rows[0].clone()].concat());
+    assert_eq!((found[0].rows, found[3].rows), (1, 0));
+    assert_eq!((stats.bad_bytes, stats.truncated_bytes), (3, 0));
+}
+
+#[test]
+fn a_format_said_again_keeps_its_units() {
+    let (header, rows) = parts();
+    let again = fmt(70, 28, b"ATT", b"QccccCCCCB", catalog::ATT.fields.as_bytes());
+    let (found, _) = tables(&[header.clone(), again, rows[0].clone()].concat());
+    assert_eq!(found[0].unit("Roll"), Some("deg"));
+    // Another format has other units, which the log does not give.
+    let other = fmt(70, 15, b"ATT", b"Qf", b"TimeUS,Roll");
+    assert_eq!(tables(&[header, other].concat()).0[0].unit("Roll"), None);
+}

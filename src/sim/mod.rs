@@ -1,1 +1,18 @@
 //! The embedded simulator: flies a show and writes one DataFlash log per drone.
+//!
+//! [`air`] says how the air moves, [`plant`] how the body answers to it and to the rotors,
+//! [`sensors`] what the autopilot believes, [`autopilot`] what it does, [`recorder`] what its log
+//! says. Inside, world axes are the show frame's (x forward, y left, z up, metres from the show's
+//! origin) and body axes forward, left, up; drones stand heading along show x.
+
+pub mod air;
+pub mod autopilot;
+mod error;
+mod flight;
+pub mod plant;
+pub mod recorder;
+pub mod sensors;
+
+pub use air::{Atmosphere, Uniform};
+pub use error::SimError;
+pub use flight::{FlightSetup, FlightSummary, Hooks, fly, fly_with, fly_without_log};

@@ -1,8 +1,13 @@
 //! Vehicles: flight limits, airframe and autopilot settings, one TOML file each in
 //! `templates/vehicles/`.
 
+pub mod library;
+mod load;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+pub use load::VehicleError;
 
 /// A vehicle as its TOML file states it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

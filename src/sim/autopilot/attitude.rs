@@ -1,0 +1,96 @@
+//! Attitude control: direction of thrust to turn rates to torque demands (AC_AttitudeControl).
+
+use nalgebra::Vector3;
+
+use super::filter::LowPass;
+use super::params as p;
+use crate::sim::sensors::Estimate;
+
+/// Rate controller of one axis.
+#[derive(Clone, Copy, Debug)]
+struct RatePid {
+    gain: [f64; 3],
+    target: LowPass,
+    slope: LowPass,
+    error: f64,
+    integral: f64,
+}
+
+impl RatePid {
+    fn new(gain: [f64; 3], dt_s: f64) -> Self {
+        let filter = LowPass::new(p::ATC_RAT_FLT, dt_s);
+        Self { gain, target: filter, slope: filter, error: 0.0, integral: 0.0 }
+    }
+
+    fn update(&mut self, target_radps: f64, rate_radps: f64, dt_s: f64, per_dt: f64) -> f64 {
+        let error = self.target.apply(target_radps) - rate_radps;
+        let slope = self.slope.apply((error - self.error) * per_dt);
+        self.error = error;
+        self.integral =
+            (self.integral + self.gain[1] * error * dt_s).clamp(-p::ATC_RAT_IMAX, p::ATC_RAT_IMAX);
+        (self.gain[0] * error + self.integral + self.gain[2] * slope).clamp(-1.0, 1.0)
+    }
+}
+
+/// The attitude controller. Fields that are logged are public.
+#[derive(Clone, Copy, Debug)]
+pub struct Attitude {
+    /// Direction of thrust wanted, show frame, length 1.
+    pub thrust_direction: Vector3<f64>,
+    /// Angle to the wanted attitude about the body's axes, rad.
+    pub error_rad: Vector3<f64>,
+    /// Turn rates wanted about forward, left, up, rad/s.
+    pub rate_target: Vector3<f64>,
+    /// Torque demands about forward, left, up, -1..1.
+    pub output: Vector3<f64>,
+    rate: [RatePid; 3],
+    dt_s: f64,
+    per_dt: f64,
+}
+
+impl Attitude {
+    /// Level, heading along show x.
+    pub fn new(dt_s: f64) -> Self {
+        let tilt = RatePid::new([p::ATC_RAT_P, p::ATC_RAT_P, p::ATC_RAT_D], dt_s);
+        let yaw = RatePid::new([p::ATC_RAT_YAW_P, p::ATC_RAT_YAW_I, 0.0], dt_s);
+        Self {
+            thrust_direction: Vector3::z(),
+            error_rad: Vector3::zeros(),
+            rate_target: Vector3::zeros(),
+            output: Vector3::zeros(),
+            rate: [tilt, tilt, yaw],
+            dt_s,
+            per_dt: 1.0 / dt_s,
+        }
+    }
+
+    /// One step: torque demands that bring the thrust into a direction (show frame, length 1) and
+    /// the heading to show x.
+    pub fn update(&mut self, direction: Vector3<f64>, estimate: &Estimate) -> Vector3<f64> {
+        self.thrust_direction = direction;
+        let body = estimate.rotation.tr_mul(&direction);
+        // The turn from the body's up axis to the wanted direction: axis up x direction; the angle
+        // is its sine for the few degrees that matter, and no less than half of it at 90 degrees.
+        let heading = estimate.rotation.column(0);
+        self.error_rad = Vector3::new(-body.y, body.x, -heading.y);
+        self.rate_target = self.error_rad.component_mul(&Vector3::new(
+            p::ATC_ANG_P,
+            p::ATC_ANG_P,
+            p::ATC_ANG_YAW_P,
+        ));
+        for axis in 0..3 {
+            self.output[axis] = self.rate[axis].update(
+                self.rate_target[axis],
+                estimate.rate_radps[axis],
+                self.dt_s,
+                self.per_dt,
+            );
+        }
+        self.output
+    }
+
+    /// Cosine of the wanted tilt.
+    pub fn cos_tilt(&self) -> f64 {
+        self.thrust_direction.z
+    }
+}

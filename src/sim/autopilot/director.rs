@@ -1,0 +1,243 @@
+//! The show: stages, their timing, and what is asked of the controllers (the fork's show mode).
+
+use nalgebra::{Vector1, Vector2, Vector3};
+
+use super::motors::{Motors, Spool};
+use super::params as p;
+use super::shaping::Kinematics;
+use super::vertical::Goal;
+use crate::show::Trajectory;
+use crate::show::trajectory::Cursor;
+use crate::sim::sensors::Estimate;
+
+/// Stages of a show flight, with the firmware's numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Stage {
+    /// Armed, waiting for the take-off time.
+    Wait = 2,
+    /// Rising to SHOW_TAKEOFF_ALT.
+    Takeoff = 3,
+    /// Flying the trajectory.
+    Performing = 4,
+    /// Descending to the ground where the trajectory ended.
+    Landing = 7,
+    /// On the ground, motors off.
+    Landed = 8,
+}
+
+/// Time for which the motors must be at their lower limit to suspect, and to declare a landing, s.
+const LAND_MAYBE_S: f64 = 0.2;
+const LAND_COMPLETE_S: f64 = 1.0;
+/// From landing declared to disarming, s.
+const DISARM_AFTER_S: f64 = 0.5;
+
+/// Take-off time that firmware 4.4 derives from a trajectory, show time s: the first instant of a
+/// 1/16 s grid at which it is SHOW_TAKEOFF_ALT above its start, less the time a climb at `speed_up`
+/// needs, and not before 0. `None` when it never gets there.
+pub fn takeoff_time_s(trajectory: &Trajectory, speed_up_mps: f64) -> Option<f64> {
+    let height_m = trajectory.start_m.z + p::SHOW_TAKEOFF_ALT;
+    let last = trajectory.duration_ms() * 16 / 1000 + 1;
+    let mut cursor = Cursor::new(trajectory);
+    let reached = (0..=last)
+        .map(|step| step as f64 / 16.0)
+        .find(|&time_s| cursor.state_at(time_s).position_m.z >= height_m)?;
+    Some((reached - p::SHOW_TAKEOFF_ALT / speed_up_mps).max(0.0))
+}
+
+/// What the controllers are asked to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Goals {
+    /// Height.
+    pub vertical: Goal,
+    /// Place.
+    pub horizontal: Kinematics<2>,
+}
+
+/// The show mode of one drone. Fields that are logged are public.
+#[derive(Clone, Debug)]
+pub struct Director<'a> {
+    /// Present stage.
+    pub stage: Stage,
+    /// Whether the motors are armed.
+    pub armed: bool,
+    /// Whether a landing is suspected (EV 17).
+    pub land_maybe: bool,
+    /// Whether a landing is declared (EV 18).
+    pub land_complete: bool,
+    /// What the show asked for last (with the velocity as sent), show frame.
+    pub target: Kinematics<3>,
+    /// Steps since the last target; 0 in the step that made one.
+    pub target_age: u32,
+    /// Take-off time, show time s.
+    pub takeoff_s: f64,
+    /// End of the trajectory, show time s.
+    pub end_s: f64,
+    cursor: Cursor<'a>,
+    home_m: Vector3<f64>,
+    above_floor: bool,
+    at_limit_s: f64,
+    landed_s: f64,
+    feed_forward: f64,
+    steps_per_target: u32,
+    dt_s: f64,
+}
+
+impl<'a> Director<'a> {
+    /// Armed and waiting at home. `None`: the trajectory never rises to SHOW_TAKEOFF_ALT.
+    pub fn new(
+        trajectory: &'a Trajectory,
+        home_m: Vector3<f64>,
+        settings: &crate::vehicle::Autopilot,
+        dt_s: f64,
+    ) -> Option<Self> {
+        let steps_per_target = (1.0 / (dt_s * f64::from(p::SHOW_CTRL_RATE))).round() as u32;
+        Some(Self {
+            stage: Stage::Wait,
+            armed: true,
+            land_maybe: false,
+            land_complete: false,
+            target: Kinematics::at(home_m),
+            target_age: 0,
+            takeoff_s: takeoff_time_s(trajectory, settings.wpnav_speed_up_mps)?,
+            end_s: trajectory.duration_ms() as f64 / 1000.0,
+            cursor: Cursor::new(trajectory),
+            home_m,
+            above_floor: false,
+            at_limit_s: 0.0,
+            landed_s: 0.0,
+            feed_forward: settings.show_vel_ff_gain,
+            steps_per_target,
+            dt_s,
+        })
+    }
+
+    /// One step: moves the stages on, and gives the goals.
+    pub fn update(&mut self, time_s: f64, estimate: &Estimate, motors: &mut Motors) -> Goals {
+        match self.stage {
+            Stage::Wait => self.wait(time_s, motors),
+            Stage::Takeoff => {
+                let height_m = estimate.position_m.z - self.home_m.z;
+                let show_m = self.cursor.state_at(time_s).position_m.z - self.home_m.z;
+                if height_m >= p::TAKEOFF_DONE * p::SHOW_TAKEOFF_ALT && show_m >= height_m {
+                    self.stage = Stage::Performing;
+                    self.sample(time_s);
+                } else if time_s >= self.end_s {
+                    self.stage = Stage::Landing;
+                }
+            }
+            Stage::Performing if time_s >= self.end_s => self.stage = Stage::Landing,
+            Stage::Performing => {
+                self.target_age += 1;
+                if self.target_age >= self.steps_per_target {
+                    self.sample(time_s);
+                } else {
+                    self.target.advance(self.dt_s);
+                }
+            }
+            Stage::Landing => self.land(estimate, motors),
+            Stage::Landed => {}
+        }
+        self.goals(estimate)
+    }
+
+    fn wait(&mut self, time_s: f64, motors: &mut Motors) {
+        if time_s >= self.takeoff_s {
+            self.stage = Stage::Takeoff;
+            motors.spool = Spool::Up(0.0);
+        } else if time_s >= self.takeoff_s - p::ARM_BEFORE_TAKEOFF_S + p::ARMING_DELAY_S {
+            motors.spool = Spool::Idle;
+        }
+    }
+
+    /// Evaluates the trajectory as the fork does at SHOW_CTRL_RATE.
+    fn sample(&mut self, time_s: f64) {
+        let state = self.cursor.state_at(time_s);
+        let floor_m = self.home_m.z + p::SHOW_TAKEOFF_ALT;
+        self.above_floor |= state.position_m.z > floor_m;
+        self.target = Kinematics {
+            position: state.position_m,
+            velocity: state.velocity_mps * self.feed_forward,
+            acceleration: Vector3::zeros(),
+        };
+        if !self.above_floor {
+            self.target.position.z = floor_m;
+            self.target.velocity.z = 0.0;
+        }
+        self.target_age = 0;
+    }
+
+    fn land(&mut self, estimate: &Estimate, motors: &mut Motors) {
+        let still = estimate.velocity_mps.norm() < 1.0;
+        let change_s = if motors.limits.lower && still { self.dt_s } else { -2.0 * self.dt_s };
+        self.at_limit_s = (self.at_limit_s + change_s).max(0.0);
+        self.land_maybe |= self.at_limit_s >= LAND_MAYBE_S;
+        self.land_complete |= self.at_limit_s >= LAND_COMPLETE_S;
+        if self.land_complete {
+            self.landed_s += self.dt_s;
+            if self.landed_s >= DISARM_AFTER_S {
+                self.stage = Stage::Landed;
+                self.armed = false;
+                motors.spool = Spool::Stopped;
+            }
+        }
+    }
+
+    fn goals(&self, estimate: &Estimate) -> Goals {
+        let stand = |place: Vector2<f64>| Kinematics::at(place);
+        match self.stage {
+            Stage::Wait | Stage::Landed => {
+                Goals { vertical: Goal::Move(0.0), horizontal: stand(self.home_m.xy()) }
+            }
+            Stage::Takeoff => Goals {
+                vertical: Goal::Follow(Kinematics::at(Vector1::new(
+                    self.home_m.z + p::SHOW_TAKEOFF_ALT,
+                ))),
+                horizontal: stand(self.home_m.xy()),
+            },
+            Stage::Performing => {
+                let Kinematics { position, velocity, acceleration } = self.target;
+                Goals {
+                    vertical: Goal::Follow(Kinematics {
+                        position: Vector1::new(position.z),
+                        velocity: Vector1::new(velocity.z),
+                        acceleration: Vector1::new(acceleration.z),
+                    }),
+                    horizontal: Kinematics {
+                        position: position.xy(),
+                        velocity: velocity.xy(),
+                        acceleration: acceleration.xy(),
+                    },
+                }
+            }
+            Stage::Landing => {
+                let height_m = estimate.position_m.z - self.home_m.z;
+                let speed =
+                    if height_m > p::LAND_ALT_LOW { p::WPNAV_SPEED_DN } else { p::LAND_SPEED };
+                Goals { vertical: Goal::Move(-speed), horizontal: stand(self.target.position.xy()) }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::show::{Path, Segment};
+
+    fn climb(speed_mps: f64, to_m: f64) -> Trajectory {
+        let duration_ms = (to_m / speed_mps * 1000.0) as u32;
+        let path = Path::Line(Vector3::new(0.0, 0.0, to_m));
+        Trajectory { start_m: Vector3::zeros(), segments: vec![Segment { duration_ms, path }] }
+    }
+
+    #[test]
+    fn takeoff_times_are_the_firmwares() {
+        // Measured on the firmware: 1 m/s climb 2.045 s, 2 m/s climb 0.795 s.
+        let [slow, fast] =
+            [1.0, 2.0].map(|speed| takeoff_time_s(&climb(speed, 20.0), 5.5).unwrap());
+        assert!((slow - 2.045).abs() < 1e-3 && (fast - 0.795).abs() < 1e-3, "{slow} {fast}");
+        assert_eq!(takeoff_time_s(&climb(5.0, 20.0), 5.5), Some(0.5 - 2.5 / 5.5));
+        assert_eq!(takeoff_time_s(&climb(1.0, 2.4), 5.5), None, "never high enough");
+    }
+}

@@ -1,0 +1,113 @@
+//! An autopilot that does what ArduCopter 4.4 does in show mode.
+//!
+//! The cascade: show targets at 10 Hz, shaped to what the vehicle can follow; position to velocity
+//! to acceleration; horizontally to a direction of thrust and turn rates, vertically to throttle;
+//! boost for tilt, mixing, thrust curve, whole microseconds. 400 Hz throughout.
+
+pub mod attitude;
+pub mod director;
+pub mod filter;
+pub mod horizontal;
+pub mod motors;
+pub mod params;
+pub mod shaping;
+pub mod vertical;
+
+use nalgebra::{Vector2, Vector3};
+
+use super::air::density_ratio;
+use super::plant::{GRAVITY, rotor::ROTORS};
+use super::sensors::Estimate;
+use crate::show::Trajectory;
+use crate::vehicle;
+use attitude::Attitude;
+use director::{Director, Stage};
+use horizontal::Horizontal;
+use motors::{Motors, Spool};
+use vertical::{ThrottleLimits, Vertical};
+
+/// The autopilot of one drone; its parts are public for the recorder.
+#[derive(Clone, Debug)]
+pub struct Autopilot<'a> {
+    /// The show mode.
+    pub director: Director<'a>,
+    /// Height control.
+    pub vertical: Vertical,
+    /// Place control.
+    pub horizontal: Horizontal,
+    /// Attitude control.
+    pub attitude: Attitude,
+    /// Motor outputs.
+    pub motors: Motors,
+    /// Throttle before the boost for tilt (CTUN.ThI).
+    pub throttle_in: f64,
+    settings: &'a vehicle::Autopilot,
+    home_m: Vector3<f64>,
+    home_amsl_m: f64,
+    dt_s: f64,
+}
+
+impl<'a> Autopilot<'a> {
+    /// Armed on the ground. `None`: the trajectory never rises to SHOW_TAKEOFF_ALT.
+    pub fn new(
+        trajectory: &'a Trajectory,
+        settings: &'a vehicle::Autopilot,
+        home_m: Vector3<f64>,
+        home_amsl_m: f64,
+        dt_s: f64,
+    ) -> Option<Self> {
+        Some(Self {
+            director: Director::new(trajectory, home_m, settings, dt_s)?,
+            vertical: Vertical::new(settings, home_m.z, dt_s),
+            horizontal: Horizontal::new(home_m.xy(), dt_s),
+            attitude: Attitude::new(dt_s),
+            motors: Motors::new(settings, dt_s),
+            throttle_in: 0.0,
+            settings,
+            home_m,
+            home_amsl_m,
+            dt_s,
+        })
+    }
+
+    /// One control step; returns the pulse width of each rotor, whole us.
+    pub fn update(&mut self, time_s: f64, estimate: &Estimate) -> [u16; ROTORS] {
+        let goals = self.director.update(time_s, estimate, &mut self.motors);
+        if self.motors.spool == Spool::Flying {
+            let push = self.horizontal.update(&goals.horizontal, estimate);
+            let direction = Vector3::new(push.x, push.y, GRAVITY).normalize();
+            let torque = self.attitude.update(direction, estimate);
+            self.throttle_in = self.vertical.update(&goals.vertical, estimate, self.motors.limits);
+            let boosted = self.throttle_in / self.attitude.cos_tilt().max(0.1);
+            let height_m = estimate.position_m.z - self.home_m.z;
+            let amsl_m = self.home_amsl_m + height_m;
+            self.motors.set_density(height_m, || density_ratio(amsl_m));
+            self.motors.update(boosted, &torque);
+            if self.director.stage == Stage::Performing {
+                self.vertical.learn_hover(self.motors.throttle, estimate);
+            }
+        } else {
+            self.relax(estimate);
+            self.motors.update(0.0, &Vector3::zeros());
+        }
+        self.motors.pulses_us
+    }
+
+    /// On the ground, the controllers start from where the vehicle is.
+    fn relax(&mut self, estimate: &Estimate) {
+        let hover_throttle = self.vertical.hover_throttle;
+        self.vertical = Vertical::new(self.settings, estimate.position_m.z, self.dt_s);
+        self.vertical.hover_throttle = hover_throttle;
+        self.horizontal =
+            Horizontal::new(Vector2::new(estimate.position_m.x, estimate.position_m.y), self.dt_s);
+        self.attitude = Attitude::new(self.dt_s);
+        self.throttle_in = 0.0;
+    }
+
+    /// Whether a rotor is at an end of its range in flight, or the throttle is.
+    pub fn saturated(&self) -> bool {
+        let (low, high) = self.motors.pulse_range_us();
+        let at_end = |pulse: &u16| *pulse <= low || *pulse >= high;
+        self.motors.limits != ThrottleLimits::default() || self.motors.pulses_us.iter().any(at_end)
+    }
+}

@@ -1,0 +1,187 @@
+//! Motors: spooling, mixing, thrust curve, whole microseconds (AP_MotorsMulticopter).
+
+use nalgebra::Vector3;
+
+use super::filter::LowPass;
+use super::params as p;
+use super::vertical::ThrottleLimits;
+use crate::sim::plant::rotor::{LAYOUT, ROTORS};
+use crate::vehicle;
+
+/// Altitude change after which the firmware refreshes its air density, m.
+const DENSITY_STEP_M: f64 = 25.0;
+
+/// What the motors are doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spool {
+    /// Disarmed, or armed and not yet spinning.
+    Stopped,
+    /// Spinning on the ground.
+    Idle,
+    /// On the way from idle to flight, 0..1.
+    Up(f64),
+    /// Throttle unlimited.
+    Flying,
+}
+
+/// The motor outputs. Fields that are logged are public.
+#[derive(Clone, Copy, Debug)]
+pub struct Motors {
+    /// State of the motors.
+    pub spool: Spool,
+    /// Pulse width of each rotor, whole us.
+    pub pulses_us: [u16; ROTORS],
+    /// Throttle after the filter, 0..1 (CTUN.ThO).
+    pub throttle: f64,
+    /// Limits that were hit in this step.
+    pub limits: ThrottleLimits,
+    throttle_filter: LowPass,
+    expo: f64,
+    spin_min: f64,
+    spin_span: f64,
+    density_gain: f64,
+    density_height_m: f64,
+    dt_s: f64,
+}
+
+impl Motors {
+    /// Stopped.
+    pub fn new(settings: &vehicle::Autopilot, dt_s: f64) -> Self {
+        Self {
+            spool: Spool::Stopped,
+            pulses_us: [p::MOT_PWM_MIN as u16; ROTORS],
+            throttle: 0.0,
+            limits: ThrottleLimits::default(),
+            throttle_filter: LowPass::new(p::THROTTLE_FLT, dt_s),
+            expo: settings.mot_thst_expo,
+            spin_min: settings.mot_spin_min,
+            spin_span: settings.mot_spin_max - settings.mot_spin_min,
+            density_gain: 1.0,
+            density_height_m: f64::NEG_INFINITY,
+            dt_s,
+        }
+    }
+
+    /// Smallest and largest pulse in flight, us.
+    pub fn pulse_range_us(&self) -> (u16, u16) {
+        (whole_us(self.spin_min), whole_us(self.spin_min + self.spin_span))
+    }
+
+    /// Tells the motors the height above home (m) and the air's density there, for its compensation.
+    pub fn set_density(&mut self, height_m: f64, density_ratio: impl FnOnce() -> f64) {
+        if (height_m - self.density_height_m).abs() >= DENSITY_STEP_M {
+            self.density_height_m = height_m;
+            self.density_gain = 1.0 / density_ratio().clamp(0.5, 1.25);
+        }
+    }
+
+    /// One step with the boosted throttle and the torque demands (forward, left, up).
+    pub fn update(&mut self, throttle: f64, torque: &Vector3<f64>) {
+        match self.spool {
+            Spool::Stopped => self.hold(0.0),
+            Spool::Idle => self.hold(p::MOT_SPIN_ARM),
+            Spool::Up(share) => {
+                self.hold(p::MOT_SPIN_ARM + share * (self.spin_min - p::MOT_SPIN_ARM));
+                let share = share + self.dt_s / p::MOT_SPOOL_TIME;
+                self.spool = if share < 1.0 { Spool::Up(share) } else { Spool::Flying };
+            }
+            Spool::Flying => self.fly(throttle, torque),
+        }
+    }
+
+    fn hold(&mut self, actuator: f64) {
+        self.pulses_us = [whole_us(actuator); ROTORS];
+        self.throttle_filter.value = 0.0;
+        self.throttle = 0.0;
+        self.limits = ThrottleLimits { upper: false, lower: true };
+    }
+
+    fn fly(&mut self, throttle: f64, torque: &Vector3<f64>) {
+        self.limits = ThrottleLimits { upper: throttle >= 1.0, lower: throttle <= 0.0 };
+        self.throttle = self.throttle_filter.apply(throttle.clamp(0.0, 1.0));
+        let wanted = self.throttle * self.density_gain;
+        let mut share = [0.0; ROTORS];
+        for (share, (forward, left, turn)) in share.iter_mut().zip(LAYOUT) {
+            *share = 0.5 * (left * torque.x - forward * torque.y + turn * torque.z);
+        }
+        // Attitude before throttle: the collective gives way where a rotor would leave its range.
+        let low = share.iter().copied().fold(0.0, f64::min);
+        let high = share.iter().copied().fold(0.0, f64::max);
+        let scale = if high - low > 1.0 { 1.0 / (high - low) } else { 1.0 };
+        let collective = if wanted > 1.0 - high * scale {
+            self.limits.upper = true;
+            1.0 - high * scale
+        } else {
+            wanted
+        };
+        for (pulse, share) in self.pulses_us.iter_mut().zip(share) {
+            let thrust = (collective + share * scale).clamp(0.0, 1.0);
+            *pulse = whole_us(self.spin_min + self.spin_span * curve(thrust, self.expo));
+        }
+    }
+}
+
+/// Actuator share for a thrust share: the inverse of (1 - expo) a + expo a².
+fn curve(thrust: f64, expo: f64) -> f64 {
+    if expo.abs() < 1e-6 {
+        return thrust;
+    }
+    let linear = 1.0 - expo;
+    ((linear * linear + 4.0 * expo * thrust).max(0.0).sqrt() - linear) / (2.0 * expo)
+}
+
+/// Pulse of an actuator share: the fraction is cut off, as the firmware does.
+fn whole_us(actuator: f64) -> u16 {
+    // The small addition keeps decimal fractions such as 0.95 from falling below their value.
+    (p::MOT_PWM_MIN + (p::MOT_PWM_MAX - p::MOT_PWM_MIN) * actuator + 1e-9) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicle::library::builtin;
+
+    fn flying() -> Motors {
+        let mut motors = Motors::new(&builtin("airsim-generic-quad").unwrap().autopilot, 0.0025);
+        motors.spool = Spool::Flying;
+        motors
+    }
+
+    fn settled(throttle: f64, torque: Vector3<f64>) -> Motors {
+        let mut motors = flying();
+        for _ in 0..4_000 {
+            motors.update(throttle, &torque);
+        }
+        motors
+    }
+
+    #[test]
+    fn pulses_are_whole_and_stay_between_the_spin_limits() {
+        assert_eq!(settled(5.0, Vector3::zeros()).pulses_us, [1950; 4]);
+        assert_eq!(settled(-5.0, Vector3::zeros()).pulses_us, [1150; 4]);
+        assert_eq!(
+            settled(0.5012, Vector3::zeros()).pulses_us,
+            [1550; 4],
+            "the fraction is cut off"
+        );
+        assert_eq!(flying().pulse_range_us(), (1150, 1950));
+        assert!(settled(5.0, Vector3::zeros()).limits.upper);
+    }
+
+    #[test]
+    fn attitude_keeps_its_difference_at_the_upper_limit() {
+        let pulses = settled(1.0, Vector3::new(0.25, 0.0, 0.0)).pulses_us;
+        assert_eq!(pulses, [1750, 1950, 1950, 1750]);
+    }
+
+    #[test]
+    fn thrust_curve_is_inverted_exactly() {
+        for expo in [-0.3, 0.0, 0.5, 0.65, 1.0] {
+            for thrust in [0.0, 0.2, 0.7, 1.0] {
+                let actuator = curve(thrust, expo);
+                let back = (1.0 - expo) * actuator + expo * actuator * actuator;
+                assert!((back - thrust).abs() < 1e-12, "{expo} {thrust}");
+            }
+        }
+    }
+}

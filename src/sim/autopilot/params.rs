@@ -1,0 +1,75 @@
+//! Parameters that are the same for every vehicle here: firmware defaults and the values that the
+//! swarm launcher sets, by their ArduPilot names. SI units; the log's PARM rows convert.
+
+/// WPNAV_ACCEL, m/s².
+pub const WPNAV_ACCEL: f64 = 8.0;
+/// WPNAV_ACCEL_Z, m/s².
+pub const WPNAV_ACCEL_Z: f64 = 5.0;
+/// WPNAV_SPEED, m/s.
+pub const WPNAV_SPEED: f64 = 10.0;
+/// WPNAV_SPEED_DN, m/s.
+pub const WPNAV_SPEED_DN: f64 = 4.5;
+/// PSC_JERK_XY and PSC_JERK_Z, m/s³.
+pub const PSC_JERK: f64 = 30.0;
+/// PSC_POSXY_P, 1/s.
+pub const PSC_POSXY_P: f64 = 1.0;
+/// PSC_VELXY_P, 1/s.
+pub const PSC_VELXY_P: f64 = 2.0;
+/// PSC_VELXY_I, 1/s².
+pub const PSC_VELXY_I: f64 = 1.0;
+/// PSC_VELXY_D.
+pub const PSC_VELXY_D: f64 = 0.5;
+/// PSC_VELXY_IMAX, m/s².
+pub const PSC_VELXY_IMAX: f64 = 10.0;
+/// PSC_VELXY_FLTE, PSC_VELXY_FLTD and PSC_VELZ_FLTE, Hz.
+pub const PSC_VEL_FLT: f64 = 5.0;
+/// PSC_ACCZ_FLTE, Hz.
+pub const PSC_ACCZ_FLTE: f64 = 20.0;
+/// PSC_ACCZ_IMAX, share of full throttle.
+pub const PSC_ACCZ_IMAX: f64 = 0.8;
+/// Low-pass on the throttle, Hz (POSCONTROL_THROTTLE_CUTOFF_FREQ_HZ).
+pub const THROTTLE_FLT: f64 = 2.0;
+/// ANGLE_MAX, degrees.
+pub const ANGLE_MAX_DEG: f64 = 30.0;
+/// ATC_ANG_RLL_P and ATC_ANG_PIT_P, 1/s.
+pub const ATC_ANG_P: f64 = 4.5;
+/// ATC_ANG_YAW_P, 1/s: lower than the default, as AirSim's rotors turn the body weakly.
+pub const ATC_ANG_YAW_P: f64 = 1.5;
+/// ATC_RAT_RLL_P and _I, and the same of pitch.
+pub const ATC_RAT_P: f64 = 0.135;
+/// ATC_RAT_RLL_D.
+pub const ATC_RAT_D: f64 = 0.0036;
+/// ATC_RAT_RLL_FLTT and _FLTD, Hz.
+pub const ATC_RAT_FLT: f64 = 20.0;
+/// ATC_RAT_YAW_P.
+pub const ATC_RAT_YAW_P: f64 = 0.5;
+/// ATC_RAT_YAW_I.
+pub const ATC_RAT_YAW_I: f64 = 0.05;
+/// ATC_RAT_RLL_IMAX.
+pub const ATC_RAT_IMAX: f64 = 0.5;
+/// MOT_SPIN_ARM.
+pub const MOT_SPIN_ARM: f64 = 0.1;
+/// MOT_SPOOL_TIME, s.
+pub const MOT_SPOOL_TIME: f64 = 0.5;
+/// MOT_PWM_MIN, us.
+pub const MOT_PWM_MIN: f64 = 1000.0;
+/// MOT_PWM_MAX, us.
+pub const MOT_PWM_MAX: f64 = 2000.0;
+/// Time constant of hover throttle learning, s (AP_MOTORS_THST_HOVER_TC).
+pub const HOVER_LEARN_S: f64 = 10.0;
+/// Range of the learned hover throttle.
+pub const HOVER_RANGE: (f64, f64) = (0.125, 0.6875);
+/// ARMING_DELAY, s: time from arming to spinning.
+pub const ARMING_DELAY_S: f64 = 2.0;
+/// LAND_SPEED, m/s.
+pub const LAND_SPEED: f64 = 0.5;
+/// LAND_ALT_LOW, m.
+pub const LAND_ALT_LOW: f64 = 10.0;
+/// SHOW_CTRL_RATE, Hz.
+pub const SHOW_CTRL_RATE: u32 = 10;
+/// SHOW_TAKEOFF_ALT, m.
+pub const SHOW_TAKEOFF_ALT: f64 = 2.5;
+/// Height at which take-off gives way to the show, share of SHOW_TAKEOFF_ALT.
+pub const TAKEOFF_DONE: f64 = 0.7;
+/// Arming before the take-off time, s.
+pub const ARM_BEFORE_TAKEOFF_S: f64 = 8.0;

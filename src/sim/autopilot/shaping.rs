@@ -1,0 +1,139 @@
+//! Targets that a vehicle can follow: approach a moving point with limited speed, acceleration and
+//! jerk, as ArduPilot's position controller does with what a show asks for.
+
+use nalgebra::SVector;
+
+/// Position, velocity and acceleration in N dimensions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kinematics<const N: usize> {
+    /// m.
+    pub position: SVector<f64, N>,
+    /// m/s.
+    pub velocity: SVector<f64, N>,
+    /// m/s².
+    pub acceleration: SVector<f64, N>,
+}
+
+/// Limits of the approach.
+#[derive(Clone, Copy, Debug)]
+pub struct Approach {
+    /// Largest speed for making up a position error, m/s.
+    pub speed: f64,
+    /// Largest acceleration for making up a velocity error, m/s².
+    pub acceleration: f64,
+    /// Largest jerk, m/s³.
+    pub jerk: f64,
+    to_position: RootLaw,
+    to_velocity: RootLaw,
+}
+
+impl Approach {
+    /// Limits on speed (m/s), acceleration (m/s²) and jerk (m/s³), for steps of `dt_s`.
+    pub fn new(speed: f64, acceleration: f64, jerk: f64, dt_s: f64) -> Self {
+        Self {
+            speed,
+            acceleration,
+            jerk,
+            // Half the acceleration and jerk are kept for the velocity loop inside.
+            to_position: RootLaw::new(0.5 * jerk / acceleration, 0.5 * acceleration, dt_s),
+            to_velocity: RootLaw::new(jerk / acceleration, jerk, dt_s),
+        }
+    }
+}
+
+impl<const N: usize> Kinematics<N> {
+    /// Standing at a point.
+    pub fn at(position: SVector<f64, N>) -> Self {
+        Self { position, velocity: SVector::zeros(), acceleration: SVector::zeros() }
+    }
+
+    /// Moves on at the present acceleration.
+    pub fn advance(&mut self, dt_s: f64) {
+        self.position += (self.velocity + self.acceleration * (dt_s / 2.0)) * dt_s;
+        self.velocity += self.acceleration * dt_s;
+    }
+
+    /// Turns the acceleration towards meeting `goal` in position and velocity.
+    pub fn approach(&mut self, goal: &Self, limits: &Approach, dt_s: f64) {
+        let catch_up = limits.to_position.rate(goal.position - self.position, limits.speed);
+        self.approach_velocity(&(catch_up + goal.velocity), &goal.acceleration, limits, dt_s);
+    }
+
+    /// Turns the acceleration towards a velocity.
+    pub fn approach_velocity(
+        &mut self,
+        velocity: &SVector<f64, N>,
+        feed_forward: &SVector<f64, N>,
+        limits: &Approach,
+        dt_s: f64,
+    ) {
+        let error = velocity - self.velocity;
+        let wanted = limits.to_velocity.rate(error, limits.acceleration) + feed_forward;
+        self.acceleration += limited(wanted - self.acceleration, limits.jerk * dt_s);
+    }
+}
+
+/// Rate that takes an error to zero: proportional near zero, and further out what a constant
+/// deceleration can still stop. Never overshoots within one step.
+#[derive(Clone, Copy, Debug)]
+struct RootLaw {
+    stiffness: f64,
+    brake: f64,
+    linear_to: f64,
+    steps_per_s: f64,
+}
+
+impl RootLaw {
+    fn new(stiffness: f64, brake: f64, dt_s: f64) -> Self {
+        let linear_to = brake / (stiffness * stiffness);
+        Self { stiffness, brake, linear_to, steps_per_s: 1.0 / dt_s }
+    }
+
+    fn rate<const N: usize>(&self, error: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
+        let square = error.norm_squared();
+        if square <= self.linear_to * self.linear_to {
+            // Most of the time; needs no square root.
+            return limited(error * self.stiffness.min(self.steps_per_s), limit);
+        }
+        let size = square.sqrt();
+        let rate = (2.0 * self.brake * (size - self.linear_to / 2.0)).sqrt();
+        error * (rate.min(size * self.steps_per_s).min(limit) / size)
+    }
+}
+
+/// A vector cut to a length.
+pub(super) fn limited<const N: usize>(vector: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
+    let square = vector.norm_squared();
+    if square > limit * limit { vector * (limit / square.sqrt()) } else { vector }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector2;
+    use proptest::prelude::*;
+
+    const DT_S: f64 = 0.0025;
+
+    proptest! {
+        #[test]
+        fn meets_a_moving_goal_within_its_limits(
+            x in -20.0..20.0, y in -20.0..20.0, vx in -3.5..3.5, vy in -3.5..3.5,
+        ) {
+            let limits = Approach::new(10.0, 5.0, 30.0, DT_S);
+            let mut goal = Kinematics::at(Vector2::new(x, y));
+            goal.velocity = Vector2::new(vx, vy);
+            let mut target = Kinematics::at(Vector2::zeros());
+            for _ in 0..8_000 {
+                let before = target.acceleration;
+                target.approach(&goal, &limits, DT_S);
+                prop_assert!(target.acceleration.norm() <= limits.acceleration * 1.5);
+                prop_assert!((target.acceleration - before).norm() <= limits.jerk * DT_S + 1e-12);
+                target.advance(DT_S);
+                goal.advance(DT_S);
+            }
+            prop_assert!((goal.position - target.position).norm() < 0.02);
+            prop_assert!((goal.velocity - target.velocity).norm() < 0.02);
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Rows at changes: arming, take-off, landing.
+
+use std::io::{self, Write};
+
+use crate::log::Value::{Int as I, Text as T};
+use crate::log::{LogWriter, catalog};
+use crate::sim::autopilot::Autopilot;
+use crate::sim::autopilot::director::Stage;
+use crate::sim::autopilot::motors::Spool;
+
+/// Event numbers of EV rows.
+const MOTOR_INTERLOCK_ENABLED: i64 = 57;
+const MOTOR_INTERLOCK_DISABLED: i64 = 56;
+const AUTO_ARMED: i64 = 15;
+const NOT_LANDED: i64 = 28;
+const LAND_COMPLETE_MAYBE: i64 = 17;
+const LAND_COMPLETE: i64 = 18;
+const DISARMED: i64 = 11;
+/// AP_Arming::Method of disarming after a landing.
+const DISARMED_AFTER_LANDING: i64 = 13;
+
+/// What was seen last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Events {
+    spinning: bool,
+    flying: bool,
+    land_maybe: bool,
+    land_complete: bool,
+    armed: bool,
+}
+
+impl Events {
+    /// Armed, on the ground.
+    pub(super) fn new() -> Self {
+        Self {
+            spinning: false,
+            flying: false,
+            land_maybe: false,
+            land_complete: false,
+            armed: true,
+        }
+    }
+
+    /// Writes rows for what changed.
+    pub(super) fn write<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        pilot: &Autopilot<'_>,
+        board_us: i64,
+    ) -> io::Result<u64> {
+        let director = &pilot.director;
+        let now = Self {
+            spinning: pilot.motors.spool != Spool::Stopped,
+            flying: director.stage > Stage::Wait && director.stage < Stage::Landed,
+            land_maybe: director.land_maybe,
+            land_complete: director.land_complete,
+            armed: director.armed,
+        };
+        if now == *self {
+            return Ok(0);
+        }
+        let before = std::mem::replace(self, now);
+        let time = I(board_us);
+        let mut rows = 0;
+        if before.armed && !now.armed {
+            log.row(&catalog::MSG, &[time, T("Disarming motors")])?;
+            log.row(&catalog::ARM, &[time, I(0), I(0), I(0), I(DISARMED_AFTER_LANDING)])?;
+            rows += 2;
+        }
+        for (happened, event) in [
+            (!before.spinning && now.spinning, MOTOR_INTERLOCK_ENABLED),
+            (!before.flying && now.flying, AUTO_ARMED),
+            (!before.flying && now.flying, NOT_LANDED),
+            (!before.land_maybe && now.land_maybe, LAND_COMPLETE_MAYBE),
+            (!before.land_complete && now.land_complete, LAND_COMPLETE),
+            (before.armed && !now.armed, DISARMED),
+            (before.spinning && !now.spinning, MOTOR_INTERLOCK_DISABLED),
+        ] {
+            if happened {
+                log.row(&catalog::EV, &[time, I(event)])?;
+                rows += 1;
+            }
+        }
+        Ok(rows)
+    }
+}

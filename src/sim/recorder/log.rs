@@ -1,0 +1,97 @@
+//! The log of one flight: which rows are due at which step.
+
+use std::io::{self, Write};
+
+use super::battery::Battery;
+use super::clock::Clock;
+use super::events::Events;
+use super::full::Full;
+use super::view::View;
+use super::{Moment, Recorder, control, navigation, start};
+use crate::log::{LogWriter, MessageDef, catalog};
+use crate::sim::flight::{FlightSetup, STEP_S, STEP_US};
+use crate::vehicle::Vehicle;
+
+/// Steps between rows at 25 Hz and at 10 Hz.
+const STEPS_25_HZ: u64 = 16;
+const STEPS_10_HZ: u64 = 40;
+
+/// Writes a DataFlash log as the show firmware does.
+pub struct LogRecorder<W: Write> {
+    log: LogWriter<W>,
+    clock: Clock,
+    view: View,
+    vehicle: Vehicle,
+    battery: Option<Battery>,
+    events: Events,
+    full: Option<Full>,
+    rows: u64,
+}
+
+impl<W: Write> LogRecorder<W> {
+    /// Starts the log of a flight that arms at this show time (us): definitions and first rows.
+    pub(in crate::sim) fn new(out: W, setup: &FlightSetup<'_>, armed_us: i64) -> io::Result<Self> {
+        let clock = Clock::new(setup.seed, setup.drone, armed_us, setup.start);
+        let view = View::new(&setup.frame, setup.home_m);
+        let board_us = clock.board_us(armed_us);
+        let mut log =
+            LogWriter::with_time(out, &messages(setup.full_logs), board_us.max(0) as u64)?;
+        let rows = start::write(&mut log, setup, &view, board_us)?;
+        Ok(Self {
+            log,
+            clock,
+            view,
+            vehicle: setup.vehicle.clone(),
+            battery: None,
+            events: Events::new(),
+            full: setup.full_logs.then(|| Full::new(setup, &view)),
+            rows,
+        })
+    }
+
+    /// Ends the log; returns its number of rows.
+    pub(in crate::sim) fn finish(self) -> io::Result<u64> {
+        self.log.finish()?;
+        Ok(self.rows)
+    }
+}
+
+/// The messages of the log.
+fn messages(full: bool) -> Vec<&'static MessageDef> {
+    if full {
+        return catalog::FULL_SET.to_vec();
+    }
+    let mut messages = catalog::DEFAULT_SET.to_vec();
+    messages.push(&catalog::GUIP);
+    messages
+}
+
+impl<W: Write> Recorder for LogRecorder<W> {
+    fn record(&mut self, moment: &Moment<'_>) -> io::Result<()> {
+        let board_us = self.clock.board_us(moment.time_us);
+        let log = &mut self.log;
+        self.rows += self.events.write(log, moment.pilot, board_us)?;
+        self.rows += control::write_target(log, moment, &self.view, board_us)?;
+        if let Some(fix) = self.clock.fix(moment.time_us, STEP_US) {
+            self.rows += navigation::write_gps(log, moment, &self.view, board_us, fix)?;
+            if let Some(full) = &mut self.full {
+                self.rows += full.write_gps(log, board_us)?;
+            }
+        }
+        if moment.step % STEPS_25_HZ == 0 {
+            self.rows += control::write_show(log, moment, board_us)?;
+        }
+        if moment.step % STEPS_10_HZ == 0 {
+            let vehicle = &self.vehicle;
+            let battery = self.battery.get_or_insert_with(|| Battery::new(vehicle, moment.plant));
+            battery.draw(moment.plant, STEPS_10_HZ as f64 * STEP_S);
+            let attitude = self.view.euler(&moment.estimate.rotation);
+            self.rows += control::write(log, moment, &self.view, &attitude, battery, board_us)?;
+            self.rows += navigation::write(log, moment, &self.view, &attitude, board_us)?;
+        }
+        if let Some(full) = &mut self.full {
+            self.rows += full.write(log, moment, &self.view, board_us)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,58 @@
+//! What a flight's log says.
+//!
+//! A [`Recorder`] sees every control step. The one that writes DataFlash logs has one file for each
+//! group of messages; `view` is the border where the show frame becomes north, east, down.
+
+mod battery;
+mod clock;
+mod control;
+mod events;
+mod full;
+mod log;
+mod navigation;
+mod start;
+mod view;
+
+use std::io;
+
+use super::air::Surroundings;
+use super::autopilot::Autopilot;
+use super::plant::Plant;
+use super::sensors::Estimate;
+pub use log::LogRecorder;
+
+/// Everything there is to know about one control step, before the body moves.
+#[derive(Clone, Copy)]
+pub struct Moment<'a> {
+    /// Number of the step since arming.
+    pub step: u64,
+    /// Show time, us.
+    pub time_us: i64,
+    /// The autopilot after its step.
+    pub pilot: &'a Autopilot<'a>,
+    /// What it believed.
+    pub estimate: &'a Estimate,
+    /// The body and its true motion.
+    pub plant: &'a Plant,
+    /// The air around it.
+    pub around: &'a Surroundings,
+}
+
+/// Sees every control step of a flight.
+pub trait Recorder {
+    /// Takes note of one step.
+    ///
+    /// # Errors
+    /// Ends the flight: the record could not be kept.
+    fn record(&mut self, moment: &Moment<'_>) -> io::Result<()>;
+}
+
+/// Records nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoLog;
+
+impl Recorder for NoLog {
+    fn record(&mut self, _moment: &Moment<'_>) -> io::Result<()> {
+        Ok(())
+    }
+}
