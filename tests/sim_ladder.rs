@@ -46,7 +46,7 @@ struct Channels(Vec<(f64, f64, f64, f64)>);
 
 impl Recorder for Channels {
     fn record(&mut self, moment: &Moment<'_>) -> io::Result<()> {
-        if moment.step % 40 == 0 {
+        if moment.step.is_multiple_of(40) {
             let pulses = moment.pilot.motors.pulses_us.map(f64::from);
             let cos_tilt = moment.estimate.rotation[(2, 2)];
             let lean = moment.plant.motion().rotation[(0, 2)];
@@ -68,12 +68,16 @@ struct Flown {
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
+    if values.len() % 2 == 1 {
+        values[middle]
+    } else {
+        f64::midpoint(values[middle - 1], values[middle])
+    }
 }
 
 fn flown(speeds_mps: &[f64], wind_mps: Vector3<f64>, seed: u64) -> Flown {
     let (trajectory, legs) = ladder(speeds_mps);
-    let vehicle = builtin("airsim-generic-quad").unwrap();
+    let vehicle = builtin("airsim-generic-quad").expect("a built-in vehicle");
     let origin = Geodetic { lat_deg: 47.4733, lon_deg: 19.0621, amsl_m: 190.0 };
     let setup = FlightSetup {
         vehicle: &vehicle,
@@ -88,7 +92,7 @@ fn flown(speeds_mps: &[f64], wind_mps: Vector3<f64>, seed: u64) -> Flown {
         hooks: Hooks::default(),
     };
     let mut channels = Channels::default();
-    let summary = fly_with(&setup, &mut channels).unwrap();
+    let summary = fly_with(&setup, &mut channels).expect("a flight");
     let inside = |from_s: f64| {
         channels.0.iter().filter(move |row| row.0 >= from_s + 10.0 && row.0 < from_s + 19.0)
     };
@@ -126,7 +130,7 @@ fn best_air(cost: impl Fn(f64) -> f64) -> f64 {
     (-10_000..=10_000)
         .map(|step| f64::from(step) * 1e-4)
         .min_by(|a, b| cost(*a).total_cmp(&cost(*b)))
-        .unwrap()
+        .expect("a grid of values")
 }
 
 #[test]

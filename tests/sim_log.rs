@@ -7,12 +7,14 @@ use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::base::time::GpsTime;
 use updraft::log::{Log, Select, Table};
 use updraft::show::{Path, Segment, Trajectory};
-use updraft::sim::{FlightSetup, FlightSummary, Hooks, SimError, Uniform, fly, fly_without_log};
+use updraft::sim::{
+    FlightSetup, FlightSummary, Hooks, SimError, Uniform, fly, fly_to_file, fly_without_log,
+};
 use updraft::vehicle::Vehicle;
 use updraft::vehicle::library::builtin;
 
 fn vehicle() -> Vehicle {
-    builtin("airsim-generic-quad").unwrap()
+    builtin("airsim-generic-quad").expect("a built-in vehicle")
 }
 
 /// Up to 10 m, a 20 m leg along show x, up 1 m/s, down again, 2.5 m at the end.
@@ -59,7 +61,7 @@ fn flown(seed: u64, drone: u16, full_logs: bool) -> (Vec<u8>, FlightSummary) {
     let trajectory = short_show(Vector3::new(7.0, 14.0, 0.0));
     let setup = FlightSetup { seed, full_logs, ..setup(&vehicle, &trajectory, &air, drone) };
     let mut bytes = Vec::new();
-    let summary = fly(&setup, &mut bytes).unwrap();
+    let summary = fly(&setup, &mut bytes).expect("a flight");
     (bytes, summary)
 }
 
@@ -195,6 +197,27 @@ fn a_stopped_flight_is_an_error() {
     let error = fly(&setup, Vec::new()).unwrap_err();
     assert!(matches!(error, SimError::Stopped { drone: 1, .. }), "{error}");
     assert!(seen.lock().unwrap().is_sorted());
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("01.BIN");
+    assert!(matches!(fly_to_file(&setup, &path), Err(SimError::Stopped { .. })));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing half-written");
+}
+
+#[test]
+fn a_file_holds_what_was_flown() {
+    let (vehicle, air) = (vehicle(), Uniform::default());
+    let trajectory = short_show(Vector3::new(7.0, 14.0, 0.0));
+    let setup = setup(&vehicle, &trajectory, &air, 3);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("logs/03.BIN");
+    let summary = fly_to_file(&setup, &path).unwrap();
+    assert!(std::fs::read(&path).unwrap() == flown(7, 3, false).0);
+    assert_eq!(summary, flown(7, 3, false).1);
+
+    let blocked = folder.path().join("logs/03.BIN/04.BIN");
+    let error = fly_to_file(&setup, &blocked).unwrap_err();
+    assert!(matches!(error, SimError::File { .. }), "{error}");
 }
 
 #[test]
@@ -242,6 +265,66 @@ fn refuses_what_the_firmware_refuses() {
     let nowhere =
         FlightSetup { home_m: Vector3::repeat(f64::NAN), ..setup(&vehicle, &trajectory, &air, 5) };
     assert!(matches!(fly_without_log(&nowhere), Err(SimError::NotFinite { .. })));
+}
+
+#[test]
+fn a_horizontal_step_makes_the_firmwares_transient() {
+    // Measured on the firmware: 0 to 1 m/s at most 0.37-0.43 m, 0 to 3.5 m/s 2.15-2.26 m.
+    let (vehicle, air) = (vehicle(), Uniform::default());
+    for (speed, low_m, high_m) in [(1.0, 0.3, 0.6), (3.5, 1.6, 2.8)] {
+        let at = |x: f64, z: f64| Path::Line(Vector3::new(x, 0.0, z));
+        let piece = |duration_ms, path| Segment { duration_ms, path };
+        let trajectory = Trajectory {
+            start_m: Vector3::zeros(),
+            segments: vec![
+                piece(10_000, at(0.0, 10.0)),
+                piece(5_000, Path::Hold),
+                piece(10_000, at(10.0 * speed, 10.0)),
+                piece(5_000, Path::Hold),
+                piece(7_500, at(10.0 * speed, 2.5)),
+            ],
+        };
+        let summary = fly_without_log(&setup(&vehicle, &trajectory, &air, 1)).unwrap();
+        let error_m = summary.max_error_xy_m;
+        println!("{speed} m/s: {error_m:.2} m");
+        assert!((low_m..high_m).contains(&error_m), "{speed} m/s: {error_m}");
+    }
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(24))]
+    #[test]
+    fn any_show_in_any_bearable_wind_is_flown_and_landed(
+        speed in 0.5..4.0_f64,
+        height in 3.0..60.0_f64,
+        side in -30.0..30.0_f64,
+        wind in proptest::array::uniform3(-3.0..3.0_f64),
+        ground in -20.0..20.0_f64,
+        drone in 0_u16..=u16::MAX,
+    ) {
+        let home = Vector3::new(1.0, -2.0, ground);
+        let at = |x: f64, z: f64| Path::Line(home + Vector3::new(x, 0.0, z));
+        let piece = |metres: f64, path| {
+            Segment { duration_ms: (metres / speed * 1000.0) as u32 + 1, path }
+        };
+        let trajectory = Trajectory {
+            start_m: home,
+            segments: vec![
+                piece(height, at(0.0, height)),
+                Segment { duration_ms: 8_000, path: Path::Hold },
+                piece(side.abs(), at(side, height)),
+                Segment { duration_ms: 3_000, path: Path::Hold },
+                piece(height - 2.5, at(side, 2.5)),
+            ],
+        };
+        let (vehicle, air) = (vehicle(), Uniform(Vector3::from(wind)));
+        let summary = fly_without_log(&setup(&vehicle, &trajectory, &air, drone)).unwrap();
+        let end_s = trajectory.duration_ms() as f64 / 1000.0;
+        proptest::prop_assert!((summary.landing_s - end_s).abs() < 0.01);
+        proptest::prop_assert!(summary.landed_s - end_s < 30.0, "{summary:?}");
+        proptest::prop_assert!(summary.max_error_xy_m < 4.0, "{summary:?}");
+        proptest::prop_assert!(summary.max_height_m < height + 6.0, "{summary:?}");
+    }
 }
 
 #[test]

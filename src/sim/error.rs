@@ -4,6 +4,8 @@ use std::io;
 
 use thiserror::Error;
 
+use crate::base::file::FileError;
+
 /// A flight could not be simulated to its end; its log must not be kept.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -65,6 +67,15 @@ pub enum SimError {
         drone: u16,
         /// Show time.
         time_s: f64,
+    },
+    /// The log's file could not be written.
+    #[error("drone {drone}: the log was not written")]
+    File {
+        /// The drone's slot.
+        drone: u16,
+        /// Which file, and why.
+        #[source]
+        source: FileError,
     },
     /// The log could not be written.
     #[error("drone {drone}: failed to write the log")]

@@ -1,6 +1,7 @@
 //! One drone's flight from arming to disarming.
 
 use std::io::{self, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Vector3;
@@ -14,6 +15,7 @@ use super::error::SimError;
 use super::plant::Plant;
 use super::recorder::{LogRecorder, Moment, NoLog, Recorder};
 use super::sensors::Sensors;
+use crate::base::file::write_with;
 use crate::base::frame::ShowFrame;
 use crate::base::time::GpsTime;
 use crate::show::Trajectory;
@@ -95,8 +97,8 @@ pub struct FlightSummary {
 
 /// Flies one drone and writes its DataFlash log to `out`.
 ///
-/// The bytes depend on the setup alone. On an error the log is incomplete: do not publish it (write
-/// through [`crate::base::file::write_with`], which does not).
+/// The bytes depend on the setup alone. On an error the log is incomplete: do not publish it
+/// ([`fly_to_file`] does not).
 ///
 /// # Errors
 /// See [`SimError`].
@@ -109,6 +111,32 @@ pub fn fly<W: Write>(setup: &FlightSetup<'_>, out: W) -> Result<FlightSummary, S
     let mut summary = fly_with(setup, &mut recorder)?;
     summary.log_rows = recorder.finish().map_err(log_error)?;
     Ok(summary)
+}
+
+/// Flies one drone and writes its log to a file, which appears only when it is whole.
+///
+/// # Errors
+/// See [`SimError`]; `path` is then as it was before.
+pub fn fly_to_file(setup: &FlightSetup<'_>, path: &Path) -> Result<FlightSummary, SimError> {
+    // Stands only when the file could not even be opened, and then the file's error is given.
+    let mut outcome = Ok(FlightSummary::default());
+    let written = write_with(path, |out| {
+        outcome = fly(setup, out);
+        match &mut outcome {
+            Ok(_) => Ok(()),
+            // The file's error says more than ours: which path.
+            Err(SimError::Log { source, .. }) => {
+                Err(std::mem::replace(source, io::ErrorKind::Other.into()))
+            }
+            Err(_) => Err(io::Error::other("the flight ended early")),
+        }
+    });
+    match (outcome, written) {
+        (Ok(_) | Err(SimError::Log { .. }), Err(source)) => {
+            Err(SimError::File { drone: setup.drone, source })
+        }
+        (outcome, _) => outcome,
+    }
 }
 
 /// Flies one drone without a log.
@@ -149,7 +177,7 @@ pub fn fly_with<R: Recorder>(
     loop {
         let time_us = start_us + step as i64 * STEP_US;
         let time_s = time_us as f64 * 1e-6;
-        if step % STEPS_PER_AIR == 0 {
+        if step.is_multiple_of(STEPS_PER_AIR) {
             let place = &plant.motion().position_m;
             around = Surroundings {
                 air_velocity_mps: setup.atmosphere.air_velocity(place, time_s),
@@ -160,7 +188,7 @@ pub fn fly_with<R: Recorder>(
                 return Err(SimError::Diverged { drone, time_s });
             }
         }
-        if step % STEPS_PER_LOOK == 0 {
+        if step.is_multiple_of(STEPS_PER_LOOK) {
             look(setup, &plant, time_s, takeoff_s, end_s)?;
             if time_s > give_up_s {
                 return Err(SimError::NotLanded { drone, time_s });

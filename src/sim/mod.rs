@@ -15,4 +15,4 @@ pub mod sensors;
 
 pub use air::{Atmosphere, Uniform};
 pub use error::SimError;
-pub use flight::{FlightSetup, FlightSummary, Hooks, fly, fly_with, fly_without_log};
+pub use flight::{FlightSetup, FlightSummary, Hooks, fly, fly_to_file, fly_with, fly_without_log};

@@ -26,6 +26,17 @@ pub enum Stage {
     Landed = 8,
 }
 
+/// Whether the autopilot takes itself to be on the ground after the show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Touchdown {
+    /// In the air, or not yet taken off.
+    None,
+    /// Suspected (EV 17).
+    Maybe,
+    /// Declared (EV 18).
+    Complete,
+}
+
 /// Time for which the motors must be at their lower limit to suspect, and to declare a landing, s.
 const LAND_MAYBE_S: f64 = 0.2;
 const LAND_COMPLETE_S: f64 = 1.0;
@@ -61,10 +72,8 @@ pub struct Director<'a> {
     pub stage: Stage,
     /// Whether the motors are armed.
     pub armed: bool,
-    /// Whether a landing is suspected (EV 17).
-    pub land_maybe: bool,
-    /// Whether a landing is declared (EV 18).
-    pub land_complete: bool,
+    /// What is believed of the landing.
+    pub touchdown: Touchdown,
     /// What the show asked for last (with the velocity as sent), show frame.
     pub target: Kinematics<3>,
     /// Steps since the last target; 0 in the step that made one.
@@ -95,8 +104,7 @@ impl<'a> Director<'a> {
         Some(Self {
             stage: Stage::Wait,
             armed: true,
-            land_maybe: false,
-            land_complete: false,
+            touchdown: Touchdown::None,
             target: Kinematics::at(home_m),
             target_age: 0,
             takeoff_s: takeoff_time_s(trajectory, settings.wpnav_speed_up_mps)?,
@@ -171,9 +179,13 @@ impl<'a> Director<'a> {
         let still = estimate.velocity_mps.norm() < 1.0;
         let change_s = if motors.limits.lower && still { self.dt_s } else { -2.0 * self.dt_s };
         self.at_limit_s = (self.at_limit_s + change_s).max(0.0);
-        self.land_maybe |= self.at_limit_s >= LAND_MAYBE_S;
-        self.land_complete |= self.at_limit_s >= LAND_COMPLETE_S;
-        if self.land_complete {
+        let seen = match self.at_limit_s {
+            limit_s if limit_s >= LAND_COMPLETE_S => Touchdown::Complete,
+            limit_s if limit_s >= LAND_MAYBE_S => Touchdown::Maybe,
+            _ => Touchdown::None,
+        };
+        self.touchdown = self.touchdown.max(seen);
+        if self.touchdown == Touchdown::Complete {
             self.landed_s += self.dt_s;
             if self.landed_s >= DISARM_AFTER_S {
                 self.stage = Stage::Landed;

@@ -211,10 +211,10 @@ mod tests {
     fn trim_us(air_up_mps: f64, ratio: f64) -> f64 {
         let (mut low, mut high) = (1000.0, 2000.0);
         for _ in 0..60 {
-            let middle = (low + high) / 2.0;
+            let middle = f64::midpoint(low, high);
             if acceleration(air_up_mps, middle, ratio) < 0.0 { low = middle } else { high = middle }
         }
-        (low + high) / 2.0
+        f64::midpoint(low, high)
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! A battery for the log: AirSim has none, so this one only reports and does not act on the motors.
 
-use super::super::plant::Plant;
+use crate::sim::flight::STEP_S;
+use crate::sim::plant::rotor::Rotors;
+use crate::sim::plant::{GRAVITY, Plant};
 use crate::vehicle::Vehicle;
 
 /// Full and empty open-circuit voltage of three lithium cells, V.
@@ -25,11 +27,12 @@ pub(super) struct Battery {
 }
 
 impl Battery {
-    pub(super) fn new(vehicle: &Vehicle, plant: &Plant) -> Self {
+    pub(super) fn new(vehicle: &Vehicle) -> Self {
         let mass_kg = vehicle.airframe.mass_kg;
+        let max_thrust_n = Rotors::new(&vehicle.airframe, STEP_S).max_thrust_n();
         let hover_a = HOVER_A_PER_KG * mass_kg;
         Self {
-            hover_output: mass_kg * super::super::plant::GRAVITY / plant.rotors().max_thrust_n(),
+            hover_output: mass_kg * GRAVITY / max_thrust_n,
             hover_a,
             capacity_as: hover_a * vehicle.limits.endurance_s,
             current_a: 0.0,

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use crate::log::Value::{Int as I, Text as T};
 use crate::log::{LogWriter, catalog};
 use crate::sim::autopilot::Autopilot;
-use crate::sim::autopilot::director::Stage;
+use crate::sim::autopilot::director::{Stage, Touchdown};
 use crate::sim::autopilot::motors::Spool;
 
 /// Event numbers of EV rows.
@@ -24,21 +24,14 @@ const DISARMED_AFTER_LANDING: i64 = 13;
 pub(super) struct Events {
     spinning: bool,
     flying: bool,
-    land_maybe: bool,
-    land_complete: bool,
     armed: bool,
+    touchdown: Touchdown,
 }
 
 impl Events {
     /// Armed, on the ground.
     pub(super) fn new() -> Self {
-        Self {
-            spinning: false,
-            flying: false,
-            land_maybe: false,
-            land_complete: false,
-            armed: true,
-        }
+        Self { spinning: false, flying: false, armed: true, touchdown: Touchdown::None }
     }
 
     /// Writes rows for what changed.
@@ -52,15 +45,15 @@ impl Events {
         let now = Self {
             spinning: pilot.motors.spool != Spool::Stopped,
             flying: director.stage > Stage::Wait && director.stage < Stage::Landed,
-            land_maybe: director.land_maybe,
-            land_complete: director.land_complete,
             armed: director.armed,
+            touchdown: director.touchdown,
         };
         if now == *self {
             return Ok(0);
         }
         let before = std::mem::replace(self, now);
         let time = I(board_us);
+        let reached = |state| before.touchdown < state && now.touchdown >= state;
         let mut rows = 0;
         if before.armed && !now.armed {
             log.row(&catalog::MSG, &[time, T("Disarming motors")])?;
@@ -71,8 +64,8 @@ impl Events {
             (!before.spinning && now.spinning, MOTOR_INTERLOCK_ENABLED),
             (!before.flying && now.flying, AUTO_ARMED),
             (!before.flying && now.flying, NOT_LANDED),
-            (!before.land_maybe && now.land_maybe, LAND_COMPLETE_MAYBE),
-            (!before.land_complete && now.land_complete, LAND_COMPLETE),
+            (reached(Touchdown::Maybe), LAND_COMPLETE_MAYBE),
+            (reached(Touchdown::Complete), LAND_COMPLETE),
             (before.armed && !now.armed, DISARMED),
             (before.spinning && !now.spinning, MOTOR_INTERLOCK_DISABLED),
         ] {

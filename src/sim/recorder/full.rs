@@ -10,7 +10,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::view::{Euler, View, frd};
-use super::{Moment, control, navigation};
+use super::{Moment, control, ekf, navigation};
 use crate::base::rng::{Purpose, stream};
 use crate::log::Value::{Float as F, Int as I};
 use crate::log::{LogWriter, Value, catalog};
@@ -53,7 +53,7 @@ impl Full {
         view: &View,
         board_us: i64,
     ) -> io::Result<u64> {
-        let every = |steps: u64| moment.step % steps == 0;
+        let every = |steps: u64| moment.step.is_multiple_of(steps);
         let mut rows = write_truth(log, moment, view, board_us)?;
         if every(16) {
             rows += self.write_imu(log, moment, board_us)?;
@@ -68,17 +68,24 @@ impl Full {
                     navigation::write_core(log, moment, view, &attitude, board_us, core)?;
                     rows += 1;
                 }
-                rows += self.write_core(log, &attitude, board_us, core)?;
+                rows += ekf::write_core(
+                    log,
+                    &attitude,
+                    self.field_mgauss,
+                    &mut self.rng,
+                    board_us,
+                    core,
+                )?;
             }
         }
         if every(200) {
-            rows += write_variances(log, board_us)?;
+            rows += ekf::write_variances(log, board_us)?;
         }
         if every(400) {
             rows += write_housekeeping(log, moment, view, board_us)?;
         }
         if every(2000) {
-            rows += write_timing(log, board_us)?;
+            rows += ekf::write_timing(log, board_us)?;
         }
         if every(4000) {
             let mut values = [I(0); 14];
@@ -95,38 +102,6 @@ impl Full {
             rows += 1;
         }
         Ok(rows)
-    }
-
-    /// GPA: what a receiver says of its accuracy.
-    pub(super) fn write_gps<W: Write>(
-        &mut self,
-        log: &mut LogWriter<W>,
-        board_us: i64,
-    ) -> io::Result<u64> {
-        let accuracy = [F(1.1), F(0.3), F(0.3), F(0.04), F(0.0)];
-        let [vdop, horizontal, vertical, speed, yaw] = accuracy;
-        let ms = I(board_us / 1000);
-        let counts = [I(200), F(0.0), I(0), I(0)];
-        let [delta, undulation, used, dropped] = counts;
-        log.row(
-            &catalog::GPA,
-            &[
-                I(board_us),
-                I(0),
-                vdop,
-                horizontal,
-                vertical,
-                speed,
-                yaw,
-                I(1),
-                ms,
-                delta,
-                undulation,
-                used,
-                dropped,
-            ],
-        )?;
-        Ok(1)
     }
 
     fn noise(&mut self, deviation: f64) -> f64 {
@@ -235,62 +210,6 @@ impl Full {
         log.row(&catalog::CTRL, &[time, roll_p, roll_d, pitch_p, pitch_d, yaw])?;
         Ok(10)
     }
-
-    /// XKF2 to XKF5, XKFS, XKQ, XKY0 and XKY1 of one EKF core.
-    fn write_core<W: Write>(
-        &mut self,
-        log: &mut LogWriter<W>,
-        attitude: &Euler,
-        board_us: i64,
-        core: i64,
-    ) -> io::Result<u64> {
-        let head = [I(board_us), I(core)];
-        let mut row = |message, rest: &[Value<'static>]| {
-            let mut values = [I(0); 16];
-            values[..2].copy_from_slice(&head);
-            values[2..2 + rest.len()].copy_from_slice(rest);
-            log.row(message, &values[..2 + rest.len()])
-        };
-        let zeros = [F(0.0); 16];
-        let mut innovations = zeros;
-        for innovation in &mut innovations[..6] {
-            let draw: f64 = StandardNormal.sample(&mut self.rng);
-            *innovation = F(0.02 * draw);
-        }
-        let [north, east, down] = self.field_mgauss.map(|part| I(part.round() as i64)).into();
-        let [w, x, y, z] = attitude.quaternion().map(F);
-        let mut field = zeros;
-        field[5..8].copy_from_slice(&[north, east, down]);
-        field[8..11].copy_from_slice(&[I(0); 3]);
-        row(&catalog::XKF2, &field[..14])?;
-        innovations[6..9].copy_from_slice(&[I(0); 3]);
-        row(&catalog::XKF3, &innovations[..13])?;
-        let status = [I(0), I(0), I(831), I(0), I(0)];
-        let mut health = zeros;
-        health[..6].copy_from_slice(&[0.03, 0.02, 0.02, 0.01, 0.0, 0.005].map(F));
-        health[8..13].copy_from_slice(&status);
-        row(&catalog::XKF4, &health[..13])?;
-        row(&catalog::XKFS, &[I(0), I(0), I(0), I(0), I(0)])?;
-        row(&catalog::XKQ, &[w, x, y, z])?;
-        let mut angles = zeros;
-        angles[0] = F(attitude.yaw_deg);
-        angles[1] = F(2.0);
-        for hypothesis in 0..5 {
-            angles[2 + hypothesis] = F((attitude.yaw_deg + 72.0 * hypothesis as f64) % 360.0);
-            angles[7 + hypothesis] = F(0.2);
-        }
-        row(&catalog::XKY0, &angles[..12])?;
-        row(&catalog::XKY1, &zeros[..10])?;
-        if core > 0 {
-            return Ok(7);
-        }
-        let mut optical = zeros;
-        optical[..4].copy_from_slice(&[I(0); 4]);
-        optical[7] = F(0.0);
-        optical[8] = F(0.5);
-        row(&catalog::XKF5, &optical[..12])?;
-        Ok(8)
-    }
 }
 
 fn magnitude(value: Value<'static>) -> Value<'static> {
@@ -305,6 +224,34 @@ fn body_field(ned: &Vector3<f64>, attitude: &Euler) -> Vector3<f64> {
     let [w, x, y, z] = attitude.quaternion();
     let turn = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
     turn.inverse_transform_vector(ned)
+}
+
+/// GPA: what a receiver says of its accuracy.
+pub(super) fn write_accuracy<W: Write>(log: &mut LogWriter<W>, board_us: i64) -> io::Result<u64> {
+    let accuracy = [F(1.1), F(0.3), F(0.3), F(0.04), F(0.0)];
+    let [vdop, horizontal, vertical, speed, yaw] = accuracy;
+    let ms = I(board_us / 1000);
+    let counts = [I(200), F(0.0), I(0), I(0)];
+    let [delta, undulation, used, dropped] = counts;
+    log.row(
+        &catalog::GPA,
+        &[
+            I(board_us),
+            I(0),
+            vdop,
+            horizontal,
+            vertical,
+            speed,
+            yaw,
+            I(1),
+            ms,
+            delta,
+            undulation,
+            used,
+            dropped,
+        ],
+    )?;
+    Ok(1)
 }
 
 /// SIM2 at every step.
@@ -368,26 +315,6 @@ fn write_attitudes<W: Write>(
     Ok(2)
 }
 
-/// XKV1, XKV2 and XKTV at 2 Hz.
-fn write_variances<W: Write>(log: &mut LogWriter<W>, board_us: i64) -> io::Result<u64> {
-    let variances = [
-        [1.2e-5, 1.2e-5, 1.2e-5, 1.8e-3, 9e-3, 9e-3, 6e-3, 0.027, 0.027, 0.05, 0.0, 0.0],
-        [0.0, 0.0, 0.0, 0.0, 1.2e-3, 6e-5, 1.2e-3, 1.2e-3, 4e-4, 1.2e-3, 0.0, 0.0],
-    ];
-    for (message, variances) in [&catalog::XKV1, &catalog::XKV2].into_iter().zip(variances) {
-        let mut values = [I(0); 14];
-        values[0] = I(board_us);
-        for (value, variance) in values[2..].iter_mut().zip(variances) {
-            *value = F(variance);
-        }
-        log.row(message, &values)?;
-    }
-    for core in 0..2 {
-        log.row(&catalog::XKTV, &[I(board_us), I(core), F(1e-4), F(1e-4)])?;
-    }
-    Ok(4)
-}
-
 /// DSF, DU32, MAV and the breadcrumbs of SRTL at 1 Hz.
 fn write_housekeeping<W: Write>(
     log: &mut LogWriter<W>,
@@ -409,16 +336,4 @@ fn write_housekeeping<W: Write>(
     let [north, east, down] = view.place(&moment.estimate.position_m).map(F).into();
     log.row(&catalog::SRTL, &[time, I(1), I(1), I(300), I(0), north, east, down])?;
     Ok(4)
-}
-
-/// XKT of both cores every 5 s.
-fn write_timing<W: Write>(log: &mut LogWriter<W>, board_us: i64) -> io::Result<u64> {
-    for core in 0..2 {
-        let spans = [0.0025, 0.0025, 0.012, 0.0124, 0.0108, 0.0125, 0.01, 0.0133].map(F);
-        let mut values = [I(0); 11];
-        values[..3].copy_from_slice(&[I(board_us), I(core), I(406)]);
-        values[3..].copy_from_slice(&spans);
-        log.row(&catalog::XKT, &values)?;
-    }
-    Ok(2)
 }

@@ -5,12 +5,11 @@ use std::io::{self, Write};
 use super::battery::Battery;
 use super::clock::Clock;
 use super::events::Events;
-use super::full::Full;
+use super::full::{self, Full};
 use super::view::View;
 use super::{Moment, Recorder, control, navigation, start};
 use crate::log::{LogWriter, MessageDef, catalog};
 use crate::sim::flight::{FlightSetup, STEP_S, STEP_US};
-use crate::vehicle::Vehicle;
 
 /// Steps between rows at 25 Hz and at 10 Hz.
 const STEPS_25_HZ: u64 = 16;
@@ -21,8 +20,7 @@ pub struct LogRecorder<W: Write> {
     log: LogWriter<W>,
     clock: Clock,
     view: View,
-    vehicle: Vehicle,
-    battery: Option<Battery>,
+    battery: Battery,
     events: Events,
     full: Option<Full>,
     rows: u64,
@@ -41,8 +39,7 @@ impl<W: Write> LogRecorder<W> {
             log,
             clock,
             view,
-            vehicle: setup.vehicle.clone(),
-            battery: None,
+            battery: Battery::new(setup.vehicle),
             events: Events::new(),
             full: setup.full_logs.then(|| Full::new(setup, &view)),
             rows,
@@ -74,19 +71,18 @@ impl<W: Write> Recorder for LogRecorder<W> {
         self.rows += control::write_target(log, moment, &self.view, board_us)?;
         if let Some(fix) = self.clock.fix(moment.time_us, STEP_US) {
             self.rows += navigation::write_gps(log, moment, &self.view, board_us, fix)?;
-            if let Some(full) = &mut self.full {
-                self.rows += full.write_gps(log, board_us)?;
+            if self.full.is_some() {
+                self.rows += full::write_accuracy(log, board_us)?;
             }
         }
-        if moment.step % STEPS_25_HZ == 0 {
+        if moment.step.is_multiple_of(STEPS_25_HZ) {
             self.rows += control::write_show(log, moment, board_us)?;
         }
-        if moment.step % STEPS_10_HZ == 0 {
-            let vehicle = &self.vehicle;
-            let battery = self.battery.get_or_insert_with(|| Battery::new(vehicle, moment.plant));
-            battery.draw(moment.plant, STEPS_10_HZ as f64 * STEP_S);
+        if moment.step.is_multiple_of(STEPS_10_HZ) {
+            self.battery.draw(moment.plant, STEPS_10_HZ as f64 * STEP_S);
             let attitude = self.view.euler(&moment.estimate.rotation);
-            self.rows += control::write(log, moment, &self.view, &attitude, battery, board_us)?;
+            self.rows +=
+                control::write(log, moment, &self.view, &attitude, &self.battery, board_us)?;
             self.rows += navigation::write(log, moment, &self.view, &attitude, board_us)?;
         }
         if let Some(full) = &mut self.full {

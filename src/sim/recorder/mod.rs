@@ -6,6 +6,7 @@
 mod battery;
 mod clock;
 mod control;
+mod ekf;
 mod events;
 mod full;
 mod log;

@@ -19,6 +19,7 @@ pub(super) struct View {
 
 /// Attitude as roll, pitch (nose up), yaw (clockwise from north), degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "the unit belongs to the name")]
 pub(super) struct Euler {
     pub(super) roll_deg: f64,
     pub(super) pitch_deg: f64,
