@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::calibrate::{self, FitOptions, PaperTable};
+use super::density::Density;
 use super::drone::{One, Shared, law_fit, one};
 use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::matching::{self, Candidate};
@@ -44,6 +45,9 @@ pub struct FlightInput<'a> {
     pub start: Option<GpsTime>,
     /// The true vertical air speed, when the flight was simulated in uniform air, m/s.
     pub true_updraft_mps: Option<f64>,
+    /// Ground height and the vehicle's response to air density; `None`: pulses of the map are not
+    /// corrected for height.
+    pub density: Option<Density>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
 }
@@ -181,8 +185,12 @@ pub fn analyze_flight(
     let mut warnings = Vec::new();
     let slots = match_slots(input, &mut warnings);
     let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
-    let map_law = options.map_law.or_else(|| reference.map(better_law));
-    let shared = Shared { input, options, reference, planned_purpose, map_law };
+    let referred = reference
+        .zip(input.density)
+        .map(|(reference, density)| density.refer_calibration(reference, &options.fit));
+    let map_reference = referred.as_ref().or(reference);
+    let map_law = options.map_law.or_else(|| map_reference.map(better_law));
+    let shared = Shared { input, options, reference, map_reference, planned_purpose, map_law };
 
     let done = AtomicUsize::new(0);
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
@@ -363,11 +371,12 @@ fn finish(
             .filter(|slot| !flown.contains(&slot.slot))
             .map(|slot| Missing {
                 slot: slot.slot,
+                home_m: Some([slot.home_m[0], slot.home_m[1]]),
                 reason: reasons.get(&slot.slot).cloned().unwrap_or_else(|| "no log".to_owned()),
             })
             .collect()
     });
-    let map = (!updrafts.is_empty()).then(|| map(updrafts, shared.map_law, input.true_updraft_mps));
+    let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -384,7 +393,8 @@ fn finish(
 
 type NamedUpdraft = (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str);
 
-fn map(updrafts: Vec<NamedUpdraft>, law: Option<MapLaw>, truth_mps: Option<f64>) -> UpdraftMap {
+fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
+    let truth_mps = shared.input.true_updraft_mps;
     let series: Vec<DroneSeries> = updrafts.iter().map(|named| named.3.clone()).collect();
     let times = updraft::common_times(&series);
     let drones = updrafts
@@ -401,11 +411,13 @@ fn map(updrafts: Vec<NamedUpdraft>, law: Option<MapLaw>, truth_mps: Option<f64>)
         })
         .collect();
     UpdraftMap {
-        law: match law {
+        law: match shared.map_law {
             Some(MapLaw::SignedQuadratic) => SIGNED_QUADRATIC,
             _ => LINEAR,
         }
         .to_owned(),
+        density: shared.input.density,
+        flock: shared.map_reference.and_then(|reference| reference.flock.clone()),
         time_s: times.iter().map(|time| *time as f64).collect(),
         drones,
     }

@@ -14,6 +14,8 @@ pub(super) struct Shared<'a> {
     pub(super) input: &'a FlightInput<'a>,
     pub(super) options: &'a AnalysisOptions,
     pub(super) reference: Option<&'a FlightAnalysis>,
+    /// The reference with its laws referred to the density at the ground, for the map.
+    pub(super) map_reference: Option<&'a FlightAnalysis>,
     pub(super) planned_purpose: Option<Purpose>,
     pub(super) map_law: Option<MapLaw>,
 }
@@ -50,10 +52,15 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let reference = shared.reference.and_then(|reference| laws_for(reference, number, &name));
     let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _)| laws)?));
     let calibration = calibrate::calibrate(&stats, &FitOptions { hold, ..options.fit });
-    let updraft = reference.and_then(|(laws, mapping)| {
+    let map_laws = shared.map_reference.and_then(|reference| laws_for(reference, number, &name));
+    let updraft = map_laws.and_then(|(laws, mapping)| {
         let fit = law_fit(laws, shared.map_law?)?;
         let hover = updraft::hover(&targets)?;
-        Some((updraft::estimate(&flight, &corrected.pulse_phi_us, hover, fit)?, mapping))
+        let referred = input
+            .density
+            .map(|density| density.refer_series(&corrected.pulse_phi_us, &flight.height_m));
+        let pulse_us = referred.as_ref().unwrap_or(&corrected.pulse_phi_us);
+        Some((updraft::estimate(&flight, pulse_us, hover, fit)?, mapping))
     });
     let source = input
         .folder

@@ -5,6 +5,7 @@
 
 mod analyze;
 pub mod calibrate;
+pub mod density;
 mod drone;
 pub mod fit;
 pub mod law;

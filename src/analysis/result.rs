@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::density::Density;
 use crate::base::estimate::Estimate;
 use crate::flight::Clock;
 use crate::mission::plan::{Kind, Purpose};
@@ -57,6 +58,9 @@ pub struct FlightAnalysis {
 pub struct Missing {
     /// Slot number.
     pub slot: u16,
+    /// Home in the show frame, m (x forward, y left).
+    #[serde(default)]
+    pub home_m: Option<[f64; 2]>,
     /// Why.
     pub reason: String,
 }
@@ -239,6 +243,12 @@ pub struct Trace {
 pub struct UpdraftMap {
     /// Law used for the inversion: `linear` or `signed quadratic`.
     pub law: String,
+    /// Density that pulses were referred to before the inversion; absent: not corrected for height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density: Option<Density>,
+    /// Flock mapping used for the inversion, at that density.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flock: Option<Laws>,
     /// Common times of all drones, show time s, 1 s apart.
     pub time_s: Vec<f64>,
     /// The drones' estimates.

@@ -1,5 +1,6 @@
 //! What every room uses: frames, time, checksums, estimates, random streams, whole files.
 
+pub mod air;
 pub mod crc;
 pub mod estimate;
 pub mod file;

@@ -13,6 +13,7 @@ use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::simulate::{made_by, sha256};
 use crate::analysis::calibrate::{Location, Weights};
+use crate::analysis::density::Density;
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, analyze};
@@ -21,10 +22,12 @@ use crate::campaign::{self, CampaignIndex, FlightFolder, to_json};
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, InputFile, Provenance, terminal_summary};
-use crate::vehicle::library;
+use crate::vehicle::{Vehicle, library};
 
 /// Largest log that is hashed, bytes.
 const MAX_LOG_BYTES: u64 = 4 << 30;
+/// Exponent of density for electric rotors with a real thrust curve.
+const REAL_ROTOR_EXPONENT: f64 = 0.4;
 /// Width of the terminal summary, columns.
 const WIDTH: usize = 100;
 
@@ -69,6 +72,9 @@ pub(super) struct AnalyzeOptions {
     /// Which part of the pulse the tilt correction multiplies
     #[arg(long, value_enum, default_value_t = TiltChoice::Paper)]
     tilt: TiltChoice,
+    /// Do not correct the map for air density at different heights
+    #[arg(long)]
+    no_density: bool,
     /// Windows as in the paper: medians, weighted by the samples' standard deviation
     #[arg(long)]
     paper: bool,
@@ -124,6 +130,7 @@ struct Found {
     logs: Vec<LogInput>,
     true_updraft_mps: Option<f64>,
     seed: Option<u64>,
+    density: Option<Density>,
 }
 
 /// What was asked to be analysed.
@@ -198,6 +205,7 @@ fn finish(
             logs: &flight.logs,
             start: None,
             true_updraft_mps: flight.true_updraft_mps,
+            density: flight.density.filter(|_| !options.no_density),
             folder: Some(&work.root),
         })
         .collect();
@@ -266,6 +274,7 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
         logs: logs.into_iter().map(|path| LogInput { slot: None, path }).collect(),
         true_updraft_mps: None,
         seed: None,
+        density: plan.map(|plan| density(plan, None)),
     });
     Ok(())
 }
@@ -285,7 +294,9 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
         }
         None => Vec::new(),
     };
+    let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
     Ok(Found {
+        density: Some(density(&plan, vehicle.as_ref())),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),
         plan: Some(plan),
@@ -293,6 +304,16 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
         true_updraft_mps: record.as_ref().map(|record| record.air_mps[2]),
         seed: record.map(|record| record.seed),
     })
+}
+
+/// How the map is corrected for air density: by the thrust curve that the vehicle's autopilot is set
+/// for (none: linear thrust).
+fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
+    let linear = vehicle.is_some_and(|vehicle| vehicle.autopilot.mot_thst_expo == 0.0);
+    Density {
+        ground_amsl_m: plan.site.ground_amsl_m,
+        exponent: if linear { 1.0 } else { REAL_ROTOR_EXPONENT },
+    }
 }
 
 /// The logs in a folder and in its direct subfolders (one per drone, as SD cards are often copied).

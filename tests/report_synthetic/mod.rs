@@ -117,6 +117,7 @@ pub(crate) fn calibration(
             ("W", "m/s", truth + W_BIAS, 0.0021),
         ])),
         signed_quadratic_held: None,
+        sigma_added_us: None,
         linear: Some(fit(&[("A'", "us/(m/s)", 23.1, 1.4), ("u0", "us", U0 - 0.4, 3.1)])),
     };
     let table = table(&analysed);
@@ -124,11 +125,12 @@ pub(crate) fn calibration(
         name: name.to_owned(),
         purpose: Purpose::Calibration,
         planned: true,
+        warnings: Vec::new(),
         true_updraft_mps: Some(truth),
         drones: analysed,
         missing: missing
             .iter()
-            .map(|(slot, reason)| Missing { slot: *slot, reason: (*reason).to_owned() })
+            .map(|(slot, reason)| Missing { slot: *slot, home_m: None, reason: (*reason).to_owned() })
             .collect(),
         flock: (drones > 1).then_some(flock),
         table: if drones > 1 { table } else { Vec::new() },
@@ -163,7 +165,14 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
     let mut height = 20.0;
     for (start, end, v) in ladder() {
         let begin = if v == 0.0 { start } else { start + 10.0 };
-        let stats = |median: f64, sd: f64| SampleStats { median, mean: median, sd, n: 90 };
+        let stats = |median: f64, sd: f64| SampleStats {
+            median,
+            mean: median,
+            trimmed: median,
+            sd,
+            se: sd / 3.0,
+            n: 90,
+        };
         let measured = law(v, w) + bias + 0.6 * noise.normal();
         windows.push(WindowStats {
             kind: match v {
@@ -226,6 +235,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
         laws: Some(Laws {
             signed_quadratic: Some(quadratic),
             signed_quadratic_held: None,
+            sigma_added_us: None,
             linear: Some(fit(&[("A'", "us/(m/s)", slope, 1.4), ("u0", "us", u0, 3.1)])),
         }),
         trace,
@@ -263,6 +273,7 @@ pub(crate) fn fit(parameters: &[(&str, &str, f64, f64)]) -> Fit {
         chi2: 10.8,
         chi2_reduced: Some(10.8 / (14 - parameters.len()) as f64),
         dof: 14 - parameters.len(),
+        p_value: None,
         rms_us: 0.61,
         other_minima: Vec::new(),
         warnings: Vec::new(),
@@ -376,14 +387,15 @@ pub(crate) fn hover() -> FlightAnalysis {
         name: "hover".to_owned(),
         purpose: Purpose::Measurement,
         planned: true,
+        warnings: Vec::new(),
         true_updraft_mps: None,
         drones,
         missing: missing
             .iter()
-            .map(|(slot, reason)| Missing { slot: *slot, reason: (*reason).to_owned() })
+            .map(|(slot, reason)| Missing { slot: *slot, home_m: None, reason: (*reason).to_owned() })
             .collect(),
         flock: None,
         table: Vec::new(),
-        map: Some(UpdraftMap { law: "signed quadratic".to_owned(), time_s, drones: estimates }),
+        map: Some(UpdraftMap { law: "signed quadratic".to_owned(), density: None, flock: None, time_s, drones: estimates }),
     }
 }

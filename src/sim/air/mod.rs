@@ -2,12 +2,11 @@
 //!
 //! A new kind of air is one more file here that implements [`Atmosphere`].
 
-mod standard;
 mod uniform;
 
 use nalgebra::Vector3;
 
-pub use standard::{SEA_LEVEL_DENSITY, density_ratio};
+pub use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 pub use uniform::Uniform;
 
 /// Motion of the air.

@@ -1,0 +1,112 @@
+//! Air density: known physics that is computed, never fitted.
+//!
+//! Thinner air needs more pulse for the same thrust. A calibration at 20 m and a hover at 100 m
+//! differ by several microseconds for this reason alone, which reads as tenths of a metre per second.
+//! Pulses are therefore referred to the density at ground height before a calibration is used at
+//! another height. The calibration itself is reported as it was measured, like the paper's.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::calibrate::{self, FitOptions};
+use super::result::{FlightAnalysis, SampleStats, WindowStats};
+use crate::base::air::density_ratio;
+use crate::flight::Series;
+
+/// Pulse at which the rotors make no thrust, us.
+const NO_THRUST_US: f64 = 1000.0;
+/// Heights are not interpolated over longer silences than this, s.
+const LONGEST_GAP_S: f64 = 1.0;
+
+/// How pulses depend on air density: `u - 1000` is proportional to `density^-exponent` at constant
+/// thrust (standard atmosphere).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Density {
+    /// Ground height above mean sea level, m: the density that pulses are referred to.
+    pub ground_amsl_m: f64,
+    /// 1 where thrust is linear in the pulse above 1000 us (AirSim), about 0.4 with the thrust curve
+    /// of real electric rotors (a duty cycle sets a voltage, and thrust grows with its square).
+    pub exponent: f64,
+}
+
+impl Density {
+    /// What `u - 1000` at a height above ground is multiplied with.
+    fn factor(self, height_m: f64) -> f64 {
+        let here = density_ratio(self.ground_amsl_m + height_m);
+        (here / density_ratio(self.ground_amsl_m)).powf(self.exponent)
+    }
+
+    /// A pulse width measured at a height above ground, referred to the ground, us.
+    pub fn refer_us(self, pulse_us: f64, height_m: f64) -> f64 {
+        NO_THRUST_US + (pulse_us - NO_THRUST_US) * self.factor(height_m)
+    }
+
+    /// A whole series of pulses, with the height interpolated to its times.
+    pub(super) fn refer_series(self, pulse_us: &Series, height_m: &Series) -> Series {
+        let (time_s, value) = pulse_us
+            .time_s
+            .iter()
+            .zip(&pulse_us.value)
+            .filter_map(|(time, pulse)| {
+                let height = height_m.at(*time, LONGEST_GAP_S)?;
+                Some((*time, self.refer_us(*pulse, height)))
+            })
+            .unzip();
+        Series { time_s, value }
+    }
+
+    fn refer_window(self, window: &WindowStats) -> WindowStats {
+        let factor = self.factor(window.height_m);
+        let refer = |pulse_us: f64| self.refer_us(pulse_us, window.height_m);
+        let stats = &window.pulse_phi_us;
+        WindowStats {
+            pulse_phi_us: SampleStats {
+                median: refer(stats.median),
+                mean: refer(stats.mean),
+                trimmed: refer(stats.trimmed),
+                sd: stats.sd * factor,
+                se: stats.se * factor,
+                n: stats.n,
+            },
+            ..window.clone()
+        }
+    }
+
+    /// A calibration with its laws refitted to pulses referred to the ground.
+    pub(super) fn refer_calibration(
+        self,
+        calibration: &FlightAnalysis,
+        options: &FitOptions,
+    ) -> FlightAnalysis {
+        let mut referred = calibration.clone();
+        for drone in &mut referred.drones {
+            drone.windows = drone.windows.iter().map(|window| self.refer_window(window)).collect();
+            if drone.laws.is_some() {
+                drone.laws = calibrate::calibrate(&drone.windows, options).ok();
+            }
+        }
+        referred.flock = calibrate::flock(&referred.drones, options).ok();
+        referred
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hover_pulses_of_a_linear_rotor_become_equal_at_all_heights() {
+        // physics of the stock quad: u0 = 1000 + 586.6 / (rho / rho0), 0.0575 us per metre.
+        let u0 = |amsl_m: f64| 1000.0 + 586.6 / density_ratio(amsl_m);
+        assert!((u0(290.0) - u0(190.0) - 5.75).abs() < 0.1);
+        let density = Density { ground_amsl_m: 190.0, exponent: 1.0 };
+        let referred = density.refer_us(u0(290.0), 100.0);
+        assert!((referred - u0(190.0)).abs() < 1e-9, "{referred}");
+    }
+
+    #[test]
+    fn a_pulse_on_the_ground_stays() {
+        let density = Density { ground_amsl_m: 190.0, exponent: 0.4 };
+        assert_eq!(density.refer_us(1546.5, 0.0), 1546.5);
+    }
+}
