@@ -482,3 +482,16 @@ fn a_log_without_id_and_number_is_matched_by_its_home() {
     .unwrap();
     assert_eq!(flight.drones[0].slot, Some(3));
 }
+
+#[test]
+fn a_second_log_of_a_slot_is_left_out_and_named() {
+    let path = fixture("square-law-ladder.trimmed.BIN");
+    let twice: Vec<LogInput> =
+        [1, 1].map(|slot| LogInput { slot: Some(slot), path: path.clone() }).to_vec();
+    let plan = plan(Purpose::Calibration, ladder(1.0), 1);
+    let flight =
+        analyze_flight(&input("twice", Some(&plan), &twice), &paper(), None, &|_, _| {}).unwrap();
+    assert_eq!((flight.drones.len(), flight.missing.len()), (1, 0));
+    assert_eq!(flight.warnings.len(), 1, "{:?}", flight.warnings);
+    assert!(flight.warnings[0].contains("slot 1 has a log already"), "{:?}", flight.warnings);
+}

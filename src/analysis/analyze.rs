@@ -183,7 +183,7 @@ pub fn analyze_flight(
         return Err(AnalysisError::NoLogs { name: input.name.to_owned() });
     }
     let mut warnings = Vec::new();
-    let slots = match_slots(input, &mut warnings);
+    let slots = match_slots(input);
     let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
     let referred = reference
         .zip(input.density)
@@ -243,7 +243,7 @@ enum SlotMatch {
 }
 
 /// Finds the slot of each log, and refuses logs that would be a slot's second one.
-fn match_slots(input: &FlightInput<'_>, warnings: &mut Vec<String>) -> Vec<SlotMatch> {
+fn match_slots(input: &FlightInput<'_>) -> Vec<SlotMatch> {
     let Some(plan) = input.plan else {
         return input.logs.iter().map(|_| SlotMatch::Unplanned).collect();
     };
@@ -280,13 +280,10 @@ fn match_slots(input: &FlightInput<'_>, warnings: &mut Vec<String>) -> Vec<SlotM
                 return SlotMatch::Refused(format!("the plan has no slot {slot}"));
             }
             if let Some(first) = seen.get(&slot) {
-                let reason = format!(
-                    "slot {slot} has two logs; {} is used and {} is not",
-                    first.display(),
-                    log.path.display()
-                );
-                warnings.push(reason);
-                return SlotMatch::Refused(format!("slot {slot} has a log already"));
+                return SlotMatch::Refused(format!(
+                    "slot {slot} has a log already ({}); this one is not used",
+                    first.display()
+                ));
             }
             seen.insert(slot, &log.path);
             SlotMatch::Slot(slot)
