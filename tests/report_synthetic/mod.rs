@@ -130,7 +130,11 @@ pub(crate) fn calibration(
         drones: analysed,
         missing: missing
             .iter()
-            .map(|(slot, reason)| Missing { slot: *slot, home_m: None, reason: (*reason).to_owned() })
+            .map(|(slot, reason)| Missing {
+                slot: *slot,
+                home_m: None,
+                reason: (*reason).to_owned(),
+            })
             .collect(),
         flock: (drones > 1).then_some(flock),
         table: if drones > 1 { table } else { Vec::new() },
@@ -392,10 +396,20 @@ pub(crate) fn hover() -> FlightAnalysis {
         drones,
         missing: missing
             .iter()
-            .map(|(slot, reason)| Missing { slot: *slot, home_m: None, reason: (*reason).to_owned() })
+            .map(|(slot, reason)| Missing {
+                slot: *slot,
+                home_m: None,
+                reason: (*reason).to_owned(),
+            })
             .collect(),
         flock: None,
         table: Vec::new(),
-        map: Some(UpdraftMap { law: "signed quadratic".to_owned(), density: None, flock: None, time_s, drones: estimates }),
+        map: Some(UpdraftMap {
+            law: "signed quadratic".to_owned(),
+            density: None,
+            flock: None,
+            time_s,
+            drones: estimates,
+        }),
     }
 }
