@@ -1,3 +1,5 @@
 //! The `updraft` command: see [`updraft::cli`].
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    updraft::cli::main()
+}

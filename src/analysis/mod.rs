@@ -1,3 +1,20 @@
 //! Windows, calibration laws and updraft estimates.
+//!
+//! [`analyze_flight`] does one flight of a fleet: logs to windows, windows to laws (a calibration) or
+//! to the map of the air (a measurement, with the laws of a calibration). [`analyze`] does a campaign.
 
+mod analyze;
+pub mod calibrate;
+mod drone;
+pub mod fit;
+pub mod law;
+mod matching;
 pub mod result;
+mod stats;
+pub mod updraft;
+pub mod windows;
+
+pub use analyze::{
+    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, Progress, analyze,
+    analyze_flight,
+};

@@ -46,6 +46,10 @@ pub struct FlightAnalysis {
     pub table: Vec<TableRow>,
     /// The map of the air, for measurements.
     pub map: Option<UpdraftMap>,
+    /// What is doubtful about the flight as a whole (logs that could not be used, matched or told
+    /// apart), one sentence each.
+    #[serde(default)]
+    pub warnings: Vec<String>,
 }
 
 /// A drone that the plan has and the analysis has not.
@@ -134,6 +138,12 @@ pub struct SampleStats {
     pub sd: f64,
     /// Number of samples.
     pub n: usize,
+    /// Mean without the lowest and the highest tenth of the samples.
+    #[serde(default)]
+    pub trimmed: f64,
+    /// Standard error of the mean from the means of blocks longer than the signal's memory.
+    #[serde(default)]
+    pub se: f64,
 }
 
 /// The laws fitted to one set of windows.
@@ -145,6 +155,10 @@ pub struct Laws {
     pub signed_quadratic_held: Option<Fit>,
     /// `u = A' V + u0`.
     pub linear: Option<Fit>,
+    /// Standard deviation added to every window's own error so that the better law's chi² is its
+    /// degrees of freedom, us; `None` when the weights do not ask for it.
+    #[serde(default)]
+    pub sigma_added_us: Option<f64>,
 }
 
 /// A fitted law.
@@ -160,6 +174,9 @@ pub struct Fit {
     pub chi2: f64,
     /// chi2 over the degrees of freedom; `None` without any.
     pub chi2_reduced: Option<f64>,
+    /// Probability of a chi² at least this large if the law and the sigmas are right.
+    #[serde(default)]
+    pub p_value: Option<f64>,
     /// Degrees of freedom.
     pub dof: usize,
     /// Unweighted rms residual, us.

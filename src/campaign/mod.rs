@@ -1,1 +1,333 @@
-//! Names of the files in a campaign folder.
+//! Names of the files in a campaign folder, and how its flights are found again.
+//!
+//! A folder with one flight holds `plan.json` and its show files directly. A campaign of several
+//! flights holds `campaign.json` and one such folder per flight:
+//!
+//! ```text
+//! my-campaign/
+//!   campaign.json  campaign.toml
+//!   calibration/   template.toml  vehicle.toml  plan.json  show.skyc  skyb/01.skyb  show.csv.zip  logs/01.BIN
+//!   hover/         ...
+//!   analysis.json  report/index.html
+//! ```
+
+pub mod write;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::base::file::{FileError, read_whole};
+use crate::mission::Plan;
+use crate::mission::plan::PLAN_SCHEMA;
+
+/// Name and version of the campaign format.
+pub const CAMPAIGN_SCHEMA: &str = "updraft.campaign/1";
+/// Largest JSON file of a campaign that is read, bytes: 5,000 drones need a few megabytes.
+const MAX_JSON_BYTES: u64 = 256 << 20;
+
+/// `campaign.json`: the flights of a campaign, in the order they are flown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CampaignIndex {
+    /// Format name and version: `updraft.campaign/1`.
+    pub schema: String,
+    /// Short name.
+    pub name: String,
+    /// Title for people.
+    pub title: String,
+    /// Folder of each flight, relative to the campaign.
+    pub flights: Vec<String>,
+}
+
+/// `logs/flight.json`: how the logs beside it came to be.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlightRecord {
+    /// Format name and version: `updraft.flight/1`.
+    pub schema: String,
+    /// Program and version.
+    pub made_by: String,
+    /// Where the logs come from: `simulator`.
+    pub source: String,
+    /// Seed of the simulation.
+    pub seed: u64,
+    /// Vehicle flown.
+    pub vehicle: String,
+    /// SHA-256 of the vehicle's numbers.
+    pub vehicle_sha256: String,
+    /// True uniform motion of the air, towards east, north and up, m/s.
+    pub air_mps: [f64; 3],
+    /// Whether the firmware's whole default set of messages was logged.
+    pub full_logs: bool,
+    /// SHA-256 of the plan that was flown.
+    pub plan_sha256: String,
+    /// The logs, in slot order.
+    pub logs: Vec<LogRecord>,
+}
+
+/// One log of a [`FlightRecord`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LogRecord {
+    /// Slot that flew.
+    pub slot: u16,
+    /// File name beside the record.
+    pub file: String,
+    /// Size, bytes.
+    pub bytes: u64,
+}
+
+/// Name and version of the flight record format.
+pub const FLIGHT_SCHEMA: &str = "updraft.flight/1";
+
+/// A campaign folder cannot be used.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum CampaignError {
+    /// A file could not be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A JSON file is wrong.
+    #[error("{} is not valid: {reason}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        reason: String,
+    },
+    /// There is neither a plan nor a campaign.
+    #[error("{} holds no plan.json and no campaign.json; make one with `updraft plan`", path.display())]
+    NoPlan {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The folder already holds something else.
+    #[error("{} already holds {what}; choose another folder or give --force", path.display())]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+        /// What is there.
+        what: String,
+    },
+}
+
+/// The folder of one flight.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FlightFolder(pub PathBuf);
+
+impl FlightFolder {
+    /// The template as resolved.
+    pub fn template(&self) -> PathBuf {
+        self.0.join("template.toml")
+    }
+
+    /// The vehicle it was planned for.
+    pub fn vehicle(&self) -> PathBuf {
+        self.0.join("vehicle.toml")
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> PathBuf {
+        self.0.join("plan.json")
+    }
+
+    /// The compiled show.
+    pub fn skyc(&self) -> PathBuf {
+        self.0.join("show.skyc")
+    }
+
+    /// Folder of the binary shows.
+    pub fn skyb_folder(&self) -> PathBuf {
+        self.0.join("skyb")
+    }
+
+    /// The binary show of a slot, among `count` slots.
+    pub fn skyb(&self, slot: u16, count: usize) -> PathBuf {
+        self.skyb_folder().join(numbered(slot, count, "skyb"))
+    }
+
+    /// The CSV exchange format.
+    pub fn csv(&self) -> PathBuf {
+        self.0.join("show.csv.zip")
+    }
+
+    /// Folder of the logs.
+    pub fn logs(&self) -> PathBuf {
+        self.0.join("logs")
+    }
+
+    /// The log of a slot, among `count` slots.
+    pub fn log(&self, slot: u16, count: usize) -> PathBuf {
+        self.logs().join(numbered(slot, count, "BIN"))
+    }
+
+    /// How the logs came to be.
+    pub fn record(&self) -> PathBuf {
+        self.logs().join("flight.json")
+    }
+
+    /// Reads the plan.
+    pub fn read_plan(&self) -> Result<Plan, CampaignError> {
+        let path = self.plan();
+        let plan: Plan = read_json(&path)?;
+        validate_plan(&plan).map_err(|reason| CampaignError::Json { path, reason })?;
+        Ok(plan)
+    }
+
+    /// Reads the flight record, if there is one.
+    pub fn read_record(&self) -> Result<Option<FlightRecord>, CampaignError> {
+        let path = self.record();
+        if path.exists() { read_json(&path).map(Some) } else { Ok(None) }
+    }
+}
+
+/// File name of a slot: two digits, more in larger fleets, so that names sort.
+fn numbered(slot: u16, count: usize, extension: &str) -> String {
+    let width = count.to_string().len().max(2);
+    format!("{slot:0width$}.{extension}")
+}
+
+/// The index of a campaign.
+pub fn index_path(folder: &Path) -> PathBuf {
+    folder.join("campaign.json")
+}
+
+/// The flights of a campaign folder, or of a folder with one flight.
+pub fn flights(folder: &Path) -> Result<Vec<FlightFolder>, CampaignError> {
+    let path = index_path(folder);
+    if path.is_file() {
+        let index: CampaignIndex = read_json(&path)?;
+        if index.schema != CAMPAIGN_SCHEMA {
+            return Err(CampaignError::Json {
+                path,
+                reason: format!(
+                    "this program reads \"{CAMPAIGN_SCHEMA}\", not \"{}\"",
+                    index.schema
+                ),
+            });
+        }
+        for name in &index.flights {
+            let plain = Path::new(name).components().count() == 1 && !name.starts_with('.');
+            if !plain || name.contains(['/', '\\']) {
+                return Err(CampaignError::Json {
+                    path,
+                    reason: format!("a flight's folder cannot be \"{name}\""),
+                });
+            }
+        }
+        return Ok(index.flights.iter().map(|name| FlightFolder(folder.join(name))).collect());
+    }
+    let flight = FlightFolder(folder.to_owned());
+    if flight.plan().is_file() {
+        return Ok(vec![flight]);
+    }
+    Err(CampaignError::NoPlan { path: folder.to_owned() })
+}
+
+/// Whether a folder is a campaign or one flight of it.
+pub fn is_campaign(folder: &Path) -> bool {
+    index_path(folder).is_file() || FlightFolder(folder.to_owned()).plan().is_file()
+}
+
+/// Reads a JSON file; errors name the file, line and column.
+pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CampaignError> {
+    let bytes = read_whole(path, MAX_JSON_BYTES)?;
+    serde_json::from_slice(&bytes)
+        .map_err(|error| CampaignError::Json { path: path.to_owned(), reason: error.to_string() })
+}
+
+/// Pretty JSON with a final newline.
+pub fn to_json<T: Serialize>(value: &T) -> io::Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// What the types of a plan do not say by themselves.
+fn validate_plan(plan: &Plan) -> Result<(), String> {
+    if plan.schema != PLAN_SCHEMA {
+        return Err(format!("this program reads \"{PLAN_SCHEMA}\", not \"{}\"", plan.schema));
+    }
+    if plan.slots.is_empty() || plan.groups.is_empty() {
+        return Err("a plan needs slots and groups".to_owned());
+    }
+    for (index, slot) in plan.slots.iter().enumerate() {
+        if usize::from(slot.slot) != index + 1 {
+            return Err(format!("slot {} stands at place {}", slot.slot, index + 1));
+        }
+        if usize::from(slot.group) >= plan.groups.len() {
+            return Err(format!(
+                "slot {} is in group {}, which is not there",
+                slot.slot, slot.group
+            ));
+        }
+        if slot.home_m.iter().any(|value| !value.is_finite()) {
+            return Err(format!("the home of slot {} is not a place", slot.slot));
+        }
+    }
+    for group in &plan.groups {
+        let mut at_ms = 0;
+        for segment in &group.segments {
+            if segment.start_ms != at_ms || segment.end_ms <= segment.start_ms {
+                return Err(format!(
+                    "group \"{}\": segment \"{}\" runs from {} to {} ms, the one before ended at {at_ms} ms",
+                    group.name, segment.label, segment.start_ms, segment.end_ms
+                ));
+            }
+            if segment.end_ms - segment.start_ms > u64::from(u32::MAX) {
+                return Err(format!("segment \"{}\" lasts longer than 49 days", segment.label));
+            }
+            at_ms = segment.end_ms;
+            if let Some(window) = segment.window
+                && (window.start_ms < segment.start_ms
+                    || window.end_ms > segment.end_ms
+                    || window.end_ms <= window.start_ms)
+            {
+                return Err(format!(
+                    "group \"{}\": the window of \"{}\" is not inside it",
+                    group.name, segment.label
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_without_a_plan_says_how_to_make_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = flights(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("updraft plan"), "{error}");
+    }
+
+    #[test]
+    fn a_campaign_cannot_point_outside_of_its_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["../other", "/etc", "..", "a/b", "a\\b"] {
+            let index = CampaignIndex {
+                schema: CAMPAIGN_SCHEMA.to_owned(),
+                name: "x".to_owned(),
+                title: "x".to_owned(),
+                flights: vec![name.to_owned()],
+            };
+            std::fs::write(index_path(folder.path()), to_json(&index).unwrap()).unwrap();
+            assert!(flights(folder.path()).is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn file_names_sort_in_large_fleets() {
+        let flight = FlightFolder(PathBuf::from("x"));
+        assert!(flight.log(7, 49).ends_with("07.BIN"));
+        assert!(flight.skyb(7, 5000).ends_with("0007.skyb"));
+    }
+}

@@ -1,1 +1,213 @@
 //! Exact safety checks of a show against its limits.
+//!
+//! Nothing is sampled: lines are solved in closed form, curves by bounds on their polynomials that
+//! are proven and refined until they agree with an attained value ([`bernstein`]). Every check
+//! reports what breaks a limit (drone, time, value, limit) and, passing or not, the worst value it
+//! met ([`Margin`]).
+//!
+//! # What counts
+//!
+//! * A drone is in the air while it is more than [`AIRBORNE_ABOVE_M`] above its own ground: the
+//!   height of its home, or of its first point.
+//! * The distance limit holds while at least one of two drones is in the air; two drones on the
+//!   ground keep [`Options::min_ground_distance_m`].
+//! * After its last point a drone may be anywhere from there down to the ground, until the end of the
+//!   show: whether it hovers, is landing or has landed depends on the firmware.
+//! * Files round to a millimetre. A limit is broken when it is exceeded by more than [`TOLERANCE_M`],
+//!   [`TOLERANCE_MPS`] or [`TOLERANCE_MPS2`]; the values in the report are exact.
+
+pub mod bernstein;
+mod curve;
+mod distance;
+mod endurance;
+mod fence;
+mod firmware;
+mod format;
+mod ground;
+mod lateral;
+mod motion;
+mod pair;
+mod report;
+mod track;
+mod tree;
+mod validity;
+mod watch;
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use firmware::Firmware;
+pub use report::{CheckReport, Count, Finding, Margin, Severity};
+pub use validity::MAX_DRONES;
+
+use crate::mission::plan::Fence;
+use crate::show::Show;
+use crate::vehicle::Limits;
+use report::Collector;
+use track::Track;
+use watch::Watch;
+
+/// Height above its ground from which a drone is in the air, m.
+pub const AIRBORNE_ABOVE_M: f64 = 0.5;
+/// What a length may exceed its limit by, m: the resolution of show files.
+pub const TOLERANCE_M: f64 = 1e-3;
+/// What a speed may exceed its limit by, m/s: what the rounding of files does to it.
+pub const TOLERANCE_MPS: f64 = 1e-3;
+/// What an acceleration may exceed its limit by, m/s².
+pub const TOLERANCE_MPS2: f64 = 1e-3;
+/// Time after the last trajectory that is still checked, ms: all drones are then landing.
+const AFTER_SHOW_MS: u64 = 1000;
+
+/// Choices that are neither the vehicle's nor the firmware's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Options {
+    /// Smallest distance of two drones that both stand on the ground, m.
+    pub min_ground_distance_m: f64,
+    /// How far a trajectory may lead below the drone's own ground, m.
+    pub ground_tolerance_m: f64,
+    /// How far a drone may move sideways below the take-off altitude, m.
+    pub low_lateral_m: f64,
+    /// Findings of each check that are listed; the rest is counted.
+    pub findings_per_check: usize,
+}
+
+impl Default for Options {
+    /// Half a metre on the ground; 50 mm sideways, as the firmware allows in a vertical stretch.
+    fn default() -> Self {
+        Self {
+            min_ground_distance_m: 0.5,
+            ground_tolerance_m: 0.05,
+            low_lateral_m: 0.05,
+            findings_per_check: 20,
+        }
+    }
+}
+
+/// A show and what it is checked against.
+#[derive(Clone, Copy, Debug)]
+pub struct CheckInput<'a> {
+    /// The show.
+    pub show: &'a Show,
+    /// What the vehicle may be asked to do.
+    pub limits: &'a Limits,
+    /// The fence, if there is one.
+    pub fence: Option<&'a Fence>,
+    /// What decides how the firmware reads a trajectory.
+    pub firmware: Firmware,
+    /// Everything else.
+    pub options: Options,
+}
+
+/// Names of all checks, as findings carry them.
+pub const NAMES: &[&str] = &[
+    "acceleration",
+    "altitude-max",
+    "altitude-min",
+    "distance",
+    "endurance",
+    "fence",
+    "fence-altitude",
+    "firmware-climb",
+    "firmware-end",
+    "firmware-landing",
+    "firmware-start",
+    "firmware-takeoff",
+    "ground-distance",
+    "home",
+    "low-lateral",
+    "mixed-starts",
+    "same-home",
+    "same-start",
+    "skyb-duration",
+    "skyb-range",
+    "skyb-size",
+    "skyb-unit",
+    "speed-down",
+    "speed-horizontal",
+    "speed-up",
+    "validity",
+    "velocity-step",
+];
+
+impl<'a> CheckInput<'a> {
+    /// A show and limits, without a fence, with default firmware and options.
+    pub fn new(show: &'a Show, limits: &'a Limits) -> Self {
+        let (firmware, options) = (Firmware::default(), Options::default());
+        Self { show, limits, fence: None, firmware, options }
+    }
+
+    /// The same with a fence, if there is one.
+    #[must_use]
+    pub fn with_fence(self, fence: Option<&'a Fence>) -> Self {
+        Self { fence, ..self }
+    }
+}
+
+/// Runs all checks.
+///
+/// The report depends on the input alone, not on the number of threads. Drones whose numbers make no
+/// sense (not finite, thousands of kilometres away) are reported and left out of the other checks.
+///
+/// ```
+/// use updraft::check::{CheckInput, check};
+/// # use updraft::{show::Show, vehicle::Limits};
+/// # let limits = Limits { max_speed_xy_mps: 4.0, max_speed_up_mps: 3.5, max_speed_down_mps: 3.5,
+/// #     max_acceleration_mps2: 2.0, max_velocity_step_mps: 3.5, max_altitude_m: 120.0,
+/// #     min_distance_m: 3.0, endurance_s: 900.0, endurance_reserve: 0.2 };
+/// let report = check(&CheckInput::new(&Show::default(), &limits));
+/// assert!(!report.passed());
+/// assert_eq!(report.findings[0].message, "the show has no drones");
+/// ```
+pub fn check(input: &CheckInput<'_>) -> CheckReport {
+    let show = input.show;
+    let mut collector = Collector::new(input.options.findings_per_check);
+    let usable = validity::check(input, &mut collector);
+    let duration_ms =
+        show.drones.iter().map(|drone| drone.trajectory.duration_ms()).max().unwrap_or(0);
+    let horizon_ms = duration_ms.saturating_add(AFTER_SHOW_MS);
+    let tracks: Vec<Track<'_>> = show
+        .drones
+        .par_iter()
+        .enumerate()
+        .zip(&usable)
+        .filter(|(_, usable)| **usable)
+        .map(|((index, drone), _)| Track::new(index, drone, AIRBORNE_ABOVE_M, horizon_ms))
+        .collect();
+
+    ground::check(&tracks, &mut collector);
+    distance::check(input, &tracks, horizon_ms, &mut collector);
+    watch_drones(input, &tracks, &mut collector);
+    format::check(&tracks, &mut collector);
+    firmware::check(input, &tracks, &mut collector);
+    collector.finish(show.drones.len(), duration_ms as f64 / 1000.0)
+}
+
+/// The checks that look at one drone at a time.
+fn watch_drones(input: &CheckInput<'_>, tracks: &[Track<'_>], collector: &mut Collector) {
+    let firmware = &input.firmware;
+    let fence = input.fence.filter(|fence| fence::usable(fence));
+    let fence = fence.map(|fence| (fence::Polygon::new(fence), fence::quantities(fence)));
+    let motion = motion::quantities(input);
+    let lateral = lateral::quantity(input);
+    let endurance = endurance::quantity(input);
+    let watched: Vec<Vec<Watch>> = tracks
+        .par_iter()
+        .map(|track| {
+            let mut watches = motion::watch(track, &motion).to_vec();
+            watches.push(lateral::watch(track, lateral, firmware.takeoff_alt_m));
+            watches.push(endurance::watch(track, endurance, firmware.land_speed_mps));
+            if let Some((polygon, quantities)) = &fence {
+                watches.extend(fence::watch(track, polygon, *quantities));
+            }
+            watches
+        })
+        .collect();
+    let kinds = watched.first().map_or(0, Vec::len);
+    let mut columns: Vec<_> = watched.into_iter().map(Vec::into_iter).collect();
+    for _ in 0..kinds {
+        let column = columns.iter_mut().filter_map(Iterator::next);
+        watch::report(tracks.iter().zip(column), collector);
+    }
+}

@@ -1,11 +1,33 @@
 //! One drone's log as time series in show time.
+//!
+//! This is the border where NED becomes up-positive, board time becomes show time, and the message
+//! names of different firmwares become one set of channels:
+//!
+//! | channel | messages, best first |
+//! |---|---|
+//! | velocity, height, position | XKF1, NKF1, EKF1 (core 0, or the primary core) |
+//! | pulses | RCOU, channels by SERVOn_FUNCTION 33..40, else C1..C4 |
+//! | roll, pitch | ATT |
+//! | desired vertical velocity | GUIP, PSCD, CTUN |
+//! | battery | BAT, CURR |
+//! | show time and stage | SHOW |
 
-use std::path::PathBuf;
+mod align;
+mod channels;
+mod clean;
+mod load;
+mod pick;
+mod series;
+
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 use crate::base::time::GpsTime;
+use crate::log::{Log, LogError, ScanStats};
+use crate::mission::plan::Segment;
 
 /// A channel: samples with their own times.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,6 +67,8 @@ pub struct Flight {
     pub pitch_rad: Series,
     /// Desired vertical velocity, m/s, up positive, where the log has it.
     pub desired_up_mps: Option<Series>,
+    /// Desired horizontal speed, m/s, where the log has it (tells horizontal legs from hovers).
+    pub desired_horizontal_mps: Option<Series>,
     /// Battery voltage, V.
     pub voltage_v: Option<Series>,
     /// Battery current, A.
@@ -53,8 +77,100 @@ pub struct Flight {
     pub stages: Vec<(f64, u8)>,
     /// When motors were armed, (start, end) show time s.
     pub armed_s: Vec<(f64, f64)>,
+    /// Pulse widths between which the autopilot keeps a spinning motor, us: (lowest, highest).
+    pub pulse_limits_us: (f64, f64),
+    /// Place where the vehicle was armed or first had a fix: (latitude, longitude), degrees.
+    pub first_fix_deg: Option<(f64, f64)>,
+    /// What the reader met besides good messages.
+    pub scan: ScanStats,
     /// What is doubtful about this log, one sentence each.
     pub warnings: Vec<String>,
+}
+
+/// What is known about a flight besides its log.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlightOptions<'a> {
+    /// GPS time of show time 0, for logs without SHOW rows.
+    pub start: Option<GpsTime>,
+    /// What the drone was to fly, for logs without SHOW rows and a start time.
+    pub segments: Option<&'a [Segment]>,
+}
+
+/// A log is not usable as a flight.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum FlightError {
+    /// The log could not be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The file has no messages at all.
+    #[error(
+        "{}: the log is empty (was it copied before the drone finished writing it?)",
+        source_path.display()
+    )]
+    Empty {
+        /// The log file.
+        source_path: PathBuf,
+    },
+    /// A message that the analysis cannot do without is missing.
+    #[error("{}: the log has no {what} ({messages}); {remedy}", source_path.display())]
+    Missing {
+        /// The log file.
+        source_path: PathBuf,
+        /// What is missing, for people.
+        what: &'static str,
+        /// Message names that would carry it.
+        messages: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The vehicle never armed or never left the ground.
+    #[error("{}: no flight in this log: {reason}", source_path.display())]
+    NoFlight {
+        /// The log file.
+        source_path: PathBuf,
+        /// What was seen instead.
+        reason: String,
+    },
+}
+
+/// What a log says about who wrote it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Identity {
+    /// MAVLink system id, if the log has the parameter.
+    pub system_id: Option<u8>,
+    /// First place with a 3-D fix: (latitude, longitude), degrees. Logging begins at arming.
+    pub first_fix_deg: Option<(f64, f64)>,
+}
+
+/// Reads only what tells drones apart.
+pub fn identify(log: &Log) -> Identity {
+    let messages = channels::Messages::read_identity(log);
+    let first_fix_deg = messages.places().first().map(|(_, lat, lon)| (*lat, *lon));
+    Identity { system_id: messages.system_id(), first_fix_deg }
+}
+
+impl Flight {
+    /// Reads one flight of a log.
+    ///
+    /// With several flights in the log, the last one that performed a show is read (else the last
+    /// armed one), and [`Flight::warnings`] says so.
+    ///
+    /// # Errors
+    ///
+    /// [`FlightError`]: an empty log, no EKF velocity, no motor outputs, no attitude, or no flight.
+    pub fn from_log(
+        log: &Log,
+        source: &Path,
+        options: FlightOptions<'_>,
+    ) -> Result<Self, FlightError> {
+        load::load(log, source, options)
+    }
+
+    /// Opens and reads a log file; see [`Flight::from_log`].
+    pub fn open(path: &Path, options: FlightOptions<'_>) -> Result<Self, FlightError> {
+        Self::from_log(&Log::open(path)?, path, options)
+    }
 }
 
 /// How a log's board time became show time: `show_s = board_s - offset_s`.

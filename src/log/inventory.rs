@@ -3,19 +3,24 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::format::Format;
+use super::format::{Field, Format};
 use super::letter::field_text;
 use super::scan::{ScanStats, TimeJump, Units, Visitor, scan, time_us};
 
 /// Texts of the firmware kept for finding its name.
 const KEPT_TEXTS: usize = 32;
 
+/// Names that the firmware's first texts start with.
+const FIRMWARES: [&str; 6] =
+    ["ArduCopter", "ArduPlane", "ArduRover", "ArduSub", "APM:Copter", "Blimp"];
+
 /// Summary of a log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Inventory {
     /// Size of the log.
     pub size_bytes: u64,
-    /// Earliest `TimeUS`, microseconds since the boot.
+    /// Earliest `TimeUS`, microseconds since the boot, except of parameters: they are written as of
+    /// a time long before.
     pub start_us: Option<u64>,
     /// Latest `TimeUS`.
     pub end_us: Option<u64>,
@@ -29,7 +34,7 @@ pub struct Inventory {
     pub boots: u64,
     /// Message types defined, logged or not.
     pub defined: u64,
-    /// Message types that were logged, by name.
+    /// Message types that were logged, by name; a name that was defined anew comes twice.
     pub messages: Vec<MessageInventory>,
     /// Damage.
     pub stats: ScanStats,
@@ -46,16 +51,16 @@ pub struct MessageInventory {
     pub count: u64,
     /// All of them together, headers included.
     pub bytes: u64,
-    /// First `TimeUS`, for messages that have it.
+    /// Earliest `TimeUS`, for messages that have it.
     pub first_us: Option<u64>,
-    /// Last `TimeUS`.
+    /// Latest `TimeUS`.
     pub last_us: Option<u64>,
-    /// Fields of the latest definition.
+    /// Its fields.
     pub fields: Vec<FieldInventory>,
 }
 
 impl MessageInventory {
-    /// Mean rate between the first and the last message (all instances together).
+    /// Mean rate between the earliest and the latest message (all instances together).
     pub fn rate_hz(&self) -> Option<f64> {
         let span_us = self.last_us?.checked_sub(self.first_us?)?;
         (span_us > 0 && self.count > 1).then(|| (self.count - 1) as f64 * 1e6 / span_us as f64)
@@ -79,29 +84,17 @@ pub struct FieldInventory {
 pub(super) fn take(bytes: &[u8]) -> Inventory {
     let mut count = Count::default();
     let scan = scan(bytes, &mut count);
-    let mut messages: Vec<MessageInventory> = Vec::new();
-    for (id, (tally, format)) in count.tallies.iter().zip(&scan.formats).enumerate() {
-        let Some(format) = format else { continue };
-        if tally.count == 0 {
-            continue;
-        }
-        messages.push(MessageInventory {
-            name: format.name.clone(),
-            count: tally.count,
-            bytes: tally.bytes,
-            first_us: tally.span_us.map(|(first, _)| first),
-            last_us: tally.span_us.map(|(_, last)| last),
-            fields: fields(id as u8, format, &scan.units),
-        });
-    }
-    messages.sort_by(|a, b| a.name.cmp(&b.name));
-    let range = count.range_us;
     let firmware = count.firmware();
+    let messages = count.messages(&scan.units);
+    let spans = || messages.iter().filter(|message| message.name != "PARM");
+    let start_us = spans().filter_map(|message| message.first_us).min();
+    let end_us = spans().filter_map(|message| message.last_us).max();
+    let span_us = start_us.zip(end_us).and_then(|(start, end)| end.checked_sub(start));
     Inventory {
         size_bytes: bytes.len() as u64,
-        start_us: range.map(|(start, _)| start),
-        end_us: range.map(|(_, end)| end),
-        duration_s: range.map(|(start, end)| (end - start) as f64 / 1e6),
+        start_us,
+        end_us,
+        duration_s: span_us.map(|span_us| span_us as f64 / 1e6),
         vehicle: firmware.as_deref().and_then(|name| name.split(' ').next()).map(str::to_owned),
         firmware,
         boots: scan.starts.max(1),
@@ -112,75 +105,75 @@ pub(super) fn take(bytes: &[u8]) -> Inventory {
     }
 }
 
-fn fields(id: u8, format: &Format, units: &Units) -> Vec<FieldInventory> {
-    let inventory = |(index, field): (usize, &super::format::Field)| FieldInventory {
-        label: field.label.clone(),
-        letter: char::from(field.byte),
-        unit: units.label(id, index).map(str::to_owned),
-        multiplier: units.multiplier(id, index),
-    };
-    format.fields.iter().enumerate().map(inventory).collect()
-}
-
-#[derive(Clone, Default)]
+/// What was counted of one definition.
 struct Tally {
-    timed: bool,
-    /// Offset of the text, for MSG.
-    text: Option<usize>,
-    /// The latest definition, kept for VER alone.
-    version: Option<Format>,
+    id: u8,
+    format: Format,
+    is_timed: bool,
+    /// MSG and VER rows are looked into.
+    is_told: bool,
     count: u64,
-    bytes: u64,
     span_us: Option<(u64, u64)>,
 }
 
+impl Tally {
+    fn new(id: u8, format: &Format) -> Self {
+        Self {
+            id,
+            is_timed: format.is_timed()
+                && !matches!(format.name.as_str(), "UNIT" | "MULT" | "FMTU"),
+            is_told: matches!(format.name.as_str(), "MSG" | "VER"),
+            format: format.clone(),
+            count: 0,
+            span_us: None,
+        }
+    }
+}
+
 struct Count {
-    /// By type byte.
     tallies: Vec<Tally>,
-    range_us: Option<(u64, u64)>,
+    /// The latest tally of each type byte.
+    current: [Option<usize>; 256],
     texts: Vec<String>,
     version: Option<String>,
 }
 
 impl Default for Count {
     fn default() -> Self {
-        let tallies = vec![Tally::default(); 256];
-        Self { tallies, range_us: None, texts: Vec::new(), version: None }
+        Self { tallies: Vec::new(), current: [None; 256], texts: Vec::new(), version: None }
     }
 }
 
 impl Visitor for Count {
     fn defined(&mut self, id: u8, format: &Format) -> bool {
-        let tally = &mut self.tallies[usize::from(id)];
-        tally.timed = format.is_timed();
-        tally.text = match format.name.as_str() {
-            "MSG" => format.field("Message").map(|(_, field)| field.offset),
-            _ => None,
-        };
-        tally.version = (format.name == "VER").then(|| format.clone());
+        let current = &mut self.current[usize::from(id)];
+        match current.and_then(|index| self.tallies.get_mut(index)) {
+            Some(unused) if unused.count == 0 => *unused = Tally::new(id, format),
+            _ => {
+                *current = Some(self.tallies.len());
+                self.tallies.push(Tally::new(id, format));
+            }
+        }
         true
     }
 
     fn message(&mut self, id: u8, message: &[u8], _start: usize) {
-        let tally = &mut self.tallies[usize::from(id)];
+        let current = self.current[usize::from(id)];
+        let Some(tally) = current.and_then(|index| self.tallies.get_mut(index)) else { return };
         tally.count += 1;
-        tally.bytes += message.len() as u64;
-        if tally.timed {
+        if tally.is_timed {
             let now_us = time_us(message);
-            let (first, _) = tally.span_us.unwrap_or((now_us, now_us));
-            tally.span_us = Some((first, now_us));
-            let (start, end) = self.range_us.unwrap_or((now_us, now_us));
-            self.range_us = Some((start.min(now_us), end.max(now_us)));
+            let (first, last) = tally.span_us.unwrap_or((now_us, now_us));
+            tally.span_us = Some((first.min(now_us), last.max(now_us)));
         }
-        if let Some(offset) = tally.text
-            && self.texts.len() < KEPT_TEXTS
-        {
-            self.texts.push(field_text(message.get(offset..).unwrap_or_default()));
-        }
-        if self.version.is_none()
-            && let Some(format) = &tally.version
-        {
-            self.version = format.bytes(message, "FWS").map(field_text);
+        if tally.is_told {
+            let text = |label| tally.format.bytes(message, label).map(field_text);
+            if self.texts.len() < KEPT_TEXTS {
+                self.texts.extend(text("Message"));
+            }
+            if self.version.is_none() {
+                self.version = text("FWS").filter(|version| !version.is_empty());
+            }
         }
     }
 }
@@ -188,15 +181,31 @@ impl Visitor for Count {
 impl Count {
     /// VER says it best; older firmware says it in its first texts.
     fn firmware(&self) -> Option<String> {
-        let named = |text: &&String| {
-            ["ArduCopter", "ArduPlane", "ArduRover", "ArduSub", "Blimp", "Rover", "CMCopter"]
-                .iter()
-                .any(|name| text.starts_with(name))
-        };
-        self.version
-            .as_ref()
-            .filter(|text| !text.is_empty())
-            .or_else(|| self.texts.iter().find(named))
-            .cloned()
+        let is_name = |text: &&String| FIRMWARES.iter().any(|name| text.starts_with(name));
+        self.version.as_ref().or_else(|| self.texts.iter().find(is_name)).cloned()
+    }
+
+    fn messages(&self, units: &Units) -> Vec<MessageInventory> {
+        let mut messages = Vec::new();
+        for (index, tally) in self.tallies.iter().enumerate().filter(|(_, tally)| tally.count > 0) {
+            // FMTU rows tell of the latest definition of a type byte.
+            let is_current = self.current[usize::from(tally.id)] == Some(index);
+            let field = |(index, field): (usize, &Field)| FieldInventory {
+                label: field.label.clone(),
+                letter: char::from(field.byte),
+                unit: units.label(tally.id, index).filter(|_| is_current).map(str::to_owned),
+                multiplier: units.multiplier(tally.id, index).filter(|_| is_current),
+            };
+            messages.push(MessageInventory {
+                name: tally.format.name.clone(),
+                count: tally.count,
+                bytes: tally.count * u64::from(tally.format.length),
+                first_us: tally.span_us.map(|(first, _)| first),
+                last_us: tally.span_us.map(|(_, last)| last),
+                fields: tally.format.fields.iter().enumerate().map(field).collect(),
+            });
+        }
+        messages.sort_by(|a, b| a.name.cmp(&b.name));
+        messages
     }
 }

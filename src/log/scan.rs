@@ -152,7 +152,6 @@ pub(super) fn scan<V: Visitor>(bytes: &[u8], visitor: &mut V) -> Scan {
 impl Walk {
     fn run<V: Visitor>(&mut self, bytes: &[u8], visitor: &mut V) {
         let mut position = 0;
-        let mut after_garbage = false;
         while let Some(rest) = bytes.get(position..)
             && let Some(&[first, second, id]) = rest.first_chunk()
         {
@@ -163,10 +162,9 @@ impl Walk {
                 && let Some((message, after)) = rest.split_at_checked(length)
             {
                 let followed = after.starts_with(&MAGIC) || after.is_empty();
-                if followed || self.is_credible(kind, message, after, after_garbage) {
+                if followed || self.is_credible(kind, message, after) {
                     self.accept(kind, id, message, position, visitor);
                     position += length;
-                    after_garbage = false;
                     continue;
                 }
             }
@@ -175,7 +173,6 @@ impl Walk {
                 return;
             }
             position += skipped;
-            after_garbage = true;
         }
         let rest = bytes.get(position..).unwrap_or_default();
         if !rest.is_empty() && MAGIC.starts_with(&rest[..1]) {
@@ -186,14 +183,11 @@ impl Walk {
     }
 
     /// Whether to believe in a message that no other follows: not if another one starts inside of
-    /// it (its tail was lost), nor, between garbage on both sides, if its time is out of reach.
+    /// it (its tail was lost), nor if its time is out of reach (chance made its header).
     #[cold]
-    fn is_credible(&self, kind: Kind, message: &[u8], after: &[u8], after_garbage: bool) -> bool {
-        if self.hides_message(message, after) {
-            return false;
-        }
-        let timed = kind.flags & TIMED != 0;
-        !(after_garbage && timed && self.jump(time_us(message)).is_some())
+    fn is_credible(&self, kind: Kind, message: &[u8], after: &[u8]) -> bool {
+        let jumps = kind.flags & TIMED != 0 && self.jump(time_us(message)).is_some();
+        !jumps && !self.hides_message(message, after)
     }
 
     /// Whether a message that another one or the end follows starts inside of `message`.

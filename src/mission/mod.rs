@@ -1,3 +1,20 @@
 //! From a mission template to a plan: who flies what, when, and where the analysis looks.
+//!
+//! [`template`] is the TOML as typed, [`resolve`] finds template files and applies overrides,
+//! [`formation`] lays out the grid, [`steps`] expands the grammar into segments, [`build`] puts the
+//! [`plan`] together.
 
+pub mod build;
+pub mod error;
+pub mod formation;
 pub mod plan;
+pub mod resolve;
+pub mod steps;
+pub mod template;
+pub mod window;
+
+#[cfg(test)]
+mod tests;
+
+pub use error::TemplateError;
+pub use plan::Plan;

@@ -1,1 +1,111 @@
 //! Figures, tables and the HTML report.
+//!
+//! [`render`] turns an [`Analysis`] into one self-contained page (no network, no external fonts or
+//! scripts) and its figures as single SVG files; [`write()`] puts them in a folder;
+//! [`terminal_summary`] says the same in a terminal. All are pure functions of their input: equal
+//! input gives equal bytes.
+//!
+//! Figures are drawn by the `kuva` crate; only the labelled map of the grid is our own SVG. Text from
+//! logs and plans (names, warnings) is treated as hostile: it is escaped for HTML and SVG and its
+//! control characters are replaced.
+
+mod axis;
+mod chart;
+mod colour;
+mod compare;
+mod figure_air;
+mod figure_drone;
+mod figure_laws;
+mod figure_map;
+mod glance;
+mod law;
+mod page;
+mod sheet;
+mod svg;
+mod table;
+mod terminal;
+mod text;
+
+use std::path::Path;
+
+use thiserror::Error;
+
+use crate::analysis::result::Analysis;
+use crate::base::file::{FileError, write_whole};
+
+pub use terminal::terminal_summary;
+
+/// Name of the page in the report's folder.
+pub const PAGE_FILE: &str = "index.html";
+/// Folder of the figures in the report's folder.
+pub const FIGURES_FOLDER: &str = "figures";
+
+/// Where a report came from, printed in it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Provenance {
+    /// Program and version.
+    pub program: String,
+    /// The command line that made the report, as people would type it.
+    pub command: String,
+    /// Seed of the simulation, if there was one.
+    pub seed: Option<u64>,
+    /// When it was made, as text; the library has no clock. May be empty.
+    pub made_at: String,
+    /// The files that the analysis read.
+    pub inputs: Vec<InputFile>,
+}
+
+/// One input file of an analysis.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InputFile {
+    /// Path, relative to the campaign folder where possible.
+    pub path: String,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha256: String,
+}
+
+/// A finished report, not yet written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// The page, with all figures inside.
+    pub html: String,
+    /// The figures: (name without `.svg`, SVG).
+    pub figures: Vec<(String, String)>,
+}
+
+/// A report could not be made or written.
+#[derive(Debug, Error)]
+pub enum ReportError {
+    /// The page's template failed; a bug of this program.
+    #[error("failed to fill in the report's page (please report this as a bug)")]
+    Page(#[from] minijinja::Error),
+    /// A file could not be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// A figure with its words.
+struct Figure {
+    /// Name of its file, and prefix of ids in it: letters, digits, hyphens.
+    name: String,
+    /// What it shows, for people who do not see it.
+    title: String,
+    /// What one sees.
+    caption: String,
+    svg: String,
+}
+
+/// Makes the page and the figures.
+pub fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Report, ReportError> {
+    page::render(analysis, provenance)
+}
+
+/// Writes `index.html` and `figures/*.svg` to `folder`, the page last: where it is, all is.
+pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
+    let figures = folder.join(FIGURES_FOLDER);
+    for (name, svg) in &report.figures {
+        write_whole(&figures.join(format!("{name}.svg")), svg.as_bytes())?;
+    }
+    write_whole(&folder.join(PAGE_FILE), report.html.as_bytes())?;
+    Ok(())
+}

@@ -1,5 +1,17 @@
 //! Shows: what each drone flies, and the files that carry it.
 
+mod archive;
+mod bezier;
+pub mod csv;
+pub mod derive;
+pub mod from_plan;
+pub mod lights;
+mod number;
+pub mod quantise;
+pub mod skyb;
+pub mod skyc;
+pub mod summary;
+pub mod to_plan;
 pub mod trajectory;
 
 use nalgebra::Vector3;

@@ -175,6 +175,40 @@ impl Trajectory {
         })
     }
 
+    /// How another trajectory differs from this one by more than `tolerance_m`, in words; `None`:
+    /// it does not.
+    ///
+    /// Both are compared at every boundary of either and in between (a file may cut long pieces,
+    /// so pieces need not match one to one).
+    pub fn difference(&self, other: &Self, tolerance_m: f64) -> Option<String> {
+        let (here_ms, there_ms) = (self.duration_ms(), other.duration_ms());
+        if here_ms != there_ms {
+            return Some(format!("it lasts {here_ms} ms, not {there_ms} ms"));
+        }
+        let mut times_ms: Vec<u64> = [self, other]
+            .into_iter()
+            .flat_map(|trajectory| trajectory.pieces().map(|piece| piece.end_ms))
+            .chain([0])
+            .collect();
+        times_ms.sort_unstable();
+        times_ms.dedup();
+        let (mut here, mut there) = (Cursor::new(self), Cursor::new(other));
+        let mut before_ms = 0;
+        for end_ms in times_ms {
+            let span_ms = (end_ms - before_ms) as f64;
+            // Eight points fix a polynomial of degree 7, the highest there is.
+            for step in 1..=8 {
+                let time_s = (before_ms as f64 + span_ms * f64::from(step) / 8.0) / 1000.0;
+                let apart = here.state_at(time_s).position_m - there.state_at(time_s).position_m;
+                if apart.amax() > tolerance_m * 1.001 {
+                    return Some(format!("{:.3} m apart at {time_s:.3} s", apart.norm()));
+                }
+            }
+            before_ms = end_ms;
+        }
+        None
+    }
+
     /// State at a show time in seconds. Linear in the number of pieces: use a [`Cursor`] for
     /// stepping through time.
     pub fn state_at(&self, time_s: f64) -> State {

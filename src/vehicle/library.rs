@@ -1,6 +1,12 @@
 //! Vehicles that come with the program.
 
+use std::path::Path;
+
 use super::{Vehicle, VehicleError};
+use crate::base::file::read_whole;
+
+/// Largest vehicle file that is read, bytes.
+const MAX_VEHICLE_BYTES: u64 = 1 << 20;
 
 /// Name and TOML text of every built-in vehicle, sorted by name.
 const BUILTIN: &[(&str, &str)] =
@@ -26,6 +32,21 @@ pub fn builtin(name: &str) -> Result<Vehicle, VehicleError> {
         known: names().collect::<Vec<_>>().join(", "),
     })?;
     Vehicle::from_toml(text, name)
+}
+
+/// A vehicle by the path of its TOML file or by its built-in name (with or without folder and
+/// `.toml`).
+///
+/// # Errors
+/// An unreadable or wrong file, or a name that is neither a file nor built in.
+pub fn load(name: &str) -> Result<Vehicle, VehicleError> {
+    let path = Path::new(name);
+    if path.is_file() {
+        let bytes = read_whole(path, MAX_VEHICLE_BYTES)?;
+        return Vehicle::from_toml(&String::from_utf8_lossy(&bytes), name);
+    }
+    let plain = name.strip_prefix("templates/vehicles/").unwrap_or(name);
+    builtin(plain.strip_suffix(".toml").unwrap_or(plain))
 }
 
 #[cfg(test)]

@@ -29,6 +29,9 @@ pub enum VehicleError {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// The file could not be read.
+    #[error(transparent)]
+    File(#[from] crate::base::file::FileError),
     /// No built-in vehicle of this name.
     #[error("there is no built-in vehicle {name}; there are: {known}")]
     Unknown {

@@ -1,0 +1,412 @@
+//! One flight of a fleet, and a campaign, from logs to results.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::calibrate::{self, FitOptions, PaperTable};
+use super::drone::{One, Shared, law_fit, one};
+use super::law::{LINEAR, SIGNED_QUADRATIC};
+use super::matching::{self, Candidate};
+use super::result::{ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, Missing, UpdraftMap};
+use super::stats::mean_sd;
+use super::updraft::{self, DroneSeries};
+use super::windows::WindowOptions;
+use crate::base::time::GpsTime;
+use crate::flight::{Identity, identify};
+use crate::log::Log;
+use crate::mission::plan::{Plan, Purpose};
+
+/// One log of a flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogInput {
+    /// Slot of the plan, if known; else it is found by system id, file name or home.
+    pub slot: Option<u16>,
+    /// The file.
+    pub path: PathBuf,
+}
+
+/// One flight to analyse.
+#[derive(Clone, Copy, Debug)]
+pub struct FlightInput<'a> {
+    /// Short name.
+    pub name: &'a str,
+    /// The plan, if there is one.
+    pub plan: Option<&'a Plan>,
+    /// What the flight was for; `None`: as the plan says, else a calibration if it has a ladder.
+    pub purpose: Option<Purpose>,
+    /// The logs, in the order in which unplanned results are listed.
+    pub logs: &'a [LogInput],
+    /// GPS time of show time 0, for logs without SHOW rows.
+    pub start: Option<GpsTime>,
+    /// The true vertical air speed, when the flight was simulated in uniform air, m/s.
+    pub true_updraft_mps: Option<f64>,
+    /// Folder to which log paths are given in results.
+    pub folder: Option<&'a Path>,
+}
+
+/// Choices of an analysis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnalysisOptions {
+    /// How windows are measured.
+    pub windows: WindowOptions,
+    /// How laws are fitted.
+    pub fit: FitOptions,
+    /// Law for the map of the air (`linear`, `signed quadratic`); `None`: the one whose calibration
+    /// has the lower reduced chi².
+    pub map_law: Option<MapLaw>,
+    /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
+    /// updraft (simulations), Table II for others.
+    pub paper: Option<PaperTable>,
+    /// Most points of a trace for figures.
+    pub trace_points: usize,
+}
+
+/// Law for the map of the air.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapLaw {
+    /// `u = A' V + u0`.
+    Linear,
+    /// `u = A f(V - W) + u0`.
+    SignedQuadratic,
+}
+
+impl Default for AnalysisOptions {
+    fn default() -> Self {
+        Self {
+            windows: WindowOptions::default(),
+            fit: FitOptions::default(),
+            map_law: None,
+            paper: None,
+            trace_points: 1200,
+        }
+    }
+}
+
+/// Told after each log: (logs done, logs in all).
+pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
+
+/// A flight cannot be analysed at all.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum AnalysisError {
+    /// There are no logs.
+    #[error(
+        "{name}: no logs to analyse (put the drones' .BIN files into the flight's logs folder)"
+    )]
+    NoLogs {
+        /// The flight.
+        name: String,
+    },
+    /// None of the logs could be used.
+    #[error("{name}: none of the {count} log(s) can be used; the first: {first}")]
+    NothingUsable {
+        /// The flight.
+        name: String,
+        /// Logs given.
+        count: usize,
+        /// Why the first one cannot be used.
+        first: String,
+    },
+    /// The campaign has no flights.
+    #[error("there is no flight to analyse")]
+    NoFlights,
+}
+
+/// Analyses a campaign: calibrations first, and measurements with the laws of the first calibration
+/// (or of `reference`).
+pub fn analyze(
+    title: &str,
+    inputs: &[FlightInput<'_>],
+    options: &AnalysisOptions,
+    reference: Option<&FlightAnalysis>,
+    progress: Progress<'_>,
+) -> Result<Analysis, AnalysisError> {
+    if inputs.is_empty() {
+        return Err(AnalysisError::NoFlights);
+    }
+    let is_measurement = |input: &FlightInput<'_>| {
+        input.purpose.or(input.plan.map(|plan| plan.purpose)) == Some(Purpose::Measurement)
+    };
+    let mut order: Vec<&FlightInput<'_>> = inputs.iter().collect();
+    order.sort_by_key(|input| is_measurement(input));
+    let total: usize = inputs.iter().map(|input| input.logs.len()).sum();
+    let mut before = 0;
+    let mut flights: Vec<FlightAnalysis> = Vec::new();
+    let mut warnings = Vec::new();
+    let mut failure = None;
+    for input in order {
+        let found = flights
+            .iter()
+            .find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some());
+        let report = |done: usize, _: usize| progress(before + done, total);
+        match analyze_flight(input, options, reference.or(found), &report) {
+            Ok(flight) => flights.push(flight),
+            Err(error) => {
+                warnings.push(error.to_string());
+                failure = failure.or(Some(error));
+            }
+        }
+        before += input.logs.len();
+    }
+    if let (true, Some(error)) = (flights.is_empty(), failure) {
+        return Err(error);
+    }
+    Ok(Analysis {
+        schema: ANALYSIS_SCHEMA.to_owned(),
+        made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
+        title: title.to_owned(),
+        flights,
+        warnings,
+    })
+}
+
+/// Analyses one flight of a fleet. A log that cannot be used is listed as missing (or as a warning,
+/// when it has no slot) and does not stop the others.
+///
+/// `reference` is a calibration whose laws measure the air and hold A and u0 (unless
+/// [`FitOptions::hold`] gives them): each drone's own laws, else its flock mapping.
+pub fn analyze_flight(
+    input: &FlightInput<'_>,
+    options: &AnalysisOptions,
+    reference: Option<&FlightAnalysis>,
+    progress: Progress<'_>,
+) -> Result<FlightAnalysis, AnalysisError> {
+    if input.logs.is_empty() {
+        return Err(AnalysisError::NoLogs { name: input.name.to_owned() });
+    }
+    let mut warnings = Vec::new();
+    let slots = match_slots(input, &mut warnings);
+    let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
+    let map_law = options.map_law.or_else(|| reference.map(better_law));
+    let shared = Shared { input, options, reference, planned_purpose, map_law };
+
+    let done = AtomicUsize::new(0);
+    let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
+    let outcomes: Vec<Result<One, String>> = work
+        .par_iter()
+        .map(|(log, slot)| {
+            let outcome = match slot {
+                SlotMatch::Refused(reason) => Err(reason.clone()),
+                SlotMatch::Slot(number) => one(&shared, log, Some(*number)),
+                SlotMatch::Unplanned => one(&shared, log, None),
+            };
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, input.logs.len());
+            outcome
+        })
+        .collect();
+
+    let mut ones: Vec<One> = Vec::new();
+    let mut reasons: BTreeMap<u16, String> = BTreeMap::new();
+    let mut first_failure = None;
+    for ((log, slot), outcome) in work.iter().zip(outcomes) {
+        match (outcome, slot) {
+            (Ok(one), _) => ones.push(one),
+            (Err(reason), slot) => {
+                let named = with_name(&reason, &log.path);
+                first_failure.get_or_insert_with(|| named.clone());
+                match slot {
+                    SlotMatch::Slot(number) => _ = reasons.entry(*number).or_insert(reason),
+                    _ => warnings.push(named),
+                }
+            }
+        }
+    }
+    if ones.is_empty() {
+        return Err(AnalysisError::NothingUsable {
+            name: input.name.to_owned(),
+            count: input.logs.len(),
+            first: first_failure.unwrap_or_default(),
+        });
+    }
+    if input.plan.is_some() {
+        ones.sort_by_key(|one| one.drone.slot);
+    }
+    Ok(finish(&shared, ones, &reasons, warnings))
+}
+
+enum SlotMatch {
+    Slot(u16),
+    Unplanned,
+    Refused(String),
+}
+
+/// Finds the slot of each log, and refuses logs that would be a slot's second one.
+fn match_slots(input: &FlightInput<'_>, warnings: &mut Vec<String>) -> Vec<SlotMatch> {
+    let Some(plan) = input.plan else {
+        return input.logs.iter().map(|_| SlotMatch::Unplanned).collect();
+    };
+    let candidates: Vec<Candidate> = input
+        .logs
+        .par_iter()
+        .map(|log| {
+            let identity = if log.slot.is_some() {
+                Identity::default()
+            } else {
+                Log::open(&log.path).map(|log| identify(&log)).unwrap_or_default()
+            };
+            Candidate {
+                given: log.slot,
+                system_id: identity.system_id,
+                file_number: matching::file_number(&log.path),
+                first_fix_deg: identity.first_fix_deg,
+            }
+        })
+        .collect();
+    let mut seen: BTreeMap<u16, &Path> = BTreeMap::new();
+    matching::slots(plan, &candidates)
+        .into_iter()
+        .zip(input.logs)
+        .map(|(slot, log)| {
+            let Some(slot) = slot else {
+                return SlotMatch::Refused(
+                    "the log fits no free slot of the plan by system id, file name or home \
+                     position; name it after its slot (07.BIN)"
+                        .to_owned(),
+                );
+            };
+            if plan.slot(slot).is_none() {
+                return SlotMatch::Refused(format!("the plan has no slot {slot}"));
+            }
+            if let Some(first) = seen.get(&slot) {
+                let reason = format!(
+                    "slot {slot} has two logs; {} is used and {} is not",
+                    first.display(),
+                    log.path.display()
+                );
+                warnings.push(reason);
+                return SlotMatch::Refused(format!("slot {slot} has a log already"));
+            }
+            seen.insert(slot, &log.path);
+            SlotMatch::Slot(slot)
+        })
+        .collect()
+}
+
+fn with_name(reason: &str, path: &Path) -> String {
+    let name = path.display().to_string();
+    if reason.contains(&name) { reason.to_owned() } else { format!("{name}: {reason}") }
+}
+
+/// The law whose fits to the reference's drones have the lower mean reduced chi².
+fn better_law(reference: &FlightAnalysis) -> MapLaw {
+    let reduced = |law: MapLaw| {
+        let values: Vec<f64> = reference
+            .drones
+            .iter()
+            .filter_map(|drone| law_fit(drone.laws.as_ref()?, law)?.chi2_reduced)
+            .collect();
+        (!values.is_empty()).then(|| mean_sd(&values).0)
+    };
+    match (reduced(MapLaw::Linear), reduced(MapLaw::SignedQuadratic)) {
+        (Some(linear), Some(quadratic)) if quadratic < linear => MapLaw::SignedQuadratic,
+        (None, Some(_)) => MapLaw::SignedQuadratic,
+        _ => MapLaw::Linear,
+    }
+}
+
+/// Joins the drones' results: purpose, laws, flock, tables, map, missing.
+fn finish(
+    shared: &Shared<'_>,
+    ones: Vec<One>,
+    reasons: &BTreeMap<u16, String>,
+    mut warnings: Vec<String>,
+) -> FlightAnalysis {
+    let Shared { input, options, .. } = shared;
+    let any_laws = ones.iter().any(|one| one.calibration.is_ok());
+    let purpose = shared.planned_purpose.unwrap_or(if any_laws {
+        Purpose::Calibration
+    } else {
+        Purpose::Measurement
+    });
+    let mut drones = Vec::new();
+    let mut updrafts = Vec::new();
+    for One { mut drone, calibration, updraft } in ones {
+        if purpose == Purpose::Calibration {
+            match calibration {
+                Ok(laws) => drone.laws = Some(laws),
+                Err(error) => drone.warnings.push(error.to_string()),
+            }
+        } else if let Some((series, mapping)) = updraft {
+            updrafts.push((drone.slot, drone.name.clone(), drone.home_m, series, mapping));
+        } else if shared.reference.is_some() {
+            drone.warnings.push("no hover long enough to measure the air in".to_owned());
+        }
+        drones.push(drone);
+    }
+    let mut flock = None;
+    let mut table = Vec::new();
+    if purpose == Purpose::Calibration {
+        match calibrate::flock(&drones, &options.fit) {
+            Ok(laws) => flock = Some(laws),
+            Err(error) => warnings.push(format!("flock mapping: {error}")),
+        }
+        let paper = options.paper.unwrap_or(match input.true_updraft_mps {
+            Some(_) => PaperTable::Simulation,
+            None => PaperTable::Field,
+        });
+        table = calibrate::table(&drones, paper);
+    } else if shared.reference.is_none() {
+        warnings.push(
+            "no calibration was given: the air cannot be measured without laws (analyse a \
+             calibration flight together with this one)"
+                .to_owned(),
+        );
+    }
+    let missing = input.plan.map_or_else(Vec::new, |plan| {
+        let flown: Vec<u16> = drones.iter().filter_map(|drone| drone.slot).collect();
+        plan.slots
+            .iter()
+            .filter(|slot| !flown.contains(&slot.slot))
+            .map(|slot| Missing {
+                slot: slot.slot,
+                reason: reasons.get(&slot.slot).cloned().unwrap_or_else(|| "no log".to_owned()),
+            })
+            .collect()
+    });
+    let map = (!updrafts.is_empty()).then(|| map(updrafts, shared.map_law, input.true_updraft_mps));
+    FlightAnalysis {
+        name: input.name.to_owned(),
+        purpose,
+        planned: input.plan.is_some(),
+        true_updraft_mps: input.true_updraft_mps,
+        drones,
+        missing,
+        flock,
+        table,
+        map,
+        warnings,
+    }
+}
+
+type NamedUpdraft = (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str);
+
+fn map(updrafts: Vec<NamedUpdraft>, law: Option<MapLaw>, truth_mps: Option<f64>) -> UpdraftMap {
+    let series: Vec<DroneSeries> = updrafts.iter().map(|named| named.3.clone()).collect();
+    let times = updraft::common_times(&series);
+    let drones = updrafts
+        .into_iter()
+        .map(|(slot, name, position_m, series, mapping)| DroneUpdraft {
+            slot,
+            name,
+            position_m,
+            height_m: series.height_m,
+            mapping: mapping.to_owned(),
+            mean: series.mean,
+            updraft_mps: series.at(&times),
+            truth_mps: truth_mps.map(|truth| vec![truth; times.len()]),
+        })
+        .collect();
+    UpdraftMap {
+        law: match law {
+            Some(MapLaw::SignedQuadratic) => SIGNED_QUADRATIC,
+            _ => LINEAR,
+        }
+        .to_owned(),
+        time_s: times.iter().map(|time| *time as f64).collect(),
+        drones,
+    }
+}

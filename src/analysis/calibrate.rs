@@ -1,0 +1,363 @@
+//! Calibration: from windows to laws, for a drone, for the fleet's average, and as tables.
+
+use thiserror::Error;
+
+use super::fit::FitError;
+use super::law::{self, ErrorScale, Law, Point};
+use super::result::{DroneAnalysis, Fit, Laws, SampleStats, TableRow, WindowStats};
+use super::stats::mean_sd;
+use crate::base::estimate::Estimate;
+
+/// Which number stands for a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Location {
+    /// Median (the paper, in simulation).
+    Median,
+    /// Mean (the paper, in the field).
+    Mean,
+    /// Mean without the lowest and highest tenth: as robust as needed, and unlike the median it sees
+    /// fractions of the whole microseconds that logs hold.
+    #[default]
+    Trimmed,
+}
+
+/// What a window's error is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Weights {
+    /// The in-window standard deviation (the paper). Not the error of a mean, so that chi² is no
+    /// test; parameter errors are scaled with chi².
+    WindowSd,
+    /// Standard error of the window's mean from block means, plus one variance common to all
+    /// windows (turbulence longer than a window), chosen so that the better of the two laws has a
+    /// reduced chi² of 1. Velocity errors count. Parameter errors are not scaled.
+    #[default]
+    BlockError,
+    /// All windows alike; parameter errors are scaled with chi².
+    Equal,
+}
+
+impl Weights {
+    fn scale(self) -> ErrorScale {
+        match self {
+            Self::BlockError => ErrorScale::Unscaled,
+            Self::WindowSd | Self::Equal => ErrorScale::Scaled,
+        }
+    }
+}
+
+/// A and u0 of the signed-quadratic law, to fit W alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hold {
+    /// A, us/(m/s)².
+    pub a: f64,
+    /// u0, us.
+    pub u0_us: f64,
+}
+
+impl Hold {
+    /// From a reference calibration's signed-quadratic fit.
+    pub fn from_laws(laws: &Laws) -> Option<Self> {
+        match Law::from_fit(laws.signed_quadratic.as_ref()?)? {
+            Law::SignedQuadratic { a, u0_us, .. } => Some(Self { a, u0_us }),
+            Law::Linear { .. } => None,
+        }
+    }
+}
+
+/// Choices of a calibration.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FitOptions {
+    /// Which number stands for a window.
+    pub location: Location,
+    /// What a window's error is.
+    pub weights: Weights,
+    /// Fit the hovers too (the paper does not).
+    pub with_hovers: bool,
+    /// Also fit W with A and u0 held.
+    pub hold: Option<Hold>,
+}
+
+/// A calibration is not possible.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// No window of vertical motion.
+    #[error(
+        "no ladder: the flight has no usable window of constant vertical speed ({rejected} rejected, \
+         {hovers} hovers); a calibration needs legs at two speeds or more"
+    )]
+    NoLadder {
+        /// Moving windows that were rejected.
+        rejected: usize,
+        /// Hover windows.
+        hovers: usize,
+    },
+    /// All moving windows have the same speed.
+    #[error(
+        "only one vertical speed ({speed_mps} m/s) in {windows} usable window(s); a calibration \
+         needs legs at two speeds or more"
+    )]
+    OneSpeed {
+        /// The speed.
+        speed_mps: f64,
+        /// Windows of it.
+        windows: usize,
+    },
+    /// The pulse is the same in all windows.
+    #[error(
+        "the pulse width is {pulse_us:.0} us in all windows: it does not depend on the speed (are \
+         these the motor channels? check SERVOn_FUNCTION)"
+    )]
+    ConstantPulse {
+        /// The pulse width.
+        pulse_us: f64,
+    },
+    /// The fit failed.
+    #[error("the fit failed: {0}")]
+    Fit(#[from] FitError),
+}
+
+/// Logs hold whole microseconds: no window is known better than the rounding of one sample.
+fn quantum_us() -> f64 {
+    1.0 / 12.0_f64.sqrt()
+}
+
+/// The number that stands for samples.
+pub fn location(stats: &SampleStats, location: Location) -> f64 {
+    match location {
+        Location::Median => stats.median,
+        Location::Mean => stats.mean,
+        Location::Trimmed => stats.trimmed,
+    }
+}
+
+/// Whether a window takes part in fits.
+pub fn is_used(window: &WindowStats, options: &FitOptions) -> bool {
+    window.rejected.is_empty()
+        && (window.kind.is_leg() || options.with_hovers && window.kind.is_hover())
+}
+
+/// A window as a point of a law.
+fn point(window: &WindowStats, options: &FitOptions) -> Point {
+    let (sigma_us, velocity_sigma_mps) = match options.weights {
+        Weights::WindowSd => (window.pulse_phi_us.sd, 0.0),
+        Weights::BlockError => (window.pulse_phi_us.se, window.velocity_mps.se),
+        Weights::Equal => (1.0, 0.0),
+    };
+    Point {
+        velocity_mps: location(&window.velocity_mps, options.location),
+        pulse_us: location(&window.pulse_phi_us, options.location)
+            - window.offset_us.unwrap_or(0.0),
+        sigma_us: sigma_us.max(quantum_us()),
+        velocity_sigma_mps,
+    }
+}
+
+/// Fits the laws to one drone's windows.
+pub fn calibrate(windows: &[WindowStats], options: &FitOptions) -> Result<Laws, CalibrationError> {
+    let points: Vec<Point> =
+        windows.iter().filter(|w| is_used(w, options)).map(|w| point(w, options)).collect();
+    let moving = windows.iter().filter(|window| window.kind.is_leg());
+    let rejected = moving.filter(|window| !window.rejected.is_empty()).count();
+    let hovers = windows.iter().filter(|window| window.kind.is_hover()).count();
+    fit_points(&points, options, CalibrationError::NoLadder { rejected, hovers })
+}
+
+fn fit_points(
+    points: &[Point],
+    options: &FitOptions,
+    empty: CalibrationError,
+) -> Result<Laws, CalibrationError> {
+    let Some(first) = points.first() else { return Err(empty) };
+    let spread = |value: fn(&Point) -> f64| {
+        points.iter().map(|point| (value(point) - value(first)).abs()).fold(0.0, f64::max)
+    };
+    // A held fit needs one window only; the free laws need two speeds.
+    if spread(|point| point.velocity_mps) < 0.1 && options.hold.is_none() {
+        let speed_mps = (first.velocity_mps * 10.0).round() / 10.0;
+        return Err(CalibrationError::OneSpeed { speed_mps, windows: points.len() });
+    }
+    if spread(|point| point.pulse_us) < quantum_us() && options.hold.is_none() {
+        return Err(CalibrationError::ConstantPulse { pulse_us: first.pulse_us });
+    }
+    let scale = options.weights.scale();
+    let sigma_added_us =
+        (options.weights == Weights::BlockError).then(|| added_sigma_us(points)).flatten();
+    let points = widened(points, sigma_added_us.unwrap_or(0.0));
+    let held = options
+        .hold
+        .map(|hold| law::signed_quadratic_held(&points, hold.a, hold.u0_us, scale))
+        .transpose();
+    let linear = law::linear(&points, scale);
+    if options.hold.is_none() {
+        // Without a held fit the line is the least that a calibration must give.
+        linear.as_ref().map_err(Clone::clone)?;
+    }
+    Ok(Laws {
+        signed_quadratic: law::signed_quadratic(&points, scale).ok(),
+        signed_quadratic_held: held?,
+        linear: linear.ok(),
+        sigma_added_us,
+    })
+}
+
+fn widened(points: &[Point], added_us: f64) -> Vec<Point> {
+    points
+        .iter()
+        .map(|point| Point { sigma_us: point.sigma_us.hypot(added_us), ..*point })
+        .collect()
+}
+
+/// Standard deviation to add to every point's error so that the better law's reduced chi² is 1
+/// (Paule and Mandel 1982); 0 when it is below 1 already, `None` without degrees of freedom.
+fn added_sigma_us(points: &[Point]) -> Option<f64> {
+    let best = |added_us: f64| -> Option<f64> {
+        let points = widened(points, added_us);
+        let scale = ErrorScale::Unscaled;
+        [law::linear(&points, scale).ok(), law::signed_quadratic(&points, scale).ok()]
+            .into_iter()
+            .filter_map(|fit| fit?.chi2_reduced)
+            .min_by(f64::total_cmp)
+    };
+    if best(0.0)? <= 1.0 {
+        return Some(0.0);
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    while best(high)? > 1.0 {
+        (low, high) = (high, high * 2.0);
+        if high > 1e4 {
+            return None;
+        }
+    }
+    for _ in 0..24 {
+        let middle = f64::midpoint(low, high);
+        if best(middle)? > 1.0 { low = middle } else { high = middle }
+    }
+    Some(high)
+}
+
+/// The paper's flock mapping: windows averaged over drones with equal weights, then fitted.
+///
+/// Windows are the same when kind, label, command and their order among equals agree, so that groups
+/// flying at different times are averaged too. The averages' statistical errors shrink with the
+/// number of drones; the air they share does not, which the added variance accounts for.
+pub fn flock(drones: &[DroneAnalysis], options: &FitOptions) -> Result<Laws, CalibrationError> {
+    let mut groups: std::collections::BTreeMap<(String, i64, usize), Vec<Point>> =
+        std::collections::BTreeMap::new();
+    for drone in drones {
+        let mut seen = std::collections::BTreeMap::<(String, i64), usize>::new();
+        for window in &drone.windows {
+            let command = (window.commanded_mps * 1000.0).round() as i64;
+            let key = (format!("{:?} {}", window.kind, window.label), command);
+            let count = seen.entry(key.clone()).or_default();
+            if is_used(window, options) {
+                groups.entry((key.0, key.1, *count)).or_default().push(point(window, options));
+            }
+            *count += 1;
+        }
+    }
+    let average = |points: &Vec<Point>| {
+        let n = points.len() as f64;
+        let mean = |value: fn(&Point) -> f64| points.iter().map(value).sum::<f64>() / n;
+        let error = |value: fn(&Point) -> f64| {
+            points.iter().map(|point| value(point).powi(2)).sum::<f64>().sqrt() / n
+        };
+        let sigma_us = match options.weights {
+            Weights::WindowSd => mean(|point| point.sigma_us),
+            Weights::BlockError => error(|point| point.sigma_us),
+            Weights::Equal => 1.0,
+        };
+        Point {
+            velocity_mps: mean(|point| point.velocity_mps),
+            pulse_us: mean(|point| point.pulse_us),
+            sigma_us,
+            velocity_sigma_mps: error(|point| point.velocity_sigma_mps),
+        }
+    };
+    let points: Vec<Point> = groups.values().map(average).collect();
+    fit_points(&points, options, CalibrationError::NoLadder { rejected: 0, hovers: 0 })
+}
+
+/// Which of the paper's tables stands beside the fleet's numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PaperTable {
+    /// Table I: simulation in still air.
+    Simulation,
+    /// Table II: field.
+    Field,
+}
+
+impl PaperTable {
+    fn value(self, law: &str, parameter: &str) -> Option<Estimate> {
+        let (value, se) = match (self, law, parameter) {
+            (Self::Simulation, law::SIGNED_QUADRATIC, "A") => (8.207, 0.020),
+            (Self::Simulation, law::SIGNED_QUADRATIC, "u0") => (1598.656, 0.039),
+            (Self::Simulation, law::SIGNED_QUADRATIC, "W") => (-0.0589, 0.0031),
+            (Self::Field, law::SIGNED_QUADRATIC, "A") => (10.5, 2.6),
+            (Self::Field, law::SIGNED_QUADRATIC, "u0") => (1562.0, 42.0),
+            (Self::Field, law::SIGNED_QUADRATIC, "W") => (0.4, 3.0),
+            (Self::Field, law::SIGNED_QUADRATIC, "chi2_nu") => (2.19, 0.84),
+            (Self::Field, law::LINEAR, "A'") => (26.4, 2.6),
+            (Self::Field, law::LINEAR, "u0") => (1546.5, 7.8),
+            (Self::Field, law::LINEAR, "chi2_nu") => (0.91, 0.44),
+            _ => return None,
+        };
+        Some(Estimate::new(value, se))
+    }
+}
+
+/// Name of the law with A and u0 held, in tables.
+pub const SIGNED_QUADRATIC_HELD: &str = "signed quadratic, A and u0 held";
+
+type FitOf = fn(&Laws) -> Option<&Fit>;
+
+/// Statistics over drones of the fitted parameters, in the rows of Tables I and II.
+pub fn table(drones: &[DroneAnalysis], paper: PaperTable) -> Vec<TableRow> {
+    let laws: [(&str, FitOf); 3] = [
+        (law::SIGNED_QUADRATIC, |laws| laws.signed_quadratic.as_ref()),
+        (SIGNED_QUADRATIC_HELD, |laws| laws.signed_quadratic_held.as_ref()),
+        (law::LINEAR, |laws| laws.linear.as_ref()),
+    ];
+    let mut rows = Vec::new();
+    for (name, fit_of) in laws {
+        let fits: Vec<&Fit> =
+            drones.iter().filter_map(|drone| fit_of(drone.laws.as_ref()?)).collect();
+        let Some(first) = fits.first() else { continue };
+        for (index, parameter) in first.parameters.iter().enumerate() {
+            if parameter.held {
+                continue;
+            }
+            let estimates: Vec<Estimate> =
+                fits.iter().filter_map(|fit| Some(fit.parameters.get(index)?.estimate)).collect();
+            let values: Vec<f64> = estimates.iter().map(|estimate| estimate.value).collect();
+            let errors: Vec<f64> = estimates.iter().map(|estimate| estimate.se).collect();
+            rows.push(row(name, &parameter.name, &parameter.unit, &values, &errors, paper));
+        }
+        let reduced: Vec<f64> = fits.iter().filter_map(|fit| fit.chi2_reduced).collect();
+        if !reduced.is_empty() {
+            rows.push(row(name, "chi2_nu", "", &reduced, &[], paper));
+        }
+    }
+    rows
+}
+
+fn row(
+    law: &str,
+    parameter: &str,
+    unit: &str,
+    values: &[f64],
+    errors: &[f64],
+    paper: PaperTable,
+) -> TableRow {
+    let (mean, sd) = mean_sd(values);
+    TableRow {
+        law: law.to_owned(),
+        parameter: parameter.to_owned(),
+        unit: unit.to_owned(),
+        mean,
+        sd,
+        mean_se: mean_sd(errors).0,
+        n: values.len(),
+        paper: paper.value(law, parameter),
+    }
+}

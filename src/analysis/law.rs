@@ -1,0 +1,450 @@
+//! The two laws of the paper, their inverses, and how they are fitted to windows.
+//!
+//! * **signed quadratic** (eqs. 3-4): `u = A f(V - W) + u0`, `f(x) = x|x|`. Given W it is linear in A
+//!   and u0, so chi² is profiled over W on a grid: the profile has several minima when the data do
+//!   not have this shape, and a local optimiser's answer depends on its start.
+//! * **linear** (the paper's f*): `u = A' V + u0`. W and u0 are exactly collinear here: the vertical
+//!   air speed is defined by the convention of eq. 5 (it vanishes on average), not fitted.
+//!
+//! Errors of the velocities count by the effective variance `sigma_u² + (du/dV)² sigma_V²`
+//! (York et al. 2004), with the slope of the fit before.
+
+use nalgebra::DMatrix;
+
+use super::fit::{FitError, Solution, minimize, minimize_with, p_value};
+use super::result::{Fit, Parameter};
+use crate::base::estimate::Estimate;
+
+/// Range of the profile over W, m/s.
+const W_LIMIT_MPS: f64 = 8.0;
+/// Step of the profile over W, m/s.
+const W_STEP_MPS: f64 = 0.05;
+/// Minima within this chi² of the best are reported.
+const OTHER_MINIMA_CHI2: f64 = 4.0;
+/// Rounds of the effective variance.
+const VARIANCE_ROUNDS: usize = 3;
+
+/// One window as a point of a law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Vertical velocity over ground, up positive, m/s.
+    pub velocity_mps: f64,
+    /// Tilt-corrected pulse width, us.
+    pub pulse_us: f64,
+    /// Standard error of the pulse, us. Must be above 0.
+    pub sigma_us: f64,
+    /// Standard error of the velocity, m/s; 0 to ignore it.
+    pub velocity_sigma_mps: f64,
+}
+
+/// Which errors a fit reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorScale {
+    /// `(JᵀJ)⁻¹`: the sigmas are the errors of the points.
+    Unscaled,
+    /// `(JᵀJ)⁻¹ chi²/dof`: only the ratios of the sigmas are known.
+    Scaled,
+}
+
+/// A law with its parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// `u = a f(V - w) + u0`.
+    SignedQuadratic {
+        /// A, us/(m/s)².
+        a: f64,
+        /// Hover pulse, us.
+        u0_us: f64,
+        /// Vertical air speed during the calibration, m/s, up positive.
+        w_mps: f64,
+    },
+    /// `u = slope V + u0`.
+    Linear {
+        /// A', us/(m/s).
+        slope: f64,
+        /// Hover pulse, us.
+        u0_us: f64,
+    },
+}
+
+/// `f(x) = x|x|`, eq. 3.
+pub fn signed_square(x: f64) -> f64 {
+    x * x.abs()
+}
+
+impl Law {
+    /// Name as in the tables.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::SignedQuadratic { .. } => SIGNED_QUADRATIC,
+            Self::Linear { .. } => LINEAR,
+        }
+    }
+
+    /// Pulse width at a velocity over ground, in the air of the calibration, us.
+    pub fn pulse_us(&self, velocity_mps: f64) -> f64 {
+        match *self {
+            Self::SignedQuadratic { a, u0_us, w_mps } => {
+                a * signed_square(velocity_mps - w_mps) + u0_us
+            }
+            Self::Linear { slope, u0_us } => slope * velocity_mps + u0_us,
+        }
+    }
+
+    /// Slope du/dV at a velocity over ground, in the air of the calibration, us/(m/s).
+    pub fn slope(&self, velocity_mps: f64) -> f64 {
+        match *self {
+            Self::SignedQuadratic { a, w_mps, .. } => 2.0 * a * (velocity_mps - w_mps).abs(),
+            Self::Linear { slope, .. } => slope,
+        }
+    }
+
+    /// Vertical velocity relative to the air, m/s, that belongs to a pulse width (eq. 6). The
+    /// signed-quadratic inverse has an infinite slope at hover: 5 us of noise there are 0.8 m/s.
+    /// Not finite when the law's slope is 0.
+    pub fn air_velocity_mps(&self, pulse_us: f64) -> f64 {
+        match *self {
+            Self::SignedQuadratic { a, u0_us, .. } => {
+                let square = (pulse_us - u0_us) / a;
+                square.signum() * square.abs().sqrt()
+            }
+            Self::Linear { slope, u0_us } => (pulse_us - u0_us) / slope,
+        }
+    }
+
+    /// The law in a fit's parameters; `None` if they are not those of a law.
+    pub fn from_fit(fit: &Fit) -> Option<Self> {
+        let value =
+            |name: &str| fit.parameters.iter().find(|p| p.name == name).map(|p| p.estimate.value);
+        let u0_us = value("u0")?;
+        match (value("A"), value("A'")) {
+            (Some(a), _) => Some(Self::SignedQuadratic { a, u0_us, w_mps: value("W")? }),
+            (None, Some(slope)) => Some(Self::Linear { slope, u0_us }),
+            (None, None) => None,
+        }
+    }
+}
+
+/// Name of the signed-quadratic law in results.
+pub const SIGNED_QUADRATIC: &str = "signed quadratic";
+/// Name of the linear law in results.
+pub const LINEAR: &str = "linear";
+
+/// Fits `u = A' V + u0`.
+pub fn linear(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
+    check(points, 2)?;
+    let (fit, sigmas) = with_effective_variance(points, |sigmas| {
+        let regressor = |point: &Point| point.velocity_mps;
+        let (slope, u0_us) = weighted_line(points, sigmas, regressor).ok_or(FitError::Singular)?;
+        let solution = minimize(
+            |p| {
+                let law = Law::Linear { slope: p[0], u0_us: p[1] };
+                residuals(points, sigmas, law)
+            },
+            &[slope, u0_us],
+        )?;
+        let law = Law::Linear { slope: solution.parameters[0], u0_us: solution.parameters[1] };
+        Ok((solution, law))
+    })?;
+    let (solution, law) = fit;
+    let names = [("A'", "us/(m/s)"), ("u0", "us")];
+    Ok(describe(points, &sigmas, law, &solution, &names, &[true, true], scale))
+}
+
+/// Fits `u = A f(V - W) + u0` with all three free.
+///
+/// The answer is the deepest minimum inside |W| < 8 m/s; other minima within a chi² of 4 of it are
+/// listed. A chi² that falls below the answer's at the edge of the range (or no minimum inside) is
+/// what a line looks like to this law, and is a warning.
+pub fn signed_quadratic(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
+    check(points, 3)?;
+    let ((found, _), sigmas) = with_effective_variance(points, |sigmas| {
+        let found = all_minima(points, sigmas)?;
+        let law = law_of(&found.best);
+        Ok((found, law))
+    })?;
+    let law = law_of(&found.best);
+    let names = [("A", "us/(m/s)²"), ("u0", "us"), ("W", "m/s")];
+    let mut fit = describe(points, &sigmas, law, &found.best, &names, &[true, true, true], scale);
+    fit.other_minima = found
+        .others
+        .iter()
+        .filter(|other| other.chi2 - found.best.chi2 < OTHER_MINIMA_CHI2)
+        .map(|other| other.parameters.clone())
+        .collect();
+    if !fit.other_minima.is_empty() {
+        fit.warnings.push(format!(
+            "{} more local minimum(s) within a chi2 of {OTHER_MINIMA_CHI2} of this one: W is not \
+             determined",
+            fit.other_minima.len()
+        ));
+    }
+    fit.warnings.extend(found.warning);
+    Ok(fit)
+}
+
+/// Fits only W, with A (us/(m/s)²) and u0 (us) held from a reference calibration.
+pub fn signed_quadratic_held(
+    points: &[Point],
+    a: f64,
+    u0_us: f64,
+    scale: ErrorScale,
+) -> Result<Fit, FitError> {
+    check(points, 1)?;
+    if !(a.is_finite() && a != 0.0 && u0_us.is_finite()) {
+        return Err(FitError::NotFinite);
+    }
+    let held = |w_mps: f64| Law::SignedQuadratic { a, u0_us, w_mps };
+    let ((found, law), sigmas) = with_effective_variance(points, |sigmas| {
+        let chi2 = |w: f64| sum_of_squares(&residuals(points, sigmas, held(w)));
+        let profile: Vec<f64> = grid().map(chi2).collect();
+        let mut minima: Vec<Solution> = minima_of(&profile)
+            .filter_map(|start| minimize(|p| residuals(points, sigmas, held(p[0])), &[start]).ok())
+            .collect();
+        minima.sort_by(|left, right| left.chi2.total_cmp(&right.chi2));
+        minima.dedup_by(|later, earlier| {
+            (later.parameters[0] - earlier.parameters[0]).abs() < W_STEP_MPS / 2.0
+        });
+        let law = held(minima.first().ok_or(FitError::Singular)?.parameters[0]);
+        Ok((minima, law))
+    })?;
+    let best = found.first().ok_or(FitError::Singular)?;
+    let names = [("A", "us/(m/s)²"), ("u0", "us"), ("W", "m/s")];
+    let mut fit = describe(points, &sigmas, law, best, &names, &[false, false, true], scale);
+    fit.other_minima = found
+        .iter()
+        .skip(1)
+        .filter(|other| other.chi2 - best.chi2 < OTHER_MINIMA_CHI2)
+        .map(|other| vec![a, u0_us, other.parameters[0]])
+        .collect();
+    if best.parameters[0].abs() >= W_LIMIT_MPS {
+        fit.warnings
+            .push(format!("W is at or beyond the edge of the searched range, ±{W_LIMIT_MPS} m/s"));
+    }
+    Ok(fit)
+}
+
+fn check(points: &[Point], parameters: usize) -> Result<(), FitError> {
+    if points.len() < parameters {
+        return Err(FitError::TooFewPoints { points: points.len(), parameters });
+    }
+    let fine = points.iter().all(|point| {
+        point.velocity_mps.is_finite()
+            && point.pulse_us.is_finite()
+            && point.sigma_us > 0.0
+            && point.sigma_us.is_finite()
+            && point.velocity_sigma_mps >= 0.0
+            && point.velocity_sigma_mps.is_finite()
+    });
+    if fine { Ok(()) } else { Err(FitError::NotFinite) }
+}
+
+/// Repeats a fit with sigmas that include the velocities' errors at the slope found before.
+fn with_effective_variance<T>(
+    points: &[Point],
+    fit: impl Fn(&[f64]) -> Result<(T, Law), FitError>,
+) -> Result<((T, Law), Vec<f64>), FitError> {
+    let mut sigmas: Vec<f64> = points.iter().map(|point| point.sigma_us).collect();
+    let mut result = fit(&sigmas)?;
+    if points.iter().any(|point| point.velocity_sigma_mps > 0.0) {
+        for _ in 0..VARIANCE_ROUNDS {
+            for (sigma, point) in sigmas.iter_mut().zip(points) {
+                let from_velocity = result.1.slope(point.velocity_mps) * point.velocity_sigma_mps;
+                *sigma = point.sigma_us.hypot(from_velocity);
+            }
+            result = fit(&sigmas)?;
+        }
+    }
+    Ok((result, sigmas))
+}
+
+fn residuals(points: &[Point], sigmas: &[f64], law: Law) -> Vec<f64> {
+    let residual = |(point, sigma): (&Point, &f64)| {
+        (point.pulse_us - law.pulse_us(point.velocity_mps)) / sigma
+    };
+    points.iter().zip(sigmas).map(residual).collect()
+}
+
+fn sum_of_squares(residuals: &[f64]) -> f64 {
+    residuals.iter().map(|residual| residual * residual).sum()
+}
+
+/// Weighted straight line `u = slope x + constant` in closed form, centred for precision.
+fn weighted_line(
+    points: &[Point],
+    sigmas: &[f64],
+    x: impl Fn(&Point) -> f64,
+) -> Option<(f64, f64)> {
+    let (mut weight, mut mean_x, mut mean_u) = (0.0, 0.0, 0.0);
+    for (point, sigma) in points.iter().zip(sigmas) {
+        let w = 1.0 / (sigma * sigma);
+        weight += w;
+        mean_x += w * x(point);
+        mean_u += w * point.pulse_us;
+    }
+    mean_x /= weight;
+    mean_u /= weight;
+    let (mut xx, mut xu) = (0.0, 0.0);
+    for (point, sigma) in points.iter().zip(sigmas) {
+        let w = 1.0 / (sigma * sigma);
+        let dx = x(point) - mean_x;
+        xx += w * dx * dx;
+        xu += w * dx * (point.pulse_us - mean_u);
+    }
+    // Squared spread of x below (1e-6)²: all velocities equal.
+    (xx > weight * 1e-12).then(|| (xu / xx, mean_u - xu / xx * mean_x))
+}
+
+fn grid() -> impl Iterator<Item = f64> {
+    let half = (W_LIMIT_MPS / W_STEP_MPS).round() as i32;
+    (-half..=half).map(|step| f64::from(step) * W_STEP_MPS)
+}
+
+/// Grid values of W at the local minima inside the profile, edges excluded.
+fn minima_of(profile: &[f64]) -> impl Iterator<Item = f64> + '_ {
+    let values: Vec<f64> = grid().collect();
+    let inside = |(index, triple): (usize, &[f64])| {
+        let [left, middle, right] = *triple else { return None };
+        (middle <= left && middle < right).then(|| values.get(index + 1).copied())?
+    };
+    profile.windows(3).enumerate().filter_map(inside).collect::<Vec<_>>().into_iter()
+}
+
+struct Minima {
+    best: Solution,
+    others: Vec<Solution>,
+    warning: Option<String>,
+}
+
+fn law_of(solution: &Solution) -> Law {
+    let p = &solution.parameters;
+    Law::SignedQuadratic { a: p[0], u0_us: p[1], w_mps: p[2] }
+}
+
+/// Profiles chi² over W and polishes every local minimum with a positive A.
+fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
+    let at = |w_mps: f64| {
+        let regressor = |point: &Point| signed_square(point.velocity_mps - w_mps);
+        let (a, u0_us) = weighted_line(points, sigmas, regressor)?;
+        let law = Law::SignedQuadratic { a, u0_us, w_mps };
+        Some((sum_of_squares(&residuals(points, sigmas, law)), [a, u0_us, w_mps]))
+    };
+    let profiled: Vec<_> = grid().map(at).collect();
+    let chi2: Vec<f64> =
+        profiled.iter().map(|entry| entry.map_or(f64::INFINITY, |(chi2, _)| chi2)).collect();
+    let law = |p: &[f64]| Law::SignedQuadratic { a: p[0], u0_us: p[1], w_mps: p[2] };
+    let derivatives = |p: &[f64]| {
+        DMatrix::from_fn(points.len(), 3, |row, column| {
+            let air = points[row].velocity_mps - p[2];
+            let derivative = [signed_square(air), 1.0, -2.0 * p[0] * air.abs()][column];
+            -derivative / sigmas[row]
+        })
+    };
+    let polish = |start: [f64; 3]| {
+        minimize_with(|p| residuals(points, sigmas, law(p)), Some(&derivatives), &start)
+    };
+    let mut minima: Vec<Solution> = minima_of(&chi2)
+        .filter_map(at)
+        .filter(|(_, start)| start[0] > 0.0)
+        .filter_map(|(_, start)| polish(start).ok())
+        .filter(|solution| {
+            solution.parameters[0] > 0.0 && solution.parameters[2].abs() <= W_LIMIT_MPS
+        })
+        .collect();
+    minima.sort_by(|left, right| left.chi2.total_cmp(&right.chi2));
+    minima.dedup_by(|later, earlier| {
+        (later.parameters[2] - earlier.parameters[2]).abs() < W_STEP_MPS / 2.0
+    });
+    let edge = [profiled.first(), profiled.last()]
+        .into_iter()
+        .filter_map(|entry| entry.copied().flatten())
+        .min_by(|left, right| left.0.total_cmp(&right.0));
+    if minima.is_empty() {
+        let (_, start) = edge.ok_or(FitError::Singular)?;
+        let best = held_at(points, sigmas, start)?;
+        let warning = format!(
+            "no minimum inside |W| < {W_LIMIT_MPS} m/s, the parameters are those at the edge: the \
+             points do not have the signed-quadratic shape (compare the linear law)"
+        );
+        return Ok(Minima { best, others: Vec::new(), warning: Some(warning) });
+    }
+    let best = minima.remove(0);
+    let warning = edge.filter(|(chi2, _)| *chi2 < best.chi2).map(|(chi2, at)| {
+        format!(
+            "chi2 falls from {:.3} at the minimum to {chi2:.3} at the edge of the range, W = {:.0} \
+             m/s: the points do not have the signed-quadratic shape (compare the linear law)",
+            best.chi2, at[2]
+        )
+    });
+    Ok(Minima { best, others: minima, warning })
+}
+
+/// The point of the profile itself, with the covariance of all three parameters there.
+fn held_at(points: &[Point], sigmas: &[f64], start: [f64; 3]) -> Result<Solution, FitError> {
+    let [_, _, w_mps] = start;
+    let two = minimize(
+        |p| residuals(points, sigmas, Law::SignedQuadratic { a: p[0], u0_us: p[1], w_mps }),
+        &start[..2],
+    )?;
+    let covariance = two.covariance.resize(3, 3, 0.0);
+    let parameters = vec![two.parameters[0], two.parameters[1], w_mps];
+    Ok(Solution { parameters, covariance, dof: points.len().saturating_sub(3), ..two })
+}
+
+/// Packs a solution of the free parameters into the result type.
+fn describe(
+    points: &[Point],
+    sigmas: &[f64],
+    law: Law,
+    solution: &Solution,
+    names: &[(&str, &str)],
+    free: &[bool],
+    scale: ErrorScale,
+) -> Fit {
+    let values = match law {
+        Law::SignedQuadratic { a, u0_us, w_mps } => vec![a, u0_us, w_mps],
+        Law::Linear { slope, u0_us } => vec![slope, u0_us],
+    };
+    let factor = match scale {
+        ErrorScale::Unscaled => 1.0,
+        ErrorScale::Scaled => solution.chi2_reduced().unwrap_or(1.0),
+    };
+    let n = values.len();
+    let mut covariance = vec![0.0; n * n];
+    let places: Vec<usize> = (0..n).filter(|index| free[*index]).collect();
+    for (i, row) in places.iter().enumerate() {
+        for (j, column) in places.iter().enumerate() {
+            covariance[row * n + column] = solution.covariance[(i, j)] * factor;
+        }
+    }
+    let parameters = names
+        .iter()
+        .zip(values)
+        .enumerate()
+        .map(|(index, ((name, unit), value))| Parameter {
+            name: (*name).to_owned(),
+            unit: (*unit).to_owned(),
+            estimate: Estimate::new(value, covariance[index * n + index].max(0.0).sqrt()),
+            held: !free[index],
+        })
+        .collect();
+    let mut warnings = Vec::new();
+    if !solution.converged {
+        warnings.push("the optimiser ran out of patience before it converged".to_owned());
+    }
+    let squares: f64 =
+        points.iter().map(|p| (p.pulse_us - law.pulse_us(p.velocity_mps)).powi(2)).sum();
+    let chi2 = sum_of_squares(&residuals(points, sigmas, law));
+    Fit {
+        parameters,
+        covariance,
+        points: points.len(),
+        chi2,
+        chi2_reduced: (solution.dof > 0).then(|| chi2 / solution.dof as f64),
+        p_value: p_value(chi2, solution.dof),
+        dof: solution.dof,
+        rms_us: (squares / points.len() as f64).sqrt(),
+        other_minima: Vec::new(),
+        warnings,
+    }
+}

@@ -1,0 +1,103 @@
+//! Location, spread and standard error of samples in a window.
+
+use super::result::SampleStats;
+
+/// Share cut off at each end for the trimmed mean.
+const TRIM: f64 = 0.1;
+
+/// Statistics of samples with their times. The standard error comes from the means of blocks of
+/// `block_s` (longer than the signal's memory), so that it does not shrink with the logging rate.
+pub(crate) fn sample_stats(times_s: &[f64], values: &[f64], block_s: f64) -> SampleStats {
+    let n = times_s.len().min(values.len());
+    let (times_s, values) = (times_s.get(..n).unwrap_or(&[]), values.get(..n).unwrap_or(&[]));
+    if n == 0 {
+        return SampleStats::default();
+    }
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (mean, sd) = mean_sd(values);
+    let cut = (n as f64 * TRIM).floor() as usize;
+    let kept = sorted.get(cut..n - cut).filter(|kept| !kept.is_empty()).unwrap_or(&sorted);
+    SampleStats {
+        median: median_of_sorted(&sorted),
+        mean,
+        sd,
+        n,
+        trimmed: mean_sd(kept).0,
+        se: block_error(times_s, values, block_s).unwrap_or(sd / (n as f64).sqrt()),
+    }
+}
+
+/// Mean and sample standard deviation (0 for fewer than two values).
+pub(crate) fn mean_sd(values: &[f64]) -> (f64, f64) {
+    let n = values.len();
+    if n == 0 {
+        return (0.0, 0.0);
+    }
+    let mean = values.iter().sum::<f64>() / n as f64;
+    if n == 1 {
+        return (mean, 0.0);
+    }
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, (squares / (n - 1) as f64).sqrt())
+}
+
+fn median_of_sorted(sorted: &[f64]) -> f64 {
+    let middle = sorted.len() / 2;
+    let upper = sorted.get(middle).copied().unwrap_or(0.0);
+    if sorted.len() % 2 == 1 {
+        return upper;
+    }
+    let lower = middle.checked_sub(1).and_then(|lower| sorted.get(lower)).copied();
+    f64::midpoint(lower.unwrap_or(upper), upper)
+}
+
+/// Standard error of the mean from block means; `None` with fewer than three blocks.
+pub(crate) fn block_error(times_s: &[f64], values: &[f64], block_s: f64) -> Option<f64> {
+    let start = *times_s.first()?;
+    let mut means: Vec<f64> = Vec::new();
+    let mut block = (-1_i64, 0.0, 0_u32);
+    for (time, value) in times_s.iter().zip(values) {
+        let index = ((time - start) / block_s).floor() as i64;
+        if index != block.0 {
+            if block.2 > 0 {
+                means.push(block.1 / f64::from(block.2));
+            }
+            block = (index, 0.0, 0);
+        }
+        block.1 += value;
+        block.2 += 1;
+    }
+    if block.2 > 0 {
+        means.push(block.1 / f64::from(block.2));
+    }
+    (means.len() >= 3).then(|| mean_sd(&means).1 / (means.len() as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn textbook_numbers() {
+        let values = [2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0, 90.0, -90.0];
+        let times: Vec<f64> = (0..10).map(f64::from).collect();
+        let stats = sample_stats(&times, &values, 2.0);
+        assert_eq!((stats.median, stats.mean, stats.n), (4.5, 4.0, 10));
+        assert_eq!(stats.trimmed, 5.0, "the two outliers are cut");
+        assert_eq!(sample_stats(&[], &[], 1.0), SampleStats::default());
+    }
+
+    #[test]
+    fn the_block_error_does_not_shrink_with_the_logging_rate() {
+        // A square wave of 4 s: samples repeat, information does not.
+        let wave = |rate: usize| {
+            let times: Vec<f64> = (0..40 * rate).map(|i| i as f64 / rate as f64).collect();
+            let values: Vec<f64> =
+                times.iter().map(|t| if (t / 2.0) as i64 % 2 == 0 { 1.0 } else { -1.0 }).collect();
+            sample_stats(&times, &values, 2.0).se
+        };
+        assert!((wave(10) - wave(100)).abs() < 1e-12);
+        assert!((wave(10) - 1.0 / 19.0_f64.sqrt()).abs() < 1e-9, "{}", wave(10));
+    }
+}

@@ -1,0 +1,289 @@
+//! The map of the air (eqs. 6-7): `W = V_U - f⁻¹(u_phi)` on running 10 s means, then on a common
+//! 1 s grid.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::law::Law;
+use super::result::Fit;
+use super::stats::{block_error, mean_sd};
+use super::windows::Target;
+use crate::base::estimate::Estimate;
+use crate::flight::{Flight, Series};
+
+/// Length of the running window, s.
+pub const RUNNING_S: f64 = 10.0;
+/// A silence longer than this breaks a running window, s.
+const GAP_S: f64 = 1.0;
+/// Fewest running values in a 1 s bin.
+const FEWEST_PER_BIN: usize = 3;
+/// Blocks for the error of the mean: twice the running window, so that blocks are nearly independent.
+const BLOCK_S: f64 = 20.0;
+/// No map is longer, whatever times a damaged log claims, s.
+const LONGEST_S: usize = 200_000;
+/// Below this air velocity the inverse of the signed-quadratic law is too steep to propagate errors
+/// through; this velocity's slope stands in, m/s.
+const STEEP_MPS: f64 = 0.05;
+
+/// One drone's updraft on the 1 s grid, before the fleet's common times are known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DroneSeries {
+    /// Whole second of show time of the first bin; bin k covers [k - 0.5, k + 0.5).
+    pub first_s: i64,
+    /// Estimates, m/s, up positive; `None` where the log has a gap.
+    pub updraft_mps: Vec<Option<f64>>,
+    /// Mean over the hover. Its error joins the scatter of 20 s blocks and the errors of the law.
+    pub mean: Estimate,
+    /// Mean height above home, m.
+    pub height_m: f64,
+}
+
+/// The longest hover among the windows: where a measurement looks.
+pub fn hover(targets: &[Target]) -> Option<&Target> {
+    let length = |target: &&Target| target.end_s - target.start_s;
+    targets
+        .iter()
+        .filter(|target| target.kind.is_hover())
+        .max_by(|left, right| length(left).total_cmp(&length(right)))
+}
+
+/// Estimates the vertical air speed over a hover with a law and its fit's covariance.
+///
+/// `None` when the hover has no full running window without a gap.
+pub fn estimate(
+    flight: &Flight,
+    pulse_phi_us: &Series,
+    hover: &Target,
+    fit: &Fit,
+) -> Option<DroneSeries> {
+    let law = Law::from_fit(fit)?;
+    let velocity = Running::new(&flight.velocity_up_mps, hover.start_s, hover.end_s);
+    let pulse = Running::new(pulse_phi_us, hover.start_s, hover.end_s);
+    let half = RUNNING_S / 2.0;
+    let mut values = Series::default();
+    for time in pulse_phi_us.times_between(hover.start_s + half, hover.end_s - half) {
+        let (Some(velocity), Some(pulse)) = (velocity.mean(*time), pulse.mean(*time)) else {
+            continue;
+        };
+        let updraft = velocity - law.air_velocity_mps(pulse);
+        if updraft.is_finite() {
+            values.time_s.push(*time);
+            values.value.push(updraft);
+        }
+    }
+    let (first, last) = values.span()?;
+    let first_s = first.round() as i64;
+    let seconds = usize::try_from(last.round() as i64 - first_s + 1).ok()?.min(LONGEST_S);
+    let bin = |index: usize| {
+        let centre = (first_s + index as i64) as f64;
+        let values = values.between(centre - 0.5, centre + 0.5);
+        (values.len() >= FEWEST_PER_BIN).then(|| mean_sd(values).0)
+    };
+    let updraft_mps: Vec<Option<f64>> = (0..seconds).map(bin).collect();
+    let (times, known): (Vec<f64>, Vec<f64>) = updraft_mps
+        .iter()
+        .enumerate()
+        .filter_map(|(index, value)| Some(((first_s + index as i64) as f64, (*value)?)))
+        .unzip();
+    let (mean, sd) = mean_sd(&known);
+    if known.is_empty() {
+        return None;
+    }
+    let scatter = block_error(&times, &known, BLOCK_S).unwrap_or(sd);
+    let mean_pulse = mean_sd(pulse_phi_us.between(hover.start_s, hover.end_s)).0;
+    let from_law = law_error_mps(law, fit, mean_pulse);
+    Some(DroneSeries {
+        first_s,
+        updraft_mps,
+        mean: Estimate::new(mean, scatter.hypot(from_law)),
+        height_m: mean_sd(flight.height_m.between(hover.start_s, hover.end_s)).0,
+    })
+}
+
+/// Error of `f⁻¹(u)` from the covariance of the law's parameters, m/s.
+fn law_error_mps(law: Law, fit: &Fit, pulse_us: f64) -> f64 {
+    let gradient = match law {
+        Law::Linear { slope, u0_us } => {
+            vec![-(pulse_us - u0_us) / (slope * slope), -1.0 / slope]
+        }
+        Law::SignedQuadratic { a, .. } => {
+            let air = law.air_velocity_mps(pulse_us);
+            let steep = air.abs().max(STEEP_MPS);
+            // W of the calibration is not a property of the drone: it does not enter the inverse.
+            vec![-air / (2.0 * a), -1.0 / (2.0 * a * steep), 0.0]
+        }
+    };
+    let n = gradient.len();
+    if fit.covariance.len() != n * n {
+        return 0.0;
+    }
+    let gradient = DVector::from_vec(gradient);
+    let covariance = DMatrix::from_row_slice(n, n, &fit.covariance);
+    (gradient.transpose() * covariance * gradient)[(0, 0)].max(0.0).sqrt()
+}
+
+/// Time-weighted running means by prefix sums, so that the logging rate does not matter.
+struct Running<'a> {
+    times: &'a [f64],
+    /// Integral of the piecewise linear signal up to each sample.
+    integral: Vec<f64>,
+    /// Index of the last gap's end at or before each sample.
+    gap_before: Vec<usize>,
+}
+
+impl<'a> Running<'a> {
+    fn new(series: &'a Series, start_s: f64, end_s: f64) -> Self {
+        let range = series.range(start_s - GAP_S, end_s + GAP_S);
+        let times = series.time_s.get(range.clone()).unwrap_or_default();
+        let values = series.value.get(range).unwrap_or_default();
+        let mut integral = Vec::with_capacity(times.len());
+        let mut gap_before = Vec::with_capacity(times.len());
+        let (mut sum, mut gap) = (0.0, 0);
+        let mut before: Option<(f64, f64)> = None;
+        for (index, (time, value)) in times.iter().zip(values).enumerate() {
+            if let Some((last, last_value)) = before {
+                let step = time - last;
+                sum += step * f64::midpoint(*value, last_value);
+                if step > GAP_S {
+                    gap = index;
+                }
+            }
+            before = Some((*time, *value));
+            integral.push(sum);
+            gap_before.push(gap);
+        }
+        Self { times, integral, gap_before }
+    }
+
+    /// Mean over the full window centred on a time; `None` across gaps and beyond the ends.
+    fn mean(&self, centre_s: f64) -> Option<f64> {
+        let half = RUNNING_S / 2.0;
+        let first = self.times.partition_point(|time| *time < centre_s - half);
+        let last = self.times.partition_point(|time| *time <= centre_s + half).checked_sub(1)?;
+        if last <= first || *self.gap_before.get(last)? > first {
+            return None;
+        }
+        let (start, end) = (*self.times.get(first)?, *self.times.get(last)?);
+        if start - (centre_s - half) > GAP_S || (centre_s + half) - end > GAP_S {
+            return None;
+        }
+        Some((self.integral.get(last)? - self.integral.get(first)?) / (end - start))
+    }
+}
+
+/// The common times of all drones: from the earliest first bin to the latest last one.
+pub fn common_times(drones: &[DroneSeries]) -> Vec<i64> {
+    let first = drones.iter().map(|drone| drone.first_s).min();
+    let last = drones.iter().map(|drone| drone.first_s + drone.updraft_mps.len() as i64).max();
+    match (first, last) {
+        (Some(first), Some(last)) => (first..last).take(LONGEST_S).collect(),
+        _ => Vec::new(),
+    }
+}
+
+impl DroneSeries {
+    /// The estimates at common times, `None` outside the drone's own.
+    pub fn at(&self, times_s: &[i64]) -> Vec<Option<f64>> {
+        let value = |time: &i64| {
+            let index = usize::try_from(time - self.first_s).ok()?;
+            self.updraft_mps.get(index).copied().flatten()
+        };
+        times_s.iter().map(value).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::law::{ErrorScale, Point, linear, signed_quadratic};
+    use crate::mission::plan::Kind;
+
+    const RATE: f64 = 10.0;
+
+    fn linear_fit() -> Fit {
+        fit(Law::Linear { slope: 26.4, u0_us: 1546.5 })
+    }
+
+    fn fit(law: Law) -> Fit {
+        let points: Vec<Point> = (-7..=7)
+            .filter(|rung| *rung != 0)
+            .map(|rung| {
+                let velocity_mps = 0.5 * f64::from(rung);
+                Point {
+                    velocity_mps,
+                    pulse_us: law.pulse_us(velocity_mps),
+                    sigma_us: 0.3,
+                    velocity_sigma_mps: 0.0,
+                }
+            })
+            .collect();
+        match law {
+            Law::Linear { .. } => linear(&points, ErrorScale::Unscaled).unwrap(),
+            Law::SignedQuadratic { .. } => signed_quadratic(&points, ErrorScale::Unscaled).unwrap(),
+        }
+    }
+
+    /// A hover of 300 s in air that rises as `air` says; the drone drifts at 0.05 m/s.
+    fn flown(law: Law, air: impl Fn(f64) -> f64) -> (Flight, Series) {
+        let time_s: Vec<f64> = (0..3000).map(|index| f64::from(index) / RATE).collect();
+        let pulse: Vec<f64> = time_s.iter().map(|time| law.pulse_us(0.05 - air(*time))).collect();
+        let flight = Flight {
+            velocity_up_mps: Series { time_s: time_s.clone(), value: vec![0.05; 3000] },
+            ..Flight::default()
+        };
+        (flight, Series { time_s, value: pulse })
+    }
+
+    fn hover() -> Target {
+        let label = String::new();
+        Target { kind: Kind::Hover, label, start_s: 0.0, end_s: 300.0, commanded_mps: 0.0 }
+    }
+
+    #[test]
+    fn steady_air_is_measured_by_both_laws() {
+        for law in [
+            Law::Linear { slope: 26.4, u0_us: 1546.5 },
+            Law::SignedQuadratic { a: 8.14, u0_us: 1598.6, w_mps: 0.0 },
+        ] {
+            for truth in [-3.0, -0.4, 0.7, 2.0] {
+                let (flight, pulse) = flown(law, |_| truth);
+                let found = estimate(&flight, &pulse, &hover(), &fit(law)).unwrap();
+                assert!((found.mean.value - truth).abs() < 1e-3, "{law:?}: {}", found.mean);
+                assert!(found.mean.se > 0.0, "the law's own error is in");
+                let first_and_last = (found.first_s, found.updraft_mps.len());
+                assert_eq!(first_and_last, (5, 291), "only full windows: 5 s to 295 s");
+            }
+        }
+    }
+
+    #[test]
+    fn a_gap_is_none_and_does_not_bleed_into_the_rest() {
+        let law = Law::Linear { slope: 26.4, u0_us: 1546.5 };
+        let (flight, mut pulse) = flown(law, |time| if time < 150.0 { 0.5 } else { -0.5 });
+        let keep: Vec<usize> =
+            (0..3000).filter(|i| !(140.0..160.0).contains(&pulse.time_s[*i])).collect();
+        pulse = Series {
+            time_s: keep.iter().map(|i| pulse.time_s[*i]).collect(),
+            value: keep.iter().map(|i| pulse.value[*i]).collect(),
+        };
+        let found = estimate(&flight, &pulse, &hover(), &linear_fit()).unwrap();
+        let at = |time: i64| found.at(&[time])[0];
+        assert!((at(130).unwrap() - 0.5).abs() < 1e-9);
+        assert!((at(170).unwrap() + 0.5).abs() < 1e-9);
+        assert!((137..=163).all(|time| at(time).is_none()), "no value mixes both sides");
+        assert_eq!(at(-3), None);
+    }
+
+    #[test]
+    fn a_slow_wave_is_followed_without_lag() {
+        let law = Law::Linear { slope: 26.4, u0_us: 1546.5 };
+        let wave = |time: f64| 0.8 * (time / 60.0 * std::f64::consts::TAU).sin();
+        let (flight, pulse) = flown(law, wave);
+        let found = estimate(&flight, &pulse, &hover(), &linear_fit()).unwrap();
+        // A centred 10 s mean keeps the phase and damps a 60 s wave by sinc(pi/6) = 0.955.
+        for time in [20_i64, 75, 130, 222] {
+            let expected = 0.9549 * wave(time as f64);
+            let value = found.at(&[time])[0].unwrap();
+            assert!((value - expected).abs() < 0.01, "{time}: {value} {expected}");
+        }
+    }
+}

@@ -1,0 +1,360 @@
+//! Windows: intervals of constant commanded velocity, from the plan or from the log itself, and what
+//! the vehicle did in them.
+//!
+//! The paper's rule: of a leg the last 10 s without the last second; of a hover all but the first
+//! 3 s (the controller's overshoot) and the last second.
+
+use super::result::{Rejection, SampleStats, WindowStats};
+use super::stats::sample_stats;
+use crate::flight::{Flight, Series};
+use crate::mission::plan::{Kind, Segment};
+
+/// How the pulse width is corrected for tilt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Tilt {
+    /// The paper's `u cos(phi)`. It scales the whole pulse, also the 1000 us that make no thrust:
+    /// at 11.7 degrees of tilt that is 20 us too much.
+    #[default]
+    Paper,
+    /// `(u - 1000) cos(phi) + 1000`: exact where thrust is linear in the pulse above 1000 us.
+    Excess,
+}
+
+/// Window rules.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WindowOptions {
+    /// Tilt correction.
+    pub tilt: Tilt,
+    /// Block length for standard errors, s: longer than the memory of gusts and controller.
+    pub block_s: f64,
+    /// A window is rejected when the mean velocity is further than this from the command, m/s.
+    pub follow_limit_mps: f64,
+}
+
+impl Default for WindowOptions {
+    fn default() -> Self {
+        Self { tilt: Tilt::Paper, block_s: 1.0, follow_limit_mps: 0.3 }
+    }
+}
+
+/// Where to look and what was commanded there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    /// Kind of the segment.
+    pub kind: Kind,
+    /// Label for people.
+    pub label: String,
+    /// Start of the window, show time, s.
+    pub start_s: f64,
+    /// End of the window, excluded, s.
+    pub end_s: f64,
+    /// Commanded vertical velocity, up positive, m/s.
+    pub commanded_mps: f64,
+}
+
+/// Last part of a leg that is used, s.
+const LEG_USED_S: f64 = 10.0;
+/// Cut at the end of every window, s.
+const END_CUT_S: f64 = 1.0;
+/// Cut at the start of a hover (and the least cut at the start of a leg), s.
+const START_CUT_S: f64 = 3.0;
+/// Shortest constant command that is a leg or hover, s.
+const SHORTEST_RUN_S: f64 = 8.0;
+/// Shortest stretch of a logged command that counts as steady, s.
+const SHORTEST_STEADY_S: f64 = 4.0;
+/// Longest time that a vehicle takes from one steady command to the next, s.
+const LONGEST_TRANSITION_S: f64 = 5.0;
+/// Legs shorter than this share of the longest one are transfers, not rungs.
+const TRANSFER_SHARE: f64 = 0.6;
+/// Wobble of a constant command, m/s (firmware adds its own corrections in some messages).
+const STEADY_MPS: f64 = 0.03;
+/// A command below this is a hover, m/s.
+const HOVER_MPS: f64 = 0.05;
+/// A silence longer than this breaks a window, s.
+const GAP_S: f64 = 1.0;
+/// A silence longer than this breaks a run of commands (some logs have them once a second), s.
+const RUN_GAP_S: f64 = 1.5;
+/// Fewest samples in a usable window.
+const FEWEST_SAMPLES: usize = 5;
+/// A commanded velocity further than this from the plan's is another plan's, m/s.
+const WRONG_MPS: f64 = 0.3;
+/// Pulse quantum, us: a motor within it of its limit is at the limit.
+const QUANTUM_US: f64 = 1.0;
+
+/// Windows of a plan's segments: legs, hovers and horizontal legs that carry one.
+pub fn planned(segments: &[Segment]) -> Vec<Target> {
+    let analysed = |segment: &&Segment| {
+        segment.kind.is_leg() || segment.kind.is_hover() || segment.kind == Kind::Horizontal
+    };
+    let target = |segment: &Segment| {
+        let window = segment.window?;
+        Some(Target {
+            kind: segment.kind,
+            label: segment.label.clone(),
+            start_s: window.start_ms as f64 / 1000.0,
+            end_s: window.end_ms as f64 / 1000.0,
+            commanded_mps: round_mmps(segment.velocity_mps[2]),
+        })
+    };
+    segments.iter().filter(analysed).filter_map(target).collect()
+}
+
+/// Windows from the log's own desired velocity: wherever it is constant for 8 s or more.
+///
+/// Horizontal legs are told from hovers where the log has horizontal commands. Legs much shorter
+/// than the longest (climbs to height, descents to land) are not rungs and are left out.
+pub fn inferred(flight: &Flight) -> Vec<Target> {
+    let Some(desired) = &flight.desired_up_mps else { return Vec::new() };
+    let mut runs: Vec<Run> = steady_runs(desired);
+    runs.retain(|run| run.duration_s() >= SHORTEST_STEADY_S);
+    let mut last_end = f64::NEG_INFINITY;
+    for run in &mut runs {
+        if run.steady_s - last_end <= LONGEST_TRANSITION_S {
+            run.start_s = last_end;
+        }
+        last_end = run.end_s;
+    }
+    runs.retain(|run| run.duration_s() >= SHORTEST_RUN_S && flies(flight, run));
+    let longest_leg = runs
+        .iter()
+        .filter(|run| run.velocity_mps.abs() > HOVER_MPS)
+        .map(Run::duration_s)
+        .fold(0.0, f64::max);
+    let target = |run: &Run| {
+        let velocity = run.velocity_mps;
+        if velocity.abs() <= HOVER_MPS {
+            let speed = flight
+                .desired_horizontal_mps
+                .as_ref()
+                .map(|series| mean(series.between(run.start_s, run.end_s)))
+                .unwrap_or_default();
+            let moves = speed > HOVER_MPS;
+            return Some(Target {
+                kind: if moves { Kind::Horizontal } else { Kind::Hover },
+                label: if moves { format!("level {speed:.1} m/s") } else { "hover".to_owned() },
+                start_s: (run.start_s + START_CUT_S).max(run.steady_s),
+                end_s: run.end_s - END_CUT_S,
+                commanded_mps: 0.0,
+            });
+        }
+        if run.duration_s() < TRANSFER_SHARE * longest_leg {
+            return None;
+        }
+        let (kind, word) =
+            if velocity > 0.0 { (Kind::LegUp, "up") } else { (Kind::LegDown, "down") };
+        Some(Target {
+            kind,
+            label: format!("{word} {} m/s", velocity.abs()),
+            start_s: (run.end_s - LEG_USED_S).max(run.start_s + START_CUT_S).max(run.steady_s),
+            end_s: run.end_s - END_CUT_S,
+            commanded_mps: velocity,
+        })
+    };
+    runs.iter().filter_map(target).collect()
+}
+
+struct Run {
+    /// When the command was given: where the run before ended, if the time between is a transition.
+    start_s: f64,
+    /// From when on the logged command is steady (firmware rounds off the plan's steps).
+    steady_s: f64,
+    end_s: f64,
+    velocity_mps: f64,
+}
+
+impl Run {
+    fn duration_s(&self) -> f64 {
+        self.end_s - self.start_s
+    }
+}
+
+/// Stretches over which the command stays put. A run ends where the next command begins.
+fn steady_runs(desired: &Series) -> Vec<Run> {
+    let mut runs = Vec::new();
+    let mut start = 0;
+    let mut sum = 0.0;
+    let n = desired.len();
+    let (times, values) = (&desired.time_s, &desired.value);
+    for index in 0..=n {
+        let current = times.get(index).copied().zip(values.get(index).copied());
+        let before = index.checked_sub(1).and_then(|before| times.get(before).copied());
+        let mean = sum / (index - start).max(1) as f64;
+        let goes_on = match (current, before) {
+            (Some((time, value)), Some(before)) if index > start => {
+                time - before <= RUN_GAP_S && (value - mean).abs() <= STEADY_MPS
+            }
+            (Some(_), _) => true,
+            (None, _) => false,
+        };
+        if !goes_on {
+            let mut window = values.get(start..index).unwrap_or_default().to_vec();
+            window.sort_by(f64::total_cmp);
+            if let (Some(start_s), Some(last), Some(median)) =
+                (times.get(start), before, window.get(window.len() / 2))
+            {
+                // The command held until the row that says otherwise, unless the log was silent.
+                let end_s = current
+                    .map_or(last, |(time, _)| if time - last <= RUN_GAP_S { time } else { last });
+                let velocity_mps = round_mmps(*median);
+                runs.push(Run { start_s: *start_s, steady_s: *start_s, end_s, velocity_mps });
+            }
+            start = index;
+            sum = 0.0;
+        }
+        sum += current.map_or(0.0, |(_, value)| value);
+    }
+    runs
+}
+
+/// Whether the vehicle is armed and off the ground in a run (a desired velocity of 0 is also logged
+/// while it stands).
+fn flies(flight: &Flight, run: &Run) -> bool {
+    let middle = f64::midpoint(run.start_s, run.end_s);
+    let armed = flight.armed_s.iter().any(|(start, end)| (*start..=*end).contains(&middle));
+    let pulses = flight.pulse_us.between(run.start_s, run.end_s);
+    // Standing, the motors idle well below the lowest output in flight.
+    let spins = mean(pulses) > flight.pulse_limits_us.0 - QUANTUM_US;
+    (armed || flight.armed_s.is_empty()) && spins
+}
+
+fn round_mmps(velocity_mps: f64) -> f64 {
+    // + 0.0 turns -0 into 0.
+    (velocity_mps * 1000.0).round() / 1000.0 + 0.0
+}
+
+fn mean(values: &[f64]) -> f64 {
+    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+}
+
+/// Channels derived from a flight at the times of its pulses.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Corrected {
+    /// Tilt-corrected pulse width u_phi, us.
+    pub pulse_phi_us: Series,
+    /// Tilt from the vertical, degrees.
+    pub tilt_deg: Series,
+}
+
+/// Corrects pulses for tilt, `phi = arctan sqrt(tan² pitch + tan² roll)`, with roll and pitch
+/// interpolated to the pulses' times. Pulses without attitude within 1 s are left out.
+pub fn correct_tilt(flight: &Flight, tilt: Tilt) -> Corrected {
+    let mut corrected = Corrected::default();
+    for (time, pulse) in flight.pulse_us.time_s.iter().zip(&flight.pulse_us.value) {
+        let (Some(roll), Some(pitch)) =
+            (nearby(&flight.roll_rad, *time), nearby(&flight.pitch_rad, *time))
+        else {
+            continue;
+        };
+        let phi = pitch.tan().hypot(roll.tan()).atan();
+        let value = match tilt {
+            Tilt::Paper => pulse * phi.cos(),
+            Tilt::Excess => (pulse - 1000.0) * phi.cos() + 1000.0,
+        };
+        corrected.pulse_phi_us.time_s.push(*time);
+        corrected.pulse_phi_us.value.push(value);
+        corrected.tilt_deg.time_s.push(*time);
+        corrected.tilt_deg.value.push(phi.to_degrees());
+    }
+    corrected
+}
+
+/// Interpolated value; at the ends of the log, where one neighbour is missing, the other one's.
+fn nearby(series: &Series, time_s: f64) -> Option<f64> {
+    series.at(time_s, GAP_S).or_else(|| series.latest(time_s, GAP_S)).or_else(|| {
+        let (first, _) = series.span()?;
+        (0.0..=GAP_S).contains(&(first - time_s)).then(|| series.value.first().copied())?
+    })
+}
+
+/// What the vehicle did in each window.
+pub fn measure(
+    flight: &Flight,
+    corrected: &Corrected,
+    targets: &[Target],
+    options: &WindowOptions,
+) -> Vec<WindowStats> {
+    targets.iter().map(|target| measure_one(flight, corrected, target, options)).collect()
+}
+
+fn measure_one(
+    flight: &Flight,
+    corrected: &Corrected,
+    target: &Target,
+    options: &WindowOptions,
+) -> WindowStats {
+    let (start, end) = (target.start_s, target.end_s);
+    let stats = |series: &Series| -> SampleStats {
+        sample_stats(series.times_between(start, end), series.between(start, end), options.block_s)
+    };
+    let velocity = stats(&flight.velocity_up_mps);
+    let pulse_phi = stats(&corrected.pulse_phi_us);
+    let mut rejected = Vec::new();
+    let (low, high) = flight.pulse_limits_us;
+    let touches = flight.pulse_max_us.between(start, end).iter().any(|u| *u >= high - QUANTUM_US)
+        || flight.pulse_min_us.between(start, end).iter().any(|u| *u <= low);
+    if touches {
+        rejected.push(Rejection::Saturated);
+    }
+    let needed = [&flight.velocity_up_mps, &corrected.pulse_phi_us];
+    let ends_early =
+        needed.iter().any(|series| series.span().is_none_or(|(_, last)| last < end - GAP_S));
+    if ends_early {
+        rejected.push(Rejection::Incomplete);
+    } else if needed.iter().any(|series| series.longest_gap_s(start, end) > GAP_S)
+        || velocity.n < FEWEST_SAMPLES
+        || pulse_phi.n < FEWEST_SAMPLES
+    {
+        rejected.push(Rejection::Gap);
+    }
+    if velocity.n > 0 && (velocity.mean - target.commanded_mps).abs() > options.follow_limit_mps {
+        rejected.push(Rejection::NotFollowing);
+    }
+    WindowStats {
+        kind: target.kind,
+        label: target.label.clone(),
+        start_s: start,
+        end_s: end,
+        commanded_mps: target.commanded_mps,
+        height_m: mean(flight.height_m.between(start, end)),
+        velocity_mps: velocity,
+        pulse_us: stats(&flight.pulse_us),
+        pulse_phi_us: pulse_phi,
+        tilt_deg: stats(&corrected.tilt_deg),
+        offset_us: None,
+        rejected,
+    }
+}
+
+/// Whether the log contradicts the plan: what was flown instead, if more than half of the plan's legs
+/// (or of its hovers, when it has no legs) were commanded otherwise. A log without commands is
+/// judged by its measured velocity.
+pub fn contradiction(flight: &Flight, targets: &[Target]) -> Option<String> {
+    let series = flight.desired_up_mps.as_ref().unwrap_or(&flight.velocity_up_mps);
+    let flown = |target: &Target| {
+        let values = series.between(target.start_s, target.end_s);
+        (!values.is_empty()).then(|| mean(values))
+    };
+    let has_legs = targets.iter().any(|target| target.kind.is_leg() && flown(target).is_some());
+    let compared: Vec<(&Target, f64)> = targets
+        .iter()
+        .filter(|target| !has_legs || target.kind.is_leg())
+        .filter_map(|target| Some((target, flown(target)?)))
+        .collect();
+    let wrong: Vec<&(&Target, f64)> = compared
+        .iter()
+        .filter(|(target, flown)| (flown - target.commanded_mps).abs() > WRONG_MPS)
+        .collect();
+    let (target, flown) = wrong.first().filter(|_| 2 * wrong.len() > compared.len())?;
+    Some(format!(
+        "this log does not belong to the plan: {} of {} {} were flown at another vertical speed \
+         (first: `{}` at {:.0} s, planned {} m/s, flown {flown:.2} m/s); check that the logs are \
+         in the folder of their own flight",
+        wrong.len(),
+        compared.len(),
+        if has_legs { "legs" } else { "windows" },
+        target.label,
+        target.start_s,
+        target.commanded_mps,
+    ))
+}

@@ -1,0 +1,136 @@
+//! Writes a flight's folder: template, vehicle, plan and the show in its three formats.
+
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::{CAMPAIGN_SCHEMA, CampaignError, CampaignIndex, FlightFolder, index_path, to_json};
+use crate::base::file::{FileError, create_folder, sweep_partial, write_whole};
+use crate::mission::resolve::{Mission, ResolvedFlight};
+use crate::show::{Show, csv, skyb, skyc};
+
+/// A flight's files could not be made.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// A file could not be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The folder cannot be used.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    /// The show does not fit into a `.skyb` file.
+    #[error("{drone} does not fit into a .skyb file")]
+    Skyb {
+        /// The drone.
+        drone: String,
+        /// Why.
+        #[source]
+        source: skyb::SkybError,
+    },
+    /// The show does not fit into a `.skyc` file.
+    #[error("the show does not fit into a .skyc file")]
+    Skyc(#[from] skyc::SkycError),
+    /// The show does not fit into the CSV format.
+    #[error("the show does not fit into the CSV format")]
+    Csv(#[from] csv::CsvError),
+    /// JSON or TOML could not be made.
+    #[error("failed to write {what} as text: {reason}")]
+    Text {
+        /// What.
+        what: &'static str,
+        /// Why not.
+        reason: String,
+    },
+}
+
+/// The files of one flight, made but not yet written.
+#[derive(Clone, Debug)]
+pub struct FlightFiles {
+    template: Vec<u8>,
+    vehicle: Vec<u8>,
+    plan: Vec<u8>,
+    skyc: Vec<u8>,
+    csv: Vec<u8>,
+    skyb: Vec<skyb::SkybFile>,
+}
+
+impl FlightFiles {
+    /// Makes the files; drones in parallel, bytes independent of the number of threads.
+    pub fn of(flight: &ResolvedFlight, show: &Show) -> Result<Self, WriteError> {
+        let text = |what, reason: String| WriteError::Text { what, reason };
+        let skyb = show
+            .drones
+            .par_iter()
+            .map(|drone| {
+                skyb::write(drone, &skyb::SkybOptions::default())
+                    .map_err(|source| WriteError::Skyb { drone: drone.name.clone(), source })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self {
+            template: flight.template_text.clone().into_bytes(),
+            vehicle: toml::to_string(&flight.vehicle)
+                .map_err(|error| text("the vehicle", error.to_string()))?
+                .into_bytes(),
+            plan: to_json(&flight.plan).map_err(|error| text("the plan", error.to_string()))?,
+            skyc: skyc::write(show)?,
+            csv: csv::write(show, &csv::CsvOptions::default())?,
+            skyb,
+        })
+    }
+
+    /// The compiled show.
+    pub fn skyc(&self) -> &[u8] {
+        &self.skyc
+    }
+
+    /// The plan's JSON.
+    pub fn plan(&self) -> &[u8] {
+        &self.plan
+    }
+
+    /// The binary shows, in slot order.
+    pub fn skyb(&self) -> &[skyb::SkybFile] {
+        &self.skyb
+    }
+
+    /// Writes all files; the plan last, so that a folder with a plan is complete.
+    pub fn write(&self, folder: &FlightFolder) -> Result<(), WriteError> {
+        create_folder(&folder.skyb_folder())?;
+        sweep_partial(&folder.0)?;
+        sweep_partial(&folder.skyb_folder())?;
+        write_whole(&folder.template(), &self.template)?;
+        write_whole(&folder.vehicle(), &self.vehicle)?;
+        write_whole(&folder.skyc(), &self.skyc)?;
+        write_whole(&folder.csv(), &self.csv)?;
+        let count = self.skyb.len();
+        self.skyb.par_iter().enumerate().try_for_each(|(index, file)| {
+            write_whole(&folder.skyb((index + 1) as u16, count), &file.bytes)
+        })?;
+        write_whole(&folder.plan(), &self.plan)?;
+        Ok(())
+    }
+}
+
+/// Folder of each flight of a mission below `root`: `root` itself for a single flight.
+pub fn folders(root: &std::path::Path, mission: &Mission) -> Vec<FlightFolder> {
+    if mission.campaign_text.is_none() {
+        return vec![FlightFolder(root.to_owned())];
+    }
+    mission.flights.iter().map(|flight| FlightFolder(root.join(&flight.plan.name))).collect()
+}
+
+/// Writes the index of a campaign of several flights, after its flights.
+pub fn write_index(root: &std::path::Path, mission: &Mission) -> Result<(), WriteError> {
+    let Some(text) = &mission.campaign_text else { return Ok(()) };
+    let index = CampaignIndex {
+        schema: CAMPAIGN_SCHEMA.to_owned(),
+        name: mission.name.clone(),
+        title: mission.title.clone(),
+        flights: mission.flights.iter().map(|flight| flight.plan.name.clone()).collect(),
+    };
+    write_whole(&root.join("campaign.toml"), text.as_bytes())?;
+    let json = to_json(&index)
+        .map_err(|error| WriteError::Text { what: "the index", reason: error.to_string() })?;
+    write_whole(&index_path(root), &json)?;
+    Ok(())
+}

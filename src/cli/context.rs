@@ -1,0 +1,104 @@
+//! What every command gets: where to print, how much to say, and whether to stop.
+
+use std::io::{self, IsTerminal, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::Serialize;
+
+use super::Global;
+use super::exit::CommandError;
+
+/// Output and interruption for one run of the program.
+#[derive(Clone, Debug)]
+pub(super) struct Context {
+    /// Say only what went wrong.
+    pub(super) quiet: bool,
+    /// One JSON object on standard output instead of tables.
+    pub(super) json: bool,
+    /// Whether standard output takes colours.
+    pub(super) color: bool,
+    /// Whether progress bars make sense.
+    pub(super) interactive: bool,
+    stop: Arc<AtomicBool>,
+}
+
+impl Context {
+    /// From the global options and the terminal.
+    pub(super) fn new(global: &Global) -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        let raised = Arc::clone(&stop);
+        // The second Ctrl-C ends at once: unfinished files are temporary and swept later.
+        let installed = ctrlc::set_handler(move || {
+            if raised.swap(true, Ordering::SeqCst) {
+                std::process::abort();
+            }
+        });
+        let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        let color = match global.color {
+            super::ColorChoice::Always => true,
+            super::ColorChoice::Never => false,
+            super::ColorChoice::Auto => io::stdout().is_terminal() && !no_color,
+        };
+        let context = Self {
+            quiet: global.quiet,
+            json: global.json,
+            color,
+            interactive: io::stderr().is_terminal() && !global.quiet && !global.no_progress,
+            stop,
+        };
+        if let Err(error) = installed {
+            context.warn(&format!("Ctrl-C ends the program at once ({error})"));
+        }
+        context
+    }
+
+    /// The flag that Ctrl-C raises.
+    pub(super) fn stop_flag(&self) -> &AtomicBool {
+        &self.stop
+    }
+
+    /// Ends the command if Ctrl-C was pressed.
+    pub(super) fn check_stop(&self) -> Result<(), CommandError> {
+        if self.stop.load(Ordering::SeqCst) { Err(CommandError::Interrupted) } else { Ok(()) }
+    }
+
+    /// Data, on standard output.
+    pub(super) fn print(&self, text: &str) -> Result<(), CommandError> {
+        let mut out = io::stdout().lock();
+        let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        match written {
+            Ok(()) => Ok(()),
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
+                Err(CommandError::BrokenPipe)
+            }
+            Err(error) => Err(CommandError::Failed(format!("failed to print: {error}"))),
+        }
+    }
+
+    /// Data as one JSON object, on standard output.
+    pub(super) fn print_json<T: Serialize>(&self, value: &T) -> Result<(), CommandError> {
+        let mut text = serde_json::to_string_pretty(value)
+            .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
+        text.push('\n');
+        self.print(&text)
+    }
+
+    /// Talk, on standard error, unless quiet.
+    pub(super) fn say(&self, text: &str) {
+        if !self.quiet {
+            let _ = writeln!(io::stderr().lock(), "{text}");
+        }
+    }
+
+    /// A warning, on standard error, always.
+    pub(super) fn warn(&self, text: &str) {
+        self.warn_as("warning", text);
+    }
+
+    /// Something that must be said even when quiet: `error: ...`, `warning: ...`.
+    #[expect(clippy::unused_self, reason = "talks like the other methods")]
+    pub(super) fn warn_as(&self, level: &str, text: &str) {
+        let _ = writeln!(io::stderr().lock(), "{level}: {text}");
+    }
+}

@@ -1,0 +1,169 @@
+//! `updraft plan`: a mission template becomes a campaign folder, if it is safe.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::check::{checked, say_findings};
+use super::clock::Stopwatch;
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use super::mission_args::MissionArgs;
+use super::timetable;
+use crate::campaign::write::{FlightFiles, folders, write_index};
+use crate::campaign::{self, CampaignError, FlightFolder};
+use crate::check::CheckReport;
+use crate::mission::Plan;
+use crate::mission::resolve::Mission;
+use crate::show::Show;
+
+/// Arguments of `updraft plan`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft plan templates/calibration.toml --grid 7x7 --spacing 7 --origin 47.4733,19.0621 -o my-campaign
+  updraft plan hover --drones 12 --set height_m=60 -o hover-60
+  updraft plan calibration-counterphase --dry-run
+
+Templates are files or built-in names: calibration, calibration-counterphase, hover, campaign.
+The grammar is in docs/templates.md.")]
+pub(super) struct PlanArgs {
+    /// Template: a file or a built-in name
+    template: String,
+    /// Campaign folder [default: the template's name]
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Replace another plan in the folder
+    #[arg(long)]
+    force: bool,
+    /// Plan and check, write nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Write the show although this check fails (by its name; may be repeated)
+    #[arg(long, value_name = "CHECK")]
+    allow: Vec<String>,
+    #[command(flatten)]
+    mission: MissionArgs,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct PlanOutput<'a> {
+    schema: &'static str,
+    folder: Option<&'a Path>,
+    flights: Vec<FlightOutput<'a>>,
+}
+
+#[derive(Serialize)]
+struct FlightOutput<'a> {
+    plan: &'a Plan,
+    check: &'a CheckReport,
+}
+
+pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandError> {
+    let watch = Stopwatch::start();
+    let mission = args.mission.resolve(&args.template)?;
+    let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(&mission.name));
+    let mut reports = Vec::new();
+    let mut safe = true;
+    for flight in &mission.flights {
+        let show = Show::of_plan(&flight.plan);
+        let report = checked(&show, &flight.plan, &args.allow)?;
+        if !context.json {
+            context.print(&timetable::describe(&flight.plan))?;
+            context.print("\n")?;
+        }
+        say_findings(context, &report, &args.allow);
+        safe &= super::check::is_safe(&report, &args.allow);
+        reports.push((show, report));
+    }
+    let written = safe && !args.dry_run;
+    if written {
+        write(context, &mission, &reports, &folder, args.force)?;
+    }
+    if context.json {
+        context.print_json(&PlanOutput {
+            schema: "updraft.plan-output/1",
+            folder: written.then_some(folder.as_path()),
+            flights: mission
+                .flights
+                .iter()
+                .zip(&reports)
+                .map(|(flight, (_, check))| FlightOutput { plan: &flight.plan, check })
+                .collect(),
+        })?;
+    }
+    let drones = mission.flights.first().map_or(0, |flight| flight.plan.slots.len());
+    if !safe {
+        context.say("Nothing was written: the show is not safe as it is");
+        return Ok(Exit::Unsafe);
+    }
+    if args.dry_run {
+        context.say(&format!("Would write {}", folder.display()));
+    } else {
+        context.say(&format!(
+            "Planned {} for {drones} drones in {watch} -> {}",
+            if mission.flights.len() == 1 { "one flight" } else { "two or more flights" },
+            folder.display()
+        ));
+    }
+    Ok(Exit::Done)
+}
+
+/// Writes the campaign folder, unless something else is there.
+pub(super) fn write(
+    context: &Context,
+    mission: &Mission,
+    shows: &[(Show, CheckReport)],
+    root: &Path,
+    force: bool,
+) -> Result<(), CommandError> {
+    let folders = folders(root, mission);
+    let mut files = Vec::with_capacity(folders.len());
+    for ((flight, folder), (show, _)) in mission.flights.iter().zip(&folders).zip(shows) {
+        context.check_stop()?;
+        let made = FlightFiles::of(flight, show).map_err(CommandError::Write)?;
+        refuse_occupied(root, folder, made.plan(), force)?;
+        files.push(made);
+    }
+    for (files, folder) in files.iter().zip(&folders) {
+        context.check_stop()?;
+        files.write(folder).map_err(CommandError::Write)?;
+    }
+    write_index(root, mission).map_err(CommandError::Write)
+}
+
+/// The same plan may be written again; another one only with `--force`, and never over logs.
+fn refuse_occupied(
+    root: &Path,
+    folder: &FlightFolder,
+    plan: &[u8],
+    force: bool,
+) -> Result<(), CommandError> {
+    let occupied = |what: &str| {
+        Err(CampaignError::Occupied { path: folder.0.clone(), what: what.to_owned() }.into())
+    };
+    if folder.0.as_path() != root && FlightFolder(root.to_owned()).plan().exists() {
+        return occupied("a plan of one flight");
+    }
+    if folder.0.as_path() == root && campaign::index_path(root).exists() {
+        return occupied("a campaign of several flights");
+    }
+    let existing = match std::fs::read(folder.plan()) {
+        Ok(existing) => existing,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => {
+            return Err(crate::base::file::FileError::new("read", &folder.plan(), error).into());
+        }
+    };
+    if existing == plan {
+        return Ok(());
+    }
+    if folder.record().exists() || folder.logs().is_dir() {
+        return Err(CommandError::Usage(format!(
+            "{} holds the logs of another plan; choose another folder",
+            folder.0.display()
+        )));
+    }
+    if force { Ok(()) } else { occupied("another plan") }
+}

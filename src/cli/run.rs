@@ -1,0 +1,99 @@
+//! `updraft run`: plan, check, fly, collect, analyse, report.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::analyze::{AnalyzeOptions, analyze_campaign};
+use super::check::{checked, is_safe, say_findings};
+use super::clock::Stopwatch;
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use super::mission_args::MissionArgs;
+use super::plan::write;
+use super::simulate::{AirArgs, Simulation, simulate, updraft};
+use crate::campaign;
+use crate::mission::plan::Purpose;
+use crate::show::Show;
+
+/// Arguments of `updraft run`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft run
+  updraft run --grid 3x3 --duration 120 --updraft -0.8 -o small
+  updraft run calibration-counterphase -o counterphase
+
+The calibration is flown in still air unless --calibration-updraft or --calibration-wind say
+otherwise; the measurement in the air that --updraft and --wind say. The same command goes on where
+an interrupted one stopped.")]
+pub(super) struct RunArgs {
+    /// Template: a file or a built-in name
+    #[arg(default_value = "campaign")]
+    template: String,
+    /// Campaign folder
+    #[arg(short, long, value_name = "FOLDER", default_value = "my-campaign")]
+    output: PathBuf,
+    /// Replace another plan in the folder, and logs simulated with other settings
+    #[arg(long)]
+    force: bool,
+    /// Vertical air speed in measurement flights, m/s, up positive
+    #[arg(long, value_name = "MPS", default_value_t = 1.0, value_parser = updraft, allow_hyphen_values = true)]
+    updraft: f64,
+    /// Vertical air speed in calibration flights, m/s, up positive
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
+    calibration_updraft: f64,
+    /// Horizontal wind speed in calibration flights, m/s
+    #[arg(long, value_name = "MPS", default_value_t = 0.0)]
+    calibration_wind: f64,
+    #[command(flatten)]
+    air: AirArgs,
+    #[command(flatten)]
+    mission: MissionArgs,
+}
+
+pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandError> {
+    let watch = Stopwatch::start();
+    let mission = args.mission.resolve(&args.template)?;
+    let mut shows = Vec::new();
+    for flight in &mission.flights {
+        let show = Show::of_plan(&flight.plan);
+        let report = checked(&show, &flight.plan, &[])?;
+        say_findings(context, &report, &[]);
+        if !is_safe(&report, &[]) {
+            context.say("Nothing was flown: the show is not safe as it is");
+            return Ok(Exit::Unsafe);
+        }
+        shows.push((show, report));
+    }
+    write(context, &mission, &shows, &args.output, args.force)?;
+    let drones = mission.flights.first().map_or(0, |flight| flight.plan.slots.len());
+    let names: Vec<_> = mission.flights.iter().map(|flight| flight.plan.name.as_str()).collect();
+    context.say(&format!(
+        "Planned {} for {drones} drones in {watch} -> {}",
+        names.join(" and "),
+        args.output.display()
+    ));
+    let mut lost = false;
+    for (folder, flight) in campaign::flights(&args.output)?.iter().zip(&mission.flights) {
+        let mut air = args.air.clone();
+        let updraft_mps = match flight.plan.purpose {
+            Purpose::Calibration => {
+                air.wind = args.calibration_wind;
+                args.calibration_updraft
+            }
+            Purpose::Measurement => args.updraft,
+        };
+        let simulation = Simulation {
+            air_mps: air.air_mps(updraft_mps),
+            seed: air.seed,
+            full_logs: air.full_logs,
+            vehicle: None,
+            only: None,
+            force: args.force,
+        };
+        lost |= !simulate(context, folder, &flight.plan, &simulation)?.failed.is_empty();
+    }
+    let exit = analyze_campaign(context, &args.output, &AnalyzeOptions::default())?;
+    context.say(&format!("Done in {watch}"));
+    Ok(if lost { Exit::Losses } else { exit })
+}

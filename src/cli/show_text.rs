@@ -1,0 +1,155 @@
+//! Shows as people read them, for `inspect`.
+
+use std::fmt::Write as _;
+
+use crate::show::summary::{DroneSummary, ShowSummary, SkybSummary};
+
+/// Drones listed one by one.
+const MAX_DRONES: usize = 60;
+
+/// A show: head, bounds, one line per drone.
+pub(super) fn describe_show(show: &ShowSummary) -> String {
+    let mut text = String::new();
+    let count = show.drones.len();
+    let title = show.title.as_deref().map_or(String::new(), |title| format!("\"{title}\", "));
+    let plural = if count == 1 { "" } else { "s" };
+    let _ = writeln!(text, "{title}{count} drone{plural}, {:.3} s", show.duration_s);
+    if let Some((lat, lon, amsl)) = show.origin {
+        let _ = write!(text, "origin {lat:.7}, {lon:.7}");
+        if let Some(amsl) = amsl {
+            let _ = write!(text, ", {amsl} m above sea level");
+        }
+        if let Some(orientation) = show.orientation_deg {
+            let _ = write!(text, ", x towards {orientation}°");
+        }
+        text.push('\n');
+    }
+    let [low, high] = show.bounds_m;
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let gap = if axis == 0 { "" } else { ", " };
+        let _ = write!(text, "{gap}{name} {:.3}..{:.3} m", low[axis], high[axis]);
+    }
+    let speeds = show.speeds;
+    let _ = writeln!(
+        text,
+        "; up {:.2}, down {:.2}, horizontal {:.2} m/s at most",
+        speeds.up_mps, speeds.down_mps, speeds.horizontal_mps
+    );
+    let _ =
+        writeln!(text, "{} cues, fence of {} corners", show.cues.len(), show.fence_polygon_m.len());
+    let _ = writeln!(
+        text,
+        "\n{:<14} {:>24} {:>9} {:>7} {:>6} {:>6} {:>9} {:>15} {:>15}",
+        "drone",
+        "start m",
+        "lasts s",
+        "pieces",
+        "skyb B",
+        "unit",
+        "error mm",
+        "4.4 take-off s",
+        "4.6 take-off s"
+    );
+    for drone in show.drones.iter().take(MAX_DRONES) {
+        describe_drone(&mut text, drone);
+    }
+    if count > MAX_DRONES {
+        let _ = writeln!(text, "... and {} more", count - MAX_DRONES);
+    }
+    for drone in &show.drones {
+        for reason in &drone.derived_44.reasons {
+            let _ = writeln!(text, "{}: {reason}", drone.name);
+        }
+        if let Some(reason) = &drone.skyb_problem {
+            let _ = writeln!(text, "{}: {reason}", drone.name);
+        }
+    }
+    text
+}
+
+fn describe_drone(text: &mut String, drone: &DroneSummary) {
+    let [x, y, z] = drone.start_m;
+    let takeoff = |time: Option<f64>, landing: f64| {
+        time.map_or("refused".to_owned(), |time| format!("{time:.2}..{landing:.1}"))
+    };
+    let (bytes, unit, error) = match &drone.skyb {
+        Some(file) => (
+            file.file_bytes.to_string(),
+            format!("{} mm", file.scale_mm),
+            format!("{:.2}", file.deviation.max_position_m * 1000.0),
+        ),
+        None => ("none".to_owned(), String::new(), String::new()),
+    };
+    let _ = writeln!(
+        text,
+        "{:<14} {:>24} {:>9.3} {:>7} {bytes:>6} {unit:>6} {error:>9} {:>15} {:>15}",
+        drone.name,
+        format!("{x:.2}, {y:.2}, {z:.2}"),
+        drone.duration_s,
+        drone.pieces.iter().sum::<usize>(),
+        takeoff(drone.derived_44.takeoff_s, drone.derived_44.landing_s),
+        takeoff(drone.derived_46.takeoff_s, drone.derived_46.landing_s),
+    );
+}
+
+/// One binary show: blocks, lights, trajectory.
+pub(super) fn describe_skyb(file: &SkybSummary) -> String {
+    let mut text = String::new();
+    let crc = if file.has_crc { "checksum correct" } else { "without checksum" };
+    let _ = writeln!(text, "version {}, {crc}, {} mm per unit", file.version, file.scale_mm);
+    for block in &file.blocks {
+        let _ = writeln!(
+            text,
+            "block {}: {} bytes at {}",
+            block.kind.name(),
+            block.bytes,
+            block.offset
+        );
+    }
+    if let Some(comment) = &file.comment {
+        let _ = writeln!(text, "comment: {comment}");
+    }
+    if file.has_rth_plan {
+        let _ = writeln!(text, "has a return-to-home plan (not read: its form differs by version)");
+    }
+    if !file.events.is_empty() {
+        let _ = writeln!(text, "{} timed events", file.events.len());
+    }
+    let drone = &file.drone;
+    let [low, high] = drone.bounds_m;
+    let _ = writeln!(
+        text,
+        "{:.3} s: {} holds, {} lines, {} cubic, {} of 7th degree; z {:.3}..{:.3} m; up {:.2}, down {:.2}, horizontal {:.2} m/s",
+        drone.duration_s,
+        drone.pieces[0],
+        drone.pieces[1],
+        drone.pieces[2],
+        drone.pieces[3],
+        low[2],
+        high[2],
+        drone.speeds.up_mps,
+        drone.speeds.down_mps,
+        drone.speeds.horizontal_mps
+    );
+    for (version, derived) in [("4.4", &drone.derived_44), ("4.6", &drone.derived_46)] {
+        let takeoff = derived.takeoff_s.map_or("never".to_owned(), |time| format!("{time:.3} s"));
+        let _ = writeln!(
+            text,
+            "firmware {version}: takes off at {takeoff}, lands at {:.3} s from {:.2} m",
+            derived.landing_s, derived.lands_from_m
+        );
+        for reason in &derived.reasons {
+            let _ = writeln!(text, "  {reason}");
+        }
+    }
+    if !file.lights.lines.is_empty() {
+        let _ = writeln!(text, "lights:");
+        for line in &file.lights.lines {
+            let _ = writeln!(text, "  {line}");
+        }
+    }
+    for problem in &file.lights.problems {
+        let _ = writeln!(text, "lights: {problem}");
+    }
+    text
+}

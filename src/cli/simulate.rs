@@ -1,0 +1,403 @@
+//! `updraft simulate`: flies a campaign in the embedded simulator, one log per drone.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use rayon::prelude::*;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::clock::Stopwatch;
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use super::progress::Progress;
+use crate::base::file::{
+    FileError, create_folder, read_whole, sweep_partial, write_whole, write_with,
+};
+use crate::base::time::GpsTime;
+use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
+use crate::mission::Plan;
+use crate::show::Trajectory;
+use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, Uniform, fly};
+use crate::vehicle::{Vehicle, library};
+
+/// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
+/// same seed gives the same bytes.
+const START_UNIX_MS: i64 = 1_780_315_200_000;
+/// Largest plan that is hashed, bytes.
+const MAX_PLAN_BYTES: u64 = 256 << 20;
+
+/// Motion of the air and seed of a simulated flight, shared by `simulate` and `run`.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Simulation")]
+pub(super) struct AirArgs {
+    /// Horizontal wind speed, m/s
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = speed)]
+    pub(super) wind: f64,
+    /// Where the wind comes from, degrees clockwise from north
+    #[arg(long, value_name = "DEG", default_value_t = 270.0, allow_hyphen_values = true)]
+    pub(super) wind_from: f64,
+    /// Seed of sensor noise and clock offsets
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Log the firmware's whole default set of messages (about ten times larger)
+    #[arg(long)]
+    pub(super) full_logs: bool,
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=30.0).contains(&value) => Ok(value),
+        _ => Err("a wind speed between 0 and 30 m/s".to_owned()),
+    }
+}
+
+/// Parser of vertical air speeds.
+pub(super) fn updraft(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (-20.0..=20.0).contains(&value) => Ok(value),
+        _ => Err("a vertical air speed between -20 and 20 m/s, up positive".to_owned()),
+    }
+}
+
+impl AirArgs {
+    /// The uniform motion of the air towards east, north and up, m/s.
+    pub(super) fn air_mps(&self, updraft_mps: f64) -> [f64; 3] {
+        let (sin, cos) = self.wind_from.to_radians().sin_cos();
+        // Adding zero turns -0 into 0, which reads better in files.
+        [-self.wind * sin + 0.0, -self.wind * cos + 0.0, updraft_mps]
+    }
+}
+
+/// Arguments of `updraft simulate`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft simulate my-campaign
+  updraft simulate my-campaign --flight hover --updraft 1.5 --wind 5
+  updraft simulate my-campaign --drones 1-10,12 --full-logs
+
+Logs that are there and were flown with the same settings are kept: an interrupted run goes on where
+it stopped.")]
+pub(super) struct SimulateArgs {
+    /// Campaign folder
+    campaign: PathBuf,
+    /// Only this flight of the campaign
+    #[arg(long, value_name = "NAME")]
+    flight: Option<String>,
+    /// Only these slots: 1-10,12
+    #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
+    drones: Option<SlotSet>,
+    /// Vertical air speed, m/s, up positive
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
+    updraft: f64,
+    /// Vehicle to fly instead of the planned one
+    #[arg(long, value_name = "NAME")]
+    vehicle: Option<String>,
+    /// Replace simulated logs that were flown with other settings
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    air: AirArgs,
+}
+
+/// A set of slots.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct SlotSet(BTreeSet<u16>);
+
+fn parse_slots(text: &str) -> Result<SlotSet, String> {
+    let bad = || "write slots as 1-10,12,20-29".to_owned();
+    let mut slots = BTreeSet::new();
+    for part in text.split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let first: u16 = first.trim().parse().map_err(|_| bad())?;
+        let last: u16 = last.trim().parse().map_err(|_| bad())?;
+        if first == 0 || last < first {
+            return Err(bad());
+        }
+        slots.extend(first..=last);
+    }
+    Ok(SlotSet(slots))
+}
+
+/// How one flight is to be simulated.
+#[derive(Clone, Debug)]
+pub(super) struct Simulation {
+    pub(super) air_mps: [f64; 3],
+    pub(super) seed: u64,
+    pub(super) full_logs: bool,
+    pub(super) vehicle: Option<Vehicle>,
+    pub(super) only: Option<SlotSet>,
+    pub(super) force: bool,
+}
+
+/// What became of one flight.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Flown {
+    pub(super) flight: String,
+    pub(super) logs: usize,
+    pub(super) kept: usize,
+    pub(super) bytes: u64,
+    pub(super) failed: Vec<String>,
+    pub(super) saturated: Vec<u16>,
+}
+
+#[derive(Serialize)]
+struct SimulateOutput {
+    schema: &'static str,
+    flights: Vec<Flown>,
+}
+
+pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, CommandError> {
+    let folders = campaign::flights(&args.campaign)?;
+    let vehicle = args.vehicle.as_deref().map(library::load).transpose()?;
+    let simulation = Simulation {
+        air_mps: args.air.air_mps(args.updraft),
+        seed: args.air.seed,
+        full_logs: args.air.full_logs,
+        vehicle,
+        only: args.drones.clone(),
+        force: args.force,
+    };
+    let mut flights = Vec::new();
+    for folder in &folders {
+        let plan = folder.read_plan()?;
+        if args.flight.as_ref().is_some_and(|name| *name != plan.name) {
+            continue;
+        }
+        flights.push(simulate(context, folder, &plan, &simulation)?);
+    }
+    if flights.is_empty() {
+        let name = args.flight.as_deref().unwrap_or_default();
+        return Err(CommandError::Usage(format!("the campaign has no flight \"{name}\"")));
+    }
+    let failed = flights.iter().any(|flight| !flight.failed.is_empty());
+    if context.json {
+        context.print_json(&SimulateOutput { schema: "updraft.simulate/1", flights })?;
+    }
+    Ok(if failed { Exit::Losses } else { Exit::Done })
+}
+
+/// Flies one flight; logs that are there and fit are kept.
+pub(super) fn simulate(
+    context: &Context,
+    folder: &FlightFolder,
+    plan: &Plan,
+    simulation: &Simulation,
+) -> Result<Flown, CommandError> {
+    let watch = Stopwatch::start();
+    let vehicle = match &simulation.vehicle {
+        Some(vehicle) => vehicle.clone(),
+        None => library::load(&folder.vehicle().display().to_string())?,
+    };
+    let mut record = prepare(folder, plan, simulation, &vehicle)?;
+    let count = plan.slots.len();
+    let wanted: Vec<_> = plan
+        .slots
+        .iter()
+        .filter(|slot| simulation.only.as_ref().is_none_or(|set| set.0.contains(&slot.slot)))
+        .collect();
+    let open: Vec<_> =
+        wanted.iter().copied().filter(|slot| !folder.log(slot.slot, count).exists()).collect();
+    let kept = wanted.len() - open.len();
+    let start = GpsTime::from_unix_ms(START_UNIX_MS)
+        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
+    let frame = plan.site.frame();
+    let [east, north, up] = record.air_mps;
+    let air = Uniform(frame.from_neu(nalgebra::Vector3::new(north, east, up)));
+    let progress = Progress::new(context, "flying", open.len() as u64);
+    let results: Vec<Result<FlightSummary, CommandError>> = open
+        .par_iter()
+        .map(|slot| {
+            context.check_stop()?;
+            let trajectory = Trajectory::of_slot(plan, slot);
+            let setup = FlightSetup {
+                vehicle: &vehicle,
+                trajectory: &trajectory,
+                home_m: slot.home_m.into(),
+                frame,
+                atmosphere: &air,
+                seed: simulation.seed,
+                drone: slot.slot,
+                start,
+                full_logs: simulation.full_logs,
+                hooks: Hooks { progress: None, stop: Some(context.stop_flag()) },
+            };
+            let result = fly_to_file(&setup, &folder.log(slot.slot, count));
+            progress.advance();
+            result
+        })
+        .collect();
+    progress.finish();
+    context.check_stop()?;
+    let mut failed = Vec::new();
+    let mut saturated = Vec::new();
+    for (slot, result) in open.iter().zip(results) {
+        match result {
+            Ok(summary) if summary.saturated_share > 0.0 => saturated.push(slot.slot),
+            Ok(_) => {}
+            Err(error) => failed.push(super::exit::with_reasons(&error)),
+        }
+    }
+    record.logs = present_logs(folder, plan)?;
+    write_record(folder, &record)?;
+    let bytes = record.logs.iter().map(|log| log.bytes).sum();
+    for error in &failed {
+        context.warn(error);
+    }
+    if !saturated.is_empty() {
+        context.warn(&format!(
+            "{} of {} drones ran into a motor limit; their windows there are flagged",
+            saturated.len(),
+            wanted.len()
+        ));
+    }
+    let word = if kept == wanted.len() { "Found" } else { "Flew" };
+    context.say(&format!(
+        "{word} {}: {} logs, {:.0} MB in {watch}{}",
+        plan.name,
+        wanted.len() - failed.len(),
+        bytes as f64 / 1e6,
+        if kept > 0 && kept < wanted.len() {
+            format!(" ({kept} were there)")
+        } else {
+            String::new()
+        }
+    ));
+    Ok(Flown {
+        flight: plan.name.clone(),
+        logs: wanted.len() - failed.len(),
+        kept,
+        bytes,
+        failed,
+        saturated,
+    })
+}
+
+/// Flies one drone; its log appears under its name only when it is whole.
+fn fly_to_file(setup: &FlightSetup<'_>, path: &Path) -> Result<FlightSummary, CommandError> {
+    let mut outcome = None;
+    let written = write_with(path, |out| match fly(setup, out) {
+        Ok(summary) => {
+            outcome = Some(Ok(summary));
+            Ok(())
+        }
+        Err(error) => {
+            let reason = error.to_string();
+            outcome = Some(Err(error));
+            Err(std::io::Error::other(reason))
+        }
+    });
+    match (outcome, written) {
+        (Some(Err(SimError::Stopped { .. })), _) => Err(CommandError::Interrupted),
+        (Some(Err(error)), _) => Err(CommandError::Sim(error)),
+        (_, Err(error)) => Err(error.into()),
+        (Some(Ok(summary)), Ok(())) => Ok(summary),
+        (None, Ok(())) => Err(CommandError::Failed("the simulator said nothing".to_owned())),
+    }
+}
+
+/// The folder's record: a matching one is continued, another one refused or replaced.
+fn prepare(
+    folder: &FlightFolder,
+    plan: &Plan,
+    simulation: &Simulation,
+    vehicle: &Vehicle,
+) -> Result<FlightRecord, CommandError> {
+    let plan_bytes = read_whole(&folder.plan(), MAX_PLAN_BYTES)?;
+    let vehicle_text = toml::to_string(vehicle)
+        .map_err(|error| CommandError::Failed(format!("failed to write the vehicle: {error}")))?;
+    let record = FlightRecord {
+        schema: FLIGHT_SCHEMA.to_owned(),
+        made_by: made_by(),
+        source: "simulator".to_owned(),
+        seed: simulation.seed,
+        vehicle: vehicle.name.clone(),
+        vehicle_sha256: sha256(vehicle_text.as_bytes()),
+        air_mps: simulation.air_mps,
+        full_logs: simulation.full_logs,
+        plan_sha256: sha256(&plan_bytes),
+        logs: Vec::new(),
+    };
+    create_folder(&folder.logs())?;
+    sweep_partial(&folder.logs())?;
+    match folder.read_record()? {
+        Some(existing) if existing.source != record.source => {
+            return Err(CommandError::Usage(format!(
+                "{} holds logs of real drones; simulate into another campaign",
+                folder.logs().display()
+            )));
+        }
+        Some(existing) => {
+            let same = FlightRecord { logs: Vec::new(), ..existing } == record;
+            if !same && !simulation.force {
+                return Err(CommandError::Usage(format!(
+                    "{} holds logs flown with other settings; give --force to replace them, or use \
+                     another folder",
+                    folder.logs().display()
+                )));
+            }
+            if !same {
+                remove_logs(folder, plan)?;
+            }
+        }
+        None if !present_logs(folder, plan)?.is_empty() => {
+            return Err(CommandError::Usage(format!(
+                "{} holds logs that this program did not simulate; use another folder",
+                folder.logs().display()
+            )));
+        }
+        None => {}
+    }
+    write_record(folder, &record)?;
+    Ok(record)
+}
+
+fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
+    for log in present_logs(folder, plan)? {
+        let path = folder.logs().join(&log.file);
+        std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
+    }
+    Ok(())
+}
+
+/// The logs of a plan's slots that are there.
+fn present_logs(folder: &FlightFolder, plan: &Plan) -> Result<Vec<LogRecord>, CommandError> {
+    let count = plan.slots.len();
+    let mut logs = Vec::new();
+    for slot in &plan.slots {
+        let path = folder.log(slot.slot, count);
+        match std::fs::metadata(&path) {
+            Ok(metadata) => logs.push(LogRecord {
+                slot: slot.slot,
+                file: path
+                    .file_name()
+                    .map_or_else(String::new, |name| name.to_string_lossy().into()),
+                bytes: metadata.len(),
+            }),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => return Err(FileError::new("read", &path, error).into()),
+        }
+    }
+    Ok(logs)
+}
+
+fn write_record(folder: &FlightFolder, record: &FlightRecord) -> Result<(), CommandError> {
+    let json = to_json(record)
+        .map_err(|error| CommandError::Failed(format!("failed to make the record: {error}")))?;
+    Ok(write_whole(&folder.record(), &json)?)
+}
+
+/// Program and version, for records.
+pub(super) fn made_by() -> String {
+    concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned()
+}
+
+/// SHA-256 in hexadecimal.
+pub(super) fn sha256(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

@@ -1,0 +1,100 @@
+//! A plan as people read it: who, where, and what happens when.
+
+use std::fmt::Write as _;
+
+use crate::mission::plan::{Group, Kind, Plan, Segment};
+
+/// Most rows of a timetable before the middle is left out.
+const MAX_ROWS: usize = 60;
+
+/// The plan's head and the timetable of each group.
+pub(super) fn describe(plan: &Plan) -> String {
+    let mut text = String::new();
+    let count = plan.slots.len();
+    let drones = if count == 1 { "1 drone".to_owned() } else { format!("{count} drones") };
+    let _ = write!(text, "{}: {drones}", plan.title);
+    if let Some(grid) = plan.grid {
+        let (rows, columns) = (grid.rows, grid.columns);
+        let _ = write!(text, " in {rows} x {columns}, {} m apart", grid.spacing_m);
+    }
+    let site = &plan.site;
+    let _ = writeln!(
+        text,
+        "\norigin {:.6}, {:.6}, ground {} m above sea level, rows towards {}°, vehicle {}",
+        site.origin_lat_deg,
+        site.origin_lon_deg,
+        site.ground_amsl_m,
+        site.orientation_deg,
+        plan.vehicle
+    );
+    for group in &plan.groups {
+        describe_group(&mut text, plan, group);
+    }
+    for line in &plan.briefing {
+        let _ = writeln!(text, "note: {line}");
+    }
+    text
+}
+
+fn describe_group(text: &mut String, plan: &Plan, group: &Group) {
+    if plan.groups.len() > 1 {
+        let index = plan.groups.iter().position(|other| std::ptr::eq(other, group));
+        let members =
+            plan.slots.iter().filter(|slot| Some(usize::from(slot.group)) == index).count();
+        let offset_s = group.offset_ms as f64 / 1000.0;
+        let _ = writeln!(text, "\ngroup {}: {members} drones, {offset_s} s later", group.name);
+    }
+    let _ = writeln!(
+        text,
+        "\n{:>8}  {:<28} {:>8} {:>9} {:>9}  {}",
+        "time", "segment", "lasts s", "height m", "m/s", "window s"
+    );
+    let shown: Vec<_> =
+        group.segments.iter().filter(|segment| segment.kind != Kind::Ramp).collect();
+    for (index, segment) in shown.iter().enumerate() {
+        if shown.len() > MAX_ROWS && (MAX_ROWS / 2..shown.len() - MAX_ROWS / 2).contains(&index) {
+            if index == MAX_ROWS / 2 {
+                let _ = writeln!(text, "{:>8}  {} more", "...", shown.len() - MAX_ROWS);
+            }
+            continue;
+        }
+        describe_segment(text, segment);
+    }
+    if let Some(last) = group.segments.last() {
+        let _ = writeln!(text, "{:>8}  end", clock(last.end_ms));
+    }
+}
+
+fn describe_segment(text: &mut String, segment: &Segment) {
+    let [vx, vy, vz] = segment.velocity_mps;
+    let speed = if vx == 0.0 && vy == 0.0 {
+        if vz == 0.0 { String::new() } else { format!("{vz:+.2}") }
+    } else {
+        format!("{:.2}", (vx * vx + vy * vy + vz * vz).sqrt())
+    };
+    let height = if segment.from_m[2] == segment.to_m[2] {
+        format!("{:.1}", segment.to_m[2])
+    } else {
+        format!("-> {:.1}", segment.to_m[2])
+    };
+    let window = segment.window.map_or(String::new(), |window| {
+        let at = |ms: u64| ms as f64 / 1000.0;
+        format!("{:.1}..{:.1}", at(window.start_ms), at(window.end_ms))
+    });
+    let line = format!(
+        "{:>8}  {:<28} {:>8.1} {:>9} {:>9}  {}",
+        clock(segment.start_ms),
+        segment.label,
+        (segment.end_ms - segment.start_ms) as f64 / 1000.0,
+        height,
+        speed,
+        window
+    );
+    let _ = writeln!(text, "{}", line.trim_end());
+}
+
+/// Show time as minutes and seconds.
+fn clock(ms: u64) -> String {
+    let tenths = (ms + 50) / 100;
+    format!("{}:{:02}.{}", tenths / 600, tenths / 10 % 60, tenths % 10)
+}

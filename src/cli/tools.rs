@@ -1,0 +1,87 @@
+//! Completions, manual page and schemas, all made from the definitions they describe.
+
+use clap::{Args, ValueEnum};
+use clap_complete::Shell;
+use schemars::schema_for;
+
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use crate::analysis::result::Analysis;
+use crate::campaign::{CampaignIndex, FlightRecord};
+use crate::mission::Plan;
+use crate::vehicle::Vehicle;
+
+/// Arguments of `updraft completions`.
+#[derive(Debug, Args)]
+pub(super) struct CompletionsArgs {
+    /// Which shell
+    shell: Shell,
+}
+
+/// Arguments of `updraft schema`.
+#[derive(Debug, Args)]
+pub(super) struct SchemaArgs {
+    /// Which format
+    #[arg(value_enum)]
+    format: Format,
+}
+
+/// The JSON (and vehicle TOML) formats that have a schema.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// plan.json
+    Plan,
+    /// campaign.json
+    Campaign,
+    /// logs/flight.json
+    Flight,
+    /// analysis.json
+    Analysis,
+    /// vehicle files
+    Vehicle,
+}
+
+impl Format {
+    /// The JSON schema, pretty, with a final newline.
+    pub fn schema(self) -> Result<String, serde_json::Error> {
+        let schema = match self {
+            Self::Plan => schema_for!(Plan),
+            Self::Campaign => schema_for!(CampaignIndex),
+            Self::Flight => schema_for!(FlightRecord),
+            Self::Analysis => schema_for!(Analysis),
+            Self::Vehicle => schema_for!(Vehicle),
+        };
+        let mut text = serde_json::to_string_pretty(&schema)?;
+        text.push('\n');
+        Ok(text)
+    }
+}
+
+pub(super) fn completions(
+    context: &Context,
+    args: &CompletionsArgs,
+    mut command: clap::Command,
+) -> Result<Exit, CommandError> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut command, "updraft", &mut script);
+    context.print(&String::from_utf8_lossy(&script))?;
+    Ok(Exit::Done)
+}
+
+pub(super) fn man(context: &Context, command: clap::Command) -> Result<Exit, CommandError> {
+    let mut page = Vec::new();
+    clap_mangen::Man::new(command)
+        .render(&mut page)
+        .map_err(|error| CommandError::Failed(format!("failed to make the page: {error}")))?;
+    context.print(&String::from_utf8_lossy(&page))?;
+    Ok(Exit::Done)
+}
+
+pub(super) fn schema(context: &Context, args: &SchemaArgs) -> Result<Exit, CommandError> {
+    let schema = args
+        .format
+        .schema()
+        .map_err(|error| CommandError::Failed(format!("failed to make the schema: {error}")))?;
+    context.print(&schema)?;
+    Ok(Exit::Done)
+}

@@ -1,0 +1,250 @@
+//! From board time to show time.
+
+use super::channels::Messages;
+use super::pick::PERFORMING;
+use super::{Alignment, Clock, FlightOptions, Series};
+use crate::base::time::GpsTime;
+use crate::mission::plan::Segment;
+
+/// ClockMS of a SHOW row while no start time is set.
+const NO_CLOCK_MS: f64 = -86_400_000.0;
+/// Stage of the show's take-off.
+const TAKEOFF: f64 = 3.0;
+/// Coarse and fine step of the search for the plan's start, s.
+const COARSE_S: f64 = 0.25;
+const FINE_S: f64 = 0.01;
+/// A velocity difference counts at most this much: a wrong or aborted part costs, but not all, m/s.
+const CLIP_MPS: f64 = 0.5;
+/// Error of an alignment by velocity alone: the firmware's answer to a step takes about this long, s.
+const UNREFINED_S: f64 = 0.3;
+/// A match must cost less than this share of not matching at all.
+const MATCH_LIMIT: f64 = 0.5;
+
+/// What alignment may look at, over board time, cut to the flight.
+pub(super) struct Evidence<'a> {
+    pub(super) messages: &'a Messages,
+    pub(super) flight: (f64, f64),
+    pub(super) desired_up: Option<&'a Series>,
+    pub(super) velocity_up: &'a Series,
+    pub(super) height: &'a Series,
+}
+
+/// Finds the board time of show time 0 by the best evidence there is.
+pub(super) fn align(
+    evidence: &Evidence<'_>,
+    options: FlightOptions<'_>,
+    warnings: &mut Vec<String>,
+) -> Clock {
+    let gps = gps_offset_s(evidence);
+    let with_start = |mut clock: Clock| {
+        clock.start = gps.and_then(|(offset, _)| {
+            GpsTime::from_total_ms(((clock.offset_s + offset) * 1000.0).round() as i64)
+        });
+        clock
+    };
+    if let Some(clock) = show_rows(evidence) {
+        return with_start(clock);
+    }
+    if let Some(start) = options.start {
+        if let Some((offset, residual_s)) = gps {
+            let offset_s = start.total_ms() as f64 / 1000.0 - offset;
+            let (armed, end) = evidence.flight;
+            if (armed - 600.0..=end).contains(&offset_s) {
+                let method = Alignment::GpsTime;
+                return Clock { method, offset_s, residual_s, start: Some(start) };
+            }
+            warnings.push(format!(
+                "the given start of the show ({start}) is {:.0} s away from this flight and is \
+                 not used",
+                offset_s - armed
+            ));
+        } else {
+            warnings.push("the log has no GPS time to place the start of the show by".to_owned());
+        }
+    }
+    if let Some(segments) = options.segments {
+        match match_plan(evidence, segments) {
+            Some(clock) => return with_start(clock),
+            None => warnings.push(
+                "the log's vertical velocity does not match the plan anywhere: times count from \
+                 take-off"
+                    .to_owned(),
+            ),
+        }
+    }
+    let offset_s = takeoff_s(evidence);
+    with_start(Clock { method: Alignment::Takeoff, offset_s, residual_s: 0.0, start: None })
+}
+
+/// SHOW rows of the flight: median of board time minus show clock.
+fn show_rows(evidence: &Evidence<'_>) -> Option<Clock> {
+    let rows = evidence.messages.rows("SHOW")?;
+    let clock_ms = rows.column("ClockMS")?;
+    let stage = rows.column("Stage")?;
+    let (start, end) = evidence.flight;
+    let offsets = |in_flight: bool| -> Vec<f64> {
+        let in_flight_stages = TAKEOFF..=f64::from(PERFORMING);
+        rows.time_s
+            .iter()
+            .zip(clock_ms)
+            .zip(stage)
+            .filter(|((time, ms), stage)| {
+                (start..=end).contains(*time)
+                    && ms.is_finite()
+                    && **ms != NO_CLOCK_MS
+                    && (!in_flight || in_flight_stages.contains(*stage))
+            })
+            .map(|((time, ms), _)| time - ms / 1000.0)
+            .collect()
+    };
+    // The clock is set for good once the show flies; before, the start may still be moved.
+    let flying = offsets(true);
+    let mut chosen = if flying.len() >= 10 { flying } else { offsets(false) };
+    let (offset_s, residual_s) = median_and_spread(&mut chosen)?;
+    Some(Clock { method: Alignment::ShowRows, offset_s, residual_s, start: None })
+}
+
+/// GPS seconds minus board seconds, and the spread of it.
+fn gps_offset_s(evidence: &Evidence<'_>) -> Option<(f64, f64)> {
+    let (start, end) = evidence.flight;
+    let mut offsets: Vec<f64> = evidence
+        .messages
+        .gps_ms()
+        .into_iter()
+        .filter(|(time, _)| (start..=end).contains(time))
+        .map(|(time, ms)| ms / 1000.0 - time)
+        .collect();
+    median_and_spread(&mut offsets)
+}
+
+/// Median and half the distance between the 5 % and 95 % points.
+fn median_and_spread(values: &mut [f64]) -> Option<(f64, f64)> {
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values.get(((values.len().saturating_sub(1)) as f64 * share) as usize);
+    let (low, high) = (*at(0.05)?, *at(0.95)?);
+    let middle = values.len() / 2;
+    let median = if values.len() % 2 == 1 {
+        *values.get(middle)?
+    } else {
+        f64::midpoint(*values.get(middle)?, *values.get(middle.checked_sub(1)?)?)
+    };
+    Some((median, (high - low) / 2.0))
+}
+
+/// Commanded vertical velocity of a plan at a show time, up positive, m/s.
+pub(crate) fn planned_up_mps(segments: &[Segment], time_s: f64) -> f64 {
+    let time_ms = time_s * 1000.0;
+    let index = segments.partition_point(|segment| segment.end_ms as f64 <= time_ms);
+    let Some(segment) = segments.get(index).filter(|s| s.start_ms as f64 <= time_ms) else {
+        return 0.0;
+    };
+    let end = segment.velocity_mps[2];
+    match segment.from_velocity_mps {
+        Some(from) => {
+            let duration = segment.end_ms.saturating_sub(segment.start_ms).max(1) as f64;
+            let share = (time_ms - segment.start_ms as f64) / duration;
+            from[2] + (end - from[2]) * share
+        }
+        None => end,
+    }
+}
+
+/// Slides the plan's velocity profile along the log's: the sum of clipped differences is lowest at
+/// the start of the show. Clipping keeps it robust against legs that were not flown as planned.
+fn match_plan(evidence: &Evidence<'_>, segments: &[Segment]) -> Option<Clock> {
+    let logged = evidence.desired_up.unwrap_or(evidence.velocity_up);
+    let (first, last) = logged.span()?;
+    let duration = segments.last()?.end_ms as f64 / 1000.0;
+    let cost = |offset: f64, step: f64| {
+        // Samples of the plan: where the log is silent it is compared with standing still, so
+        // that sliding the plan off the log never pays.
+        let count = (duration / step) as usize;
+        (0..count)
+            .map(|index| {
+                let time = (index as f64 + 0.5) * step;
+                let value = logged.at(offset + time, 1.0).unwrap_or(0.0);
+                (value - planned_up_mps(segments, time)).abs().min(CLIP_MPS)
+            })
+            .sum::<f64>()
+            * step
+    };
+    let best_of = |from: f64, to: f64, step: f64, sampling: f64| {
+        let count = ((to - from) / step).ceil().max(0.0) as usize;
+        (0..=count)
+            .map(|index| from + index as f64 * step)
+            .map(|offset| (cost(offset, sampling), offset))
+            .min_by(|left, right| left.0.total_cmp(&right.0))
+    };
+    let earliest = (first - 30.0).max(evidence.flight.0 - 120.0);
+    let latest = (last - duration / 2.0).max(earliest);
+    // A log of hours would make the search long; shows do not last that long.
+    if latest - earliest > 7200.0 || duration > 7200.0 {
+        return None;
+    }
+    // A thousand samples tell where a plan lies; a step of it must not fall between them, though.
+    let sampling = (duration / 1000.0).clamp(0.5, 5.0);
+    let (_, coarse) = best_of(earliest, latest, COARSE_S, sampling)?;
+    let (lowest, offset_s) =
+        best_of(coarse - 2.0 * COARSE_S, coarse + 2.0 * COARSE_S, FINE_S, 0.1)?;
+    // Standing still all the time is the null match.
+    let null: f64 = (0..(duration / 0.1) as usize)
+        .map(|index| planned_up_mps(segments, (index as f64 + 0.5) * 0.1).abs().min(CLIP_MPS) * 0.1)
+        .sum();
+    if !(null > 0.0 && lowest < MATCH_LIMIT * null) {
+        return None;
+    }
+    let (offset_s, residual_s) =
+        refine_by_height(evidence.height, segments, offset_s).unwrap_or((offset_s, UNREFINED_S));
+    Some(Clock { method: Alignment::Plan, offset_s, residual_s, start: None })
+}
+
+/// Sharpens an alignment by heights in the analysis windows. The velocity answers a step of the plan
+/// late, but in the windows the vehicle is back on its path: if the log runs `d` seconds late, its
+/// height differs from the plan's by `constant - d v` in a window flown at `v`. Gives the better
+/// offset and its standard error.
+fn refine_by_height(height: &Series, segments: &[Segment], offset_s: f64) -> Option<(f64, f64)> {
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for segment in segments {
+        let Some(window) = segment.window else { continue };
+        if segment.from_velocity_mps.is_some() {
+            continue;
+        }
+        let (start, end) = (window.start_ms as f64 / 1000.0, window.end_ms as f64 / 1000.0);
+        let times = height.times_between(offset_s + start, offset_s + end);
+        let logged = height.between(offset_s + start, offset_s + end);
+        let planned = |time: f64| {
+            let since = time - offset_s - segment.start_ms as f64 / 1000.0;
+            segment.from_m[2] + segment.velocity_mps[2] * since
+        };
+        let sum: f64 = times.iter().zip(logged).map(|(time, height)| height - planned(*time)).sum();
+        if times.len() >= 5 {
+            points.push((segment.velocity_mps[2], sum / times.len() as f64));
+        }
+    }
+    let n = points.len() as f64;
+    let (mean_v, mean_d) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let vv: f64 = points.iter().map(|(v, _)| (v - mean_v).powi(2)).sum();
+    if points.len() < 4 || vv < 0.1 {
+        return None;
+    }
+    let vd: f64 = points.iter().map(|(v, d)| (v - mean_v) * (d - mean_d)).sum();
+    let slope = vd / vv;
+    let squares: f64 =
+        points.iter().map(|(v, d)| (d - mean_d - slope * (v - mean_v)).powi(2)).sum();
+    let error = (squares / (n - 2.0) / vv).sqrt();
+    // A large or uncertain shift means that the heights are not those of the plan.
+    (slope.abs() < 1.0 && error < UNREFINED_S).then_some((offset_s - slope, error.max(FINE_S)))
+}
+
+/// Board time of take-off: the last one before the vehicle is half a metre above where it was armed
+/// at which it was still within 5 cm; the arming when it never climbs.
+fn takeoff_s(evidence: &Evidence<'_>) -> f64 {
+    let (start, end) = evidence.flight;
+    let heights = evidence.height.between(start, end);
+    let times = evidence.height.times_between(start, end);
+    let Some(ground) = heights.first() else { return start };
+    let Some(up) = heights.iter().position(|height| height - ground > 0.5) else { return start };
+    let low = |height: &f64| height - ground < 0.05;
+    let still = heights.get(..up).and_then(|before| before.iter().rposition(low));
+    still.and_then(|index| times.get(index).copied()).unwrap_or(start)
+}

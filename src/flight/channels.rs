@@ -1,0 +1,352 @@
+//! Message rows to channels over board time: names, signs and units of all firmwares.
+
+use std::collections::BTreeMap;
+
+use super::Series;
+use super::clean::Rows;
+use crate::log::{Log, ScanStats, Select, Table};
+
+/// GUIP types whose velocity is a command: position-velocity-acceleration, velocity-acceleration.
+const GUIDED_WITH_VELOCITY: [f64; 2] = [3.0, 4.0];
+/// A median above this is centivolts (no show drone flies on 100 V).
+const HIGHEST_VOLTAGE_V: f64 = 100.0;
+/// Pulse widths that a motor output can have, us; unused outputs are 0, and damage makes others.
+const PULSES_US: std::ops::RangeInclusive<f64> = 500.0..=2500.0;
+/// No multirotor is faster, m/s: what is was damaged in the log.
+const FASTEST_MPS: f64 = 100.0;
+/// Rows below which a desired-velocity message is not worth having.
+const FEWEST_DESIRED: usize = 20;
+
+const MOTORS: &[&str] = &[
+    "TimeUS", "TimeMS", "C1", "C2", "C3", "C4", "C5", "C6", "C7", "C8", "C9", "C10", "C11", "C12",
+    "C13", "C14", "Ch1", "Ch2", "Ch3", "Ch4", "Ch5", "Ch6", "Ch7", "Ch8", "Ch9", "Ch10", "Ch11",
+    "Ch12",
+];
+const EKF: &[&str] = &["TimeUS", "TimeMS", "C", "VN", "VE", "VD", "PN", "PE", "PD"];
+
+/// The messages that a flight is read from.
+const WANTED: &[Select<'static>] = &[
+    Select { message: "XKF1", fields: EKF },
+    Select { message: "NKF1", fields: EKF },
+    Select { message: "EKF1", fields: EKF },
+    Select { message: "XKF4", fields: &["TimeUS", "C", "PI"] },
+    Select { message: "RCOU", fields: MOTORS },
+    Select { message: "ATT", fields: &["TimeUS", "TimeMS", "Roll", "Pitch"] },
+    Select { message: "GUIP", fields: &["TimeUS", "Type", "vX", "vY", "vZ"] },
+    Select { message: "PSCD", fields: &["TimeUS", "DVD", "TVD"] },
+    Select { message: "PSCN", fields: &["TimeUS", "DVN", "TVN"] },
+    Select { message: "PSCE", fields: &["TimeUS", "DVE", "TVE"] },
+    Select { message: "CTUN", fields: &["TimeUS", "TimeMS", "DCRt"] },
+    Select { message: "BAT", fields: &["TimeUS", "Instance", "Volt", "Curr"] },
+    Select { message: "CURR", fields: &["TimeUS", "TimeMS", "Volt", "Curr"] },
+    Select { message: "SHOW", fields: &["TimeUS", "ClockMS", "Stage"] },
+    Select { message: "GPS", fields: &["TimeUS", "I", "Status", "GMS", "GWk", "Lat", "Lng"] },
+    Select { message: "ARM", fields: &["TimeUS", "ArmState"] },
+    Select { message: "EV", fields: &["TimeUS", "TimeMS", "Id"] },
+    Select { message: "PARM", fields: &["TimeUS", "Name", "Value"] },
+];
+
+/// All messages of a log that matter, over board time.
+#[derive(Debug, Default)]
+pub(super) struct Messages {
+    rows: BTreeMap<String, Rows>,
+    pub(super) parameters: BTreeMap<String, f64>,
+    pub(super) scan: ScanStats,
+    /// Rows whose time was impossible.
+    pub(super) dropped: usize,
+}
+
+impl Messages {
+    pub(super) fn read(log: &Log) -> Self {
+        Self::select(log, WANTED)
+    }
+
+    /// Only what tells drones apart: parameters and places.
+    pub(super) fn read_identity(log: &Log) -> Self {
+        let wanted: Vec<Select<'static>> = WANTED
+            .iter()
+            .filter(|select| matches!(select.message, "PARM" | "GPS"))
+            .copied()
+            .collect();
+        Self::select(log, &wanted)
+    }
+
+    /// MAVLink system id.
+    pub(super) fn system_id(&self) -> Option<u8> {
+        ["SYSID_THISMAV", "MAV_SYSID"]
+            .iter()
+            .find_map(|name| self.parameters.get(*name))
+            .filter(|id| (1.0..=255.0).contains(*id))
+            .map(|id| *id as u8)
+    }
+
+    fn select(log: &Log, wanted: &[Select<'_>]) -> Self {
+        let (tables, scan) = log.select(wanted);
+        let mut messages = Self { scan, ..Self::default() };
+        for table in &tables {
+            if table.message == "PARM" {
+                messages.parameters = parameters(table);
+                continue;
+            }
+            let (rows, dropped) = Rows::from_table(table);
+            messages.dropped += dropped;
+            if !rows.is_empty() {
+                messages.rows.insert(table.message.clone(), rows);
+            }
+        }
+        messages
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.rows.is_empty() && self.parameters.is_empty()
+    }
+
+    pub(super) fn rows(&self, message: &str) -> Option<&Rows> {
+        self.rows.get(message)
+    }
+
+    /// Keeps one boot of a log that holds several: the last one with motor outputs (or the last one
+    /// that performed a show). Returns how many boots the log holds.
+    pub(super) fn keep_one_boot(&mut self) -> usize {
+        let steady = ["RCOU", "ATT", "XKF1", "NKF1", "EKF1", "SHOW"];
+        let boots = |rows: Option<&Rows>| rows.map_or(0, |rows| rows.boots().len());
+        let count = steady.iter().map(|name| boots(self.rows(name))).max().unwrap_or(0);
+        if count < 2 {
+            return count;
+        }
+        let performing = self.rows("SHOW").filter(|show| show.boots().len() == count);
+        let chosen = performing
+            .and_then(|show| {
+                let stage = show.column("Stage")?;
+                let performs = |boot: &std::ops::Range<usize>| {
+                    stage.get(boot.clone()).is_some_and(|stages| stages.contains(&4.0))
+                };
+                show.boots().iter().rposition(performs)
+            })
+            .unwrap_or(count - 1);
+        let span = steady.iter().find_map(|name| {
+            let rows = self.rows(name)?;
+            let boot = rows.boots().get(chosen).cloned().filter(|_| boots(Some(rows)) == count)?;
+            let times = rows.time_s.get(boot)?;
+            Some((*times.first()?, *times.last()?))
+        });
+        for rows in self.rows.values_mut() {
+            let own = rows.boots();
+            if own.len() == count {
+                let boot = own.get(chosen).cloned().unwrap_or_default();
+                rows.retain(|index| boot.contains(&index));
+            } else if let Some((start, end)) = span {
+                // A sparse message may have no row in some boots; its last rows in the time span
+                // of the chosen boot are the best guess.
+                let times = rows.time_s.clone();
+                rows.retain(|index| {
+                    times.get(index).is_some_and(|time| (start - 10.0..=end + 10.0).contains(time))
+                });
+            }
+        }
+        count
+    }
+
+    /// Velocity up, height, north and east of the EKF: primary core of the newest filter present.
+    pub(super) fn ekf(&self) -> Option<Ekf> {
+        let rows = ["XKF1", "NKF1", "EKF1"].iter().find_map(|name| self.rows(name))?;
+        let mut rows = rows.clone();
+        let primary = self.primary_core();
+        if let Some(cores) = rows.column("C").map(<[f64]>::to_vec) {
+            let core = if cores.contains(&primary) { primary } else { 0.0 };
+            rows.retain(|index| cores.get(index) == Some(&core));
+        }
+        Some(Ekf {
+            velocity_up: rows.series("VD", |down| within(-down, FASTEST_MPS))?,
+            height: rows.series("PD", |down| -down)?,
+            north: rows.series("PN", |north| north).unwrap_or_default(),
+            east: rows.series("PE", |east| east).unwrap_or_default(),
+        })
+    }
+
+    /// The core that most XKF4 rows call primary; core 0 without them.
+    fn primary_core(&self) -> f64 {
+        let mut counts = BTreeMap::<i64, usize>::new();
+        let indices = self.rows("XKF4").and_then(|rows| rows.column("PI")).unwrap_or_default();
+        for index in indices.iter().filter(|index| (0.0..8.0).contains(*index)) {
+            *counts.entry(*index as i64).or_default() += 1;
+        }
+        // The lowest of equally frequent cores.
+        let most = counts.iter().rev().max_by_key(|(_, count)| **count);
+        most.map_or(0.0, |(core, _)| *core as f64)
+    }
+
+    /// Mean, largest and smallest motor output, us.
+    pub(super) fn motors(&self) -> Option<[Series; 3]> {
+        let rows = self.rows("RCOU")?;
+        let column = |channel: usize| {
+            rows.column(&format!("C{channel}")).or_else(|| rows.column(&format!("Ch{channel}")))
+        };
+        let motors: Vec<&[f64]> = self.motor_channels().into_iter().filter_map(column).collect();
+        let mut series = [Series::default(), Series::default(), Series::default()];
+        for (row, time) in rows.time_s.iter().enumerate() {
+            let outputs = motors
+                .iter()
+                .filter_map(|motor| motor.get(row).copied())
+                .filter(|pulse| PULSES_US.contains(pulse));
+            let (mut sum, mut count) = (0.0, 0);
+            let (mut largest, mut smallest) = (f64::NEG_INFINITY, f64::INFINITY);
+            for pulse in outputs {
+                sum += pulse;
+                count += 1;
+                largest = largest.max(pulse);
+                smallest = smallest.min(pulse);
+            }
+            if count > 0 && series[0].time_s.last().is_none_or(|last| time > last) {
+                for (series, value) in
+                    series.iter_mut().zip([sum / f64::from(count), largest, smallest])
+                {
+                    series.time_s.push(*time);
+                    series.value.push(value);
+                }
+            }
+        }
+        (!series[0].is_empty()).then_some(series)
+    }
+
+    /// Output channels of the motors: SERVOn_FUNCTION 33..40 and 82..85, else the first four.
+    fn motor_channels(&self) -> Vec<usize> {
+        let is_motor =
+            |function: f64| (33.0..=40.0).contains(&function) || (82.0..=85.0).contains(&function);
+        let assigned: Vec<usize> = (1..=14)
+            .filter(|n| {
+                let function = self.parameters.get(&format!("SERVO{n}_FUNCTION"));
+                function.is_some_and(|function| is_motor(*function))
+            })
+            .collect();
+        if assigned.is_empty() { (1..=4).collect() } else { assigned }
+    }
+
+    /// Pulse widths between which a spinning motor is kept, us.
+    pub(super) fn pulse_limits_us(&self) -> (f64, f64) {
+        let value = |name: &str| self.parameters.get(name).copied().filter(|v| *v > 0.0);
+        // MOT_PWM_MIN/MAX of 0 mean "as the throttle stick" in older firmware.
+        let low = value("MOT_PWM_MIN")
+            .or_else(|| self.parameters.contains_key("MOT_PWM_MIN").then(|| value("RC3_MIN"))?);
+        let high = value("MOT_PWM_MAX")
+            .or_else(|| self.parameters.contains_key("MOT_PWM_MAX").then(|| value("RC3_MAX"))?);
+        let (low, high) = (low.unwrap_or(1000.0), high.unwrap_or(2000.0));
+        let at = |share: f64| low + (high - low) * share;
+        (at(value("MOT_SPIN_MIN").unwrap_or(0.15)), at(value("MOT_SPIN_MAX").unwrap_or(0.95)))
+    }
+
+    /// Desired vertical velocity up and horizontal speed, m/s.
+    pub(super) fn desired(&self) -> (Option<Series>, Option<Series>) {
+        self.guided()
+            .or_else(|| {
+                let down = |message: &str, names: [&str; 2]| {
+                    let rows = self.rows(message)?;
+                    names.iter().find_map(|name| rows.series(name, |value| -value))
+                };
+                let up = down("PSCD", ["DVD", "TVD"]).filter(|s| s.len() >= FEWEST_DESIRED)?;
+                let north = down("PSCN", ["DVN", "TVN"]);
+                let east = down("PSCE", ["DVE", "TVE"]);
+                Some((Some(up), horizontal(north.as_ref(), east.as_ref())))
+            })
+            .or_else(|| {
+                let up = self.rows("CTUN")?.series("DCRt", |cmps| cmps / 100.0)?;
+                (up.len() >= FEWEST_DESIRED).then_some((Some(up), None))
+            })
+            .unwrap_or_default()
+    }
+
+    /// The commands of guided (and show) mode, the profile as planned. The log has them in cm/s.
+    fn guided(&self) -> Option<(Option<Series>, Option<Series>)> {
+        let mut rows = self.rows("GUIP")?.clone();
+        let types = rows.column("Type")?.to_vec();
+        rows.retain(|row| types.get(row).is_some_and(|kind| GUIDED_WITH_VELOCITY.contains(kind)));
+        let mps = |name: &str| rows.series(name, |cmps| cmps / 100.0);
+        let up = mps("vZ").filter(|series| series.len() >= FEWEST_DESIRED)?;
+        Some((Some(up), horizontal(mps("vX").as_ref(), mps("vY").as_ref())))
+    }
+
+    /// Battery voltage (V) and current (A).
+    pub(super) fn battery(&self) -> (Option<Series>, Option<Series>) {
+        let Some(rows) = ["BAT", "CURR"].iter().find_map(|name| self.rows(name)) else {
+            return (None, None);
+        };
+        let mut rows = rows.clone();
+        if let Some(instances) = rows.column("Instance").map(<[f64]>::to_vec) {
+            rows.retain(|row| instances.get(row) == Some(&0.0));
+        }
+        let mut volts: Vec<f64> = rows.column("Volt").map(<[f64]>::to_vec).unwrap_or_default();
+        volts.sort_by(f64::total_cmp);
+        let centi = volts.get(volts.len() / 2).is_some_and(|median| *median > HIGHEST_VOLTAGE_V);
+        let scale = if centi { 0.01 } else { 1.0 };
+        (rows.series("Volt", |v| v * scale), rows.series("Curr", |v| v * scale))
+    }
+
+    /// GPS rows with a 3-D fix: (board time s, milliseconds since the GPS epoch).
+    pub(super) fn gps_ms(&self) -> Vec<(f64, f64)> {
+        self.fixes("GWk", "GMS")
+            .into_iter()
+            .filter(|(_, week, _)| *week > 0.0)
+            .map(|(time, week, ms)| (time, week * crate::base::time::WEEK_MS as f64 + ms))
+            .collect()
+    }
+
+    /// Latitude and longitude of GPS rows with a 3-D fix: (board time s, degrees, degrees).
+    pub(super) fn places(&self) -> Vec<(f64, f64, f64)> {
+        self.fixes("Lat", "Lng")
+    }
+
+    fn fixes(&self, first: &str, second: &str) -> Vec<(f64, f64, f64)> {
+        let Some(rows) = self.rows("GPS") else { return Vec::new() };
+        let (Some(one), Some(two)) = (rows.column(first), rows.column(second)) else {
+            return Vec::new();
+        };
+        let status = rows.column("Status").unwrap_or_default();
+        let instance = rows.column("I").unwrap_or_default();
+        (0..rows.time_s.len())
+            .filter(|row| status.get(*row).is_none_or(|status| *status >= 3.0))
+            .filter(|row| instance.get(*row).is_none_or(|instance| *instance == 0.0))
+            .filter_map(|row| Some((*rows.time_s.get(row)?, *one.get(row)?, *two.get(row)?)))
+            .filter(|(_, one, two)| one.is_finite() && two.is_finite())
+            .collect()
+    }
+}
+
+/// The value, or NaN (which channels leave out) when it is larger than anything possible.
+fn within(value: f64, limit: f64) -> f64 {
+    if value.abs() <= limit { value } else { f64::NAN }
+}
+
+/// What the position filter says, over board time.
+#[derive(Debug)]
+pub(super) struct Ekf {
+    pub(super) velocity_up: Series,
+    pub(super) height: Series,
+    pub(super) north: Series,
+    pub(super) east: Series,
+}
+
+/// Speed from two components logged at the same times.
+fn horizontal(north: Option<&Series>, east: Option<&Series>) -> Option<Series> {
+    let (north, east) = (north?, east?);
+    let mut speed = Series::default();
+    for (time, north) in north.time_s.iter().zip(&north.value) {
+        if let Some(east) = east.latest(*time + 0.02, 0.2) {
+            speed.time_s.push(*time);
+            speed.value.push(north.hypot(east));
+        }
+    }
+    (!speed.is_empty()).then_some(speed)
+}
+
+/// Parameters by name; the last value of each. Compass and statistics rows repeat in flight.
+fn parameters(table: &Table) -> BTreeMap<String, f64> {
+    let (Some(names), Some(values)) = (table.text("Name"), table.number("Value")) else {
+        return BTreeMap::new();
+    };
+    names
+        .iter()
+        .zip(values)
+        .filter(|(_, value)| value.is_finite())
+        .map(|(name, value)| (name.clone(), *value))
+        .collect()
+}

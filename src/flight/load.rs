@@ -1,0 +1,172 @@
+//! Puts a flight together from the channels of a log.
+
+use std::path::Path;
+
+use super::align::{Evidence, align};
+use super::channels::Messages;
+use super::{Flight, FlightError, FlightOptions, Series, pick};
+use crate::log::Log;
+
+/// Kept before arming and after disarming, s.
+const MARGIN_S: f64 = 2.0;
+/// A silence in a channel longer than this is worth a warning, s.
+const GAP_S: f64 = 1.0;
+/// Motors that never exceed their lower limit by this much did not fly, us.
+const IDLE_US: f64 = 20.0;
+
+pub(super) fn load(
+    log: &Log,
+    source: &Path,
+    options: FlightOptions<'_>,
+) -> Result<Flight, FlightError> {
+    let mut messages = Messages::read(log);
+    if messages.is_empty() {
+        return Err(FlightError::Empty { source_path: source.to_owned() });
+    }
+    let mut warnings = scan_warnings(&messages);
+    let boots = messages.keep_one_boot();
+    if boots > 1 {
+        warnings.push(format!("the log holds {boots} boots of the autopilot; one is analysed"));
+    }
+    let missing = |what, messages, remedy| FlightError::Missing {
+        source_path: source.to_owned(),
+        what,
+        messages,
+        remedy,
+    };
+    let [pulse, pulse_max, pulse_min] = messages.motors().ok_or_else(|| {
+        missing("motor outputs", "RCOU", "set LOG_BITMASK bit 10 (RCOUT, +1024) and fly again")
+    })?;
+    let ekf = messages.ekf().ok_or_else(|| {
+        missing(
+            "vertical velocity of the position filter",
+            "XKF1, NKF1 or EKF1",
+            "set LOG_BITMASK bit 1 or 0 (ATTITUDE_MED, +2, or FAST, +1) and fly again",
+        )
+    })?;
+    let attitude = |field: &str| messages.rows("ATT")?.series(field, f64::to_radians);
+    let (Some(roll), Some(pitch)) = (attitude("Roll"), attitude("Pitch")) else {
+        return Err(missing(
+            "attitude",
+            "ATT",
+            "set LOG_BITMASK bit 1 or 0 (ATTITUDE_MED, +2, or FAST, +1) and fly again",
+        ));
+    };
+
+    let stages = pick::stages(&messages);
+    let armed = pick::armed(&messages, &pulse);
+    let no_flight =
+        |reason: String| FlightError::NoFlight { source_path: source.to_owned(), reason };
+    let (flight, choice) = pick::flight(&armed, &stages, &pulse).ok_or_else(|| {
+        no_flight("the motors were never armed for 5 s with outputs logged".into())
+    })?;
+    warnings.extend(choice);
+    let pulse_limits_us = messages.pulse_limits_us();
+    let strongest =
+        pulse.between(flight.0, flight.1).iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if strongest < pulse_limits_us.0 + IDLE_US {
+        return Err(no_flight(format!(
+            "the motors were armed but never ran above idle (highest mean output {strongest:.0} us)"
+        )));
+    }
+
+    let (desired_up, desired_horizontal) = messages.desired();
+    let clock = align(
+        &Evidence {
+            messages: &messages,
+            flight,
+            desired_up: desired_up.as_ref(),
+            velocity_up: &ekf.velocity_up,
+            height: &ekf.height,
+        },
+        options,
+        &mut warnings,
+    );
+
+    let cut = |series: Series| to_show_time(&series, flight, clock.offset_s);
+    // A log that begins in the air does not know the ground; the filter's origin stands in.
+    let starts_in_air = pulse
+        .between(flight.0 - 1.0, flight.0 + 1.0)
+        .first()
+        .is_some_and(|first| *first > pulse_limits_us.0 + IDLE_US);
+    let ground_m = if starts_in_air { 0.0 } else { ground_height_m(&ekf.height, flight.0) };
+    let mut height_m = cut(ekf.height);
+    for height in &mut height_m.value {
+        *height -= ground_m;
+    }
+    for (name, series) in
+        [("motor output", &pulse), ("velocity", &ekf.velocity_up), ("attitude", &roll)]
+    {
+        let (from, to) = series.span().unwrap_or_default();
+        let gap = series.longest_gap_s(flight.0.max(from), flight.1.min(to));
+        if gap > GAP_S {
+            warnings.push(format!("{name}: no data for {gap:.1} s of the flight"));
+        }
+        if to + GAP_S < flight.1 {
+            let lost = flight.1 - to;
+            warnings.push(format!("{name}: the log ends {lost:.1} s before the flight does"));
+        }
+    }
+    let (voltage_v, current_a) = messages.battery();
+    let show = |time: f64| time - clock.offset_s;
+    let place = messages.places().into_iter().find(|(time, ..)| *time >= flight.0 - MARGIN_S);
+    Ok(Flight {
+        source: source.to_owned(),
+        system_id: messages.system_id(),
+        velocity_up_mps: cut(ekf.velocity_up),
+        height_m,
+        north_m: cut(ekf.north),
+        east_m: cut(ekf.east),
+        pulse_us: cut(pulse),
+        pulse_max_us: cut(pulse_max),
+        pulse_min_us: cut(pulse_min),
+        roll_rad: cut(roll),
+        pitch_rad: cut(pitch),
+        desired_up_mps: desired_up.map(cut).filter(|series| !series.is_empty()),
+        desired_horizontal_mps: desired_horizontal.map(cut).filter(|series| !series.is_empty()),
+        voltage_v: voltage_v.map(cut),
+        current_a: current_a.map(cut),
+        stages: stages.into_iter().map(|(time, stage)| (show(time), stage)).collect(),
+        armed_s: armed.into_iter().map(|(start, end)| (show(start), show(end))).collect(),
+        pulse_limits_us,
+        first_fix_deg: place.map(|(_, latitude, longitude)| (latitude, longitude)),
+        scan: messages.scan,
+        clock,
+        warnings,
+    })
+}
+
+fn scan_warnings(messages: &Messages) -> Vec<String> {
+    let scan = &messages.scan;
+    let mut warnings = Vec::new();
+    if scan.bad_bytes > 0 {
+        warnings.push(format!("{} bytes of the log are damaged and were skipped", scan.bad_bytes));
+    }
+    if scan.rejected_formats > 0 {
+        let count = scan.rejected_formats;
+        warnings.push(format!("{count} message definitions in the log contradict themselves"));
+    }
+    if messages.dropped > 0 {
+        let count = messages.dropped;
+        warnings.push(format!("{count} rows with an impossible time were dropped"));
+    }
+    warnings
+}
+
+/// Cuts a channel over board time to the flight (with margins) and shifts it to show time.
+fn to_show_time(series: &Series, flight: (f64, f64), offset_s: f64) -> Series {
+    let range = series.range(flight.0 - MARGIN_S, flight.1 + MARGIN_S);
+    let times = series.time_s.get(range.clone()).unwrap_or_default();
+    Series {
+        time_s: times.iter().map(|time| time - offset_s).collect(),
+        value: series.value.get(range).unwrap_or_default().to_vec(),
+    }
+}
+
+/// Height of the ground the vehicle was armed on: median over the first second after arming, when it
+/// is still there.
+fn ground_height_m(height: &Series, armed_s: f64) -> f64 {
+    let mut first = height.between(armed_s - 1.0, armed_s + 1.0).to_vec();
+    first.sort_by(f64::total_cmp);
+    first.get(first.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,128 @@
+//! Which flight of a log is meant: armed intervals and show stages.
+
+use super::Series;
+use super::channels::Messages;
+
+/// Event ids of older firmware.
+const EV_ARMED: f64 = 10.0;
+const EV_DISARMED: f64 = 11.0;
+/// The show's stage while it performs.
+pub(super) const PERFORMING: u8 = 4;
+/// An armed interval with less motor data than this is not a flight, s.
+const SHORTEST_FLIGHT_S: f64 = 5.0;
+
+/// Show stages at their changes, over board time.
+pub(super) fn stages(messages: &Messages) -> Vec<(f64, u8)> {
+    let Some(rows) = messages.rows("SHOW") else { return Vec::new() };
+    let Some(column) = rows.column("Stage") else { return Vec::new() };
+    let mut stages: Vec<(f64, u8)> = Vec::new();
+    for (time, stage) in rows.time_s.iter().zip(column) {
+        if !(0.0..=255.0).contains(stage) {
+            continue;
+        }
+        let stage = *stage as u8;
+        if stages.last().is_none_or(|(_, last)| *last != stage) {
+            stages.push((*time, stage));
+        }
+    }
+    stages
+}
+
+/// When the motors were armed, over board time: from ARM and EV rows. A log that begins or ends
+/// armed has no row for it, so its ends stand in; without any rows the whole log counts as armed.
+pub(super) fn armed(messages: &Messages, pulses: &Series) -> Vec<(f64, f64)> {
+    let mut events: Vec<(f64, bool)> = Vec::new();
+    if let Some(rows) = messages.rows("ARM")
+        && let Some(states) = rows.column("ArmState")
+    {
+        events.extend(rows.time_s.iter().zip(states).map(|(time, state)| (*time, *state != 0.0)));
+    }
+    if let Some(rows) = messages.rows("EV")
+        && let Some(ids) = rows.column("Id")
+    {
+        let arming = |(time, id): (&f64, &f64)| match *id {
+            EV_ARMED => Some((*time, true)),
+            EV_DISARMED => Some((*time, false)),
+            _ => None,
+        };
+        events.extend(rows.time_s.iter().zip(ids).filter_map(arming));
+    }
+    events.sort_by(|left, right| left.0.total_cmp(&right.0));
+    let Some((first, last)) = pulses.span() else { return Vec::new() };
+    let mut intervals = Vec::new();
+    let mut since = events.first().is_none_or(|(_, armed)| !armed).then_some(first);
+    for (time, armed) in events {
+        match (since, armed) {
+            (None, true) => since = Some(time),
+            (Some(start), false) => {
+                intervals.push((start, time));
+                since = None;
+            }
+            _ => {}
+        }
+    }
+    intervals.extend(since.filter(|start| *start < last).map(|start| (start, last)));
+    intervals
+}
+
+/// The armed interval to analyse, and a warning when there was a choice.
+pub(super) fn flight(
+    armed: &[(f64, f64)],
+    stages: &[(f64, u8)],
+    pulses: &Series,
+) -> Option<((f64, f64), Option<String>)> {
+    let flown: Vec<(f64, f64)> = armed
+        .iter()
+        .copied()
+        .filter(|(start, end)| {
+            let times = pulses.times_between(*start, *end);
+            times.first().zip(times.last()).is_some_and(|(a, b)| b - a >= SHORTEST_FLIGHT_S)
+        })
+        .collect();
+    let performs = |(start, end): &&(f64, f64)| {
+        stages.iter().any(|(time, stage)| *stage == PERFORMING && (start..=end).contains(&time))
+    };
+    let shows: Vec<(f64, f64)> = flown.iter().filter(performs).copied().collect();
+    let (chosen, kind) = match shows.last() {
+        Some(show) => (*show, "performed a show"),
+        None => (*flown.last()?, "was armed"),
+    };
+    let warning = (flown.len() > 1).then(|| {
+        format!(
+            "the log holds {} flights; the last one that {kind} is analysed (board time {:.0} to \
+             {:.0} s)",
+            flown.len(),
+            chosen.0,
+            chosen.1
+        )
+    });
+    Some((chosen, warning))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pulses() -> Series {
+        let time_s: Vec<f64> = (0..1000).map(|index| f64::from(index) * 0.1).collect();
+        Series { value: vec![1500.0; time_s.len()], time_s }
+    }
+
+    #[test]
+    fn the_flight_that_performed_the_show_is_taken() {
+        let armed = [(0.0, 20.0), (30.0, 50.0), (60.0, 80.0)];
+        let (chosen, warning) =
+            flight(&armed, &[(5.0, 3), (35.0, PERFORMING), (45.0, 7)], &pulses()).unwrap();
+        assert_eq!(chosen, (30.0, 50.0));
+        assert!(warning.unwrap().contains("3 flights"));
+        let (last, _) = flight(&armed, &[], &pulses()).unwrap();
+        assert_eq!(last, (60.0, 80.0));
+    }
+
+    #[test]
+    fn an_armed_interval_without_motor_data_is_no_flight() {
+        let (chosen, warning) = flight(&[(0.0, 50.0), (200.0, 300.0)], &[], &pulses()).unwrap();
+        assert_eq!((chosen, warning), ((0.0, 50.0), None));
+        assert!(flight(&[(200.0, 300.0)], &[], &pulses()).is_none());
+    }
+}

@@ -1,0 +1,383 @@
+//! Finds template files, applies overrides, and resolves a mission into plans.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+use toml::Table;
+use toml::Value as Toml;
+
+use super::build::build_plan;
+use super::error::TemplateError;
+use super::plan::Plan;
+use super::template::{FlightTemplate, Template, span_of};
+use crate::base::file::{FileError, read_whole};
+use crate::vehicle::{Vehicle, VehicleError};
+
+/// Largest template file that is read, bytes.
+const MAX_TEMPLATE_BYTES: u64 = 4 << 20;
+
+/// The templates that come with the program: file name and text.
+pub const BUILTIN: &[(&str, &str)] = &[
+    ("calibration.toml", include_str!("../../templates/calibration.toml")),
+    (
+        "calibration-counterphase.toml",
+        include_str!("../../templates/calibration-counterphase.toml"),
+    ),
+    ("hover.toml", include_str!("../../templates/hover.toml")),
+    ("campaign.toml", include_str!("../../templates/campaign.toml")),
+];
+
+/// One `KEY=VALUE` that replaces a value of a template.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Override {
+    /// Dotted path (`grid.rows`, `steps.2.speed_mps`) or the name of a parameter (`leg_s`).
+    pub key: String,
+    /// The new value, or `None` to remove the key.
+    pub value: Option<Toml>,
+}
+
+/// Why a mission could not be resolved.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum MissionError {
+    /// The template itself is wrong.
+    #[error(transparent)]
+    Template(#[from] TemplateError),
+    /// A file could not be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The vehicle is unknown or its file is wrong.
+    #[error(transparent)]
+    Vehicle(#[from] VehicleError),
+    /// There is no such template.
+    #[error("there is no template {name}; built in are {}", names().join(", "))]
+    NoTemplate {
+        /// As asked for.
+        name: String,
+    },
+    /// A template file is not text.
+    #[error("{} is not UTF-8 text", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+    },
+    /// An override does not fit the template.
+    #[error("cannot set {key}: {reason}")]
+    Override {
+        /// As asked for.
+        key: String,
+        /// Why not.
+        reason: String,
+    },
+}
+
+/// A mission: one flight, or a campaign of several.
+#[derive(Clone, Debug)]
+pub struct Mission {
+    /// Short name.
+    pub name: String,
+    /// Title for people.
+    pub title: String,
+    /// Text of the campaign template, when there are several flights.
+    pub campaign_text: Option<String>,
+    /// The flights.
+    pub flights: Vec<ResolvedFlight>,
+}
+
+/// A flight's template after overrides, and its plan.
+#[derive(Clone, Debug)]
+pub struct ResolvedFlight {
+    /// The template as resolved: reading it again gives the same plan.
+    pub template_text: String,
+    /// The vehicle it was planned for.
+    pub vehicle: Vehicle,
+    /// The plan.
+    pub plan: Plan,
+}
+
+impl Override {
+    /// Reads `KEY=VALUE`; the value is TOML, or plain text where it is not.
+    pub fn parse(text: &str) -> Result<Self, MissionError> {
+        let bad = |reason: &str| MissionError::Override { key: text.into(), reason: reason.into() };
+        let (key, value) = text.split_once('=').ok_or_else(|| bad("write it as KEY=VALUE"))?;
+        let (key, value) = (key.trim(), value.trim());
+        if key.is_empty() || value.is_empty() {
+            return Err(bad("write it as KEY=VALUE"));
+        }
+        let parsed = format!("value = {value}")
+            .parse::<Table>()
+            .ok()
+            .filter(|table| table.len() == 1)
+            .and_then(|mut table| table.remove("value"))
+            .unwrap_or_else(|| Toml::String(value.to_owned()));
+        Ok(Self { key: key.to_owned(), value: Some(parsed) })
+    }
+
+    /// An override by path and value.
+    pub fn new(key: &str, value: impl Into<Toml>) -> Self {
+        Self { key: key.to_owned(), value: Some(value.into()) }
+    }
+
+    /// Removes a key if it is there.
+    pub fn remove(key: &str) -> Self {
+        Self { key: key.to_owned(), value: None }
+    }
+}
+
+fn names() -> Vec<&'static str> {
+    BUILTIN.iter().map(|(name, _)| *name).collect()
+}
+
+/// Text of a template: a file, or a built-in one by its name (with or without folder and `.toml`).
+fn load(name: &str, relative_to: Option<&Path>) -> Result<(String, String), MissionError> {
+    let asked = Path::new(name);
+    let path = match relative_to {
+        Some(folder) if asked.is_relative() => folder.join(asked),
+        _ => asked.to_owned(),
+    };
+    if path.is_file() {
+        let bytes = read_whole(&path, MAX_TEMPLATE_BYTES)?;
+        let text =
+            String::from_utf8(bytes).map_err(|_| MissionError::NotText { path: path.clone() })?;
+        return Ok((path.display().to_string(), text));
+    }
+    let plain = name.strip_prefix("templates/").unwrap_or(name);
+    BUILTIN
+        .iter()
+        .find(|(builtin, _)| *builtin == plain || builtin.strip_suffix(".toml") == Some(plain))
+        .map(|(builtin, text)| (format!("templates/{builtin}"), (*text).to_owned()))
+        .ok_or_else(|| MissionError::NoTemplate { name: name.to_owned() })
+}
+
+/// Resolves a template (a file or a built-in name) with overrides into plans.
+pub fn resolve(name: &str, overrides: &[Override]) -> Result<Mission, MissionError> {
+    let (path, text) = load(name, None)?;
+    resolve_text(&path, &text, overrides)
+}
+
+/// Resolves a template's text; `path` locates files it refers to and is named in messages.
+pub fn resolve_text(
+    path: &str,
+    text: &str,
+    overrides: &[Override],
+) -> Result<Mission, MissionError> {
+    match Template::parse(path, text)? {
+        Template::Flight(_) => {
+            let refused = |key: &Override| MissionError::Override {
+                key: key.key.clone(),
+                reason: format!("{path} has no such key"),
+            };
+            let (flight, used) = resolve_flight(path, text, overrides)?;
+            if let Some(unused) = used.iter().zip(overrides).find(|(used, _)| !**used) {
+                return Err(refused(unused.1));
+            }
+            Ok(Mission {
+                name: flight.plan.name.clone(),
+                title: flight.plan.title.clone(),
+                campaign_text: None,
+                flights: vec![flight],
+            })
+        }
+        Template::Campaign(campaign) => {
+            let folder = Path::new(path).parent().map(Path::to_owned);
+            let common: Vec<_> = table_overrides(&campaign.set);
+            let mut used_any = vec![false; overrides.len()];
+            let mut flights: Vec<ResolvedFlight> = Vec::new();
+            for reference in campaign.flights.get_ref() {
+                let name = reference.template.get_ref();
+                let (flight_path, flight_text) =
+                    load(name, folder.as_deref()).map_err(|error| match error {
+                        MissionError::NoTemplate { .. } => TemplateError::new(
+                            path,
+                            text,
+                            span_of(&reference.template),
+                            format!("there is no template {name}"),
+                        )
+                        .with_help(format!("built in are {}", names().join(", ")))
+                        .into(),
+                        other => other,
+                    })?;
+                let Template::Flight(parsed) = Template::parse(&flight_path, &flight_text)? else {
+                    return Err(TemplateError::new(
+                        path,
+                        text,
+                        span_of(&reference.template),
+                        "a campaign cannot contain a campaign",
+                    )
+                    .into());
+                };
+                let own_name = parsed.name.get_ref();
+                let mut all = common.clone();
+                all.extend(table_overrides(&reference.set));
+                let from_user = all.len();
+                let mut index = Vec::new();
+                for (i, item) in overrides.iter().enumerate() {
+                    let mut item = item.clone();
+                    if let Some((first, rest)) = item.key.split_once('.')
+                        && campaign_has(&campaign.flights, first)
+                    {
+                        if first != flight_stem(name) && first != own_name {
+                            continue;
+                        }
+                        item.key = rest.to_owned();
+                    }
+                    index.push(i);
+                    all.push(item);
+                }
+                let (flight, used) = resolve_flight(&flight_path, &flight_text, &all)?;
+                for (used, i) in used[from_user..].iter().zip(index) {
+                    used_any[i] |= used;
+                }
+                if flights.iter().any(|other| other.plan.name == flight.plan.name) {
+                    return Err(TemplateError::new(
+                        path,
+                        text,
+                        span_of(&reference.template),
+                        format!("two flights are named \"{}\"", flight.plan.name),
+                    )
+                    .into());
+                }
+                flights.push(flight);
+            }
+            if flights.is_empty() {
+                let span = span_of(&campaign.flights);
+                return Err(TemplateError::new(path, text, span, "a campaign needs flights").into());
+            }
+            if let Some(unused) = used_any.iter().zip(overrides).find(|(used, _)| !**used) {
+                return Err(MissionError::Override {
+                    key: unused.1.key.clone(),
+                    reason: "none of the campaign's flights has such a key".to_owned(),
+                });
+            }
+            Ok(Mission {
+                name: campaign.name.get_ref().clone(),
+                title: campaign.title.clone(),
+                campaign_text: Some(text.to_owned()),
+                flights,
+            })
+        }
+    }
+}
+
+fn flight_stem(name: &str) -> &str {
+    Path::new(name).file_stem().and_then(|stem| stem.to_str()).unwrap_or(name)
+}
+
+fn campaign_has(
+    flights: &toml::Spanned<Vec<super::template::FlightReference>>,
+    first: &str,
+) -> bool {
+    flights.get_ref().iter().any(|flight| flight_stem(flight.template.get_ref()) == first)
+}
+
+fn table_overrides(table: &Table) -> Vec<Override> {
+    table.iter().map(|(key, value)| Override::new(key, value.clone())).collect()
+}
+
+/// Applies overrides, reads the result and builds the plan. Also says which overrides had a place.
+fn resolve_flight(
+    path: &str,
+    text: &str,
+    overrides: &[Override],
+) -> Result<(ResolvedFlight, Vec<bool>), MissionError> {
+    let mut used = vec![true; overrides.len()];
+    let (shown_path, resolved_text) = if overrides.is_empty() {
+        (path.to_owned(), text.to_owned())
+    } else {
+        let mut table: Table = text.parse().map_err(|error: toml::de::Error| {
+            TemplateError::new(path, text, error.span(), error.message())
+        })?;
+        for (used, item) in used.iter_mut().zip(overrides) {
+            *used = apply(&mut table, item)?;
+        }
+        let resolved = toml::to_string(&table).map_err(|error| MissionError::Override {
+            key: path.to_owned(),
+            reason: error.to_string(),
+        })?;
+        (format!("{path} with overrides"), resolved)
+    };
+    let template = match Template::parse(&shown_path, &resolved_text)? {
+        Template::Flight(template) => template,
+        Template::Campaign(_) => {
+            return Err(MissionError::Override {
+                key: "flights".to_owned(),
+                reason: "a flight template cannot become a campaign".to_owned(),
+            });
+        }
+    };
+    let vehicle = vehicle_of(&shown_path, &resolved_text, &template)?;
+    let plan = build_plan(&shown_path, &resolved_text, &template, &vehicle)?;
+    Ok((ResolvedFlight { template_text: resolved_text, vehicle, plan }, used))
+}
+
+fn vehicle_of(path: &str, text: &str, template: &FlightTemplate) -> Result<Vehicle, MissionError> {
+    let name = template.vehicle.get_ref();
+    crate::vehicle::library::load(name).map_err(|error| match error {
+        VehicleError::Unknown { .. } => {
+            TemplateError::new(path, text, span_of(&template.vehicle), error.to_string()).into()
+        }
+        other => other.into(),
+    })
+}
+
+/// Sets one value. `Ok(false)`: the template has no place for it.
+fn apply(table: &mut Table, item: &Override) -> Result<bool, MissionError> {
+    let refused = |reason: String| MissionError::Override { key: item.key.clone(), reason };
+    // A bare name that is a parameter means that parameter.
+    if let Some(Toml::Table(parameters)) = table.get_mut("parameters")
+        && parameters.contains_key(&item.key)
+        && let Some(value) = &item.value
+    {
+        parameters.insert(item.key.clone(), value.clone());
+        return Ok(true);
+    }
+    let keys: Vec<&str> = item.key.split('.').collect();
+    let Some((last, parents)) = keys.split_last() else { return Ok(false) };
+    // Only known top-level keys: anything else is a mistyped parameter.
+    let known = [
+        "name", "title", "purpose", "vehicle", "site", "grid", "takeoff", "landing", "motion",
+        "fence", "window", "limits", "groups", "steps", "briefing",
+    ];
+    if !known.contains(&keys[0]) {
+        return Ok(false);
+    }
+    if parents.is_empty() {
+        match &item.value {
+            Some(value) => table.insert((*last).to_owned(), value.clone()),
+            None => table.remove(*last),
+        };
+        return Ok(true);
+    }
+    let mut place: &mut Toml =
+        table.entry(parents[0].to_owned()).or_insert_with(|| Toml::Table(Table::new()));
+    for key in &parents[1..] {
+        place = match place {
+            Toml::Table(inner) => {
+                inner.entry((*key).to_owned()).or_insert_with(|| Toml::Table(Table::new()))
+            }
+            Toml::Array(list) => {
+                let count = list.len();
+                key.parse::<usize>().ok().and_then(|index| list.get_mut(index)).ok_or_else(
+                    || refused(format!("`{key}` is not one of the {count} entries (from 0)")),
+                )?
+            }
+            _ => return Err(refused(format!("`{key}` is inside a plain value"))),
+        };
+    }
+    match (place, &item.value) {
+        (Toml::Table(inner), Some(value)) => {
+            inner.insert((*last).to_owned(), value.clone());
+        }
+        (Toml::Table(inner), None) => {
+            inner.remove(*last);
+        }
+        (Toml::Array(list), Some(value)) => {
+            let count = list.len();
+            *last.parse::<usize>().ok().and_then(|index| list.get_mut(index)).ok_or_else(
+                || refused(format!("`{last}` is not one of the {count} entries (from 0)")),
+            )? = value.clone();
+        }
+        _ => return Err(refused(format!("`{last}` is inside a plain value"))),
+    }
+    Ok(true)
+}

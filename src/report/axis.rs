@@ -1,0 +1,104 @@
+//! Axes: round ranges and ticks around data.
+
+use kuva::render::layout::TickFormat;
+
+use super::text::{fixed, usable};
+
+/// Distances of ticks on a time axis.
+const TIME_STEPS_S: [f64; 12] =
+    [1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0, 7200.0];
+
+/// A linear axis: label with unit, range, distance of its ticks.
+#[derive(Clone, Debug)]
+pub(super) struct Axis {
+    pub(super) label: String,
+    pub(super) min: f64,
+    pub(super) max: f64,
+    pub(super) step: f64,
+}
+
+impl Axis {
+    /// An axis around all usable values, at least `span` wide, ending on ticks.
+    pub(super) fn around(label: &str, values: impl Iterator<Item = f64>, span: f64) -> Self {
+        let (low, high) = extent(values, span);
+        let step = nice_step((high - low) / 5.0);
+        // Room between the data and the frame.
+        let pad = 0.03 * (high - low);
+        let min = ((low - pad) / step).floor() * step;
+        let max = ((high + pad) / step).ceil() * step;
+        Self { label: label.to_owned(), min, max, step }
+    }
+
+    /// A time axis in seconds, not starting before the data.
+    pub(super) fn time(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = extent(values, 10.0);
+        let wanted = (high - low) / 7.0;
+        let step = TIME_STEPS_S
+            .into_iter()
+            .find(|&step| step >= wanted)
+            .unwrap_or_else(|| nice_step(wanted));
+        let min = if low > 0.0 && low < step { 0.0 } else { low };
+        Self { label: "show time (s)".to_owned(), min, max: high, step }
+    }
+
+    /// Tick labels with just the decimals that the step needs.
+    pub(super) fn format(&self) -> TickFormat {
+        let decimals = decimals_of(self.step);
+        TickFormat::Custom(std::sync::Arc::new(move |value| fixed(value, decimals)))
+    }
+}
+
+/// Decimals that tell two multiples of `step` apart.
+pub(super) fn decimals_of(step: f64) -> usize {
+    (0..6)
+        .find(|&decimals| {
+            let scaled = step * 10_f64.powi(decimals);
+            (scaled - scaled.round()).abs() < 1e-6 * scaled.abs().max(1.0)
+        })
+        .unwrap_or(6) as usize
+}
+
+/// The smallest of 1, 2, 2.5, 5 times a power of ten that is not below `raw`.
+pub(super) fn nice_step(raw: f64) -> f64 {
+    if !(raw.is_finite() && raw > 0.0) {
+        return 1.0;
+    }
+    let power = 10_f64.powf(raw.log10().floor());
+    [1.0, 2.0, 2.5, 5.0, 10.0]
+        .into_iter()
+        .map(|factor| factor * power)
+        .find(|&step| step >= raw * (1.0 - 1e-9))
+        .unwrap_or(10.0 * power)
+}
+
+fn extent(values: impl Iterator<Item = f64>, span: f64) -> (f64, f64) {
+    let (low, high) = values
+        .filter(|&value| usable(value))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    if low > high {
+        return (0.0, span);
+    }
+    let lacking = (span - (high - low)).max(0.0) / 2.0;
+    (low - lacking, high + lacking)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_end_on_round_numbers() {
+        let axis = Axis::around("u (us)", [1498.7, 1702.3].into_iter(), 10.0);
+        assert_eq!((axis.min, axis.max, axis.step), (1450.0, 1750.0, 50.0));
+        assert_eq!(decimals_of(0.25), 2);
+        assert_eq!(decimals_of(50.0), 0);
+    }
+
+    #[test]
+    fn nothing_and_nonsense_still_make_an_axis() {
+        for values in [vec![], vec![f64::NAN], vec![f64::INFINITY, 1e300], vec![3.0, 3.0]] {
+            let axis = Axis::around("x", values.into_iter(), 1.0);
+            assert!(axis.max > axis.min && axis.step > 0.0, "{axis:?}");
+        }
+    }
+}

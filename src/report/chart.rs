@@ -1,0 +1,313 @@
+//! Panels with axes, drawn by `kuva`.
+
+use std::fmt::Write as _;
+
+use kuva::plot::legend::{LegendEntry, LegendPosition, LegendShape};
+use kuva::plot::scatter::{MarkerShape, ScatterPlot};
+use kuva::plot::{BandPlot, LinePlot};
+use kuva::render::layout::{ComputedLayout, Layout};
+use kuva::render::plots::Plot;
+use kuva::render::render::{
+    PathData, Primitive, Scene, TextAnchor, render_multiple, render_twin_y,
+};
+use kuva::render::theme::Theme;
+
+use super::axis::Axis;
+use super::colour::{INK, RULE};
+use super::sheet::FONT;
+use super::text::{clean, usable};
+
+/// Pixels right of a panel with a right axis.
+const RIGHT_AXIS_MARGIN: f64 = 62.0;
+
+/// A point with half lengths of its error bars.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mark {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) x_error: f64,
+    pub(super) y_error: f64,
+}
+
+impl Mark {
+    /// Whether the point can be drawn.
+    pub(super) fn usable(&self) -> bool {
+        usable(self.x) && usable(self.y)
+    }
+}
+
+/// One pair of axes with what is drawn in them, in order.
+pub(super) struct Panel {
+    title: String,
+    x: Axis,
+    y: Axis,
+    plots: Vec<Plot>,
+    right: Option<(Axis, Vec<Plot>)>,
+    bars: Vec<(Vec<Mark>, String)>,
+    legend: Vec<LegendEntry>,
+    legend_position: LegendPosition,
+    legend_box: bool,
+    right_margin: f64,
+}
+
+impl Panel {
+    /// An empty panel.
+    pub(super) fn new(title: &str, x: Axis, y: Axis) -> Self {
+        Self {
+            title: plain(title),
+            x,
+            y,
+            plots: Vec::new(),
+            right: None,
+            bars: Vec::new(),
+            legend: Vec::new(),
+            legend_position: LegendPosition::InsideTopLeft,
+            legend_box: true,
+            right_margin: 16.0,
+        }
+    }
+
+    /// Where the legend goes.
+    pub(super) fn legend_at(&mut self, position: LegendPosition) {
+        self.legend_position = position;
+    }
+
+    /// Lets what is drawn show behind the legend.
+    pub(super) fn clear_legend(&mut self) {
+        self.legend_box = false;
+    }
+
+    /// Puts the legend right of the panel, so many pixels wide.
+    pub(super) fn legend_outside(&mut self, width: f64) {
+        self.legend_position = LegendPosition::OutsideRightTop;
+        self.right_margin = width;
+    }
+
+    /// Leaves room on the right, as a panel with a right axis does, so that both line up.
+    pub(super) fn leave_room_right(&mut self) {
+        self.right_margin = RIGHT_AXIS_MARGIN;
+    }
+
+    /// A second axis on the right, with its own lines.
+    pub(super) fn right_axis(&mut self, axis: Axis, lines: Vec<Plot>) {
+        self.right = Some((axis, lines));
+        self.leave_room_right();
+    }
+
+    /// An entry of the legend.
+    pub(super) fn entry(&mut self, label: &str, colour: &str, shape: LegendShape, dash: &str) {
+        self.legend.push(LegendEntry {
+            label: plain(label),
+            color: colour.to_owned(),
+            shape,
+            dasharray: (!dash.is_empty()).then(|| dash.to_owned()),
+        });
+    }
+
+    /// A line, broken where a point cannot be drawn.
+    pub(super) fn line(&mut self, points: &[(f64, f64)], colour: &str, width: f64, dash: &str) {
+        self.plots.extend(lines(points, colour, width, dash));
+    }
+
+    /// A shaded band: (x, lower, upper).
+    pub(super) fn band(&mut self, points: &[(f64, f64, f64)], colour: &str) {
+        for run in points.split(|&(x, low, high)| !(usable(x) && usable(low) && usable(high))) {
+            if run.len() > 1 {
+                let band = BandPlot::new(
+                    run.iter().map(|point| point.0),
+                    run.iter().map(|point| point.1),
+                    run.iter().map(|point| point.2),
+                );
+                self.plots.push(Plot::Band(band.with_color(colour).with_opacity(0.22)));
+            }
+        }
+    }
+
+    /// Points of one colour, with thin error bars behind them.
+    pub(super) fn marks(&mut self, marks: &[Mark], colour: &str, size: f64, shape: MarkerShape) {
+        let marks: Vec<Mark> = marks.iter().copied().filter(Mark::usable).collect();
+        if marks.is_empty() {
+            return;
+        }
+        let mut scatter = ScatterPlot::new()
+            .with_data(marks.iter().map(|mark| (mark.x, mark.y)))
+            .with_color(colour)
+            .with_size(size)
+            .with_marker(shape);
+        scatter.marker_opacity = Some(0.85);
+        self.plots.push(Plot::Scatter(scatter));
+        self.bars.push((marks, colour.to_owned()));
+    }
+
+    /// Draws the panel.
+    pub(super) fn draw(self, width: f64, height: f64) -> Scene {
+        let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
+            .with_width(width)
+            .with_height(height)
+            .with_x_label(self.x.label.clone())
+            .with_y_label(self.y.label.clone())
+            .with_x_axis_min(self.x.min)
+            .with_x_axis_max(self.x.max)
+            .with_y_axis_min(self.y.min)
+            .with_y_axis_max(self.y.max)
+            .with_x_tick_step(self.x.step)
+            .with_y_tick_step(self.y.step)
+            .with_x_tick_format(self.x.format())
+            .with_y_tick_format(self.y.format())
+            .with_force_margins(66.0, self.right_margin)
+            .with_force_margins_y(30.0, 46.0)
+            .with_label_size(13)
+            .with_tick_size(12)
+            .with_body_size(12)
+            .with_font_family(FONT)
+            .with_theme(theme());
+        if !self.legend.is_empty() {
+            layout = layout
+                .with_legend_entries(self.legend)
+                .with_legend_position(self.legend_position)
+                .with_legend_box(self.legend_box);
+        }
+        let mut scene;
+        if let Some((axis, lines)) = self.right {
+            layout = layout
+                .with_y2_range(axis.min, axis.max)
+                .with_y2_axis_min(axis.min)
+                .with_y2_axis_max(axis.max)
+                .with_y2_label(axis.label.clone())
+                .with_y2_tick_format(axis.format());
+            let computed = ComputedLayout::from_layout(&layout);
+            scene = render_twin_y(self.plots, lines, layout);
+            insert_bars(&mut scene, &computed, &self.bars);
+        } else {
+            let computed = ComputedLayout::from_layout(&layout);
+            scene = render_multiple(self.plots, layout);
+            insert_bars(&mut scene, &computed, &self.bars);
+        }
+        scene.elements.push(Primitive::Text {
+            x: 66.0,
+            y: 17.0,
+            content: self.title,
+            size: 14,
+            anchor: TextAnchor::Start,
+            rotate: None,
+            bold: true,
+            color: None,
+        });
+        scene
+    }
+}
+
+/// Lines for [`Panel::right_axis`], broken where a point cannot be drawn.
+pub(super) fn lines(points: &[(f64, f64)], colour: &str, width: f64, dash: &str) -> Vec<Plot> {
+    points
+        .split(|&(x, y)| !(usable(x) && usable(y)))
+        .filter(|run| run.len() > 1)
+        .map(|run| {
+            let line = LinePlot::new()
+                .with_data(run.iter().copied())
+                .with_color(colour)
+                .with_stroke_width(width);
+            Plot::Line(if dash.is_empty() {
+                line
+            } else {
+                line.with_line_style(kuva::plot::LineStyle::Custom(dash.to_owned()))
+            })
+        })
+        .collect()
+}
+
+/// Keeps the highest and the lowest sample of each of `buckets` stretches: a thinned trace looks
+/// like the whole one.
+pub(super) fn thinned(points: &[(f64, f64)], buckets: usize) -> Vec<(f64, f64)> {
+    if points.len() <= 2 * buckets.max(1) {
+        return points.to_vec();
+    }
+    let size = points.len().div_ceil(buckets.max(1));
+    let mut kept = Vec::with_capacity(2 * buckets);
+    for stretch in points.chunks(size) {
+        let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let (Some(low), Some(high)) =
+            (stretch.iter().min_by(by_value), stretch.iter().max_by(by_value))
+        else {
+            continue;
+        };
+        let (first, second) = if low.0 <= high.0 { (low, high) } else { (high, low) };
+        kept.push(*first);
+        if first != second {
+            kept.push(*second);
+        }
+    }
+    kept
+}
+
+/// All bars of a colour in one path: three elements for each bar would make big files.
+fn insert_bars(scene: &mut Scene, computed: &ComputedLayout, bars: &[(Vec<Mark>, String)]) {
+    let (left, right) = (computed.map_x(computed.x_range.0), computed.map_x(computed.x_range.1));
+    let (bottom, top) = (computed.map_y(computed.y_range.0), computed.map_y(computed.y_range.1));
+    let mut paths = Vec::new();
+    for (marks, colour) in bars {
+        let mut d = String::new();
+        for mark in marks {
+            let (x, y) = (computed.map_x(mark.x), computed.map_y(mark.y));
+            if usable(mark.x_error) && mark.x_error > 0.0 {
+                let from = computed.map_x(mark.x - mark.x_error).clamp(left, right);
+                let to = computed.map_x(mark.x + mark.x_error).clamp(left, right);
+                let _ = write!(d, "M{from:.1} {y:.1}H{to:.1}");
+            }
+            if usable(mark.y_error) && mark.y_error > 0.0 {
+                let from = computed.map_y(mark.y - mark.y_error).clamp(top, bottom);
+                let to = computed.map_y(mark.y + mark.y_error).clamp(top, bottom);
+                let _ = write!(d, "M{x:.1} {from:.1}V{to:.1}");
+            }
+        }
+        if !d.is_empty() {
+            paths.push(Primitive::Path(Box::new(PathData {
+                d,
+                fill: None,
+                stroke: colour.as_str().into(),
+                stroke_width: 1.0,
+                opacity: Some(0.55),
+                stroke_dasharray: None,
+            })));
+        }
+    }
+    let behind = scene
+        .elements
+        .iter()
+        .position(|element| matches!(element, Primitive::ClipStart { .. }))
+        .map_or(scene.elements.len(), |index| index + 1);
+    scene.elements.splice(behind..behind, paths);
+}
+
+/// `kuva` reads `$...$` as mathematics; names from outside must not be.
+fn plain(text: &str) -> String {
+    clean(text).replace('$', "\\$")
+}
+
+fn theme() -> Theme {
+    Theme {
+        axis_color: "#8a949e".into(),
+        grid_color: RULE.into(),
+        tick_color: "#8a949e".into(),
+        text_color: INK.into(),
+        legend_bg: "#ffffff".into(),
+        legend_border: "none".into(),
+        ..Theme::light()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_the_extremes_in_time_order() {
+        let mut points: Vec<(f64, f64)> = (0..1000).map(|i| (f64::from(i), 0.0)).collect();
+        points[503].1 = 9.0;
+        points[507].1 = -9.0;
+        let thin = thinned(&points, 50);
+        assert!(thin.len() <= 100);
+        assert!(thin.contains(&(503.0, 9.0)) && thin.contains(&(507.0, -9.0)));
+        assert!(thin.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+    }
+}

@@ -1,0 +1,221 @@
+//! Fleet tables beside the paper's values, and the words that a page and a terminal share.
+
+use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, TableRow, UpdraftMap};
+use crate::base::estimate::Estimate;
+use crate::flight::Alignment;
+
+use super::figure_air::{deviation, mean, mean_truth};
+use super::law;
+use super::text::{
+    NONE, clean, count, estimate, fixed, parameter, rejection, signed, symbol, unit, usable,
+};
+
+/// A row of Table I or II in words.
+pub(super) struct Comparison {
+    pub(super) law: String,
+    pub(super) parameter: String,
+    pub(super) unit: String,
+    /// Mean and standard deviation between drones.
+    pub(super) fleet: String,
+    /// Mean standard error of one drone's fit.
+    pub(super) mean_se: String,
+    pub(super) n: usize,
+    pub(super) paper: String,
+    /// Ours minus the paper's.
+    pub(super) difference: String,
+    /// The same over the paper's error.
+    pub(super) in_errors: String,
+}
+
+/// The row in words.
+pub(super) fn comparison(row: &TableRow) -> Comparison {
+    let paper = row.paper.filter(|paper| usable(paper.value));
+    let gap = paper.map(|paper| row.mean - paper.value).filter(|gap| usable(*gap));
+    let in_errors = paper
+        .filter(|paper| usable(paper.se) && paper.se > 0.0)
+        .and_then(|paper| gap.map(|gap| gap / paper.se));
+    let unit = unit(&row.unit);
+    Comparison {
+        law: clean(&row.law),
+        parameter: symbol(&row.parameter),
+        unit: if unit.is_empty() { NONE.to_owned() } else { unit },
+        fleet: if row.n > 1 {
+            estimate(Estimate::new(row.mean, row.sd))
+        } else {
+            estimate(Estimate::new(row.mean, 0.0))
+        },
+        mean_se: if usable(row.mean_se) && row.mean_se > 0.0 {
+            significant(row.mean_se)
+        } else {
+            NONE.to_owned()
+        },
+        n: row.n,
+        paper: paper.map_or_else(|| NONE.to_owned(), estimate),
+        difference: gap.map_or_else(|| NONE.to_owned(), |gap| signed(gap, decimals(paper))),
+        in_errors: in_errors.map_or_else(|| NONE.to_owned(), |ratio| signed(ratio, 1)),
+    }
+}
+
+fn decimals(paper: Option<Estimate>) -> usize {
+    paper
+        .filter(|paper| paper.se > 0.0)
+        .map_or(3, |paper| (1 - paper.se.log10().floor() as i32).clamp(0, 6) as usize)
+}
+
+/// A positive number with two significant digits.
+fn significant(value: f64) -> String {
+    fixed(value, (1 - value.log10().floor() as i32).clamp(0, 6) as usize)
+}
+
+/// A fit in one line: `A = 8.139 ± 0.012 µs/(m/s)², …`.
+pub(super) fn fit_line(fit: &Fit) -> String {
+    let mut parts: Vec<String> = fit
+        .parameters
+        .iter()
+        .map(|p| {
+            let held = if p.held { " (held)" } else { "" };
+            format!("{} = {} {}{held}", symbol(&p.name), estimate(p.estimate), unit(&p.unit))
+        })
+        .collect();
+    if let Some(chi2) = fit.chi2_reduced {
+        parts.push(format!("χ²/ν = {} (ν = {})", fixed(chi2, 2), fit.dof));
+    }
+    parts.push(format!("rms {} µs over {}", fixed(fit.rms_us, 2), count(fit.points, "point")));
+    parts.join(", ")
+}
+
+/// The flock's fits in words: (law, line).
+pub(super) fn flock_lines(flight: &FlightAnalysis) -> Vec<(&'static str, String)> {
+    let Some(laws) = &flight.flock else {
+        return Vec::new();
+    };
+    [
+        ("signed quadratic", &laws.signed_quadratic),
+        ("signed quadratic, held", &laws.signed_quadratic_held),
+        ("linear", &laws.linear),
+    ]
+    .into_iter()
+    .filter_map(|(name, fit)| Some((name, fit_line(fit.as_ref()?))))
+    .collect()
+}
+
+/// One drone's fitted parameters in words; a dash where there is none.
+pub(super) struct DroneLaws {
+    pub(super) a: String,
+    pub(super) u0: String,
+    pub(super) w: String,
+    pub(super) chi2: String,
+    pub(super) slope: String,
+    pub(super) linear_u0: String,
+    pub(super) linear_chi2: String,
+}
+
+/// The drone's laws in words.
+pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
+    let quadratic = drone.laws.as_ref().and_then(law::signed_quadratic);
+    let linear = drone.laws.as_ref().and_then(|laws| laws.linear.as_ref());
+    let of = |fit, name| {
+        parameter(fit, name).map_or_else(
+            || NONE.to_owned(),
+            |p| {
+                if p.held { format!("{} held", estimate(p.estimate)) } else { estimate(p.estimate) }
+            },
+        )
+    };
+    let chi2 = |fit: Option<&Fit>| {
+        fit.and_then(|fit| fit.chi2_reduced).map_or_else(|| NONE.to_owned(), |chi2| fixed(chi2, 2))
+    };
+    DroneLaws {
+        a: of(quadratic, "A"),
+        u0: of(quadratic, "u0"),
+        w: of(quadratic, "W"),
+        chi2: chi2(quadratic),
+        slope: of(linear, "A'"),
+        linear_u0: of(linear, "u0"),
+        linear_chi2: chi2(linear),
+    }
+}
+
+/// Everything doubtful about a drone: rejected windows by reason, its warnings, its fits' warnings.
+pub(super) fn flags(drone: &DroneAnalysis) -> Vec<String> {
+    let mut flags = Vec::new();
+    let mut reasons: Vec<(&str, usize)> = Vec::new();
+    for reason in drone.windows.iter().flat_map(|window| &window.rejected) {
+        let words = rejection(*reason);
+        match reasons.iter_mut().find(|(known, _)| *known == words) {
+            Some((_, n)) => *n += 1,
+            None => reasons.push((words, 1)),
+        }
+    }
+    flags.extend(reasons.iter().map(|(words, n)| format!("{} {words}", count(*n, "window"))));
+    flags.extend(drone.warnings.iter().map(|warning| clean(warning)));
+    if let Some(laws) = &drone.laws {
+        let fits = [&laws.signed_quadratic, &laws.signed_quadratic_held, &laws.linear];
+        for fit in fits.into_iter().flatten() {
+            flags.extend(fit.warnings.iter().map(|warning| clean(warning)));
+            if !fit.other_minima.is_empty() {
+                let n = fit.other_minima.len();
+                let noun = if n == 1 { "other minimum" } else { "other minima" };
+                flags.push(format!("{n} {noun} nearly as good"));
+            }
+        }
+    }
+    flags.sort();
+    flags.dedup();
+    flags
+}
+
+/// Accepted windows over all: `28/30`.
+pub(super) fn windows_used(drone: &DroneAnalysis) -> String {
+    let used = drone.windows.iter().filter(|window| window.rejected.is_empty()).count();
+    format!("{used}/{}", drone.windows.len())
+}
+
+/// How the drone's clock was aligned, in words.
+pub(super) fn clock(drone: &DroneAnalysis) -> &'static str {
+    match drone.clock.method {
+        Alignment::ShowRows => "show clock",
+        Alignment::GpsTime => "GPS time",
+        Alignment::Plan => "plan",
+        Alignment::Takeoff => "take-off",
+    }
+}
+
+/// What the map says about the fleet as a whole.
+pub(super) struct FleetAir {
+    /// Mean of the drones' means, m/s, and their standard deviation between drones.
+    pub(super) mean: f64,
+    pub(super) sd: f64,
+    pub(super) lowest: f64,
+    pub(super) highest: f64,
+    /// Root mean square of estimate minus truth over drones, m/s.
+    pub(super) rms_error: Option<f64>,
+    pub(super) n: usize,
+}
+
+/// Summary of a map; `None` without a usable estimate.
+pub(super) fn fleet_air(map: &UpdraftMap) -> Option<FleetAir> {
+    let means = map.drones.iter().map(|drone| drone.mean.value).filter(|&w| usable(w));
+    let squares = map.drones.iter().filter_map(|drone| {
+        let error = drone.mean.value - mean_truth(drone)?;
+        usable(error).then_some(error * error)
+    });
+    Some(FleetAir {
+        mean: mean(means.clone())?,
+        sd: deviation(means.clone()).unwrap_or(0.0),
+        lowest: means.clone().fold(f64::INFINITY, f64::min),
+        highest: means.clone().fold(f64::NEG_INFINITY, f64::max),
+        rms_error: mean(squares).map(f64::sqrt),
+        n: means.count(),
+    })
+}
+
+/// `45 of 49 drones`, or `12 drones` when none is missing.
+pub(super) fn drones_of(flight: &FlightAnalysis) -> String {
+    let have = flight.drones.len();
+    if flight.missing.is_empty() {
+        count(have, "drone")
+    } else {
+        format!("{have} of {}", count(have + flight.missing.len(), "drone"))
+    }
+}

@@ -1,0 +1,143 @@
+//! The fleet's estimate of the air over time, and against the truth where it is known.
+
+use kuva::plot::legend::{LegendPosition, LegendShape};
+use kuva::plot::scatter::MarkerShape;
+
+use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
+
+use super::Figure;
+use super::axis::Axis;
+use super::chart::{Mark, Panel};
+use super::colour::{BLUE, VERMILLION};
+use super::sheet::Sheet;
+use super::text::{clean, usable};
+
+/// Mean and standard deviation between drones at one time, and the mean truth.
+struct Instant {
+    time_s: f64,
+    mean: f64,
+    sd: f64,
+    truth: Option<f64>,
+}
+
+/// Mean truth of a drone over the times that it was estimated at.
+pub(super) fn mean_truth(drone: &DroneUpdraft) -> Option<f64> {
+    let truth = drone.truth_mps.as_ref()?;
+    let pairs = drone.updraft_mps.iter().zip(truth);
+    mean(pairs.filter(|(estimate, _)| estimate.is_some()).map(|(_, &truth)| truth))
+}
+
+/// Mean of the usable values.
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, n) = values
+        .filter(|&value| usable(value))
+        .fold((0.0, 0_usize), |(sum, n), value| (sum + value, n + 1));
+    (n > 0).then(|| sum / n as f64)
+}
+
+/// Standard deviation (n - 1) of the usable values; `None` below two.
+pub(super) fn deviation(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    let middle = mean(values.clone())?;
+    let (sum, n) = values
+        .filter(|&value| usable(value))
+        .fold((0.0, 0_usize), |(sum, n), value| (sum + (value - middle).powi(2), n + 1));
+    (n > 1).then(|| (sum / (n - 1) as f64).sqrt())
+}
+
+fn instants(map: &UpdraftMap) -> Vec<Instant> {
+    map.time_s
+        .iter()
+        .enumerate()
+        .filter_map(|(index, &time_s)| {
+            let estimates = map
+                .drones
+                .iter()
+                .filter_map(|drone| drone.updraft_mps.get(index).copied().flatten());
+            let truths = map.drones.iter().filter_map(|drone| {
+                drone.updraft_mps.get(index).copied().flatten()?;
+                drone.truth_mps.as_ref()?.get(index).copied()
+            });
+            Some(Instant {
+                time_s,
+                mean: mean(estimates.clone())?,
+                sd: deviation(estimates).unwrap_or(0.0),
+                truth: mean(truths),
+            })
+        })
+        .collect()
+}
+
+/// Fleet mean over time, beside estimate against truth; `None` if nothing was estimated.
+pub(super) fn figure(flight: &FlightAnalysis, key: &str, map: &UpdraftMap) -> Option<Figure> {
+    let instants = instants(map);
+    if instants.len() < 2 {
+        return None;
+    }
+    let reach =
+        instants.iter().flat_map(|i| [i.mean - i.sd, i.mean + i.sd, i.truth.unwrap_or(i.mean)]);
+    let time = Axis::time(instants.iter().map(|instant| instant.time_s));
+    let y = Axis::around("updraft W* (m/s, up positive)", reach.chain([0.0]), 0.1);
+    let mut panel = Panel::new("(a) Fleet mean over time", time, y);
+    panel.legend_at(LegendPosition::InsideTopRight);
+    panel.clear_legend();
+    let band: Vec<(f64, f64, f64)> =
+        instants.iter().map(|i| (i.time_s, i.mean - i.sd, i.mean + i.sd)).collect();
+    panel.band(&band, BLUE);
+    let line: Vec<(f64, f64)> = instants.iter().map(|i| (i.time_s, i.mean)).collect();
+    panel.line(&line, BLUE, 1.8, "");
+    panel.entry("mean of the drones", BLUE, LegendShape::Line, "");
+    let truth: Vec<(f64, f64)> =
+        instants.iter().map(|i| (i.time_s, i.truth.unwrap_or(f64::NAN))).collect();
+    let known = truth.iter().any(|point| point.1.is_finite());
+    if known {
+        panel.line(&truth, VERMILLION, 1.4, "6 4");
+        panel.entry("true mean", VERMILLION, LegendShape::Line, "6 4");
+    }
+    let side = truth_panel(map);
+    let mut sheet = Sheet::new(1040.0, 380.0);
+    let wide = if side.is_some() { 620.0 } else { 1040.0 };
+    sheet.place(panel.draw(wide, 380.0), 0.0, 0.0);
+    let mut caption = "(a) The mean of all drones' running 10 s estimates; the band is one \
+                       standard deviation between drones."
+        .to_owned();
+    if known {
+        caption.push_str(" Dashed: the true mean in the simulated air.");
+    }
+    if let Some(side) = side {
+        sheet.place(side.draw(410.0, 380.0), 630.0, 0.0);
+        caption.push_str(
+            " (b) Each drone's mean over the hover, with its standard error, against the true \
+             mean at its place; on the dashed line they agree.",
+        );
+    }
+    let name = format!("air-{key}");
+    let title = format!("Vertical air speed over time, {}", clean(&flight.name));
+    Some(Figure { svg: sheet.svg(&name, &title), name, title, caption })
+}
+
+fn truth_panel(map: &UpdraftMap) -> Option<Panel> {
+    let marks: Vec<Mark> = map
+        .drones
+        .iter()
+        .filter_map(|drone| {
+            Some(Mark {
+                x: drone.mean.value,
+                y: mean_truth(drone)?,
+                x_error: drone.mean.se,
+                y_error: 0.0,
+            })
+        })
+        .filter(Mark::usable)
+        .collect();
+    if marks.is_empty() {
+        return None;
+    }
+    let values = || marks.iter().flat_map(|mark| [mark.x, mark.y]);
+    let x = Axis::around("estimated W* (m/s)", values(), 0.1);
+    let y = Axis::around("true W (m/s)", values(), 0.1);
+    let mut panel = Panel::new("(b) Estimated and true", x.clone(), y);
+    panel.line(&[(x.min, x.min), (x.max, x.max)], VERMILLION, 1.4, "6 4");
+    panel.entry("W* = W", VERMILLION, LegendShape::Line, "6 4");
+    panel.marks(&marks, BLUE, 3.6, MarkerShape::Circle);
+    Some(panel)
+}

@@ -1,0 +1,161 @@
+//! The top of the page: a sentence and the numbers that matter.
+
+use std::fmt::Write as _;
+
+use minijinja::context;
+use minijinja::value::Value;
+
+use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::base::estimate::Estimate;
+
+use super::compare::{drones_of, flags, fleet_air};
+use super::page::capitalised;
+use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable, value_of};
+use super::{figure_air, law};
+
+/// More flights than this are summed up at the top of the page.
+const SUMMED_FLIGHTS: usize = 3;
+/// The numbers at a glance.
+pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
+    let mut tiles = Vec::new();
+    let mut tile = |value: String, label: String, note: String| {
+        tiles.push(context! { value, label, note });
+    };
+    let logs = |flights: &[FlightAnalysis]| {
+        let have: usize = flights.iter().map(|flight| flight.drones.len()).sum();
+        let missing: usize = flights.iter().map(|flight| flight.missing.len()).sum();
+        let note =
+            if missing == 0 { "none missing".to_owned() } else { format!("{missing} missing") };
+        (format!("{have}/{}", have + missing), note)
+    };
+    if analysis.flights.len() > SUMMED_FLIGHTS {
+        let (value, note) = logs(&analysis.flights);
+        tile(value, format!("logs, {}", count(analysis.flights.len(), "flight")), note);
+    } else {
+        for flight in &analysis.flights {
+            let (value, note) = logs(std::slice::from_ref(flight));
+            tile(value, format!("drones, {}", clean(&flight.name)), note);
+        }
+    }
+    let mut fitted = analysis.flights.iter().map(fleet_values).filter(|values| !values.is_empty());
+    if let (Some(values), None) = (fitted.next(), fitted.next()) {
+        for (label, of, unit) in values {
+            tile(value_of(of), label, format!("± {} {unit}", error_of(of)));
+        }
+    }
+    if let Some((rms, fits)) = fit_error(analysis) {
+        let note = format!("m/s, {}", count(fits, "fit"));
+        tile(fixed(rms, 3), "rms of W* − true W".to_owned(), note);
+    }
+    for flight in &analysis.flights {
+        let Some(air) = flight.map.as_ref().and_then(fleet_air) else { continue };
+        let note = format!("± {} m/s between drones", fixed(air.sd, 2));
+        tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
+        if let Some(rms) = air.rms_error {
+            let note = format!("m/s, {}", count(air.n, "drone"));
+            tile(fixed(rms, 3), "rms error of the map".to_owned(), note);
+        }
+    }
+    tiles
+}
+
+/// Root mean square of fitted minus true updraft over all fits of several calibrations, and their
+/// number.
+fn fit_error(analysis: &Analysis) -> Option<(f64, usize)> {
+    let calibrations: Vec<&FlightAnalysis> = analysis
+        .flights
+        .iter()
+        .filter(|flight| flight.true_updraft_mps.is_some() && flight.map.is_none())
+        .collect();
+    if calibrations.len() < 2 {
+        return None;
+    }
+    let errors = || {
+        calibrations.iter().flat_map(|flight| {
+            let truth = flight.true_updraft_mps.unwrap_or(f64::NAN);
+            flight.drones.iter().filter_map(move |drone| {
+                let fit = law::signed_quadratic(drone.laws.as_ref()?);
+                let error = parameter(fit, "W")?.estimate.value - truth;
+                usable(error).then_some(error * error)
+            })
+        })
+    };
+    figure_air::mean(errors()).map(|mean| (mean.sqrt(), errors().count()))
+}
+
+fn error_of(of: Estimate) -> String {
+    estimate(of).split("± ").nth(1).unwrap_or("unknown").to_owned()
+}
+
+/// The fleet's parameters for the tiles: from its table, else from the laws of the flight.
+fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
+    let wanted = [
+        ("signed quadratic", "A", "A, quadratic law"),
+        ("signed quadratic", "W", "W* in the fits"),
+        ("linear", "A'", "A′, linear law"),
+    ];
+    let laws = law::flight_laws(flight);
+    wanted
+        .into_iter()
+        .filter_map(|(law_name, name, label)| {
+            let row = flight
+                .table
+                .iter()
+                .find(|row| row.law == law_name && row.parameter == name && row.n > 1)
+                .map(|row| (Estimate::new(row.mean, row.sd), unit(&row.unit)));
+            let own = || {
+                let laws = laws?;
+                let fit = if law_name == "linear" {
+                    laws.linear.as_ref()
+                } else {
+                    law::signed_quadratic(laws)
+                };
+                parameter(fit, name).map(|found| (found.estimate, unit(&found.unit)))
+            };
+            let (of, unit) = row.or_else(own)?;
+            usable(of.value).then(|| (label.to_owned(), of, unit))
+        })
+        .collect()
+}
+
+/// One sentence for each flight, or one for many.
+pub(super) fn verdict(analysis: &Analysis) -> Vec<String> {
+    if analysis.flights.is_empty() {
+        return vec!["There is no flight in this analysis.".to_owned()];
+    }
+    if analysis.flights.len() > SUMMED_FLIGHTS {
+        let drones = || analysis.flights.iter().flat_map(|flight| &flight.drones);
+        let fitted = drones().filter(|drone| drone.laws.is_some()).count();
+        return vec![format!(
+            "{} with {} analysed, laws fitted for {fitted}.",
+            count(analysis.flights.len(), "flight"),
+            count(drones().count(), "log"),
+        )];
+    }
+    analysis
+        .flights
+        .iter()
+        .map(|flight| {
+            let name = capitalised(&clean(&flight.name));
+            let mut text = format!("{name}: {} analysed", drones_of(flight));
+            let fitted = flight.drones.iter().filter(|drone| drone.laws.is_some()).count();
+            if fitted > 0 {
+                let _ = write!(text, ", laws fitted for {fitted}");
+            }
+            if let Some(air) = flight.map.as_ref().and_then(fleet_air) {
+                let _ = write!(
+                    text,
+                    ", vertical air speed from {} to {} m/s over the grid",
+                    signed(air.lowest, 2),
+                    signed(air.highest, 2),
+                );
+            }
+            let noted = flight.drones.iter().filter(|drone| !flags(drone).is_empty()).count();
+            if noted > 0 {
+                let _ = write!(text, ", {} with notes", count(noted, "drone"));
+            }
+            text.push('.');
+            text
+        })
+        .collect()
+}

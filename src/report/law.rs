@@ -1,0 +1,69 @@
+//! Fitted laws as curves, and windows as points.
+
+use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, WindowStats};
+
+use super::axis::Axis;
+use super::chart::Mark;
+use super::text::{parameter, usable};
+
+/// Samples of a drawn curve.
+const CURVE_POINTS: u32 = 81;
+
+/// The point of a window in the plane of V_U (m/s) and offset-corrected u_phi (us), with the
+/// standard deviations of its samples as errors.
+pub(super) fn mark(window: &WindowStats) -> Mark {
+    Mark {
+        x: window.velocity_mps.median,
+        y: window.pulse_phi_us.median - window.offset_us.unwrap_or(0.0),
+        x_error: window.velocity_mps.sd,
+        y_error: window.pulse_phi_us.sd,
+    }
+}
+
+/// Windows that laws are fitted to: accepted rungs of the ladder.
+pub(super) fn moving(drone: &DroneAnalysis) -> impl Iterator<Item = &WindowStats> {
+    drone.windows.iter().filter(|window| window.kind.is_leg() && window.rejected.is_empty())
+}
+
+/// The signed-quadratic fit to show: with A and u0 held where it was made so.
+pub(super) fn signed_quadratic(laws: &Laws) -> Option<&Fit> {
+    laws.signed_quadratic_held.as_ref().or(laws.signed_quadratic.as_ref())
+}
+
+/// The laws of a flight as one: the flock's, or its only drone's.
+pub(super) fn flight_laws(flight: &FlightAnalysis) -> Option<&Laws> {
+    flight.flock.as_ref().or(match flight.drones.as_slice() {
+        [drone] => drone.laws.as_ref(),
+        _ => None,
+    })
+}
+
+/// Points (V_U, u) of `u = A f(V - W) + u0` over a velocity axis; empty if a parameter is missing.
+pub(super) fn signed_quadratic_curve(fit: &Fit, axis: &Axis) -> Vec<(f64, f64)> {
+    let get = |name| value(fit, name);
+    let (Some(a), Some(u0), Some(w)) = (get("A"), get("u0"), get("W")) else {
+        return Vec::new();
+    };
+    sampled(axis, |v| a * (v - w) * (v - w).abs() + u0)
+}
+
+/// Points (V_U, u) of `u = A' V + u0` over a velocity axis; empty if a parameter is missing.
+pub(super) fn linear_curve(fit: &Fit, axis: &Axis) -> Vec<(f64, f64)> {
+    let (Some(slope), Some(u0)) = (value(fit, "A'"), value(fit, "u0")) else {
+        return Vec::new();
+    };
+    sampled(axis, |v| slope * v + u0)
+}
+
+fn value(fit: &Fit, name: &str) -> Option<f64> {
+    parameter(Some(fit), name).map(|found| found.estimate.value).filter(|&value| usable(value))
+}
+
+fn sampled(axis: &Axis, law: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+    (0..CURVE_POINTS)
+        .map(|i| {
+            let v = axis.min + (axis.max - axis.min) * f64::from(i) / f64::from(CURVE_POINTS - 1);
+            (v, law(v))
+        })
+        .collect()
+}

@@ -1,0 +1,112 @@
+//! A minimal SVG writer for what the plotting crate does not draw: the labelled map of the grid.
+
+use std::fmt::Write as _;
+
+use super::sheet::svg_head;
+use super::text::clean;
+
+/// Escapes text for XML and HTML, in text and in attributes.
+pub(super) fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+/// Where a text's position lies in it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Anchor {
+    /// At its left end.
+    Start,
+    /// In its middle.
+    Middle,
+    /// At its right end.
+    End,
+}
+
+/// Size, weight and colour of a text.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TextStyle<'a> {
+    pub(super) size: f64,
+    pub(super) bold: bool,
+    pub(super) colour: &'a str,
+    pub(super) anchor: Anchor,
+}
+
+/// A drawing being written, pixels, y down.
+pub(super) struct Drawing {
+    width: f64,
+    height: f64,
+    body: String,
+}
+
+impl Drawing {
+    /// An empty white drawing.
+    pub(super) fn new(width: f64, height: f64) -> Self {
+        let mut drawing = Self { width, height, body: String::new() };
+        drawing.rect([0.0, 0.0, width, height], "#ffffff", "");
+        drawing
+    }
+
+    /// A filled rectangle: x, y, width, height; `more` holds further attributes of our own making.
+    pub(super) fn rect(&mut self, [x, y, w, h]: [f64; 4], fill: &str, more: &str) {
+        let _ = write!(
+            self.body,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" fill=\"{fill}\"{}{more}/>",
+            if more.is_empty() { "" } else { " " },
+        );
+    }
+
+    /// A straight line.
+    pub(super) fn line(&mut self, [x1, y1, x2, y2]: [f64; 4], stroke: &str) {
+        let _ = write!(
+            self.body,
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{stroke}\"/>",
+        );
+    }
+
+    /// A text; `turn_deg` rotates it around its position.
+    pub(super) fn text(&mut self, at: [f64; 2], text: &str, style: TextStyle<'_>, turn_deg: f64) {
+        let [x, y] = at;
+        let anchor = match style.anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let _ = write!(
+            self.body,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{:.1}\" text-anchor=\"{anchor}\" fill=\"{}\"",
+            style.size, style.colour,
+        );
+        if style.bold {
+            self.body.push_str(" font-weight=\"600\"");
+        }
+        if turn_deg != 0.0 {
+            let _ = write!(self.body, " transform=\"rotate({turn_deg} {x:.1} {y:.1})\"");
+        }
+        let _ = write!(self.body, ">{}</text>", escape(&clean(text)));
+    }
+
+    /// Opens a group with a tooltip.
+    pub(super) fn open(&mut self, tooltip: &str) {
+        let _ = write!(self.body, "<g><title>{}</title>", escape(&clean(tooltip)));
+    }
+
+    /// Closes the group.
+    pub(super) fn close(&mut self) {
+        self.body.push_str("</g>");
+    }
+
+    /// The whole SVG; `title` is read aloud.
+    pub(super) fn finish(self, title: &str) -> String {
+        format!("{}{}</svg>", svg_head(self.width, self.height, title), self.body)
+    }
+}

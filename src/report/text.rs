@@ -1,0 +1,198 @@
+//! Numbers, symbols and foreign text as people read them.
+
+use crate::analysis::result::{Fit, Parameter, Rejection};
+use crate::base::estimate::Estimate;
+use crate::mission::plan::{Kind, Purpose};
+
+/// Shown instead of a number that does not exist.
+pub(super) const NONE: &str = "–";
+
+/// Largest magnitude that the report draws or prints in full; beyond it a number is nonsense.
+const LARGEST: f64 = 1e7;
+
+/// Whether a number can be drawn.
+pub(super) fn usable(value: f64) -> bool {
+    value.is_finite() && value.abs() < LARGEST
+}
+
+/// Text from outside without control characters, which no output may pass on: they are not allowed
+/// in XML and drive terminals.
+pub(super) fn clean(text: &str) -> String {
+    text.chars()
+        .map(
+            |c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { '\u{fffd}' } else { c },
+        )
+        .collect()
+}
+
+/// [`clean`] cut to `limit` characters with an ellipsis.
+pub(super) fn shortened(text: &str, limit: usize) -> String {
+    let text = clean(text);
+    if text.chars().count() <= limit {
+        return text;
+    }
+    let cut: String = text.chars().take(limit.saturating_sub(1)).collect();
+    format!("{}…", cut.trim_end())
+}
+
+/// A file name part of lower-case letters, digits and hyphens; never empty, never a path.
+pub(super) fn slug(text: &str) -> String {
+    let mut slug = String::new();
+    for c in text.chars().take(60) {
+        if c.is_ascii_alphanumeric() {
+            slug.push(c.to_ascii_lowercase());
+        } else if !slug.is_empty() && !slug.ends_with('-') {
+            slug.push('-');
+        }
+    }
+    let slug = slug.trim_end_matches('-');
+    if slug.is_empty() { "unnamed".to_owned() } else { slug.to_owned() }
+}
+
+/// A number with a true minus sign.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return "not a number".to_owned();
+    }
+    if value.abs() >= LARGEST {
+        return minus(&format!("{value:.2e}"));
+    }
+    let text = format!("{value:.decimals$}");
+    let zero = text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.'));
+    minus(if zero { text.trim_start_matches('-') } else { &text })
+}
+
+/// Like [`fixed`], with a plus sign.
+pub(super) fn signed(value: f64, decimals: usize) -> String {
+    let text = fixed(value, decimals);
+    if value > 0.0 && value.is_finite() && text.chars().any(|c| matches!(c, '1'..='9')) {
+        format!("+{text}")
+    } else {
+        text
+    }
+}
+
+/// A value with its error; says so when either is not a number.
+pub(super) fn estimate(estimate: Estimate) -> String {
+    if !usable(estimate.value) {
+        return fixed(estimate.value, 2);
+    }
+    if !usable(estimate.se) {
+        return format!("{} ± unknown", fixed(estimate.value, 3));
+    }
+    // An error in the last bits of a double is none.
+    let negligible = estimate.se < 1e-9 * estimate.value.abs();
+    let shown = if negligible { Estimate::new(estimate.value, 0.0) } else { estimate };
+    minus(&shown.to_string())
+}
+
+/// A value without its error, to the digit that the error supports.
+pub(super) fn value_of(of: Estimate) -> String {
+    let text = estimate(of);
+    text.split(" ±").next().unwrap_or(&text).to_owned()
+}
+
+fn minus(text: &str) -> String {
+    text.replace('-', "−")
+}
+
+/// Units with the Greek letter.
+pub(super) fn unit(unit: &str) -> String {
+    let unit = clean(unit);
+    match unit.strip_prefix("us") {
+        Some(rest) => format!("µs{rest}"),
+        None => unit,
+    }
+}
+
+/// The report's symbol of a parameter.
+pub(super) fn symbol(name: &str) -> String {
+    match name {
+        "u0" => "u₀".to_owned(),
+        "W" | "W_Z" => "W*".to_owned(),
+        "A'" => "A′".to_owned(),
+        "chi2_nu" => "χ²/ν".to_owned(),
+        other => clean(other),
+    }
+}
+
+/// What a flight was for, in words.
+pub(super) fn purpose(purpose: Purpose) -> &'static str {
+    match purpose {
+        Purpose::Calibration => "calibration",
+        Purpose::Measurement => "measurement",
+    }
+}
+
+/// Kind of a window, in words.
+pub(super) fn kind(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Wait => "wait",
+        Kind::Takeoff => "take-off",
+        Kind::Climb => "climb",
+        Kind::Descend => "descend",
+        Kind::LegUp => "up",
+        Kind::LegDown => "down",
+        Kind::Hover => "hover",
+        Kind::Horizontal => "horizontal",
+        Kind::Ramp => "ramp",
+        Kind::Landing => "landing",
+    }
+}
+
+/// Why a window was rejected, in words.
+pub(super) fn rejection(rejection: Rejection) -> &'static str {
+    match rejection {
+        Rejection::Saturated => "saturated",
+        Rejection::NotFollowing => "not following",
+        Rejection::Gap => "gap in the log",
+        Rejection::Incomplete => "log ends early",
+    }
+}
+
+/// A parameter of a fit by its symbol.
+pub(super) fn parameter<'fit>(fit: Option<&'fit Fit>, name: &str) -> Option<&'fit Parameter> {
+    fit?.parameters.iter().find(|parameter| parameter.name == name)
+}
+
+/// Plural by count: `1 drone`, `3 drones`.
+pub(super) fn count(n: usize, noun: &str) -> String {
+    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slug_is_never_a_path() {
+        assert_eq!(slug("../../etc/passwd"), "etc-passwd");
+        assert_eq!(slug("<script>"), "script");
+        assert_eq!(slug("ő/.."), "unnamed");
+        assert_eq!(slug("Drone 07"), "drone-07");
+    }
+
+    #[test]
+    fn control_characters_do_not_pass() {
+        assert_eq!(clean("a\u{1b}[31mb\0"), "a\u{fffd}[31mb\u{fffd}");
+        assert_eq!(shortened("abcdef", 4), "abc…");
+    }
+
+    #[test]
+    fn numbers_have_a_true_minus_and_no_negative_zero() {
+        assert_eq!(fixed(-0.051, 2), "−0.05");
+        assert_eq!(fixed(-0.001, 2), "0.00");
+        assert_eq!(signed(0.25, 2), "+0.25");
+        assert_eq!(signed(0.001, 2), "0.00");
+        assert_eq!(fixed(f64::NAN, 2), "not a number");
+        assert_eq!(fixed(1e300, 2), "1.00e300");
+    }
+
+    #[test]
+    fn an_unknown_error_is_called_unknown() {
+        assert_eq!(estimate(Estimate::new(8.1, f64::INFINITY)), "8.100 ± unknown");
+        assert_eq!(estimate(Estimate::new(f64::NAN, 0.1)), "not a number");
+        assert_eq!(estimate(Estimate::new(-0.0589, 0.0031)), "−0.0589 ± 0.0031");
+        assert_eq!(value_of(Estimate::new(-0.0589, 0.0031)), "−0.0589");
+    }
+}

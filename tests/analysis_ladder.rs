@@ -1,0 +1,484 @@
+//! From logs to laws and maps: the two ladders of the real firmware with the laws known from its
+//! plants, and a synthetic fleet with a known air.
+
+#![expect(clippy::unwrap_used, reason = "this is test code")]
+
+mod analysis_support;
+
+use std::f64::consts::TAU;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use analysis_support::{Synthetic, Timetable, fixture, ladder, plan};
+use updraft::analysis::calibrate::{FitOptions, Location, Weights};
+use updraft::analysis::result::{Fit, FlightAnalysis, Rejection, WindowStats};
+use updraft::analysis::{
+    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, analyze, analyze_flight,
+};
+use updraft::mission::plan::{Kind, Plan, Purpose};
+
+fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> FlightInput<'a> {
+    FlightInput {
+        name,
+        plan,
+        purpose: None,
+        logs,
+        start: None,
+        true_updraft_mps: None,
+        folder: None,
+    }
+}
+
+fn logs(paths: &[PathBuf]) -> Vec<LogInput> {
+    paths.iter().map(|path| LogInput { slot: None, path: path.clone() }).collect()
+}
+
+fn run(plan: Option<&Plan>, paths: &[PathBuf], options: &AnalysisOptions) -> FlightAnalysis {
+    analyze_flight(&input("flight", plan, &logs(paths)), options, None, &|_, _| {}).unwrap()
+}
+
+fn paper() -> AnalysisOptions {
+    let fit = FitOptions {
+        location: Location::Median,
+        weights: Weights::WindowSd,
+        ..FitOptions::default()
+    };
+    AnalysisOptions { fit, ..AnalysisOptions::default() }
+}
+
+fn values(fit: &Fit) -> Vec<f64> {
+    fit.parameters.iter().map(|parameter| parameter.estimate.value).collect()
+}
+
+fn legs(windows: &[WindowStats]) -> Vec<&WindowStats> {
+    windows.iter().filter(|window| window.kind.is_leg()).collect()
+}
+
+/// With the plan, and without any.
+fn both_ways() -> [Option<Plan>; 2] {
+    [Some(plan(Purpose::Calibration, ladder(1.0), 1)), None]
+}
+
+#[test]
+fn the_still_air_ladder_has_the_law_of_its_plant() {
+    for plan in both_ways() {
+        let paths = [fixture("ladder-still.trimmed.BIN")];
+        let flight = run(plan.as_ref(), &paths, &AnalysisOptions::default());
+        assert_eq!(flight.purpose, Purpose::Calibration);
+        let windows = &flight.drones[0].windows;
+        assert_eq!((windows.len(), legs(windows).len()), (29, 14), "planned: {}", flight.planned);
+        assert!(windows.iter().all(|window| window.rejected.is_empty()));
+        // Quoted from an independent reading of the plant; 0.036 us per metre is air density.
+        let mut squares = 0.0;
+        for window in legs(windows) {
+            let v = window.velocity_mps.mean;
+            let law = 1591.04 + 7.05 * v + 0.281 * v * v + 1.237 * v * v.abs();
+            let residual = window.pulse_phi_us.mean - 0.036 * (window.height_m - 20.0) - law;
+            squares += residual * residual;
+        }
+        let rms = (squares / 14.0).sqrt();
+        println!("planned {}: rms {rms:.3} us around the plant's law", flight.planned);
+        assert!(rms < 0.1, "{rms}");
+        let ground: Vec<f64> = windows
+            .iter()
+            .filter(|window| window.kind.is_hover() && window.height_m < 21.0)
+            .map(|window| window.pulse_phi_us.median)
+            .collect();
+        assert_eq!(ground.len(), 8);
+        assert!(ground.iter().all(|pulse| (pulse - 1591.0).abs() < 0.1), "{ground:?}");
+        let laws = flight.drones[0].laws.as_ref().unwrap();
+        let (line, square) =
+            (laws.linear.as_ref().unwrap(), laws.signed_quadratic.as_ref().unwrap());
+        assert!(line.chi2_reduced.unwrap() < square.chi2_reduced.unwrap(), "mostly linear");
+        assert!(square.warnings.iter().any(|warning| warning.contains("compare the linear law")));
+    }
+}
+
+#[test]
+fn the_square_law_ladder_has_the_law_of_its_plant() {
+    for plan in both_ways() {
+        let paths = [fixture("square-law-ladder.trimmed.BIN")];
+        let flight = run(plan.as_ref(), &paths, &paper());
+        let laws = flight.drones[0].laws.as_ref().unwrap();
+        let fit = laws.signed_quadratic.as_ref().unwrap();
+        let [a, u0, w] = values(fit)[..] else { panic!("three parameters") };
+        println!("planned {}: A {a:.4} u0 {u0:.3} W {w:.4} rms {:.3}", flight.planned, fit.rms_us);
+        assert!((a - 4.963).abs() < 0.002, "{a}");
+        assert!((u0 - 1462.43).abs() < 0.05, "{u0}");
+        assert!((w + 0.044).abs() < 0.003, "{w}");
+        assert!((fit.rms_us - 0.12).abs() < 0.02, "{}", fit.rms_us);
+        assert!(fit.other_minima.is_empty() && fit.warnings.is_empty(), "{fit:?}");
+        assert!(fit.chi2_reduced.unwrap() < laws.linear.as_ref().unwrap().chi2_reduced.unwrap());
+    }
+}
+
+#[test]
+fn a_reference_calibration_holds_a_and_u0() {
+    let paths = [fixture("square-law-ladder.trimmed.BIN")];
+    let logs = logs(&paths);
+    let own = run(None, &paths, &paper());
+    let again =
+        analyze_flight(&input("again", None, &logs), &paper(), Some(&own), &|_, _| {}).unwrap();
+    let laws = again.drones[0].laws.as_ref().unwrap();
+    let (free, held) =
+        (laws.signed_quadratic.as_ref().unwrap(), laws.signed_quadratic_held.as_ref().unwrap());
+    assert_eq!(values(held)[..2], values(free)[..2]);
+    assert!((values(held)[2] - values(free)[2]).abs() < 1e-5, "the same data give the same W");
+    assert!(held.parameters[2].estimate.se < free.parameters[2].estimate.se);
+    assert!(again.table.iter().any(|row| row.law.contains("held") && row.parameter == "W"));
+}
+
+#[test]
+fn a_log_cut_in_flight_keeps_its_whole_windows() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("1.BIN");
+    let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let plan = plan(Purpose::Calibration, ladder(1.0), 1);
+    let flight = run(Some(&plan), &[path], &paper());
+    let windows = &flight.drones[0].windows;
+    assert_eq!(windows.len(), 29);
+    let lost: Vec<&WindowStats> =
+        windows.iter().filter(|w| w.rejected.contains(&Rejection::Incomplete)).collect();
+    assert!((10..20).contains(&lost.len()), "{} windows lost", lost.len());
+    assert!(lost.iter().all(|window| window.start_s > 150.0));
+    let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.clone().unwrap();
+    assert!((values(&fit)[0] - 4.963).abs() < 0.2, "{:?}", values(&fit));
+}
+
+#[test]
+fn a_fleet_is_matched_and_what_is_lost_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let square = fixture("square-law-ladder.trimmed.BIN");
+    // All logs carry a system id of 1 or 2, so only the file names tell four drones apart.
+    for name in ["drone-01.BIN", "drone-02.BIN", "drone-04.BIN"] {
+        fs::copy(&square, place(name)).unwrap();
+    }
+    fs::write(place("drone-03.BIN"), b"").unwrap();
+    let plan = plan(Purpose::Calibration, ladder(1.0), 5);
+    let paths: Vec<PathBuf> =
+        (1..=4).rev().map(|number| place(&format!("drone-0{number}.BIN"))).collect();
+    let flight = run(Some(&plan), &paths, &paper());
+    let slots: Vec<Option<u16>> = flight.drones.iter().map(|drone| drone.slot).collect();
+    assert_eq!(slots, [Some(1), Some(2), Some(4)]);
+    assert_eq!(flight.drones[1].home_m, Some([7.0, 0.0]));
+    let missing: Vec<(u16, bool)> = flight
+        .missing
+        .iter()
+        .map(|missing| (missing.slot, missing.reason.contains("empty")))
+        .collect();
+    assert_eq!(missing, [(3, true), (5, false)], "{:?}", flight.missing);
+    assert_eq!(flight.missing[1].reason, "no log");
+
+    let flock = flight.flock.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
+    assert!((values(flock)[0] - 4.963).abs() < 0.002, "the average of equals is one of them");
+    let row = flight.table.iter().find(|row| row.parameter == "A").unwrap();
+    assert_eq!((row.n, row.sd), (3, 0.0));
+    assert_eq!(row.paper.map(|paper| paper.value), Some(10.5), "a field flight beside Table II");
+
+    // The same bytes with any number of threads.
+    let json = serde_json::to_string(&flight).unwrap();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(
+        json,
+        serde_json::to_string(&one.install(|| run(Some(&plan), &paths, &paper()))).unwrap()
+    );
+}
+
+#[test]
+fn a_log_of_another_plan_is_refused_by_name() {
+    let wrong = plan(Purpose::Calibration, ladder(-1.0), 1);
+    let logs = logs(&[fixture("ladder-still.trimmed.BIN")]);
+    let error = analyze_flight(
+        &input("calibration", Some(&wrong), &logs),
+        &AnalysisOptions::default(),
+        None,
+        &|_, _| {},
+    )
+    .map(|flight| flight.drones.len())
+    .unwrap_err()
+    .to_string();
+    for part in ["does not belong to the plan", "14 of 14 legs", "`up 0.5 m/s`", "planned -0.5"] {
+        assert!(error.contains(part), "{error}");
+    }
+}
+
+#[test]
+fn impossible_inputs_say_what_to_do() {
+    let options = AnalysisOptions::default();
+    let none = analyze_flight(&input("hover", None, &[]), &options, None, &|_, _| {});
+    assert!(none.unwrap_err().to_string().contains("no logs to analyse"));
+    let nothing = logs(&[PathBuf::from("nowhere/1.BIN")]);
+    let error = analyze_flight(&input("hover", None, &nothing), &options, None, &|_, _| {});
+    let text = error.unwrap_err().to_string();
+    assert!(text.contains("none of the 1 log(s)") && text.contains("nowhere"), "{text}");
+    let empty = analyze("x", &[], &options, None, &|_, _| {});
+    assert!(matches!(empty, Err(AnalysisError::NoFlights)));
+}
+
+/// Rotors that answer a climb with 26.4 us per m/s, in air that rises as `air` says.
+fn drone(system_id: u8, duration_s: f64, up: fn(f64) -> f64, air: fn(f64) -> f64) -> Vec<u8> {
+    let u0 = 1546.5 + f64::from(system_id);
+    let pulse_us = Box::new(move |time: f64| u0 + 26.4 * (up(time) - air(time)));
+    Synthetic { system_id, duration_s, velocity_up_mps: up, pulse_us }.write()
+}
+
+const LEGS: [f64; 8] = [1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 0.5, -0.5];
+
+fn ladder_up(time: f64) -> f64 {
+    let index = (time - 20.0) / 30.0;
+    let rung = LEGS.get(index.max(0.0) as usize).copied().unwrap_or(0.0);
+    if index >= 0.0 && (time - 20.0) % 30.0 < 20.0 { rung } else { 0.0 }
+}
+
+fn wave(time: f64) -> f64 {
+    0.3 + 0.6 * (time / 120.0 * TAU).sin()
+}
+
+fn synthetic_campaign(folder: &Path) -> [Vec<LogInput>; 2] {
+    let mut campaign = [Vec::new(), Vec::new()];
+    for id in 1..=2 {
+        let path = folder.join(format!("cal-{id}.BIN"));
+        fs::write(&path, drone(id, 265.0, ladder_up, |_| 0.0)).unwrap();
+        campaign[0].push(LogInput { slot: None, path });
+    }
+    for id in 1..=3 {
+        let path = folder.join(format!("hover-{id}.BIN"));
+        fs::write(&path, drone(id, 264.0, |_| 0.0, wave)).unwrap();
+        campaign[1].push(LogInput { slot: None, path });
+    }
+    campaign
+}
+
+fn synthetic_plans() -> [Plan; 2] {
+    let mut table = Timetable::default().add(Kind::Hover, "hover", 0.0, 20.0);
+    for rung in LEGS {
+        let kind = if rung > 0.0 { Kind::LegUp } else { Kind::LegDown };
+        table = table.add(kind, &format!("leg {rung}"), rung, 20.0).add(
+            Kind::Hover,
+            "hover",
+            0.0,
+            10.0,
+        );
+    }
+    let hover = Timetable::default().add(Kind::Hover, "hover", 0.0, 264.0).segments;
+    [plan(Purpose::Calibration, table.segments, 3), plan(Purpose::Measurement, hover, 3)]
+}
+
+#[test]
+fn a_campaign_measures_the_air_it_flew_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let [calibration, hover] = synthetic_campaign(folder.path());
+    let [ladder, scan] = synthetic_plans();
+    for planned in [true, false] {
+        // The hover comes first: order must not matter.
+        let mut inputs = [
+            input("hover", planned.then_some(&scan), &hover),
+            input("calibration", planned.then_some(&ladder), &calibration),
+        ];
+        inputs[0].purpose = Some(Purpose::Measurement);
+        inputs[0].folder = Some(folder.path());
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let count = |_: usize, total: usize| {
+            assert_eq!(total, 5);
+            done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        };
+        let analysis =
+            analyze("campaign", &inputs, &AnalysisOptions::default(), None, &count).unwrap();
+        assert_eq!(done.into_inner(), 5);
+        let [calibration, hover] = &analysis.flights[..] else { panic!("two flights") };
+        assert_eq!((calibration.name.as_str(), hover.name.as_str()), ("calibration", "hover"));
+        let line = calibration.drones[1].laws.as_ref().unwrap().linear.as_ref().unwrap();
+        assert!((values(line)[0] - 26.4).abs() < 0.05, "{:?}", values(line));
+        assert_eq!(hover.drones[0].source, "hover-1.BIN");
+
+        let map = hover.map.as_ref().unwrap();
+        assert_eq!(map.law, "linear");
+        let mapping: Vec<&str> = map.drones.iter().map(|drone| drone.mapping.as_str()).collect();
+        // Without a plan a hover log is not known to be the same drone as a ladder log.
+        let expected = if planned { ["own", "own", "flock"] } else { ["flock", "flock", "flock"] };
+        assert_eq!(mapping, expected);
+        for drone in &map.drones {
+            // Own hover pulses are 1 us apart; the flock's is in the middle of drones 1 and 2.
+            let bias = match (drone.mapping.as_str(), drone.name.chars().last()) {
+                ("flock", Some('1')) => 0.5 / 26.4,
+                ("flock", Some('2')) => -0.5 / 26.4,
+                ("flock", Some('3')) => -1.5 / 26.4,
+                _ => 0.0,
+            };
+            let mut worst: f64 = 0.0;
+            for (time, value) in map.time_s.iter().zip(&drone.updraft_mps) {
+                // A centred 10 s mean damps a wave of 120 s by sinc(pi/12) = 0.9886.
+                let truth = 0.3 + 0.9886 * (wave(*time) - 0.3);
+                worst = worst.max((value.unwrap() - truth - bias).abs());
+            }
+            assert!(worst < 0.03, "{} {}: {worst}", drone.name, drone.mapping);
+            assert!(drone.mean.se > 0.0 && drone.mean.se < 0.3, "{}", drone.mean);
+        }
+        assert_eq!(map.time_s.windows(2).filter(|pair| pair[1] - pair[0] != 1.0).count(), 0);
+    }
+}
+
+#[test]
+fn a_measurement_without_laws_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let [_, hover] = synthetic_campaign(folder.path());
+    let [_, scan] = synthetic_plans();
+    let options = AnalysisOptions { map_law: Some(MapLaw::Linear), ..AnalysisOptions::default() };
+    let flight =
+        analyze_flight(&input("hover", Some(&scan), &hover), &options, None, &|_, _| {}).unwrap();
+    assert!(flight.map.is_none());
+    assert!(flight.warnings.iter().any(|w| w.contains("no calibration was given")));
+    assert!(flight.drones.iter().all(|drone| drone.laws.is_none()));
+}
+
+#[test]
+fn flights_that_cannot_calibrate_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let warning = |name: &str, up: fn(f64) -> f64, pulse: Box<dyn Fn(f64) -> f64>| {
+        let path = folder.path().join(name);
+        let log =
+            Synthetic { system_id: 1, duration_s: 265.0, velocity_up_mps: up, pulse_us: pulse };
+        fs::write(&path, log.write()).unwrap();
+        let logs = logs(&[path]);
+        let mut input = input("calibration", None, &logs);
+        input.purpose = Some(Purpose::Calibration);
+        let flight = analyze_flight(&input, &AnalysisOptions::default(), None, &|_, _| {}).unwrap();
+        assert!(flight.drones[0].laws.is_none());
+        flight.drones[0].warnings.join("; ")
+    };
+    let none = warning("hover.BIN", |_| 0.0, Box::new(|_| 1550.0));
+    assert!(none.contains("no ladder"), "{none}");
+    let one = warning(
+        "one.BIN",
+        |time| if (20.0..40.0).contains(&time) { 2.0 } else { 0.0 },
+        Box::new(|_| 1550.0),
+    );
+    assert!(one.contains("only one vertical speed (2 m/s) in 1"), "{one}");
+    let constant = warning("constant.BIN", ladder_up, Box::new(|_| 1550.0));
+    assert!(constant.contains("1550 us in all windows"), "{constant}");
+    let saturated = warning(
+        "saturated.BIN",
+        ladder_up,
+        Box::new(|time| if ladder_up(time) > 0.0 { 1950.0 } else { 1150.0 }),
+    );
+    assert!(saturated.contains("no ladder") && saturated.contains("8 rejected"), "{saturated}");
+}
+
+/// The whole logs of the firmware's flights, where a checkout has them beside it.
+#[test]
+fn whole_logs_agree_with_the_fixtures() {
+    let Ok(folder) = std::env::var("UPDRAFT_SHARED_DATA") else { return };
+    let log = |name: &str| [Path::new(&folder).join("arducopter-4.4").join(name)];
+    for plan in both_ways() {
+        let flight = run(plan.as_ref(), &log("square-law-ladder-still.BIN"), &paper());
+        let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.clone().unwrap();
+        let found = values(&fit);
+        println!("planned {}: {found:?} rms {:.3}", flight.planned, fit.rms_us);
+        assert!((found[0] - 4.963).abs() < 0.002 && (found[2] + 0.044).abs() < 0.003);
+
+        let still = run(plan.as_ref(), &log("ladder-still.BIN"), &AnalysisOptions::default());
+        let windy = run(plan.as_ref(), &log("ladder-wind5.BIN"), &AnalysisOptions::default());
+        let base = |flight: &FlightAnalysis| {
+            let window = flight.drones[0].windows[4].clone();
+            assert!(window.kind.is_hover() && window.height_m < 21.0);
+            (window.pulse_us.mean, window.pulse_phi_us.mean, window.tilt_deg.mean)
+        };
+        let ((u, u_phi, _), (wind_u, wind_u_phi, tilt)) = (base(&still), base(&windy));
+        println!("wind: u {:+.2} u_phi {:+.2} us, tilt {tilt:.2}", wind_u - u, wind_u_phi - u_phi);
+        assert!((wind_u - u - 2.7).abs() < 0.1);
+        assert!((tilt - 11.7).abs() < 0.1);
+        // Tilt takes u cos(phi) - u = -33 us off the pulse itself.
+        assert!((wind_u_phi - wind_u + 33.0).abs() < 0.1);
+    }
+}
+
+#[test]
+fn the_oldest_command_message_suffices_to_find_the_windows() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.BIN");
+    let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
+    // Without PSCD only CTUN's desired climb rate is left, here once a second and in whole cm/s.
+    fs::write(&path, analysis_support::renamed(&bytes, *b"PSCD", *b"PSCX")).unwrap();
+    let flight = run(None, &[path], &paper());
+    assert_eq!(legs(&flight.drones[0].windows).len(), 14);
+    let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.clone().unwrap();
+    assert!((values(&fit)[0] - 4.963).abs() < 0.05, "{:?}", values(&fit));
+}
+
+#[test]
+fn damaged_logs_never_stop_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
+    let plan = plan(Purpose::Calibration, ladder(1.0), 13);
+    let mut paths = vec![folder.path().join("1.BIN")];
+    fs::write(&paths[0], &bytes).unwrap();
+    for seed in 2..=13_usize {
+        let mut damaged = bytes.clone();
+        for step in 0..seed * 60 {
+            let at = (seed * 7919 + step * 104_729 + step * step * 31) % damaged.len();
+            damaged[at] = damaged[at].wrapping_add(1 << (step % 8));
+        }
+        damaged.truncate(bytes.len() - seed * 30_011);
+        paths.push(folder.path().join(format!("{seed}.BIN")));
+        fs::write(&paths[seed - 1], damaged).unwrap();
+    }
+    for plan in [Some(&plan), None] {
+        let flight = run(plan, &paths, &AnalysisOptions::default());
+        let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
+        assert!((values(fit)[0] - 4.963).abs() < 0.01, "the whole log is unharmed");
+        assert_eq!(flight.drones.len() + flight.missing.len() + flight.warnings.len(), 13);
+        let json = serde_json::to_string(&flight).unwrap();
+        let back: FlightAnalysis = serde_json::from_str(&json).unwrap();
+        assert_eq!(back, flight, "every number is finite, so JSON holds all of it");
+        let repaired = flight.drones.iter().filter(|drone| !drone.warnings.is_empty()).count();
+        for drone in &flight.drones {
+            let fit = drone.laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
+            assert!((values(fit)[0] - 4.963).abs() < 0.05, "{}: {:?}", drone.name, values(fit));
+        }
+        assert!(repaired > 0);
+    }
+}
+
+#[test]
+fn a_log_without_id_and_number_is_matched_by_its_home() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("unnamed.BIN");
+    let bytes = fs::read(fixture("ladder-still.trimmed.BIN")).unwrap();
+    let nameless = analysis_support::renamed(&bytes, *b"PARM", *b"PARX");
+    fs::write(&path, &nameless).unwrap();
+    // The fixture was flown from the show's origin, which is the home of slot 2 here.
+    let mut plan = plan(Purpose::Calibration, ladder(1.0), 3);
+    for slot in &mut plan.slots {
+        slot.home_m[0] -= 7.0;
+    }
+    let paths = [path];
+    let flight = run(Some(&plan), &paths, &AnalysisOptions::default());
+    assert_eq!(flight.drones[0].slot, Some(2));
+
+    // Without GPS the show's clock still aligns it, but nothing tells whose log it is.
+    fs::write(&paths[0], analysis_support::renamed(&nameless, *b"GPS\0", *b"GPX\0")).unwrap();
+    let logs = logs(&paths);
+    let error = analyze_flight(
+        &input("calibration", Some(&plan), &logs),
+        &AnalysisOptions::default(),
+        None,
+        &|_, _| {},
+    )
+    .map(|flight| flight.drones.len())
+    .unwrap_err()
+    .to_string();
+    assert!(error.contains("name it after its slot"), "{error}");
+
+    // Given by the caller, the slot needs no proof.
+    let given = [LogInput { slot: Some(3), path: paths[0].clone() }];
+    let flight = analyze_flight(
+        &input("calibration", Some(&plan), &given),
+        &AnalysisOptions::default(),
+        None,
+        &|_, _| {},
+    )
+    .unwrap();
+    assert_eq!(flight.drones[0].slot, Some(3));
+}

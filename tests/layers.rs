@@ -1,0 +1,63 @@
+//! Dependencies between the rooms point one way.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Each room and those it may use.
+const ALLOWED: &[(&str, &[&str])] = &[
+    ("base", &[]),
+    ("vehicle", &["base"]),
+    ("mission", &["base", "vehicle"]),
+    ("show", &["base", "vehicle", "mission"]),
+    ("check", &["base", "vehicle", "mission", "show"]),
+    ("log", &["base"]),
+    ("campaign", &["base", "vehicle", "mission", "show", "check"]),
+    ("sim", &["base", "vehicle", "mission", "show", "log"]),
+    ("flight", &["base", "vehicle", "mission", "log"]),
+    ("analysis", &["base", "vehicle", "mission", "log", "flight"]),
+    ("report", &["base", "vehicle", "mission", "flight", "analysis"]),
+];
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// The rooms that a file's code names, without its test module and comments.
+fn rooms_named(text: &str) -> Vec<String> {
+    let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+    code.lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .flat_map(|line| line.split("crate::").skip(1))
+        .map(|rest| rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect())
+        .collect()
+}
+
+#[test]
+fn no_room_uses_one_behind_it() {
+    let allowed: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut against = Vec::new();
+    for (room, may_use) in &allowed {
+        let mut files = Vec::new();
+        sources(&root.join(room), &mut files);
+        assert!(!files.is_empty(), "{room} has moved");
+        for file in files {
+            let text = fs::read_to_string(&file).unwrap();
+            for named in rooms_named(&text) {
+                let known = allowed.contains_key(named.as_str()) || named == "cli";
+                if known && named != *room && !may_use.contains(&named.as_str()) {
+                    against.push(format!("{} uses {named}", file.display()));
+                }
+            }
+        }
+    }
+    assert!(against.is_empty(), "{}", against.join("\n"));
+}

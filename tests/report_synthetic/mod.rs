@@ -1,0 +1,389 @@
+//! A synthetic analysis: what the paper's campaign would give in simulated air.
+//!
+//! Deterministic, and independent of the analysis code: the report is tested against it alone.
+
+#![allow(dead_code, clippy::allow_attributes, reason = "each test binary uses a part")]
+
+use std::f64::consts::TAU;
+
+use rand::Rng as _;
+use updraft::analysis::result::{
+    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, Fit, FlightAnalysis, Laws, Missing,
+    Parameter, Rejection, SampleStats, TableRow, Trace, UpdraftMap, WindowStats,
+};
+use updraft::base::estimate::Estimate;
+use updraft::base::rng::{self, Purpose as Stream};
+use updraft::flight::{Alignment, Clock};
+use updraft::mission::plan::{Kind, Purpose};
+use updraft::report::{InputFile, Provenance};
+
+/// The paper's simulated law.
+const A: f64 = 8.14;
+const U0: f64 = 1598.6;
+const W_BIAS: f64 = -0.035;
+const SPACING_M: f64 = 7.0;
+
+/// Noise of one drone.
+struct Noise(rand_pcg::Pcg64);
+
+impl Noise {
+    fn of(slot: u16, stream: Stream) -> Self {
+        Self(rng::stream(2024, u64::from(slot), stream))
+    }
+
+    fn uniform(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Close enough to a standard normal number.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// 49 drones, calibration and hover, some logs missing.
+pub(crate) fn campaign() -> Analysis {
+    let missing = [
+        (7, "no log was found"),
+        (18, "the log ends 41 s before take-off"),
+        (33, "no log was found"),
+        (41, "the file is not a DataFlash log"),
+    ];
+    let calibration = calibration("calibration", 49, 0.0, &missing);
+    Analysis {
+        schema: ANALYSIS_SCHEMA.to_owned(),
+        made_by: "updraft 0.1.0".to_owned(),
+        title: "Pixel fleet, 49 drones over a synthetic thermal".to_owned(),
+        flights: vec![calibration, hover()],
+        warnings: vec![
+            "Slot 12: the clock was aligned with the plan only; its windows may be off by 0.2 s."
+                .to_owned(),
+        ],
+    }
+}
+
+/// One drone flown in eleven updrafts, as for the paper's Figure 2.
+pub(crate) fn updraft_series() -> Analysis {
+    let flights = (-5..=5)
+        .map(|i| {
+            let w = f64::from(i) * 0.7;
+            calibration(&format!("updraft {w:+.1} m/s"), 1, w, &[])
+        })
+        .collect();
+    Analysis {
+        schema: ANALYSIS_SCHEMA.to_owned(),
+        made_by: "updraft 0.1.0".to_owned(),
+        title: "One drone in eleven updrafts".to_owned(),
+        flights,
+        warnings: Vec::new(),
+    }
+}
+
+pub(crate) fn provenance() -> Provenance {
+    Provenance {
+        program: "updraft 0.1.0".to_owned(),
+        command: "updraft run --grid 7x7 --spacing 7 --seed 2024 -o my-campaign".to_owned(),
+        seed: Some(2024),
+        made_at: "2026-11-20 12:00 UTC".to_owned(),
+        inputs: (1..=3)
+            .map(|i| InputFile {
+                path: format!("calibration/logs/{i:02}.BIN"),
+                sha256: format!("{i:02x}").repeat(32),
+            })
+            .collect(),
+    }
+}
+
+fn home(slot: u16) -> [f64; 2] {
+    let (row, column) = ((slot - 1) / 7, (slot - 1) % 7);
+    [(f64::from(row) - 3.0) * SPACING_M, (f64::from(column) - 3.0) * SPACING_M]
+}
+
+pub(crate) fn calibration(
+    name: &str,
+    drones: u16,
+    truth: f64,
+    missing: &[(u16, &str)],
+) -> FlightAnalysis {
+    let gone: Vec<u16> = missing.iter().map(|(slot, _)| *slot).collect();
+    let analysed: Vec<DroneAnalysis> = (1..=drones)
+        .filter(|slot| !gone.contains(slot))
+        .map(|slot| calibrated_drone(slot, truth))
+        .collect();
+    let flock = Laws {
+        signed_quadratic: Some(fit(&[
+            ("A", "us/(m/s)²", A, 0.012),
+            ("u0", "us", U0, 0.031),
+            ("W", "m/s", truth + W_BIAS, 0.0021),
+        ])),
+        signed_quadratic_held: None,
+        linear: Some(fit(&[("A'", "us/(m/s)", 23.1, 1.4), ("u0", "us", U0 - 0.4, 3.1)])),
+    };
+    let table = table(&analysed);
+    FlightAnalysis {
+        name: name.to_owned(),
+        purpose: Purpose::Calibration,
+        planned: true,
+        true_updraft_mps: Some(truth),
+        drones: analysed,
+        missing: missing
+            .iter()
+            .map(|(slot, reason)| Missing { slot: *slot, reason: (*reason).to_owned() })
+            .collect(),
+        flock: (drones > 1).then_some(flock),
+        table: if drones > 1 { table } else { Vec::new() },
+        map: None,
+    }
+}
+
+/// Legs of the ladder: start (s), end (s), velocity (m/s).
+fn ladder() -> Vec<(f64, f64, f64)> {
+    let mut legs = vec![(30.0, 40.0, 0.0)];
+    let mut time = 40.0;
+    for step in 1..=7 {
+        for sign in [1.0, -1.0] {
+            legs.push((time, time + 20.0, sign * 0.5 * f64::from(step)));
+            legs.push((time + 20.0, time + 30.0, 0.0));
+            time += 30.0;
+        }
+    }
+    legs
+}
+
+fn law(v: f64, w: f64) -> f64 {
+    A * (v - w) * (v - w).abs() + U0
+}
+
+fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
+    let mut noise = Noise::of(slot, Stream::Sensors);
+    let bias = 0.06 * noise.normal();
+    let w = truth + W_BIAS;
+    let mut windows = Vec::new();
+    let mut trace = Trace::default();
+    let mut height = 20.0;
+    for (start, end, v) in ladder() {
+        let begin = if v == 0.0 { start } else { start + 10.0 };
+        let stats = |median: f64, sd: f64| SampleStats { median, mean: median, sd, n: 90 };
+        let measured = law(v, w) + bias + 0.6 * noise.normal();
+        windows.push(WindowStats {
+            kind: match v {
+                v if v > 0.0 => Kind::LegUp,
+                v if v < 0.0 => Kind::LegDown,
+                _ => Kind::Hover,
+            },
+            label: if v == 0.0 {
+                "hover".to_owned()
+            } else {
+                format!("{} {:.1} m/s", if v > 0.0 { "up" } else { "down" }, v.abs())
+            },
+            start_s: begin,
+            end_s: end - 1.0,
+            commanded_mps: v,
+            height_m: height + v * (end - start) / 2.0,
+            velocity_mps: stats(v + 0.01 * noise.normal(), 0.04),
+            pulse_us: stats(measured + 0.4, 4.0),
+            pulse_phi_us: stats(measured, 4.0),
+            tilt_deg: stats(1.2, 0.4),
+            offset_us: None,
+            rejected: if slot == 23 && v > 3.2 { vec![Rejection::Saturated] } else { Vec::new() },
+        });
+        let mut time = start;
+        while time < end {
+            let settled = 1.0 - (-(time - start) / 1.5).exp();
+            trace.time_s.push(time);
+            trace.height_m.push(height);
+            trace.velocity_mps.push(v * settled + 0.03 * noise.normal());
+            trace.pulse_phi_us.push(law(v * settled, w) + bias + 4.0 * noise.normal());
+            height += 0.5 * v;
+            time += 0.5;
+        }
+    }
+    let (slope, u0) = straight_line(&windows);
+    let chi2 = 0.98 + 0.3 * noise.normal().clamp(-2.0, 2.0);
+    let mut quadratic = fit(&[
+        ("A", "us/(m/s)²", A + 0.02 * noise.normal(), 0.021),
+        ("u0", "us", U0 + bias, 0.051),
+        ("W", "m/s", w + 0.004 * noise.normal(), 0.0043),
+    ]);
+    quadratic.chi2_reduced = Some(chi2);
+    let mut warnings = Vec::new();
+    if slot == 12 {
+        warnings.push("no SHOW rows in the log; clock aligned with the plan".to_owned());
+    }
+    if slot == 30 {
+        quadratic.warnings.push("W is correlated with A (0.93)".to_owned());
+    }
+    DroneAnalysis {
+        slot: Some(slot),
+        name: format!("Drone {slot}"),
+        source: format!("calibration/logs/{slot:02}.BIN"),
+        home_m: Some(home(slot)),
+        clock: Clock {
+            method: if slot == 12 { Alignment::Plan } else { Alignment::ShowRows },
+            ..Clock::default()
+        },
+        windows,
+        laws: Some(Laws {
+            signed_quadratic: Some(quadratic),
+            signed_quadratic_held: None,
+            linear: Some(fit(&[("A'", "us/(m/s)", slope, 1.4), ("u0", "us", u0, 3.1)])),
+        }),
+        trace,
+        warnings,
+    }
+}
+
+fn straight_line(windows: &[WindowStats]) -> (f64, f64) {
+    let moving: Vec<(f64, f64)> = windows
+        .iter()
+        .filter(|window| window.kind.is_leg())
+        .map(|window| (window.velocity_mps.median, window.pulse_phi_us.median))
+        .collect();
+    let n = moving.len() as f64;
+    let (mx, my) =
+        (moving.iter().map(|p| p.0).sum::<f64>() / n, moving.iter().map(|p| p.1).sum::<f64>() / n);
+    let slope = moving.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
+        / moving.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
+    (slope, my - slope * mx)
+}
+
+pub(crate) fn fit(parameters: &[(&str, &str, f64, f64)]) -> Fit {
+    Fit {
+        parameters: parameters
+            .iter()
+            .map(|(name, unit, value, se)| Parameter {
+                name: (*name).to_owned(),
+                unit: (*unit).to_owned(),
+                estimate: Estimate::new(*value, *se),
+                held: false,
+            })
+            .collect(),
+        covariance: vec![0.0; parameters.len().pow(2)],
+        points: 14,
+        chi2: 10.8,
+        chi2_reduced: Some(10.8 / (14 - parameters.len()) as f64),
+        dof: 14 - parameters.len(),
+        rms_us: 0.61,
+        other_minima: Vec::new(),
+        warnings: Vec::new(),
+    }
+}
+
+fn table(drones: &[DroneAnalysis]) -> Vec<TableRow> {
+    let row = |law: &str, name: &str, unit: &str, paper: Option<Estimate>| {
+        let estimates: Vec<Estimate> = drones
+            .iter()
+            .filter_map(|drone| {
+                let laws = drone.laws.as_ref()?;
+                let fit = if law == "linear" { &laws.linear } else { &laws.signed_quadratic };
+                let fit = fit.as_ref()?;
+                if name == "chi2_nu" {
+                    return Some(Estimate::new(fit.chi2_reduced?, 0.0));
+                }
+                fit.parameters.iter().find(|p| p.name == name).map(|p| p.estimate)
+            })
+            .collect();
+        let n = estimates.len() as f64;
+        let mean = estimates.iter().map(|e| e.value).sum::<f64>() / n;
+        let squares = estimates.iter().map(|e| (e.value - mean).powi(2)).sum::<f64>();
+        TableRow {
+            law: law.to_owned(),
+            parameter: name.to_owned(),
+            unit: unit.to_owned(),
+            mean,
+            sd: (squares / (n - 1.0)).sqrt(),
+            mean_se: estimates.iter().map(|e| e.se).sum::<f64>() / n,
+            n: estimates.len(),
+            paper,
+        }
+    };
+    let paper = |value, se| Some(Estimate::new(value, se));
+    vec![
+        row("signed quadratic", "A", "us/(m/s)²", paper(8.207, 0.020)),
+        row("signed quadratic", "u0", "us", paper(1598.656, 0.039)),
+        row("signed quadratic", "W", "m/s", paper(-0.0589, 0.0031)),
+        row("signed quadratic", "chi2_nu", "", paper(2.19, 0.84)),
+        row("linear", "A'", "us/(m/s)", paper(26.4, 2.6)),
+        row("linear", "u0", "us", paper(1546.5, 7.8)),
+        row("linear", "chi2_nu", "", paper(0.91, 0.44)),
+    ]
+}
+
+/// A thermal beside the middle of the grid, sinking air around it, slowly swinging.
+fn air(position: [f64; 2], time_s: f64) -> f64 {
+    let drift = 5.0 * (time_s / 600.0 - 0.5);
+    let r2 = (position[0] - 8.0 - drift).powi(2) + (position[1] + 5.0 + drift).powi(2);
+    1.15 * (-r2 / (2.0 * 11.0_f64.powi(2))).exp() - 0.38
+        + 0.16 * (TAU * time_s / 240.0 + position[0] / 25.0).sin()
+}
+
+pub(crate) fn hover() -> FlightAnalysis {
+    let missing: [(u16, &str); 6] = [
+        (3, "no log was found"),
+        (7, "no log was found"),
+        (18, "no log was found"),
+        (26, "the log has no EKF velocity"),
+        (33, "no log was found"),
+        (45, "the log ends after 212 s of 600 s"),
+    ];
+    let slots = (1..=49).filter(|slot| !missing.iter().any(|(gone, _)| gone == slot));
+    let mut drones = Vec::new();
+    let mut estimates = Vec::new();
+    let time_s: Vec<f64> = (0..590).map(|i| 95.0 + f64::from(i)).collect();
+    for slot in slots {
+        let mut noise = Noise::of(slot, Stream::Air);
+        let position = home(slot);
+        let bias = 0.025 * noise.normal();
+        let mut drift = 0.0;
+        let truth: Vec<f64> = time_s.iter().map(|&time| air(position, time)).collect();
+        let updraft: Vec<Option<f64>> = truth
+            .iter()
+            .enumerate()
+            .map(|(index, w)| {
+                drift = 0.9 * drift + 0.02 * noise.normal();
+                (slot != 20 || index < 300).then_some(w + bias + drift)
+            })
+            .collect();
+        let present: Vec<f64> = updraft.iter().copied().flatten().collect();
+        let mean = present.iter().sum::<f64>() / present.len() as f64;
+        estimates.push(DroneUpdraft {
+            slot: Some(slot),
+            name: format!("Drone {slot}"),
+            position_m: Some(position),
+            height_m: 100.0,
+            mapping: if [41].contains(&slot) { "flock" } else { "own" }.to_owned(),
+            mean: Estimate::new(mean, 0.028),
+            updraft_mps: updraft,
+            truth_mps: Some(truth),
+        });
+        drones.push(DroneAnalysis {
+            slot: Some(slot),
+            name: format!("Drone {slot}"),
+            source: format!("hover/logs/{slot:02}.BIN"),
+            home_m: Some(position),
+            clock: Clock { method: Alignment::ShowRows, ..Clock::default() },
+            windows: Vec::new(),
+            laws: None,
+            trace: Trace::default(),
+            warnings: if slot == 20 {
+                vec!["gap of 290 s in the log".to_owned()]
+            } else {
+                Vec::new()
+            },
+        });
+    }
+    FlightAnalysis {
+        name: "hover".to_owned(),
+        purpose: Purpose::Measurement,
+        planned: true,
+        true_updraft_mps: None,
+        drones,
+        missing: missing
+            .iter()
+            .map(|(slot, reason)| Missing { slot: *slot, reason: (*reason).to_owned() })
+            .collect(),
+        flock: None,
+        table: Vec::new(),
+        map: Some(UpdraftMap { law: "signed quadratic".to_owned(), time_s, drones: estimates }),
+    }
+}
