@@ -183,6 +183,12 @@ fn rates_are_the_firmwares() {
 }
 
 #[test]
+fn a_full_log_is_of_the_same_flight() {
+    let pulses = |full| column(&table(&flown(7, 3, full).0, "RCOU", &["C1"]), "C1");
+    assert_eq!(pulses(false), pulses(true));
+}
+
+#[test]
 fn a_stopped_flight_is_an_error() {
     let (vehicle, air) = (vehicle(), Uniform::default());
     let trajectory = short_show(Vector3::zeros());

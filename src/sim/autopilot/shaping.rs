@@ -73,6 +73,10 @@ impl<const N: usize> Kinematics<N> {
     }
 }
 
+/// Errors below this are none, m or m/s: left to decay for ever, they would become subnormal
+/// numbers, with which processors are tens of times slower.
+const NOTHING: f64 = 1e-12;
+
 /// Rate that takes an error to zero: proportional near zero, and further out what a constant
 /// deceleration can still stop. Never overshoots within one step.
 #[derive(Clone, Copy, Debug)]
@@ -91,6 +95,9 @@ impl RootLaw {
 
     fn rate<const N: usize>(&self, error: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
         let square = error.norm_squared();
+        if square < NOTHING * NOTHING {
+            return SVector::zeros();
+        }
         if square <= self.linear_to * self.linear_to {
             // Most of the time; needs no square root.
             return limited(error * self.stiffness.min(self.steps_per_s), limit);
@@ -104,7 +111,14 @@ impl RootLaw {
 /// A vector cut to a length.
 pub(super) fn limited<const N: usize>(vector: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
     let square = vector.norm_squared();
-    if square > limit * limit { vector * (limit / square.sqrt()) } else { vector }
+    if square > limit * limit { shortened(vector, limit) } else { vector }
+}
+
+/// Rare, and said so: else the root and the division are made every time, branch-free.
+#[cold]
+#[inline(never)]
+fn shortened<const N: usize>(vector: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
+    vector * (limit / vector.norm())
 }
 
 #[cfg(test)]
