@@ -225,7 +225,7 @@ fn finish(
     if let Some(folder) = output {
         let json = to_json(&analysis)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-        let provenance = provenance(work, folder)?;
+        let provenance = provenance(work);
         let made = report::render(&analysis, &provenance)?;
         let report_folder = folder.join("report");
         report::write(&made, &report_folder)?;
@@ -386,7 +386,7 @@ fn name_apart(flights: &mut [Found], paths: &[PathBuf]) {
     }
 }
 
-fn provenance(work: &Work, output: &Path) -> Result<Provenance, CommandError> {
+fn provenance(work: &Work) -> Provenance {
     let paths: Vec<&Path> =
         work.flights.iter().flat_map(|flight| &flight.logs).map(|log| log.path.as_path()).collect();
     let inputs = paths
@@ -403,12 +403,11 @@ fn provenance(work: &Work, output: &Path) -> Result<Provenance, CommandError> {
         .skip(1)
         .map(|word| if word.contains(' ') { format!("'{word}'") } else { word })
         .collect();
-    let _ = output;
-    Ok(Provenance {
+    Provenance {
         program: made_by(),
         command: format!("updraft {}", shown.join(" ")),
         seed: work.flights.iter().find_map(|flight| flight.seed),
         made_at: String::new(),
         inputs,
-    })
+    }
 }

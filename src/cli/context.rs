@@ -11,6 +11,7 @@ use super::exit::CommandError;
 
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option of the command line")]
 pub(super) struct Context {
     /// Say only what went wrong.
     pub(super) quiet: bool,
@@ -64,6 +65,7 @@ impl Context {
     }
 
     /// Data, on standard output.
+    #[expect(clippy::unused_self, reason = "prints like the other methods")]
     pub(super) fn print(&self, text: &str) -> Result<(), CommandError> {
         let mut out = io::stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());

@@ -46,7 +46,7 @@ impl From<Exit> for ExitCode {
 pub enum CommandError {
     /// A template, override or vehicle is wrong.
     #[error(transparent)]
-    Mission(#[from] MissionError),
+    Mission(Box<MissionError>),
     /// A vehicle is unknown or wrong.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
@@ -58,10 +58,10 @@ pub enum CommandError {
     File(#[from] FileError),
     /// A show could not be written.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Write(Box<WriteError>),
     /// A show could not be read.
     #[error(transparent)]
-    Load(#[from] LoadError),
+    Load(Box<LoadError>),
     /// A log could not be read.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -70,7 +70,7 @@ pub enum CommandError {
     Report(#[from] ReportError),
     /// A flight could not be simulated.
     #[error(transparent)]
-    Sim(#[from] SimError),
+    Sim(Box<SimError>),
     /// The arguments do not fit together.
     #[error("{0}")]
     Usage(String),
@@ -88,12 +88,36 @@ pub enum CommandError {
     BrokenPipe,
 }
 
+impl From<MissionError> for CommandError {
+    fn from(error: MissionError) -> Self {
+        Self::Mission(Box::new(error))
+    }
+}
+
+impl From<WriteError> for CommandError {
+    fn from(error: WriteError) -> Self {
+        Self::Write(Box::new(error))
+    }
+}
+
+impl From<LoadError> for CommandError {
+    fn from(error: LoadError) -> Self {
+        Self::Load(Box::new(error))
+    }
+}
+
+impl From<SimError> for CommandError {
+    fn from(error: SimError) -> Self {
+        Self::Sim(Box::new(error))
+    }
+}
+
 impl CommandError {
     /// The exit code for this error.
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Mission(MissionError::File(_))
-            | Self::Vehicle(VehicleError::File(_))
+            Self::Mission(error) if matches!(**error, MissionError::File(_)) => Exit::Failed,
+            Self::Vehicle(VehicleError::File(_))
             | Self::File(_)
             | Self::Write(_)
             | Self::Sim(_)

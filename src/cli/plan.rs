@@ -122,15 +122,15 @@ pub(super) fn write(
     let mut files = Vec::with_capacity(folders.len());
     for ((flight, folder), (show, _)) in mission.flights.iter().zip(&folders).zip(shows) {
         context.check_stop()?;
-        let made = FlightFiles::of(flight, show).map_err(CommandError::Write)?;
+        let made = FlightFiles::of(flight, show)?;
         refuse_occupied(root, folder, made.plan(), force)?;
         files.push(made);
     }
     for (files, folder) in files.iter().zip(&folders) {
         context.check_stop()?;
-        files.write(folder).map_err(CommandError::Write)?;
+        files.write(folder)?;
     }
-    write_index(root, mission).map_err(CommandError::Write)
+    Ok(write_index(root, mission)?)
 }
 
 /// The same plan may be written again; another one only with `--force`, and never over logs.

@@ -1,7 +1,7 @@
 //! `updraft simulate`: flies a campaign in the embedded simulator, one log per drone.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use rayon::prelude::*;
@@ -12,14 +12,12 @@ use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::progress::Progress;
-use crate::base::file::{
-    FileError, create_folder, read_whole, sweep_partial, write_whole, write_with,
-};
+use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
 use crate::mission::Plan;
 use crate::show::Trajectory;
-use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, Uniform, fly};
+use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, Uniform, fly_to_file};
 use crate::vehicle::{Vehicle, library};
 
 /// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
@@ -225,7 +223,10 @@ pub(super) fn simulate(
             };
             let result = fly_to_file(&setup, &folder.log(slot.slot, count));
             progress.advance();
-            result
+            result.map_err(|error| match error {
+                SimError::Stopped { .. } => CommandError::Interrupted,
+                other => other.into(),
+            })
         })
         .collect();
     progress.finish();
@@ -244,13 +245,6 @@ pub(super) fn simulate(
     let bytes = record.logs.iter().map(|log| log.bytes).sum();
     for error in &failed {
         context.warn(error);
-    }
-    if !saturated.is_empty() {
-        context.warn(&format!(
-            "{} of {} drones ran into a motor limit; their windows there are flagged",
-            saturated.len(),
-            wanted.len()
-        ));
     }
     let word = if kept == wanted.len() { "Found" } else { "Flew" };
     context.say(&format!(
@@ -272,29 +266,6 @@ pub(super) fn simulate(
         failed,
         saturated,
     })
-}
-
-/// Flies one drone; its log appears under its name only when it is whole.
-fn fly_to_file(setup: &FlightSetup<'_>, path: &Path) -> Result<FlightSummary, CommandError> {
-    let mut outcome = None;
-    let written = write_with(path, |out| match fly(setup, out) {
-        Ok(summary) => {
-            outcome = Some(Ok(summary));
-            Ok(())
-        }
-        Err(error) => {
-            let reason = error.to_string();
-            outcome = Some(Err(error));
-            Err(std::io::Error::other(reason))
-        }
-    });
-    match (outcome, written) {
-        (Some(Err(SimError::Stopped { .. })), _) => Err(CommandError::Interrupted),
-        (Some(Err(error)), _) => Err(CommandError::Sim(error)),
-        (_, Err(error)) => Err(error.into()),
-        (Some(Ok(summary)), Ok(())) => Ok(summary),
-        (None, Ok(())) => Err(CommandError::Failed("the simulator said nothing".to_owned())),
-    }
 }
 
 /// The folder's record: a matching one is continued, another one refused or replaced.

@@ -46,8 +46,8 @@ fn describe_group(text: &mut String, plan: &Plan, group: &Group) {
     }
     let _ = writeln!(
         text,
-        "\n{:>8}  {:<28} {:>8} {:>9} {:>9}  {}",
-        "time", "segment", "lasts s", "height m", "m/s", "window s"
+        "\n{:>8}  {:<28} {:>8} {:>9} {:>9}  window s",
+        "time", "segment", "lasts s", "height m", "m/s"
     );
     let shown: Vec<_> =
         group.segments.iter().filter(|segment| segment.kind != Kind::Ramp).collect();

@@ -219,7 +219,7 @@ pub fn resolve_text(
                         if first != flight_stem(name) && first != own_name {
                             continue;
                         }
-                        item.key = rest.to_owned();
+                        item = Override { key: rest.to_owned(), value: item.value };
                     }
                     index.push(i);
                     all.push(item);

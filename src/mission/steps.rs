@@ -490,7 +490,8 @@ impl<'a> Timeline<'a> {
         } else {
             0.0
         };
-        let ramps_m = (before.z + nominal.z) / 2.0 * start_ramp_s + nominal.z / 2.0 * stop_ramp_s;
+        let ramps_m =
+            f64::midpoint(before.z, nominal.z) * start_ramp_s + nominal.z / 2.0 * stop_ramp_s;
         let cruise_s = (distance_m - ramps_m) / nominal.z;
         let cruise_ms = to_ms(cruise_s.max(0.0));
         if cruise_s <= 0.0 || cruise_ms == 0 {
@@ -501,7 +502,7 @@ impl<'a> Timeline<'a> {
         }
         // Whole milliseconds change the speed a little, so that the height is met exactly.
         let exact_mps = (distance_m - before.z / 2.0 * start_ramp_s)
-            / (to_s(cruise_ms) + (start_ramp_s + stop_ramp_s) / 2.0);
+            / (to_s(cruise_ms) + f64::midpoint(start_ramp_s, stop_ramp_s));
         let velocity = Vector3::new(0.0, 0.0, exact_mps);
         if start_ramp_s > 0.0 {
             let displacement = (before + velocity) * (start_ramp_s / 2.0);

@@ -89,7 +89,7 @@ fn counterphase_halves_move_in_opposite_directions() {
     };
     let mut opposite = 0;
     for leg in even.segments.iter().filter(|s| s.kind.is_leg()) {
-        let middle = (leg.start_ms + leg.end_ms) / 2;
+        let middle = u64::midpoint(leg.start_ms, leg.end_ms);
         let other = moving_at(&odd.segments, middle);
         assert!(other * leg.velocity_mps[2] <= 0.0, "both halves move alike at {middle} ms");
         opposite += usize::from(other * leg.velocity_mps[2] < 0.0);

@@ -88,6 +88,7 @@ fn refusal(show: &Value) -> String {
     read_json(show).unwrap_err()
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "calls with json! read better")]
 fn point_refusal(points: Value) -> String {
     refusal(&inline(&with_points(&points)))
 }
