@@ -18,7 +18,7 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, analyze};
 use crate::base::file::{FileError, read_whole, write_whole};
-use crate::campaign::{self, CampaignIndex, FlightFolder, to_json};
+use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, to_json};
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, InputFile, Provenance, terminal_summary};
@@ -281,7 +281,7 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
 
 fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     let plan = folder.read_plan()?;
-    let record = folder.read_record()?;
+    let record = folder.read_record()?.filter(|record| record_holds(folder, record));
     let logs = match &record {
         // A record says which log is whose.
         Some(record) => record
@@ -303,6 +303,16 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
         logs,
         true_updraft_mps: record.as_ref().map(|record| record.air_mps[2]),
         seed: record.map(|record| record.seed),
+    })
+}
+
+/// Whether the logs are still those that the record speaks of: somebody may have put the logs of real
+/// drones in their place.
+fn record_holds(folder: &FlightFolder, record: &FlightRecord) -> bool {
+    record.logs.iter().all(|log| {
+        let size = std::fs::metadata(folder.logs().join(&log.file)).map(|file| file.len());
+        // A log that is gone is a loss, not another flight.
+        size.map_or(true, |bytes| bytes == log.bytes)
     })
 }
 
