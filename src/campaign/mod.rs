@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::base::file::{FileError, read_whole};
+use crate::base::time::GpsTime;
 use crate::mission::Plan;
 use crate::mission::plan::PLAN_SCHEMA;
 
@@ -62,6 +63,8 @@ pub struct FlightRecord {
     pub vehicle_sha256: String,
     /// True uniform motion of the air, towards east, north and up, m/s.
     pub air_mps: [f64; 3],
+    /// GPS time of show time 0.
+    pub start: GpsTime,
     /// Whether the firmware's whole default set of messages was logged.
     pub full_logs: bool,
     /// SHA-256 of the plan that was flown.

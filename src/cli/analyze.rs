@@ -18,6 +18,7 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, analyze};
 use crate::base::file::{FileError, read_whole, write_whole};
+use crate::base::time::GpsTime;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, to_json};
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
@@ -52,6 +53,9 @@ pub(super) struct AnalyzeArgs {
     /// Take A and u0 from this analysis.json and fit only W
     #[arg(long, value_name = "FILE")]
     hold: Option<PathBuf>,
+    /// Unix time of show time 0, s: aligns logs without SHOW rows by their GPS time
+    #[arg(long, value_name = "UNIX_S")]
+    start: Option<i64>,
     /// Folder for analysis.json and report/ [default: the campaign, or NAME-analysis]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
@@ -130,6 +134,7 @@ struct Found {
     logs: Vec<LogInput>,
     true_updraft_mps: Option<f64>,
     seed: Option<u64>,
+    start: Option<GpsTime>,
     density: Option<Density>,
 }
 
@@ -172,6 +177,12 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         None if args.paths.len() == 1 && campaign::is_campaign(first) => first.clone(),
         None => PathBuf::from(format!("{}-analysis", stem(first))),
     });
+    if let Some(unix_s) = args.start {
+        let start = unix_s.checked_mul(1000).and_then(GpsTime::from_unix_ms).ok_or_else(|| {
+            CommandError::Usage(format!("--start {unix_s} is not a time since 1980"))
+        })?;
+        work.flights.iter_mut().for_each(|flight| flight.start = Some(start));
+    }
     finish(context, &work, &args.options, args.hold.as_deref(), output.as_deref())
 }
 
@@ -203,7 +214,7 @@ fn finish(
             plan: flight.plan.as_ref(),
             purpose: flight.purpose,
             logs: &flight.logs,
-            start: None,
+            start: flight.start,
             true_updraft_mps: flight.true_updraft_mps,
             density: flight.density.filter(|_| !options.no_density),
             folder: Some(&work.root),
@@ -274,6 +285,7 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
         logs: logs.into_iter().map(|path| LogInput { slot: None, path }).collect(),
         true_updraft_mps: None,
         seed: None,
+        start: None,
         density: plan.map(|plan| density(plan, None)),
     });
     Ok(())
@@ -302,6 +314,7 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
         plan: Some(plan),
         logs,
         true_updraft_mps: record.as_ref().map(|record| record.air_mps[2]),
+        start: record.as_ref().map(|record| record.start),
         seed: record.map(|record| record.seed),
     })
 }

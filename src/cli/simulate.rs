@@ -198,8 +198,7 @@ pub(super) fn simulate(
     let open: Vec<_> =
         wanted.iter().copied().filter(|slot| !folder.log(slot.slot, count).exists()).collect();
     let kept = wanted.len() - open.len();
-    let start = GpsTime::from_unix_ms(START_UNIX_MS)
-        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
+    let start = record.start;
     let frame = plan.site.frame();
     let [east, north, up] = record.air_mps;
     let air = Uniform(frame.from_neu(nalgebra::Vector3::new(north, east, up)));
@@ -278,6 +277,8 @@ fn prepare(
     let plan_bytes = read_whole(&folder.plan(), MAX_PLAN_BYTES)?;
     let vehicle_text = toml::to_string(vehicle)
         .map_err(|error| CommandError::Failed(format!("failed to write the vehicle: {error}")))?;
+    let start = GpsTime::from_unix_ms(START_UNIX_MS)
+        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
     let record = FlightRecord {
         schema: FLIGHT_SCHEMA.to_owned(),
         made_by: made_by(),
@@ -286,6 +287,7 @@ fn prepare(
         vehicle: vehicle.name.clone(),
         vehicle_sha256: sha256(vehicle_text.as_bytes()),
         air_mps: simulation.air_mps,
+        start,
         full_logs: simulation.full_logs,
         plan_sha256: sha256(&plan_bytes),
         logs: Vec::new(),
