@@ -176,10 +176,7 @@ impl FlightFolder {
 
     /// Reads the plan.
     pub fn read_plan(&self) -> Result<Plan, CampaignError> {
-        let path = self.plan();
-        let plan: Plan = read_json(&path)?;
-        validate_plan(&plan).map_err(|reason| CampaignError::Json { path, reason })?;
-        Ok(plan)
+        read_plan(&self.plan())
     }
 
     /// Reads the flight record, if there is one.
@@ -242,6 +239,19 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CampaignError> {
     let bytes = read_whole(path, MAX_JSON_BYTES)?;
     serde_json::from_slice(&bytes)
         .map_err(|error| CampaignError::Json { path: path.to_owned(), reason: error.to_string() })
+}
+
+/// Reads a plan's file; errors name the file and what is wrong.
+pub fn read_plan(path: &Path) -> Result<Plan, CampaignError> {
+    let bytes = read_whole(path, MAX_JSON_BYTES)?;
+    parse_plan(&bytes).map_err(|reason| CampaignError::Json { path: path.to_owned(), reason })
+}
+
+/// A plan from its JSON, if its parts fit together; else why not.
+pub fn parse_plan(bytes: &[u8]) -> Result<Plan, String> {
+    let plan: Plan = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+    validate_plan(&plan)?;
+    Ok(plan)
 }
 
 /// Pretty JSON with a final newline.

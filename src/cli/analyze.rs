@@ -12,6 +12,7 @@ use super::exit::{CommandError, Exit};
 use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::simulate::{made_by, sha256};
+use super::words;
 use crate::analysis::calibrate::{Location, Weights};
 use crate::analysis::density::Density;
 use crate::analysis::result::{Analysis, FlightAnalysis};
@@ -251,7 +252,7 @@ fn finish(
         })?;
     }
     let place = page.map_or(String::new(), |page| format!(" -> {}", page.display()));
-    context.say(&format!("Analysed {total} logs in {watch}{place}"));
+    context.say(&format!("Analysed {} in {watch}{place}", words::count(total, "log")));
     let lost = analysis.flights.iter().any(|flight| !flight.missing.is_empty())
         || analysis.flights.len() < work.flights.len();
     Ok(if lost { Exit::Losses } else { Exit::Done })
@@ -339,6 +340,12 @@ fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
     }
 }
 
+/// Whether a path is a finished log: what an interrupted run or copy left is not.
+fn is_log(path: &Path) -> bool {
+    let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    has_extension(path, "bin") && !hidden
+}
+
 /// The logs in a folder and in its direct subfolders (one per drone, as SD cards are often copied).
 fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
     let mut logs = Vec::new();
@@ -352,8 +359,8 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
     };
     for path in list(folder)? {
         if path.is_dir() {
-            logs.extend(list(&path)?.into_iter().filter(|path| has_extension(path, "bin")));
-        } else if has_extension(&path, "bin") {
+            logs.extend(list(&path)?.into_iter().filter(|path| is_log(path)));
+        } else if is_log(&path) {
             logs.push(path);
         }
     }
@@ -362,12 +369,7 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
 
 fn load_plan(path: &Path) -> Result<Plan, CommandError> {
     if has_extension(path, "json") {
-        let parent = path.parent().unwrap_or(Path::new(".")).to_owned();
-        if path.file_name().is_some_and(|name| name == "plan.json") {
-            return Ok(FlightFolder(parent).read_plan()?);
-        }
-        let plan: Plan = campaign::read_json(path)?;
-        return Ok(plan);
+        return Ok(campaign::read_plan(path)?);
     }
     let vehicle = library::builtin("airsim-generic-quad")?;
     let mut loaded = load_shows(path, &vehicle)?;

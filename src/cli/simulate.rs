@@ -12,6 +12,7 @@ use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::progress::Progress;
+use super::words;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
@@ -118,6 +119,13 @@ fn parse_slots(text: &str) -> Result<SlotSet, String> {
     Ok(SlotSet(slots))
 }
 
+impl SlotSet {
+    /// The first of them that a plan does not have.
+    fn stray(&self, plan: &Plan) -> Option<u16> {
+        self.0.iter().copied().find(|slot| plan.slot(*slot).is_none())
+    }
+}
+
 /// How one flight is to be simulated.
 #[derive(Clone, Debug)]
 pub(super) struct Simulation {
@@ -188,6 +196,13 @@ pub(super) fn simulate(
         Some(vehicle) => vehicle.clone(),
         None => library::load(&folder.vehicle().display().to_string())?,
     };
+    if let Some(stray) = simulation.only.as_ref().and_then(|set| set.stray(plan)) {
+        return Err(CommandError::Usage(format!(
+            "{} has no slot {stray}; slots are 1 to {}",
+            plan.name,
+            plan.slots.len()
+        )));
+    }
     let mut record = prepare(folder, plan, simulation, &vehicle)?;
     let count = plan.slots.len();
     let wanted: Vec<_> = plan
@@ -247,12 +262,12 @@ pub(super) fn simulate(
     }
     let word = if kept == wanted.len() { "Found" } else { "Flew" };
     context.say(&format!(
-        "{word} {}: {} logs, {:.0} MB in {watch}{}",
+        "{word} {}: {}, {:.1} MB in {watch}{}",
         plan.name,
-        wanted.len() - failed.len(),
+        words::count(wanted.len() - failed.len(), "log"),
         bytes as f64 / 1e6,
         if kept > 0 && kept < wanted.len() {
-            format!(" ({kept} were there)")
+            format!(" ({kept} {} there)", if kept == 1 { "was" } else { "were" })
         } else {
             String::new()
         }
