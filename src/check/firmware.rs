@@ -98,6 +98,7 @@ pub(super) fn check(input: &CheckInput<'_>, tracks: &[Track<'_>], collector: &mu
             check_end(track, derived, firmware, collector);
         }
     }
+    check_early_landing(&flown, &derived, collector);
     margins(&flown, &derived, collector);
 }
 
@@ -231,24 +232,42 @@ fn check_end(track: &Track<'_>, derived: &Both, firmware: &Firmware, collector: 
         let time_s = derived.v44.landing_s;
         collector.add(track.index, finding(track, kind, time_s, values, message, remedy));
     }
-    let landing_s = derived.v46.landing_s;
-    let skipped = |piece: &&crate::show::trajectory::Piece<'_>| {
-        piece.end_ms as f64 / 1000.0 > landing_s
-            && curve_of(piece).bounds().size_m().norm() < HOVER_MPS * piece.duration_s()
-    };
-    let skipped_s: f64 = (track.pieces.iter().filter(skipped))
-        .map(|piece| (piece.end_ms as f64 / 1000.0 - landing_s).min(piece.duration_s()))
-        .sum();
-    if skipped_s > SHORT_HOVER_S {
-        let from_m = derived.v46.lands_from_m + track.start_m.z - ground_m;
-        let message = format!(
-            "firmware 4.6 starts to land at {landing_s:.3} s from {from_m:.3} m and leaves out {skipped_s:.3} s of hovering, limit {SHORT_HOVER_S:.3} s"
-        );
-        let kind = (Severity::Warning, "firmware-early-landing");
-        let remedy = "hover at least twice the take-off altitude above the end of the last descent";
-        let values = (skipped_s, SHORT_HOVER_S, "s");
-        collector.add(track.index, finding(track, kind, landing_s, values, message, remedy));
+}
+
+/// One warning for the whole show: the drones of a show usually end in the same way.
+fn check_early_landing(tracks: &[&Track<'_>], derived: &[Both], collector: &mut Collector) {
+    let mut names = Vec::new();
+    let mut worst: Option<(f64, &Track<'_>, &Derived)> = None;
+    for (track, both) in tracks.iter().zip(derived).filter(|(_, both)| both.v46.valid) {
+        let skipped_s = skipped_s(track, both.v46.landing_s);
+        if skipped_s > SHORT_HOVER_S {
+            names.push(track.name());
+            if worst.is_none_or(|(most, ..)| skipped_s > most) {
+                worst = Some((skipped_s, track, &both.v46));
+            }
+        }
     }
+    let Some((skipped_s, track, derived)) = worst else { return };
+    let ground_m = track.drone.land_at_m.map_or(track.ground_m, |place| place.z);
+    let from_m = derived.lands_from_m + track.start_m.z - ground_m;
+    let landing_s = derived.landing_s;
+    let message = format!(
+        "firmware 4.6 starts to land at {landing_s:.3} s from {from_m:.3} m and leaves out {skipped_s:.3} s of hovering, limit {SHORT_HOVER_S:.3} s"
+    );
+    let kind = (Severity::Warning, "firmware-early-landing");
+    let remedy = "hover at more than the take-off altitude above the trajectory's end";
+    let values = (skipped_s, SHORT_HOVER_S, "s");
+    let finding = finding(track, kind, landing_s, values, message, remedy);
+    collector.add(track.index, Finding { drones: names, ..finding });
+}
+
+/// How long a drone should still hover after a landing has begun, s.
+fn skipped_s(track: &Track<'_>, landing_s: f64) -> f64 {
+    let late = track.pieces.iter().rev();
+    late.take_while(|piece| piece.end_ms as f64 / 1000.0 > landing_s)
+        .filter(|piece| curve_of(piece).bounds().size_m().norm() < HOVER_MPS * piece.duration_s())
+        .map(|piece| (piece.end_ms as f64 / 1000.0 - landing_s).min(piece.duration_s()))
+        .sum()
 }
 
 /// First take-off and last landing by each generation, and how late 4.6 is at the start.

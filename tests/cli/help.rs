@@ -1,5 +1,7 @@
 //! What the program says about itself.
 
+use std::fmt::Write as _;
+
 use snapbox::cmd::Command;
 
 use crate::support::Bench;
@@ -13,11 +15,8 @@ fn every_command_has_its_help() {
     for command in commands {
         let ended = bench.expect(0, &[command, &["--help"]].concat());
         assert!(ended.err.is_empty(), "{ended}");
-        all.push_str(&format!(
-            "$ updraft {}\n{}\n",
-            [command, &["--help"]].concat().join(" "),
-            ended.out
-        ));
+        let args = [command, &["--help"]].concat().join(" ");
+        let _ = writeln!(all, "$ updraft {args}\n{}", ended.out);
     }
     insta::assert_snapshot!(all);
 }

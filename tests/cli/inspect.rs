@@ -1,5 +1,6 @@
 //! `updraft inspect`.
 
+use std::fmt::Write as _;
 use std::io::Read as _;
 use std::process::Stdio;
 
@@ -14,7 +15,7 @@ fn every_kind_of_file_is_described() {
         let path = format!("campaign/{file}");
         let ended = bench.expect(0, &["inspect", &path]);
         assert!(ended.err.is_empty(), "{ended}");
-        all.push_str(&format!("$ updraft inspect {path}\n{}\n", ended.out));
+        let _ = writeln!(all, "$ updraft inspect {path}\n{}", ended.out);
         bench.expect(0, &["inspect", "--json", &path]).json("updraft.inspect/1");
     }
     insta::assert_snapshot!(all);
