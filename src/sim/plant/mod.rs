@@ -5,6 +5,7 @@
 
 pub mod drag;
 pub mod rotor;
+pub mod sitl;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -12,6 +13,7 @@ use super::air::Surroundings;
 use crate::vehicle::Airframe;
 use drag::Drag;
 use rotor::{LAYOUT, ROTORS, Rotors};
+use sitl::Sitl;
 
 /// Standard gravity, m/s² (AirSim's EarthUtils below 10 km).
 pub const GRAVITY: f64 = 9.80665;
@@ -54,6 +56,8 @@ pub struct Plant {
     ground_z_m: f64,
     rotors: Rotors,
     drag: Drag,
+    /// Stands in for rotors and drag.
+    sitl: Option<Sitl>,
     motion: Motion,
     on_ground: bool,
 }
@@ -62,7 +66,8 @@ impl Plant {
     /// A body at rest on the ground at `home_m` (show frame), heading along show x, for steps of
     /// `dt_s`.
     pub fn new(airframe: &Airframe, home_m: Vector3<f64>, dt_s: f64) -> Self {
-        let inertia = inertia_kgm2(airframe);
+        let sitl = airframe.sitl.map(|frame| Sitl::new(&frame, airframe.mass_kg));
+        let inertia = sitl.map_or_else(|| inertia_kgm2(airframe), |sitl| sitl.inertia_kgm2());
         Self {
             per_mass: 1.0 / airframe.mass_kg,
             inertia,
@@ -71,6 +76,7 @@ impl Plant {
             ground_z_m: home_m.z,
             rotors: Rotors::new(airframe, dt_s),
             drag: Drag::new(airframe),
+            sitl,
             motion: Motion {
                 position_m: home_m,
                 velocity_mps: Vector3::zeros(),
@@ -110,9 +116,13 @@ impl Plant {
         let middle_radps = now.rate_radps + now.angular_acceleration * half_s;
 
         let mut loads = Loads::default();
-        self.rotors.add_loads(around.density_ratio, &mut loads);
         let relative = now.rotation.tr_mul(&(middle_mps - around.air_velocity_mps));
-        self.drag.add_loads(&relative, around.density_ratio, &mut loads);
+        if let Some(sitl) = &mut self.sitl {
+            sitl.add_loads(command, &relative, &middle_radps, around.density_ratio, &mut loads);
+        } else {
+            self.rotors.add_loads(around.density_ratio, &mut loads);
+            self.drag.add_loads(&relative, around.density_ratio, &mut loads);
+        }
 
         let mut acceleration = now.rotation * (loads.force_n * self.per_mass);
         acceleration.z -= GRAVITY;
