@@ -161,6 +161,9 @@ pub fn fly_with<R: Recorder>(
     let settings = &setup.vehicle.autopilot;
     let mut pilot = Autopilot::new(setup.trajectory, settings, setup.home_m, home_amsl_m, STEP_S)
         .ok_or(SimError::NoTakeoff { drone, height_m: p::SHOW_TAKEOFF_ALT })?;
+    if let Some(frame) = &setup.vehicle.airframe.sitl {
+        pilot.motors.set_voltage(frame.battery_voltage_v);
+    }
     let mut plant = Plant::new(&setup.vehicle.airframe, setup.home_m, STEP_S);
     let mut sensors = Sensors::new(setup.seed, drone, STEP_S);
 

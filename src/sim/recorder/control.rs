@@ -67,7 +67,7 @@ fn write_throttle<W: Write>(
     let height_m = -view.place(&estimate.position_m).z;
     let vertical = &pilot.vertical;
     let target_m = height_m + vertical.target.position.x - estimate.position_m.z;
-    let boost = pilot.throttle_in * (1.0 / pilot.attitude.cos_tilt().max(0.1) - 1.0);
+    let boost = pilot.throttle_in * (pilot.boost(estimate) - 1.0);
     let throttle = pilot.motors.throttle;
     log.row(
         &catalog::CTUN,
