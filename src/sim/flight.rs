@@ -197,7 +197,8 @@ pub fn fly_with<R: Recorder>(
                 return Err(SimError::NotLanded { drone, time_s });
             }
         }
-        let estimate = sensors.sense(plant.motion());
+        let mut estimate = sensors.sense(plant.motion());
+        estimate.acceleration_mps2.z += plant.impact_mps2();
         let pulses = pilot.update(time_s, &estimate);
         tally.note(&pilot, &plant, time_s, setup.home_m.z);
         let moment = Moment {

@@ -47,6 +47,7 @@ type Rule = (&'static str, fn(f64) -> bool);
 
 const POSITIVE: Rule = ("a finite number above 0", |x| x.is_finite() && x > 0.0);
 const NOT_NEGATIVE: Rule = ("a finite number, 0 or above", |x| x.is_finite() && x >= 0.0);
+const CELSIUS: Rule = ("-100 to 100", |x| x.abs() <= 100.0);
 const SHARE: Rule = ("between 0 and 1", |x| (0.0..=1.0).contains(&x));
 
 impl Vehicle {
@@ -75,6 +76,11 @@ impl Vehicle {
             if !holds(value) {
                 return Err(fail(key, value, allowed));
             }
+        }
+        if let Some(celsius) = self.autopilot.baro_ground_temperature_c
+            && !CELSIUS.1(celsius)
+        {
+            return Err(fail("autopilot.baro_ground_temperature_c", celsius, CELSIUS.0));
         }
         let (low, high) = (self.autopilot.mot_spin_min, self.autopilot.mot_spin_max);
         if low >= high {
@@ -137,7 +143,6 @@ impl Vehicle {
 fn sitl_numbers(frame: &SitlFrame) -> [(&'static str, f64, Rule); 15] {
     const LEAN: Rule = ("above 0 and below 90", |x| x > 0.0 && x < 90.0);
     const ALTITUDE: Rule = ("-1000 to 11000", |x| (-1_000.0..=11_000.0).contains(&x));
-    const CELSIUS: Rule = ("-100 to 100", |x| x.abs() <= 100.0);
     const OPEN_SHARE: Rule = ("above 0 and at most 1", |x| x > 0.0 && x <= 1.0);
     [
         ("airframe.sitl.arm_m", frame.arm_m, POSITIVE),

@@ -149,6 +149,11 @@ pub struct Autopilot {
     /// MOT_BAT_VOLT_MAX, V: full thrust is scaled to this voltage; 0 for no compensation.
     #[serde(default)]
     pub mot_bat_volt_max: f64,
+    /// Temperature at the ground that the barometer takes for that of the air, degrees Celsius, for
+    /// the compensation of density; without it that of the standard atmosphere. On a board that
+    /// warms itself it is too high.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub baro_ground_temperature_c: Option<f64>,
     /// MOT_BAT_VOLT_MIN, V: below it the compensation grows no more.
     #[serde(default)]
     pub mot_bat_volt_min: f64,

@@ -14,9 +14,10 @@ pub fn legs() -> Vec<(f64, f64)> {
     let mut legs = vec![(10.0, 0.0)];
     for step in 1..=7 {
         let (speed, start_s) = (f64::from(step) * 0.5, 20.0 + 60.0 * f64::from(step - 1));
-        legs.extend([(0.0, speed), (20.0, 0.0), (30.0, -speed), (50.0, 0.0)].map(
-            |(after_s, speed)| (start_s + after_s, speed),
-        ));
+        legs.extend(
+            [(0.0, speed), (20.0, 0.0), (30.0, -speed), (50.0, 0.0)]
+                .map(|(after_s, speed)| (start_s + after_s, speed)),
+        );
     }
     legs
 }

@@ -81,6 +81,8 @@ pub struct Director<'a> {
     pub touchdown: Touchdown,
     /// What the show asked for last (with the velocity as sent), show frame.
     pub target: Kinematics<3>,
+    /// Position of the last target as it was sent, show frame, m.
+    pub sent_m: Vector3<f64>,
     /// Steps since the last target; 0 in the step that made one.
     pub target_age: u32,
     /// Take-off time, show time s.
@@ -114,6 +116,7 @@ impl<'a> Director<'a> {
             armed: true,
             touchdown: Touchdown::None,
             target: Kinematics::at(home_m),
+            sent_m: home_m,
             target_age: 0,
             takeoff_s: takeoff_time_s(trajectory, settings.wpnav_speed_up_mps)?,
             end_s: trajectory.duration_ms() as f64 / 1000.0,
@@ -173,7 +176,10 @@ impl<'a> Director<'a> {
 
     /// Evaluates the trajectory as the fork does at SHOW_CTRL_RATE.
     fn sample(&mut self, time_s: f64) {
-        let state = self.cursor.state_at(time_s);
+        let mut state = self.cursor.state_at(time_s);
+        // Altitudes are sent as whole centimetres, cut off; the addition is for fractions such as
+        // 0.07, which binary numbers cannot have.
+        state.position_m.z = (state.position_m.z * 100.0 + 1e-6).trunc() / 100.0;
         let floor_m = self.home_m.z + p::SHOW_TAKEOFF_ALT;
         self.above_floor |= state.position_m.z > floor_m;
         self.target = Kinematics {
@@ -185,6 +191,7 @@ impl<'a> Director<'a> {
             self.target.position.z = floor_m;
             self.target.velocity.z = 0.0;
         }
+        self.sent_m = self.target.position;
         self.target_age = 0;
     }
 

@@ -26,6 +26,9 @@ use horizontal::Horizontal;
 use motors::{Motors, Spool};
 use vertical::{ThrottleLimits, Vertical};
 
+/// Temperature lost per height.
+const LAPSE_K_PER_M: f64 = 6.5e-3;
+
 /// The autopilot of one drone; its parts are public for the recorder.
 #[derive(Clone, Debug)]
 pub struct Autopilot<'a> {
@@ -42,7 +45,7 @@ pub struct Autopilot<'a> {
     /// Throttle before the boost for tilt (CTUN.ThI).
     pub throttle_in: f64,
     home_m: Vector3<f64>,
-    home_amsl_m: f64,
+    air: BaroAir,
     dt_s: f64,
 }
 
@@ -63,7 +66,7 @@ impl<'a> Autopilot<'a> {
             motors: Motors::new(settings, dt_s),
             throttle_in: 0.0,
             home_m,
-            home_amsl_m,
+            air: BaroAir { home_amsl_m, ground_c: settings.baro_ground_temperature_c },
             dt_s,
         })
     }
@@ -86,8 +89,7 @@ impl<'a> Autopilot<'a> {
             };
             let boosted = self.throttle_in * self.boost(estimate);
             let height_m = estimate.position_m.z - self.home_m.z;
-            let amsl_m = self.home_amsl_m + height_m;
-            self.motors.set_density(height_m, || density_ratio(amsl_m));
+            self.motors.set_density(height_m, |height_m| self.air.ratio(height_m));
             self.motors.update(boosted, &torque);
             if self.director.stage == Stage::Performing {
                 self.vertical.learn_hover(self.motors.throttle, estimate);
@@ -116,5 +118,23 @@ impl<'a> Autopilot<'a> {
         let (low, high) = self.motors.pulse_range_us();
         let at_end = |pulse: &u16| *pulse <= low || *pulse >= high;
         self.motors.limits != ThrottleLimits::default() || self.motors.pulses_us.iter().any(at_end)
+    }
+}
+
+/// Density of the air as the barometer has it.
+#[derive(Clone, Copy, Debug)]
+struct BaroAir {
+    home_amsl_m: f64,
+    /// Temperature taken for that of the air at home, if not the standard one.
+    ground_c: Option<f64>,
+}
+
+impl BaroAir {
+    /// Share of the density at sea level at a height above home, m.
+    fn ratio(&self, height_m: f64) -> f64 {
+        let amsl_m = self.home_amsl_m + height_m;
+        let standard_k = 288.15 - LAPSE_K_PER_M * amsl_m;
+        let taken_k = self.ground_c.map_or(standard_k, |c| 273.15 + c - LAPSE_K_PER_M * height_m);
+        density_ratio(amsl_m) * standard_k / taken_k
     }
 }

@@ -77,11 +77,12 @@ impl Motors {
         (whole_us(self.spin_min), whole_us(self.spin_min + self.spin_span))
     }
 
-    /// Tells the motors the height above home (m) and the air's density there, for its compensation.
-    pub fn set_density(&mut self, height_m: f64, density_ratio: impl FnOnce() -> f64) {
+    /// Tells the motors the height above home (m) and how to find the density of the air there, as a
+    /// share of that at sea level, for its compensation.
+    pub fn set_density(&mut self, height_m: f64, ratio: impl FnOnce(f64) -> f64) {
         if (height_m - self.density_height_m).abs() >= DENSITY_STEP_M {
             self.density_height_m = height_m;
-            self.density_gain = 1.0 / density_ratio().clamp(0.5, 1.25);
+            self.density_gain = 1.0 / ratio(height_m).clamp(0.5, 1.25);
         }
     }
 
@@ -119,8 +120,7 @@ impl Motors {
     fn fly(&mut self, throttle: f64, torque: &Vector3<f64>) {
         self.throttle = self.throttle_filter.apply(throttle).clamp(0.0, 1.0);
         self.throttle_filter.value = self.throttle;
-        self.limits =
-            ThrottleLimits { upper: self.throttle >= 1.0, lower: self.throttle <= 0.0 };
+        self.limits = ThrottleLimits { upper: self.throttle >= 1.0, lower: self.throttle <= 0.0 };
         let gain = self.density_gain / self.lift;
         let wanted = self.throttle * gain;
         let mut share = [0.0; ROTORS];

@@ -189,8 +189,7 @@ impl Vertical {
                     let limit = p::WPNAV_ACCEL_Z * over;
                     let (speed, jerk) = (self.limits.speed, p::PSC_JERK * over);
                     let up = Approach::new(speed, limit, jerk, self.dt_s);
-                    let down =
-                        Approach::new(speed, limit.min(MAX_ACCELERATION), jerk, self.dt_s);
+                    let down = Approach::new(speed, limit.min(MAX_ACCELERATION), jerk, self.dt_s);
                     target.approach_between(wanted, &up, &down, self.dt_s);
                 } else {
                     target.approach(wanted, &self.limits, self.dt_s);

@@ -60,6 +60,7 @@ pub struct Plant {
     sitl: Option<Sitl>,
     motion: Motion,
     on_ground: bool,
+    impact_mps2: f64,
 }
 
 impl Plant {
@@ -87,6 +88,7 @@ impl Plant {
                 angular_acceleration: Vector3::zeros(),
             },
             on_ground: true,
+            impact_mps2: 0.0,
         }
     }
 
@@ -103,6 +105,12 @@ impl Plant {
     /// Whether the body rests on the ground.
     pub fn on_ground(&self) -> bool {
         self.on_ground
+    }
+
+    /// Mean acceleration by which the ground stopped the fall in the last step, m/s² upward: what an
+    /// accelerometer feels of a touchdown; 0 otherwise.
+    pub fn impact_mps2(&self) -> f64 {
+        self.impact_mps2
     }
 
     /// Moves on by one step with rotor commands in 0..1.
@@ -145,8 +153,13 @@ impl Plant {
     /// The ground carries what would sink into it, and holds it level: drones stand on their legs.
     fn rest_on_ground(&mut self) {
         let motion = &mut self.motion;
+        let stood = self.on_ground;
+        self.impact_mps2 = 0.0;
         self.on_ground = motion.position_m.z <= self.ground_z_m && motion.velocity_mps.z <= 0.0;
         if self.on_ground {
+            if !stood {
+                self.impact_mps2 = -motion.velocity_mps.z / self.dt_s;
+            }
             let heading = motion.rotation * Vector3::x();
             let yaw = heading.y.atan2(heading.x);
             motion.position_m.z = self.ground_z_m;

@@ -53,8 +53,7 @@ impl Sitl {
         let rotors = ROTORS as f64;
 
         // Power is thrust times the mean of the speeds before and behind the fan.
-        let outflow_mps =
-            2.0 * frame.reference_current_a * frame.reference_voltage_v / weight_n;
+        let outflow_mps = 2.0 * frame.reference_current_a * frame.reference_voltage_v / weight_n;
         let fan_area_m2 = weight_n / (0.5 * density * outflow_mps * outflow_mps);
         let full_outflow_mps = outflow_mps / frame.hover_throttle.sqrt();
         let voltage = frame.battery_voltage_v / frame.full_voltage_v;
@@ -124,8 +123,7 @@ impl Sitl {
         loads.force_n -= relative_mps * (self.momentum * self.root_density * root);
         let drag = self.half_drag_m2 * self.density;
         loads.force_n -= relative_mps.map(|speed| drag * speed * speed.abs());
-        loads.torque_nm +=
-            Vector3::new(roll * lever, pitch * lever, yaw * YAW_SCALE * self.arm_m);
+        loads.torque_nm += Vector3::new(roll * lever, pitch * lever, yaw * YAW_SCALE * self.arm_m);
         loads.torque_nm -= rate_radps.component_mul(&self.inertia) * TURN_DAMPING_PER_S;
     }
 }

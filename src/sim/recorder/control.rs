@@ -178,7 +178,7 @@ pub(super) fn write_show<W: Write>(
 ) -> io::Result<u64> {
     let director = &moment.pilot.director;
     let miss = if director.stage == Stage::Performing {
-        moment.estimate.position_m - director.target.position
+        moment.estimate.position_m - director.sent_m
     } else {
         Vector3::zeros()
     };
