@@ -55,6 +55,8 @@ pub struct FlightSetup<'a> {
     pub drone: u16,
     /// GPS time of show time 0.
     pub start: GpsTime,
+    /// Its light program, as in a `.skyb` file, for the colours in the log; may be empty.
+    pub lights: &'a [u8],
     /// Whether the log has the firmware's whole default set.
     pub full_logs: bool,
     /// Progress and stop.
