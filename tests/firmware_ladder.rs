@@ -1,6 +1,8 @@
 //! The speed ladder of the real firmware in its own simulator, beside the same flown by our
 //! autopilot on our model of that simulator's quadcopter.
 
+#![expect(clippy::print_stdout, reason = "shown when a test fails or is asked for")]
+
 mod firmware_support;
 
 use firmware_support::{

@@ -1,5 +1,7 @@
 //! A short square flight of the real firmware, and its steps of horizontal velocity.
 
+#![expect(clippy::print_stdout, reason = "shown when a test fails or is asked for")]
+
 mod firmware_support;
 
 use firmware_support::{distances, flown, greatest, read, show, sitl, stage_s};
@@ -99,15 +101,15 @@ fn horizontal_steps_are_the_firmwares() {
             for (at_s, range) in [start_s, start_s + 10.0].into_iter().zip(&mut found) {
                 let [when_s, most_m] = greatest(&rows, 1, at_s, 3.0);
                 *range = (range.0.min(most_m), range.1.max(most_m));
-                println!("{speed} {phase} {when_s} {most_m}");
-                assert!((0.6..1.3).contains(&(when_s - at_s)), "{when_s} s");
+                assert!((0.5..1.3).contains(&(when_s - at_s)), "{when_s} s");
             }
             let [_, rest_m] = greatest(&rows, 1, start_s + 10.0 + settled_s, 4.0);
             assert!(rest_m < settled_m, "{rest_m} m");
         }
         println!("{speed} m/s: {found:?}");
         for ((low, high), (least, most)) in found.into_iter().zip([start_m, stop_m]) {
-            assert!(low <= least && high >= most, "{low} to {high}, not {least} to {most} m");
+            assert!(low < least + 0.05 && high > most - 0.05, "{low} to {high}: {least}, {most}");
+            assert!(low > least - 0.2 && high < most + 0.2, "{low} to {high}: {least}, {most}");
         }
     }
 }

@@ -147,7 +147,7 @@ pub struct Autopilot {
     /// SHOW_VEL_FF_GAIN.
     pub show_vel_ff_gain: f64,
     /// MOT_BAT_VOLT_MAX, V: full thrust is scaled to this voltage; 0 for no compensation.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub mot_bat_volt_max: f64,
     /// Temperature at the ground that the barometer takes for that of the air, degrees Celsius, for
     /// the compensation of density; without it that of the standard atmosphere. On a board that
@@ -155,6 +155,12 @@ pub struct Autopilot {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baro_ground_temperature_c: Option<f64>,
     /// MOT_BAT_VOLT_MIN, V: below it the compensation grows no more.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub mot_bat_volt_min: f64,
+}
+
+/// Left out of files, as serde asks for it: by reference.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }

@@ -47,7 +47,7 @@ pub struct Attitude {
     /// Torque demands about forward, left, up, -1..1.
     pub output: Vector3<f64>,
     rate: [RatePid; 3],
-    to_attitude: RootLaw,
+    to_lean: RootLaw,
     turn_step: f64,
     dt_s: f64,
     per_dt: f64,
@@ -66,7 +66,7 @@ impl Attitude {
             rate_target: Vector3::zeros(),
             output: Vector3::zeros(),
             rate: [tilt, tilt, yaw],
-            to_attitude: RootLaw::new(1.0 / p::ATC_INPUT_TC, limit_radps2, dt_s),
+            to_lean: RootLaw::new(1.0 / p::ATC_INPUT_TC, limit_radps2, dt_s),
             turn_step: limit_radps2 * dt_s,
             dt_s,
             per_dt: 1.0 / dt_s,
@@ -109,7 +109,7 @@ impl Attitude {
         let forward = Vector3::new(up.z, 0.0, -up.x) / (1.0 - up.y * up.y).sqrt();
         let left = up.cross(&forward);
         let error = Vector2::new(-wanted.dot(&left), wanted.dot(&forward));
-        let rate = self.to_attitude.rate(error, f64::INFINITY);
+        let rate = self.to_lean.rate(error, f64::INFINITY);
         let most = self.turn_step;
         for axis in 0..2 {
             self.target_turn[axis] += (rate[axis] - self.target_turn[axis]).clamp(-most, most);
