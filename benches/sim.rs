@@ -52,6 +52,7 @@ fn bench(bencher: Bencher<'_, '_>, run: impl Fn(&FlightSetup<'_>) + Sync) {
         seed: 1,
         drone: 1,
         start: GpsTime { week: 2445, tow_ms: 442_755_000 },
+        lights: &[],
         full_logs: false,
         hooks: Hooks::default(),
     };

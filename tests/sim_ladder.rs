@@ -88,6 +88,7 @@ fn flown(speeds_mps: &[f64], wind_mps: Vector3<f64>, seed: u64) -> Flown {
         seed,
         drone: 1,
         start: GpsTime { week: 2445, tow_ms: 442_755_000 },
+        lights: &[],
         full_logs: false,
         hooks: Hooks::default(),
     };

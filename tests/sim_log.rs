@@ -51,6 +51,7 @@ fn setup<'a>(
         seed: 7,
         drone,
         start: GpsTime { week: 2445, tow_ms: 442_755_000 },
+        lights: &[],
         full_logs: false,
         hooks: Hooks::default(),
     }

@@ -1,6 +1,6 @@
 //! `updraft simulate`: flies a campaign in the embedded simulator, one log per drone.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -17,7 +17,7 @@ use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, wri
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
 use crate::mission::Plan;
-use crate::show::Trajectory;
+use crate::show::{Show, Trajectory};
 use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, Uniform, fly_to_file};
 use crate::vehicle::{Vehicle, library};
 
@@ -217,6 +217,10 @@ pub(super) fn simulate(
     let frame = plan.site.frame();
     let [east, north, up] = record.air_mps;
     let air = Uniform(frame.from_neu(nalgebra::Vector3::new(north, east, up)));
+    let show = Show::of_plan(plan);
+    let lights: BTreeMap<u16, &[u8]> = (plan.slots.iter().zip(&show.drones))
+        .map(|(slot, drone)| (slot.slot, drone.lights.as_slice()))
+        .collect();
     let progress = Progress::new(context, "flying", open.len() as u64);
     let results: Vec<Result<FlightSummary, CommandError>> = open
         .par_iter()
@@ -232,6 +236,7 @@ pub(super) fn simulate(
                 seed: simulation.seed,
                 drone: slot.slot,
                 start,
+                lights: lights.get(&slot.slot).copied().unwrap_or_default(),
                 full_logs: simulation.full_logs,
                 hooks: Hooks { progress: None, stop: Some(context.stop_flag()) },
             };

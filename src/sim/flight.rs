@@ -55,6 +55,8 @@ pub struct FlightSetup<'a> {
     pub drone: u16,
     /// GPS time of show time 0.
     pub start: GpsTime,
+    /// Its light program, as in a `.skyb` file, for the colours in the log; may be empty.
+    pub lights: &'a [u8],
     /// Whether the log has the firmware's whole default set.
     pub full_logs: bool,
     /// Progress and stop.
@@ -161,6 +163,9 @@ pub fn fly_with<R: Recorder>(
     let settings = &setup.vehicle.autopilot;
     let mut pilot = Autopilot::new(setup.trajectory, settings, setup.home_m, home_amsl_m, STEP_S)
         .ok_or(SimError::NoTakeoff { drone, height_m: p::SHOW_TAKEOFF_ALT })?;
+    if let Some(frame) = &setup.vehicle.airframe.sitl {
+        pilot.motors.set_voltage(frame.battery_voltage_v);
+    }
     let mut plant = Plant::new(&setup.vehicle.airframe, setup.home_m, STEP_S);
     let mut sensors = Sensors::new(setup.seed, drone, STEP_S);
 
@@ -194,7 +199,8 @@ pub fn fly_with<R: Recorder>(
                 return Err(SimError::NotLanded { drone, time_s });
             }
         }
-        let estimate = sensors.sense(plant.motion());
+        let mut estimate = sensors.sense(plant.motion());
+        estimate.acceleration_mps2.z += plant.impact_mps2();
         let pulses = pilot.update(time_s, &estimate);
         tally.note(&pilot, &plant, time_s, setup.home_m.z);
         let moment = Moment {

@@ -9,8 +9,10 @@ use crate::base::file::read_whole;
 const MAX_VEHICLE_BYTES: u64 = 1 << 20;
 
 /// Name and TOML text of every built-in vehicle, sorted by name.
-const BUILTIN: &[(&str, &str)] =
-    &[("airsim-generic-quad", include_str!("../../templates/vehicles/airsim-generic-quad.toml"))];
+const BUILTIN: &[(&str, &str)] = &[
+    ("airsim-generic-quad", include_str!("../../templates/vehicles/airsim-generic-quad.toml")),
+    ("arducopter-sitl", include_str!("../../templates/vehicles/arducopter-sitl.toml")),
+];
 
 /// Names of the built-in vehicles, sorted.
 pub fn names() -> impl Iterator<Item = &'static str> {

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::Vehicle;
+use super::{SitlFrame, Vehicle};
 
 /// A vehicle file could not be used.
 #[derive(Debug, Error)]
@@ -47,6 +47,7 @@ type Rule = (&'static str, fn(f64) -> bool);
 
 const POSITIVE: Rule = ("a finite number above 0", |x| x.is_finite() && x > 0.0);
 const NOT_NEGATIVE: Rule = ("a finite number, 0 or above", |x| x.is_finite() && x >= 0.0);
+const CELSIUS: Rule = ("-100 to 100", |x| x.abs() <= 100.0);
 const SHARE: Rule = ("between 0 and 1", |x| (0.0..=1.0).contains(&x));
 
 impl Vehicle {
@@ -70,14 +71,25 @@ impl Vehicle {
             value,
             allowed,
         };
-        for (key, value, (allowed, holds)) in self.numbers() {
+        let sitl = self.airframe.sitl.iter().flat_map(sitl_numbers);
+        for (key, value, (allowed, holds)) in self.numbers().into_iter().chain(sitl) {
             if !holds(value) {
                 return Err(fail(key, value, allowed));
             }
         }
+        if let Some(celsius) = self.autopilot.baro_ground_temperature_c
+            && !CELSIUS.1(celsius)
+        {
+            return Err(fail("autopilot.baro_ground_temperature_c", celsius, CELSIUS.0));
+        }
         let (low, high) = (self.autopilot.mot_spin_min, self.autopilot.mot_spin_max);
         if low >= high {
             return Err(fail("autopilot.mot_spin_max", high, "above mot_spin_min"));
+        }
+        if let Some(frame) = &self.airframe.sitl
+            && frame.spin_min >= frame.spin_max
+        {
+            return Err(fail("airframe.sitl.spin_max", frame.spin_max, "above spin_min"));
         }
         let motors_kg = 4.0 * self.airframe.motor_mass_kg;
         if motors_kg >= self.airframe.mass_kg {
@@ -86,7 +98,7 @@ impl Vehicle {
         Ok(())
     }
 
-    fn numbers(&self) -> [(&'static str, f64, Rule); 33] {
+    fn numbers(&self) -> [(&'static str, f64, Rule); 35] {
         let (limits, frame, pilot) = (&self.limits, &self.airframe, &self.autopilot);
         [
             ("limits.max_speed_xy_mps", limits.max_speed_xy_mps, POSITIVE),
@@ -122,8 +134,33 @@ impl Vehicle {
             ("autopilot.psc_accz_i", pilot.psc_accz_i, NOT_NEGATIVE),
             ("autopilot.wpnav_speed_up_mps", pilot.wpnav_speed_up_mps, POSITIVE),
             ("autopilot.show_vel_ff_gain", pilot.show_vel_ff_gain, NOT_NEGATIVE),
+            ("autopilot.mot_bat_volt_max", pilot.mot_bat_volt_max, NOT_NEGATIVE),
+            ("autopilot.mot_bat_volt_min", pilot.mot_bat_volt_min, NOT_NEGATIVE),
         ]
     }
+}
+
+fn sitl_numbers(frame: &SitlFrame) -> [(&'static str, f64, Rule); 15] {
+    const LEAN: Rule = ("above 0 and below 90", |x| x > 0.0 && x < 90.0);
+    const ALTITUDE: Rule = ("-1000 to 11000", |x| (-1_000.0..=11_000.0).contains(&x));
+    const OPEN_SHARE: Rule = ("above 0 and at most 1", |x| x > 0.0 && x <= 1.0);
+    [
+        ("airframe.sitl.arm_m", frame.arm_m, POSITIVE),
+        ("airframe.sitl.reference_speed_mps", frame.reference_speed_mps, POSITIVE),
+        ("airframe.sitl.reference_lean_deg", frame.reference_lean_deg, LEAN),
+        ("airframe.sitl.reference_voltage_v", frame.reference_voltage_v, POSITIVE),
+        ("airframe.sitl.reference_current_a", frame.reference_current_a, POSITIVE),
+        ("airframe.sitl.reference_amsl_m", frame.reference_amsl_m, ALTITUDE),
+        ("airframe.sitl.air_temperature_c", frame.air_temperature_c, CELSIUS),
+        ("airframe.sitl.hover_throttle", frame.hover_throttle, OPEN_SHARE),
+        ("airframe.sitl.thrust_expo", frame.thrust_expo, SHARE),
+        ("airframe.sitl.spin_min", frame.spin_min, SHARE),
+        ("airframe.sitl.spin_max", frame.spin_max, OPEN_SHARE),
+        ("airframe.sitl.disc_area_m2", frame.disc_area_m2, POSITIVE),
+        ("airframe.sitl.momentum_drag", frame.momentum_drag, NOT_NEGATIVE),
+        ("airframe.sitl.full_voltage_v", frame.full_voltage_v, POSITIVE),
+        ("airframe.sitl.battery_voltage_v", frame.battery_voltage_v, POSITIVE),
+    ]
 }
 
 #[cfg(test)]

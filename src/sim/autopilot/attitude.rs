@@ -1,9 +1,10 @@
 //! Attitude control: direction of thrust to turn rates to torque demands (AC_AttitudeControl).
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use super::filter::LowPass;
 use super::params as p;
+use super::shaping::RootLaw;
 use crate::sim::sensors::Estimate;
 
 /// Rate controller of one axis.
@@ -35,8 +36,10 @@ impl RatePid {
 /// The attitude controller. Fields that are logged are public.
 #[derive(Clone, Copy, Debug)]
 pub struct Attitude {
-    /// Direction of thrust wanted, show frame, length 1.
+    /// Direction of thrust that the attitude follows, show frame, length 1.
     pub thrust_direction: Vector3<f64>,
+    /// Turn rate of that direction about its own forward and left axes, rad/s.
+    pub target_turn: Vector2<f64>,
     /// Angle to the wanted attitude about the body's axes, rad.
     pub error_rad: Vector3<f64>,
     /// Turn rates wanted about forward, left, up, rad/s.
@@ -44,6 +47,8 @@ pub struct Attitude {
     /// Torque demands about forward, left, up, -1..1.
     pub output: Vector3<f64>,
     rate: [RatePid; 3],
+    to_lean: RootLaw,
+    turn_step: f64,
     dt_s: f64,
     per_dt: f64,
 }
@@ -52,13 +57,17 @@ impl Attitude {
     /// Level, heading along show x.
     pub fn new(dt_s: f64) -> Self {
         let tilt = RatePid::new([p::ATC_RAT_P, p::ATC_RAT_P, p::ATC_RAT_D], dt_s);
+        let limit_radps2 = p::ATC_ACCEL_RP_MAX_DEG.to_radians();
         let yaw = RatePid::new([p::ATC_RAT_YAW_P, p::ATC_RAT_YAW_I, 0.0], dt_s);
         Self {
             thrust_direction: Vector3::z(),
+            target_turn: Vector2::zeros(),
             error_rad: Vector3::zeros(),
             rate_target: Vector3::zeros(),
             output: Vector3::zeros(),
             rate: [tilt, tilt, yaw],
+            to_lean: RootLaw::new(1.0 / p::ATC_INPUT_TC, limit_radps2, dt_s),
+            turn_step: limit_radps2 * dt_s,
             dt_s,
             per_dt: 1.0 / dt_s,
         }
@@ -67,8 +76,8 @@ impl Attitude {
     /// One step: torque demands that bring the thrust into a direction (show frame, length 1) and
     /// the heading to show x.
     pub fn update(&mut self, direction: Vector3<f64>, estimate: &Estimate) -> Vector3<f64> {
-        self.thrust_direction = direction;
-        let body = estimate.rotation.tr_mul(&direction);
+        let turn = self.shape(&direction);
+        let body = estimate.rotation.tr_mul(&self.thrust_direction);
         // The turn from the body's up axis to the wanted direction: axis up x direction; the angle
         // is its sine for the few degrees that matter, and no less than half of it at 90 degrees.
         let heading = estimate.rotation.column(0);
@@ -78,6 +87,9 @@ impl Attitude {
             p::ATC_ANG_P,
             p::ATC_ANG_YAW_P,
         ));
+        self.rate_target.x += self.target_turn.x;
+        self.rate_target.y += self.target_turn.y;
+        self.thrust_direction = turned(self.thrust_direction + turn);
         for axis in 0..3 {
             self.output[axis] = self.rate[axis].update(
                 self.rate_target[axis],
@@ -89,8 +101,24 @@ impl Attitude {
         self.output
     }
 
-    /// Cosine of the wanted tilt.
-    pub fn cos_tilt(&self) -> f64 {
-        self.thrust_direction.z
+    /// Turns the followed direction towards a wanted one with limited angular acceleration; returns
+    /// its change in this step.
+    fn shape(&mut self, wanted: &Vector3<f64>) -> Vector3<f64> {
+        let up = self.thrust_direction;
+        // Axes of an attitude that heads along show x.
+        let forward = Vector3::new(up.z, 0.0, -up.x) / (1.0 - up.y * up.y).sqrt();
+        let left = up.cross(&forward);
+        let error = Vector2::new(-wanted.dot(&left), wanted.dot(&forward));
+        let rate = self.to_lean.rate(error, f64::INFINITY);
+        let most = self.turn_step;
+        for axis in 0..2 {
+            self.target_turn[axis] += (rate[axis] - self.target_turn[axis]).clamp(-most, most);
+        }
+        (forward * self.target_turn.y - left * self.target_turn.x) * self.dt_s
     }
+}
+
+/// A vector that is off length 1 by little, brought back to it.
+fn turned(direction: Vector3<f64>) -> Vector3<f64> {
+    direction * (1.5 - 0.5 * direction.norm_squared())
 }

@@ -1,10 +1,11 @@
 //! The show: stages, their timing, and what is asked of the controllers (the fork's show mode).
 
-use nalgebra::{Vector1, Vector2, Vector3};
+use nalgebra::{Vector1, Vector3};
 
+use super::filter::LowPass;
 use super::motors::{Motors, Spool};
 use super::params as p;
-use super::shaping::Kinematics;
+use super::shaping::{Kinematics, RootLaw};
 use super::vertical::Goal;
 use crate::show::Trajectory;
 use crate::show::trajectory::Cursor;
@@ -40,6 +41,8 @@ pub enum Touchdown {
 /// Time for which the motors must be at their lower limit to suspect, and to declare a landing, s.
 const LAND_MAYBE_S: f64 = 0.2;
 const LAND_COMPLETE_S: f64 = 1.0;
+/// A vehicle that has landed accelerates by no more than this, m/s².
+const LAND_ACCELERATION: f64 = 1.0;
 /// From landing declared to disarming, s.
 const DISARM_AFTER_S: f64 = 0.5;
 
@@ -61,8 +64,10 @@ pub fn takeoff_time_s(trajectory: &Trajectory, speed_up_mps: f64) -> Option<f64>
 pub struct Goals {
     /// Height.
     pub vertical: Goal,
-    /// Place.
-    pub horizontal: Kinematics<2>,
+    /// Place; `None`: come to a stop.
+    pub horizontal: Option<Kinematics<2>>,
+    /// Whether the controllers start anew from the present motion.
+    pub restart: bool,
 }
 
 /// The show mode of one drone. Fields that are logged are public.
@@ -76,6 +81,8 @@ pub struct Director<'a> {
     pub touchdown: Touchdown,
     /// What the show asked for last (with the velocity as sent), show frame.
     pub target: Kinematics<3>,
+    /// Position of the last target as it was sent, show frame, m.
+    pub sent_m: Vector3<f64>,
     /// Steps since the last target; 0 in the step that made one.
     pub target_age: u32,
     /// Take-off time, show time s.
@@ -88,6 +95,9 @@ pub struct Director<'a> {
     at_limit_s: f64,
     landed_s: f64,
     feed_forward: f64,
+    spin_min: f64,
+    land_acceleration: [LowPass; 3],
+    to_land_alt: RootLaw,
     steps_per_target: u32,
     dt_s: f64,
 }
@@ -106,6 +116,7 @@ impl<'a> Director<'a> {
             armed: true,
             touchdown: Touchdown::None,
             target: Kinematics::at(home_m),
+            sent_m: home_m,
             target_age: 0,
             takeoff_s: takeoff_time_s(trajectory, settings.wpnav_speed_up_mps)?,
             end_s: trajectory.duration_ms() as f64 / 1000.0,
@@ -115,6 +126,9 @@ impl<'a> Director<'a> {
             at_limit_s: 0.0,
             landed_s: 0.0,
             feed_forward: settings.show_vel_ff_gain,
+            spin_min: settings.mot_spin_min.max(p::MOT_SPIN_ARM),
+            land_acceleration: [LowPass::new(p::LAND_ACCEL_FLT, dt_s); 3],
+            to_land_alt: RootLaw::new(settings.psc_posz_p, p::WPNAV_ACCEL_Z, dt_s),
             steps_per_target,
             dt_s,
         })
@@ -122,6 +136,7 @@ impl<'a> Director<'a> {
 
     /// One step: moves the stages on, and gives the goals.
     pub fn update(&mut self, time_s: f64, estimate: &Estimate, motors: &mut Motors) -> Goals {
+        let mut restart = false;
         match self.stage {
             Stage::Wait => self.wait(time_s, motors),
             Stage::Takeoff => {
@@ -129,6 +144,7 @@ impl<'a> Director<'a> {
                 let show_m = self.cursor.state_at(time_s).position_m.z - self.home_m.z;
                 if height_m >= p::TAKEOFF_DONE * p::SHOW_TAKEOFF_ALT && show_m >= height_m {
                     self.stage = Stage::Performing;
+                    restart = true;
                     self.sample(time_s);
                 } else if time_s >= self.end_s {
                     self.stage = Stage::Landing;
@@ -146,13 +162,13 @@ impl<'a> Director<'a> {
             Stage::Landing => self.land(estimate, motors),
             Stage::Landed => {}
         }
-        self.goals(estimate)
+        self.goals(estimate, restart)
     }
 
     fn wait(&mut self, time_s: f64, motors: &mut Motors) {
         if time_s >= self.takeoff_s {
             self.stage = Stage::Takeoff;
-            motors.spool = Spool::Up(0.0);
+            motors.spool = Spool::Up(p::MOT_SPIN_ARM / self.spin_min);
         } else if time_s >= self.takeoff_s - p::ARM_BEFORE_TAKEOFF_S + p::ARMING_DELAY_S {
             motors.spool = Spool::Idle;
         }
@@ -160,7 +176,10 @@ impl<'a> Director<'a> {
 
     /// Evaluates the trajectory as the fork does at SHOW_CTRL_RATE.
     fn sample(&mut self, time_s: f64) {
-        let state = self.cursor.state_at(time_s);
+        let mut state = self.cursor.state_at(time_s);
+        // Altitudes are sent as whole centimetres, cut off; the addition is for fractions such as
+        // 0.07, which binary numbers cannot have.
+        state.position_m.z = (state.position_m.z * 100.0 + 1e-6).trunc() / 100.0;
         let floor_m = self.home_m.z + p::SHOW_TAKEOFF_ALT;
         self.above_floor |= state.position_m.z > floor_m;
         self.target = Kinematics {
@@ -172,13 +191,20 @@ impl<'a> Director<'a> {
             self.target.position.z = floor_m;
             self.target.velocity.z = 0.0;
         }
+        self.sent_m = self.target.position;
         self.target_age = 0;
     }
 
     fn land(&mut self, estimate: &Estimate, motors: &mut Motors) {
-        let still = estimate.velocity_mps.norm() < 1.0;
-        let change_s = if motors.limits.lower && still { self.dt_s } else { -2.0 * self.dt_s };
-        self.at_limit_s = (self.at_limit_s + change_s).max(0.0);
+        let mut square = 0.0;
+        for (filter, sample) in
+            self.land_acceleration.iter_mut().zip(estimate.acceleration_mps2.iter())
+        {
+            square += filter.apply(*sample).powi(2);
+        }
+        let still = square <= LAND_ACCELERATION.powi(2) && estimate.velocity_mps.z.abs() < 1.0;
+        self.at_limit_s =
+            if motors.limits.lower && still { self.at_limit_s + self.dt_s } else { 0.0 };
         let seen = match self.at_limit_s {
             limit_s if limit_s >= LAND_COMPLETE_S => Touchdown::Complete,
             limit_s if limit_s >= LAND_MAYBE_S => Touchdown::Maybe,
@@ -195,18 +221,12 @@ impl<'a> Director<'a> {
         }
     }
 
-    fn goals(&self, estimate: &Estimate) -> Goals {
-        let stand = |place: Vector2<f64>| Kinematics::at(place);
+    fn goals(&self, estimate: &Estimate, restart: bool) -> Goals {
+        let floor = Kinematics::at(Vector1::new(self.home_m.z + p::SHOW_TAKEOFF_ALT));
         match self.stage {
-            Stage::Wait | Stage::Landed => {
-                Goals { vertical: Goal::Move(0.0), horizontal: stand(self.home_m.xy()) }
+            Stage::Wait | Stage::Landed | Stage::Takeoff => {
+                Goals { vertical: Goal::Follow(floor), horizontal: None, restart }
             }
-            Stage::Takeoff => Goals {
-                vertical: Goal::Follow(Kinematics::at(Vector1::new(
-                    self.home_m.z + p::SHOW_TAKEOFF_ALT,
-                ))),
-                horizontal: stand(self.home_m.xy()),
-            },
             Stage::Performing => {
                 let Kinematics { position, velocity, acceleration } = self.target;
                 Goals {
@@ -215,18 +235,19 @@ impl<'a> Director<'a> {
                         velocity: Vector1::new(velocity.z),
                         acceleration: Vector1::new(acceleration.z),
                     }),
-                    horizontal: Kinematics {
+                    horizontal: Some(Kinematics {
                         position: position.xy(),
                         velocity: velocity.xy(),
                         acceleration: acceleration.xy(),
-                    },
+                    }),
+                    restart,
                 }
             }
             Stage::Landing => {
-                let height_m = estimate.position_m.z - self.home_m.z;
-                let speed =
-                    if height_m > p::LAND_ALT_LOW { p::WPNAV_SPEED_DN } else { p::LAND_SPEED };
-                Goals { vertical: Goal::Move(-speed), horizontal: stand(self.target.position.xy()) }
+                let high_m = estimate.position_m.z - self.home_m.z - p::LAND_ALT_LOW;
+                let speed = self.to_land_alt.rate(Vector1::new(high_m.max(0.0)), p::WPNAV_SPEED_DN);
+                let speed = speed.x.max(p::LAND_SPEED);
+                Goals { vertical: Goal::Land(speed), horizontal: None, restart }
             }
         }
     }

@@ -13,7 +13,7 @@ pub mod params;
 pub mod shaping;
 pub mod vertical;
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 
 use super::air::density_ratio;
 use super::plant::{GRAVITY, rotor::ROTORS};
@@ -21,10 +21,13 @@ use super::sensors::Estimate;
 use crate::show::Trajectory;
 use crate::vehicle;
 use attitude::Attitude;
-use director::{Director, Stage};
+use director::{Director, Stage, Touchdown};
 use horizontal::Horizontal;
 use motors::{Motors, Spool};
 use vertical::{ThrottleLimits, Vertical};
+
+/// Temperature lost per height.
+const LAPSE_K_PER_M: f64 = 6.5e-3;
 
 /// The autopilot of one drone; its parts are public for the recorder.
 #[derive(Clone, Debug)]
@@ -41,9 +44,8 @@ pub struct Autopilot<'a> {
     pub motors: Motors,
     /// Throttle before the boost for tilt (CTUN.ThI).
     pub throttle_in: f64,
-    settings: &'a vehicle::Autopilot,
     home_m: Vector3<f64>,
-    home_amsl_m: f64,
+    air: BaroAir,
     dt_s: f64,
 }
 
@@ -51,7 +53,7 @@ impl<'a> Autopilot<'a> {
     /// Armed on the ground. `None`: the trajectory never rises to SHOW_TAKEOFF_ALT.
     pub fn new(
         trajectory: &'a Trajectory,
-        settings: &'a vehicle::Autopilot,
+        settings: &vehicle::Autopilot,
         home_m: Vector3<f64>,
         home_amsl_m: f64,
         dt_s: f64,
@@ -63,9 +65,8 @@ impl<'a> Autopilot<'a> {
             attitude: Attitude::new(dt_s),
             motors: Motors::new(settings, dt_s),
             throttle_in: 0.0,
-            settings,
             home_m,
-            home_amsl_m,
+            air: BaroAir { home_amsl_m, ground_c: settings.baro_ground_temperature_c },
             dt_s,
         })
     }
@@ -74,34 +75,42 @@ impl<'a> Autopilot<'a> {
     pub fn update(&mut self, time_s: f64, estimate: &Estimate) -> [u16; ROTORS] {
         let goals = self.director.update(time_s, estimate, &mut self.motors);
         if self.motors.spool == Spool::Flying {
-            let push = self.horizontal.update(&goals.horizontal, estimate);
+            if goals.restart {
+                self.vertical.restart(estimate, self.throttle_in);
+                self.horizontal.restart(estimate);
+            }
+            let push = self.horizontal.update(goals.horizontal.as_ref(), estimate);
             let direction = Vector3::new(push.x, push.y, GRAVITY).normalize();
             let torque = self.attitude.update(direction, estimate);
-            self.throttle_in = self.vertical.update(&goals.vertical, estimate, self.motors.limits);
-            let boosted = self.throttle_in / self.attitude.cos_tilt().max(0.1);
+            self.throttle_in = if self.director.touchdown == Touchdown::Complete {
+                self.vertical.relax(estimate, self.throttle_in)
+            } else {
+                self.vertical.update(&goals.vertical, estimate, self.motors.limits)
+            };
+            let boosted = self.throttle_in * self.boost(estimate);
             let height_m = estimate.position_m.z - self.home_m.z;
-            let amsl_m = self.home_amsl_m + height_m;
-            self.motors.set_density(height_m, || density_ratio(amsl_m));
+            self.motors.set_density(height_m, |height_m| self.air.ratio(height_m));
             self.motors.update(boosted, &torque);
             if self.director.stage == Stage::Performing {
                 self.vertical.learn_hover(self.motors.throttle, estimate);
             }
         } else {
-            self.relax(estimate);
+            self.stand(estimate);
             self.motors.update(0.0, &Vector3::zeros());
         }
         self.motors.pulses_us
     }
 
-    /// On the ground, the controllers start from where the vehicle is.
-    fn relax(&mut self, estimate: &Estimate) {
-        let hover_throttle = self.vertical.hover_throttle;
-        self.vertical = Vertical::new(self.settings, estimate.position_m.z, self.dt_s);
-        self.vertical.hover_throttle = hover_throttle;
-        self.horizontal =
-            Horizontal::new(Vector2::new(estimate.position_m.x, estimate.position_m.y), self.dt_s);
+    /// What the throttle is multiplied by for the tilt.
+    pub fn boost(&self, estimate: &Estimate) -> f64 {
+        1.0 / estimate.rotation[(2, 2)].max(0.1)
+    }
+
+    /// On the ground, the controllers start from where the vehicle is and from no throttle.
+    fn stand(&mut self, estimate: &Estimate) {
+        self.horizontal = Horizontal::new(estimate.position_m.xy(), self.dt_s);
         self.attitude = Attitude::new(self.dt_s);
-        self.throttle_in = 0.0;
+        self.throttle_in = self.vertical.relax(estimate, 0.0);
     }
 
     /// Whether a rotor is at an end of its range in flight, or the throttle is.
@@ -109,5 +118,23 @@ impl<'a> Autopilot<'a> {
         let (low, high) = self.motors.pulse_range_us();
         let at_end = |pulse: &u16| *pulse <= low || *pulse >= high;
         self.motors.limits != ThrottleLimits::default() || self.motors.pulses_us.iter().any(at_end)
+    }
+}
+
+/// Density of the air as the barometer has it.
+#[derive(Clone, Copy, Debug)]
+struct BaroAir {
+    home_amsl_m: f64,
+    /// Temperature taken for that of the air at home, if not the standard one.
+    ground_c: Option<f64>,
+}
+
+impl BaroAir {
+    /// Share of the density at sea level at a height above home, m.
+    fn ratio(&self, height_m: f64) -> f64 {
+        let amsl_m = self.home_amsl_m + height_m;
+        let standard_k = 288.15 - LAPSE_K_PER_M * amsl_m;
+        let taken_k = self.ground_c.map_or(standard_k, |c| 273.15 + c - LAPSE_K_PER_M * height_m);
+        density_ratio(amsl_m) * standard_k / taken_k
     }
 }

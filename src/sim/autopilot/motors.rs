@@ -18,7 +18,7 @@ pub enum Spool {
     Stopped,
     /// Spinning on the ground.
     Idle,
-    /// On the way from idle to flight, 0..1.
+    /// Spinning up to flight: share of the lowest output in flight.
     Up(f64),
     /// Throttle unlimited.
     Flying,
@@ -41,6 +41,10 @@ pub struct Motors {
     spin_span: f64,
     density_gain: f64,
     density_height_m: f64,
+    voltage_limits: (f64, f64),
+    /// Battery voltage as a share of MOT_BAT_VOLT_MAX, and the share of full thrust it gives.
+    voltage: f64,
+    lift: f64,
     dt_s: f64,
 }
 
@@ -58,6 +62,12 @@ impl Motors {
             spin_span: settings.mot_spin_max - settings.mot_spin_min,
             density_gain: 1.0,
             density_height_m: f64::NEG_INFINITY,
+            voltage_limits: (
+                settings.mot_bat_volt_min.max(0.6 * settings.mot_bat_volt_max),
+                settings.mot_bat_volt_max,
+            ),
+            voltage: 1.0,
+            lift: 1.0,
             dt_s,
         }
     }
@@ -67,11 +77,22 @@ impl Motors {
         (whole_us(self.spin_min), whole_us(self.spin_min + self.spin_span))
     }
 
-    /// Tells the motors the height above home (m) and the air's density there, for its compensation.
-    pub fn set_density(&mut self, height_m: f64, density_ratio: impl FnOnce() -> f64) {
+    /// Tells the motors the height above home (m) and how to find the density of the air there, as a
+    /// share of that at sea level, for its compensation.
+    pub fn set_density(&mut self, height_m: f64, ratio: impl FnOnce(f64) -> f64) {
         if (height_m - self.density_height_m).abs() >= DENSITY_STEP_M {
             self.density_height_m = height_m;
-            self.density_gain = 1.0 / density_ratio().clamp(0.5, 1.25);
+            self.density_gain = 1.0 / ratio(height_m).clamp(0.5, 1.25);
+        }
+    }
+
+    /// Tells the motors the resting voltage of the battery, V, for its compensation; without
+    /// MOT_BAT_VOLT_MAX there is none.
+    pub fn set_voltage(&mut self, resting_v: f64) {
+        let (low, high) = self.voltage_limits;
+        if low < high {
+            self.voltage = resting_v.clamp(low, high) / high;
+            self.lift = self.voltage * (1.0 - self.expo + self.expo * self.voltage);
         }
     }
 
@@ -81,7 +102,7 @@ impl Motors {
             Spool::Stopped => self.hold(0.0),
             Spool::Idle => self.hold(p::MOT_SPIN_ARM),
             Spool::Up(share) => {
-                self.hold(p::MOT_SPIN_ARM + share * (self.spin_min - p::MOT_SPIN_ARM));
+                self.hold(share * self.spin_min);
                 let share = share + self.dt_s / p::MOT_SPOOL_TIME;
                 self.spool = if share < 1.0 { Spool::Up(share) } else { Spool::Flying };
             }
@@ -97,12 +118,14 @@ impl Motors {
     }
 
     fn fly(&mut self, throttle: f64, torque: &Vector3<f64>) {
-        self.limits = ThrottleLimits { upper: throttle >= 1.0, lower: throttle <= 0.0 };
-        self.throttle = self.throttle_filter.apply(throttle.clamp(0.0, 1.0));
-        let wanted = self.throttle * self.density_gain;
+        self.throttle = self.throttle_filter.apply(throttle).clamp(0.0, 1.0);
+        self.throttle_filter.value = self.throttle;
+        self.limits = ThrottleLimits { upper: self.throttle >= 1.0, lower: self.throttle <= 0.0 };
+        let gain = self.density_gain / self.lift;
+        let wanted = self.throttle * gain;
         let mut share = [0.0; ROTORS];
         for (share, (forward, left, turn)) in share.iter_mut().zip(LAYOUT) {
-            *share = 0.5 * (left * torque.x - forward * torque.y + turn * torque.z);
+            *share = 0.5 * gain * (left * torque.x - forward * torque.y + turn * torque.z);
         }
         // Attitude before throttle: the collective gives way where a rotor would leave its range.
         let low = share.iter().copied().fold(0.0, f64::min);
@@ -116,7 +139,8 @@ impl Motors {
         };
         for (pulse, share) in self.pulses_us.iter_mut().zip(share) {
             let thrust = (collective + share * scale).clamp(0.0, 1.0);
-            *pulse = whole_us(self.spin_min + self.spin_span * curve(thrust, self.expo));
+            let output = (curve(thrust * self.lift, self.expo) / self.voltage).min(1.0);
+            *pulse = whole_us(self.spin_min + self.spin_span * output);
         }
     }
 }

@@ -11,6 +11,10 @@ pub const WPNAV_SPEED: f64 = 10.0;
 pub const WPNAV_SPEED_DN: f64 = 4.5;
 /// PSC_JERK_XY and PSC_JERK_Z, m/s³.
 pub const PSC_JERK: f64 = 30.0;
+/// ATC_ACCEL_R_MAX and ATC_ACCEL_P_MAX, degrees/s².
+pub const ATC_ACCEL_RP_MAX_DEG: f64 = 1100.0;
+/// ATC_INPUT_TC, s.
+pub const ATC_INPUT_TC: f64 = 0.15;
 /// PSC_POSXY_P, 1/s.
 pub const PSC_POSXY_P: f64 = 1.0;
 /// PSC_VELXY_P, 1/s.
@@ -27,6 +31,8 @@ pub const PSC_VEL_FLT: f64 = 5.0;
 pub const PSC_ACCZ_FLTE: f64 = 20.0;
 /// PSC_ACCZ_IMAX, share of full throttle.
 pub const PSC_ACCZ_IMAX: f64 = 0.8;
+/// Time constant with which the controllers let go on the ground, s (POSCONTROL_RELAX_TC).
+pub const RELAX_S: f64 = 0.16;
 /// Low-pass on the throttle, Hz (POSCONTROL_THROTTLE_CUTOFF_FREQ_HZ).
 pub const THROTTLE_FLT: f64 = 2.0;
 /// ANGLE_MAX, degrees.
@@ -63,6 +69,8 @@ pub const HOVER_RANGE: (f64, f64) = (0.125, 0.6875);
 pub const ARMING_DELAY_S: f64 = 2.0;
 /// LAND_SPEED, m/s.
 pub const LAND_SPEED: f64 = 0.5;
+/// Low-pass on the acceleration that the landing detector looks at, Hz.
+pub const LAND_ACCEL_FLT: f64 = 1.0;
 /// LAND_ALT_LOW, m.
 pub const LAND_ALT_LOW: f64 = 10.0;
 /// SHOW_CTRL_RATE, Hz.

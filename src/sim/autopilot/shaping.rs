@@ -53,6 +53,30 @@ impl<const N: usize> Kinematics<N> {
         self.velocity += self.acceleration * dt_s;
     }
 
+    /// Moves on, but not away from a vehicle that can give no more in the direction of `stuck`
+    /// (zero: free): neither in position while that is ahead by `ahead`, nor in velocity while that
+    /// is ahead by `faster`.
+    pub fn advance_within(
+        &mut self,
+        dt_s: f64,
+        stuck: &SVector<f64, N>,
+        ahead: &SVector<f64, N>,
+        faster: &SVector<f64, N>,
+    ) {
+        if stuck.norm_squared() == 0.0 {
+            return self.advance(dt_s);
+        }
+        let step = (self.velocity + self.acceleration * (dt_s / 2.0)) * dt_s;
+        if step.dot(stuck) <= 0.0 || ahead.dot(stuck) <= 0.0 {
+            self.position += step;
+        }
+        let gain = self.acceleration * dt_s;
+        let away = gain.dot(stuck) > 0.0 && faster.dot(stuck) > 0.0;
+        if !away || self.velocity.dot(stuck) < 0.0 {
+            self.velocity += gain;
+        }
+    }
+
     /// Turns the acceleration towards meeting `goal` in position and velocity.
     pub fn approach(&mut self, goal: &Self, limits: &Approach, dt_s: f64) {
         let catch_up = limits.to_position.rate(goal.position - self.position, limits.speed);
@@ -73,6 +97,19 @@ impl<const N: usize> Kinematics<N> {
     }
 }
 
+impl Kinematics<1> {
+    /// As [`Kinematics::approach`], with limits of their own for accelerating up and down.
+    pub fn approach_between(&mut self, goal: &Self, up: &Approach, down: &Approach, dt_s: f64) {
+        let error = goal.position - self.position;
+        // What brakes before a goal above is the downward acceleration.
+        let brake = if error.x > 0.0 { down } else { up };
+        let catch_up = brake.to_position.rate(error, brake.speed);
+        let velocity = catch_up + goal.velocity;
+        let limits = if velocity.x > self.velocity.x { up } else { down };
+        self.approach_velocity(&velocity, &goal.acceleration, limits, dt_s);
+    }
+}
+
 /// Errors below this are none, m or m/s: left to decay for ever, they would become subnormal
 /// numbers, with which processors are tens of times slower.
 const NOTHING: f64 = 1e-12;
@@ -80,7 +117,7 @@ const NOTHING: f64 = 1e-12;
 /// Rate that takes an error to zero: proportional near zero, and further out what a constant
 /// deceleration can still stop. Never overshoots within one step.
 #[derive(Clone, Copy, Debug)]
-struct RootLaw {
+pub(super) struct RootLaw {
     stiffness: f64,
     brake: f64,
     linear_to: f64,
@@ -88,12 +125,16 @@ struct RootLaw {
 }
 
 impl RootLaw {
-    fn new(stiffness: f64, brake: f64, dt_s: f64) -> Self {
+    pub(super) fn new(stiffness: f64, brake: f64, dt_s: f64) -> Self {
         let linear_to = brake / (stiffness * stiffness);
         Self { stiffness, brake, linear_to, steps_per_s: 1.0 / dt_s }
     }
 
-    fn rate<const N: usize>(&self, error: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
+    pub(super) fn rate<const N: usize>(
+        &self,
+        error: SVector<f64, N>,
+        limit: f64,
+    ) -> SVector<f64, N> {
         let square = error.norm_squared();
         if square < NOTHING * NOTHING {
             return SVector::zeros();

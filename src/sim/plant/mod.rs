@@ -5,6 +5,7 @@
 
 pub mod drag;
 pub mod rotor;
+pub mod sitl;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -12,6 +13,7 @@ use super::air::Surroundings;
 use crate::vehicle::Airframe;
 use drag::Drag;
 use rotor::{LAYOUT, ROTORS, Rotors};
+use sitl::Sitl;
 
 /// Standard gravity, m/s² (AirSim's EarthUtils below 10 km).
 pub const GRAVITY: f64 = 9.80665;
@@ -54,15 +56,19 @@ pub struct Plant {
     ground_z_m: f64,
     rotors: Rotors,
     drag: Drag,
+    /// Stands in for rotors and drag.
+    sitl: Option<Sitl>,
     motion: Motion,
     on_ground: bool,
+    impact_mps2: f64,
 }
 
 impl Plant {
     /// A body at rest on the ground at `home_m` (show frame), heading along show x, for steps of
     /// `dt_s`.
     pub fn new(airframe: &Airframe, home_m: Vector3<f64>, dt_s: f64) -> Self {
-        let inertia = inertia_kgm2(airframe);
+        let sitl = airframe.sitl.map(|frame| Sitl::new(&frame, airframe.mass_kg));
+        let inertia = sitl.map_or_else(|| inertia_kgm2(airframe), |sitl| sitl.inertia_kgm2());
         Self {
             per_mass: 1.0 / airframe.mass_kg,
             inertia,
@@ -71,6 +77,7 @@ impl Plant {
             ground_z_m: home_m.z,
             rotors: Rotors::new(airframe, dt_s),
             drag: Drag::new(airframe),
+            sitl,
             motion: Motion {
                 position_m: home_m,
                 velocity_mps: Vector3::zeros(),
@@ -81,6 +88,7 @@ impl Plant {
                 angular_acceleration: Vector3::zeros(),
             },
             on_ground: true,
+            impact_mps2: 0.0,
         }
     }
 
@@ -99,6 +107,12 @@ impl Plant {
         self.on_ground
     }
 
+    /// Mean acceleration by which the ground stopped the fall in the last step, m/s² upward: what an
+    /// accelerometer feels of a touchdown; 0 otherwise.
+    pub fn impact_mps2(&self) -> f64 {
+        self.impact_mps2
+    }
+
     /// Moves on by one step with rotor commands in 0..1.
     ///
     /// The velocity-Verlet scheme of AirSim's FastPhysicsEngine: drag at the velocity expected in
@@ -110,9 +124,13 @@ impl Plant {
         let middle_radps = now.rate_radps + now.angular_acceleration * half_s;
 
         let mut loads = Loads::default();
-        self.rotors.add_loads(around.density_ratio, &mut loads);
         let relative = now.rotation.tr_mul(&(middle_mps - around.air_velocity_mps));
-        self.drag.add_loads(&relative, around.density_ratio, &mut loads);
+        if let Some(sitl) = &mut self.sitl {
+            sitl.add_loads(command, &relative, &middle_radps, around.density_ratio, &mut loads);
+        } else {
+            self.rotors.add_loads(around.density_ratio, &mut loads);
+            self.drag.add_loads(&relative, around.density_ratio, &mut loads);
+        }
 
         let mut acceleration = now.rotation * (loads.force_n * self.per_mass);
         acceleration.z -= GRAVITY;
@@ -135,8 +153,13 @@ impl Plant {
     /// The ground carries what would sink into it, and holds it level: drones stand on their legs.
     fn rest_on_ground(&mut self) {
         let motion = &mut self.motion;
+        let stood = self.on_ground;
+        self.impact_mps2 = 0.0;
         self.on_ground = motion.position_m.z <= self.ground_z_m && motion.velocity_mps.z <= 0.0;
         if self.on_ground {
+            if !stood {
+                self.impact_mps2 = -motion.velocity_mps.z / self.dt_s;
+            }
             let heading = motion.rotation * Vector3::x();
             let yaw = heading.y.atan2(heading.x);
             motion.position_m.z = self.ground_z_m;

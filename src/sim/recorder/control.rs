@@ -6,8 +6,10 @@ use nalgebra::Vector3;
 
 use crate::log::Value::{Float as F, Int as I};
 use crate::log::{LogWriter, catalog};
+use crate::show::lights::Rgb;
 use crate::sim::autopilot::director::Stage;
 use crate::sim::autopilot::motors::Spool;
+use crate::sim::plant::GRAVITY;
 
 use super::Moment;
 use super::battery::Battery;
@@ -67,7 +69,7 @@ fn write_throttle<W: Write>(
     let height_m = -view.place(&estimate.position_m).z;
     let vertical = &pilot.vertical;
     let target_m = height_m + vertical.target.position.x - estimate.position_m.z;
-    let boost = pilot.throttle_in * (1.0 / pilot.attitude.cos_tilt().max(0.1) - 1.0);
+    let boost = pilot.throttle_in * (pilot.boost(estimate) - 1.0);
     let throttle = pilot.motors.throttle;
     log.row(
         &catalog::CTUN,
@@ -114,6 +116,9 @@ fn write_position_control<W: Write>(
     let (pilot, estimate) = (moment.pilot, moment.estimate);
     let (flat, up) = (&pilot.horizontal, &pilot.vertical);
     let join = |flat: nalgebra::Vector2<f64>, up: f64| Vector3::new(flat.x, flat.y, up);
+    // The firmware states the horizontal acceleration by the lean that it wants.
+    let lean = pilot.attitude.thrust_direction;
+    let push = lean.xy() * (GRAVITY / lean.z);
     let columns = [
         view.place(&join(flat.target.position, up.target.position.x)),
         view.place(&estimate.position_m),
@@ -122,7 +127,7 @@ fn write_position_control<W: Write>(
         view.ned(&estimate.velocity_mps),
         view.ned(&join(flat.target.acceleration, up.target.acceleration.x)),
         view.ned(&join(flat.acceleration_target, up.acceleration_target)),
-        view.ned(&estimate.acceleration_mps2),
+        view.ned(&join(push, estimate.acceleration_mps2.z)),
     ];
     for (axis, message) in [&catalog::PSCN, &catalog::PSCE, &catalog::PSCD].into_iter().enumerate()
     {
@@ -174,11 +179,13 @@ pub(super) fn write_target<W: Write>(
 pub(super) fn write_show<W: Write>(
     log: &mut LogWriter<W>,
     moment: &Moment<'_>,
+    color: Rgb,
     board_us: i64,
 ) -> io::Result<u64> {
     let director = &moment.pilot.director;
+    let [red, green, blue] = color.map(|value| I(value.into()));
     let miss = if director.stage == Stage::Performing {
-        moment.estimate.position_m - director.target.position
+        moment.estimate.position_m - director.sent_m
     } else {
         Vector3::zeros()
     };
@@ -188,9 +195,9 @@ pub(super) fn write_show<W: Write>(
             I(board_us),
             I(moment.time_us.div_euclid(1000)),
             I(director.stage as i64),
-            I(0),
-            I(0),
-            I(0),
+            red,
+            green,
+            blue,
             F(miss.xy().norm()),
             F(miss.z),
         ],

@@ -6,6 +6,7 @@ use super::battery::Battery;
 use super::clock::Clock;
 use super::events::Events;
 use super::full::{self, Full};
+use super::lights::Lights;
 use super::view::View;
 use super::{Moment, Recorder, control, navigation, start};
 use crate::log::{LogWriter, MessageDef, catalog};
@@ -16,19 +17,20 @@ const STEPS_25_HZ: u64 = 16;
 const STEPS_10_HZ: u64 = 40;
 
 /// Writes a DataFlash log as the show firmware does.
-pub struct LogRecorder<W: Write> {
+pub struct LogRecorder<'a, W: Write> {
     log: LogWriter<W>,
     clock: Clock,
     view: View,
     battery: Battery,
     events: Events,
+    lights: Lights<'a>,
     full: Option<Full>,
     rows: u64,
 }
 
-impl<W: Write> LogRecorder<W> {
+impl<'a, W: Write> LogRecorder<'a, W> {
     /// Starts the log of a flight that arms at this show time (us): definitions and first rows.
-    pub(in crate::sim) fn new(out: W, setup: &FlightSetup<'_>, armed_us: i64) -> io::Result<Self> {
+    pub(in crate::sim) fn new(out: W, setup: &FlightSetup<'a>, armed_us: i64) -> io::Result<Self> {
         let clock = Clock::new(setup.seed, setup.drone, armed_us, setup.start);
         let view = View::new(&setup.frame, setup.home_m);
         let board_us = clock.board_us(armed_us);
@@ -41,6 +43,7 @@ impl<W: Write> LogRecorder<W> {
             view,
             battery: Battery::new(setup.vehicle),
             events: Events::new(),
+            lights: Lights::new(setup.lights),
             full: setup.full_logs.then(|| Full::new(setup, &view)),
             rows,
         })
@@ -63,7 +66,7 @@ fn messages(full: bool) -> Vec<&'static MessageDef> {
     messages
 }
 
-impl<W: Write> Recorder for LogRecorder<W> {
+impl<W: Write> Recorder for LogRecorder<'_, W> {
     fn record(&mut self, moment: &Moment<'_>) -> io::Result<()> {
         let board_us = self.clock.board_us(moment.time_us);
         let log = &mut self.log;
@@ -76,7 +79,8 @@ impl<W: Write> Recorder for LogRecorder<W> {
             }
         }
         if moment.step.is_multiple_of(STEPS_25_HZ) {
-            self.rows += control::write_show(log, moment, board_us)?;
+            let color = self.lights.color(moment.pilot, moment.time_us.div_euclid(1000));
+            self.rows += control::write_show(log, moment, color, board_us)?;
         }
         if moment.step.is_multiple_of(STEPS_10_HZ) {
             self.battery.draw(moment.plant, STEPS_10_HZ as f64 * STEP_S);

@@ -9,6 +9,7 @@ mod control;
 mod ekf;
 mod events;
 mod full;
+mod lights;
 mod log;
 mod navigation;
 mod start;
