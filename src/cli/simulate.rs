@@ -58,7 +58,7 @@ pub(super) struct AirSpecs(Vec<AirSpec>);
 
 /// Parser of `--air`.
 pub(super) fn air_specs(text: &str) -> Result<AirSpecs, String> {
-    spec::load(text).map(AirSpecs).map_err(|error| error.to_string())
+    spec::load(text).map(AirSpecs).map_err(|error| super::exit::with_reasons(&error))
 }
 
 /// The part of the long help that lists the kinds of air.
@@ -66,6 +66,7 @@ pub(super) fn air_help() -> String {
     let files: Vec<_> = spec::builtin_names().collect();
     format!(
         "Kinds of air for --air, with their keys and [defaults]; several --air add up:\n{}\n\
+         Mean wind: that of the uniform parts, and of profiles at their reference height.\n\
          Files of several that come with the program: {}\n",
         spec::help_text(),
         files.join(", ")

@@ -158,7 +158,8 @@ impl AllenThermals {
         if distance_m <= thermal.core_m {
             return inside;
         }
-        let area = self.centres_m.len() as f64 * PI * mean_radius_m(self.zi_m, position_m.z).powi(2);
+        let area =
+            self.centres_m.len() as f64 * PI * mean_radius_m(self.zi_m, position_m.z).powi(2);
         let free = self.side_m * self.side_m - area;
         let sink_mps =
             if free > 0.0 { -area * thermal.mean_mps * (1.0 - ring_share) / free } else { 0.0 };

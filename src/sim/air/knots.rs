@@ -20,7 +20,7 @@ const FASTEST_MPS: f64 = 30.0;
 pub struct Knots<F> {
     look_up: F,
     /// Index of the interval that `values` surrounds: knots `at - 1` to `at + 2`.
-    at: Option<i64>,
+    at: Option<f64>,
     values: [Vector3<f64>; 4],
     last_position_m: Vector3<f64>,
     last_time_s: f64,
@@ -38,19 +38,18 @@ impl<F: Fn(&Vector3<f64>, f64) -> Vector3<f64>> Knots<F> {
         }
     }
 
-    fn fill(&mut self, interval: i64, position_m: &Vector3<f64>, time_s: f64) {
-        let knot = |index: i64| index as f64 * KNOT_S;
-        if self.at.is_some_and(|at| at + 1 == interval) {
+    fn fill(&mut self, interval: f64, position_m: &Vector3<f64>, time_s: f64) {
+        let knot = |offset: f64| (interval + offset) * KNOT_S;
+        if self.at.is_some_and(|at| at + 1.0 == interval) {
             let passed_s = time_s - self.last_time_s;
             let velocity = (position_m - self.last_position_m) / passed_s;
-            let velocity =
-                if velocity.norm() <= FASTEST_MPS { velocity } else { Vector3::zeros() };
-            let next_s = knot(interval + 2);
+            let velocity = if velocity.norm() <= FASTEST_MPS { velocity } else { Vector3::zeros() };
+            let next_s = knot(2.0);
             self.values.rotate_left(1);
             self.values[3] = (self.look_up)(&(position_m + velocity * (next_s - time_s)), next_s);
         } else {
-            for (value, offset) in self.values.iter_mut().zip(-1..) {
-                *value = (self.look_up)(position_m, knot(interval + offset));
+            for (value, offset) in self.values.iter_mut().zip([-1.0, 0.0, 1.0, 2.0]) {
+                *value = (self.look_up)(position_m, knot(offset));
             }
         }
         self.at = Some(interval);
@@ -60,13 +59,13 @@ impl<F: Fn(&Vector3<f64>, f64) -> Vector3<f64>> Knots<F> {
 impl<F: Fn(&Vector3<f64>, f64) -> Vector3<f64>> AirSampler for Knots<F> {
     fn air_velocity(&mut self, position_m: &Vector3<f64>, time_s: f64) -> Vector3<f64> {
         let along = time_s / KNOT_S;
-        let interval = along.floor() as i64;
+        let interval = along.floor();
         if self.at != Some(interval) {
             self.fill(interval, position_m, time_s);
         }
         self.last_position_m = *position_m;
         self.last_time_s = time_s;
-        let u = along - interval as f64;
+        let u = along - interval;
         let [before, from, to, after] = &self.values;
         let bend = before * 2.0 - from * 5.0 + to * 4.0 - after;
         let twist = (from - to) * 3.0 + after - before;
@@ -108,7 +107,8 @@ mod tests {
 
     #[test]
     fn a_jump_in_time_starts_over() {
-        let mut knots = Knots::new(|place: &Vector3<f64>, time_s| Vector3::repeat(place.x + time_s));
+        let mut knots =
+            Knots::new(|place: &Vector3<f64>, time_s| Vector3::repeat(place.x + time_s));
         let place = Vector3::new(3.0, 0.0, 0.0);
         for time_s in [0.0, 0.01, 100.0, -20.0, -19.99] {
             let value = knots.air_velocity(&place, time_s).x;

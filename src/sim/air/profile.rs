@@ -4,6 +4,9 @@ use nalgebra::Vector3;
 
 use super::Atmosphere;
 
+/// The laws end at the top of the boundary layer: above, the wind is that of this height, m.
+const TOP_M: f64 = 1_000.0;
+
 /// How wind speed grows with height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WindLaw {
@@ -33,6 +36,7 @@ pub struct WindProfile {
 impl WindProfile {
     /// Wind speed at a height as a share of that at the reference height.
     pub fn ratio(&self, height_m: f64) -> f64 {
+        let height_m = height_m.min(TOP_M);
         match self.law {
             WindLaw::Log { roughness_m } if height_m > roughness_m => {
                 (height_m / roughness_m).ln() / (self.reference_height_m / roughness_m).ln()

@@ -92,10 +92,8 @@ pub fn to_csv(
         // Adding zero turns -0 into 0.
         let [x, y, z] = [place.x, place.y, place.z].map(|value| value + 0.0);
         let [east, north, up] = [neu.y, neu.x, neu.z].map(|value| value + 0.0);
-        let _ = writeln!(
-            text,
-            "{second},{x:.3},{y:.3},{z:.3},{east:.5},{north:.5},{up:.5},{mean:.5}"
-        );
+        let _ =
+            writeln!(text, "{second},{x:.3},{y:.3},{z:.3},{east:.5},{north:.5},{up:.5},{mean:.5}");
     }
     text
 }
@@ -138,9 +136,8 @@ pub fn read(path: &Path) -> Result<TrueUpdraft, TruthError> {
         let (Some(time), Some(mean), 8) = (fields.first(), fields.last(), fields.len()) else {
             return Err(wrong(index, format!("{} values instead of 8", fields.len())));
         };
-        let time: i64 = time
-            .parse()
-            .map_err(|_| wrong(index, format!("\"{time}\" is not a whole second")))?;
+        let time: i64 =
+            time.parse().map_err(|_| wrong(index, format!("\"{time}\" is not a whole second")))?;
         let number = mean.parse::<f64>().ok().filter(|value| value.is_finite());
         let mean = number.ok_or_else(|| wrong(index, format!("\"{mean}\" is not a number")))?;
         if truth.updraft_mps.is_empty() {

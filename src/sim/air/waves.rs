@@ -73,8 +73,7 @@ impl<const N: usize> Waves<N> {
     /// The sum at a place and time.
     pub(super) fn at(&self, position_m: &Vector3<f64>, time_s: f64) -> [f64; N] {
         let mut sums = [[0.0; LANES]; N];
-        let [x, y, z, time_s] =
-            [position_m.x, position_m.y, position_m.z, time_s].map(resolved);
+        let [x, y, z, time_s] = [position_m.x, position_m.y, position_m.z, time_s].map(resolved);
         for block in &self.blocks {
             let mut cosine = [0.0; LANES];
             for lane in 0..LANES {

@@ -98,8 +98,7 @@ pub fn build(air: &Air, frame: &ShowFrame, seed: u64, flight: &str) -> Sum {
                 sum.0.push(Box::new(DroneConstant { sd_mps: value("sd"), seed, component }));
             }
             "thermals" => {
-                let first_m =
-                    spec.given("x").zip(spec.given("y")).map(|(x, y)| Vector2::new(x, y));
+                let first_m = spec.given("x").zip(spec.given("y")).map(|(x, y)| Vector2::new(x, y));
                 let count = value("n") as usize;
                 sum.0.push(Box::new(AllenThermals::random(
                     w_star_mps, zi_m, wind_mps, count, first_m, &mut rng,
@@ -132,11 +131,8 @@ pub fn build(air: &Air, frame: &ShowFrame, seed: u64, flight: &str) -> Sum {
                 sum.0.push(Box::new(RandomField::new(&scales, &mut rng)));
             }
             name @ ("dryden" | "von-karman") => {
-                let spectrum = if name == "dryden" {
-                    GustSpectrum::Dryden
-                } else {
-                    GustSpectrum::VonKarman
-                };
+                let spectrum =
+                    if name == "dryden" { GustSpectrum::Dryden } else { GustSpectrum::VonKarman };
                 let (sd_mps, length_m) = (value("sd"), value("length"));
                 sum.0.push(Box::new(Gusts::new(
                     spectrum, sd_mps, length_m, wind_mps, modes, &mut rng,

@@ -52,7 +52,7 @@ use Preset::{Derived, Required, Value};
 const SPEED: (f64, f64) = (0.0, 30.0);
 const DEGREES: (f64, f64) = (-360.0, 360.0);
 const LENGTH: (f64, f64) = (1.0, 1e6);
-const MEAN_WIND: Preset = Derived("the mean wind: uniform parts, and profiles at their height");
+const MEAN_WIND: Preset = Derived("the mean wind");
 
 const WIND: Key = key("wind", "m/s", MEAN_WIND, SPEED, "speed it moves along with");
 const FROM: Key = key("from", "deg", Value(270.0), DEGREES, "where the wind comes from");
@@ -75,7 +75,7 @@ pub const KINDS: &[Kind] = &[
     Kind {
         name: "wind",
         help: "the same horizontal wind everywhere and always",
-        keys: &[key("speed", "m/s", Required, SPEED, "speed"), FROM],
+        keys: &[key("speed", "m/s", Required, SPEED, "wind speed"), FROM],
     },
     Kind {
         name: "profile",
@@ -83,9 +83,9 @@ pub const KINDS: &[Kind] = &[
         keys: &[
             key("speed", "m/s", Required, SPEED, "speed at the reference height"),
             FROM,
-            key("height", "m", Value(10.0), (1.0, 1_000.0), "reference height above ground"),
+            key("height", "m", Value(10.0), (2.0, 1_000.0), "reference height above ground"),
             key("z0", "m", Value(0.03), (1e-5, 0.99), "roughness length of the log law"),
-            key("alpha", "", Derived("the log law"), (0.0, 1.0), "exponent of the power law"),
+            key("alpha", "", Derived("the log law"), (0.0, 0.6), "exponent of the power law"),
         ],
     },
     Kind {

@@ -142,7 +142,11 @@ impl AirSpec {
             } else {
                 format!("it has {}", kind.key_names())
             };
-            return Err(AirSpecError::UnknownKey { kind: kind.name, key: name.to_owned(), allowed });
+            return Err(AirSpecError::UnknownKey {
+                kind: kind.name,
+                key: name.to_owned(),
+                allowed,
+            });
         };
         let key = &kind.keys[index];
         let (low, high) = key.range;
