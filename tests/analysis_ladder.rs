@@ -25,6 +25,7 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
         logs,
         start: None,
         true_updraft_mps: None,
+        truth: None,
         density: None,
         folder: None,
     }

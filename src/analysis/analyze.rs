@@ -46,11 +46,33 @@ pub struct FlightInput<'a> {
     pub start: Option<GpsTime>,
     /// The true vertical air speed, when the flight was simulated in uniform air, m/s.
     pub true_updraft_mps: Option<f64>,
+    /// The true vertical air speed that each slot met, when it was written down.
+    pub truth: Option<&'a BTreeMap<u16, TruthSeries>>,
     /// Ground height and the vehicle's response to air density; `None`: pulses of the map are not
     /// corrected for height.
     pub density: Option<Density>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
+}
+
+/// The vertical air speed that one simulated drone met.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TruthSeries {
+    /// Show time of the first value, s; the others follow each second.
+    pub first_s: i64,
+    /// Mean updraft over the 10 s around each second, m/s, up positive.
+    pub updraft_mps: Vec<f64>,
+}
+
+impl TruthSeries {
+    /// The values at whole seconds of show time; `None` if one is missing.
+    fn at(&self, times_s: &[i64]) -> Option<Vec<f64>> {
+        let value = |time: &i64| {
+            let index = usize::try_from(time.checked_sub(self.first_s)?).ok()?;
+            self.updraft_mps.get(index).copied()
+        };
+        times_s.iter().map(value).collect()
+    }
 }
 
 /// Choices of an analysis.
@@ -392,9 +414,13 @@ fn finish(
 type NamedUpdraft = (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str);
 
 fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
-    let truth_mps = shared.input.true_updraft_mps;
+    let uniform_mps = shared.input.true_updraft_mps;
     let series: Vec<DroneSeries> = updrafts.iter().map(|named| named.3.clone()).collect();
     let times = updraft::common_times(&series);
+    let truth_of = |slot: Option<u16>| match uniform_mps {
+        Some(truth_mps) => Some(vec![truth_mps; times.len()]),
+        None => shared.input.truth?.get(&slot?)?.at(&times),
+    };
     let drones = updrafts
         .into_iter()
         .map(|(slot, name, position_m, series, mapping)| DroneUpdraft {
@@ -405,7 +431,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             mapping: mapping.to_owned(),
             mean: series.mean,
             updraft_mps: series.at(&times),
-            truth_mps: truth_mps.map(|truth| vec![truth; times.len()]),
+            truth_mps: truth_of(slot),
         })
         .collect();
     UpdraftMap {

@@ -17,6 +17,6 @@ pub mod updraft;
 pub mod windows;
 
 pub use analyze::{
-    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, Progress, analyze,
+    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, Progress, TruthSeries, analyze,
     analyze_flight,
 };

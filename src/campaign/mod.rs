@@ -7,6 +7,7 @@
 //! my-campaign/
 //!   campaign.json  campaign.toml
 //!   calibration/   template.toml  vehicle.toml  plan.json  show.skyc  skyb/01.skyb  show.csv.zip  logs/01.BIN
+//!                  truth/01.csv
 //!   hover/         ...
 //!   analysis.json  report/index.html
 //! ```
@@ -65,6 +66,9 @@ pub struct FlightRecord {
     pub air_mps: [f64; 3],
     /// GPS time of show time 0.
     pub start: GpsTime,
+    /// Further components of the air, as `--air` takes them; then the motion is not uniform.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub air: Vec<String>,
     /// Whether the firmware's whole default set of messages was logged.
     pub full_logs: bool,
     /// SHA-256 of the plan that was flown.
@@ -172,6 +176,16 @@ impl FlightFolder {
     /// How the logs came to be.
     pub fn record(&self) -> PathBuf {
         self.logs().join("flight.json")
+    }
+
+    /// Folder of the true air, for simulated flights.
+    pub fn truth_folder(&self) -> PathBuf {
+        self.0.join("truth")
+    }
+
+    /// The true air that a slot met, among `count` slots.
+    pub fn truth(&self, slot: u16, count: usize) -> PathBuf {
+        self.truth_folder().join(numbered(slot, count, "csv"))
     }
 
     /// Reads the plan.

@@ -1,5 +1,6 @@
 //! `updraft analyze`: logs become laws, a map of the air, and a report.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -17,13 +18,14 @@ use crate::analysis::calibrate::{Location, Weights};
 use crate::analysis::density::Density;
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::windows::Tilt;
-use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, analyze};
+use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, TruthSeries, analyze};
 use crate::base::file::{FileError, read_whole, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, to_json};
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, InputFile, Provenance, terminal_summary};
+use crate::sim::air::truth::{self, TrueUpdraft};
 use crate::vehicle::{Vehicle, library};
 
 /// Largest log that is hashed, bytes.
@@ -134,6 +136,7 @@ struct Found {
     purpose: Option<Purpose>,
     logs: Vec<LogInput>,
     true_updraft_mps: Option<f64>,
+    truth: BTreeMap<u16, TruthSeries>,
     seed: Option<u64>,
     start: Option<GpsTime>,
     density: Option<Density>,
@@ -217,6 +220,7 @@ fn finish(
             logs: &flight.logs,
             start: flight.start,
             true_updraft_mps: flight.true_updraft_mps,
+            truth: (!flight.truth.is_empty()).then_some(&flight.truth),
             density: flight.density.filter(|_| !options.no_density),
             folder: Some(&work.root),
         })
@@ -285,6 +289,7 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
         purpose: None,
         logs: logs.into_iter().map(|path| LogInput { slot: None, path }).collect(),
         true_updraft_mps: None,
+        truth: BTreeMap::new(),
         seed: None,
         start: None,
         density: plan.map(|plan| density(plan, None)),
@@ -308,13 +313,18 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
         None => Vec::new(),
     };
     let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
+    let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
     Ok(Found {
         density: Some(density(&plan, vehicle.as_ref())),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),
         plan: Some(plan),
         logs,
-        true_updraft_mps: record.as_ref().map(|record| record.air_mps[2]),
+        true_updraft_mps: record
+            .as_ref()
+            .filter(|record| record.air.is_empty())
+            .map(|record| record.air_mps[2]),
+        truth,
         start: record.as_ref().map(|record| record.start),
         seed: record.map(|record| record.seed),
     })
@@ -328,6 +338,23 @@ fn record_holds(folder: &FlightFolder, record: &FlightRecord) -> bool {
         // A log that is gone is a loss, not another flight.
         size.map_or(true, |bytes| bytes == log.bytes)
     })
+}
+
+/// The true air beside a simulated flight's logs, for the slots that have it.
+fn true_air(
+    folder: &FlightFolder,
+    plan: &Plan,
+) -> Result<BTreeMap<u16, TruthSeries>, CommandError> {
+    let mut found = BTreeMap::new();
+    for slot in &plan.slots {
+        let path = folder.truth(slot.slot, plan.slots.len());
+        if path.is_file() {
+            let TrueUpdraft { first_s, updraft_mps } =
+                truth::read(&path).map_err(|error| CommandError::Failed(error.to_string()))?;
+            found.insert(slot.slot, TruthSeries { first_s, updraft_mps });
+        }
+    }
+    Ok(found)
 }
 
 /// How the map is corrected for air density: by the thrust curve that the vehicle's autopilot is set

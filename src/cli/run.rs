@@ -11,21 +11,24 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::mission_args::MissionArgs;
 use super::plan::{what_for_whom, write};
-use super::simulate::{AirArgs, Simulation, simulate, updraft};
+use super::simulate::{AirArgs, AirSpecs, Simulation, air_help, air_specs, simulate, updraft};
 use crate::campaign;
 use crate::mission::plan::Purpose;
 use crate::show::Show;
 
 /// Arguments of `updraft run`.
 #[derive(Debug, Args)]
-#[command(after_long_help = "Examples:
+#[command(after_long_help = format!("Examples:
   updraft run
   updraft run --grid 3x3 --duration 120 --updraft -0.8 -o small
   updraft run calibration-counterphase -o counterphase
+  updraft run --air field-day --truth -o field-day
 
-The calibration is flown in still air unless --calibration-updraft or --calibration-wind say
-otherwise; the measurement in the air that --updraft and --wind say. The same command goes on where
-an interrupted one stopped.")]
+The calibration is flown in still air unless --calibration-updraft, --calibration-wind or
+--calibration-air say otherwise; the measurement in the air that --updraft, --wind and --air say. The
+same command goes on where an interrupted one stopped.
+
+{}", air_help()))]
 pub(super) struct RunArgs {
     /// Template: a file or a built-in name
     #[arg(default_value = "campaign")]
@@ -36,15 +39,18 @@ pub(super) struct RunArgs {
     /// Replace another plan in the folder, and logs simulated with other settings
     #[arg(long)]
     force: bool,
-    /// Vertical air speed in measurement flights, m/s, up positive
-    #[arg(long, value_name = "MPS", default_value_t = 1.0, value_parser = updraft, allow_hyphen_values = true)]
-    updraft: f64,
+    /// Vertical air speed in measurement flights, m/s, up positive [default: 1, or 0 with --air]
+    #[arg(long, value_name = "MPS", value_parser = updraft, allow_hyphen_values = true)]
+    updraft: Option<f64>,
     /// Vertical air speed in calibration flights, m/s, up positive
     #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
     calibration_updraft: f64,
     /// Horizontal wind speed in calibration flights, m/s
     #[arg(long, value_name = "MPS", default_value_t = 0.0)]
     calibration_wind: f64,
+    /// Air to add in calibration flights, repeatable; as --air
+    #[arg(long, value_name = "SPEC", value_parser = air_specs)]
+    calibration_air: Vec<AirSpecs>,
     #[command(flatten)]
     air: AirArgs,
     #[command(flatten)]
@@ -77,12 +83,15 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
         let updraft_mps = match flight.plan.purpose {
             Purpose::Calibration => {
                 air.wind = args.calibration_wind;
+                air.specs.clone_from(&args.calibration_air);
                 args.calibration_updraft
             }
-            Purpose::Measurement => args.updraft,
+            Purpose::Measurement if air.specs.is_empty() => args.updraft.unwrap_or(1.0),
+            Purpose::Measurement => args.updraft.unwrap_or(0.0),
         };
         let simulation = Simulation {
-            air_mps: air.air_mps(updraft_mps),
+            air: air.air(updraft_mps),
+            truth: air.truth,
             seed: air.seed,
             full_logs: air.full_logs,
             vehicle: None,

@@ -18,7 +18,9 @@ use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
 use crate::mission::Plan;
 use crate::show::{Show, Trajectory};
-use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, Uniform, fly_to_file};
+use crate::sim::air::spec::{self, Air, AirSpec};
+use crate::sim::air::truth;
+use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, fly_to_file};
 use crate::vehicle::{Vehicle, library};
 
 /// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
@@ -37,12 +39,39 @@ pub(super) struct AirArgs {
     /// Where the wind comes from, degrees clockwise from north
     #[arg(long, value_name = "DEG", default_value_t = 270.0, allow_hyphen_values = true)]
     pub(super) wind_from: f64,
-    /// Seed of sensor noise and clock offsets
+    /// Air to add, repeatable: KIND:KEY=VALUE,... or a TOML file or its name (see below)
+    #[arg(long = "air", value_name = "SPEC", value_parser = air_specs)]
+    pub(super) specs: Vec<AirSpecs>,
+    /// Write the true air at each drone's planned place to truth/, beside the logs
+    #[arg(long)]
+    pub(super) truth: bool,
+    /// Seed of sensor noise, clock offsets and random air
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
     /// Log the firmware's whole default set of messages (about ten times larger)
     #[arg(long)]
     pub(super) full_logs: bool,
+}
+
+/// What one `--air` asks for.
+#[derive(Clone, Debug, Default)]
+pub(super) struct AirSpecs(Vec<AirSpec>);
+
+/// Parser of `--air`.
+pub(super) fn air_specs(text: &str) -> Result<AirSpecs, String> {
+    spec::load(text).map(AirSpecs).map_err(|error| super::exit::with_reasons(&error))
+}
+
+/// The part of the long help that lists the kinds of air.
+pub(super) fn air_help() -> String {
+    let files: Vec<_> = spec::builtin_names().collect();
+    format!(
+        "Kinds of air for --air, with their keys and [defaults]; several --air add up:\n{}\n\
+         Mean wind: that of the uniform parts, and of profiles at their reference height.\n\
+         Files of several that come with the program: {}\n",
+        spec::help_text(),
+        files.join(", ")
+    )
 }
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -61,23 +90,28 @@ pub(super) fn updraft(text: &str) -> Result<f64, String> {
 }
 
 impl AirArgs {
-    /// The uniform motion of the air towards east, north and up, m/s.
-    pub(super) fn air_mps(&self, updraft_mps: f64) -> [f64; 3] {
+    /// The air of a flight with a uniform vertical speed.
+    pub(super) fn air(&self, updraft_mps: f64) -> Air {
         let (sin, cos) = self.wind_from.to_radians().sin_cos();
         // Adding zero turns -0 into 0, which reads better in files.
-        [-self.wind * sin + 0.0, -self.wind * cos + 0.0, updraft_mps]
+        let uniform_mps = [-self.wind * sin + 0.0, -self.wind * cos + 0.0, updraft_mps];
+        let specs: Vec<_> = self.specs.iter().flat_map(|specs| specs.0.iter().cloned()).collect();
+        Air::new(uniform_mps, &specs)
     }
 }
 
 /// Arguments of `updraft simulate`.
 #[derive(Debug, Args)]
-#[command(after_long_help = "Examples:
+#[command(after_long_help = format!("Examples:
   updraft simulate my-campaign
   updraft simulate my-campaign --flight hover --updraft 1.5 --wind 5
+  updraft simulate my-campaign --flight hover --air field:sd=0.5,lambda=145 --truth
   updraft simulate my-campaign --drones 1-10,12 --full-logs
 
 Logs that are there and were flown with the same settings are kept: an interrupted run goes on where
-it stopped.")]
+it stopped.
+
+{}", air_help()))]
 pub(super) struct SimulateArgs {
     /// Campaign folder
     campaign: PathBuf,
@@ -129,7 +163,8 @@ impl SlotSet {
 /// How one flight is to be simulated.
 #[derive(Clone, Debug)]
 pub(super) struct Simulation {
-    pub(super) air_mps: [f64; 3],
+    pub(super) air: Air,
+    pub(super) truth: bool,
     pub(super) seed: u64,
     pub(super) full_logs: bool,
     pub(super) vehicle: Option<Vehicle>,
@@ -158,7 +193,8 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
     let folders = campaign::flights(&args.campaign)?;
     let vehicle = args.vehicle.as_deref().map(library::load).transpose()?;
     let simulation = Simulation {
-        air_mps: args.air.air_mps(args.updraft),
+        air: args.air.air(args.updraft),
+        truth: args.air.truth,
         seed: args.air.seed,
         full_logs: args.air.full_logs,
         vehicle,
@@ -215,12 +251,17 @@ pub(super) fn simulate(
     let kept = wanted.len() - open.len();
     let start = record.start;
     let frame = plan.site.frame();
-    let [east, north, up] = record.air_mps;
-    let air = Uniform(frame.from_neu(nalgebra::Vector3::new(north, east, up)));
     let show = Show::of_plan(plan);
     let lights: BTreeMap<u16, &[u8]> = (plan.slots.iter().zip(&show.drones))
         .map(|(slot, drone)| (slot.slot, drone.lights.as_slice()))
         .collect();
+    let air = spec::build(&simulation.air, &frame, simulation.seed, &plan.name);
+    if simulation.truth {
+        wanted.par_iter().try_for_each(|slot| {
+            let path = folder.truth(slot.slot, count);
+            truth::write(&path, &air, &Trajectory::of_slot(plan, slot), slot.slot, &frame)
+        })?;
+    }
     let progress = Progress::new(context, "flying", open.len() as u64);
     let results: Vec<Result<FlightSummary, CommandError>> = open
         .par_iter()
@@ -306,7 +347,8 @@ fn prepare(
         seed: simulation.seed,
         vehicle: vehicle.name.clone(),
         vehicle_sha256: sha256(vehicle_text.as_bytes()),
-        air_mps: simulation.air_mps,
+        air_mps: simulation.air.uniform_mps,
+        air: simulation.air.texts(),
         start,
         full_logs: simulation.full_logs,
         plan_sha256: sha256(&plan_bytes),
@@ -346,9 +388,12 @@ fn prepare(
     Ok(record)
 }
 
+/// Removes a flight's logs and the truth that they were flown in.
 fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
-    for log in present_logs(folder, plan)? {
-        let path = folder.logs().join(&log.file);
+    let logs = present_logs(folder, plan)?;
+    let paths = logs.iter().map(|log| folder.logs().join(&log.file));
+    let truths = plan.slots.iter().map(|slot| folder.truth(slot.slot, plan.slots.len()));
+    for path in paths.chain(truths.filter(|path| path.exists())) {
         std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
     }
     Ok(())

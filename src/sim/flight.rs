@@ -177,6 +177,7 @@ pub fn fly_with<R: Recorder>(
         + LANDING_PATIENCE_S;
     let mut tally = Tally::default();
     let mut around = Surroundings { air_velocity_mps: Vector3::zeros(), density_ratio: 1.0 };
+    let mut air = setup.atmosphere.sampler(drone);
     let mut stop_at_s = f64::INFINITY;
     let mut step: u64 = 0;
     loop {
@@ -185,7 +186,7 @@ pub fn fly_with<R: Recorder>(
         if step.is_multiple_of(STEPS_PER_AIR) {
             let place = &plant.motion().position_m;
             around = Surroundings {
-                air_velocity_mps: setup.atmosphere.air_velocity(place, time_s),
+                air_velocity_mps: air.air_velocity(place, time_s),
                 density_ratio: density_ratio(setup.frame.origin.amsl_m + place.z),
             };
             // Checked here, as the drag's dead band would take NaN for no wind.

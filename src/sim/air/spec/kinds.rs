@@ -1,0 +1,183 @@
+//! The kinds of air that can be asked for by name: their keys, units, bounds and defaults.
+
+/// One key of a [`Kind`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Key {
+    /// Name, as in `sd=0.5`.
+    pub name: &'static str,
+    /// Unit; empty for plain numbers.
+    pub unit: &'static str,
+    /// Value when the key is not given.
+    pub default: Preset,
+    /// Smallest and largest value.
+    pub range: (f64, f64),
+    /// What it is.
+    pub help: &'static str,
+}
+
+/// What a key is when it is not given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Preset {
+    /// It must be given.
+    Required,
+    /// This value.
+    Value(f64),
+    /// What the words say.
+    Derived(&'static str),
+}
+
+/// One kind of air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kind {
+    /// Name, as in `field:sd=0.5`.
+    pub name: &'static str,
+    /// What it is.
+    pub help: &'static str,
+    /// Its keys.
+    pub keys: &'static [Key],
+}
+
+const fn key(
+    name: &'static str,
+    unit: &'static str,
+    default: Preset,
+    range: (f64, f64),
+    help: &'static str,
+) -> Key {
+    Key { name, unit, default, range, help }
+}
+
+use Preset::{Derived, Required, Value};
+
+const SPEED: (f64, f64) = (0.0, 30.0);
+const DEGREES: (f64, f64) = (-360.0, 360.0);
+const LENGTH: (f64, f64) = (1.0, 1e6);
+const MEAN_WIND: Preset = Derived("the mean wind");
+
+const WIND: Key = key("wind", "m/s", MEAN_WIND, SPEED, "speed it moves along with");
+const FROM: Key = key("from", "deg", Value(270.0), DEGREES, "where the wind comes from");
+const MODES: Key = key("modes", "", Value(600.0), (50.0, 20_000.0), "number of waves");
+const W_STAR: Key = key("w_star", "m/s", Value(2.0), (0.0, 10.0), "convective velocity scale w*");
+const ZI: Key = key("zi", "m", Value(1_400.0), (100.0, 6_000.0), "height of the inversion");
+
+/// Every kind, in the order of the help text.
+pub const KINDS: &[Kind] = &[
+    Kind { name: "still", help: "no motion", keys: &[] },
+    Kind {
+        name: "uniform",
+        help: "the same everywhere and always",
+        keys: &[
+            key("east", "m/s", Value(0.0), (-30.0, 30.0), "velocity towards east"),
+            key("north", "m/s", Value(0.0), (-30.0, 30.0), "velocity towards north"),
+            key("up", "m/s", Value(0.0), (-20.0, 20.0), "velocity upwards"),
+        ],
+    },
+    Kind {
+        name: "wind",
+        help: "the same horizontal wind everywhere and always",
+        keys: &[key("speed", "m/s", Required, SPEED, "wind speed"), FROM],
+    },
+    Kind {
+        name: "profile",
+        help: "wind that grows with height: logarithmic, or a power law if alpha is given",
+        keys: &[
+            key("speed", "m/s", Required, SPEED, "speed at the reference height"),
+            FROM,
+            key("height", "m", Value(10.0), (2.0, 1_000.0), "reference height above ground"),
+            key("z0", "m", Value(0.03), (1e-5, 0.99), "roughness length of the log law"),
+            key("alpha", "", Derived("the log law"), (0.0, 0.6), "exponent of the power law"),
+        ],
+    },
+    Kind {
+        name: "drone-constant",
+        help: "a constant updraft of its own for each drone",
+        keys: &[key("sd", "m/s", Required, (0.0, 10.0), "standard deviation between drones")],
+    },
+    Kind {
+        name: "thermals",
+        help: "thermals after Allen (2006), drifting with the wind",
+        keys: &[
+            W_STAR,
+            ZI,
+            key("n", "", Value(3.0), (1.0, 1_000.0), "thermals on the square that repeats"),
+            key("x", "m", Derived("random"), (-1e5, 1e5), "show x of the first one at time 0"),
+            key("y", "m", Derived("random"), (-1e5, 1e5), "show y of the first one at time 0"),
+            WIND,
+            FROM,
+        ],
+    },
+    Kind {
+        name: "lenschow",
+        help: "convective turbulence that grows with height (Lenschow 1980), as a random field",
+        keys: &[
+            W_STAR,
+            ZI,
+            key("height", "m", Value(100.0), (1.0, 5_000.0), "height that lambda and tau are for"),
+            key("lambda", "m", Derived("0.28 zi sqrt(height/zi)"), LENGTH, "correlation length"),
+            key("tau", "s", Derived("lambda / sd at height"), LENGTH, "correlation time"),
+            WIND,
+            FROM,
+            MODES,
+        ],
+    },
+    Kind {
+        name: "field",
+        help: "random vertical velocity with exponential correlations",
+        keys: &[
+            key("sd", "m/s", Value(0.5), (0.0, 10.0), "standard deviation"),
+            key("lambda", "m", Value(145.0), LENGTH, "correlation length along show x"),
+            key("lambda_y", "m", Derived("lambda"), LENGTH, "along show y"),
+            key("lambda_z", "m", Derived("lambda"), LENGTH, "along the vertical"),
+            key("tau", "s", Value(186.0), LENGTH, "correlation time in the moving air"),
+            WIND,
+            FROM,
+            MODES,
+        ],
+    },
+    Kind { name: "dryden", help: "gusts with the Dryden spectrum", keys: GUST_KEYS },
+    Kind { name: "von-karman", help: "gusts with the von Karman spectrum", keys: GUST_KEYS },
+];
+
+const GUST_KEYS: &[Key] = &[
+    key("sd", "m/s", Value(0.5), (0.0, 10.0), "standard deviation of each axis"),
+    key("length", "m", Value(50.0), LENGTH, "integral length (low: height above ground)"),
+    WIND,
+    FROM,
+    MODES,
+];
+
+/// The kind of a name.
+pub fn kind(name: &str) -> Option<&'static Kind> {
+    KINDS.iter().find(|kind| kind.name == name)
+}
+
+impl Kind {
+    /// The key of a name.
+    pub fn key(&self, name: &str) -> Option<&'static Key> {
+        self.keys.iter().find(|key| key.name == name)
+    }
+
+    /// The names of its keys, for messages.
+    pub fn key_names(&self) -> String {
+        self.keys.iter().map(|key| key.name).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// The table as text, for `--help` and the documentation.
+pub fn help_text() -> String {
+    use std::fmt::Write as _;
+    let mut text = String::new();
+    for kind in KINDS {
+        let _ = writeln!(text, "  {:<15} {}", kind.name, kind.help);
+        for key in kind.keys {
+            let unit = if key.unit.is_empty() { String::new() } else { format!(" {}", key.unit) };
+            let default = match key.default {
+                Required => "required".to_owned(),
+                Value(value) => format!("{value}{unit}"),
+                Derived(words) => words.to_owned(),
+            };
+            let _ = writeln!(text, "    {:<13} {} [{default}]", key.name, key.help);
+        }
+    }
+    text
+}
