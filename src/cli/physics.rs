@@ -310,7 +310,7 @@ fn watch(
         let now: Vec<Status> = watched.iter().map(|status| got(status)).collect();
         let elapsed = watch.elapsed();
         if args.status > 0 && elapsed >= printed_at + interval {
-            let wall_s = (elapsed - printed_at).as_secs_f64();
+            let wall_s = elapsed.saturating_sub(printed_at).as_secs_f64();
             printed_at = elapsed;
             for (index, (now, before)) in now.iter().zip(&mut printed).enumerate() {
                 context.say(&status_line(index, before, now, wall_s));

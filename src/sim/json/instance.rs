@@ -289,9 +289,12 @@ mod tests {
     #[test]
     fn at_rest_the_accelerometer_feels_gravitys_reaction() {
         with(&STILL, |mut instance| {
-            for pulse in [0, 1000, 1100] {
-                let reply = instance.answer(address(1), &packet(1200, 0, [pulse; 4])).unwrap();
-                insta::assert_snapshot!("reply_at_rest", reply);
+            let reply = instance.answer(address(1), &packet(1200, 0, [1000; 4])).unwrap();
+            insta::assert_snapshot!("reply_at_rest", reply);
+            // Also with rotors that do not lift it yet, and without any output.
+            for (count, pulse) in (1..400).zip([0, 1100, 1500].into_iter().cycle()) {
+                let reply = send(&mut instance, count, pulse);
+                assert_eq!(reply["imu"]["accel_body"], serde_json::json!([0.0, 0.0, -9.80665]));
             }
         });
     }
