@@ -39,6 +39,7 @@ use exit::{CommandError, Exit};
   updraft plan templates/calibration.toml --grid 7x7 --spacing 7 -o my-campaign
   updraft check my-campaign                       also any .skyc or .skyb
   updraft simulate my-campaign
+  updraft physics                                 the real firmware's simulator in our air
   updraft analyze my-campaign                     also a folder of logs, or one log
   updraft inspect my-campaign/show.skyc
 
