@@ -4,7 +4,11 @@
 //! `fuzz/Cargo.toml`, and a few small inputs in `corpus/NAME/`. A target panics if what must hold
 //! for any bytes does not; being refused with an error is fine.
 
+use std::net::SocketAddr;
+
+use nalgebra::Vector3;
 use updraft::base::crc::ap_crc32;
+use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::campaign::{parse_plan, to_json};
 use updraft::check::{CheckInput, check};
 use updraft::log::{Log, Select};
@@ -13,6 +17,8 @@ use updraft::mission::resolve::resolve_text;
 use updraft::show::derive::DeriveParams;
 use updraft::show::summary::{summarise, summarise_skyb};
 use updraft::show::{Show, csv, skyb, skyc};
+use updraft::sim::Uniform;
+use updraft::sim::json::{Instance, InstanceSetup, ServoPacket};
 use updraft::vehicle::library;
 
 /// Shows of more drones or segments are read, but not checked: that takes too long for a fuzzer.
@@ -25,6 +31,7 @@ pub(crate) type Target = (&'static str, fn(&[u8]));
 /// All of them.
 pub(crate) const TARGETS: &[Target] = &[
     ("csv", csv),
+    ("json_packet", json_packet),
     ("log", log),
     ("plan", plan),
     ("skyb", skyb),
@@ -36,6 +43,37 @@ pub(crate) const TARGETS: &[Target] = &[
 pub(crate) fn run(name: &str, bytes: &[u8]) {
     for (_, target) in TARGETS.iter().filter(|(known, _)| *known == name) {
         target(bytes);
+    }
+}
+
+/// Datagrams of a length byte and as many bytes, to one instance: whatever they are, an answer is a
+/// finite motion at or above the ground and comes exactly for what is a packet.
+fn json_packet(bytes: &[u8]) {
+    let Ok(vehicle) = library::builtin("airsim-generic-quad") else { return };
+    let origin = Geodetic { lat_deg: 47.0, lon_deg: 19.0, amsl_m: 190.0 };
+    let air = Uniform(Vector3::new(3.0, -2.0, 1.0));
+    let mut instance = Instance::new(InstanceSetup {
+        vehicle: &vehicle,
+        home_m: Vector3::zeros(),
+        frame: ShowFrame { origin, orientation_deg: 59.0 },
+        atmosphere: &air,
+    });
+    let peer = SocketAddr::from(([127, 0, 0, 1], 50_000));
+    let mut rest = bytes;
+    while let Some((&length, after)) = rest.split_first() {
+        let (datagram, after) = after.split_at(usize::from(length).min(after.len()));
+        rest = after;
+        let frames = instance.status().frames;
+        let reply = instance.answer(peer, datagram).map(str::to_owned);
+        assert_eq!(reply.is_ok(), ServoPacket::parse(datagram).is_ok());
+        let status = instance.status();
+        if let Ok(reply) = reply {
+            assert!(reply.len() < 1_000 && !reply.contains("NaN") && !reply.contains("inf"));
+            assert!(status.frames - frames <= 6_553, "{status:?}");
+            assert!(status.height_m >= 0.0, "{status:?}");
+        } else {
+            assert_eq!(status.frames, frames);
+        }
     }
 }
 

@@ -8,6 +8,7 @@ pub mod exit;
 mod inspect;
 mod load;
 mod mission_args;
+mod physics;
 mod plan;
 mod progress;
 mod run;
@@ -39,6 +40,7 @@ use exit::{CommandError, Exit};
   updraft plan templates/calibration.toml --grid 7x7 --spacing 7 -o my-campaign
   updraft check my-campaign                       also any .skyc or .skyb
   updraft simulate my-campaign
+  updraft physics                                 the real firmware's simulator in our air
   updraft analyze my-campaign                     also a folder of logs, or one log
   updraft inspect my-campaign/show.skyc
 
@@ -90,6 +92,8 @@ enum Command {
     Check(check::CheckArgs),
     /// Fly a campaign in the embedded simulator
     Simulate(simulate::SimulateArgs),
+    /// Fly the real firmware's simulator in our physics and our air
+    Physics(physics::PhysicsArgs),
     /// Turn logs into calibration laws, a map of the air and a report
     Analyze(analyze::AnalyzeArgs),
     /// Say what is in a file
@@ -134,6 +138,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Plan(args) => plan::run(context, &args),
         Command::Check(args) => check::run(context, &args),
         Command::Simulate(args) => simulate::run(context, &args),
+        Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),

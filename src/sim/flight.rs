@@ -229,7 +229,7 @@ pub fn fly_with<R: Recorder>(
 
 /// AirSim's motor interface: the command is linear in the pulse, 1000..2000 us, whatever the
 /// autopilot's own settings are.
-fn command(pulse_us: u16) -> f64 {
+pub(super) fn command(pulse_us: u16) -> f64 {
     (f64::from(pulse_us) - 1000.0) / 1000.0
 }
 

@@ -9,6 +9,7 @@ pub mod air;
 pub mod autopilot;
 mod error;
 mod flight;
+pub mod json;
 pub mod plant;
 pub mod recorder;
 pub mod sensors;

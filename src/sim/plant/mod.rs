@@ -92,6 +92,12 @@ impl Plant {
         }
     }
 
+    /// Changes the length of the steps in flight; `airframe` is the one it was made with.
+    pub fn set_step(&mut self, airframe: &Airframe, dt_s: f64) {
+        self.dt_s = dt_s;
+        self.rotors.set_step(airframe, dt_s);
+    }
+
     /// Present motion.
     pub fn motion(&self) -> &Motion {
         &self.motion

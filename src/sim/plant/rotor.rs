@@ -38,12 +38,6 @@ impl Rotors {
     pub fn new(airframe: &Airframe, dt_s: f64) -> Self {
         let revolutions_per_s = airframe.max_rpm / 60.0;
         let pressure = REFERENCE_DENSITY * revolutions_per_s.powi(2);
-        let gain = if airframe.motor_time_constant_s > 0.0 {
-            // Exact for a command held over the step.
-            -(-dt_s / airframe.motor_time_constant_s).exp_m1()
-        } else {
-            1.0
-        };
         Self {
             max_thrust_n: airframe.thrust_coefficient
                 * pressure
@@ -53,10 +47,15 @@ impl Rotors {
                 * airframe.rotor_diameter_m.powi(5)
                 / TAU,
             offset_m: airframe.arm_m * FRAC_1_SQRT_2,
-            gain,
+            gain: lag_gain(airframe, dt_s),
             filtered: [0.0; ROTORS],
             output: [0.0; ROTORS],
         }
+    }
+
+    /// Changes the length of the steps.
+    pub fn set_step(&mut self, airframe: &Airframe, dt_s: f64) {
+        self.gain = lag_gain(airframe, dt_s);
     }
 
     /// Thrust of one rotor at full command and sea level, N.
@@ -98,6 +97,16 @@ impl Rotors {
     pub fn settle(&mut self, command: &[f64; ROTORS]) {
         self.filtered = *command;
         self.output = *command;
+    }
+}
+
+/// Share of the way to the command that the motors go in one step.
+fn lag_gain(airframe: &Airframe, dt_s: f64) -> f64 {
+    if airframe.motor_time_constant_s > 0.0 {
+        // Exact for a command held over the step.
+        -(-dt_s / airframe.motor_time_constant_s).exp_m1()
+    } else {
+        1.0
     }
 }
 
