@@ -13,6 +13,7 @@ mod progress;
 mod run;
 mod show_text;
 mod simulate;
+mod sweep;
 mod timetable;
 pub mod tools;
 
@@ -38,6 +39,7 @@ use exit::{CommandError, Exit};
   updraft plan templates/calibration.toml --grid 7x7 --spacing 7 -o my-campaign
   updraft check my-campaign                       also any .skyc or .skyb
   updraft simulate my-campaign
+  updraft sweep                                   the paper's simulation study, with its figure 2
   updraft analyze my-campaign                     also a folder of logs, or one log
   updraft inspect my-campaign/show.skyc
 
@@ -91,6 +93,8 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     /// Turn logs into calibration laws, a map of the air and a report
     Analyze(analyze::AnalyzeArgs),
+    /// Fly the ladder in every wind and updraft of a study, and correlate what is found with the truth
+    Sweep(sweep::SweepArgs),
     /// Say what is in a file
     Inspect(inspect::InspectArgs),
     /// Print a shell's completion script
@@ -134,6 +138,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Check(args) => check::run(context, &args),
         Command::Simulate(args) => simulate::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
+        Command::Sweep(args) => sweep::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),
         Command::Man => tools::man(context, Cli::command()),

@@ -435,7 +435,7 @@ impl Template {
 }
 
 /// The reader's message in the words of people who write templates.
-fn first_line(message: &str) -> String {
+pub(crate) fn first_line(message: &str) -> String {
     let line = message.lines().next().unwrap_or_default();
     line.replace("expected f64", "expected a number")
         .replace("expected i64", "expected a whole number")
