@@ -9,7 +9,7 @@ use crate::study::Condition;
 use crate::study::result::{ConditionResult, StudyFlight, StudyResult};
 
 use super::Figure;
-use super::axis::Axis;
+use super::axis::{Axis, nice_step};
 use super::chart::{Mark, Panel};
 use super::colour::{BLUE, FAINT, GREEN, INK, MUTED, VERMILLION, sequential};
 use super::figure_laws::{PULSE_LABEL, VELOCITY_LABEL};
@@ -113,7 +113,15 @@ fn still(study: &StudyResult) -> Option<Figure> {
     if coloured.flights.is_empty() {
         return None;
     }
-    let (v, u) = axes(study);
+    let (v, mut u) = axes(study);
+    // Room above the points on the left, where the inset goes.
+    u.step = nice_step((u.max - u.min) / 10.0);
+    u.max += u.step;
+    let lowest = study.flights.iter().flat_map(|flight| &flight.windows);
+    let lowest = lowest.map(|w| w.pulse_phi_us.median).fold(f64::INFINITY, f64::min);
+    while u.min + 1.5 * u.step < lowest && u.min + 5.0 * u.step < u.max {
+        u.min += u.step;
+    }
     let mut panel = Panel::new("Still air", v.clone(), u.clone());
     panel.legend_outside(124.0);
     let unused = coloured.draw(&mut panel, (&v, &u), 3.8);
@@ -124,9 +132,10 @@ fn still(study: &StudyResult) -> Option<Figure> {
     if unused > 0 {
         panel.entry("not used", VERMILLION, LegendShape::Marker(MarkerShape::Cross), "");
     }
-    let mut sheet = Sheet::new(1040.0, 640.0);
-    sheet.place(panel.draw(1040.0, 640.0), 0.0, 0.0);
-    sheet.place(inset(&coloured).draw(330.0, 262.0), 76.0, 40.0);
+    let mut sheet = Sheet::new(1040.0, 720.0);
+    sheet.place(panel.draw(1040.0, 720.0), 0.0, 0.0);
+    sheet.cover([70.0, 33.0, 350.0, 242.0]);
+    sheet.place(inset(&coloured).draw(350.0, 250.0), 68.0, 24.0);
     let name = "fig2-study".to_owned();
     let title = "Pulse width against vertical velocity in still air, by updraft".to_owned();
     let rho = study
@@ -292,6 +301,5 @@ pub(super) fn rho(rho: f64) -> String {
         return fixed(rho, 6);
     }
     let text = fixed(rho, (1 - gap.log10().floor() as i32).clamp(2, 9) as usize);
-    // Never up to 1, which it is not.
-    text
+    text.trim_end_matches('0').to_owned()
 }

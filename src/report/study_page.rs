@@ -152,8 +152,7 @@ fn condition_table(study: &StudyResult) -> Vec<Value> {
                 intercept => words.intercept,
                 at_zero => words.at_zero,
                 unused => words.unused,
-                own_rho => own.as_ref().map_or_else(|| NONE.to_owned(), |own| own.rho.clone()),
-                own_slope => own.map_or_else(|| NONE.to_owned(), |own| own.slope),
+                own_rho => own.map_or_else(|| NONE.to_owned(), |own| own.rho),
             }
         })
         .collect()
