@@ -7,7 +7,7 @@ mod study_support;
 use std::fmt::Write as _;
 
 use study_support::{SMALL, small, small_with};
-use updraft::study::StudyPlan;
+use updraft::study::{Cell, StudyPlan};
 
 #[test]
 fn wrong_studies_are_told_where_and_what_is_allowed() {
@@ -50,6 +50,14 @@ fn wrong_studies_are_told_where_and_what_is_allowed() {
 }
 
 #[test]
+fn a_template_without_a_ladder_is_refused() {
+    let text = SMALL.replace("calibration.toml", "hover.toml").replace("hover_s = 5.0\n", "");
+    let text = text.replace("leg_s = 14.0\n", "").replace("speeds_mps = [1.0, 2.0, 3.5]\n", "");
+    let error = StudyPlan::parse("mine.toml", &text).unwrap_err().to_string();
+    assert!(error.contains("no ladder") && error.contains("mine.toml:3:12"), "{error}");
+}
+
+#[test]
 fn a_name_that_is_no_study_is_told_what_is_built_in() {
     let error = StudyPlan::load("templates/studies.toml").unwrap_err().to_string();
     assert_eq!(error, "there is no study templates/studies.toml; built in is study.toml");
@@ -66,7 +74,7 @@ fn keys_of_the_template_may_be_quoted_or_dotted() {
 #[test]
 fn still_air_is_flown_once_and_winds_in_every_direction() {
     let names: Vec<String> =
-        small().cells().iter().filter(|c| c.updraft_mps == 0.0).map(|c| c.name()).collect();
+        small().cells().iter().filter(|c| c.updraft_mps == 0.0).map(Cell::name).collect();
     assert_eq!(names, ["still-updraft+0", "wind4-from030-updraft+0", "wind4-from135-updraft+0"]);
     let counted = small_with("[30.0, 135.0]", "3");
     let from: Vec<_> = counted.conditions.iter().filter_map(|c| c.from_deg).collect();

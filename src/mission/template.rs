@@ -438,6 +438,7 @@ impl Template {
 pub(crate) fn first_line(message: &str) -> String {
     let line = message.lines().next().unwrap_or_default();
     line.replace("expected f64", "expected a number")
+        .replace("expected a sequence", "expected a list")
         .replace("expected i64", "expected a whole number")
         .replace("unknown field", "unknown key")
         .replace("missing field", "missing key")

@@ -201,8 +201,8 @@ fn winds(study: &StudyResult) -> Option<Figure> {
         return None;
     }
     let (mut v, mut u) = axes(study);
-    v.label = "velocity (m/s)".to_owned();
-    u.label = "u cos φ (µs)".to_owned();
+    "velocity (m/s)".clone_into(&mut v.label);
+    "u cos φ (µs)".clone_into(&mut u.label);
     // Every other tick fits these panels.
     v.step *= 2.0;
     let rows = shown.div_ceil(COLUMNS);

@@ -323,13 +323,17 @@ fn steps(
 ) -> Result<Vec<f64>, TemplateError> {
     let Range { from, to, step } = *range;
     let count = (to - from) / step;
-    let whole = step > 0.0 && count >= 0.0 && (count - count.round()).abs() < GRAIN;
-    if !whole || count > MAX_FLIGHTS as f64 {
+    if !(step > 0.0 && count >= 0.0 && (count - count.round()).abs() < GRAIN) {
         return Err(place
             .error(value, format!("steps of {step} do not lead from {from} to {to} m/s"))
             .with_help(
                 "a positive step that divides the range: { from = -3.5, to = 3.5, step = 0.7 }",
             ));
+    }
+    if count >= MAX_FLIGHTS as f64 {
+        return Err(place
+            .error(value, format!("{} updrafts are too many", count.round() + 1.0))
+            .with_help(format!("allowed: up to {MAX_FLIGHTS} flights")));
     }
     Ok((0..=count.round() as usize).map(|k| rounded(from + k as f64 * step)).collect())
 }

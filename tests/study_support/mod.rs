@@ -1,7 +1,6 @@
 //! A small study: two winds, two directions, three updrafts, a short ladder.
 
 #![allow(dead_code, reason = "each test file uses its own part")]
-#![expect(clippy::allow_attributes, reason = "what is unused differs between test files")]
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -9,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use updraft::study::result::StudyResult;
 use updraft::study::{Flown, Settings, StudyError, StudyPlan, Work, evaluate};
 
-pub const SMALL: &str = r#"schema = "updraft.study/1"
+pub(crate) const SMALL: &str = r#"schema = "updraft.study/1"
 title = "A small study"
 template = "calibration.toml"
 winds_mps = [0.0, 4.0]
@@ -26,25 +25,29 @@ hover_s = 5.0
 "#;
 
 /// [`SMALL`] with a piece of its text replaced.
-pub fn small_with(from: &str, to: &str) -> StudyPlan {
+pub(crate) fn small_with(from: &str, to: &str) -> StudyPlan {
     assert!(SMALL.contains(from), "the study no longer has {from}");
     StudyPlan::parse("small.toml", &SMALL.replacen(from, to, 1)).unwrap()
 }
 
-pub fn small() -> StudyPlan {
+pub(crate) fn small() -> StudyPlan {
     StudyPlan::parse("small.toml", SMALL).unwrap()
 }
 
-pub fn settings(seed: u64) -> Settings {
+pub(crate) fn settings(seed: u64) -> Settings {
     Settings { seed, ..Settings::default() }
 }
 
 /// Flies what is open in a folder.
-pub fn flown(study: &StudyPlan, folder: &Path, settings: Settings) -> Result<Flown, StudyError> {
+pub(crate) fn flown(
+    study: &StudyPlan,
+    folder: &Path,
+    settings: Settings,
+) -> Result<Flown, StudyError> {
     Work::open(study, folder, settings)?.fly(&AtomicBool::new(false), &|| {})
 }
 
-pub fn result(study: &StudyPlan, folder: &Path) -> StudyResult {
+pub(crate) fn result(study: &StudyPlan, folder: &Path) -> StudyResult {
     let flown = flown(study, folder, settings(1)).unwrap();
     evaluate(study, 1, &flown).unwrap()
 }
