@@ -300,6 +300,5 @@ pub(super) fn rho(rho: f64) -> String {
     if gap <= 0.0 || !gap.is_finite() {
         return fixed(rho, 6);
     }
-    let text = fixed(rho, (1 - gap.log10().floor() as i32).clamp(2, 9) as usize);
-    text.trim_end_matches('0').to_owned()
+    fixed(rho, (1 - gap.log10().floor() as i32).clamp(2, 9) as usize)
 }

@@ -4,10 +4,10 @@ use minijinja::value::Value;
 use minijinja::{Environment, UndefinedBehavior, context};
 
 use crate::study::paper;
-use crate::study::result::{Evaluation, StudyResult};
+use crate::study::result::StudyResult;
 
 use super::figure_study::{self, rho};
-use super::study_terminal::{ConditionWords, p_value, windows};
+use super::study_terminal::{ConditionWords, range_rows, windows};
 use super::text::{NONE, clean, count, estimate, symbol, unit};
 use super::{Provenance, Report, ReportError};
 
@@ -159,21 +159,6 @@ fn condition_table(study: &StudyResult) -> Vec<Value> {
 }
 
 fn ranges(study: &StudyResult) -> Vec<Value> {
-    let row = |name: &str, n: usize, rhos: Option<[f64; 2]>, p_values: Option<[f64; 2]>| {
-        let range = |values: Option<[f64; 2]>, words: fn(f64) -> String| {
-            values.map_or_else(
-                || NONE.to_owned(),
-                |[low, high]| format!("{} to {}", words(low), words(high)),
-            )
-        };
-        context! { name, n, rho => range(rhos, rho), p_value => range(p_values, p_value) }
-    };
-    let of = |name: &str, evaluation: &Evaluation| {
-        row(name, study.updrafts_mps.len(), evaluation.rho, evaluation.p_value)
-    };
-    vec![
-        row("the paper", paper::N, Some(paper::RHO), Some(paper::P_VALUE)),
-        of("here, the paper's way", &study.paper_way),
-        of("here, this program's way", &study.own_way),
-    ]
+    let row = |[name, n, rho, p_value]: [String; 4]| context! { name, n, rho, p_value };
+    range_rows(study).map(row).into()
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::study::paper;
-use crate::study::result::{ConditionResult, StudyResult, WindowCount};
+use crate::study::result::{ConditionResult, Evaluation, StudyResult, WindowCount};
 
 use super::figure_study::rho;
 use super::table::{Align, Column, lines};
@@ -137,28 +137,38 @@ fn range_table(study: &StudyResult) -> (Vec<Column>, Vec<Vec<String>>) {
         column("rho", Align::Left, 0),
         column("p", Align::Left, 0),
     ];
-    let range = |range: Option<[f64; 2]>, words: fn(f64) -> String| {
-        range.map_or_else(
-            || NONE.to_owned(),
-            |[low, high]| format!("{} to {}", words(low), words(high)),
-        )
+    let rows = range_rows(study).map(|[name, n, rhos, p_values]| vec![name, n, rhos, p_values]);
+    (columns, rows.into())
+}
+
+/// Name, n, lowest and highest rho and p: the paper's, and both ways to fit.
+pub(super) fn range_rows(study: &StudyResult) -> [[String; 4]; 3] {
+    let of = |name: &str, evaluation: &Evaluation| {
+        let range = |range: Option<[f64; 2]>, words: fn(f64) -> String| {
+            range.map_or_else(
+                || NONE.to_owned(),
+                |[low, high]| format!("{} to {}", words(low), words(high)),
+            )
+        };
+        [
+            name.to_owned(),
+            study.updrafts_mps.len().to_string(),
+            range(evaluation.rho, rho),
+            range(evaluation.p_value, p_value),
+        ]
     };
-    let rows = [
-        ("paper", paper::N, Some(paper::RHO), Some(paper::P_VALUE)),
-        (
-            "here, the paper's way",
-            study.updrafts_mps.len(),
-            study.paper_way.rho,
-            study.paper_way.p_value,
-        ),
-        ("here, own way", study.updrafts_mps.len(), study.own_way.rho, study.own_way.p_value),
+    let [low, high] = paper::RHO;
+    let [least, most] = paper::P_VALUE.map(p_value);
+    [
+        [
+            "the paper".to_owned(),
+            paper::N.to_string(),
+            format!("{low} to {high}"),
+            format!("{least} to {most}"),
+        ],
+        of("here, the paper's way", &study.paper_way),
+        of("here, this program's way", &study.own_way),
     ]
-    .into_iter()
-    .map(|(name, n, rhos, p_values)| {
-        vec![name.to_owned(), n.to_string(), range(rhos, rho), range(p_values, p_value)]
-    })
-    .collect();
-    (columns, rows)
 }
 
 /// A condition's numbers in words.
