@@ -3,7 +3,7 @@
 //! The data's way through the house is one-directional, and so are the dependencies:
 //!
 //! ```text
-//! mission -> show -> check -> sim | fleet -> log -> flight -> analysis -> gap -> report
+//! mission -> show -> check -> sim | fleet -> log -> flight -> analysis -> gap | study -> report
 //! ```
 //!
 //! * [`mission`]: TOML templates become a [`mission::plan::Plan`], the timetable that everything
@@ -14,6 +14,7 @@
 //! * [`log`]: the ArduPilot DataFlash format, reader and writer.
 //! * [`flight`]: one drone's log as time series in show time.
 //! * [`analysis`]: windows, calibration laws, updraft estimates.
+//! * [`study`]: the same ladder flown in many airs, as in the paper's simulations.
 //! * [`report`]: figures, tables and the HTML page.
 //! * [`campaign`]: names of the files in a campaign folder.
 //!
@@ -34,4 +35,5 @@ pub mod mission;
 pub mod report;
 pub mod show;
 pub mod sim;
+pub mod study;
 pub mod vehicle;

@@ -27,6 +27,8 @@ fn json_schemas_are_current() {
         (Format::Campaign, "campaign"),
         (Format::Flight, "flight"),
         (Format::Analysis, "analysis"),
+        (Format::Study, "study"),
+        (Format::Cell, "cell"),
         (Format::Vehicle, "vehicle"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));

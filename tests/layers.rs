@@ -18,7 +18,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("sim", &["base", "vehicle", "mission", "show", "log"]),
     ("flight", &["base", "vehicle", "mission", "log"]),
     ("analysis", &["base", "vehicle", "mission", "log", "flight"]),
-    ("report", &["base", "vehicle", "mission", "flight", "analysis"]),
+    ("study", &["base", "vehicle", "mission", "show", "sim", "log", "flight", "analysis"]),
+    ("report", &["base", "vehicle", "mission", "flight", "analysis", "study"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

@@ -13,6 +13,7 @@ use crate::log::LogError;
 use crate::mission::resolve::MissionError;
 use crate::report::ReportError;
 use crate::sim::SimError;
+use crate::study::StudyError;
 use crate::vehicle::VehicleError;
 
 /// How a command ended. The numbers are documented in the README and do not change.
@@ -72,6 +73,9 @@ pub enum CommandError {
     /// A flight could not be simulated.
     #[error(transparent)]
     Sim(Box<SimError>),
+    /// A study could not be read, flown or evaluated.
+    #[error(transparent)]
+    Study(Box<StudyError>),
     /// The arguments do not fit together.
     #[error("{0}")]
     Usage(String),
@@ -107,6 +111,18 @@ impl From<LoadError> for CommandError {
     }
 }
 
+impl From<StudyError> for CommandError {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::File(error) => Self::File(error),
+            StudyError::Mission(error) => Self::Mission(error),
+            StudyError::Vehicle(error) => Self::Vehicle(*error),
+            StudyError::Stopped => Self::Interrupted,
+            other => Self::Study(Box::new(other)),
+        }
+    }
+}
+
 impl From<SimError> for CommandError {
     fn from(error: SimError) -> Self {
         Self::Sim(Box::new(error))
@@ -119,6 +135,10 @@ impl CommandError {
         match self {
             Self::Mission(error) if matches!(**error, MissionError::File(_)) => Exit::Failed,
             Self::Load(error) if matches!(**error, LoadError::File(_)) => Exit::Failed,
+            Self::Study(error) if matches!(**error, StudyError::Record { .. }) => Exit::Failed,
+            Self::Study(error) if matches!(**error, StudyError::NoReference { .. }) => {
+                Exit::Nothing
+            }
             Self::Vehicle(VehicleError::File(_))
             | Self::File(_)
             | Self::Write(_)
@@ -126,6 +146,7 @@ impl CommandError {
             | Self::Report(_)
             | Self::Failed(_) => Exit::Failed,
             Self::Mission(_)
+            | Self::Study(_)
             | Self::Vehicle(_)
             | Self::Campaign(_)
             | Self::Load(_)

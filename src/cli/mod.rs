@@ -14,6 +14,7 @@ mod progress;
 mod run;
 mod show_text;
 mod simulate;
+mod sweep;
 mod timetable;
 pub mod tools;
 mod words;
@@ -41,6 +42,7 @@ use exit::{CommandError, Exit};
   updraft check my-campaign                       also any .skyc or .skyb
   updraft simulate my-campaign
   updraft physics                                 the real firmware's simulator in our air
+  updraft sweep                                   the paper's simulation study, with its figure 2
   updraft analyze my-campaign                     also a folder of logs, or one log
   updraft inspect my-campaign/show.skyc
 
@@ -96,6 +98,8 @@ enum Command {
     Physics(physics::PhysicsArgs),
     /// Turn logs into calibration laws, a map of the air and a report
     Analyze(analyze::AnalyzeArgs),
+    /// Fly the ladder in every wind and updraft of a study, and correlate what is found with the truth
+    Sweep(sweep::SweepArgs),
     /// Say what is in a file
     Inspect(inspect::InspectArgs),
     /// Print a shell's completion script
@@ -140,6 +144,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Simulate(args) => simulate::run(context, &args),
         Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
+        Command::Sweep(args) => sweep::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),
         Command::Man => tools::man(context, Cli::command()),

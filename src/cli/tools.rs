@@ -9,6 +9,8 @@ use super::exit::{CommandError, Exit};
 use crate::analysis::result::Analysis;
 use crate::campaign::{CampaignIndex, FlightRecord};
 use crate::mission::Plan;
+use crate::study::CellRecord;
+use crate::study::result::StudyResult;
 use crate::vehicle::Vehicle;
 
 /// Arguments of `updraft completions`.
@@ -37,6 +39,10 @@ pub enum Format {
     Flight,
     /// analysis.json
     Analysis,
+    /// study.json
+    Study,
+    /// a finished flight of a study
+    Cell,
     /// vehicle files
     Vehicle,
 }
@@ -49,6 +55,8 @@ impl Format {
             Self::Campaign => schema_for!(CampaignIndex),
             Self::Flight => schema_for!(FlightRecord),
             Self::Analysis => schema_for!(Analysis),
+            Self::Study => schema_for!(StudyResult),
+            Self::Cell => schema_for!(CellRecord),
             Self::Vehicle => schema_for!(Vehicle),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;

@@ -165,7 +165,8 @@ impl Log {
         self.bytes().len() as u64
     }
 
-    fn bytes(&self) -> &[u8] {
+    /// The log as it was written.
+    pub fn bytes(&self) -> &[u8] {
         match &self.bytes {
             Bytes::Mapped(map) => map,
             Bytes::Held(bytes) => bytes,

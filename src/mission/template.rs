@@ -435,9 +435,10 @@ impl Template {
 }
 
 /// The reader's message in the words of people who write templates.
-fn first_line(message: &str) -> String {
+pub(crate) fn first_line(message: &str) -> String {
     let line = message.lines().next().unwrap_or_default();
     line.replace("expected f64", "expected a number")
+        .replace("expected a sequence", "expected a list")
         .replace("expected i64", "expected a whole number")
         .replace("unknown field", "unknown key")
         .replace("missing field", "missing key")

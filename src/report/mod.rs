@@ -17,10 +17,13 @@ mod figure_air;
 mod figure_drone;
 mod figure_laws;
 mod figure_map;
+mod figure_study;
 mod glance;
 mod law;
 mod page;
 mod sheet;
+mod study_page;
+mod study_terminal;
 mod svg;
 mod table;
 mod terminal;
@@ -33,6 +36,8 @@ use thiserror::Error;
 use crate::analysis::result::Analysis;
 use crate::base::file::{FileError, write_whole};
 
+pub use study_page::render_study;
+pub use study_terminal::study_summary;
 pub use terminal::terminal_summary;
 
 /// Name of the page in the report's folder.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use kuva::backend::svg::SvgBackend;
-use kuva::render::render::{Primitive, Scene};
+use kuva::render::render::{PathData, Primitive, Scene};
 
 use super::colour::INK;
 use super::svg::escape;
@@ -40,6 +40,18 @@ impl Sheet {
         });
         self.scene.elements.extend(panel.elements);
         self.scene.elements.push(Primitive::GroupEnd);
+    }
+
+    /// Puts a white box over what is there: [x, y, width, height].
+    pub(super) fn cover(&mut self, [x, y, width, height]: [f64; 4]) {
+        self.scene.elements.push(Primitive::Path(Box::new(PathData {
+            d: format!("M{x} {y}h{width}v{height}h-{width}z"),
+            fill: Some("#ffffff".into()),
+            stroke: "#ffffff".into(),
+            stroke_width: 0.0,
+            opacity: None,
+            stroke_dasharray: None,
+        })));
     }
 
     /// The SVG. `name` makes ids unique in a page with several figures; `title` is read aloud.

@@ -1,0 +1,145 @@
+//! `updraft sweep`: a study flown, evaluated and reported.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::clock::Stopwatch;
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use super::progress::Progress;
+use super::simulate::made_by;
+use crate::base::file::write_whole;
+use crate::campaign::{self, to_json};
+use crate::report::{self, Provenance};
+use crate::study::result::StudyResult;
+use crate::study::{Settings, StudyPlan, Work, evaluate};
+
+/// Width of the terminal summary, columns.
+const WIDTH: usize = 100;
+
+/// Arguments of `updraft sweep`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft sweep templates/study.toml
+  updraft sweep my-study.toml -o my-study --seed 7
+  updraft sweep --keep-logs
+
+Flies the ladder in every wind and updraft of the study, fits the updraft of each flight with A and u0
+held from the one in still air, and writes study.json and report/index.html. Finished flights are kept
+in cells/: the same command goes on where an interrupted one stopped, and a changed study flies only
+what changed. The grammar is in docs/study.md. Exit code 3: done, but some flights were lost.")]
+pub(super) struct SweepArgs {
+    /// Study: a file or the built-in name
+    #[arg(default_value = "study")]
+    study: String,
+    /// Folder of the study's flights and results
+    #[arg(short, long, value_name = "FOLDER", default_value = "study")]
+    output: PathBuf,
+    /// Seed of sensor noise and clock offsets; every flight has its own from it
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Flights at the same time [default: one per core]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Keep the log of every flight in logs/
+    #[arg(long)]
+    keep_logs: bool,
+    /// Fly again what is finished
+    #[arg(long)]
+    force: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct SweepOutput<'a> {
+    schema: &'static str,
+    report: PathBuf,
+    flown: usize,
+    kept: usize,
+    study: &'a StudyResult,
+}
+
+pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandError> {
+    let watch = Stopwatch::start();
+    let study = StudyPlan::load(&args.study)?;
+    refuse_campaign(&args.output)?;
+    let settings = Settings { seed: args.seed, keep_logs: args.keep_logs, force: args.force };
+    let work = Work::open(&study, &args.output, settings)?;
+    let (total, open) = (work.total(), work.open_flights());
+    if open < total {
+        context.say(&format!("{} of {total} flights are there already", total - open));
+    }
+    let progress = Progress::new(context, "flying", open as u64);
+    let fly = || work.fly(context.stop_flag(), &|| progress.advance());
+    let flown = match args.jobs {
+        Some(jobs) => rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(jobs))
+            .build()
+            .map_err(|error| CommandError::Failed(format!("failed to start threads: {error}")))?
+            .install(fly),
+        None => fly(),
+    };
+    progress.finish();
+    let flown = flown?;
+    let flying = watch.to_string();
+    context.check_stop()?;
+
+    let result = evaluate(&study, args.seed, &flown)?;
+    for lost in &result.lost {
+        context.warn(&format!("{}: {}", lost.name, lost.reason));
+    }
+    if !context.json {
+        context.print(&report::study_summary(&result, WIDTH, context.color))?;
+    }
+    let page = write(args, &result)?;
+    if context.json {
+        context.print_json(&SweepOutput {
+            schema: "updraft.sweep/1",
+            report: page.clone(),
+            flown: flown.flown,
+            kept: total - flown.flown,
+            study: &result,
+        })?;
+    }
+    context.say(&format!(
+        "Flew {} flights in {flying}, all done in {watch} -> {}",
+        flown.flown,
+        page.display()
+    ));
+    Ok(if result.lost.is_empty() { Exit::Done } else { Exit::Losses })
+}
+
+/// A study in a campaign's folder would overwrite its report.
+fn refuse_campaign(folder: &Path) -> Result<(), CommandError> {
+    if campaign::is_campaign(folder) {
+        return Err(CommandError::Usage(format!(
+            "{} is a campaign; give the study another folder with --output",
+            folder.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Writes the results; the page last, so that where it is, all is.
+fn write(args: &SweepArgs, result: &StudyResult) -> Result<PathBuf, CommandError> {
+    let json = to_json(result)
+        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
+    let provenance = Provenance {
+        program: made_by(),
+        command: command(args),
+        seed: Some(args.seed),
+        ..Provenance::default()
+    };
+    let made = report::render_study(result, &provenance)?;
+    let folder = args.output.join("report");
+    write_whole(&args.output.join("study.json"), &json)?;
+    report::write(&made, &folder)?;
+    Ok(folder.join(report::PAGE_FILE))
+}
+
+/// The command line that gives these results.
+fn command(args: &SweepArgs) -> String {
+    format!("updraft sweep {} --seed {} -o {}", args.study, args.seed, args.output.display())
+}

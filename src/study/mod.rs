@@ -1,0 +1,23 @@
+//! A study: the same speed ladder flown in many airs, to see how well the updraft is found.
+//!
+//! [`StudyPlan`] reads what is to be flown, [`Work`] flies what is not there yet, one drone for each
+//! [`Cell`] (a wind condition and an updraft), and keeps each finished flight as a whole file;
+//! [`evaluate()`] makes the paper's Table I, the fitted updraft of every flight and Pearson's rho of
+//! each wind condition out of them.
+
+mod cell;
+mod error;
+mod evaluate;
+mod fly;
+pub mod paper;
+pub mod regression;
+pub mod result;
+mod template;
+mod work;
+
+pub use cell::{Cell, Condition};
+pub use error::StudyError;
+pub use evaluate::evaluate;
+pub use fly::{CELL_SCHEMA, CellLog, CellRecord};
+pub use template::{STUDY_TEMPLATE_SCHEMA, StudyPlan};
+pub use work::{Flown, Lost, Settings, Work, cells_folder, logs_folder};

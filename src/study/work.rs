@@ -1,0 +1,210 @@
+//! Flies what is not there yet, and keeps every finished flight as one whole file.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use rayon::prelude::*;
+
+use super::cell::{Cell, sha256};
+use super::error::StudyError;
+use super::fly::{CELL_SCHEMA, CellLog, CellRecord, FlyError, fly_cell};
+use super::template::StudyPlan;
+use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
+use crate::sim::SimError;
+
+/// Largest record that is read back, bytes.
+const MAX_RECORD_BYTES: u64 = 16 << 20;
+
+/// How a study is flown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// Seed of the study; every flight has its own from it.
+    pub seed: u64,
+    /// Keep the log of every flight.
+    pub keep_logs: bool,
+    /// Fly again what is there.
+    pub force: bool,
+}
+
+/// A flight that could not be flown or read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lost {
+    /// Index in the study's cells.
+    pub cell: usize,
+    /// Why.
+    pub reason: String,
+}
+
+/// The flights of a study.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Flown {
+    /// One per cell of the study, in its order; `None`: lost.
+    pub records: Vec<Option<CellRecord>>,
+    /// Why flights are missing.
+    pub lost: Vec<Lost>,
+    /// How many were flown now; the others were there.
+    pub flown: usize,
+}
+
+/// A study and what of it is finished in a folder.
+#[derive(Debug)]
+pub struct Work<'a> {
+    study: &'a StudyPlan,
+    folder: &'a Path,
+    settings: Settings,
+    cells: Vec<Item>,
+}
+
+#[derive(Debug)]
+struct Item {
+    cell: Cell,
+    key: String,
+    record: Option<CellRecord>,
+}
+
+/// Where the records of finished flights are.
+pub fn cells_folder(folder: &Path) -> PathBuf {
+    folder.join("cells")
+}
+
+/// Where kept logs are.
+pub fn logs_folder(folder: &Path) -> PathBuf {
+    folder.join("logs")
+}
+
+impl<'a> Work<'a> {
+    /// Looks which flights are finished in a study's folder, flown with the same settings.
+    ///
+    /// # Errors
+    /// [`StudyError::File`] if the folder cannot be made or read.
+    pub fn open(
+        study: &'a StudyPlan,
+        folder: &'a Path,
+        settings: Settings,
+    ) -> Result<Self, StudyError> {
+        create_folder(&cells_folder(folder))?;
+        sweep_partial(&cells_folder(folder))?;
+        if settings.keep_logs {
+            create_folder(&logs_folder(folder))?;
+        }
+        if logs_folder(folder).is_dir() {
+            sweep_partial(&logs_folder(folder))?;
+        }
+        let cells = study.cells();
+        let cells = cells
+            .into_par_iter()
+            .map(|cell| {
+                let key = cell
+                    .key(study, settings.seed)
+                    .map_err(|source| StudyError::Record { cell: cell.name(), source })?;
+                let record = finished(folder, &cell, &key, settings);
+                Ok(Item { cell, key, record })
+            })
+            .collect::<Result<_, StudyError>>()?;
+        Ok(Self { study, folder, settings, cells })
+    }
+
+    /// Flights of the study.
+    pub fn total(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Flights that are not finished.
+    pub fn open_flights(&self) -> usize {
+        self.cells.iter().filter(|item| item.record.is_none()).count()
+    }
+
+    /// Flies what is open, on all threads of the current pool; a flight that fails is lost and does
+    /// not stop the others. `done` is told after each flight. Each thread holds one log.
+    ///
+    /// # Errors
+    /// [`StudyError::Stopped`] when `stop` was raised (what is finished is kept), and
+    /// [`StudyError::File`] when a finished flight could not be written.
+    pub fn fly(self, stop: &AtomicBool, done: &(dyn Fn() + Sync)) -> Result<Flown, StudyError> {
+        let flown = self.open_flights();
+        let Self { study, folder, settings, cells } = self;
+        let results = cells
+            .into_par_iter()
+            .map(|item| {
+                if let Some(record) = item.record {
+                    return Ok(Ok(record));
+                }
+                let result = match fly_cell(study, &item.cell, settings.seed, stop) {
+                    Ok((mut record, log)) => {
+                        record.key = item.key;
+                        let log = settings.keep_logs.then(|| log.bytes());
+                        keep(folder, &item.cell, &mut record, log)?;
+                        Ok(record)
+                    }
+                    Err(FlyError::Sim(SimError::Stopped { .. })) => {
+                        return Err(StudyError::Stopped);
+                    }
+                    Err(FlyError::Sim(error)) => Err(error.to_string()),
+                    Err(FlyError::Flight(error)) => Err(error.to_string()),
+                };
+                done();
+                Ok(result)
+            })
+            .collect::<Result<Vec<_>, StudyError>>()?;
+        let mut all = Flown { flown, ..Flown::default() };
+        for (cell, result) in results.into_iter().enumerate() {
+            if let Err(reason) = &result {
+                all.lost.push(Lost { cell, reason: reason.clone() });
+            }
+            all.records.push(result.ok());
+        }
+        Ok(all)
+    }
+}
+
+fn record_path(folder: &Path, cell: &Cell) -> PathBuf {
+    cells_folder(folder).join(format!("{}.json", cell.name()))
+}
+
+fn log_path(folder: &Path, cell: &Cell) -> PathBuf {
+    logs_folder(folder).join(format!("{}.BIN", cell.name()))
+}
+
+/// The record of a flight if it is there, whole, and of these settings. A damaged one is flown again.
+fn finished(folder: &Path, cell: &Cell, key: &str, settings: Settings) -> Option<CellRecord> {
+    if settings.force {
+        return None;
+    }
+    let bytes = read_whole(&record_path(folder, cell), MAX_RECORD_BYTES).ok()?;
+    let record: CellRecord = serde_json::from_slice(&bytes).ok()?;
+    if record.schema != CELL_SCHEMA || record.key != key {
+        return None;
+    }
+    if settings.keep_logs {
+        let size = std::fs::metadata(log_path(folder, cell)).ok()?.len();
+        if record.log.as_ref()?.bytes != size {
+            return None;
+        }
+    }
+    Some(record)
+}
+
+/// Writes the log, then the record: where the record is, all is.
+fn keep(
+    folder: &Path,
+    cell: &Cell,
+    record: &mut CellRecord,
+    log: Option<&[u8]>,
+) -> Result<(), StudyError> {
+    let path = log_path(folder, cell);
+    if let Some(bytes) = log {
+        write_whole(&path, bytes)?;
+        record.log = Some(CellLog {
+            file: format!("{}.BIN", cell.name()),
+            bytes: bytes.len() as u64,
+            sha256: sha256(bytes),
+        });
+    } else if path.exists() {
+        // It belongs to other settings.
+        std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
+    }
+    let mut json = serde_json::to_vec(record)
+        .map_err(|source| StudyError::Record { cell: cell.name(), source })?;
+    json.push(b'\n');
+    Ok(write_whole(&record_path(folder, cell), &json)?)
+}
