@@ -50,6 +50,9 @@ pub enum CommandError {
     /// A vehicle is unknown or wrong.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
+    /// An effect cannot be used.
+    #[error(transparent)]
+    Effect(#[from] crate::effects::EffectError),
     /// A campaign folder cannot be used.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
@@ -125,6 +128,7 @@ impl CommandError {
             | Self::Failed(_) => Exit::Failed,
             Self::Mission(_)
             | Self::Vehicle(_)
+            | Self::Effect(_)
             | Self::Campaign(_)
             | Self::Load(_)
             | Self::Log(_)

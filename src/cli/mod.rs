@@ -4,6 +4,8 @@ mod analyze;
 mod check;
 mod clock;
 mod context;
+mod effects;
+mod effects_plot;
 pub mod exit;
 mod inspect;
 mod load;
@@ -91,6 +93,8 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     /// Turn logs into calibration laws, a map of the air and a report
     Analyze(analyze::AnalyzeArgs),
+    /// List the physics that can be flown, or explain one piece
+    Effects(effects::EffectsArgs),
     /// Say what is in a file
     Inspect(inspect::InspectArgs),
     /// Print a shell's completion script
@@ -134,6 +138,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Check(args) => check::run(context, &args),
         Command::Simulate(args) => simulate::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
+        Command::Effects(args) => effects::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),
         Command::Man => tools::man(context, Cli::command()),

@@ -87,6 +87,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
             air_mps: air.air_mps(updraft_mps),
             seed: air.seed,
             full_logs: air.full_logs,
+            effects: air.effects,
             vehicle: None,
             only: None,
             force: args.force,

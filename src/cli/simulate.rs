@@ -15,6 +15,7 @@ use super::progress::Progress;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
+use crate::effects;
 use crate::mission::Plan;
 use crate::show::Trajectory;
 use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, Uniform, fly_to_file};
@@ -42,6 +43,17 @@ pub(super) struct AirArgs {
     /// Log the firmware's whole default set of messages (about ten times larger)
     #[arg(long)]
     pub(super) full_logs: bool,
+    /// Switch a piece of physics on or off, or set a parameter: NAME, NAME=off, NAME.PARAMETER=NUMBER
+    /// (`updraft effects` lists them)
+    #[arg(long = "effect", value_name = "NAME[=off]", value_parser = effect)]
+    pub(super) effects: Vec<String>,
+}
+
+/// Checks a choice of effect without its vehicle's own bounds.
+fn effect(text: &str) -> Result<String, String> {
+    let name = text.split(['=', '.']).next().unwrap_or_default().trim();
+    effects::select::known(name).map_err(|error| error.to_string())?;
+    Ok(text.to_owned())
 }
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -124,6 +136,8 @@ pub(super) struct Simulation {
     pub(super) air_mps: [f64; 3],
     pub(super) seed: u64,
     pub(super) full_logs: bool,
+    /// Choices of effects, over the vehicle's own.
+    pub(super) effects: Vec<String>,
     pub(super) vehicle: Option<Vehicle>,
     pub(super) only: Option<SlotSet>,
     pub(super) force: bool,
@@ -153,6 +167,7 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
         air_mps: args.air.air_mps(args.updraft),
         seed: args.air.seed,
         full_logs: args.air.full_logs,
+        effects: args.air.effects.clone(),
         vehicle,
         only: args.drones.clone(),
         force: args.force,
@@ -184,10 +199,14 @@ pub(super) fn simulate(
     simulation: &Simulation,
 ) -> Result<Flown, CommandError> {
     let watch = Stopwatch::start();
-    let vehicle = match &simulation.vehicle {
+    let mut vehicle = match &simulation.vehicle {
         Some(vehicle) => vehicle.clone(),
         None => library::load(&folder.vehicle().display().to_string())?,
     };
+    for choice in &simulation.effects {
+        effects::select::choose(&mut vehicle, choice)?;
+    }
+    effects::select::resolved(&vehicle)?;
     let mut record = prepare(folder, plan, simulation, &vehicle)?;
     let count = plan.slots.len();
     let wanted: Vec<_> = plan

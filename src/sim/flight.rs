@@ -18,6 +18,7 @@ use super::sensors::Sensors;
 use crate::base::file::write_with;
 use crate::base::frame::ShowFrame;
 use crate::base::time::GpsTime;
+use crate::effects::Active;
 use crate::show::Trajectory;
 use crate::vehicle::Vehicle;
 
@@ -161,7 +162,9 @@ pub fn fly_with<R: Recorder>(
     let settings = &setup.vehicle.autopilot;
     let mut pilot = Autopilot::new(setup.trajectory, settings, setup.home_m, home_amsl_m, STEP_S)
         .ok_or(SimError::NoTakeoff { drone, height_m: p::SHOW_TAKEOFF_ALT })?;
-    let mut plant = Plant::new(&setup.vehicle.airframe, setup.home_m, STEP_S);
+    let (effects, airframe) = Active::start(setup.vehicle, setup.seed, drone, setup.home_m, STEP_S)
+        .map_err(|source| SimError::Effect { drone, source })?;
+    let mut plant = Plant::with_effects(&airframe, effects, setup.home_m, STEP_S);
     let mut sensors = Sensors::new(setup.seed, drone, STEP_S);
 
     let takeoff_s = pilot.director.takeoff_s;
@@ -194,7 +197,8 @@ pub fn fly_with<R: Recorder>(
                 return Err(SimError::NotLanded { drone, time_s });
             }
         }
-        let estimate = sensors.sense(plant.motion());
+        let mut estimate = sensors.sense(plant.motion());
+        plant.sense(&mut estimate.velocity_mps.z);
         let pulses = pilot.update(time_s, &estimate);
         tally.note(&pilot, &plant, time_s, setup.home_m.z);
         let moment = Moment {

@@ -9,8 +9,11 @@ use crate::base::file::read_whole;
 const MAX_VEHICLE_BYTES: u64 = 1 << 20;
 
 /// Name and TOML text of every built-in vehicle, sorted by name.
-const BUILTIN: &[(&str, &str)] =
-    &[("airsim-generic-quad", include_str!("../../templates/vehicles/airsim-generic-quad.toml"))];
+const BUILTIN: &[(&str, &str)] = &[
+    ("airsim-generic-quad", include_str!("../../templates/vehicles/airsim-generic-quad.toml")),
+    ("phantom4", include_str!("../../templates/vehicles/phantom4.toml")),
+    ("pixel", include_str!("../../templates/vehicles/pixel.toml")),
+];
 
 /// Names of the built-in vehicles, sorted.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -62,7 +65,7 @@ mod tests {
 
     #[test]
     fn an_unknown_name_is_told_what_exists() {
-        let error = builtin("pixel").unwrap_err().to_string();
-        assert!(error.contains("pixel") && error.contains("airsim-generic-quad"), "{error}");
+        let error = builtin("pixle").unwrap_err().to_string();
+        assert!(error.contains("pixle") && error.contains("airsim-generic-quad"), "{error}");
     }
 }
