@@ -3,6 +3,7 @@
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
 use super::reference::DENSITY;
 use super::{Change, Effect, Now, Own, Reference, Signals};
+use crate::vehicle::Vehicle;
 
 const VERTICAL: usize = 0;
 const HORIZONTAL: usize = 1;
@@ -10,6 +11,16 @@ const HORIZONTAL: usize = 1;
 /// Parasitic body drag.
 #[derive(Debug)]
 pub(super) struct ParasiticDrag;
+
+const USUAL_VERTICAL_M2: f64 = 0.02;
+
+/// Vertical drag area of a vehicle on which this effect acts, else 0, m².
+pub(super) fn vertical_m2(vehicle: &Vehicle) -> f64 {
+    let Some(table) = vehicle.effects.get("parasitic-drag").filter(|table| table.on) else {
+        return 0.0;
+    };
+    table.parameters.get("vertical_m2").copied().unwrap_or(USUAL_VERTICAL_M2)
+}
 
 impl Effect for ParasiticDrag {
     fn definition(&self) -> &'static Definition {
@@ -33,7 +44,7 @@ impl Effect for ParasiticDrag {
                     what: "drag coefficient times area for vertical flow (S_v)",
                     low: 0.0,
                     high: 1.0,
-                    default: |_| 0.02,
+                    default: |_| USUAL_VERTICAL_M2,
                 },
                 Parameter {
                     name: "horizontal_m2",

@@ -8,7 +8,7 @@ use statrs::function::erf::erf;
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
 use super::model::base_drag_m2;
 use super::reference::DENSITY;
-use super::{Air, Effect, Now, Own, Reference, Signals, Start};
+use super::{Air, Effect, Now, Own, Reference, Signals, Start, parasitic_drag};
 use crate::vehicle::{Airframe, Vehicle};
 
 const SIGMA: usize = 0;
@@ -19,14 +19,17 @@ const GUST: usize = 0;
 const DECAY: usize = 1;
 const KICK: usize = 2;
 
+const MOST_CURVATURE: f64 = 50.0;
+
 /// Turbulence rectification.
 #[derive(Debug)]
 pub(super) struct Turbulence;
 
-/// A of `A V|V|` from the drag of the box, us/(m/s)².
+/// A of `A V|V|` from the drag of the box and, where that acts, of the body, us/(m/s)².
 fn curvature(vehicle: &Vehicle) -> f64 {
     let at = Reference::of(vehicle);
-    at.sensitivity_us() * base_drag_m2(vehicle) * DENSITY / at.weight_n()
+    let drag_m2 = base_drag_m2(vehicle) + parasitic_drag::vertical_m2(vehicle) / 2.0;
+    (at.sensitivity_us() * drag_m2 * DENSITY / at.weight_n()).clamp(0.0, MOST_CURVATURE)
 }
 
 /// Mean of (V - w)|V - w| over normal w of mean 0 and standard deviation `sigma`.
@@ -77,7 +80,7 @@ impl Effect for Turbulence {
                     unit: "us/(m/s)²",
                     what: "A of the response A V|V| that the gusts meet",
                     low: 0.0,
-                    high: 50.0,
+                    high: MOST_CURVATURE,
                     default: curvature,
                 },
             ],
