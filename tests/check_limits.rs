@@ -268,7 +268,7 @@ fn skyb_range_unit_and_size() {
     assert_eq!(finding.check, "skyb-unit");
     assert_eq!(finding.severity, Severity::Warning);
     assert!(
-        finding.message.contains("units of 2 mm at least, which moves a point by 1.0 mm"),
+        finding.message.contains("units of 2 mm, which moves a point by up to 1.0 mm"),
         "{finding}"
     );
     assert!(far(50.001).passed(), "a warning does not fail a show");
@@ -300,7 +300,9 @@ fn what_the_firmware_derives() {
     let hop = |height: f64| {
         run(vec![drone(1, 0.0, 0.0, vec![line(5_000, 0.0, 0.0, height), hold(10_000)])])
     };
-    clean(&hop(2.5));
+    let finding = only(&hop(2.5), "firmware-early-landing");
+    assert_eq!((finding.severity, finding.value), (Severity::Warning, Some(10.0)));
+    assert!(finding.message.contains("at 5.000 s from 2.500 m"), "{finding}");
     let finding = only(&hop(2.4), "firmware-takeoff");
     assert_eq!(finding.severity, Severity::Error);
     assert!(finding.message.contains("climbs only 2.400 m above its start, limit 2.500 m"));
@@ -325,6 +327,73 @@ fn what_the_firmware_derives() {
     clean(&away(3.0));
     let finding = only(&away(3.1), "firmware-start");
     assert!(finding.message.contains("3.100 m from its home, limit 3.000 m"), "{finding}");
+}
+
+/// A hop in a single curve: firmware 4.6 takes it for the descent at the end and lands at once.
+#[test]
+fn a_landing_before_the_take_off() {
+    let hop = |ms: u32| {
+        let top = [[0.0, 0.0, 26.0], [0.0, 0.0, 26.0], [0.0, 0.0, 2.5]];
+        let mut drone = drone(1, 0.0, 0.0, vec![cubic(ms, top)]);
+        drone.trajectory.start_m.z = 2.5;
+        run(vec![drone])
+    };
+    // Three times 23.5 m over the duration is the climb; 2.5 m are reached at 3.67 % of it, and the
+    // drone needs 2 sqrt(2.5) + 0.5 s for them.
+    clean(&hop(90_000));
+    let finding = only(&hop(110_000), "firmware-landing");
+    assert_eq!(finding.severity, Severity::Error);
+    assert!(finding.message.contains("firmware 4.6 would land at 0.000 s"), "{finding}");
+}
+
+#[test]
+fn a_low_hover_at_the_end_that_4_6_leaves_out() {
+    let end = |hover_m: f64| {
+        let down = vec![line(10_000, 0.0, 0.0, hover_m), hold(5_000)];
+        run(vec![flight(1, (0.0, 0.0), down, (0.0, 0.0))])
+    };
+    clean(&end(5.1));
+    let finding = only(&end(4.0), "firmware-early-landing");
+    assert_eq!(finding.severity, Severity::Warning);
+    assert!(finding.message.contains("leaves out 5.000 s of hovering"), "{finding}");
+}
+
+#[test]
+fn the_climb_speed_of_the_vehicle_decides_when_it_takes_off() {
+    let show = show(vec![calm(1, 0.0, 0.0)]);
+    let takeoff = |mps: f64| {
+        let limits = limits();
+        let mut autopilot =
+            updraft::vehicle::library::builtin("airsim-generic-quad").unwrap().autopilot;
+        autopilot.wpnav_speed_up_mps = mps;
+        let report = check(&CheckInput::new(&show, &limits).with_autopilot(&autopilot));
+        report.margin("firmware-takeoff").unwrap().value
+    };
+    assert_eq!((takeoff(2.5), takeoff(5.0)), (1.5, 2.0));
+}
+
+#[test]
+fn the_unit_is_the_one_that_the_writer_takes() {
+    // 90 m are too far for 1 mm; 5 mm hold the half metres, and the 5 mm of a half of 7.01 m, exactly.
+    let tall = |x: f64| {
+        let mut drone =
+            drone(1, x, 0.0, vec![line(40_000, x, 0.0, 90.0), line(40_000, x, 0.0, 2.5)]);
+        drone.home_m = None;
+        let show = show(vec![drone]);
+        let report = check(&CheckInput::new(&show, &limits()));
+        let file = updraft::show::skyb::write(
+            &show.drones[0],
+            &updraft::show::skyb::SkybOptions::default(),
+        )
+        .unwrap();
+        let unit = report.margin("skyb-unit").unwrap().value;
+        assert_eq!(unit, f64::from(file.scale_mm));
+        assert_eq!(report.margin("skyb-size").unwrap().value, file.trajectory_bytes as f64);
+        (unit, report.counts.contains_key("skyb-unit"))
+    };
+    assert_eq!(tall(3.505), (5.0, false));
+    assert_eq!(tall(3.504), (4.0, false));
+    assert_eq!(tall(3.501), (3.0, true));
 }
 
 #[test]

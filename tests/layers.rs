@@ -52,7 +52,8 @@ fn no_room_uses_one_behind_it() {
         let mut files = Vec::new();
         sources(&root.join(room), &mut files);
         assert!(!files.is_empty(), "{room} has moved");
-        for file in files {
+        // A room's tests may look ahead.
+        for file in files.into_iter().filter(|file| !file.ends_with("tests.rs")) {
             let text = fs::read_to_string(&file).unwrap();
             for named in rooms_named(&text) {
                 let known = allowed.contains_key(named.as_str()) || named == "cli";

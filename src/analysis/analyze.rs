@@ -12,6 +12,7 @@ use super::density::Density;
 use super::drone::{One, Shared, law_fit, one};
 use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::matching::{self, Candidate};
+use super::refer::refer_calibration;
 use super::result::{ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, Missing, UpdraftMap};
 use super::stats::mean_sd;
 use super::updraft::{self, DroneSeries};
@@ -187,7 +188,7 @@ pub fn analyze_flight(
     let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
     let referred = reference
         .zip(input.density)
-        .map(|(reference, density)| density.refer_calibration(reference, &options.fit));
+        .map(|(reference, density)| refer_calibration(density, reference, &options.fit));
     let map_reference = referred.as_ref().or(reference);
     let map_law = options.map_law.or_else(|| map_reference.map(better_law));
     let shared = Shared { input, options, reference, map_reference, planned_purpose, map_law };

@@ -8,8 +8,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::calibrate::{self, FitOptions};
-use super::result::{FlightAnalysis, SampleStats, WindowStats};
 use crate::base::air::density_ratio;
 use crate::flight::Series;
 
@@ -31,7 +29,7 @@ pub struct Density {
 
 impl Density {
     /// What `u - 1000` at a height above ground is multiplied with.
-    fn factor(self, height_m: f64) -> f64 {
+    pub(super) fn factor(self, height_m: f64) -> f64 {
         let here = density_ratio(self.ground_amsl_m + height_m);
         (here / density_ratio(self.ground_amsl_m)).powf(self.exponent)
     }
@@ -53,40 +51,6 @@ impl Density {
             })
             .unzip();
         Series { time_s, value }
-    }
-
-    fn refer_window(self, window: &WindowStats) -> WindowStats {
-        let factor = self.factor(window.height_m);
-        let refer = |pulse_us: f64| self.refer_us(pulse_us, window.height_m);
-        let stats = &window.pulse_phi_us;
-        WindowStats {
-            pulse_phi_us: SampleStats {
-                median: refer(stats.median),
-                mean: refer(stats.mean),
-                trimmed: refer(stats.trimmed),
-                sd: stats.sd * factor,
-                se: stats.se * factor,
-                n: stats.n,
-            },
-            ..window.clone()
-        }
-    }
-
-    /// A calibration with its laws refitted to pulses referred to the ground.
-    pub(super) fn refer_calibration(
-        self,
-        calibration: &FlightAnalysis,
-        options: &FitOptions,
-    ) -> FlightAnalysis {
-        let mut referred = calibration.clone();
-        for drone in &mut referred.drones {
-            drone.windows = drone.windows.iter().map(|window| self.refer_window(window)).collect();
-            if drone.laws.is_some() {
-                drone.laws = calibrate::calibrate(&drone.windows, options).ok();
-            }
-        }
-        referred.flock = calibrate::flock(&referred.drones, options).ok();
-        referred
     }
 }
 

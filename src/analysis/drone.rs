@@ -6,6 +6,7 @@ use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace};
 use super::stats::mean_sd;
 use super::updraft::{self, DroneSeries};
 use super::windows::{self, Corrected, Target};
+use crate::base::causes::with_causes;
 use crate::flight::{Alignment, Flight, FlightOptions};
 use crate::mission::plan::{Purpose, Segment, Slot};
 
@@ -37,7 +38,8 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     });
     let flight_options =
         FlightOptions { start: input.start, segments: slot.map(|(_, segments)| segments) };
-    let flight = Flight::open(&log.path, flight_options).map_err(|error| chain(&error))?;
+    let flight =
+        Flight::open(&log.path, flight_options).map_err(|error| with_causes(&error, ": "))?;
     let mut warnings = flight.warnings.clone();
 
     let targets = find_targets(&flight, slot.map(|(_, segments)| segments), &mut warnings)?;
@@ -149,18 +151,4 @@ fn trace(flight: &Flight, corrected: &Corrected, points: usize) -> Trace {
         trace.pulse_phi_us.push(pulse);
     }
     trace
-}
-
-/// Error text with its causes.
-fn chain(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        let cause_text = cause.to_string();
-        if !text.contains(&cause_text) {
-            text = format!("{text}: {cause_text}");
-        }
-        source = cause.source();
-    }
-    text
 }

@@ -10,6 +10,7 @@ mod drone;
 pub mod fit;
 pub mod law;
 mod matching;
+mod refer;
 pub mod result;
 mod stats;
 pub mod updraft;

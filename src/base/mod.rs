@@ -1,6 +1,7 @@
 //! What every room uses: frames, time, checksums, estimates, random streams, whole files.
 
 pub mod air;
+pub mod causes;
 pub mod crc;
 pub mod estimate;
 pub mod file;

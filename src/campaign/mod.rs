@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::base::file::{FileError, read_whole};
+use crate::base::time::GpsTime;
 use crate::mission::Plan;
 use crate::mission::plan::PLAN_SCHEMA;
 
@@ -62,6 +63,8 @@ pub struct FlightRecord {
     pub vehicle_sha256: String,
     /// True uniform motion of the air, towards east, north and up, m/s.
     pub air_mps: [f64; 3],
+    /// GPS time of show time 0.
+    pub start: GpsTime,
     /// Whether the firmware's whole default set of messages was logged.
     pub full_logs: bool,
     /// SHA-256 of the plan that was flown.
@@ -173,10 +176,7 @@ impl FlightFolder {
 
     /// Reads the plan.
     pub fn read_plan(&self) -> Result<Plan, CampaignError> {
-        let path = self.plan();
-        let plan: Plan = read_json(&path)?;
-        validate_plan(&plan).map_err(|reason| CampaignError::Json { path, reason })?;
-        Ok(plan)
+        read_plan(&self.plan())
     }
 
     /// Reads the flight record, if there is one.
@@ -239,6 +239,19 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CampaignError> {
     let bytes = read_whole(path, MAX_JSON_BYTES)?;
     serde_json::from_slice(&bytes)
         .map_err(|error| CampaignError::Json { path: path.to_owned(), reason: error.to_string() })
+}
+
+/// Reads a plan's file; errors name the file and what is wrong.
+pub fn read_plan(path: &Path) -> Result<Plan, CampaignError> {
+    let bytes = read_whole(path, MAX_JSON_BYTES)?;
+    parse_plan(&bytes).map_err(|reason| CampaignError::Json { path: path.to_owned(), reason })
+}
+
+/// A plan from its JSON, if its parts fit together; else why not.
+pub fn parse_plan(bytes: &[u8]) -> Result<Plan, String> {
+    let plan: Plan = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+    validate_plan(&plan)?;
+    Ok(plan)
 }
 
 /// Pretty JSON with a final newline.

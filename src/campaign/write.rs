@@ -1,5 +1,7 @@
 //! Writes a flight's folder: template, vehicle, plan and the show in its three formats.
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -106,9 +108,26 @@ impl FlightFiles {
         self.skyb.par_iter().enumerate().try_for_each(|(index, file)| {
             write_whole(&folder.skyb((index + 1) as u16, count), &file.bytes)
         })?;
+        remove_others(folder, count)?;
         write_whole(&folder.plan(), &self.plan)?;
         Ok(())
     }
+}
+
+/// Removes binary shows of slots that an earlier plan in this folder had: they would be uploaded.
+fn remove_others(folder: &FlightFolder, count: usize) -> Result<(), FileError> {
+    let place = folder.skyb_folder();
+    let fail = |source| FileError::new("clean", &place, source);
+    let wanted: BTreeSet<_> = (1..=count).map(|slot| folder.skyb(slot as u16, count)).collect();
+    for entry in std::fs::read_dir(&place).map_err(fail)? {
+        let path = entry.map_err(fail)?.path();
+        let slot = path.file_stem().and_then(|stem| stem.to_str()?.parse::<u16>().ok());
+        let ours = slot.is_some() && path.extension().is_some_and(|extension| extension == "skyb");
+        if ours && !wanted.contains(&path) {
+            std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
+        }
+    }
+    Ok(())
 }
 
 /// Folder of each flight of a mission below `root`: `root` itself for a single flight.

@@ -24,6 +24,10 @@ impl Bounds {
         high: Vector3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
     };
 
+    pub(super) fn size_m(&self) -> Vector3<f64> {
+        self.high - self.low
+    }
+
     pub(super) fn include(&mut self, point: &Vector3<f64>) {
         self.low = self.low.inf(point);
         self.high = self.high.sup(point);

@@ -1,87 +1,74 @@
 //! Limits of the `.skyb` format and of the tools that write it: range, unit, size and durations.
+//!
+//! The writer itself is asked what it makes of a trajectory, so that both never disagree.
+
+use rayon::prelude::*;
 
 use super::report::{Collector, Finding, Margin, Severity};
-use super::track::{Track, curve_of};
-use crate::show::Path;
+use super::track::Track;
+use crate::show::skyb::{self, MAX_BODY, MAX_SCALE_MM, SkybCost, SkybError, SkybOptions};
 
-/// Largest unit, mm.
-const MAX_SCALE: u64 = 127;
-/// Largest coordinate in units.
-const MAX_UNITS: f64 = 32_767.0;
-/// Largest body of a block, B.
-const MAX_BODY: u64 = 65_535;
-/// Header of the trajectory block, B.
-const HEADER: u64 = 9;
-/// Longest segment, ms.
-const MAX_SEGMENT_MS: u64 = 65_535;
 /// Longest segment that Skybrush's server leaves whole, ms.
 const SERVER_SEGMENT_MS: u64 = 65_000;
-/// Rounding that a unit of 1 mm has anyway, mm.
-const FINE_MM: f64 = 0.5;
+/// What whole millimetres can move a point by, mm: half of one along each axis.
+const FINE_MM: f64 = 0.866_025_4;
 
 /// What a drone's trajectory needs in a `.skyb` file.
 struct Need {
-    scale: u64,
-    /// Largest coordinate, control points included, m.
-    largest_m: f64,
-    /// Largest rounding of a coordinate in that unit, mm, and the time of its piece, s.
-    rounding: (f64, f64),
-    body: u64,
+    cost: Result<SkybCost, SkybError>,
     /// Largest loss of time, ms, when Skybrush's server splits a long piece, with its time.
     lost: Option<(u64, f64)>,
 }
 
-fn need(track: &Track<'_>) -> Need {
-    let mut largest_m: f64 = 0.0;
-    let mut each = |point: &nalgebra::Vector3<f64>| largest_m = largest_m.max(point.amax());
-    each(&track.start_m);
-    for piece in &track.pieces {
-        curve_of(piece).points().iter().for_each(&mut each);
-    }
-    // Rounded to a micrometre first, so that 32.767 m is 32767 units in spite of binary fractions.
-    let units = (largest_m * 1e6).round() / 1e3;
-    let scale = ((units / MAX_UNITS).ceil() as u64).max(1);
-    let mut rounding = (0.0, 0.0);
-    let mut body = HEADER;
-    let mut lost: Option<(u64, f64)> = None;
-    let round = |value_m: f64| (value_m * 1000.0 / scale as f64).round();
-    for piece in &track.pieces {
-        let start_s = piece.start_ms as f64 / 1000.0;
-        let curve = curve_of(piece);
-        let values: u64 = match piece.path {
-            Path::Hold => 0,
-            Path::Line(_) => 1,
-            Path::Cubic(_) => 3,
-            Path::Septic(_) => 7,
-        };
-        let mut axes = 0;
-        for axis in 0..3 {
-            let first = round(curve.first()[axis]);
-            axes += u64::from(curve.points().iter().any(|point| round(point[axis]) != first));
-            for point in curve.points() {
-                let error = (round(point[axis]) * scale as f64 - point[axis] * 1000.0).abs();
-                if error > rounding.0 + 1e-9 {
-                    rounding = (error, start_s);
+impl Need {
+    fn of(track: &Track<'_>) -> Self {
+        let cost = skyb::measure(&track.drone.trajectory, &SkybOptions::default());
+        let mut lost: Option<(u64, f64)> = None;
+        for piece in &track.pieces {
+            let duration_ms = piece.end_ms - piece.start_ms;
+            if duration_ms > SERVER_SEGMENT_MS {
+                let parts = duration_ms / SERVER_SEGMENT_MS + 1;
+                let loss = duration_ms % parts;
+                if loss > lost.map_or(0, |(most, _)| most) {
+                    lost = Some((loss, piece.start_ms as f64 / 1000.0));
                 }
             }
         }
-        let duration_ms = piece.end_ms - piece.start_ms;
-        body += duration_ms.div_ceil(MAX_SEGMENT_MS) * (3 + 2 * values * axes);
-        if duration_ms > SERVER_SEGMENT_MS {
-            let parts = duration_ms / SERVER_SEGMENT_MS + 1;
-            let loss = duration_ms % parts;
-            if loss > lost.map_or(0, |(most, _)| most) {
-                lost = Some((loss, start_s));
-            }
+        Self { cost, lost }
+    }
+
+    /// Size of the trajectory's block, also one that is too large, B.
+    fn body(&self) -> Option<usize> {
+        match &self.cost {
+            Ok(cost) => Some(cost.trajectory_bytes),
+            Err(SkybError::TooManyPieces { bytes, .. }) => Some(*bytes),
+            Err(_) => None,
         }
     }
-    Need { scale, largest_m, rounding, body, lost }
+
+    fn scale_mm(&self) -> Option<u8> {
+        self.cost.as_ref().ok().map(|cost| cost.scale_mm)
+    }
+
+    /// What rounding moves a point by, mm, if that is more than whole millimetres would.
+    fn coarse_mm(&self) -> Option<f64> {
+        let rounding_mm = self.cost.as_ref().ok()?.quantisation.max_position_m * 1000.0;
+        (rounding_mm > FINE_MM + 1e-3).then_some(rounding_mm)
+    }
 }
 
 pub(super) fn check(tracks: &[Track<'_>], collector: &mut Collector) {
-    let needs: Vec<_> = tracks.iter().map(need).collect();
+    let needs: Vec<_> = tracks.par_iter().map(Need::of).collect();
     for (track, need) in tracks.iter().zip(&needs) {
-        let finding = |severity, check, time_s, value, limit, unit, message, remedy| Finding {
+        check_drone(track, need, collector);
+    }
+    coarse_units(tracks, &needs, collector);
+    margins(tracks, &needs, collector);
+}
+
+fn check_drone(track: &Track<'_>, need: &Need, collector: &mut Collector) {
+    let mut add = |(severity, check), time_s, (value, limit, unit), message, remedy| {
+        let finding = Finding {
             severity,
             check,
             drones: vec![track.name()],
@@ -93,83 +80,62 @@ pub(super) fn check(tracks: &[Track<'_>], collector: &mut Collector) {
             message,
             remedy,
         };
-        let range_m = MAX_SCALE as f64 * MAX_UNITS / 1000.0;
-        if need.scale > MAX_SCALE {
-            let message = format!(
-                "has a coordinate of {:.3} m; .skyb files hold up to {range_m:.3} m",
-                need.largest_m
-            );
-            let remedy = "put the origin of the show near its middle";
-            let (check, unit) = ("skyb-range", "m");
-            let (value, limit) = (need.largest_m, range_m);
-            let severity = Severity::Error;
-            collector.add(
-                track.index,
-                finding(severity, check, None, value, limit, unit, message, remedy),
-            );
-        }
-        let lights = track.drone.lights.len() as u64;
-        let blocks = [("trajectory", need.body), ("light program", lights)];
-        for (what, body) in blocks {
-            if body > MAX_BODY {
-                let message =
-                    format!("needs {body} B for its {what}; a .skyb block holds {MAX_BODY} B");
-                let remedy = "use fewer and longer pieces";
-                let (value, limit) = (body as f64, MAX_BODY as f64);
-                let finding =
-                    finding(Severity::Error, "skyb-size", None, value, limit, "B", message, remedy);
-                collector.add(track.index, finding);
-            }
-        }
-        if let Some((loss, time_s)) = need.lost {
-            let message = format!(
-                "has a piece longer than 65 s that Skybrush's server cuts into parts {loss} ms short in all"
-            );
-            let remedy = "cut long pieces into equal parts of whole milliseconds";
-            let finding = finding(
-                Severity::Warning,
-                "skyb-duration",
-                Some(time_s),
-                loss as f64,
-                0.0,
-                "ms",
-                message,
-                remedy,
-            );
-            collector.add(track.index, finding);
-        }
+        collector.add(track.index, finding);
+    };
+    if let Err(SkybError::OutOfRange { value_m, reach_m, .. }) = &need.cost {
+        let message =
+            format!("has a coordinate of {value_m:.3} m; .skyb files hold up to {reach_m:.3} m");
+        let kind = (Severity::Error, "skyb-range");
+        let remedy = "put the origin of the show near its middle";
+        add(kind, None, (*value_m, *reach_m, "m"), message, remedy);
     }
-    coarse_units(tracks, &needs, collector);
-    margins(tracks, &needs, collector);
+    let lights = Some(track.drone.lights.len());
+    for (what, body) in [("trajectory", need.body()), ("light program", lights)] {
+        let Some(body) = body.filter(|body| *body > MAX_BODY) else { continue };
+        let message = format!("needs {body} B for its {what}; a .skyb block holds {MAX_BODY} B");
+        let kind = (Severity::Error, "skyb-size");
+        let values = (body as f64, MAX_BODY as f64, "B");
+        add(kind, None, values, message, "use fewer and longer pieces");
+    }
+    if let Some((loss, time_s)) = need.lost {
+        let message = format!(
+            "has a piece longer than 65 s that Skybrush's server cuts into parts {loss} ms short in all"
+        );
+        let kind = (Severity::Warning, "skyb-duration");
+        let remedy = "cut long pieces into equal parts of whole milliseconds";
+        add(kind, Some(time_s), (loss as f64, 0.0, "ms"), message, remedy);
+    }
 }
 
 /// One warning for the whole show: large shows have coarse units, and it is the same for all drones.
 fn coarse_units(tracks: &[Track<'_>], needs: &[Need], collector: &mut Collector) {
-    let coarse = |need: &Need| need.scale <= MAX_SCALE && need.rounding.0 > FINE_MM + 1e-6;
-    let mut worst: Option<(&Track<'_>, &Need)> = None;
-    for (track, need) in tracks.iter().zip(needs).filter(|(_, need)| coarse(need)) {
-        if worst.is_none_or(|(_, most)| need.rounding.0 > most.rounding.0 + 1e-9) {
-            worst = Some((track, need));
+    let mut worst: Option<(&Track<'_>, u8, f64)> = None;
+    let mut count = 0;
+    for (track, need) in tracks.iter().zip(needs) {
+        let (Some(scale_mm), Some(error_mm)) = (need.scale_mm(), need.coarse_mm()) else {
+            continue;
+        };
+        count += 1;
+        if worst.is_none_or(|(_, _, most)| error_mm > most + 1e-9) {
+            worst = Some((track, scale_mm, error_mm));
         }
     }
-    let Some((track, need)) = worst else { return };
-    let others = match needs.iter().filter(|need| coarse(need)).count() {
+    let Some((track, scale_mm, error_mm)) = worst else { return };
+    let others = match count {
         1 => String::new(),
         count => format!("; {count} drones are rounded more than at 1 mm"),
     };
-    let (error_mm, time_s) = need.rounding;
     let finding = Finding {
         severity: Severity::Warning,
         check: "skyb-unit",
         drones: vec![track.name()],
-        time_s: Some(time_s),
+        time_s: None,
         end_s: None,
         value: Some(error_mm),
         limit: Some(FINE_MM),
         unit: "mm",
         message: format!(
-            "is stored in units of {} mm at least, which moves a point by {error_mm:.1} mm{others}",
-            need.scale
+            "is stored in units of {scale_mm} mm, which moves a point by up to {error_mm:.1} mm{others}"
         ),
         remedy: "put the origin near the middle of the show, or way-points on a 10 mm grid",
     };
@@ -177,24 +143,37 @@ fn coarse_units(tracks: &[Track<'_>], needs: &[Need], collector: &mut Collector)
 }
 
 fn margins(tracks: &[Track<'_>], needs: &[Need], collector: &mut Collector) {
-    type Measure = fn(&Need) -> u64;
-    let measures: [(&'static str, &'static str, Measure, u64, &'static str); 2] = [
-        ("skyb-unit", "coarsest unit of a .skyb file", |need| need.scale, MAX_SCALE, "mm"),
-        ("skyb-size", "largest trajectory block", |need| need.body, MAX_BODY, "B"),
+    type Measure = fn(&Need) -> Option<f64>;
+    let measures: [(&'static str, &'static str, Measure, f64, &'static str); 2] = [
+        (
+            "skyb-unit",
+            "coarsest unit of a .skyb file",
+            |need| need.scale_mm().map(f64::from),
+            f64::from(MAX_SCALE_MM),
+            "mm",
+        ),
+        (
+            "skyb-size",
+            "largest trajectory block",
+            |need| need.body().map(|body| body as f64),
+            MAX_BODY as f64,
+            "B",
+        ),
     ];
     for (check, quantity, measure, limit, unit) in measures {
-        let mut most: Option<(u64, &Track<'_>)> = None;
+        let mut most: Option<(f64, &Track<'_>)> = None;
         for (track, need) in tracks.iter().zip(needs) {
-            if most.is_none_or(|(value, _)| measure(need) > value) {
-                most = Some((measure(need), track));
+            let Some(value) = measure(need) else { continue };
+            if most.is_none_or(|(known, _)| value > known) {
+                most = Some((value, track));
             }
         }
         if let Some((value, track)) = most {
             collector.margin(Margin {
                 check,
                 quantity,
-                value: value as f64,
-                limit: Some(limit as f64),
+                value,
+                limit: Some(limit),
                 unit,
                 drones: vec![track.name()],
                 time_s: None,

@@ -39,11 +39,12 @@ use serde::{Deserialize, Serialize};
 
 pub use firmware::Firmware;
 pub use report::{CheckReport, Count, Finding, Margin, Severity};
-pub use validity::MAX_DRONES;
+
+pub use crate::mission::formation::MAX_DRONES;
 
 use crate::mission::plan::Fence;
 use crate::show::Show;
-use crate::vehicle::Limits;
+use crate::vehicle::{Autopilot, Limits};
 use report::Collector;
 use track::Track;
 use watch::Watch;
@@ -110,6 +111,7 @@ pub const NAMES: &[&str] = &[
     "fence",
     "fence-altitude",
     "firmware-climb",
+    "firmware-early-landing",
     "firmware-end",
     "firmware-landing",
     "firmware-start",
@@ -136,6 +138,13 @@ impl<'a> CheckInput<'a> {
     pub fn new(show: &'a Show, limits: &'a Limits) -> Self {
         let (firmware, options) = (Firmware::default(), Options::default());
         Self { show, limits, fence: None, firmware, options }
+    }
+
+    /// The same for an autopilot with these parameters.
+    #[must_use]
+    pub fn with_autopilot(mut self, autopilot: &Autopilot) -> Self {
+        self.firmware.wpnav_speed_up_mps = autopilot.wpnav_speed_up_mps;
+        self
     }
 
     /// The same with a fence, if there is one.

@@ -118,7 +118,7 @@ impl fmt::Display for Quantity {
         let Self(value, unit) = *self;
         match unit {
             "" => write!(f, "{value:.0}"),
-            "B" | "drones" | "times" => write!(f, "{value:.0} {unit}"),
+            "B" | "mm" | "drones" | "times" => write!(f, "{value:.0} {unit}"),
             "s" => write!(f, "{value:.1} {unit}"),
             _ => write!(f, "{value:.2} {unit}"),
         }
@@ -155,16 +155,25 @@ impl fmt::Display for Finding {
     }
 }
 
+impl Margin {
+    /// ` between Drone 3 and Drone 4 at 123.4 s`; nothing for a zero, which is the same everywhere.
+    fn place(&self) -> String {
+        if self.value == 0.0 {
+            return String::new();
+        }
+        let drones = match self.drones.len() {
+            0 => String::new(),
+            2 => format!(" between {}", among(&self.drones)),
+            _ => format!(" of {}", among(&self.drones)),
+        };
+        let time = self.time_s.map_or(String::new(), |time_s| format!(" at {time_s:.1} s"));
+        drones + &time
+    }
+}
+
 impl fmt::Display for Margin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}", self.quantity, Quantity(self.value, self.unit))?;
-        if !self.drones.is_empty() {
-            let relation = if self.drones.len() == 2 { "between" } else { "of" };
-            write!(f, " {relation} {}", among(&self.drones))?;
-        }
-        if let Some(time_s) = self.time_s {
-            write!(f, " at {time_s:.1} s")?;
-        }
+        write!(f, "{} {}{}", self.quantity, Quantity(self.value, self.unit), self.place())?;
         if let Some(limit) = self.limit {
             write!(f, ", limit {}", Quantity(limit, self.unit))?;
         }
@@ -189,8 +198,16 @@ impl fmt::Display for CheckReport {
                 writeln!(f, "{check}: {least}{} more like these", count.omitted)?;
             }
         }
+        if !self.margins.is_empty() {
+            writeln!(f, "{:<17} {:>12} {:>12}  of what", "check", "worst", "limit")?;
+        }
         for margin in &self.margins {
-            writeln!(f, "{:<16} {margin}", margin.check)?;
+            let limit = margin
+                .limit
+                .map_or(String::new(), |limit| Quantity(limit, margin.unit).to_string());
+            let worst = Quantity(margin.value, margin.unit).to_string();
+            write!(f, "{:<17} {worst:>12} {limit:>12}  {}", margin.check, margin.quantity)?;
+            writeln!(f, "{}", margin.place())?;
         }
         let number = |count: usize, word: &str| match count {
             1 => format!("1 {word}"),

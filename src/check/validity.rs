@@ -1,15 +1,13 @@
 //! Whether the numbers of a show make sense at all; the other checks rely on it.
 
-use super::CheckInput;
 use super::fence::usable;
 use super::report::{Collector, Finding, Severity};
 use super::track::name_of;
+use super::{CheckInput, MAX_DRONES};
 use crate::show::ShowDrone;
 use crate::show::trajectory::Path;
 
 const CHECK: &str = "validity";
-/// Most drones that Skybrush's loader takes.
-pub const MAX_DRONES: usize = 5000;
 /// Coordinates beyond this are taken for mistakes, m.
 const MAX_COORDINATE_M: f64 = 1e6;
 

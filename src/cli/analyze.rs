@@ -12,13 +12,15 @@ use super::exit::{CommandError, Exit};
 use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::simulate::{made_by, sha256};
+use super::words;
 use crate::analysis::calibrate::{Location, Weights};
 use crate::analysis::density::Density;
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, analyze};
 use crate::base::file::{FileError, read_whole, write_whole};
-use crate::campaign::{self, CampaignIndex, FlightFolder, to_json};
+use crate::base::time::GpsTime;
+use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, to_json};
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, InputFile, Provenance, terminal_summary};
@@ -52,6 +54,9 @@ pub(super) struct AnalyzeArgs {
     /// Take A and u0 from this analysis.json and fit only W
     #[arg(long, value_name = "FILE")]
     hold: Option<PathBuf>,
+    /// Unix time of show time 0, s: aligns logs without SHOW rows by their GPS time
+    #[arg(long, value_name = "UNIX_S")]
+    start: Option<i64>,
     /// Folder for analysis.json and report/ [default: the campaign, or NAME-analysis]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
@@ -130,6 +135,7 @@ struct Found {
     logs: Vec<LogInput>,
     true_updraft_mps: Option<f64>,
     seed: Option<u64>,
+    start: Option<GpsTime>,
     density: Option<Density>,
 }
 
@@ -172,6 +178,12 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         None if args.paths.len() == 1 && campaign::is_campaign(first) => first.clone(),
         None => PathBuf::from(format!("{}-analysis", stem(first))),
     });
+    if let Some(unix_s) = args.start {
+        let start = unix_s.checked_mul(1000).and_then(GpsTime::from_unix_ms).ok_or_else(|| {
+            CommandError::Usage(format!("--start {unix_s} is not a time since 1980"))
+        })?;
+        work.flights.iter_mut().for_each(|flight| flight.start = Some(start));
+    }
     finish(context, &work, &args.options, args.hold.as_deref(), output.as_deref())
 }
 
@@ -203,7 +215,7 @@ fn finish(
             plan: flight.plan.as_ref(),
             purpose: flight.purpose,
             logs: &flight.logs,
-            start: None,
+            start: flight.start,
             true_updraft_mps: flight.true_updraft_mps,
             density: flight.density.filter(|_| !options.no_density),
             folder: Some(&work.root),
@@ -240,7 +252,7 @@ fn finish(
         })?;
     }
     let place = page.map_or(String::new(), |page| format!(" -> {}", page.display()));
-    context.say(&format!("Analysed {total} logs in {watch}{place}"));
+    context.say(&format!("Analysed {} in {watch}{place}", words::count(total, "log")));
     let lost = analysis.flights.iter().any(|flight| !flight.missing.is_empty())
         || analysis.flights.len() < work.flights.len();
     Ok(if lost { Exit::Losses } else { Exit::Done })
@@ -274,6 +286,7 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
         logs: logs.into_iter().map(|path| LogInput { slot: None, path }).collect(),
         true_updraft_mps: None,
         seed: None,
+        start: None,
         density: plan.map(|plan| density(plan, None)),
     });
     Ok(())
@@ -281,7 +294,7 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
 
 fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     let plan = folder.read_plan()?;
-    let record = folder.read_record()?;
+    let record = folder.read_record()?.filter(|record| record_holds(folder, record));
     let logs = match &record {
         // A record says which log is whose.
         Some(record) => record
@@ -302,7 +315,18 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
         plan: Some(plan),
         logs,
         true_updraft_mps: record.as_ref().map(|record| record.air_mps[2]),
+        start: record.as_ref().map(|record| record.start),
         seed: record.map(|record| record.seed),
+    })
+}
+
+/// Whether the logs are still those that the record speaks of: somebody may have put the logs of real
+/// drones in their place.
+fn record_holds(folder: &FlightFolder, record: &FlightRecord) -> bool {
+    record.logs.iter().all(|log| {
+        let size = std::fs::metadata(folder.logs().join(&log.file)).map(|file| file.len());
+        // A log that is gone is a loss, not another flight.
+        size.map_or(true, |bytes| bytes == log.bytes)
     })
 }
 
@@ -314,6 +338,12 @@ fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
         ground_amsl_m: plan.site.ground_amsl_m,
         exponent: if linear { 1.0 } else { REAL_ROTOR_EXPONENT },
     }
+}
+
+/// Whether a path is a finished log: what an interrupted run or copy left is not.
+fn is_log(path: &Path) -> bool {
+    let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    has_extension(path, "bin") && !hidden
 }
 
 /// The logs in a folder and in its direct subfolders (one per drone, as SD cards are often copied).
@@ -329,8 +359,8 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
     };
     for path in list(folder)? {
         if path.is_dir() {
-            logs.extend(list(&path)?.into_iter().filter(|path| has_extension(path, "bin")));
-        } else if has_extension(&path, "bin") {
+            logs.extend(list(&path)?.into_iter().filter(|path| is_log(path)));
+        } else if is_log(&path) {
             logs.push(path);
         }
     }
@@ -339,12 +369,7 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
 
 fn load_plan(path: &Path) -> Result<Plan, CommandError> {
     if has_extension(path, "json") {
-        let parent = path.parent().unwrap_or(Path::new(".")).to_owned();
-        if path.file_name().is_some_and(|name| name == "plan.json") {
-            return Ok(FlightFolder(parent).read_plan()?);
-        }
-        let plan: Plan = campaign::read_json(path)?;
-        return Ok(plan);
+        return Ok(campaign::read_plan(path)?);
     }
     let vehicle = library::builtin("airsim-generic-quad")?;
     let mut loaded = load_shows(path, &vehicle)?;

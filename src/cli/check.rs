@@ -12,7 +12,7 @@ use super::load::{Loaded, load_shows};
 use crate::check::{CheckInput, CheckReport, NAMES, Severity, check};
 use crate::mission::Plan;
 use crate::show::Show;
-use crate::vehicle::library;
+use crate::vehicle::{Vehicle, library};
 
 /// Arguments of `updraft check`.
 #[derive(Debug, Args)]
@@ -56,15 +56,15 @@ pub(super) fn run(context: &Context, args: &CheckArgs) -> Result<Exit, CommandEr
     let vehicle = library::load(&args.vehicle)?;
     let loaded = load_shows(&args.path, &vehicle)?;
     let mut reports = Vec::new();
-    for Loaded { show, plan, .. } in &loaded {
+    for Loaded { show, plan, vehicle, .. } in &loaded {
         context.check_stop()?;
-        reports.push(checked(show, plan, &args.allow)?);
+        reports.push(checked(show, plan, vehicle, &args.allow)?);
     }
     let mut safe = true;
     for (loaded, report) in loaded.iter().zip(&reports) {
         safe &= is_safe(report, &args.allow) && loaded.mismatches.is_empty();
         if !context.json {
-            context.print(&format!("{}\n{report}", loaded.path.display()))?;
+            context.print(&format!("{}\n{report}\n", loaded.path.display()))?;
             for mismatch in &loaded.mismatches {
                 context.print(&format!("error: {mismatch}\n"))?;
             }
@@ -90,10 +90,11 @@ pub(super) fn run(context: &Context, args: &CheckArgs) -> Result<Exit, CommandEr
     Ok(if safe { Exit::Done } else { Exit::Unsafe })
 }
 
-/// Checks a show against its plan's limits and fence.
+/// Checks a show against its plan's limits and fence, for the autopilot of a vehicle.
 pub(super) fn checked(
     show: &Show,
     plan: &Plan,
+    vehicle: &Vehicle,
     allow: &[String],
 ) -> Result<CheckReport, CommandError> {
     if let Some(unknown) = allow.iter().find(|name| !NAMES.contains(&name.as_str())) {
@@ -103,7 +104,9 @@ pub(super) fn checked(
         )));
     }
     let fence = (plan.fence.polygon_m.len() >= 3).then_some(&plan.fence);
-    Ok(check(&CheckInput::new(show, &plan.limits).with_fence(fence)))
+    Ok(check(
+        &CheckInput::new(show, &plan.limits).with_fence(fence).with_autopilot(&vehicle.autopilot),
+    ))
 }
 
 /// Whether only allowed checks failed.
@@ -114,14 +117,17 @@ pub(super) fn is_safe(report: &CheckReport, allow: &[String]) -> bool {
         .all(|(check, count)| count.errors == 0 || allow.iter().any(|name| name == check))
 }
 
-/// Says what was found, errors before warnings.
+/// Says what was found, errors before warnings; a finding begins with its level.
 pub(super) fn say_findings(context: &Context, report: &CheckReport, allow: &[String]) {
     for finding in &report.findings {
         let allowed = allow.iter().any(|name| name == finding.check);
-        if finding.severity == Severity::Error && !allowed {
-            context.warn_as("error", &finding.to_string());
-        } else {
-            context.say(&format!("warning: {finding}"));
+        match finding.severity {
+            Severity::Error if allowed => context.say(&format!("allowed: {finding}")),
+            Severity::Error => context.insist(&finding.to_string()),
+            Severity::Warning => context.say(&finding.to_string()),
         }
+    }
+    for (check, count) in report.counts.iter().filter(|(_, count)| count.omitted > 0) {
+        context.say(&format!("{check}: {} more like these", count.omitted));
     }
 }

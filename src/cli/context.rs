@@ -95,12 +95,12 @@ impl Context {
 
     /// A warning, on standard error, always.
     pub(super) fn warn(&self, text: &str) {
-        self.warn_as("warning", text);
+        self.insist(&format!("warning: {text}"));
     }
 
-    /// Something that must be said even when quiet: `error: ...`, `warning: ...`.
+    /// Something that must be said even when quiet, on standard error.
     #[expect(clippy::unused_self, reason = "talks like the other methods")]
-    pub(super) fn warn_as(&self, level: &str, text: &str) {
-        let _ = writeln!(io::stderr().lock(), "{level}: {text}");
+    pub(super) fn insist(&self, text: &str) {
+        let _ = writeln!(io::stderr().lock(), "{text}");
     }
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use thiserror::Error;
 
 use super::load::LoadError;
+use crate::base::causes::with_causes;
 use crate::base::file::FileError;
 use crate::campaign::CampaignError;
 use crate::campaign::write::WriteError;
@@ -120,6 +121,7 @@ impl CommandError {
     pub fn exit(&self) -> Exit {
         match self {
             Self::Mission(error) if matches!(**error, MissionError::File(_)) => Exit::Failed,
+            Self::Load(error) if matches!(**error, LoadError::File(_)) => Exit::Failed,
             Self::Vehicle(VehicleError::File(_))
             | Self::File(_)
             | Self::Write(_)
@@ -142,16 +144,5 @@ impl CommandError {
 
 /// An error and its reasons, one below the other.
 pub(super) fn with_reasons(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(reason) = source {
-        let line = reason.to_string();
-        // Transparent wrappers repeat their source; say everything once.
-        if !text.contains(&line) {
-            text.push_str("\n  because: ");
-            text.push_str(&line);
-        }
-        source = reason.source();
-    }
-    text
+    with_causes(error, "\n  because: ")
 }

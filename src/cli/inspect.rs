@@ -13,7 +13,6 @@ use super::show_text::{describe_show, describe_skyb};
 use super::timetable;
 use crate::base::file::read_whole;
 use crate::campaign::{self, FlightFolder};
-
 use crate::log::{Inventory, Log, ScanStats};
 use crate::mission::Plan;
 use crate::show::derive::DeriveParams;
@@ -34,6 +33,13 @@ pub(super) struct InspectArgs {
 
 /// What `--json` prints.
 #[derive(Serialize)]
+struct InspectDocument<'a> {
+    schema: &'static str,
+    #[serde(flatten)]
+    found: &'a InspectOutput,
+}
+
+#[derive(Serialize)]
 #[serde(rename_all = "snake_case")]
 enum InspectOutput {
     Log(Box<Inventory>),
@@ -51,7 +57,7 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
             .collect::<Result<_, _>>()?;
         InspectOutput::Plans(plans)
     } else if has_extension(path, "json") {
-        InspectOutput::Plans(vec![campaign::read_json(path)?])
+        InspectOutput::Plans(vec![campaign::read_plan(path)?])
     } else if has_extension(path, "skyb") {
         let bytes = read_whole(path, MAX_SKYB_BYTES)?;
         let contents =
@@ -63,7 +69,7 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
         InspectOutput::Log(Box::new(Log::open(path)?.inventory()))
     };
     if context.json {
-        context.print_json(&found)?;
+        context.print_json(&InspectDocument { schema: "updraft.inspect/1", found: &found })?;
     } else {
         context.print(&match &found {
             InspectOutput::Log(inventory) => describe_log(path, inventory),

@@ -8,7 +8,7 @@ use crate::base::file::{FileError, read_whole};
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::mission::Plan;
 use crate::show::{Show, csv, skyb, skyc};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Vehicle, VehicleError, library};
 
 /// Largest show file that is read, bytes.
 const MAX_SHOW_BYTES: u64 = 256 << 20;
@@ -25,6 +25,9 @@ pub enum LoadError {
     /// The campaign folder cannot be used.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
+    /// The campaign's vehicle cannot be used.
+    #[error(transparent)]
+    Vehicle(#[from] VehicleError),
     /// A `.skyc` file is broken.
     #[error("{} is not a usable .skyc file", path.display())]
     Skyc {
@@ -69,6 +72,8 @@ pub(super) struct Loaded {
     pub(super) show: Show,
     /// Its plan; recovered from the show itself when it has none.
     pub(super) plan: Plan,
+    /// The vehicle that is to fly it.
+    pub(super) vehicle: Vehicle,
     /// How the campaign's files differ from its plan, one sentence each.
     pub(super) mismatches: Vec<String>,
 }
@@ -111,6 +116,7 @@ pub(super) fn read_show(path: &Path) -> Result<Show, LoadError> {
         let bytes = read_whole(path, MAX_SHOW_BYTES)?;
         csv::read(&bytes).map_err(|source| LoadError::Csv { path: path.to_owned(), source })
     } else {
+        std::fs::metadata(path).map_err(|error| FileError::new("read", path, error))?;
         Err(LoadError::Unknown { path: path.to_owned() })
     }
 }
@@ -138,7 +144,7 @@ fn read_skyb(path: &Path) -> Result<crate::show::ShowDrone, LoadError> {
 
 fn foreign(path: &Path, show: Show, vehicle: &Vehicle) -> Loaded {
     let plan = Plan::of_show(&show, vehicle);
-    Loaded { path: path.to_owned(), show, plan, mismatches: Vec::new() }
+    Loaded { path: path.to_owned(), show, plan, vehicle: vehicle.clone(), mismatches: Vec::new() }
 }
 
 /// A flight of a campaign: the show is what its files say, the limits are its plan's.
@@ -170,5 +176,6 @@ fn load_flight(folder: &FlightFolder) -> Result<Loaded, LoadError> {
             planned.drones.len()
         ));
     }
-    Ok(Loaded { path: folder.0.clone(), show, plan, mismatches })
+    let vehicle = library::load(&folder.vehicle().display().to_string())?;
+    Ok(Loaded { path: folder.0.clone(), show, plan, vehicle, mismatches })
 }

@@ -17,6 +17,7 @@ mod show_text;
 mod simulate;
 mod timetable;
 pub mod tools;
+mod words;
 
 use std::io::Write as _;
 use std::process::ExitCode;

@@ -10,7 +10,7 @@ use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::mission_args::MissionArgs;
-use super::timetable;
+use super::{timetable, words};
 use crate::campaign::write::{FlightFiles, folders, write_index};
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::check::CheckReport;
@@ -68,7 +68,7 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
     let mut safe = true;
     for flight in &mission.flights {
         let show = Show::of_plan(&flight.plan);
-        let report = checked(&show, &flight.plan, &args.allow)?;
+        let report = checked(&show, &flight.plan, &flight.vehicle, &args.allow)?;
         if !context.json {
             context.print(&timetable::describe(&flight.plan))?;
             context.print("\n")?;
@@ -93,21 +93,27 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
                 .collect(),
         })?;
     }
-    let drones = mission.flights.first().map_or(0, |flight| flight.plan.slots.len());
     if !safe {
-        context.say("Nothing was written: the show is not safe as it is");
+        context.insist("Nothing was written: the show is not safe as it is");
         return Ok(Exit::Unsafe);
     }
     if args.dry_run {
         context.say(&format!("Would write {}", folder.display()));
     } else {
         context.say(&format!(
-            "Planned {} for {drones} drones in {watch} -> {}",
-            if mission.flights.len() == 1 { "one flight" } else { "two or more flights" },
+            "Planned {} in {watch} -> {}",
+            what_for_whom(&mission),
             folder.display()
         ));
     }
     Ok(Exit::Done)
+}
+
+/// `calibration and hover for 49 drones`.
+pub(super) fn what_for_whom(mission: &Mission) -> String {
+    let names: Vec<_> = mission.flights.iter().map(|flight| flight.plan.name.as_str()).collect();
+    let drones = mission.flights.first().map_or(0, |flight| flight.plan.slots.len());
+    format!("{} for {}", words::list(&names), words::count(drones, "drone"))
 }
 
 /// Writes the campaign folder, unless something else is there.

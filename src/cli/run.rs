@@ -10,7 +10,7 @@ use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::mission_args::MissionArgs;
-use super::plan::write;
+use super::plan::{what_for_whom, write};
 use super::simulate::{AirArgs, Simulation, simulate, updraft};
 use crate::campaign;
 use crate::mission::plan::Purpose;
@@ -57,20 +57,18 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     let mut shows = Vec::new();
     for flight in &mission.flights {
         let show = Show::of_plan(&flight.plan);
-        let report = checked(&show, &flight.plan, &[])?;
+        let report = checked(&show, &flight.plan, &flight.vehicle, &[])?;
         say_findings(context, &report, &[]);
         if !is_safe(&report, &[]) {
-            context.say("Nothing was flown: the show is not safe as it is");
+            context.insist("Nothing was flown: the show is not safe as it is");
             return Ok(Exit::Unsafe);
         }
         shows.push((show, report));
     }
     write(context, &mission, &shows, &args.output, args.force)?;
-    let drones = mission.flights.first().map_or(0, |flight| flight.plan.slots.len());
-    let names: Vec<_> = mission.flights.iter().map(|flight| flight.plan.name.as_str()).collect();
     context.say(&format!(
-        "Planned {} for {drones} drones in {watch} -> {}",
-        names.join(" and "),
+        "Planned {} in {watch} -> {}",
+        what_for_whom(&mission),
         args.output.display()
     ));
     let mut lost = false;

@@ -1,19 +1,20 @@
 //! Shows as people read them, for `inspect`.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use super::words;
 use crate::show::summary::{DroneSummary, ShowSummary, SkybSummary};
 
 /// Drones listed one by one.
-const MAX_DRONES: usize = 60;
+const MAX_ROWS: usize = 60;
 
 /// A show: head, bounds, one line per drone.
 pub(super) fn describe_show(show: &ShowSummary) -> String {
     let mut text = String::new();
     let count = show.drones.len();
     let title = show.title.as_deref().map_or(String::new(), |title| format!("\"{title}\", "));
-    let plural = if count == 1 { "" } else { "s" };
-    let _ = writeln!(text, "{title}{count} drone{plural}, {:.3} s", show.duration_s);
+    let _ = writeln!(text, "{title}{}, {:.3} s", words::count(count, "drone"), show.duration_s);
     if let Some((lat, lon, amsl)) = show.origin {
         let _ = write!(text, "origin {lat:.7}, {lon:.7}");
         if let Some(amsl) = amsl {
@@ -35,8 +36,13 @@ pub(super) fn describe_show(show: &ShowSummary) -> String {
         "; up {:.2}, down {:.2}, horizontal {:.2} m/s at most",
         speeds.up_mps, speeds.down_mps, speeds.horizontal_mps
     );
-    let _ =
-        writeln!(text, "{} cues, fence of {} corners", show.cues.len(), show.fence_polygon_m.len());
+    let cues = (!show.cues.is_empty()).then(|| words::count(show.cues.len(), "cue"));
+    let corners = show.fence_polygon_m.len();
+    let fence = (corners > 0).then(|| format!("fence of {}", words::count(corners, "corner")));
+    let extras: Vec<_> = cues.into_iter().chain(fence).collect();
+    if !extras.is_empty() {
+        let _ = writeln!(text, "{}", extras.join(", "));
+    }
     let _ = writeln!(
         text,
         "\n{:<14} {:>24} {:>9} {:>7} {:>6} {:>6} {:>9} {:>15} {:>15}",
@@ -47,24 +53,37 @@ pub(super) fn describe_show(show: &ShowSummary) -> String {
         "skyb B",
         "unit",
         "error mm",
-        "4.4 take-off s",
-        "4.6 take-off s"
+        "flown by 4.4, s",
+        "flown by 4.6, s"
     );
-    for drone in show.drones.iter().take(MAX_DRONES) {
+    for drone in show.drones.iter().take(MAX_ROWS) {
         describe_drone(&mut text, drone);
     }
-    if count > MAX_DRONES {
-        let _ = writeln!(text, "... and {} more", count - MAX_DRONES);
+    if count > MAX_ROWS {
+        let _ = writeln!(text, "... and {} more", count - MAX_ROWS);
     }
-    for drone in &show.drones {
-        for reason in &drone.derived_44.reasons {
-            let _ = writeln!(text, "{}: {reason}", drone.name);
-        }
-        if let Some(reason) = &drone.skyb_problem {
-            let _ = writeln!(text, "{}: {reason}", drone.name);
-        }
-    }
+    describe_remarks(&mut text, show);
     text
+}
+
+/// What is remarkable about drones, each thing once.
+fn describe_remarks(text: &mut String, show: &ShowSummary) {
+    let mut remarks: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for drone in &show.drones {
+        let firmware = [("4.4", &drone.derived_44), ("4.6", &drone.derived_46)];
+        let derived = firmware.into_iter().flat_map(|(version, derived)| {
+            derived.reasons.iter().map(move |reason| format!("firmware {version}: {reason}"))
+        });
+        for remark in derived.chain(drone.skyb_problem.clone()) {
+            remarks.entry(remark).or_default().push(&drone.name);
+        }
+    }
+    if !remarks.is_empty() {
+        text.push('\n');
+    }
+    for (remark, drones) in remarks {
+        let _ = writeln!(text, "{}: {remark}", words::range(&drones));
+    }
 }
 
 fn describe_drone(text: &mut String, drone: &DroneSummary) {
@@ -113,13 +132,13 @@ pub(super) fn describe_skyb(file: &SkybSummary) -> String {
         let _ = writeln!(text, "has a return-to-home plan (not read: its form differs by version)");
     }
     if !file.events.is_empty() {
-        let _ = writeln!(text, "{} timed events", file.events.len());
+        let _ = writeln!(text, "{}", words::count(file.events.len(), "timed event"));
     }
     let drone = &file.drone;
     let [low, high] = drone.bounds_m;
     let _ = writeln!(
         text,
-        "{:.3} s: {} holds, {} lines, {} cubic, {} of 7th degree; z {:.3}..{:.3} m; up {:.2}, down {:.2}, horizontal {:.2} m/s",
+        "trajectory: {:.3} s; {} holds, {} lines, {} cubic, {} of 7th degree; z {:.3}..{:.3} m; up {:.2}, down {:.2}, horizontal {:.2} m/s",
         drone.duration_s,
         drone.pieces[0],
         drone.pieces[1],

@@ -12,6 +12,7 @@ use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::progress::Progress;
+use super::words;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
@@ -130,6 +131,13 @@ fn parse_slots(text: &str) -> Result<SlotSet, String> {
     Ok(SlotSet(slots))
 }
 
+impl SlotSet {
+    /// The first of them that a plan does not have.
+    fn stray(&self, plan: &Plan) -> Option<u16> {
+        self.0.iter().copied().find(|slot| plan.slot(*slot).is_none())
+    }
+}
+
 /// How one flight is to be simulated.
 #[derive(Clone, Debug)]
 pub(super) struct Simulation {
@@ -207,6 +215,13 @@ pub(super) fn simulate(
         effects::select::choose(&mut vehicle, choice)?;
     }
     effects::select::resolved(&vehicle)?;
+    if let Some(stray) = simulation.only.as_ref().and_then(|set| set.stray(plan)) {
+        return Err(CommandError::Usage(format!(
+            "{} has no slot {stray}; slots are 1 to {}",
+            plan.name,
+            plan.slots.len()
+        )));
+    }
     let mut record = prepare(folder, plan, simulation, &vehicle)?;
     let count = plan.slots.len();
     let wanted: Vec<_> = plan
@@ -217,8 +232,7 @@ pub(super) fn simulate(
     let open: Vec<_> =
         wanted.iter().copied().filter(|slot| !folder.log(slot.slot, count).exists()).collect();
     let kept = wanted.len() - open.len();
-    let start = GpsTime::from_unix_ms(START_UNIX_MS)
-        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
+    let start = record.start;
     let frame = plan.site.frame();
     let [east, north, up] = record.air_mps;
     let air = Uniform(frame.from_neu(nalgebra::Vector3::new(north, east, up)));
@@ -267,12 +281,12 @@ pub(super) fn simulate(
     }
     let word = if kept == wanted.len() { "Found" } else { "Flew" };
     context.say(&format!(
-        "{word} {}: {} logs, {:.0} MB in {watch}{}",
+        "{word} {}: {}, {:.1} MB in {watch}{}",
         plan.name,
-        wanted.len() - failed.len(),
+        words::count(wanted.len() - failed.len(), "log"),
         bytes as f64 / 1e6,
         if kept > 0 && kept < wanted.len() {
-            format!(" ({kept} were there)")
+            format!(" ({kept} {} there)", if kept == 1 { "was" } else { "were" })
         } else {
             String::new()
         }
@@ -297,6 +311,8 @@ fn prepare(
     let plan_bytes = read_whole(&folder.plan(), MAX_PLAN_BYTES)?;
     let vehicle_text = toml::to_string(vehicle)
         .map_err(|error| CommandError::Failed(format!("failed to write the vehicle: {error}")))?;
+    let start = GpsTime::from_unix_ms(START_UNIX_MS)
+        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
     let record = FlightRecord {
         schema: FLIGHT_SCHEMA.to_owned(),
         made_by: made_by(),
@@ -305,6 +321,7 @@ fn prepare(
         vehicle: vehicle.name.clone(),
         vehicle_sha256: sha256(vehicle_text.as_bytes()),
         air_mps: simulation.air_mps,
+        start,
         full_logs: simulation.full_logs,
         plan_sha256: sha256(&plan_bytes),
         logs: Vec::new(),

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::words::count;
 use crate::mission::plan::{Group, Kind, Plan, Segment};
 
 /// Most rows of a timetable before the middle is left out.
@@ -10,9 +11,7 @@ const MAX_ROWS: usize = 60;
 /// The plan's head and the timetable of each group.
 pub(super) fn describe(plan: &Plan) -> String {
     let mut text = String::new();
-    let count = plan.slots.len();
-    let drones = if count == 1 { "1 drone".to_owned() } else { format!("{count} drones") };
-    let _ = write!(text, "{}: {drones}", plan.title);
+    let _ = write!(text, "{}: {}", plan.title, count(plan.slots.len(), "drone"));
     if let Some(grid) = plan.grid {
         let (rows, columns) = (grid.rows, grid.columns);
         let _ = write!(text, " in {rows} x {columns}, {} m apart", grid.spacing_m);
@@ -42,7 +41,12 @@ fn describe_group(text: &mut String, plan: &Plan, group: &Group) {
         let members =
             plan.slots.iter().filter(|slot| Some(usize::from(slot.group)) == index).count();
         let offset_s = group.offset_ms as f64 / 1000.0;
-        let _ = writeln!(text, "\ngroup {}: {members} drones, {offset_s} s later", group.name);
+        let _ = writeln!(
+            text,
+            "\ngroup {}: {}, {offset_s} s later",
+            group.name,
+            count(members, "drone")
+        );
     }
     let _ = writeln!(
         text,

@@ -3,7 +3,8 @@
 use super::error::TemplateError;
 use super::formation::{assign_groups, lay_out};
 use super::plan::{Fence, Group, PLAN_SCHEMA, Plan, Site};
-use super::steps::{Offset, Source, Timeline};
+use super::source::Source;
+use super::steps::{Offset, Timeline};
 use super::template::{FlightTemplate, span_of};
 use crate::vehicle::{Limits, Vehicle};
 

@@ -2,7 +2,7 @@
 
 use super::error::TemplateError;
 use super::plan::{Grid, Slot};
-use super::steps::Source;
+use super::source::Source;
 use super::template::{Selection, span_of};
 
 /// Most drones in a show: the Skybrush loader's limit.

@@ -9,6 +9,7 @@ pub mod error;
 pub mod formation;
 pub mod plan;
 pub mod resolve;
+mod source;
 pub mod steps;
 pub mod template;
 pub mod window;

@@ -58,6 +58,8 @@ pub struct Derived {
     pub reaches_takeoff_alt_s: Option<f64>,
     /// When the drone takes off, show time in s; `None`: the show is refused.
     pub takeoff_s: Option<f64>,
+    /// By how much it takes off too late, because the show starts too late for it, s.
+    pub late_s: f64,
     /// When it goes over to landing, show time in s.
     pub landing_s: f64,
     /// Altitude from which it lands by itself, m above the start point.
@@ -116,13 +118,22 @@ pub fn derive(trajectory: &Trajectory, firmware: Firmware, params: &DeriveParams
         )),
         Some(_) => {}
     }
+    let late_s = takeoff_s.map_or(0.0, |s| (-s).max(0.0));
     let takeoff_s = takeoff_s.map(|s| s.max(0.0));
     if takeoff_s.is_some_and(|takeoff_s| landing_s < takeoff_s) {
         reasons.push("it would land before it takes off".to_owned());
     }
     let valid = takeoff_s.is_some_and(|takeoff_s| landing_s >= takeoff_s);
     let lands_from_m = trajectory.state_at(landing_s).position_m.z - start_z_m;
-    Derived { reaches_takeoff_alt_s: reaches, takeoff_s, landing_s, lands_from_m, valid, reasons }
+    Derived {
+        reaches_takeoff_alt_s: reaches,
+        takeoff_s,
+        late_s,
+        landing_s,
+        lands_from_m,
+        valid,
+        reasons,
+    }
 }
 
 /// First time on the 1/16 s grid at which the altitude is reached. The firmware starts each piece's
@@ -133,13 +144,19 @@ fn reached_on_grid(trajectory: &Trajectory, altitude_m: f64) -> Option<f64> {
         if piece.end_ms <= piece.start_ms {
             continue;
         }
-        // Only where the curve may be high enough: its control points bound it.
-        let may_reach = z_points(&piece).points().iter().any(|z| *z >= altitude_m);
-        if !may_reach {
+        let lasts_ms = (piece.end_ms - piece.start_ms) as f64;
+        // Ticks before the curve first touches the altitude need not be looked at one by one.
+        let touch = if piece.from_m.z >= altitude_m {
+            Some(0.0)
+        } else {
+            first_touch(z_points(&piece), altitude_m)
+        };
+        let Some(touch) = touch else {
             tick = piece.end_ms * 2 / 125 + 1;
             continue;
-        }
-        let lasts_ms = (piece.end_ms - piece.start_ms) as f64;
+        };
+        let touch_ms = piece.start_ms as f64 + touch * lasts_ms;
+        tick = tick.max(((touch_ms / 62.5).floor() as u64).saturating_sub(1));
         // 1/16 s is 62.5 ms; the earlier piece holds at a boundary.
         while tick * 125 <= piece.end_ms * 2 {
             let u = (tick as f64 * 62.5 - piece.start_ms as f64) / lasts_ms;

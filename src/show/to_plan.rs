@@ -2,7 +2,7 @@
 //!
 //! What a show file does not say is inferred by stated rules:
 //! * drones whose trajectories differ only by their homes are one command group;
-//! * neighbouring pieces of the same constant velocity are one segment (files split long ones);
+//! * neighbouring pieces on one line at one constant velocity are one segment (files split long ones);
 //! * the first climb from the ground is the take-off, a last vertical descent the landing;
 //! * a vertical piece of at least 5 s between hovers is a rung of the ladder, any other a transfer;
 //! * a piece of constant acceleration is a ramp; a curve of changing acceleration is described as a
@@ -19,6 +19,9 @@ use crate::vehicle::{Limits, Vehicle};
 
 /// Velocities closer than this are the same, m/s: what rounding to a file's units can change.
 const SAME_VELOCITY_MPS: f64 = 0.01;
+/// How far the point between two pieces may be from the one line that they are taken for, m: the
+/// resolution of `.skyc` files. Slow commands that differ by less than a file's rounding stay apart.
+const JOINT_M: f64 = 0.001;
 /// Shortest vertical piece that counts as a rung, ms.
 const MIN_LEG_MS: u64 = 5_000;
 /// Fence room around a show that brings no fence, m.
@@ -99,6 +102,29 @@ struct Stretch {
     to_m: Vector3<f64>,
     velocity_mps: Vector3<f64>,
     from_velocity_mps: Option<Vector3<f64>>,
+    /// Velocities, m/s, of the lines from its start that pass all its inner points near enough.
+    passing_mps: [Vector3<f64>; 2],
+}
+
+impl Stretch {
+    fn seconds_to(&self, ms: u64) -> f64 {
+        (ms - self.start_ms) as f64 / 1000.0
+    }
+
+    /// Lengthens it to a new end, if it stays one straight line.
+    fn goes_straight_on(&mut self, end_ms: u64, to_m: Vector3<f64>) -> bool {
+        let joint_s = self.seconds_to(self.end_ms);
+        let (mean_mps, slack_mps) = ((self.to_m - self.from_m) / joint_s, JOINT_M / joint_s);
+        let low_mps = self.passing_mps[0].sup(&mean_mps.add_scalar(-slack_mps));
+        let high_mps = self.passing_mps[1].inf(&mean_mps.add_scalar(slack_mps));
+        let velocity_mps = (to_m - self.from_m) / self.seconds_to(end_ms);
+        let passes = low_mps <= velocity_mps && velocity_mps <= high_mps;
+        if passes {
+            self.passing_mps = [low_mps, high_mps];
+            (self.end_ms, self.to_m, self.velocity_mps) = (end_ms, to_m, velocity_mps);
+        }
+        passes
+    }
 }
 
 fn group(index: usize, trajectory: &Trajectory, curved: &mut bool) -> Group {
@@ -142,11 +168,8 @@ fn stretches(trajectory: &Trajectory, curved: &mut bool) -> Vec<Stretch> {
             if let Some(before) = stretches.last_mut()
                 && before.from_velocity_mps.is_none()
                 && (before.velocity_mps - mean_mps).norm() < SAME_VELOCITY_MPS
+                && before.goes_straight_on(piece.end_ms, to_m)
             {
-                before.end_ms = piece.end_ms;
-                before.to_m = to_m;
-                let duration_s = (before.end_ms - before.start_ms) as f64 / 1000.0;
-                before.velocity_mps = (before.to_m - before.from_m) / duration_s;
                 continue;
             }
         } else {
@@ -160,6 +183,7 @@ fn stretches(trajectory: &Trajectory, curved: &mut bool) -> Vec<Stretch> {
             to_m,
             velocity_mps: if straight { mean_mps } else { last.velocity_mps },
             from_velocity_mps: (!straight).then_some(first.velocity_mps),
+            passing_mps: [f64::NEG_INFINITY, f64::INFINITY].map(Vector3::repeat),
         });
     }
     stretches

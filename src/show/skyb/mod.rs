@@ -14,7 +14,7 @@ use thiserror::Error;
 
 pub use read::{BlockInfo, Event, SkybContents, read};
 pub use units::Quantisation;
-pub use write::{Scale, SkybFile, SkybOptions, write};
+pub use write::{Scale, SkybCost, SkybFile, SkybOptions, measure, write};
 
 /// First bytes of every file.
 pub const MAGIC: [u8; 4] = *b"skyb";

@@ -57,6 +57,19 @@ pub struct SkybFile {
     pub quantisation: Quantisation,
 }
 
+/// What a trajectory costs in a file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkybCost {
+    /// Size of the unit, mm.
+    pub scale_mm: u8,
+    /// Pieces in the file, after cutting long ones.
+    pub pieces: usize,
+    /// Size of the trajectory block's body, of 65 535 bytes.
+    pub trajectory_bytes: usize,
+    /// Deviation from the trajectory caused by whole units.
+    pub quantisation: Quantisation,
+}
+
 /// Writes one drone's show as a version 2 file with checksum.
 ///
 /// Coordinates are rounded to the nearest unit, piece by piece boundaries fall on the same
@@ -79,14 +92,11 @@ pub struct SkybFile {
 ///
 /// When the show does not fit the format; the error says what and by how much.
 pub fn write(drone: &ShowDrone, options: &SkybOptions) -> Result<SkybFile, SkybError> {
-    let pieces = cut(&drone.trajectory, u32::from(options.longest_piece_ms.max(1)))?;
-    let scale_mm = choose_scale(drone.trajectory.start_m, &pieces, options.scale)?;
-    let block = trajectory_block(drone.trajectory.start_m, &pieces, scale_mm)?;
-
-    let mut bytes = Vec::with_capacity(block.body.len() + drone.lights.len() + 64);
+    let (cost, body) = store(&drone.trajectory, options)?;
+    let mut bytes = Vec::with_capacity(body.len() + drone.lights.len() + 64);
     bytes.extend(MAGIC);
     bytes.extend([2, 1, 0, 0, 0, 0]);
-    push_block(&mut bytes, BlockKind::Trajectory, &block.body)?;
+    push_block(&mut bytes, BlockKind::Trajectory, &body)?;
     if !drone.lights.is_empty() {
         push_block(&mut bytes, BlockKind::Lights, &drone.lights)?;
     }
@@ -98,13 +108,30 @@ pub fn write(drone: &ShowDrone, options: &SkybOptions) -> Result<SkybFile, SkybE
     }
     let crc = ap_crc32(&bytes);
     bytes[6..10].copy_from_slice(&crc.to_le_bytes());
-    Ok(SkybFile {
-        bytes,
+    let SkybCost { scale_mm, pieces, trajectory_bytes, quantisation } = cost;
+    Ok(SkybFile { bytes, scale_mm, pieces, trajectory_bytes, quantisation })
+}
+
+/// What [`write()`] would make of a trajectory.
+///
+/// # Errors
+///
+/// As [`write()`].
+pub fn measure(trajectory: &Trajectory, options: &SkybOptions) -> Result<SkybCost, SkybError> {
+    store(trajectory, options).map(|(cost, _)| cost)
+}
+
+fn store(trajectory: &Trajectory, options: &SkybOptions) -> Result<(SkybCost, Vec<u8>), SkybError> {
+    let pieces = cut(trajectory, u32::from(options.longest_piece_ms.max(1)))?;
+    let scale_mm = choose_scale(trajectory.start_m, &pieces, options.scale)?;
+    let block = trajectory_block(trajectory.start_m, &pieces, scale_mm)?;
+    let cost = SkybCost {
         scale_mm,
         pieces: pieces.len(),
         trajectory_bytes: block.body.len(),
         quantisation: block.quantisation,
-    })
+    };
+    Ok((cost, block.body))
 }
 
 fn push_block(bytes: &mut Vec<u8>, kind: BlockKind, body: &[u8]) -> Result<(), SkybError> {

@@ -15,7 +15,7 @@ pub use read::{read, read_with};
 pub use write::write;
 
 /// Most drones the official loader takes.
-pub const MAX_DRONES: usize = 5000;
+pub use crate::mission::formation::MAX_DRONES;
 /// Largest coordinate that is taken for serious, m.
 pub const MAX_COORDINATE_M: f64 = 1e5;
 /// Longest show that is taken for serious, s.

@@ -1,0 +1,17 @@
+//! The program as its users meet it: arguments, exit codes, files, interruption.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot run the program fails")]
+
+#[path = "cli/support.rs"]
+mod support;
+
+#[path = "cli/analyze.rs"]
+mod analyze;
+#[path = "cli/help.rs"]
+mod help;
+#[path = "cli/inspect.rs"]
+mod inspect;
+#[path = "cli/plan.rs"]
+mod plan;
+#[path = "cli/simulate.rs"]
+mod simulate;
