@@ -1,7 +1,5 @@
 //! `docs/effects.md` is what the library says today; `UPDATE=1` rewrites it.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot read the repository fails")]
-
 use std::fs;
 use std::path::Path;
 

@@ -1,7 +1,5 @@
 //! The worked example of CONTRIBUTING compiles and does what it says there.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot read the repository fails")]
-
 // example
 use updraft::effects::definition::{Class, Definition, Hook, Parameter, Signal, Values};
 use updraft::effects::{Effect, Own, Reference, Signals, Start};

@@ -162,8 +162,11 @@ fn the_phantom_turns_as_published() {
     assert!((slope - 87.0).abs() < 3.0, "{slope}");
 }
 
+/// Pairs of numbers: legs as (duration s, height m), windows as (from s, to s).
+type Ladder = (Vec<(u32, f64)>, Vec<(f64, f64)>);
+
 /// The paper's ladder: legs, and for each moving leg the windows before, in and after it.
-fn ladder() -> (Vec<(u32, f64)>, Vec<(f64, f64)>) {
+fn ladder() -> Ladder {
     let mut legs = vec![(10, 20.0), (10, 20.0)];
     let mut windows = Vec::new();
     let mut now = 20.0;

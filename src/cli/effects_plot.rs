@@ -122,12 +122,12 @@ pub(super) fn svg(title: &str, x_label: &str, points: &[(f64, f64)]) -> String {
     let line: Vec<String> =
         points.iter().map(|(x, y)| format!("{:.1},{:.1}", px(*x), py(*y))).collect();
     let middle_y = f64::midpoint(top, bottom);
-    let _ = write!(
+    let _ = writeln!(
         svg,
         "<polyline points=\"{}\" fill=\"none\" stroke=\"#0b62a4\" stroke-width=\"2\"/>\
          <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
          <text x=\"18\" y=\"{middle_y:.1}\" text-anchor=\"middle\" \
-         transform=\"rotate(-90 18 {middle_y:.1})\">change of the pulse (us)</text></svg>\n",
+         transform=\"rotate(-90 18 {middle_y:.1})\">change of the pulse (us)</text></svg>",
         line.join(" "),
         f64::midpoint(left, right),
         HEIGHT - 14.0,

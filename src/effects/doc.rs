@@ -133,12 +133,11 @@ pub fn size_text(effect: &dyn super::Effect, vehicle: &Vehicle) -> Result<String
         curve.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, us)| {
             (low.min(*us), high.max(*us))
         });
-    let digits = if low.abs().max(high.abs()) < 9.95 { 1 } else { 0 };
+    let digits = usize::from(low.abs().max(high.abs()) < 9.95);
     // Adding zero turns a rounded -0 into 0.
     let rounded = |value: f64| {
-        let scale = 10_f64.powi(digits);
+        let scale = if digits == 1 { 10.0 } else { 1.0 };
         (value * scale).round() / scale + 0.0
     };
-    let digits = digits as usize;
     Ok(format!("{:+.digits$} .. {:+.digits$}", rounded(low), rounded(high)))
 }

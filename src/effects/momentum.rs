@@ -42,7 +42,7 @@ pub fn induced(axial: f64, edgewise: f64) -> f64 {
 /// A rotor at fixed speed in axial and edgewise flow.
 pub fn at_speed(share: f64, axial: f64, edgewise: f64) -> Working {
     let beta = beta(share);
-    let half = (axial + beta) / 2.0;
+    let half = f64::midpoint(axial, beta);
     let mut value = -half + (half * half + 1.0 + beta - beta * axial).max(0.0).sqrt();
     if edgewise > 0.0 {
         for _ in 0..STEPS {

@@ -15,7 +15,7 @@ use updraft::vehicle::Vehicle;
 use updraft::vehicle::library::builtin;
 
 /// A built-in vehicle without its effects, and then with these choices.
-pub fn vehicle(name: &str, choices: &[&str]) -> Vehicle {
+pub(crate) fn vehicle(name: &str, choices: &[&str]) -> Vehicle {
     let mut vehicle = builtin(name).expect("a built-in vehicle");
     vehicle.effects.clear();
     for choice in choices {
@@ -26,20 +26,20 @@ pub fn vehicle(name: &str, choices: &[&str]) -> Vehicle {
 
 /// What is flown: legs of (duration s, height at their end m), and in which air.
 #[derive(Clone)]
-pub struct Flight {
-    pub legs: Vec<(u32, f64)>,
-    pub air_mps: Vector3<f64>,
-    pub home_m: Vector3<f64>,
-    pub drone: u16,
-    pub seed: u64,
-    pub amsl_m: f64,
+pub(crate) struct Flight {
+    pub(crate) legs: Vec<(u32, f64)>,
+    pub(crate) air_mps: Vector3<f64>,
+    pub(crate) home_m: Vector3<f64>,
+    pub(crate) drone: u16,
+    pub(crate) seed: u64,
+    pub(crate) amsl_m: f64,
     /// Windows, show time from and to, s.
-    pub windows: Vec<(f64, f64)>,
+    pub(crate) windows: Vec<(f64, f64)>,
 }
 
 impl Flight {
     /// Hover at a height for 60 s; the window is its second half.
-    pub fn hover(height_m: f64) -> Self {
+    pub(crate) fn hover(height_m: f64) -> Self {
         Self {
             legs: vec![(4, 3.0), (20, height_m), (60, height_m), (20, 3.0)],
             air_mps: Vector3::zeros(),
@@ -52,7 +52,7 @@ impl Flight {
     }
 
     /// Vertical motion at a speed for 20 s, around 60 m; the window is the last 10 s but one.
-    pub fn moving(speed_mps: f64) -> Self {
+    pub(crate) fn moving(speed_mps: f64) -> Self {
         let from_m = 60.0 - 10.0 * speed_mps;
         Self {
             legs: vec![
@@ -68,7 +68,7 @@ impl Flight {
         }
     }
 
-    pub fn wind(mut self, wind_mps: f64) -> Self {
+    pub(crate) fn wind(mut self, wind_mps: f64) -> Self {
         self.air_mps.x = wind_mps;
         self
     }
@@ -76,18 +76,18 @@ impl Flight {
 
 /// Means over a window.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Steady {
-    pub count: f64,
-    pub time_s: f64,
-    pub pulse_us: f64,
-    pub climb_mps: f64,
-    pub measured_mps: f64,
-    pub height_m: f64,
-    pub tilt_rad: f64,
-    pub density_ratio: f64,
-    pub used_ah: f64,
-    pub speed_radps: f64,
-    pub pulse_sd_us: f64,
+pub(crate) struct Steady {
+    pub(crate) count: f64,
+    pub(crate) time_s: f64,
+    pub(crate) pulse_us: f64,
+    pub(crate) climb_mps: f64,
+    pub(crate) measured_mps: f64,
+    pub(crate) height_m: f64,
+    pub(crate) tilt_rad: f64,
+    pub(crate) density_ratio: f64,
+    pub(crate) used_ah: f64,
+    pub(crate) speed_radps: f64,
+    pub(crate) pulse_sd_us: f64,
 }
 
 struct Averages(Vec<((f64, f64), Steady)>, Vec<Vec<f64>>);
@@ -117,7 +117,7 @@ impl Recorder for Averages {
 }
 
 /// Flies and averages over the windows.
-pub fn fly_windows(vehicle: &Vehicle, flight: &Flight) -> Vec<Steady> {
+pub(crate) fn fly_windows(vehicle: &Vehicle, flight: &Flight) -> Vec<Steady> {
     let segments = flight
         .legs
         .iter()
@@ -171,6 +171,6 @@ pub fn fly_windows(vehicle: &Vehicle, flight: &Flight) -> Vec<Steady> {
 }
 
 /// Flies and averages over the only window.
-pub fn steady(vehicle: &Vehicle, flight: &Flight) -> Steady {
+pub(crate) fn steady(vehicle: &Vehicle, flight: &Flight) -> Steady {
     fly_windows(vehicle, flight)[0]
 }
