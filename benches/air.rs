@@ -74,6 +74,7 @@ fn hover(bencher: Bencher<'_, '_>, spec: &str) {
     let air = air(spec);
     let setup = FlightSetup {
         vehicle: &vehicle,
+        lights: &[],
         trajectory: &trajectory,
         home_m: Vector3::zeros(),
         frame: frame(),

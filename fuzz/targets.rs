@@ -57,6 +57,8 @@ fn json_packet(bytes: &[u8]) {
         home_m: Vector3::zeros(),
         frame: ShowFrame { origin, orientation_deg: 59.0 },
         atmosphere: &air,
+        seed: 1,
+        drone: 1,
     });
     let peer = SocketAddr::from(([127, 0, 0, 1], 50_000));
     let mut rest = bytes;

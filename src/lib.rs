@@ -10,6 +10,7 @@
 //!   downstream reads.
 //! * [`show`]: plans become trajectories and Skybrush files (`.skyc`, `.skyb`, zipped CSV), and back.
 //! * [`check`]: exact safety checks on the trajectory pieces.
+//! * [`effects`]: physics beyond the base model, each piece stated once, for simulator and analysis.
 //! * [`sim`]: the embedded simulator flies a show and writes the same `.BIN` logs as a drone.
 //! * [`log`]: the ArduPilot DataFlash format, reader and writer.
 //! * [`flight`]: one drone's log as time series in show time.
@@ -29,6 +30,7 @@ pub mod base;
 pub mod campaign;
 pub mod check;
 pub mod cli;
+pub mod effects;
 pub mod flight;
 pub mod log;
 pub mod mission;

@@ -106,6 +106,8 @@ fn flight(air: &dyn Atmosphere) -> (Vec<[f64; 4]>, Status) {
         home_m: Vector3::zeros(),
         frame: place,
         atmosphere: air,
+        seed: 1,
+        drone: 1,
     });
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = socket.local_addr().unwrap();

@@ -37,7 +37,14 @@ fn vehicle() -> Vehicle {
 fn instance<'a>(vehicle: &'a Vehicle, atmosphere: &'a dyn Atmosphere) -> Instance<'a> {
     // The recording was made at a home 190 m above sea level.
     let home_m = Vector3::new(3.0, 4.0, 0.0);
-    Instance::new(InstanceSetup { vehicle, home_m, frame: frame(190.0), atmosphere })
+    Instance::new(InstanceSetup {
+        vehicle,
+        home_m,
+        frame: frame(190.0),
+        atmosphere,
+        seed: 1,
+        drone: 1,
+    })
 }
 
 fn peer() -> SocketAddr {

@@ -15,6 +15,8 @@ pub enum Purpose {
     Air = 3,
     /// Resampling in statistics.
     Resampling = 4,
+    /// Chance within an effect, such as gusts.
+    Effects = 5,
 }
 
 /// The random stream of one drone and purpose. PCG's output is stable across releases.

@@ -52,6 +52,9 @@ pub enum CommandError {
     /// A vehicle is unknown or wrong.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
+    /// An effect cannot be used.
+    #[error(transparent)]
+    Effect(#[from] crate::effects::EffectError),
     /// A campaign folder cannot be used.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
@@ -148,6 +151,7 @@ impl CommandError {
             Self::Mission(_)
             | Self::Study(_)
             | Self::Vehicle(_)
+            | Self::Effect(_)
             | Self::Campaign(_)
             | Self::Load(_)
             | Self::Log(_)

@@ -4,6 +4,8 @@ mod analyze;
 mod check;
 mod clock;
 mod context;
+mod effects;
+mod effects_plot;
 pub mod exit;
 mod inspect;
 mod load;
@@ -100,6 +102,8 @@ enum Command {
     Analyze(analyze::AnalyzeArgs),
     /// Fly the ladder in every wind and updraft of a study, and correlate what is found with the truth
     Sweep(sweep::SweepArgs),
+    /// List the physics that can be flown, or explain one piece
+    Effects(effects::EffectsArgs),
     /// Say what is in a file
     Inspect(inspect::InspectArgs),
     /// Print a shell's completion script
@@ -145,6 +149,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
         Command::Sweep(args) => sweep::run(context, &args),
+        Command::Effects(args) => effects::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),
         Command::Man => tools::man(context, Cli::command()),

@@ -248,6 +248,8 @@ fn stations<'a>(
                 home_m: *home_m,
                 frame: fleet.frame,
                 atmosphere,
+                seed: args.air.seed,
+                drone: (index + 1) as u16,
             }),
             status: Mutex::default(),
         });

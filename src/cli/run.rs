@@ -94,6 +94,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
             truth: air.truth,
             seed: air.seed,
             full_logs: air.full_logs,
+            effects: air.effects,
             vehicle: None,
             only: None,
             force: args.force,

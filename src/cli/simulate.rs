@@ -16,6 +16,7 @@ use super::words;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
+use crate::effects;
 use crate::mission::Plan;
 use crate::show::{Show, Trajectory};
 use crate::sim::air::spec::{self, Air, AirSpec};
@@ -51,6 +52,17 @@ pub(super) struct AirArgs {
     /// Log the firmware's whole default set of messages (about ten times larger)
     #[arg(long)]
     pub(super) full_logs: bool,
+    /// Switch a piece of physics on or off, or set a parameter: NAME, NAME=off, NAME.PARAMETER=NUMBER
+    /// (`updraft effects` lists them)
+    #[arg(long = "effect", value_name = "NAME[=off]", value_parser = effect)]
+    pub(super) effects: Vec<String>,
+}
+
+/// Checks a choice of effect without its vehicle's own bounds.
+fn effect(text: &str) -> Result<String, String> {
+    let name = text.split(['=', '.']).next().unwrap_or_default().trim();
+    effects::select::known(name).map_err(|error| error.to_string())?;
+    Ok(text.to_owned())
 }
 
 /// What one `--air` asks for.
@@ -167,6 +179,8 @@ pub(super) struct Simulation {
     pub(super) truth: bool,
     pub(super) seed: u64,
     pub(super) full_logs: bool,
+    /// Choices of effects, over the vehicle's own.
+    pub(super) effects: Vec<String>,
     pub(super) vehicle: Option<Vehicle>,
     pub(super) only: Option<SlotSet>,
     pub(super) force: bool,
@@ -197,6 +211,7 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
         truth: args.air.truth,
         seed: args.air.seed,
         full_logs: args.air.full_logs,
+        effects: args.air.effects.clone(),
         vehicle,
         only: args.drones.clone(),
         force: args.force,
@@ -228,10 +243,14 @@ pub(super) fn simulate(
     simulation: &Simulation,
 ) -> Result<Flown, CommandError> {
     let watch = Stopwatch::start();
-    let vehicle = match &simulation.vehicle {
+    let mut vehicle = match &simulation.vehicle {
         Some(vehicle) => vehicle.clone(),
         None => library::load(&folder.vehicle().display().to_string())?,
     };
+    for choice in &simulation.effects {
+        effects::select::choose(&mut vehicle, choice)?;
+    }
+    effects::select::resolved(&vehicle)?;
     if let Some(stray) = simulation.only.as_ref().and_then(|set| set.stray(plan)) {
         return Err(CommandError::Usage(format!(
             "{} has no slot {stray}; slots are 1 to {}",

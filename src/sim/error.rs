@@ -42,6 +42,15 @@ pub enum SimError {
         /// Which number.
         what: &'static str,
     },
+    /// The vehicle's effects cannot be used.
+    #[error("drone {drone}: the vehicle's effects cannot be used")]
+    Effect {
+        /// The drone's slot.
+        drone: u16,
+        /// Which one, and why.
+        #[source]
+        source: crate::effects::EffectError,
+    },
     /// The motion became infinite or undefined.
     #[error(
         "drone {drone}: the motion became undefined at show time {time_s:.1} s; check the wind"

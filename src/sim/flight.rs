@@ -18,6 +18,7 @@ use super::sensors::Sensors;
 use crate::base::file::write_with;
 use crate::base::frame::ShowFrame;
 use crate::base::time::GpsTime;
+use crate::effects::Active;
 use crate::show::Trajectory;
 use crate::vehicle::Vehicle;
 
@@ -166,7 +167,9 @@ pub fn fly_with<R: Recorder>(
     if let Some(frame) = &setup.vehicle.airframe.sitl {
         pilot.motors.set_voltage(frame.battery_voltage_v);
     }
-    let mut plant = Plant::new(&setup.vehicle.airframe, setup.home_m, STEP_S);
+    let (effects, airframe) = Active::start(setup.vehicle, setup.seed, drone, setup.home_m, STEP_S)
+        .map_err(|source| SimError::Effect { drone, source })?;
+    let mut plant = Plant::with_effects(&airframe, effects, setup.home_m, STEP_S);
     let mut sensors = Sensors::new(setup.seed, drone, STEP_S);
 
     let takeoff_s = pilot.director.takeoff_s;
@@ -202,6 +205,7 @@ pub fn fly_with<R: Recorder>(
         }
         let mut estimate = sensors.sense(plant.motion());
         estimate.acceleration_mps2.z += plant.impact_mps2();
+        plant.sense(&mut estimate.velocity_mps.z);
         let pulses = pilot.update(time_s, &estimate);
         tally.note(&pilot, &plant, time_s, setup.home_m.z);
         let moment = Moment {

@@ -85,6 +85,7 @@ pub(super) fn fly_cell(
         atmosphere: &air,
         seed: cell.seed(seed),
         drone: study.slot.slot,
+        lights: &[],
         start: START,
         full_logs: false,
         hooks: Hooks { progress: None, stop: Some(stop) },

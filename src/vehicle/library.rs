@@ -12,6 +12,8 @@ const MAX_VEHICLE_BYTES: u64 = 1 << 20;
 const BUILTIN: &[(&str, &str)] = &[
     ("airsim-generic-quad", include_str!("../../templates/vehicles/airsim-generic-quad.toml")),
     ("arducopter-sitl", include_str!("../../templates/vehicles/arducopter-sitl.toml")),
+    ("phantom4", include_str!("../../templates/vehicles/phantom4.toml")),
+    ("pixel", include_str!("../../templates/vehicles/pixel.toml")),
 ];
 
 /// Names of the built-in vehicles, sorted.
@@ -64,7 +66,7 @@ mod tests {
 
     #[test]
     fn an_unknown_name_is_told_what_exists() {
-        let error = builtin("pixel").unwrap_err().to_string();
-        assert!(error.contains("pixel") && error.contains("airsim-generic-quad"), "{error}");
+        let error = builtin("pixle").unwrap_err().to_string();
+        assert!(error.contains("pixle") && error.contains("airsim-generic-quad"), "{error}");
     }
 }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::{SitlFrame, Vehicle};
+use super::{RotorLaw, SitlFrame, Vehicle};
 
 /// A vehicle file could not be used.
 #[derive(Debug, Error)]
@@ -81,6 +81,18 @@ impl Vehicle {
             && !CELSIUS.1(celsius)
         {
             return Err(fail("autopilot.baro_ground_temperature_c", celsius, CELSIUS.0));
+        }
+        if let RotorLaw::Motor(motor) = &self.airframe.rotor {
+            for (key, value, (allowed, holds)) in [
+                ("airframe.rotor.supply_v", motor.supply_v, POSITIVE),
+                ("airframe.rotor.kv_rpm_per_v", motor.kv_rpm_per_v, POSITIVE),
+                ("airframe.rotor.resistance_ohm", motor.resistance_ohm, POSITIVE),
+                ("airframe.rotor.no_load_a", motor.no_load_a, NOT_NEGATIVE),
+            ] {
+                if !holds(value) {
+                    return Err(fail(key, value, allowed));
+                }
+            }
         }
         let (low, high) = (self.autopilot.mot_spin_min, self.autopilot.mot_spin_max);
         if low >= high {

@@ -1,13 +1,19 @@
 //! Vehicles: flight limits, airframe and autopilot settings, one TOML file each in
 //! `templates/vehicles/`.
 
+mod effects;
 pub mod library;
 mod load;
+mod rotor;
+
+use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use effects::EffectTable;
 pub use load::VehicleError;
+pub use rotor::{MotorLaw, RotorLaw};
 
 /// A vehicle as its TOML file states it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,6 +31,9 @@ pub struct Vehicle {
     pub airframe: Airframe,
     /// Autopilot parameters that shape the pulse.
     pub autopilot: Autopilot,
+    /// Physics beyond AirSim's that this vehicle has, by name (`updraft effects` lists them).
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub effects: BTreeMap<String, EffectTable>,
 }
 
 /// What a vehicle may be asked to do; plans are checked against it.
@@ -79,6 +88,9 @@ pub struct Airframe {
     pub motor_time_constant_s: f64,
     /// Linear drag coefficient of the box faces (AirSim: 1.3 / 4).
     pub drag_coefficient: f64,
+    /// How a command becomes thrust.
+    #[serde(default, skip_serializing_if = "RotorLaw::is_linear")]
+    pub rotor: RotorLaw,
     /// Rotors, drag and inertia of ArduPilot's own simulator instead of AirSim's; only the mass is
     /// taken from the above.
     #[serde(default, skip_serializing_if = "Option::is_none")]

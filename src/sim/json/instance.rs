@@ -10,6 +10,7 @@ use super::imu::Imu;
 use super::packet::{PacketError, ServoPacket};
 use super::reply::write_reply;
 use crate::base::frame::ShowFrame;
+use crate::effects::Active;
 use crate::sim::air::{Atmosphere, Surroundings, density_ratio};
 use crate::sim::flight::command;
 use crate::sim::plant::{Plant, rotor::ROTORS};
@@ -33,6 +34,21 @@ pub struct InstanceSetup<'a> {
     pub frame: ShowFrame,
     /// Motion of the air, at the time since the firmware's start.
     pub atmosphere: &'a dyn Atmosphere,
+    /// Seed of what differs between drones and of random effects.
+    pub seed: u64,
+    /// Which drone of the fleet it is.
+    pub drone: u16,
+}
+
+impl InstanceSetup<'_> {
+    /// The body with the vehicle's effects, at home. A vehicle whose effects cannot start flies
+    /// without them: whoever loads it checks that before.
+    fn plant(&self, step_s: f64) -> Plant {
+        match Active::start(self.vehicle, self.seed, self.drone, self.home_m, step_s) {
+            Ok((effects, airframe)) => Plant::with_effects(&airframe, effects, self.home_m, step_s),
+            Err(_) => Plant::new(&self.vehicle.airframe, self.home_m, step_s),
+        }
+    }
 }
 
 /// One body in its air, in lockstep with one firmware.
@@ -107,7 +123,7 @@ impl<'a> Instance<'a> {
         let step_s = 1.0 / f64::from(MIN_STEP_RATE_HZ);
         Self {
             setup,
-            plant: Plant::new(&setup.vehicle.airframe, setup.home_m, step_s),
+            plant: setup.plant(step_s),
             around: Surroundings { air_velocity_mps: Vector3::zeros(), density_ratio: 1.0 },
             air_until_s: f64::NEG_INFINITY,
             time_s: 0.0,
@@ -186,7 +202,7 @@ impl<'a> Instance<'a> {
     /// Puts the body back home at time 0.
     fn restart(&mut self, rate_hz: u16) {
         self.step_s = step_s(rate_hz).1;
-        self.plant = Plant::new(&self.setup.vehicle.airframe, self.setup.home_m, self.step_s);
+        self.plant = self.setup.plant(self.step_s);
         self.time_s = 0.0;
         self.air_until_s = f64::NEG_INFINITY;
     }
@@ -272,6 +288,8 @@ mod tests {
             home_m: Vector3::new(7.0, -14.0, 0.5),
             frame: ShowFrame { origin, orientation_deg: 59.0 },
             atmosphere,
+            seed: 1,
+            drone: 1,
         }))
     }
 

@@ -10,6 +10,7 @@ pub mod sitl;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use super::air::Surroundings;
+use crate::effects::{Active, Air, Change, Hook, Now, Reading};
 use crate::vehicle::Airframe;
 use drag::Drag;
 use rotor::{LAYOUT, ROTORS, Rotors};
@@ -47,7 +48,7 @@ pub struct Motion {
 }
 
 /// The simulated body with its rotors.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Plant {
     per_mass: f64,
     inertia: Vector3<f64>,
@@ -58,6 +59,9 @@ pub struct Plant {
     drag: Drag,
     /// Stands in for rotors and drag.
     sitl: Option<Sitl>,
+    effects: Active,
+    /// Torque of the rotors over that in still air, as the effects had it in the last step.
+    torque: f64,
     motion: Motion,
     on_ground: bool,
     impact_mps2: f64,
@@ -67,6 +71,16 @@ impl Plant {
     /// A body at rest on the ground at `home_m` (show frame), heading along show x, for steps of
     /// `dt_s`.
     pub fn new(airframe: &Airframe, home_m: Vector3<f64>, dt_s: f64) -> Self {
+        Self::with_effects(airframe, Active::default(), home_m, dt_s)
+    }
+
+    /// The same with effects.
+    pub fn with_effects(
+        airframe: &Airframe,
+        effects: Active,
+        home_m: Vector3<f64>,
+        dt_s: f64,
+    ) -> Self {
         let sitl = airframe.sitl.map(|frame| Sitl::new(&frame, airframe.mass_kg));
         let inertia = sitl.map_or_else(|| inertia_kgm2(airframe), |sitl| sitl.inertia_kgm2());
         Self {
@@ -78,6 +92,8 @@ impl Plant {
             rotors: Rotors::new(airframe, dt_s),
             drag: Drag::new(airframe),
             sitl,
+            effects,
+            torque: 1.0,
             motion: Motion {
                 position_m: home_m,
                 velocity_mps: Vector3::zeros(),
@@ -119,6 +135,19 @@ impl Plant {
         self.impact_mps2
     }
 
+    /// The battery, if this vehicle has one.
+    pub fn battery(&self) -> Option<Reading> {
+        self.effects.battery()
+    }
+
+    /// Changes what the autopilot takes for its vertical speed, m/s up, as the effects say.
+    #[inline]
+    pub fn sense(&mut self, climb_mps: &mut f64) {
+        if self.effects.acts(Hook::Sense) {
+            self.effects.sense(self.dt_s, climb_mps);
+        }
+    }
+
     /// Moves on by one step with rotor commands in 0..1.
     ///
     /// The velocity-Verlet scheme of AirSim's FastPhysicsEngine: drag at the velocity expected in
@@ -130,13 +159,22 @@ impl Plant {
         let middle_radps = now.rate_radps + now.angular_acceleration * half_s;
 
         let mut loads = Loads::default();
-        let relative = now.rotation.tr_mul(&(middle_mps - around.air_velocity_mps));
-        if let Some(sitl) = &mut self.sitl {
-            sitl.add_loads(command, &relative, &middle_radps, around.density_ratio, &mut loads);
+        let (air, change, command) = if self.effects.any() {
+            self.affected(command, around, &middle_mps)
         } else {
-            self.rotors.add_loads(around.density_ratio, &mut loads);
-            self.drag.add_loads(&relative, around.density_ratio, &mut loads);
+            let air =
+                Air { velocity_mps: around.air_velocity_mps, density_ratio: around.density_ratio };
+            (air, Change::default(), *command)
+        };
+        let now = &self.motion;
+        let relative = now.rotation.tr_mul(&(middle_mps - air.velocity_mps));
+        if let Some(sitl) = &mut self.sitl {
+            sitl.add_loads(&command, &relative, &middle_radps, air.density_ratio, &mut loads);
+        } else {
+            self.rotors.add_loads(air.density_ratio, &change, &mut loads);
+            self.drag.add_loads(&relative, air.density_ratio, &mut loads);
         }
+        loads.force_n += change.force_n;
 
         let mut acceleration = now.rotation * (loads.force_n * self.per_mass);
         acceleration.z -= GRAVITY;
@@ -152,8 +190,50 @@ impl Plant {
         next.attitude = turned(next.attitude, middle_radps * self.dt_s);
         next.rotation = *next.attitude.to_rotation_matrix().matrix();
 
-        self.rotors.advance(command);
+        self.rotors.advance(&command, air.density_ratio * change.torque);
         self.rest_on_ground();
+    }
+
+    /// The air, the loads' changes and the commands as the effects make them.
+    fn affected(
+        &mut self,
+        command: &[f64; ROTORS],
+        around: &Surroundings,
+        velocity_mps: &Vector3<f64>,
+    ) -> (Air, Change, [f64; ROTORS]) {
+        let motion = &self.motion;
+        let mut air =
+            Air { velocity_mps: around.air_velocity_mps, density_ratio: around.density_ratio };
+        let thrust_n = self.rotors.thrust_n(air.density_ratio);
+        let mut now = Now {
+            dt_s: self.dt_s,
+            position_m: motion.position_m,
+            height_m: motion.position_m.z - self.ground_z_m,
+            relative_mps: motion.rotation.tr_mul(&(velocity_mps - air.velocity_mps)),
+            acceleration_mps2: motion.rotation.tr_mul(&motion.acceleration_mps2),
+            density_ratio: air.density_ratio,
+            thrust_n,
+            power_w: 0.0,
+            turning: thrust_n > 0.0,
+        };
+        if self.effects.acts(Hook::Air) {
+            self.effects.air(&now, &mut air);
+            now.relative_mps = motion.rotation.tr_mul(&(velocity_mps - air.velocity_mps));
+            now.density_ratio = air.density_ratio;
+            now.thrust_n = self.rotors.thrust_n(air.density_ratio);
+        }
+        let mut command = *command;
+        if self.effects.acts(Hook::Command) {
+            now.power_w = self.rotors.power_w(air.density_ratio, self.torque);
+            self.effects.follow(&now);
+            command = command.map(|command| self.effects.command(command));
+        }
+        let mut change = Change::default();
+        if self.effects.acts(Hook::Loads) {
+            change = self.effects.loads(&now);
+        }
+        self.torque = change.torque;
+        (air, change, command)
     }
 
     /// The ground carries what would sink into it, and holds it level: drones stand on their legs.

@@ -1,5 +1,7 @@
-//! A battery for the log: AirSim has none, so this one only reports and does not act on the motors.
+//! The battery as the log has it: the vehicle's own (the effect `battery`), or, as AirSim has none,
+//! one that only reports and does not act on the motors.
 
+use crate::effects::Reading;
 use crate::sim::flight::STEP_S;
 use crate::sim::plant::rotor::Rotors;
 use crate::sim::plant::{GRAVITY, Plant};
@@ -24,6 +26,7 @@ pub(super) struct Battery {
     pub(super) used_as: f64,
     /// Energy used, J.
     pub(super) used_j: f64,
+    own: Option<Reading>,
 }
 
 impl Battery {
@@ -38,11 +41,19 @@ impl Battery {
             current_a: 0.0,
             used_as: 0.0,
             used_j: 0.0,
+            own: None,
         }
     }
 
     /// Draws for `interval_s` at the rotors' present output: ideal power goes with thrust to 3/2.
     pub(super) fn draw(&mut self, plant: &Plant, interval_s: f64) {
+        self.own = plant.battery();
+        if let Some(own) = self.own {
+            self.current_a = own.amps;
+            self.used_as = own.used_ah * 3600.0;
+            self.used_j += own.amps * own.volts * interval_s;
+            return;
+        }
         let load = plant.rotors().total_output() / self.hover_output;
         self.current_a = 0.3 + self.hover_a * load.max(0.0).powf(1.5);
         self.used_as += self.current_a * interval_s;
@@ -51,21 +62,28 @@ impl Battery {
 
     /// Voltage at rest, V.
     pub(super) fn resting_volts(&self) -> f64 {
+        if let Some(own) = self.own {
+            return own.resting_v;
+        }
         FULL_V - (FULL_V - EMPTY_V) * (self.used_as / self.capacity_as).min(1.0)
     }
 
     /// Voltage under load, V.
     pub(super) fn volts(&self) -> f64 {
+        if let Some(own) = self.own {
+            return own.volts;
+        }
         self.resting_volts() - RESISTANCE_OHM * self.current_a
     }
 
     /// Resistance, ohm.
-    pub(super) fn resistance_ohm() -> f64 {
-        RESISTANCE_OHM
+    pub(super) fn resistance_ohm(&self) -> f64 {
+        self.own.map_or(RESISTANCE_OHM, |own| own.resistance_ohm)
     }
 
     /// Charge left, percent.
     pub(super) fn remaining_percent(&self) -> f64 {
-        (100.0 * (1.0 - self.used_as / self.capacity_as)).clamp(0.0, 100.0)
+        let capacity_as = self.own.map_or(self.capacity_as, |own| own.capacity_ah * 3600.0);
+        (100.0 * (1.0 - self.used_as / capacity_as)).clamp(0.0, 100.0)
     }
 }

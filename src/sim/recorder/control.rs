@@ -100,7 +100,7 @@ fn write_throttle<W: Write>(
             F(battery.used_as / 3.6),
             F(battery.used_j / 3600.0),
             F(0.0),
-            F(Battery::resistance_ohm()),
+            F(battery.resistance_ohm()),
             I(battery.remaining_percent() as i64),
         ],
     )?;

@@ -1,4 +1,4 @@
-//! Rotors: thrust and torque linear in the command, behind a first-order lag.
+//! AirSim's rotors: thrust and torque linear in the command, behind a first-order lag.
 //!
 //! AirSim's RotorActuator and RotorParams: no influence of the air's motion on the thrust.
 
@@ -6,24 +6,19 @@ use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use nalgebra::Vector3;
 
-use super::Loads;
+use super::{LAYOUT, ROTORS, lag_gain};
+use crate::effects::Change;
+use crate::effects::reference::rotor_w;
 use crate::sim::air::SEA_LEVEL_DENSITY;
-use crate::vehicle::Airframe;
-
-/// Number of rotors.
-pub const ROTORS: usize = 4;
-
-/// Where each rotor sits (forward, left: signs) and the sign of its torque about the up axis, in
-/// ArduPilot's order for a quad X: front right, rear left, front left, rear right. The first two
-/// turn counter-clockwise seen from above, which turns the body clockwise.
-pub const LAYOUT: [(f64, f64, f64); ROTORS] =
-    [(1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)];
+use crate::sim::plant::Loads;
+use crate::vehicle::{Airframe, RotorLaw};
 
 /// The four rotors and their state.
 #[derive(Clone, Copy, Debug)]
-pub struct Rotors {
+pub struct Linear {
     max_thrust_n: f64,
     max_torque_nm: f64,
+    max_radps: f64,
     /// Distance of a rotor from the body's forward and left axes, m.
     offset_m: f64,
     /// Share of the way to the command that the filter goes in one step.
@@ -33,7 +28,7 @@ pub struct Rotors {
     output: [f64; ROTORS],
 }
 
-impl Rotors {
+impl Linear {
     /// Rotors at rest, for steps of `dt_s`.
     pub fn new(airframe: &Airframe, dt_s: f64) -> Self {
         let revolutions_per_s = airframe.max_rpm / 60.0;
@@ -46,6 +41,7 @@ impl Rotors {
                 * pressure
                 * airframe.rotor_diameter_m.powi(5)
                 / TAU,
+            max_radps: airframe.max_rpm * TAU / 60.0,
             offset_m: airframe.arm_m * FRAC_1_SQRT_2,
             gain: lag_gain(airframe, dt_s),
             filtered: [0.0; ROTORS],
@@ -69,7 +65,7 @@ impl Rotors {
     }
 
     /// Adds thrust and torque at the present output.
-    pub fn add_loads(&self, density_ratio: f64, loads: &mut Loads) {
+    pub fn add_loads(&self, density_ratio: f64, change: &Change, loads: &mut Loads) {
         let [mut thrust, mut roll, mut pitch, mut yaw] = [0.0; 4];
         for ((forward, left, turn), output) in LAYOUT.into_iter().zip(self.output) {
             thrust += output;
@@ -77,11 +73,27 @@ impl Rotors {
             pitch -= forward * output;
             yaw += turn * output;
         }
-        let thrust_n = self.max_thrust_n * density_ratio;
+        let thrust_n = self.max_thrust_n * density_ratio * change.thrust;
         loads.force_n.z += thrust * thrust_n;
         let lever = self.offset_m * thrust_n;
-        loads.torque_nm +=
-            Vector3::new(roll * lever, pitch * lever, yaw * self.max_torque_nm * density_ratio);
+        let torque_nm = self.max_torque_nm * density_ratio * change.torque;
+        loads.torque_nm += Vector3::new(roll * lever, pitch * lever, yaw * torque_nm);
+    }
+
+    /// Thrust of all rotors in still air at their present output, N.
+    pub fn thrust_n(&self, density_ratio: f64) -> f64 {
+        self.total_output() * self.max_thrust_n * density_ratio
+    }
+
+    /// Electrical power at the present output, W.
+    pub fn power_w(&self, density_ratio: f64, torque: f64) -> f64 {
+        self.output
+            .iter()
+            .map(|output| {
+                let torque_nm = output * self.max_torque_nm * density_ratio * torque;
+                rotor_w(&RotorLaw::Linear, output.max(0.0).sqrt() * self.max_radps, torque_nm)
+            })
+            .sum()
     }
 
     /// Moves the rotors on by one step towards `command` (0..1 of full thrust).
@@ -100,16 +112,6 @@ impl Rotors {
     }
 }
 
-/// Share of the way to the command that the motors go in one step.
-fn lag_gain(airframe: &Airframe, dt_s: f64) -> f64 {
-    if airframe.motor_time_constant_s > 0.0 {
-        // Exact for a command held over the step.
-        -(-dt_s / airframe.motor_time_constant_s).exp_m1()
-    } else {
-        1.0
-    }
-}
-
 /// AirSim's rotor parameters are stated for 1.225 kg/m³, not for its own sea-level density.
 const REFERENCE_DENSITY: f64 = 1.225;
 const _: () = assert!((SEA_LEVEL_DENSITY - REFERENCE_DENSITY).abs() < 1e-4);
@@ -119,8 +121,8 @@ mod tests {
     use super::*;
     use crate::vehicle::library::builtin;
 
-    fn rotors() -> Rotors {
-        Rotors::new(&builtin("airsim-generic-quad").unwrap().airframe, 0.0025)
+    fn rotors() -> Linear {
+        Linear::new(&builtin("airsim-generic-quad").unwrap().airframe, 0.0025)
     }
 
     #[test]
@@ -153,11 +155,11 @@ mod tests {
         let mut rotors = rotors();
         rotors.settle(&[1.0, 0.0, 0.0, 0.0]);
         let mut loads = Loads::default();
-        rotors.add_loads(1.0, &mut loads);
+        rotors.add_loads(1.0, &Change::default(), &mut loads);
         assert!(loads.torque_nm.x < 0.0 && loads.torque_nm.y < 0.0 && loads.torque_nm.z < 0.0);
         rotors.settle(&[1.0; 4]);
         let mut loads = Loads::default();
-        rotors.add_loads(1.0, &mut loads);
+        rotors.add_loads(1.0, &Change::default(), &mut loads);
         assert!(loads.torque_nm.norm() < 1e-12);
     }
 }

@@ -1,0 +1,179 @@
+//! What an effect says about itself.
+
+use serde::Serialize;
+
+use crate::vehicle::Vehicle;
+
+/// Most parameters an effect has.
+pub const MAX_PARAMETERS: usize = 8;
+
+/// Values of an effect's parameters, in the order of its definition; unused ones are 0.
+pub type Values = [f64; MAX_PARAMETERS];
+
+/// What an effect is, for people and for choosing among effects.
+#[derive(Debug)]
+pub struct Definition {
+    /// Standard name in kebab case, the key in vehicle files.
+    pub name: &'static str,
+    /// Title.
+    pub title: &'static str,
+    /// What it does, one line.
+    pub what: &'static str,
+    /// Why, and when it matters.
+    pub explanation: &'static str,
+    /// The formula, as text.
+    pub formula: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// Effects in one class cannot be told apart by the paper's protocol.
+    pub class: Class,
+    /// Signals that its closed form looks at.
+    pub signals: &'static [Signal],
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
+    /// Where it acts in the simulator.
+    pub hooks: &'static [Hook],
+    /// The signal along which it is shown, with the range.
+    pub shown: (Signal, f64, f64),
+}
+
+/// One parameter of an effect.
+#[derive(Debug)]
+pub struct Parameter {
+    /// Key in vehicle files.
+    pub name: &'static str,
+    /// Unit; "1" for a pure number.
+    pub unit: &'static str,
+    /// What it is.
+    pub what: &'static str,
+    /// Smallest allowed value.
+    pub low: f64,
+    /// Largest allowed value.
+    pub high: f64,
+    /// Value when the vehicle's file states none.
+    pub default: fn(&Vehicle) -> f64,
+}
+
+/// Signals that a closed form looks at; the fields of [`super::Signals`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Signal {
+    /// Vertical speed relative to the air, m/s up.
+    Climb,
+    /// Horizontal speed relative to the air, m/s.
+    Horizontal,
+    /// Lean of the rotor axis into the wind, rad.
+    Tilt,
+    /// Height above ground, m.
+    Height,
+    /// Time since the motors started, s.
+    Time,
+    /// Air density as a share of sea level's.
+    Density,
+    /// Charge drawn from the battery, Ah.
+    ChargeUsed,
+    /// Vertical acceleration, m/s² up.
+    Acceleration,
+    /// Which drone: its deviation from the fleet in standard deviations.
+    Drone,
+    /// Drones next to this one in the array, 0..8.
+    Neighbours,
+    /// What the rest of the model adds to the hover pulse, us.
+    ModelIncrement,
+    /// Change of the pulse per vertical air speed, us/(m/s).
+    Sensitivity,
+}
+
+impl Signal {
+    /// Label with unit, for axes and tables.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Climb => "vertical speed relative to the air (m/s)",
+            Self::Horizontal => "horizontal speed relative to the air (m/s)",
+            Self::Tilt => "tilt (rad)",
+            Self::Height => "height above ground (m)",
+            Self::Time => "time since motor start (s)",
+            Self::Density => "air density (share of sea level's)",
+            Self::ChargeUsed => "charge used (Ah)",
+            Self::Acceleration => "vertical acceleration (m/s²)",
+            Self::Drone => "drone (standard deviations from the fleet)",
+            Self::Neighbours => "neighbours",
+            Self::ModelIncrement => "rest of the model (us)",
+            Self::Sensitivity => "sensitivity to vertical air speed (us/(m/s))",
+        }
+    }
+}
+
+/// Where an effect acts in the simulator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum Hook {
+    /// Before the flight, on the drone itself.
+    Drone = 1,
+    /// On the air around the drone.
+    Air = 2,
+    /// On the way from command to motor.
+    Command = 4,
+    /// On thrust, torque and forces.
+    Loads = 8,
+    /// On what the autopilot takes for its vertical speed.
+    Sense = 16,
+}
+
+impl Hook {
+    /// What is acted on, in text.
+    pub fn what(self) -> &'static str {
+        match self {
+            Self::Drone => "the drone itself",
+            Self::Air => "the air around it",
+            Self::Command => "the way from command to motor",
+            Self::Loads => "thrust, torque and forces",
+            Self::Sense => "its own idea of its vertical speed",
+        }
+    }
+}
+
+/// Effects that a flight of the paper's protocol cannot tell apart (they leave the same trace).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Class {
+    /// Odd and linear in the vertical air speed.
+    AxialLinear,
+    /// Scales the odd response to vertical air speed.
+    AxialShape,
+    /// Only in fast descent; leans on the shape of the axial response.
+    Descent,
+    /// Slow change with time.
+    TimeDrift,
+    /// Slow change with height.
+    HeightTrend,
+    /// Only near the ground.
+    NearGround,
+    /// Grows with horizontal air speed or tilt.
+    Horizontal,
+    /// Constant offset of a drone.
+    DroneOffset,
+    /// Only while accelerating.
+    Acceleration,
+    /// In the vertical velocity's own channel.
+    VelocityChannel,
+}
+
+impl Class {
+    /// Name in text.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AxialLinear => "axial-linear",
+            Self::AxialShape => "axial-shape",
+            Self::Descent => "descent",
+            Self::TimeDrift => "time-drift",
+            Self::HeightTrend => "height-trend",
+            Self::NearGround => "near-ground",
+            Self::Horizontal => "horizontal",
+            Self::DroneOffset => "drone-offset",
+            Self::Acceleration => "acceleration",
+            Self::VelocityChannel => "velocity-channel",
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Horizontal air speed carries the rotor's own inflow away.
+
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::rotor_inflow::{Disc, LEAST_SHARE, MOST_SHARE, flow_us, share_of};
+use super::{Change, Effect, Now, Own, Reference, Signals, Start, momentum};
+use crate::vehicle::Airframe;
+
+const SHARE: usize = 0;
+/// Thrust over that in still air below which a rotor has no state worth a correction.
+const LEAST_THRUST: f64 = 0.05;
+
+/// Translational lift.
+#[derive(Debug)]
+pub(super) struct TranslationalLift;
+
+impl Effect for TranslationalLift {
+    fn definition(&self) -> &'static Definition {
+        &Definition {
+            name: "translational-lift",
+            title: "Translational lift",
+            what: "in wind the rotors induce less flow and give more thrust at the same speed",
+            explanation: "Edgewise flow brings fresh air to the disc, so the same momentum needs \
+                less induced velocity (Glauert). The saved inflow is thrust: hovering in wind needs \
+                a smaller pulse. In constant wind it hides in u0; a gust of 1 m/s at 5 m/s looks \
+                like a sink of almost half as much.",
+            formula: "v_i sqrt(v² + (V + v_i)²) = v_h²;  T = k w² - k2 w (V + v_i)",
+            source: "Glauert 1926; Leishman, Principles of Helicopter Aerodynamics, ch. 2",
+            class: Class::Horizontal,
+            signals: &[Signal::Horizontal, Signal::Climb, Signal::Tilt],
+            parameters: &[Parameter {
+                name: "inflow_share",
+                unit: "1",
+                what: "share of the geometric thrust lost to the inflow in hover",
+                low: LEAST_SHARE,
+                high: MOST_SHARE,
+                default: share_of,
+            }],
+            hooks: &[Hook::Loads],
+            shown: (Signal::Horizontal, 0.0, 8.0),
+        }
+    }
+
+    fn pulse_us(&self, at: &Reference, values: &Values, signals: &Signals) -> f64 {
+        let induced_mps = at.hover_induced_mps();
+        let axial = signals.axial_mps() / induced_mps;
+        let edgewise = signals.edgewise_mps() / induced_mps;
+        let flow = |edgewise| axial + momentum::induced(axial, edgewise);
+        flow_us(at, values[SHARE], flow(edgewise)) - flow_us(at, values[SHARE], flow(0.0))
+    }
+
+    fn start(&self, own: &mut Own, _start: &Start<'_>, airframe: &mut Airframe) {
+        let disc = Disc::of(airframe);
+        own.state[0] = disc.flow_factor;
+        own.state[1] = disc.merit;
+    }
+
+    fn loads(&self, own: &mut Own, now: &Now, change: &mut Change) {
+        let disc = Disc { flow_factor: own.state[0], merit: own.state[1] };
+        let Some((axial, edgewise)) = disc.speeds(now) else { return };
+        let without = momentum::at_speed(own.values[SHARE], axial, 0.0);
+        let with = momentum::at_speed(own.values[SHARE], axial, edgewise);
+        if without.thrust > LEAST_THRUST {
+            change.thrust *= with.thrust / without.thrust;
+            change.torque += disc.merit * (with.thrust * with.flow - without.thrust * without.flow);
+        }
+    }
+}
