@@ -138,3 +138,18 @@ impl BaroAir {
         density_ratio(amsl_m) * standard_k / taken_k
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warm_barometer_finds_the_air_thinner() {
+        let standard = BaroAir { home_amsl_m: 584.0, ground_c: None };
+        assert!((standard.ratio(100.0) - density_ratio(684.0)).abs() < 1e-12);
+        // 584 m: 94502 Pa; ArduPilot's gas constant differs by 0.07 %.
+        let warm = BaroAir { home_amsl_m: 584.0, ground_c: Some(30.74) };
+        let expected = 94_502.0 / (287.26 * 303.89) / 1.225;
+        assert!((warm.ratio(0.0) / expected - 1.0).abs() < 1e-3, "{}", warm.ratio(0.0));
+    }
+}

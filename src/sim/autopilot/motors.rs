@@ -199,6 +199,24 @@ mod tests {
     }
 
     #[test]
+    fn a_lower_voltage_is_made_up_for_in_the_command() {
+        let mut settings = builtin("arducopter-sitl").unwrap().autopilot;
+        settings.mot_spin_min = 0.0;
+        settings.mot_spin_max = 1.0;
+        let command = |resting_v| {
+            let mut motors = Motors::new(&settings, 0.0025);
+            motors.spool = Spool::Flying;
+            motors.set_voltage(resting_v);
+            (0..4_000).for_each(|_| motors.update(0.4, &Vector3::zeros()));
+            f64::from(motors.pulses_us[0] - 1000)
+        };
+        // The voltage at the motor is what stays the same.
+        assert!((command(11.52) * 0.9 - command(12.8)).abs() < 2.0);
+        assert_eq!(command(5.0), command(9.6), "below the least voltage it grows no more");
+        assert_eq!(command(20.0), command(12.8));
+    }
+
+    #[test]
     fn thrust_curve_is_inverted_exactly() {
         for expo in [-0.3, 0.0, 0.5, 0.65, 1.0] {
             for thrust in [0.0, 0.2, 0.7, 1.0] {
