@@ -106,7 +106,7 @@ impl Attitude {
     fn shape(&mut self, wanted: &Vector3<f64>) -> Vector3<f64> {
         let up = self.thrust_direction;
         // Axes of an attitude that heads along show x.
-        let forward = Vector3::new(up.z, 0.0, -up.x) / (1.0 - up.y * up.y).sqrt();
+        let forward = Vector3::new(up.z, 0.0, -up.x) * (1.0 - up.y * up.y).sqrt().recip();
         let left = up.cross(&forward);
         let error = Vector2::new(-wanted.dot(&left), wanted.dot(&forward));
         let rate = self.to_lean.rate(error, f64::INFINITY);

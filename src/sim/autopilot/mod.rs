@@ -80,7 +80,8 @@ impl<'a> Autopilot<'a> {
                 self.horizontal.restart(estimate);
             }
             let push = self.horizontal.update(goals.horizontal.as_ref(), estimate);
-            let direction = Vector3::new(push.x, push.y, GRAVITY).normalize();
+            let direction = Vector3::new(push.x, push.y, GRAVITY);
+            let direction = direction * direction.norm().recip();
             let torque = self.attitude.update(direction, estimate);
             self.throttle_in = if self.director.touchdown == Touchdown::Complete {
                 self.vertical.relax(estimate, self.throttle_in)
