@@ -208,5 +208,6 @@ fn velocity_steps_settle_before_the_window() {
     // The firmware's own simulator: 2.7 m at most, 0.1 m sideways.
     assert!((2.0..4.0).contains(&flown.summary.max_error_z_m), "{:?}", flown.summary);
     assert!(flown.summary.max_error_xy_m < 0.15);
-    assert!((flown.summary.landed_s - flown.summary.landing_s - 8.3).abs() < 3.0);
+    // The firmware needs 8.25 s from 3.07 m: 0.57 m more, at 0.5 m/s, and what is left of a climb.
+    assert!((flown.summary.landed_s - flown.summary.landing_s - 6.57).abs() < 0.3);
 }

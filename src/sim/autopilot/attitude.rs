@@ -106,7 +106,7 @@ impl Attitude {
     fn shape(&mut self, wanted: &Vector3<f64>) -> Vector3<f64> {
         let up = self.thrust_direction;
         // Axes of an attitude that heads along show x.
-        let forward = Vector3::new(up.z, 0.0, -up.x) / (1.0 - up.y * up.y).sqrt();
+        let forward = Vector3::new(up.z, 0.0, -up.x) * (1.0 - up.y * up.y).sqrt().recip();
         let left = up.cross(&forward);
         let error = Vector2::new(-wanted.dot(&left), wanted.dot(&forward));
         let rate = self.to_lean.rate(error, f64::INFINITY);
@@ -121,4 +121,39 @@ impl Attitude {
 /// A vector that is off length 1 by little, brought back to it.
 fn turned(direction: Vector3<f64>) -> Vector3<f64> {
     direction * (1.5 - 0.5 * direction.norm_squared())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+
+    #[test]
+    fn the_followed_lean_comes_to_the_wanted_one_within_its_acceleration() {
+        const DT_S: f64 = 0.0025;
+        let mut attitude = Attitude::new(DT_S);
+        let level = Estimate {
+            position_m: Vector3::zeros(),
+            velocity_mps: Vector3::zeros(),
+            acceleration_mps2: Vector3::zeros(),
+            rotation: Matrix3::identity(),
+            rate_radps: Vector3::zeros(),
+        };
+        let wanted = Vector3::new(0.3, -0.2, 0.9).normalize();
+        let most = p::ATC_ACCEL_RP_MAX_DEG.to_radians() * DT_S;
+        let mut reached_s = f64::NAN;
+        for step in 0..800 {
+            let before = attitude.target_turn;
+            attitude.update(wanted, &level);
+            let change = attitude.target_turn - before;
+            assert!(change.amax() <= most + 1e-12);
+            assert!((attitude.thrust_direction.norm() - 1.0).abs() < 1e-6);
+            if reached_s.is_nan() && attitude.thrust_direction.dot(&wanted) > 0.9998 {
+                reached_s = f64::from(step) * DT_S;
+            }
+        }
+        assert!((attitude.thrust_direction - wanted).norm() < 1e-4);
+        // Some time constants of 0.15 s, at first held up by the acceleration.
+        assert!((0.3..0.7).contains(&reached_s), "{reached_s} s");
+    }
 }

@@ -80,7 +80,8 @@ impl<'a> Autopilot<'a> {
                 self.horizontal.restart(estimate);
             }
             let push = self.horizontal.update(goals.horizontal.as_ref(), estimate);
-            let direction = Vector3::new(push.x, push.y, GRAVITY).normalize();
+            let direction = Vector3::new(push.x, push.y, GRAVITY);
+            let direction = direction * direction.norm().recip();
             let torque = self.attitude.update(direction, estimate);
             self.throttle_in = if self.director.touchdown == Touchdown::Complete {
                 self.vertical.relax(estimate, self.throttle_in)
@@ -136,5 +137,20 @@ impl BaroAir {
         let standard_k = 288.15 - LAPSE_K_PER_M * amsl_m;
         let taken_k = self.ground_c.map_or(standard_k, |c| 273.15 + c - LAPSE_K_PER_M * height_m);
         density_ratio(amsl_m) * standard_k / taken_k
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warm_barometer_finds_the_air_thinner() {
+        let standard = BaroAir { home_amsl_m: 584.0, ground_c: None };
+        assert!((standard.ratio(100.0) - density_ratio(684.0)).abs() < 1e-12);
+        // 584 m: 94502 Pa; ArduPilot's gas constant differs by 0.07 %.
+        let warm = BaroAir { home_amsl_m: 584.0, ground_c: Some(30.74) };
+        let expected = 94_502.0 / (287.26 * 303.89) / 1.225;
+        assert!((warm.ratio(0.0) / expected - 1.0).abs() < 1e-3, "{}", warm.ratio(0.0));
     }
 }

@@ -42,9 +42,12 @@ pub struct Motors {
     density_gain: f64,
     density_height_m: f64,
     voltage_limits: (f64, f64),
-    /// Battery voltage as a share of MOT_BAT_VOLT_MAX, and the share of full thrust it gives.
-    voltage: f64,
+    /// Inverse of the battery's voltage as a share of MOT_BAT_VOLT_MAX, and the share of full thrust
+    /// that this voltage gives.
+    per_voltage: f64,
     lift: f64,
+    /// What throttle and torque are multiplied by for the air's density and the voltage.
+    gain: f64,
     dt_s: f64,
 }
 
@@ -66,8 +69,9 @@ impl Motors {
                 settings.mot_bat_volt_min.max(0.6 * settings.mot_bat_volt_max),
                 settings.mot_bat_volt_max,
             ),
-            voltage: 1.0,
+            per_voltage: 1.0,
             lift: 1.0,
+            gain: 1.0,
             dt_s,
         }
     }
@@ -83,6 +87,7 @@ impl Motors {
         if (height_m - self.density_height_m).abs() >= DENSITY_STEP_M {
             self.density_height_m = height_m;
             self.density_gain = 1.0 / ratio(height_m).clamp(0.5, 1.25);
+            self.gain = self.density_gain / self.lift;
         }
     }
 
@@ -91,8 +96,10 @@ impl Motors {
     pub fn set_voltage(&mut self, resting_v: f64) {
         let (low, high) = self.voltage_limits;
         if low < high {
-            self.voltage = resting_v.clamp(low, high) / high;
-            self.lift = self.voltage * (1.0 - self.expo + self.expo * self.voltage);
+            let voltage = resting_v.clamp(low, high) / high;
+            self.per_voltage = 1.0 / voltage;
+            self.lift = voltage * (1.0 - self.expo + self.expo * voltage);
+            self.gain = self.density_gain / self.lift;
         }
     }
 
@@ -121,7 +128,7 @@ impl Motors {
         self.throttle = self.throttle_filter.apply(throttle).clamp(0.0, 1.0);
         self.throttle_filter.value = self.throttle;
         self.limits = ThrottleLimits { upper: self.throttle >= 1.0, lower: self.throttle <= 0.0 };
-        let gain = self.density_gain / self.lift;
+        let gain = self.gain;
         let wanted = self.throttle * gain;
         let mut share = [0.0; ROTORS];
         for (share, (forward, left, turn)) in share.iter_mut().zip(LAYOUT) {
@@ -139,7 +146,7 @@ impl Motors {
         };
         for (pulse, share) in self.pulses_us.iter_mut().zip(share) {
             let thrust = (collective + share * scale).clamp(0.0, 1.0);
-            let output = (curve(thrust * self.lift, self.expo) / self.voltage).min(1.0);
+            let output = (curve(thrust * self.lift, self.expo) * self.per_voltage).min(1.0);
             *pulse = whole_us(self.spin_min + self.spin_span * output);
         }
     }
@@ -196,6 +203,24 @@ mod tests {
     fn attitude_keeps_its_difference_at_the_upper_limit() {
         let pulses = settled(1.0, Vector3::new(0.25, 0.0, 0.0)).pulses_us;
         assert_eq!(pulses, [1750, 1950, 1950, 1750]);
+    }
+
+    #[test]
+    fn a_lower_voltage_is_made_up_for_in_the_command() {
+        let mut settings = builtin("arducopter-sitl").unwrap().autopilot;
+        settings.mot_spin_min = 0.0;
+        settings.mot_spin_max = 1.0;
+        let command = |resting_v| {
+            let mut motors = Motors::new(&settings, 0.0025);
+            motors.spool = Spool::Flying;
+            motors.set_voltage(resting_v);
+            (0..4_000).for_each(|_| motors.update(0.4, &Vector3::zeros()));
+            f64::from(motors.pulses_us[0] - 1000)
+        };
+        // The voltage at the motor is what stays the same.
+        assert!((command(11.52) * 0.9 - command(12.8)).abs() < 2.0);
+        assert_eq!(command(5.0), command(9.6), "below the least voltage it grows no more");
+        assert_eq!(command(20.0), command(12.8));
     }
 
     #[test]

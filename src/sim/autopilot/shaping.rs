@@ -170,6 +170,22 @@ mod tests {
 
     const DT_S: f64 = 0.0025;
 
+    #[test]
+    fn a_target_does_not_leave_a_vehicle_that_can_give_no_more() {
+        let mut target = Kinematics::at(Vector2::zeros());
+        target.velocity.x = 1.0;
+        target.acceleration = Vector2::new(2.0, 1.0);
+        let (ahead, behind) = (Vector2::new(1.0, 0.0), Vector2::new(-1.0, 0.0));
+        let held = target;
+        target.advance_within(DT_S, &ahead, &ahead, &ahead);
+        assert_eq!((target.position, target.velocity), (held.position, held.velocity));
+        target.advance_within(DT_S, &ahead, &behind, &behind);
+        assert!(target.position.x > 0.0 && target.velocity.x > 1.0, "it is behind: let it come");
+        let mut free = held;
+        free.advance_within(DT_S, &Vector2::zeros(), &ahead, &ahead);
+        assert!(free.position.x > 0.0 && free.velocity.x > 1.0);
+    }
+
     proptest! {
         #[test]
         fn meets_a_moving_goal_within_its_limits(
