@@ -102,8 +102,7 @@ fn axial_effects_fly_as_their_formulas_say() {
             "thrust-curve",
             &Flight::moving(3.0),
             |vehicle, signals| {
-                let model = Model::of(&vehicle(&vehicle.name, &[]))
-                    .expect("a model");
+                let model = Model::of(&vehicle(&vehicle.name, &[])).expect("a model");
                 let hover = model.reference.in_air(signals.density_ratio).hover_us();
                 Signals { increment_us: model.pulse_us(&signals) - hover, ..signals }
             },

@@ -160,7 +160,9 @@ impl Plant {
 
         let mut loads = Loads::default();
         let (air, change, command) = if self.effects.any() {
-            self.affected(command, around, &middle_mps)
+            let affected = self.affected(command, around, &middle_mps);
+            loads.force_n = affected.1.force_n;
+            affected
         } else {
             let air =
                 Air { velocity_mps: around.air_velocity_mps, density_ratio: around.density_ratio };
@@ -174,7 +176,6 @@ impl Plant {
             self.rotors.add_loads(air.density_ratio, &change, &mut loads);
             self.drag.add_loads(&relative, air.density_ratio, &mut loads);
         }
-        loads.force_n += change.force_n;
 
         let mut acceleration = now.rotation * (loads.force_n * self.per_mass);
         acceleration.z -= GRAVITY;

@@ -76,8 +76,9 @@ impl Linear {
         let thrust_n = self.max_thrust_n * density_ratio * change.thrust;
         loads.force_n.z += thrust * thrust_n;
         let lever = self.offset_m * thrust_n;
-        let torque_nm = self.max_torque_nm * density_ratio * change.torque;
-        loads.torque_nm += Vector3::new(roll * lever, pitch * lever, yaw * torque_nm);
+        // In this order, AirSim's own numbers come out to the last bit when nothing changes them.
+        let yaw_nm = yaw * self.max_torque_nm * density_ratio * change.torque;
+        loads.torque_nm += Vector3::new(roll * lever, pitch * lever, yaw_nm);
     }
 
     /// Thrust of all rotors in still air at their present output, N.
@@ -161,5 +162,22 @@ mod tests {
         let mut loads = Loads::default();
         rotors.add_loads(1.0, &Change::default(), &mut loads);
         assert!(loads.torque_nm.norm() < 1e-12);
+    }
+
+    #[test]
+    fn without_changes_loads_are_airsims_to_the_last_bit() {
+        let mut rotors = rotors();
+        for (k, ratio) in [(1_u32, 1.0), (7, 0.981_234_5), (13, 0.953_3)] {
+            let output = [3, 5, 7, 11].map(|n| f64::from(n * k % 17) / 17.3);
+            rotors.settle(&output);
+            let mut loads = Loads::default();
+            rotors.add_loads(ratio, &Change::default(), &mut loads);
+            let [a, b, c, d] = output;
+            let thrust_n = rotors.max_thrust_n * ratio;
+            let yaw = 0.0 - a - b + c + d;
+            assert_eq!(loads.force_n.z.to_bits(), ((a + b + c + d) * thrust_n).to_bits());
+            let yaw_nm = yaw * rotors.max_torque_nm * ratio;
+            assert_eq!(loads.torque_nm.z.to_bits(), yaw_nm.to_bits());
+        }
     }
 }
