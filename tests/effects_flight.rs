@@ -101,8 +101,8 @@ fn axial_effects_fly_as_their_formulas_say() {
             &[expo],
             "thrust-curve",
             &Flight::moving(3.0),
-            |vehicle, signals| {
-                let model = Model::of(&vehicle(&vehicle.name, &[])).expect("a model");
+            |flown, signals| {
+                let model = Model::of(&vehicle(&flown.name, &[])).expect("a model");
                 let hover = model.reference.in_air(signals.density_ratio).hover_us();
                 Signals { increment_us: model.pulse_us(&signals) - hover, ..signals }
             },
