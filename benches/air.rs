@@ -61,7 +61,7 @@ fn along(bencher: Bencher<'_, '_>, spec: &str) {
     });
 }
 
-#[divan::bench(args = ["still", "field", "thermal-day", "field-day"], sample_count = 10)]
+#[divan::bench(args = ["still", "uniform:east=2,up=0.5", "field", "thermal-day", "field-day"], sample_count = 10)]
 fn hover(bencher: Bencher<'_, '_>, spec: &str) {
     let vehicle = builtin("airsim-generic-quad").expect("a built-in vehicle");
     let to = |height_m: f64, duration_ms| Segment {

@@ -128,7 +128,7 @@ fn truth_files_read_back() {
     let truth = read(&path).unwrap();
     assert_eq!((truth.first_s, truth.updraft_mps.len()), (0, 41));
     // Mean over 5..15 s: 0.1 for the time; heights 15..30 m in the first half.
-    assert!((truth.updraft_mps[10] - (0.1 + (2.25 + 3.0) / 2.0)).abs() < 1e-4, "{truth:?}");
+    assert!((truth.updraft_mps[10] - (0.1 + f64::midpoint(2.25, 3.0))).abs() < 1e-4, "{truth:?}");
 
     for (broken, told) in [
         ("a,b\n0,1\n".to_owned(), "line 1"),

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails")]
 
+use std::fmt::Write as _;
+
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -286,7 +288,7 @@ fn what_is_wrong_is_told_with_what_is_allowed() {
         "missing.toml",
     ] {
         let error = load(text).unwrap_err();
-        told += &format!("{text:?}: {error}\n");
+        writeln!(told, "{text:?}: {error}").unwrap();
     }
     for (name, text) in [
         ("other.toml", "schema = \"updraft.air/9\"\ntitle = \"\"\nair = []"),
@@ -305,7 +307,7 @@ fn what_is_wrong_is_told_with_what_is_allowed() {
             "schema = \"updraft.air/1\"\ntitle = \"\"\n[[air]]\nkind = \"field\"\nsd = -1",
         ),
     ] {
-        told += &format!("{name}: {}\n", wrong_file(name, text));
+        writeln!(told, "{name}: {}", wrong_file(name, text)).unwrap();
     }
     insta::assert_snapshot!(told);
 }

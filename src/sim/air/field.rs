@@ -56,7 +56,7 @@ impl RandomField {
             let phase_turns = StandardUniform.sample(rng);
             let rate_radps = own_radps - wave_radpm.dot(&scales.wind_mps);
             if is_felt(&wave_radpm, rate_radps) {
-                waves.push(Wave { wave_radpm, rate_radps, phase_turns, amplitude });
+                waves.push(Wave { number_radpm: wave_radpm, rate_radps, phase_turns, amplitude });
             }
         }
         Self { waves: Waves::new(&waves) }

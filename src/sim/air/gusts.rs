@@ -111,7 +111,7 @@ impl Gusts {
             let rate_radps = -wave_radpm.dot(&wind_mps);
             if is_felt(&wave_radpm, rate_radps) && norm > 0.0 {
                 let amplitude = (across * (size_mps / norm)).into();
-                drawn.push(Wave { wave_radpm, rate_radps, phase_turns, amplitude });
+                drawn.push(Wave { number_radpm: wave_radpm, rate_radps, phase_turns, amplitude });
             }
         }
         Self { waves: Waves::new(&drawn) }
