@@ -1,6 +1,8 @@
 //! What the simulator flies is what an effect's closed form says: the autopilot is closed around
 //! the plant, and the mean pulse of a steady window with and without the effect is compared.
 
+#![expect(clippy::print_stdout, reason = "the numbers are the point of a closer look")]
+
 mod effects_support;
 
 use effects_support::{Flight, Steady, fly_windows, steady, vehicle};
@@ -101,8 +103,9 @@ fn axial_effects_fly_as_their_formulas_say() {
             &[expo],
             "thrust-curve",
             &Flight::moving(3.0),
-            |flown, signals| {
-                let model = Model::of(&vehicle(&flown.name, &[])).expect("a model");
+            |vehicle, signals| {
+                let model =
+                    Model::of(&effects_support::vehicle(&vehicle.name, &[])).expect("a model");
                 let hover = model.reference.in_air(signals.density_ratio).hover_us();
                 Signals { increment_us: model.pulse_us(&signals) - hover, ..signals }
             },

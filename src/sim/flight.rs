@@ -198,6 +198,9 @@ pub fn fly_with<R: Recorder>(
             }
         }
         if step.is_multiple_of(STEPS_PER_LOOK) {
+            if let Some(battery) = plant.battery().filter(|battery| battery.compensated) {
+                pilot.motors.set_voltage(battery.resting_v);
+            }
             look(setup, &plant, time_s, takeoff_s, end_s)?;
             if time_s > give_up_s {
                 return Err(SimError::NotLanded { drone, time_s });
