@@ -29,6 +29,7 @@ fn bench(bencher: Bencher<'_, '_>, vehicle: &Vehicle) {
     let air = Uniform(Vector3::new(2.5, 0.0, 0.0));
     let setup = FlightSetup {
         vehicle,
+        lights: &[],
         trajectory: &trajectory,
         home_m: Vector3::zeros(),
         frame: ShowFrame { origin, orientation_deg: 0.0 },
