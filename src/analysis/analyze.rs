@@ -259,6 +259,9 @@ pub fn analyze_flight(
     Ok(finish(&shared, ones, &reasons, warnings))
 }
 
+/// Largest W of a calibration's signed quadratic that may be the air's, m/s.
+const LARGEST_CALIBRATION_W_MPS: f64 = 0.5;
+
 enum SlotMatch {
     Slot(u16),
     Unplanned,
@@ -320,7 +323,15 @@ fn with_name(reason: &str, path: &Path) -> String {
 }
 
 /// The law whose fits to the reference's drones have the lower mean reduced chi².
+///
+/// A signed quadratic that needs a strong W is a parabola's flank standing in for another curve, not
+/// air that moved: its inverse is off by that W, and the line is taken.
 fn better_law(reference: &FlightAnalysis) -> MapLaw {
+    let calm = reference.flock.as_ref().is_none_or(|laws| {
+        let quadratic = laws.signed_quadratic.as_ref();
+        let w = quadratic.and_then(|fit| fit.parameters.iter().find(|found| found.name == "W"));
+        w.is_none_or(|w| w.estimate.value.abs() <= LARGEST_CALIBRATION_W_MPS)
+    });
     let reduced = |law: MapLaw| {
         let values: Vec<f64> = reference
             .drones
@@ -330,7 +341,7 @@ fn better_law(reference: &FlightAnalysis) -> MapLaw {
         (!values.is_empty()).then(|| mean_sd(&values).0)
     };
     match (reduced(MapLaw::Linear), reduced(MapLaw::SignedQuadratic)) {
-        (Some(linear), Some(quadratic)) if quadratic < linear => MapLaw::SignedQuadratic,
+        (Some(linear), Some(quadratic)) if calm && quadratic < linear => MapLaw::SignedQuadratic,
         (None, Some(_)) => MapLaw::SignedQuadratic,
         _ => MapLaw::Linear,
     }

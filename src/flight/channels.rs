@@ -6,6 +6,8 @@ use super::Series;
 use super::clean::Rows;
 use crate::log::{Log, ScanStats, Select, Table};
 
+/// With less feed-forward than this the logged commands say nothing about velocity.
+const LEAST_FEED_FORWARD: f64 = 0.05;
 /// GUIP types whose velocity is a command: position-velocity-acceleration, velocity-acceleration.
 const GUIDED_WITH_VELOCITY: [f64; 2] = [3.0, 4.0];
 /// A median above this is centivolts (no show drone flies on 100 V).
@@ -255,12 +257,18 @@ impl Messages {
             .unwrap_or_default()
     }
 
-    /// The commands of guided (and show) mode, the profile as planned. The log has them in cm/s.
+    /// The commands of guided (and show) mode, the profile as planned. The log has them in cm/s, and
+    /// show mode logs its velocities times SHOW_VEL_FF_GAIN.
     fn guided(&self) -> Option<(Option<Series>, Option<Series>)> {
+        let gain = self.parameters.get("SHOW_VEL_FF_GAIN").copied().unwrap_or(1.0);
+        if !(LEAST_FEED_FORWARD..=10.0).contains(&gain) {
+            return None;
+        }
+        let per_mps = 100.0 * gain;
         let mut rows = self.rows("GUIP")?.clone();
         let types = rows.column("Type")?.to_vec();
         rows.retain(|row| types.get(row).is_some_and(|kind| GUIDED_WITH_VELOCITY.contains(kind)));
-        let mps = |name: &str| rows.series(name, |cmps| cmps / 100.0);
+        let mps = |name: &str| rows.series(name, |logged| logged / per_mps);
         let up = mps("vZ").filter(|series| series.len() >= FEWEST_DESIRED)?;
         Some((Some(up), horizontal(mps("vX").as_ref(), mps("vY").as_ref())))
     }
