@@ -17,6 +17,8 @@ pub enum Purpose {
     Resampling = 4,
     /// Chance within an effect, such as gusts.
     Effects = 5,
+    /// Faults of a simulated radio link.
+    Link = 6,
 }
 
 /// The random stream of one drone and purpose. PCG's output is stable across releases.

@@ -1,0 +1,203 @@
+//! Where a link goes: the words of `--connect`.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// A link and the network it belongs to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Address {
+    /// Vehicles with the same system id in different networks are different vehicles.
+    pub network: u16,
+    /// How it is reached.
+    pub way: Way,
+}
+
+/// How a link is reached.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Listens for datagrams; answers go to where each vehicle was heard.
+    UdpIn(String),
+    /// Sends datagrams to an address first.
+    UdpOut(String),
+    /// Connects to a TCP server, as the firmware's simulator is.
+    Tcp(String),
+    /// A serial radio: device and baud rate.
+    Serial(String, u32),
+}
+
+/// Text that is no link.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum AddressError {
+    /// Not of any known form.
+    #[error(
+        "{text:?} is no link: give udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, \
+         serial:DEVICE:BAUD or a file with one of these per line; N@ before it puts it into \
+         network N"
+    )]
+    Form {
+        /// What was given.
+        text: String,
+    },
+    /// A number in it is wrong.
+    #[error("{text:?}: {part:?} is no {what}")]
+    Number {
+        /// What was given.
+        text: String,
+        /// The wrong part.
+        part: String,
+        /// What it should be.
+        what: &'static str,
+    },
+    /// A list file that cannot be read.
+    #[error("cannot read the list of links {path}: {reason}")]
+    List {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A wrong line of a list file.
+    #[error("{path}:{line}: {source}")]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        source: Box<AddressError>,
+    },
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.network != 0 {
+            write!(f, "{}@", self.network)?;
+        }
+        match &self.way {
+            Way::UdpIn(host) => write!(f, "udpin:{host}"),
+            Way::UdpOut(host) => write!(f, "udpout:{host}"),
+            Way::Tcp(host) => write!(f, "tcp:{host}"),
+            Way::Serial(device, baud) => write!(f, "serial:{device}:{baud}"),
+        }
+    }
+}
+
+impl FromStr for Address {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let number = |part: &str, what| AddressError::Number {
+            text: text.to_owned(),
+            part: part.to_owned(),
+            what,
+        };
+        let (network, link) = match text.split_once('@') {
+            Some((network, link)) => {
+                (network.parse().map_err(|_| number(network, "network number"))?, link)
+            }
+            None => (0, text),
+        };
+        let form = || AddressError::Form { text: text.to_owned() };
+        let (kind, rest) = link.split_once(':').ok_or_else(form)?;
+        let (head, tail) = rest.rsplit_once(':').ok_or_else(form)?;
+        if head.is_empty() {
+            return Err(form());
+        }
+        let host = || match tail.parse::<u16>() {
+            Ok(port) if port != 0 => Ok(rest.to_owned()),
+            _ => Err(number(tail, "port (1 to 65535)")),
+        };
+        let way = match kind {
+            "udpin" => Way::UdpIn(host()?),
+            "udpout" => Way::UdpOut(host()?),
+            "tcp" | "tcpout" => Way::Tcp(host()?),
+            "serial" => {
+                let baud = tail.parse().map_err(|_| number(tail, "baud rate"))?;
+                Way::Serial(head.to_owned(), baud)
+            }
+            _ => return Err(form()),
+        };
+        Ok(Self { network, way })
+    }
+}
+
+/// Most links in one list.
+const MOST: usize = 1_000;
+/// Longest list file, bytes.
+const LONGEST_LIST: u64 = 1_000_000;
+
+/// The links of one `--connect`: an address, or a file that lists them (one per line, `#`
+/// begins a comment).
+pub fn links(text: &str) -> Result<Vec<Address>, AddressError> {
+    let path = Path::new(text);
+    match text.parse() {
+        Ok(address) => Ok(vec![address]),
+        Err(_) if path.is_file() => list(path),
+        Err(error) => Err(error),
+    }
+}
+
+fn list(path: &Path) -> Result<Vec<Address>, AddressError> {
+    let unreadable = |reason: String| AddressError::List { path: path.to_owned(), reason };
+    let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
+    if size > LONGEST_LIST {
+        return Err(unreadable(format!("it has {size} bytes, more than a list can have")));
+    }
+    let text = std::fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))?;
+    let mut links = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
+            continue;
+        }
+        links.push(line.parse().map_err(|source| AddressError::Line {
+            path: path.to_owned(),
+            line: index + 1,
+            source: Box::new(source),
+        })?);
+    }
+    match links.len() {
+        0 => Err(unreadable("it lists no link".to_owned())),
+        1..=MOST => Ok(links),
+        count => Err(unreadable(format!("it lists {count} links; {MOST} can be open"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_are_read_as_they_are_written() {
+        for text in [
+            "udpin:0.0.0.0:14550",
+            "1@udpout:10.0.0.7:14555",
+            "tcp:localhost:5760",
+            "udpin:[::1]:14550",
+            "serial:/dev/ttyUSB0:57600",
+        ] {
+            assert_eq!(text.parse::<Address>().unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let text = |link: &str| links(link).unwrap_err().to_string();
+        assert!(text("udp:14550").contains("give udpin:HOST:PORT"));
+        assert!(text("udpin:0.0.0.0:0").contains("\"0\" is no port"));
+        assert!(text("x@tcp:a:1").contains("\"x\" is no network number"));
+        assert!(text("serial:/dev/ttyS0:fast").contains("\"fast\" is no baud rate"));
+    }
+
+    #[test]
+    fn a_wrong_line_of_a_list_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fleet.txt");
+        std::fs::write(&path, "# field radios\ntcp:10.0.0.1:5760\n\n1@tcp:10.0.0.2:5760 # spare\n")
+            .unwrap();
+        assert_eq!(links(path.to_str().unwrap()).unwrap().len(), 2);
+        std::fs::write(&path, "tcp:a:1\nradio 7\n").unwrap();
+        assert!(links(path.to_str().unwrap()).unwrap_err().to_string().contains("fleet.txt:2: "));
+    }
+}

@@ -1,0 +1,338 @@
+//! A ground station on the air: sockets, who was heard where, its own heartbeat.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::address::Address;
+use super::clock::{Clock, Micros, S};
+use super::error::NetError;
+use super::frame::{Frame, FrameLoss, FrameReader, MavMessage, Sender, dialect, encode};
+use super::id::DroneId;
+use super::net::{Net, Received};
+use super::signing::{Key, Signer, Verifier, signing_time};
+use super::wire::{self, Peer, Receiving, Sending};
+
+/// The identity crews know from Skybrush Server: system 254, component 190 (mission planner).
+pub const STATION: Sender = Sender { system: 254, component: 190 };
+/// The component that is a vehicle's autopilot.
+pub const AUTOPILOT: u8 = 1;
+
+/// Pieces of input that wait to be looked at; more are dropped by the kernel, not stored here.
+const BACKLOG: usize = 16_384;
+/// A reader looks up so often whether it is to end.
+const READER_LOOK: Duration = Duration::from_millis(200);
+/// Longest piece read at once, bytes; a datagram is never longer.
+const PIECE: usize = 65_536;
+/// A vehicle keeps the way it was heard by until it has been silent there for so long.
+const KEEP_ROUTE: Micros = 3 * S;
+
+/// How a station is set up.
+pub struct Setup {
+    /// Its links.
+    pub links: Vec<Address>,
+    /// With a key everything sent is signed, and what is not signed with it is refused.
+    pub key: Option<Key>,
+    /// Its clock.
+    pub clock: Arc<dyn Clock>,
+}
+
+/// What went through a network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Bytes received, with all overhead above UDP.
+    pub bytes_in: u64,
+    /// Bytes sent.
+    pub bytes_out: u64,
+    /// Frames received that gave a message.
+    pub frames_in: u64,
+    /// Bytes that gave none.
+    pub loss: FrameLoss,
+}
+
+/// A station with open links. Its readers end when it is dropped.
+pub struct Station {
+    ports: Vec<Port>,
+    input: Receiver<Piece>,
+    routes: BTreeMap<DroneId, Route>,
+    /// Vehicles that were also heard from elsewhere while their route was alive.
+    doubled: BTreeSet<DroneId>,
+    verifiers: BTreeMap<u16, Verifier>,
+    signer: Option<Signer>,
+    traffic: BTreeMap<u16, Traffic>,
+    queue: VecDeque<Received>,
+    next_heartbeat: Micros,
+    clock: Arc<dyn Clock>,
+    end: Arc<AtomicBool>,
+    readers: Vec<JoinHandle<()>>,
+}
+
+struct Port {
+    network: u16,
+    sending: Box<dyn Sending>,
+    sequence: u8,
+    stream: Option<FrameReader>,
+}
+
+#[derive(Clone, Copy)]
+struct Route {
+    port: usize,
+    peer: Peer,
+    heard: Micros,
+}
+
+enum Piece {
+    Bytes { port: usize, peer: Peer, bytes: Vec<u8> },
+    Closed { port: usize, reason: String },
+}
+
+impl Station {
+    /// Opens all links.
+    ///
+    /// # Errors
+    /// When one cannot be opened; the others are closed again.
+    pub fn open(setup: Setup) -> Result<Self, NetError> {
+        let Setup { links, key, clock } = setup;
+        let (output, input) = sync_channel(BACKLOG);
+        let time = signing_time(clock.unix_us());
+        let mut station = Self {
+            ports: Vec::new(),
+            input,
+            routes: BTreeMap::new(),
+            doubled: BTreeSet::new(),
+            verifiers: BTreeMap::new(),
+            signer: key.clone().map(|key| Signer::new(key, 1, time)),
+            traffic: BTreeMap::new(),
+            queue: VecDeque::new(),
+            next_heartbeat: 0,
+            clock,
+            end: Arc::default(),
+            readers: Vec::new(),
+        };
+        for (index, address) in links.iter().enumerate() {
+            let (sending, receiving) = wire::open(address)?;
+            let stream = (!receiving.is_datagram()).then(FrameReader::default);
+            let network = address.network;
+            station.ports.push(Port { network, sending, sequence: 0, stream });
+            station.traffic.entry(network).or_default();
+            if let Some(key) = &key {
+                station
+                    .verifiers
+                    .entry(network)
+                    .or_insert_with(|| Verifier::new(key.clone(), time));
+            }
+            let (output, end) = (output.clone(), Arc::clone(&station.end));
+            let reader = std::thread::Builder::new()
+                .name(format!("link {address}"))
+                .spawn(move || read(index, receiving, &output, &end))
+                .map_err(|source| NetError::Thread { address: address.clone(), source })?;
+            station.readers.push(reader);
+        }
+        Ok(station)
+    }
+
+    /// What went through each network.
+    pub fn traffic(&self) -> &BTreeMap<u16, Traffic> {
+        &self.traffic
+    }
+
+    /// Vehicles whose id was heard from two places at once: two vehicles with one id, or one
+    /// vehicle over two links (then only one link is used).
+    pub fn doubled(&self) -> &BTreeSet<DroneId> {
+        &self.doubled
+    }
+
+    fn take(&mut self, piece: Piece) -> Result<(), NetError> {
+        let (port, peer, bytes) = match piece {
+            Piece::Bytes { port, peer, bytes } => (port, peer, bytes),
+            Piece::Closed { port, reason } => {
+                let network = self.ports[port].network;
+                // The others may go on.
+                self.routes.retain(|_, route| route.port != port);
+                self.ports[port].stream = None;
+                return if self.ports.len() == 1 || !self.ports.iter().any(|p| p.network == network)
+                {
+                    Err(NetError::Closed { reason })
+                } else {
+                    Ok(())
+                };
+            }
+        };
+        let network = self.ports[port].network;
+        let mut verifier = self.verifiers.get_mut(&network);
+        if let Some(verifier) = verifier.as_deref_mut() {
+            verifier.advance(signing_time(self.clock.unix_us()));
+        }
+        let mut datagram = FrameReader::default();
+        let is_stream = self.ports[port].stream.is_some();
+        let reader = self.ports[port].stream.as_mut().unwrap_or(&mut datagram);
+        let before = reader.loss;
+        reader.push(&bytes);
+        let mut frames = Vec::new();
+        while let Some(frame) = reader.next(verifier.as_deref_mut()) {
+            frames.push(frame);
+        }
+        if !is_stream {
+            reader.end_of_datagram();
+        }
+        let loss = reader.loss;
+        let traffic = self.traffic.entry(network).or_default();
+        traffic.bytes_in += bytes.len() as u64;
+        traffic.frames_in += frames.len() as u64;
+        traffic.loss.noise_bytes += loss.noise_bytes - before.noise_bytes;
+        traffic.loss.version_1 += loss.version_1 - before.version_1;
+        traffic.loss.unknown += loss.unknown - before.unknown;
+        traffic.loss.unsigned += loss.unsigned - before.unsigned;
+        traffic.loss.forged += loss.forged - before.forged;
+        for frame in frames {
+            self.hear(network, port, peer, frame);
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, network: u16, port: usize, peer: Peer, frame: Frame) {
+        if frame.sender.component != AUTOPILOT || matches!(frame.sender.system, 0 | 254 | 255) {
+            return;
+        }
+        let from = DroneId { network, system: frame.sender.system };
+        let now = self.clock.now();
+        match self.routes.get_mut(&from) {
+            Some(route) if route.port == port && route.peer == peer => route.heard = now,
+            Some(route) if now < route.heard + KEEP_ROUTE => {
+                self.doubled.insert(from);
+                return;
+            }
+            _ if is_vehicle(&frame.message) => {
+                self.routes.insert(from, Route { port, peer, heard: now });
+            }
+            // Nobody is known before it says who it is.
+            _ => return,
+        }
+        self.queue.push_back(Received { from, message: frame.message });
+    }
+
+    fn send_to(&mut self, port: usize, peer: Peer, message: &MavMessage) -> Result<(), NetError> {
+        if let Some(signer) = &mut self.signer {
+            signer.advance(signing_time(self.clock.unix_us()));
+        }
+        let Some(port) = self.ports.get_mut(port) else { return Ok(()) };
+        let frame = encode(STATION, port.sequence, message, self.signer.as_mut());
+        port.sequence = port.sequence.wrapping_add(1);
+        self.traffic.entry(port.network).or_default().bytes_out += frame.len() as u64;
+        port.sending
+            .send(peer, &frame)
+            .map_err(|error| NetError::Closed { reason: error.to_string() })
+    }
+
+    fn beat(&mut self) -> Result<(), NetError> {
+        let now = self.clock.now();
+        if now >= self.next_heartbeat {
+            self.next_heartbeat = now + S;
+            self.broadcast(&heartbeat())?;
+        }
+        Ok(())
+    }
+}
+
+impl Net for Station {
+    fn now(&self) -> Micros {
+        self.clock.now()
+    }
+
+    fn recv(&mut self, until: Micros) -> Result<Option<Received>, NetError> {
+        loop {
+            self.beat()?;
+            if let Some(received) = self.queue.pop_front() {
+                return Ok(Some(received));
+            }
+            let now = self.clock.now();
+            let wait = until.min(self.next_heartbeat).saturating_sub(now);
+            match self.input.recv_timeout(Duration::from_micros(wait)) {
+                Ok(piece) => self.take(piece)?,
+                Err(RecvTimeoutError::Timeout) if self.clock.now() >= until => return Ok(None),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(NetError::Closed { reason: "no link is open".to_owned() });
+                }
+            }
+        }
+    }
+
+    fn send(&mut self, to: DroneId, message: &MavMessage) -> Result<(), NetError> {
+        match self.routes.get(&to).copied() {
+            Some(route) => self.send_to(route.port, route.peer, message),
+            None => Ok(()),
+        }
+    }
+
+    fn broadcast(&mut self, message: &MavMessage) -> Result<(), NetError> {
+        let mut ends: BTreeSet<(usize, Peer)> =
+            self.routes.values().map(|route| (route.port, route.peer)).collect();
+        for (index, port) in self.ports.iter().enumerate() {
+            ends.extend(port.sending.first_peer().map(|peer| (index, peer)));
+        }
+        for (port, peer) in ends {
+            self.send_to(port, peer, message)?;
+        }
+        Ok(())
+    }
+
+    fn heard(&self) -> Vec<DroneId> {
+        self.routes.keys().copied().collect()
+    }
+}
+
+impl Drop for Station {
+    fn drop(&mut self) {
+        self.end.store(true, Ordering::Relaxed);
+        // A full backlog would keep readers from seeing it.
+        while self.input.try_recv().is_ok() {}
+        for reader in self.readers.drain(..) {
+            while !reader.is_finished() {
+                while self.input.try_recv().is_ok() {}
+                std::thread::yield_now();
+            }
+            let _ = reader.join();
+        }
+    }
+}
+
+fn read(
+    port: usize,
+    mut receiving: Box<dyn Receiving>,
+    output: &SyncSender<Piece>,
+    end: &AtomicBool,
+) {
+    let mut buffer = vec![0; PIECE];
+    while !end.load(Ordering::Relaxed) {
+        let piece = match receiving.recv(&mut buffer, READER_LOOK) {
+            Ok(None) => continue,
+            Ok(Some((peer, size))) => Piece::Bytes { port, peer, bytes: buffer[..size].to_vec() },
+            Err(error) => Piece::Closed { port, reason: error.to_string() },
+        };
+        let closed = matches!(piece, Piece::Closed { .. });
+        if output.send(piece).is_err() || closed {
+            return;
+        }
+    }
+}
+
+fn is_vehicle(message: &MavMessage) -> bool {
+    matches!(message, MavMessage::HEARTBEAT(beat)
+        if beat.autopilot != dialect::MavAutopilot::MAV_AUTOPILOT_INVALID)
+}
+
+/// The station's own heartbeat.
+pub fn heartbeat() -> MavMessage {
+    MavMessage::HEARTBEAT(dialect::HEARTBEAT_DATA {
+        custom_mode: 0,
+        mavtype: dialect::MavType::MAV_TYPE_GCS,
+        autopilot: dialect::MavAutopilot::MAV_AUTOPILOT_INVALID,
+        base_mode: dialect::MavModeFlag::empty(),
+        system_status: dialect::MavState::MAV_STATE_ACTIVE,
+        mavlink_version: 3,
+    })
+}

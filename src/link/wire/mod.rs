@@ -1,0 +1,60 @@
+//! Sockets and ports that carry frames.
+
+mod serial;
+mod tcp;
+mod udp;
+
+use std::io;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use super::address::{Address, Way};
+use super::error::NetError;
+
+/// The other end of a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Peer {
+    /// There is but one.
+    Only,
+    /// One of many on a datagram socket.
+    At(SocketAddr),
+}
+
+/// The sending half of a link.
+pub trait Sending: Send {
+    /// Sends one frame. Losing it is no error; a link that is down for now loses all.
+    fn send(&mut self, to: Peer, frame: &[u8]) -> io::Result<()>;
+
+    /// Where to speak first when nobody was heard yet; `None`: the link can only answer.
+    fn first_peer(&self) -> Option<Peer>;
+}
+
+/// The receiving half of a link.
+pub trait Receiving: Send {
+    /// Bytes that came until the timeout; `None`: none came. A datagram is whole.
+    fn recv(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<(Peer, usize)>>;
+
+    /// Whether what is received at once belongs together.
+    fn is_datagram(&self) -> bool;
+}
+
+/// Both halves of a link.
+pub type Halves = (Box<dyn Sending>, Box<dyn Receiving>);
+
+/// Opens a link.
+///
+/// # Errors
+/// When the address is not there, taken, or not allowed.
+pub fn open(address: &Address) -> Result<Halves, NetError> {
+    let (opened, hint) = match &address.way {
+        Way::UdpIn(host) => {
+            (udp::listen(host), "is another ground station listening on the same port?")
+        }
+        Way::UdpOut(host) => (udp::connect(host), "is the host name right?"),
+        Way::Tcp(host) => (tcp::connect(host), "does anything listen there?"),
+        Way::Serial(device, baud) => {
+            (serial::open(device, *baud), "is the radio plugged in, and may you use the device?")
+        }
+    };
+    opened.map_err(|source| NetError::Open { address: address.clone(), hint, source })
+}

@@ -1,0 +1,8 @@
+//! Virtual vehicles that speak MAVLink as the show firmware does, flown by the embedded
+//! simulator: what `run` flies, and what a crew practises with.
+//!
+//! A vehicle is an [`endpoint::Endpoint`]: no sockets and no clock of its own, so that a whole
+//! fleet with a bad radio link also runs in one thread, in simulated time ([`lossy::LossyNet`]).
+
+pub mod endpoint;
+pub mod lossy;
