@@ -194,7 +194,8 @@ impl<E: Endpoint> LossyNet<E> {
     }
 
     fn next_event(&self) -> Micros {
-        let wake = self.wake.values().copied().min().unwrap_or(Micros::MAX);
+        let awake = self.vehicles.keys().filter_map(|drone| self.wake.get(drone));
+        let wake = awake.copied().min().unwrap_or(Micros::MAX);
         let air = self.air.keys().next().map_or(Micros::MAX, |(time, _)| *time);
         wake.min(air).min(self.next_heartbeat)
     }
