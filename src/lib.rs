@@ -39,6 +39,7 @@ pub mod protocol;
 pub mod report;
 pub mod show;
 pub mod sim;
+pub mod skybrush_server;
 pub mod study;
 pub mod vehicle;
 pub mod virtual_fleet;

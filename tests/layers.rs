@@ -16,6 +16,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("log", &["base"]),
     ("link", &["base"]),
     ("protocol", &["base"]),
+    ("skybrush_server", &["base", "link"]),
     ("campaign", &["base", "vehicle", "mission", "show", "check"]),
     ("effects", &["base", "vehicle"]),
     ("sim", &["base", "vehicle", "mission", "show", "log", "effects"]),

@@ -1,0 +1,275 @@
+//! Requests, receipts and notifications.
+
+use std::collections::BTreeMap;
+use std::io::{self, Read as _, Write as _};
+use std::net::{TcpStream, ToSocketAddrs as _};
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use super::error::ServerError;
+use super::lines::Lines;
+use super::message::{self, Incoming};
+use crate::link::clock::{Clock, Micros, S};
+
+/// Longest line: a log of 380 MB in base64.
+const MOST_LINE: usize = 512 << 20;
+/// An answer to a request comes at once.
+const ANSWER: Micros = 10 * S;
+/// The server gives up work without progress after 90 s, and says so.
+const PATIENCE: Micros = 120 * S;
+/// Longest wait on the socket at once.
+const LOOK: Duration = Duration::from_millis(100);
+const CONNECT: Duration = Duration::from_secs(5);
+/// Notifications that nobody has asked for yet; more are forgotten, the oldest first.
+const KEPT: usize = 10_000;
+
+/// A connection to a server.
+pub struct Client {
+    stream: TcpStream,
+    lines: Lines,
+    clock: Arc<dyn Clock>,
+    next_id: u64,
+    /// Ends of work by receipt, and progress.
+    ended: BTreeMap<String, Result<Value, String>>,
+    moved: BTreeMap<String, (Micros, f64)>,
+}
+
+/// How one drone's part of a request ended.
+pub type Outcome = Result<Value, String>;
+
+/// Work that goes on at the server: receipts by drone.
+#[derive(Clone, Debug, Default)]
+pub struct Running {
+    receipts: BTreeMap<String, String>,
+    over: BTreeMap<String, Outcome>,
+}
+
+impl Client {
+    /// Connects to `host:port`.
+    pub fn connect(address: &str, clock: Arc<dyn Clock>) -> Result<Self, ServerError> {
+        let port = address.rsplit_once(':').and_then(|(_, port)| port.parse().ok()).unwrap_or(0);
+        let fail = |source| ServerError::Connect { address: address.to_owned(), port, source };
+        let mut last = io::Error::from(io::ErrorKind::NotFound);
+        for place in address.to_socket_addrs().map_err(fail)? {
+            match TcpStream::connect_timeout(&place, CONNECT) {
+                Ok(stream) => {
+                    stream.set_nodelay(true).map_err(fail)?;
+                    stream.set_read_timeout(Some(LOOK)).map_err(fail)?;
+                    stream.set_write_timeout(Some(CONNECT)).map_err(fail)?;
+                    return Ok(Self {
+                        stream,
+                        lines: Lines::new(MOST_LINE),
+                        clock,
+                        next_id: 0,
+                        ended: BTreeMap::new(),
+                        moved: BTreeMap::new(),
+                    });
+                }
+                Err(error) => last = error,
+            }
+        }
+        Err(fail(last))
+    }
+
+    /// Asks, and waits for the answer's body.
+    pub fn ask(&mut self, body: &Value) -> Result<Value, ServerError> {
+        let what = kind_of(body);
+        let id = self.send(body)?;
+        let until = self.clock.now() + ANSWER;
+        loop {
+            let Some(incoming) = self.receive(&what, until)? else {
+                return Err(ServerError::Silent { what, seconds: ANSWER / S });
+            };
+            if incoming.refers_to.as_deref() != Some(&id) {
+                self.note(incoming);
+                continue;
+            }
+            if incoming.kind == "ACK-NAK" {
+                let reason = text(&incoming.body, "reason").unwrap_or("no reason given").to_owned();
+                return Err(ServerError::Refused { what, reason });
+            }
+            return Ok(incoming.body);
+        }
+    }
+
+    /// Asks for work on drones; what is over at once is over, the rest has receipts.
+    pub fn begin(&mut self, body: &Value) -> Result<Running, ServerError> {
+        let answer = self.ask(body)?;
+        let mut running = Running::default();
+        for (drone, receipt) in entries(&answer, "receipt") {
+            if let Some(receipt) = receipt.as_str() {
+                running.receipts.insert(drone, receipt.to_owned());
+            }
+        }
+        for (drone, result) in entries(&answer, "result") {
+            running.over.insert(drone, Ok(result));
+        }
+        for (drone, error) in entries(&answer, "error") {
+            running.over.insert(drone, Err(words(&error)));
+        }
+        // A single drone's receipt is not keyed by it.
+        if let (Some(receipt), Some(drone)) = (text(&answer, "receipt"), text(body, "uavId")) {
+            running.receipts.insert(drone.to_owned(), receipt.to_owned());
+        }
+        Ok(running)
+    }
+
+    /// Waits until all of it is over. `progress` is called with a drone and its share, 0..1, and
+    /// ends the waiting by returning false.
+    pub fn finish(
+        &mut self,
+        mut running: Running,
+        mut progress: impl FnMut(&str, f64) -> bool,
+    ) -> Result<BTreeMap<String, Outcome>, ServerError> {
+        let mut moved = self.clock.now();
+        while !running.receipts.is_empty() {
+            let now = self.clock.now();
+            if let Some(incoming) = self.receive("the end of its work", now + 200_000)? {
+                self.note(incoming);
+            }
+            let mut over = Vec::new();
+            for (drone, receipt) in &running.receipts {
+                if let Some(outcome) = self.ended.remove(receipt) {
+                    running.over.insert(drone.clone(), outcome);
+                    over.push(drone.clone());
+                }
+                let (time, share) = self.moved.get(receipt).copied().unwrap_or((0, 0.0));
+                moved = moved.max(time);
+                if !progress(drone, if running.over.contains_key(drone) { 1.0 } else { share }) {
+                    return Ok(running.over);
+                }
+            }
+            for drone in over {
+                if let Some(receipt) = running.receipts.remove(&drone) {
+                    self.moved.remove(&receipt);
+                    moved = self.clock.now();
+                }
+            }
+            if self.clock.now() > moved + PATIENCE {
+                for drone in std::mem::take(&mut running.receipts).into_keys() {
+                    let silent = format!("nothing was heard of it for {} s", PATIENCE / S);
+                    running.over.insert(drone, Err(silent));
+                }
+            }
+        }
+        Ok(running.over)
+    }
+
+    fn send(&mut self, body: &Value) -> Result<String, ServerError> {
+        self.next_id += 1;
+        let id = format!("updraft-{}", self.next_id);
+        let line = message::request(&id, body);
+        self.stream
+            .write_all(line.as_bytes())
+            .map_err(|source| ServerError::Broken { what: kind_of(body), source })?;
+        Ok(id)
+    }
+
+    /// The next message until a time.
+    fn receive(&mut self, what: &str, until: Micros) -> Result<Option<Incoming>, ServerError> {
+        let broken = |source| ServerError::Broken { what: what.to_owned(), source };
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            while let Some(line) = self.lines.next() {
+                if let Some(incoming) = message::parse(&line) {
+                    return Ok(Some(incoming));
+                }
+            }
+            match self.stream.read(&mut buffer) {
+                Ok(0) => return Err(broken(io::ErrorKind::UnexpectedEof.into())),
+                Ok(size) => self
+                    .lines
+                    .push(&buffer[..size])
+                    .map_err(|_| ServerError::TooLong { most: MOST_LINE })?,
+                Err(error) => match error.kind() {
+                    io::ErrorKind::WouldBlock
+                    | io::ErrorKind::TimedOut
+                    | io::ErrorKind::Interrupted => {}
+                    _ => return Err(broken(error)),
+                },
+            }
+            if self.clock.now() >= until {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// Keeps a notification until it is asked for.
+    fn note(&mut self, incoming: Incoming) {
+        let body = &incoming.body;
+        match incoming.kind.as_str() {
+            "ASYNC-RESP" => {
+                let Some(receipt) = text(body, "id") else { return };
+                let outcome = match body.get("error") {
+                    Some(error) if !error.is_null() => Err(words(error)),
+                    _ => Ok(body.get("result").cloned().unwrap_or(Value::Null)),
+                };
+                self.ended.insert(receipt.to_owned(), outcome);
+            }
+            "ASYNC-ST" => {
+                let Some(receipt) = text(body, "id") else { return };
+                let percentage = body.pointer("/progress/percentage").and_then(Value::as_f64);
+                let share = percentage.unwrap_or(0.0).clamp(0.0, 100.0) / 100.0;
+                self.moved.insert(receipt.to_owned(), (self.clock.now(), share));
+            }
+            "ASYNC-TIMEOUT" => {
+                let ids = body.get("ids").and_then(Value::as_array).cloned().unwrap_or_default();
+                for receipt in ids.iter().filter_map(Value::as_str) {
+                    let late = Err("the server gave up: the drone does not answer".to_owned());
+                    self.ended.insert(receipt.to_owned(), late);
+                }
+            }
+            _ => {}
+        }
+        while self.ended.len() > KEPT {
+            self.ended.pop_first();
+        }
+        while self.moved.len() > KEPT {
+            self.moved.pop_first();
+        }
+    }
+
+    /// Ids of the drones that the server knows.
+    pub fn drones(&mut self) -> Result<Vec<String>, ServerError> {
+        let answer = self.ask(&json!({ "type": "UAV-LIST" }))?;
+        let ids = answer.get("ids").and_then(Value::as_array).ok_or_else(|| {
+            ServerError::Answer { what: "UAV-LIST".to_owned(), problem: "it has no ids".to_owned() }
+        })?;
+        Ok(ids.iter().filter_map(Value::as_str).map(str::to_owned).collect())
+    }
+
+    /// The server's name and version.
+    pub fn version(&mut self) -> Result<String, ServerError> {
+        let answer = self.ask(&json!({ "type": "SYS-VER" }))?;
+        let part = |key| text(&answer, key).unwrap_or("?").to_owned();
+        Ok(format!("{} {}", part("software"), part("version")))
+    }
+
+    /// Status of drones by id, as the server tells it (UAV-INF).
+    pub fn status(&mut self, drones: &[String]) -> Result<BTreeMap<String, Value>, ServerError> {
+        let answer = self.ask(&json!({ "type": "UAV-INF", "ids": drones }))?;
+        Ok(entries(&answer, "status").collect())
+    }
+}
+
+fn kind_of(body: &Value) -> String {
+    match (text(body, "type"), text(body, "command")) {
+        (Some(kind), Some(command)) => format!("{kind} {command}"),
+        (Some(kind), None) => kind.to_owned(),
+        _ => "a request".to_owned(),
+    }
+}
+
+pub(super) fn text<'a>(value: &'a Value, key: &str) -> Option<&'a str> {
+    value.get(key).and_then(Value::as_str)
+}
+
+fn entries(value: &Value, key: &str) -> impl Iterator<Item = (String, Value)> {
+    value.get(key).and_then(Value::as_object).cloned().unwrap_or_default().into_iter()
+}
+
+fn words(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}

@@ -1,0 +1,71 @@
+//! Logs through the server. Only one download per drone at a time.
+
+use std::collections::BTreeMap;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+
+use super::client::{Client, Running, text};
+use super::error::ServerError;
+
+/// A log on a drone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogEntry {
+    /// Its name on the server.
+    pub id: String,
+    /// Bytes.
+    pub size: u64,
+    /// Unix time, s; `None` when the autopilot had no clock.
+    pub unix_s: Option<i64>,
+}
+
+impl Client {
+    /// The logs of drones; what went wrong with one is its value.
+    pub fn logs(
+        &mut self,
+        drones: &[String],
+    ) -> Result<BTreeMap<String, Result<Vec<LogEntry>, String>>, ServerError> {
+        let running = self.begin(&json!({ "type": "LOG-INF", "ids": drones }))?;
+        let ended = self.finish(running, |_, _| true)?;
+        Ok(ended
+            .into_iter()
+            .map(|(drone, outcome)| (drone, outcome.and_then(|value| entries(&value))))
+            .collect())
+    }
+
+    /// Begins the download of a log; [`log_bytes`] reads what it ends with.
+    pub fn fetch_log(&mut self, drone: &str, log: &str) -> Result<Running, ServerError> {
+        self.begin(&json!({ "type": "LOG-DATA", "uavId": drone, "logId": log }))
+    }
+}
+
+fn entries(value: &Value) -> Result<Vec<LogEntry>, String> {
+    let list = value.as_array().ok_or("the server's list of logs is no list")?;
+    Ok(list
+        .iter()
+        .filter(|entry| text(entry, "kind") == Some("ardupilot"))
+        .filter_map(|entry| {
+            Some(LogEntry {
+                id: text(entry, "id")?.to_owned(),
+                size: entry.get("size")?.as_u64()?,
+                unix_s: entry.get("timestamp").and_then(Value::as_i64).filter(|time| *time > 0),
+            })
+        })
+        .collect())
+}
+
+/// The bytes of a downloaded log, of the size that was promised.
+///
+/// # Errors
+/// When they are not all there.
+pub fn log_bytes(value: &Value) -> Result<Vec<u8>, String> {
+    let body = text(value, "body").ok_or("the server sent no log")?;
+    let bytes = STANDARD.decode(body).map_err(|error| format!("the log is garbled: {error}"))?;
+    match value.get("size").and_then(Value::as_u64) {
+        Some(size) if size != bytes.len() as u64 => {
+            Err(format!("the server sent {} of {size} bytes", bytes.len()))
+        }
+        _ => Ok(bytes),
+    }
+}

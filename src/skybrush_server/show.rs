@@ -1,0 +1,52 @@
+//! Starting and ending a show through the server.
+
+use serde_json::{Value, json};
+
+use super::client::{Client, Running};
+use super::error::ServerError;
+
+/// When the show starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StartConfig {
+    /// Unix time, whole seconds; `None`: no start.
+    pub unix_s: Option<i64>,
+    /// Whether it is allowed to.
+    pub authorized: bool,
+    /// Drones that take part, as the server names them.
+    pub drones: Vec<String>,
+    /// How long the show takes, s.
+    pub duration_s: f64,
+}
+
+impl Client {
+    /// Tells the server when to start; it tells the drones once a second.
+    pub fn set_start(&mut self, start: &StartConfig) -> Result<(), ServerError> {
+        self.ask(&json!({
+            "type": "SHOW-SETCFG",
+            "configuration": {
+                "start": {
+                    "authorized": start.authorized,
+                    "authorizationScope": "live",
+                    "clock": null,
+                    "time": start.unix_s,
+                    "method": "auto",
+                    "uavIds": start.drones,
+                },
+                "duration": start.duration_s,
+            },
+        }))
+        .map(|_| ())
+    }
+
+    /// What the server would start, as it tells it.
+    pub fn start(&mut self) -> Result<Value, ServerError> {
+        let mut answer = self.ask(&json!({ "type": "SHOW-CFG" }))?;
+        Ok(answer.get_mut("configuration").map(Value::take).unwrap_or_default())
+    }
+
+    /// Sends drones home, or lets them land where they are.
+    pub fn end_flight(&mut self, drones: &[String], home: bool) -> Result<Running, ServerError> {
+        let kind = if home { "UAV-RTH" } else { "UAV-LAND" };
+        self.begin(&json!({ "type": kind, "ids": drones }))
+    }
+}

@@ -1,0 +1,110 @@
+//! A show for one drone, as the server takes it.
+
+use serde_json::{Value, json};
+
+use super::client::{Client, Running};
+use super::error::ServerError;
+use crate::base::frame::ShowFrame;
+
+/// The fence that goes with a show. There is no show without one: a server that is told nothing
+/// switches the fence of the drone off.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fence {
+    /// Corners, show x and y, m.
+    pub polygon_m: Vec<[f64; 2]>,
+    /// Highest altitude above home, m; the server takes 10 to 3000.
+    pub max_altitude_m: f64,
+    /// Largest distance from home, m; the server takes 30 to 10000.
+    pub max_distance_m: f64,
+}
+
+/// What all drones of a show have in common.
+#[derive(Clone, Debug)]
+pub struct ShowUpload {
+    /// Short name.
+    pub id: String,
+    /// Title for people.
+    pub title: String,
+    /// Drones in the show.
+    pub drones: usize,
+    /// Where the show is.
+    pub frame: ShowFrame,
+    /// The fence.
+    pub fence: Fence,
+}
+
+/// The server's limits, m.
+const ALTITUDE_M: std::ops::RangeInclusive<f64> = 10.0..=3000.0;
+const DISTANCE_M: std::ops::RangeInclusive<f64> = 30.0..=10_000.0;
+
+impl ShowUpload {
+    /// The payload for the drone with this index (from 0). `trajectory` and `lights` are the
+    /// objects of a `.skyc` file.
+    ///
+    /// # Errors
+    /// When the fence is not one that the server would set as it is.
+    pub fn payload(
+        &self,
+        index: usize,
+        trajectory: &Value,
+        lights: Option<&Value>,
+    ) -> Result<Value, ServerError> {
+        let fail = |problem: String| ServerError::Show { problem };
+        let fence = &self.fence;
+        if fence.polygon_m.len() < 3 {
+            return Err(fail("its fence has fewer than 3 corners".to_owned()));
+        }
+        if !ALTITUDE_M.contains(&fence.max_altitude_m) {
+            let wrong = fence.max_altitude_m;
+            return Err(fail(format!("its fence is {wrong} m high; 10 to 3000 m are possible")));
+        }
+        if !DISTANCE_M.contains(&fence.max_distance_m) {
+            let wrong = fence.max_distance_m;
+            return Err(fail(format!("its fence reaches {wrong} m; 30 to 10000 m are possible")));
+        }
+        let origin = self.frame.origin;
+        let mut show = json!({
+            "name": format!("{}", index + 1),
+            "trajectory": trajectory,
+            "amslReference": null,
+            "coordinateSystem": {
+                "type": "nwu",
+                "origin": [origin.lon_deg, origin.lat_deg],
+                "orientation": self.frame.orientation_deg,
+            },
+            "geofence": {
+                "version": 1,
+                "enabled": true,
+                "polygons": [{ "isInclusion": true, "points": fence.polygon_m }],
+                "rallyPoints": [],
+                "maxAltitude": fence.max_altitude_m,
+                "maxDistance": fence.max_distance_m,
+                "minAltitude": null,
+                "action": "return",
+            },
+            "mission": {
+                "id": self.id,
+                "title": self.title,
+                "index": index,
+                "displayName": format!("{} / {}", self.id, index + 1),
+                "numDrones": self.drones,
+            },
+        });
+        if let (Some(lights), Some(show)) = (lights, show.as_object_mut()) {
+            show.insert("lights".to_owned(), lights.clone());
+        }
+        Ok(show)
+    }
+}
+
+impl Client {
+    /// Begins the upload of a payload to a drone of the server.
+    pub fn upload(&mut self, drone: &str, show: &Value) -> Result<Running, ServerError> {
+        self.begin(&json!({
+            "type": "OBJ-CMD",
+            "ids": [drone],
+            "command": "__show_upload",
+            "kwds": { "show": show },
+        }))
+    }
+}
