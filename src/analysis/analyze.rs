@@ -11,21 +11,25 @@ use super::calibrate::{self, FitOptions, PaperTable};
 use super::density::Density;
 use super::drone::{One, Shared, law_fit, one};
 use super::law::{LINEAR, SIGNED_QUADRATIC};
-use super::matching::{self, Candidate};
+use super::matching::{self, Candidate, Matched};
 use super::refer::refer_calibration;
-use super::result::{ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, Missing, UpdraftMap};
+use super::result::{
+    ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, LostLog, Missing, UpdraftMap,
+};
 use super::stats::mean_sd;
 use super::updraft::{self, DroneSeries};
 use super::windows::WindowOptions;
+use crate::base::causes::with_causes;
 use crate::base::time::GpsTime;
-use crate::flight::{Identity, identify};
+use crate::flight::identify;
 use crate::log::Log;
 use crate::mission::plan::{Plan, Purpose};
 
 /// One log of a flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogInput {
-    /// Slot of the plan, if known; else it is found by system id, file name or home.
+    /// Slot of the plan by somebody's record. Only the home position in the log counts more; without
+    /// a record, the file's number and the system id count.
     pub slot: Option<u16>,
     /// The file.
     pub path: PathBuf,
@@ -53,6 +57,14 @@ pub struct FlightInput<'a> {
     pub density: Option<Density>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
+}
+
+impl FlightInput<'_> {
+    /// A log's path as results give it.
+    pub(super) fn shown(&self, path: &Path) -> String {
+        let inside = self.folder.and_then(|folder| path.strip_prefix(folder).ok());
+        inside.unwrap_or(path).display().to_string()
+    }
 }
 
 /// The vertical air speed that one simulated drone met.
@@ -129,14 +141,14 @@ pub enum AnalysisError {
         name: String,
     },
     /// None of the logs could be used.
-    #[error("{name}: none of the {count} log(s) can be used; the first: {first}")]
+    #[error("{name}: none of the {count} log(s) can be used:{}", listed(reasons))]
     NothingUsable {
         /// The flight.
         name: String,
         /// Logs given.
         count: usize,
-        /// Why the first one cannot be used.
-        first: String,
+        /// Why not, one sentence for each.
+        reasons: Vec<String>,
     },
     /// The campaign has no flights.
     #[error("there is no flight to analyse")]
@@ -191,8 +203,21 @@ pub fn analyze(
     })
 }
 
-/// Analyses one flight of a fleet. A log that cannot be used is listed as missing (or as a warning,
-/// when it has no slot) and does not stop the others.
+/// Reasons one below the other; the first ones of many.
+fn listed(reasons: &[String]) -> String {
+    let mut text = String::new();
+    for reason in reasons.iter().take(LISTED) {
+        text.push_str("\n  ");
+        text.push_str(reason);
+    }
+    if reasons.len() > LISTED {
+        text.push_str("\n  and more");
+    }
+    text
+}
+
+/// Analyses one flight of a fleet. A log that cannot be used is listed as missing (or as lost, when
+/// it has no slot) and does not stop the others.
 ///
 /// `reference` is a calibration whose laws measure the air and hold A and u0 (unless
 /// [`FitOptions::hold`] gives them): each drone's own laws, else its flock mapping.
@@ -205,8 +230,7 @@ pub fn analyze_flight(
     if input.logs.is_empty() {
         return Err(AnalysisError::NoLogs { name: input.name.to_owned() });
     }
-    let mut warnings = Vec::new();
-    let slots = match_slots(input);
+    let (slots, warnings) = match_slots(input);
     let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
     let referred = reference
         .zip(input.density)
@@ -232,16 +256,24 @@ pub fn analyze_flight(
 
     let mut ones: Vec<One> = Vec::new();
     let mut reasons: BTreeMap<u16, String> = BTreeMap::new();
-    let mut first_failure = None;
+    let mut failures = Vec::new();
+    let mut lost = Vec::new();
     for ((log, slot), outcome) in work.iter().zip(outcomes) {
+        let source = input.shown(&log.path);
         match (outcome, slot) {
-            (Ok(one), _) => ones.push(one),
+            (Ok(one), _) => {
+                let cut_off = one.cut_off.clone();
+                lost.extend(cut_off.map(|reason| LostLog { source, reason, used: true }));
+                ones.push(one);
+            }
             (Err(reason), slot) => {
-                let named = with_name(&reason, &log.path);
-                first_failure.get_or_insert_with(|| named.clone());
+                // Errors name the file as it was opened; results name it as their reader finds it.
+                let reason = reason.replace(&log.path.display().to_string(), &source);
+                let failure = LostLog { source, reason, used: false };
+                failures.push(failure.sentence());
                 match slot {
-                    SlotMatch::Slot(number) => _ = reasons.entry(*number).or_insert(reason),
-                    _ => warnings.push(named),
+                    SlotMatch::Slot(slot) => _ = reasons.entry(*slot).or_insert(failure.sentence()),
+                    _ => lost.push(failure),
                 }
             }
         }
@@ -250,15 +282,17 @@ pub fn analyze_flight(
         return Err(AnalysisError::NothingUsable {
             name: input.name.to_owned(),
             count: input.logs.len(),
-            first: first_failure.unwrap_or_default(),
+            reasons: failures,
         });
     }
     if input.plan.is_some() {
         ones.sort_by_key(|one| one.drone.slot);
     }
-    Ok(finish(&shared, ones, &reasons, warnings))
+    Ok(FlightAnalysis { lost, ..finish(&shared, ones, &reasons, warnings) })
 }
 
+/// Unusable logs named in an error.
+const LISTED: usize = 20;
 /// Largest W of a calibration's signed quadratic that may be the air's, m/s.
 const LARGEST_CALIBRATION_W_MPS: f64 = 0.5;
 
@@ -268,58 +302,45 @@ enum SlotMatch {
     Refused(String),
 }
 
-/// Finds the slot of each log, and refuses logs that would be a slot's second one.
-fn match_slots(input: &FlightInput<'_>) -> Vec<SlotMatch> {
+/// Finds the slot of each log, refuses copies, other places and a slot's second log; and says what
+/// contradicts itself.
+fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<String>) {
+    let opened: Vec<Result<Log, String>> = (input.logs.par_iter())
+        .map(|log| Log::open(&log.path).map_err(|error| with_causes(&error, ": ")))
+        .collect();
+    let bytes: Vec<Option<&[u8]>> = opened
+        .iter()
+        .map(|log| log.as_ref().ok().map(Log::bytes).filter(|bytes| !bytes.is_empty()))
+        .collect();
+    let copies = matching::same_bytes(&bytes);
     let Some(plan) = input.plan else {
-        return input.logs.iter().map(|_| SlotMatch::Unplanned).collect();
+        let refused = |first: usize| {
+            let first = input.logs.get(first).map(|log| input.shown(&log.path));
+            SlotMatch::Refused(matching::copy_of(&first.unwrap_or_default()))
+        };
+        let slots = copies.into_iter().map(|copy| copy.map_or(SlotMatch::Unplanned, refused));
+        return (slots.collect(), Vec::new());
     };
-    let candidates: Vec<Candidate> = input
-        .logs
-        .par_iter()
-        .map(|log| {
-            let identity = if log.slot.is_some() {
-                Identity::default()
-            } else {
-                Log::open(&log.path).map(|log| identify(&log)).unwrap_or_default()
-            };
+    let candidates: Vec<Candidate> = (input.logs.par_iter())
+        .zip(&opened)
+        .zip(&copies)
+        .map(|((log, opened), copy)| {
+            let identity = opened.as_ref().map(identify).unwrap_or_default();
             Candidate {
+                name: input.shown(&log.path),
                 given: log.slot,
                 system_id: identity.system_id,
                 file_number: matching::file_number(&log.path),
-                first_fix_deg: identity.first_fix_deg,
+                home_deg: identity.home_deg,
+                flew: identity.flew,
+                same_as: *copy,
+                unreadable: opened.as_ref().err().cloned(),
             }
         })
         .collect();
-    let mut seen: BTreeMap<u16, &Path> = BTreeMap::new();
-    matching::slots(plan, &candidates)
-        .into_iter()
-        .zip(input.logs)
-        .map(|(slot, log)| {
-            let Some(slot) = slot else {
-                return SlotMatch::Refused(
-                    "the log fits no free slot of the plan by system id, file name or home \
-                     position; name it after its slot (07.BIN)"
-                        .to_owned(),
-                );
-            };
-            if plan.slot(slot).is_none() {
-                return SlotMatch::Refused(format!("the plan has no slot {slot}"));
-            }
-            if let Some(first) = seen.get(&slot) {
-                return SlotMatch::Refused(format!(
-                    "slot {slot} has a log already ({}); this one is not used",
-                    first.display()
-                ));
-            }
-            seen.insert(slot, &log.path);
-            SlotMatch::Slot(slot)
-        })
-        .collect()
-}
-
-fn with_name(reason: &str, path: &Path) -> String {
-    let name = path.display().to_string();
-    if reason.contains(&name) { reason.to_owned() } else { format!("{name}: {reason}") }
+    let Matched { slots, warnings } = matching::slots(plan, &candidates);
+    let slots = slots.into_iter().map(|slot| slot.map_or_else(SlotMatch::Refused, SlotMatch::Slot));
+    (slots.collect(), warnings)
 }
 
 /// The law whose fits to the reference's drones have the lower mean reduced chi².
@@ -363,7 +384,7 @@ fn finish(
     });
     let mut drones = Vec::new();
     let mut updrafts = Vec::new();
-    for One { mut drone, calibration, updraft } in ones {
+    for One { mut drone, calibration, updraft, .. } in ones {
         if purpose == Purpose::Calibration {
             match calibration {
                 Ok(laws) => drone.laws = Some(laws),
@@ -419,6 +440,7 @@ fn finish(
         table,
         map,
         warnings,
+        lost: Vec::new(),
     }
 }
 

@@ -24,6 +24,8 @@ pub(super) struct Shared<'a> {
 /// What one log gave.
 pub(super) struct One {
     pub(super) drone: DroneAnalysis,
+    /// Why the log lacks the flight's end.
+    pub(super) cut_off: Option<String>,
     pub(super) calibration: Result<Laws, CalibrationError>,
     pub(super) updraft: Option<(DroneSeries, &'static str)>,
 }
@@ -64,12 +66,12 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         let pulse_us = referred.as_ref().unwrap_or(&corrected.pulse_phi_us);
         Some((updraft::estimate(&flight, pulse_us, hover, fit)?, mapping))
     });
-    let source = input
-        .folder
-        .and_then(|folder| log.path.strip_prefix(folder).ok())
-        .unwrap_or(&log.path)
-        .display()
-        .to_string();
+    let source = input.shown(&log.path);
+    let cut_off = flight.cut_off_at_m.map(|height| {
+        format!(
+            "the log ends in the air, {height:.1} m above the ground; what it holds is analysed"
+        )
+    });
     let drone = DroneAnalysis {
         slot: number,
         name,
@@ -81,7 +83,7 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         trace: trace(&flight, &corrected, options.trace_points),
         warnings,
     };
-    Ok(One { drone, calibration, updraft })
+    Ok(One { drone, cut_off, calibration, updraft })
 }
 
 /// Windows from the plan's segments, checked against what was flown, or from the log itself.

@@ -47,10 +47,36 @@ pub struct FlightAnalysis {
     pub table: Vec<TableRow>,
     /// The map of the air, for measurements.
     pub map: Option<UpdraftMap>,
-    /// What is doubtful about the flight as a whole (logs that could not be used, matched or told
-    /// apart), one sentence each.
+    /// What is doubtful about the flight as a whole (logs that contradict each other), one sentence
+    /// each.
     #[serde(default)]
     pub warnings: Vec<String>,
+    /// Logs that could not be used, or not to the flight's end. Those of slots are in
+    /// [`FlightAnalysis::missing`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<LostLog>,
+}
+
+/// A log that could not be used, or not to the flight's end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LostLog {
+    /// The file, relative to the campaign folder where possible.
+    pub source: String,
+    /// Why.
+    pub reason: String,
+    /// Whether what it holds was analysed nevertheless.
+    pub used: bool,
+}
+
+impl LostLog {
+    /// One sentence that names the file.
+    pub fn sentence(&self) -> String {
+        if self.reason.contains(&self.source) {
+            self.reason.clone()
+        } else {
+            format!("{}: {}", self.source, self.reason)
+        }
+    }
 }
 
 /// A drone that the plan has and the analysis has not.

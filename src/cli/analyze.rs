@@ -21,7 +21,7 @@ use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, TruthSeries, analyze};
 use crate::base::file::{FileError, read_whole, write_whole};
 use crate::base::time::GpsTime;
-use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, to_json};
+use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, LogRecord, to_json};
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, InputFile, Provenance, terminal_summary};
@@ -44,8 +44,9 @@ const WIDTH: usize = 100;
   updraft analyze windy --hold still/analysis.json
 
 A campaign's results go into its folder, others into --output. Without a plan, windows are found in
-the log's own desired velocity. Exit code 3: done, but some logs are missing or unusable; they are
-named.")]
+the log's own desired velocity. Whose a log is, it says itself: by its home position (where the plan's
+slots are), else by its file name (07.BIN), else by its system id. Exit code 3: done, but some logs are
+missing, unusable, copies, from another place or end in the air; they are named.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
     #[arg(required = true)]
@@ -140,6 +141,8 @@ struct Found {
     seed: Option<u64>,
     start: Option<GpsTime>,
     density: Option<Density>,
+    /// What is doubtful about the files, one sentence each.
+    notes: Vec<String>,
 }
 
 /// What was asked to be analysed.
@@ -187,6 +190,7 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         })?;
         work.flights.iter_mut().for_each(|flight| flight.start = Some(start));
     }
+    let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
     finish(context, &work, &args.options, args.hold.as_deref(), output.as_deref())
 }
 
@@ -210,6 +214,9 @@ fn finish(
 ) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start();
     let reference = hold.map(read_reference).transpose()?;
+    for note in work.flights.iter().flat_map(|flight| &flight.notes) {
+        context.warn(note);
+    }
     let inputs: Vec<_> = work
         .flights
         .iter()
@@ -256,8 +263,12 @@ fn finish(
         })?;
     }
     let place = page.map_or(String::new(), |page| format!(" -> {}", page.display()));
-    context.say(&format!("Analysed {} in {watch}{place}", words::count(total, "log")));
-    let lost = analysis.flights.iter().any(|flight| !flight.missing.is_empty())
+    let used: usize = analysis.flights.iter().map(|flight| flight.drones.len()).sum();
+    let share = if used < total { format!("{used} of ") } else { String::new() };
+    context.say(&format!("Analysed {share}{} in {watch}{place}", words::count(total, "log")));
+    let lossy = |flight: &FlightAnalysis| !flight.missing.is_empty() || !flight.lost.is_empty();
+    let lost = used < total
+        || analysis.flights.iter().any(lossy)
         || analysis.flights.len() < work.flights.len();
     Ok(if lost { Exit::Losses } else { Exit::Done })
 }
@@ -293,25 +304,23 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
         seed: None,
         start: None,
         density: plan.map(|plan| density(plan, None)),
+        notes: Vec::new(),
     });
     Ok(())
 }
 
 fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     let plan = folder.read_plan()?;
-    let record = folder.read_record()?.filter(|record| record_holds(folder, record));
-    let logs = match &record {
-        // A record says which log is whose.
-        Some(record) => record
-            .logs
-            .iter()
-            .map(|log| LogInput { slot: Some(log.slot), path: folder.logs().join(&log.file) })
-            .collect(),
-        None if folder.logs().is_dir() => {
-            logs_in(&folder.logs())?.into_iter().map(|path| LogInput { slot: None, path }).collect()
-        }
-        None => Vec::new(),
+    let files = if folder.logs().is_dir() { logs_in(&folder.logs())? } else { Vec::new() };
+    let mut notes = Vec::new();
+    let record = match folder.read_record()? {
+        Some(record) => held_record(folder, record, &files, &mut notes),
+        None => None,
     };
+    let logs = files
+        .into_iter()
+        .map(|path| LogInput { slot: recorded_slot(folder, record.as_ref(), &path), path })
+        .collect();
     let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
     let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
     Ok(Found {
@@ -327,17 +336,48 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
         truth,
         start: record.as_ref().map(|record| record.start),
         seed: record.map(|record| record.seed),
+        notes,
     })
 }
 
-/// Whether the logs are still those that the record speaks of: somebody may have put the logs of real
-/// drones in their place.
-fn record_holds(folder: &FlightFolder, record: &FlightRecord) -> bool {
-    record.logs.iter().all(|log| {
-        let size = std::fs::metadata(folder.logs().join(&log.file)).map(|file| file.len());
-        // A log that is gone is a loss, not another flight.
-        size.map_or(true, |bytes| bytes == log.bytes)
-    })
+/// The record, if most of the logs are still those that it speaks of: somebody may have put the logs
+/// of real drones in their place. Says where files and record differ.
+fn held_record(
+    folder: &FlightFolder,
+    record: FlightRecord,
+    files: &[PathBuf],
+    notes: &mut Vec<String>,
+) -> Option<FlightRecord> {
+    let mut held = 0;
+    for log in &record.logs {
+        let path = folder.logs().join(&log.file);
+        if !path.exists() {
+            continue;
+        }
+        match log.difference(&path) {
+            Ok(None) => held += 1,
+            Ok(Some(how)) => notes.push(format!(
+                "{} is not the log that flight.json speaks of: {how}",
+                path.display()
+            )),
+            // The analysis says why it cannot be read.
+            Err(_) => {}
+        }
+    }
+    let holds = record.logs.is_empty() || (held > 0 && 2 * held >= files.len());
+    if !holds && !files.is_empty() {
+        *notes = vec![format!(
+            "{} speaks of other logs than those beside it: it is not used",
+            folder.record().display()
+        )];
+    }
+    holds.then_some(record)
+}
+
+/// Whose log a file is by the record.
+fn recorded_slot(folder: &FlightFolder, record: Option<&FlightRecord>, path: &Path) -> Option<u16> {
+    let named = |log: &&LogRecord| folder.logs().join(&log.file) == path;
+    record?.logs.iter().find(named).map(|log| log.slot)
 }
 
 /// The true air beside a simulated flight's logs, for the slots that have it.

@@ -1,6 +1,7 @@
 //! What every command gets: where to print, how much to say, and whether to stop.
 
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,6 +9,7 @@ use serde::Serialize;
 
 use super::Global;
 use super::exit::CommandError;
+use crate::campaign::lock::FolderLock;
 
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
@@ -62,6 +64,18 @@ impl Context {
     /// Ends the command if Ctrl-C was pressed.
     pub(super) fn check_stop(&self) -> Result<(), CommandError> {
         if self.stop.load(Ordering::SeqCst) { Err(CommandError::Interrupted) } else { Ok(()) }
+    }
+
+    /// Locks a campaign folder for this process; dropped, it is free again.
+    pub(super) fn lock(&self, folder: &Path) -> Result<FolderLock, CommandError> {
+        let lock = FolderLock::take(folder)?;
+        if !lock.is_held() {
+            self.warn(&format!(
+                "{} cannot be locked on this file system: let no other updraft write into it",
+                folder.display()
+            ));
+        }
+        Ok(lock)
     }
 
     /// Data, on standard output.

@@ -32,6 +32,8 @@ pub enum Exit {
     Unsafe = 4,
     /// There was nothing to work on: no logs, no windows.
     Nothing = 5,
+    /// Another process is writing into the same folder.
+    Busy = 6,
     /// Interrupted by the user; the same command goes on where it stopped.
     Interrupted = 130,
 }
@@ -142,6 +144,7 @@ impl CommandError {
             Self::Study(error) if matches!(**error, StudyError::NoReference { .. }) => {
                 Exit::Nothing
             }
+            Self::Campaign(CampaignError::Busy { .. }) => Exit::Busy,
             Self::Vehicle(VehicleError::File(_))
             | Self::File(_)
             | Self::Write(_)

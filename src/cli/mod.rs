@@ -49,7 +49,8 @@ use exit::{CommandError, Exit};
   updraft inspect my-campaign/show.skyc
 
 Exit codes: 0 done, 1 failed, 2 wrong arguments or template, 3 done with losses,
-4 a check failed, 5 nothing to work on, 130 interrupted."
+4 a check failed, 5 nothing to work on, 6 another updraft is writing there,
+130 interrupted."
 )]
 pub struct Cli {
     #[command(flatten)]

@@ -79,6 +79,7 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
     }
     let written = safe && !args.dry_run;
     if written {
+        let _lock = context.lock(&folder)?;
         write(context, &mission, &reports, &folder, args.force)?;
     }
     if context.json {

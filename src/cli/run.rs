@@ -71,6 +71,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
         }
         shows.push((show, report));
     }
+    let _lock = context.lock(&args.output)?;
     write(context, &mission, &shows, &args.output, args.force)?;
     context.say(&format!(
         "Planned {} in {watch} -> {}",

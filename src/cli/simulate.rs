@@ -1,7 +1,7 @@
 //! `updraft simulate`: flies a campaign in the embedded simulator, one log per drone.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::prelude::*;
@@ -17,7 +17,9 @@ use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, wri
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
 use crate::effects;
+use crate::log::{Log, Select};
 use crate::mission::Plan;
+use crate::mission::plan::Slot;
 use crate::show::{Show, Trajectory};
 use crate::sim::air::spec::{self, Air, AirSpec};
 use crate::sim::air::truth;
@@ -121,7 +123,7 @@ impl AirArgs {
   updraft simulate my-campaign --drones 1-10,12 --full-logs
 
 Logs that are there and were flown with the same settings are kept: an interrupted run goes on where
-it stopped.
+it stopped. Logs that are not as they were flown (cut short, damaged) are flown again.
 
 {}", air_help()))]
 pub(super) struct SimulateArgs {
@@ -216,6 +218,7 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
         only: args.drones.clone(),
         force: args.force,
     };
+    let _lock = context.lock(&args.campaign)?;
     let mut flights = Vec::new();
     for folder in &folders {
         let plan = folder.read_plan()?;
@@ -265,8 +268,15 @@ pub(super) fn simulate(
         .iter()
         .filter(|slot| simulation.only.as_ref().is_none_or(|set| set.0.contains(&slot.slot)))
         .collect();
-    let open: Vec<_> =
-        wanted.iter().copied().filter(|slot| !folder.log(slot.slot, count).exists()).collect();
+    let changed = changed_logs(folder, &record, &wanted, count)?;
+    for (slot, how) in &changed {
+        let path = folder.log(*slot, count);
+        context.warn(&format!("{} is not as it was flown ({how}): flown again", path.display()));
+    }
+    record.logs.retain(|log| !changed.contains_key(&log.slot));
+    let is_open =
+        |slot: &&Slot| changed.contains_key(&slot.slot) || !folder.log(slot.slot, count).exists();
+    let open: Vec<_> = wanted.iter().copied().filter(is_open).collect();
     let kept = wanted.len() - open.len();
     let start = record.start;
     let frame = plan.site.frame();
@@ -309,6 +319,8 @@ pub(super) fn simulate(
         })
         .collect();
     progress.finish();
+    record.logs = taken_down(folder, plan, &record, &open)?;
+    write_record(folder, &record)?;
     context.check_stop()?;
     let mut failed = Vec::new();
     let mut saturated = Vec::new();
@@ -319,8 +331,6 @@ pub(super) fn simulate(
             Err(error) => failed.push(super::exit::with_reasons(&error)),
         }
     }
-    record.logs = present_logs(folder, plan)?;
-    write_record(folder, &record)?;
     let bytes = record.logs.iter().map(|log| log.bytes).sum();
     for error in &failed {
         context.warn(error);
@@ -359,7 +369,7 @@ fn prepare(
         .map_err(|error| CommandError::Failed(format!("failed to write the vehicle: {error}")))?;
     let start = GpsTime::from_unix_ms(START_UNIX_MS)
         .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
-    let record = FlightRecord {
+    let mut record = FlightRecord {
         schema: FLIGHT_SCHEMA.to_owned(),
         made_by: made_by(),
         source: "simulator".to_owned(),
@@ -383,6 +393,7 @@ fn prepare(
             )));
         }
         Some(existing) => {
+            let logs = existing.logs.clone();
             let same = FlightRecord { logs: Vec::new(), ..existing } == record;
             if !same && !simulation.force {
                 return Err(CommandError::Usage(format!(
@@ -391,11 +402,13 @@ fn prepare(
                     folder.logs().display()
                 )));
             }
-            if !same {
+            if same {
+                record.logs = logs;
+            } else {
                 remove_logs(folder, plan)?;
             }
         }
-        None if !present_logs(folder, plan)?.is_empty() => {
+        None if !present_logs(folder, plan).is_empty() => {
             return Err(CommandError::Usage(format!(
                 "{} holds logs that this program did not simulate; use another folder",
                 folder.logs().display()
@@ -409,8 +422,7 @@ fn prepare(
 
 /// Removes a flight's logs and the truth that they were flown in.
 fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
-    let logs = present_logs(folder, plan)?;
-    let paths = logs.iter().map(|log| folder.logs().join(&log.file));
+    let paths = present_logs(folder, plan).into_iter().map(|(_, path)| path);
     let truths = plan.slots.iter().map(|slot| folder.truth(slot.slot, plan.slots.len()));
     for path in paths.chain(truths.filter(|path| path.exists())) {
         std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
@@ -419,24 +431,69 @@ fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
 }
 
 /// The logs of a plan's slots that are there.
-fn present_logs(folder: &FlightFolder, plan: &Plan) -> Result<Vec<LogRecord>, CommandError> {
+fn present_logs(folder: &FlightFolder, plan: &Plan) -> Vec<(u16, PathBuf)> {
     let count = plan.slots.len();
-    let mut logs = Vec::new();
-    for slot in &plan.slots {
-        let path = folder.log(slot.slot, count);
-        match std::fs::metadata(&path) {
-            Ok(metadata) => logs.push(LogRecord {
-                slot: slot.slot,
-                file: path
-                    .file_name()
-                    .map_or_else(String::new, |name| name.to_string_lossy().into()),
-                bytes: metadata.len(),
-            }),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => return Err(FileError::new("read", &path, error).into()),
-        }
-    }
-    Ok(logs)
+    let paths = plan.slots.iter().map(|slot| (slot.slot, folder.log(slot.slot, count)));
+    paths.filter(|(_, path)| path.exists()).collect()
+}
+
+/// The record's entries of the logs that are there; those that it lacks, and those of drones just
+/// flown, are made from the files.
+fn taken_down(
+    folder: &FlightFolder,
+    plan: &Plan,
+    record: &FlightRecord,
+    flown: &[&Slot],
+) -> Result<Vec<LogRecord>, CommandError> {
+    let flown: BTreeSet<u16> = flown.iter().map(|slot| slot.slot).collect();
+    let known: BTreeMap<u16, &LogRecord> = (record.logs.iter())
+        .filter(|log| log.crc32.is_some() && !flown.contains(&log.slot))
+        .map(|log| (log.slot, log))
+        .collect();
+    let logs: Result<Vec<_>, FileError> = (present_logs(folder, plan).par_iter())
+        .map(|(slot, path)| match known.get(slot) {
+            Some(log) => Ok((*log).clone()),
+            None => LogRecord::of(*slot, path),
+        })
+        .collect();
+    Ok(logs?)
+}
+
+/// Logs that are not as they were flown, and how they differ. What somebody else put in their place
+/// is not ours to replace.
+fn changed_logs(
+    folder: &FlightFolder,
+    record: &FlightRecord,
+    wanted: &[&Slot],
+    count: usize,
+) -> Result<BTreeMap<u16, String>, CommandError> {
+    let known: BTreeMap<u16, &LogRecord> = record.logs.iter().map(|log| (log.slot, log)).collect();
+    let changed: Result<Vec<_>, CommandError> = wanted
+        .par_iter()
+        .filter_map(|slot| {
+            let path = folder.log(slot.slot, count);
+            let log = known.get(&slot.slot).filter(|_| path.exists())?;
+            match log.difference(&path) {
+                Ok(None) => None,
+                Ok(Some(_)) if is_of_others(&path) => Some(Err(CommandError::Usage(format!(
+                    "{} was not simulated by this program; move it away, or use another folder",
+                    path.display()
+                )))),
+                Ok(Some(how)) => Some(Ok((slot.slot, how))),
+                Err(error) => Some(Err(error.into())),
+            }
+        })
+        .collect();
+    Ok(changed?.into_iter().collect())
+}
+
+/// Whether a file is a log of another firmware than the simulator's.
+fn is_of_others(path: &Path) -> bool {
+    let Ok(log) = Log::open(path) else { return false };
+    let (tables, _) = log.select(&[Select { message: "MSG", fields: &["Message"] }]);
+    let texts: Vec<&String> =
+        tables.iter().filter_map(|table| table.text("Message")).flatten().collect();
+    !texts.is_empty() && !texts.iter().any(|text| text.contains("(updraft)"))
 }
 
 fn write_record(folder: &FlightFolder, record: &FlightRecord) -> Result<(), CommandError> {

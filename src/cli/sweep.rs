@@ -65,6 +65,7 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
     let watch = Stopwatch::start();
     let study = StudyPlan::load(&args.study)?;
     refuse_campaign(&args.output)?;
+    let _lock = context.lock(&args.output)?;
     let settings = Settings { seed: args.seed, keep_logs: args.keep_logs, force: args.force };
     let work = Work::open(&study, &args.output, settings)?;
     let (total, open) = (work.total(), work.open_flights());

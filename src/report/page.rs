@@ -177,6 +177,8 @@ fn flight_section(
         rows,
         missing_open => missing.len() <= 2 * OPEN_LIMIT,
         missing,
+        lost => flight.lost.iter().map(|log| clean(&log.sentence())).collect::<Vec<_>>(),
+        doubts => flight.warnings.iter().map(|doubt| clean(doubt)).collect::<Vec<_>>(),
     }
 }
 

@@ -124,6 +124,14 @@ impl Output {
             self.line("", "");
             self.list("  Missing drones", &missing);
         }
+        let lost: Vec<String> = flight.lost.iter().map(|log| clean(&log.sentence())).collect();
+        let doubts: Vec<String> = flight.warnings.iter().map(|doubt| clean(doubt)).collect();
+        for (heading, items) in [("  Lost logs", lost), ("  Warnings", doubts)] {
+            if !items.is_empty() {
+                self.line("", "");
+                self.list(heading, &items);
+            }
+        }
     }
 
     fn fleet_table(&mut self, flight: &FlightAnalysis) {

@@ -126,6 +126,7 @@ pub(crate) fn calibration(
         purpose: Purpose::Calibration,
         planned: true,
         warnings: Vec::new(),
+        lost: Vec::new(),
         true_updraft_mps: Some(truth),
         drones: analysed,
         missing: missing
@@ -392,6 +393,7 @@ pub(crate) fn hover() -> FlightAnalysis {
         purpose: Purpose::Measurement,
         planned: true,
         warnings: Vec::new(),
+        lost: Vec::new(),
         true_updraft_mps: None,
         drones,
         missing: missing
