@@ -413,7 +413,9 @@ fn the_oldest_command_message_suffices_to_find_the_windows() {
 fn damaged_logs_never_stop_the_others() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
-    let plan = plan(Purpose::Calibration, ladder(1.0), 13);
+    let mut plan = plan(Purpose::Calibration, ladder(1.0), 13);
+    // All were flown from one place: without an origin their names tell them apart.
+    (plan.site.origin_lat_deg, plan.site.origin_lon_deg) = (0.0, 0.0);
     let mut paths = vec![folder.path().join("1.BIN")];
     fs::write(&paths[0], &bytes).unwrap();
     for seed in 2..=13_usize {
@@ -430,7 +432,8 @@ fn damaged_logs_never_stop_the_others() {
         let flight = run(plan, &paths, &AnalysisOptions::default());
         let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
         assert!((values(fit)[0] - 4.963).abs() < 0.01, "the whole log is unharmed");
-        assert_eq!(flight.drones.len() + flight.missing.len() + flight.warnings.len(), 13);
+        let unused = flight.lost.iter().filter(|log| !log.used).count();
+        assert_eq!(flight.drones.len() + flight.missing.len() + unused, 13);
         let json = serde_json::to_string(&flight).unwrap();
         let back: FlightAnalysis = serde_json::from_str(&json).unwrap();
         assert_eq!(back, flight, "every number is finite, so JSON holds all of it");
@@ -487,13 +490,15 @@ fn a_log_without_id_and_number_is_matched_by_its_home() {
 
 #[test]
 fn a_second_log_of_a_slot_is_left_out_and_named() {
-    let path = fixture("square-law-ladder.trimmed.BIN");
-    let twice: Vec<LogInput> =
-        [1, 1].map(|slot| LogInput { slot: Some(slot), path: path.clone() }).to_vec();
+    let twice: Vec<LogInput> = ["square-law-ladder.trimmed.BIN", "ladder-still.trimmed.BIN"]
+        .map(|name| LogInput { slot: Some(1), path: fixture(name) })
+        .to_vec();
     let plan = plan(Purpose::Calibration, ladder(1.0), 1);
     let flight =
         analyze_flight(&input("twice", Some(&plan), &twice), &paper(), None, &|_, _| {}).unwrap();
     assert_eq!((flight.drones.len(), flight.missing.len()), (1, 0));
-    assert_eq!(flight.warnings.len(), 1, "{:?}", flight.warnings);
-    assert!(flight.warnings[0].contains("slot 1 has a log already"), "{:?}", flight.warnings);
+    let unused: Vec<String> =
+        flight.lost.iter().filter(|log| !log.used).map(|log| log.sentence()).collect();
+    assert_eq!(unused.len(), 1, "{unused:?}");
+    assert!(unused[0].contains("slot 1 has a log already"), "{unused:?}");
 }

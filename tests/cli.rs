@@ -11,6 +11,10 @@ mod analyze;
 mod help;
 #[path = "cli/inspect.rs"]
 mod inspect;
+#[path = "cli/lock.rs"]
+mod lock;
+#[path = "cli/logs.rs"]
+mod logs;
 #[path = "cli/plan.rs"]
 mod plan;
 #[path = "cli/simulate.rs"]
