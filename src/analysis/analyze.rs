@@ -424,7 +424,10 @@ fn finish(
             .map(|slot| Missing {
                 slot: slot.slot,
                 home_m: Some([slot.home_m[0], slot.home_m[1]]),
-                reason: reasons.get(&slot.slot).cloned().unwrap_or_else(|| "no log".to_owned()),
+                reason: reasons
+                    .get(&slot.slot)
+                    .cloned()
+                    .unwrap_or_else(|| format!("no log of {}", slot.name)),
             })
             .collect()
     });

@@ -44,9 +44,9 @@ const WIDTH: usize = 100;
   updraft analyze windy --hold still/analysis.json
 
 A campaign's results go into its folder, others into --output. Without a plan, windows are found in
-the log's own desired velocity. Whose a log is, it says itself: by its home position (where the plan's
-slots are), else by its file name (07.BIN), else by its system id. Exit code 3: done, but some logs are
-missing, unusable, copies, from another place or end in the air; they are named.")]
+the log's own desired velocity. Whose a log is, it says itself: by its home position, else by its
+file name (07.BIN), else by its system id. Exit code 3: done, but some logs are missing, unusable,
+copies, from another place or end in the air; they are named.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
     #[arg(required = true)]
