@@ -11,18 +11,15 @@ use super::calibrate::{self, FitOptions, PaperTable};
 use super::density::Density;
 use super::drone::{One, Shared, law_fit, one};
 use super::law::{LINEAR, SIGNED_QUADRATIC};
-use super::matching::{self, Candidate, Matched};
 use super::refer::refer_calibration;
 use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, LostLog, Missing, UpdraftMap,
 };
+use super::slots::{SlotMatch, match_slots};
 use super::stats::mean_sd;
 use super::updraft::{self, DroneSeries};
 use super::windows::WindowOptions;
-use crate::base::causes::with_causes;
 use crate::base::time::GpsTime;
-use crate::flight::identify;
-use crate::log::Log;
 use crate::mission::plan::{Plan, Purpose};
 
 /// One log of a flight.
@@ -295,53 +292,6 @@ pub fn analyze_flight(
 const LISTED: usize = 20;
 /// Largest W of a calibration's signed quadratic that may be the air's, m/s.
 const LARGEST_CALIBRATION_W_MPS: f64 = 0.5;
-
-enum SlotMatch {
-    Slot(u16),
-    Unplanned,
-    Refused(String),
-}
-
-/// Finds the slot of each log, refuses copies, other places and a slot's second log; and says what
-/// contradicts itself.
-fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<String>) {
-    let opened: Vec<Result<Log, String>> = (input.logs.par_iter())
-        .map(|log| Log::open(&log.path).map_err(|error| with_causes(&error, ": ")))
-        .collect();
-    let bytes: Vec<Option<&[u8]>> = opened
-        .iter()
-        .map(|log| log.as_ref().ok().map(Log::bytes).filter(|bytes| !bytes.is_empty()))
-        .collect();
-    let copies = matching::same_bytes(&bytes);
-    let Some(plan) = input.plan else {
-        let refused = |first: usize| {
-            let first = input.logs.get(first).map(|log| input.shown(&log.path));
-            SlotMatch::Refused(matching::copy_of(&first.unwrap_or_default()))
-        };
-        let slots = copies.into_iter().map(|copy| copy.map_or(SlotMatch::Unplanned, refused));
-        return (slots.collect(), Vec::new());
-    };
-    let candidates: Vec<Candidate> = (input.logs.par_iter())
-        .zip(&opened)
-        .zip(&copies)
-        .map(|((log, opened), copy)| {
-            let identity = opened.as_ref().map(identify).unwrap_or_default();
-            Candidate {
-                name: input.shown(&log.path),
-                given: log.slot,
-                system_id: identity.system_id,
-                file_number: matching::file_number(&log.path),
-                home_deg: identity.home_deg,
-                flew: identity.flew,
-                same_as: *copy,
-                unreadable: opened.as_ref().err().cloned(),
-            }
-        })
-        .collect();
-    let Matched { slots, warnings } = matching::slots(plan, &candidates);
-    let slots = slots.into_iter().map(|slot| slot.map_or_else(SlotMatch::Refused, SlotMatch::Slot));
-    (slots.collect(), warnings)
-}
 
 /// The law whose fits to the reference's drones have the lower mean reduced chi².
 ///

@@ -12,6 +12,7 @@ pub mod law;
 mod matching;
 mod refer;
 pub mod result;
+mod slots;
 mod stats;
 pub mod updraft;
 pub mod windows;

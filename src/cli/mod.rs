@@ -7,6 +7,8 @@ mod context;
 mod effects;
 mod effects_plot;
 pub mod exit;
+mod flown;
+mod found;
 mod inspect;
 mod load;
 mod mission_args;

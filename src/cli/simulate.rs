@@ -1,7 +1,7 @@
 //! `updraft simulate`: flies a campaign in the embedded simulator, one log per drone.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use rayon::prelude::*;
@@ -11,13 +11,11 @@ use sha2::{Digest, Sha256};
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::flown::{changed_logs, prepare, taken_down, write_record};
 use super::progress::Progress;
 use super::words;
-use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
-use crate::base::time::GpsTime;
-use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
+use crate::campaign::{self, FlightFolder};
 use crate::effects;
-use crate::log::{Log, Select};
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
 use crate::show::{Show, Trajectory};
@@ -25,12 +23,6 @@ use crate::sim::air::spec::{self, Air, AirSpec};
 use crate::sim::air::truth;
 use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, fly_to_file};
 use crate::vehicle::{Vehicle, library};
-
-/// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
-/// same seed gives the same bytes.
-const START_UNIX_MS: i64 = 1_780_315_200_000;
-/// Largest plan that is hashed, bytes.
-const MAX_PLAN_BYTES: u64 = 256 << 20;
 
 /// Motion of the air and seed of a simulated flight, shared by `simulate` and `run`.
 #[derive(Clone, Debug, Args)]
@@ -355,151 +347,6 @@ pub(super) fn simulate(
         failed,
         saturated,
     })
-}
-
-/// The folder's record: a matching one is continued, another one refused or replaced.
-fn prepare(
-    folder: &FlightFolder,
-    plan: &Plan,
-    simulation: &Simulation,
-    vehicle: &Vehicle,
-) -> Result<FlightRecord, CommandError> {
-    let plan_bytes = read_whole(&folder.plan(), MAX_PLAN_BYTES)?;
-    let vehicle_text = toml::to_string(vehicle)
-        .map_err(|error| CommandError::Failed(format!("failed to write the vehicle: {error}")))?;
-    let start = GpsTime::from_unix_ms(START_UNIX_MS)
-        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
-    let mut record = FlightRecord {
-        schema: FLIGHT_SCHEMA.to_owned(),
-        made_by: made_by(),
-        source: "simulator".to_owned(),
-        seed: simulation.seed,
-        vehicle: vehicle.name.clone(),
-        vehicle_sha256: sha256(vehicle_text.as_bytes()),
-        air_mps: simulation.air.uniform_mps,
-        air: simulation.air.texts(),
-        start,
-        full_logs: simulation.full_logs,
-        plan_sha256: sha256(&plan_bytes),
-        logs: Vec::new(),
-    };
-    create_folder(&folder.logs())?;
-    sweep_partial(&folder.logs())?;
-    match folder.read_record()? {
-        Some(existing) if existing.source != record.source => {
-            return Err(CommandError::Usage(format!(
-                "{} holds logs of real drones; simulate into another campaign",
-                folder.logs().display()
-            )));
-        }
-        Some(existing) => {
-            let logs = existing.logs.clone();
-            let same = FlightRecord { logs: Vec::new(), ..existing } == record;
-            if !same && !simulation.force {
-                return Err(CommandError::Usage(format!(
-                    "{} holds logs flown with other settings; give --force to replace them, or use \
-                     another folder",
-                    folder.logs().display()
-                )));
-            }
-            if same {
-                record.logs = logs;
-            } else {
-                remove_logs(folder, plan)?;
-            }
-        }
-        None if !present_logs(folder, plan).is_empty() => {
-            return Err(CommandError::Usage(format!(
-                "{} holds logs that this program did not simulate; use another folder",
-                folder.logs().display()
-            )));
-        }
-        None => {}
-    }
-    write_record(folder, &record)?;
-    Ok(record)
-}
-
-/// Removes a flight's logs and the truth that they were flown in.
-fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
-    let paths = present_logs(folder, plan).into_iter().map(|(_, path)| path);
-    let truths = plan.slots.iter().map(|slot| folder.truth(slot.slot, plan.slots.len()));
-    for path in paths.chain(truths.filter(|path| path.exists())) {
-        std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
-    }
-    Ok(())
-}
-
-/// The logs of a plan's slots that are there.
-fn present_logs(folder: &FlightFolder, plan: &Plan) -> Vec<(u16, PathBuf)> {
-    let count = plan.slots.len();
-    let paths = plan.slots.iter().map(|slot| (slot.slot, folder.log(slot.slot, count)));
-    paths.filter(|(_, path)| path.exists()).collect()
-}
-
-/// The record's entries of the logs that are there; those that it lacks, and those of drones just
-/// flown, are made from the files.
-fn taken_down(
-    folder: &FlightFolder,
-    plan: &Plan,
-    record: &FlightRecord,
-    flown: &[&Slot],
-) -> Result<Vec<LogRecord>, CommandError> {
-    let flown: BTreeSet<u16> = flown.iter().map(|slot| slot.slot).collect();
-    let known: BTreeMap<u16, &LogRecord> = (record.logs.iter())
-        .filter(|log| log.crc32.is_some() && !flown.contains(&log.slot))
-        .map(|log| (log.slot, log))
-        .collect();
-    let logs: Result<Vec<_>, FileError> = (present_logs(folder, plan).par_iter())
-        .map(|(slot, path)| match known.get(slot) {
-            Some(log) => Ok((*log).clone()),
-            None => LogRecord::of(*slot, path),
-        })
-        .collect();
-    Ok(logs?)
-}
-
-/// Logs that are not as they were flown, and how they differ. What somebody else put in their place
-/// is not ours to replace.
-fn changed_logs(
-    folder: &FlightFolder,
-    record: &FlightRecord,
-    wanted: &[&Slot],
-    count: usize,
-) -> Result<BTreeMap<u16, String>, CommandError> {
-    let known: BTreeMap<u16, &LogRecord> = record.logs.iter().map(|log| (log.slot, log)).collect();
-    let changed: Result<Vec<_>, CommandError> = wanted
-        .par_iter()
-        .filter_map(|slot| {
-            let path = folder.log(slot.slot, count);
-            let log = known.get(&slot.slot).filter(|_| path.exists())?;
-            match log.difference(&path) {
-                Ok(None) => None,
-                Ok(Some(_)) if is_of_others(&path) => Some(Err(CommandError::Usage(format!(
-                    "{} was not simulated by this program; move it away, or use another folder",
-                    path.display()
-                )))),
-                Ok(Some(how)) => Some(Ok((slot.slot, how))),
-                Err(error) => Some(Err(error.into())),
-            }
-        })
-        .collect();
-    Ok(changed?.into_iter().collect())
-}
-
-/// Whether a file is a log of another firmware than the simulator's.
-fn is_of_others(path: &Path) -> bool {
-    let Ok(log) = Log::open(path) else { return false };
-    let (tables, _) = log.select(&[Select { message: "MSG", fields: &["Message"] }]);
-    let texts: Vec<&String> =
-        tables.iter().filter_map(|table| table.text("Message")).flatten().collect();
-    !texts.is_empty() && !texts.iter().any(|text| text.contains("(updraft)"))
-}
-
-fn write_record(folder: &FlightFolder, record: &FlightRecord) -> Result<(), CommandError> {
-    let json = to_json(record)
-        .map_err(|error| CommandError::Failed(format!("failed to make the record: {error}")))?;
-    Ok(write_whole(&folder.record(), &json)?)
 }
 
 /// Program and version, for records.
