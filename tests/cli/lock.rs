@@ -29,7 +29,16 @@ fn a_second_writer_is_refused_until_the_first_is_gone() {
     }
     // Stopped, it still holds the folder.
     signal("-STOP", first.id());
-    let before = contents(&bench.path("campaign"));
+    let mut before = contents(&bench.path("campaign"));
+    // The signal takes its time to reach every thread.
+    loop {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        let now = contents(&bench.path("campaign"));
+        if now == before {
+            break;
+        }
+        before = now;
+    }
     let run = ["run", "calibration", "--grid", "3x4", "-o", "campaign"];
     let commands: [Vec<&str>; 4] = [
         vec!["simulate", "campaign", "--full-logs"],
