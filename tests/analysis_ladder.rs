@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use analysis_support::{Synthetic, Timetable, fixture, ladder, plan};
 use updraft::analysis::calibrate::{FitOptions, Location, Weights};
-use updraft::analysis::result::{Fit, FlightAnalysis, Rejection, WindowStats};
+use updraft::analysis::result::{Fit, FlightAnalysis, LostLog, Rejection, WindowStats};
 use updraft::analysis::{
     AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, analyze, analyze_flight,
 };
@@ -502,7 +502,7 @@ fn a_second_log_of_a_slot_is_left_out_and_named() {
         analyze_flight(&input("twice", Some(&plan), &twice), &paper(), None, &|_, _| {}).unwrap();
     assert_eq!((flight.drones.len(), flight.missing.len()), (1, 0));
     let unused: Vec<String> =
-        flight.lost.iter().filter(|log| !log.used).map(|log| log.sentence()).collect();
+        flight.lost.iter().filter(|log| !log.used).map(LostLog::sentence).collect();
     assert_eq!(unused.len(), 1, "{unused:?}");
     assert!(unused[0].contains("slot 1 has a log already"), "{unused:?}");
 }
