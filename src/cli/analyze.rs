@@ -255,6 +255,9 @@ fn finish(
             analysis: &analysis,
         })?;
     }
+    if let Some(page) = &page {
+        context.result(page)?;
+    }
     let place = page.map_or(String::new(), |page| format!(" -> {}", page.display()));
     context.say(&format!("Analysed {} in {watch}{place}", words::count(total, "log")));
     let lost = analysis.flights.iter().any(|flight| !flight.missing.is_empty())

@@ -1,6 +1,7 @@
 //! What every command gets: where to print, how much to say, and whether to stop.
 
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,7 +14,7 @@ use super::exit::CommandError;
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an option of the command line")]
 pub(super) struct Context {
-    /// Say only what went wrong.
+    /// Say only what went wrong, and print only the path of the result.
     pub(super) quiet: bool,
     /// One JSON object on standard output instead of tables.
     pub(super) json: bool,
@@ -21,6 +22,8 @@ pub(super) struct Context {
     pub(super) color: bool,
     /// Whether progress bars make sense.
     pub(super) interactive: bool,
+    /// Columns of the terminal that standard output is read on; none for files and pipes.
+    pub(super) width: Option<usize>,
     stop: Arc<AtomicBool>,
 }
 
@@ -46,6 +49,7 @@ impl Context {
             json: global.json,
             color,
             interactive: io::stderr().is_terminal() && !global.quiet && !global.no_progress,
+            width: columns(),
             stop,
         };
         if let Err(error) = installed {
@@ -64,9 +68,20 @@ impl Context {
         if self.stop.load(Ordering::SeqCst) { Err(CommandError::Interrupted) } else { Ok(()) }
     }
 
-    /// Data, on standard output.
-    #[expect(clippy::unused_self, reason = "prints like the other methods")]
+    /// A table or a summary, on standard output, unless quiet.
     pub(super) fn print(&self, text: &str) -> Result<(), CommandError> {
+        if self.quiet { Ok(()) } else { self.emit(text) }
+    }
+
+    /// The file or folder that the command made: on standard output when that is all that is asked
+    /// for.
+    pub(super) fn result(&self, path: &Path) -> Result<(), CommandError> {
+        if self.quiet && !self.json { self.emit(&format!("{}\n", path.display())) } else { Ok(()) }
+    }
+
+    /// What the user asked for, on standard output, also when quiet.
+    #[expect(clippy::unused_self, reason = "prints like the other methods")]
+    pub(super) fn emit(&self, text: &str) -> Result<(), CommandError> {
         let mut out = io::stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
         match written {
@@ -83,7 +98,7 @@ impl Context {
         let mut text = serde_json::to_string_pretty(value)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
         text.push('\n');
-        self.print(&text)
+        self.emit(&text)
     }
 
     /// Talk, on standard error, unless quiet.
@@ -103,4 +118,13 @@ impl Context {
     pub(super) fn insist(&self, text: &str) {
         let _ = writeln!(io::stderr().lock(), "{text}");
     }
+}
+
+/// Narrowest terminal that lines are broken for.
+const MIN_COLUMNS: usize = 30;
+
+/// Columns of the terminal, from `COLUMNS`; none where it is not set or makes no sense.
+fn columns() -> Option<usize> {
+    let columns = std::env::var("COLUMNS").ok()?.trim().parse().ok()?;
+    (columns >= MIN_COLUMNS).then_some(columns)
 }

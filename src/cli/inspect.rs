@@ -11,6 +11,7 @@ use super::exit::{CommandError, Exit};
 use super::load::{LoadError, MAX_SKYB_BYTES, has_extension, read_show};
 use super::show_text::{describe_show, describe_skyb};
 use super::timetable;
+use super::words::wrap;
 use crate::base::file::read_whole;
 use crate::campaign::{self, FlightFolder};
 use crate::log::{Inventory, Log, ScanStats};
@@ -71,14 +72,15 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
     if context.json {
         context.print_json(&InspectDocument { schema: "updraft.inspect/1", found: &found })?;
     } else {
-        context.print(&match &found {
+        let text = match &found {
             InspectOutput::Log(inventory) => describe_log(path, inventory),
             InspectOutput::Show(show) => format!("{}: {}", path.display(), describe_show(show)),
             InspectOutput::Skyb(file) => format!("{}: {}", path.display(), describe_skyb(file)),
             InspectOutput::Plans(plans) => {
                 plans.iter().map(timetable::describe).collect::<Vec<_>>().join("\n")
             }
-        })?;
+        };
+        context.emit(&wrap(&text, context.width))?;
     }
     Ok(Exit::Done)
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::analyze::{AnalyzeOptions, analyze_campaign};
-use super::check::{checked, is_safe, say_findings};
+use super::check::{Origin, checked, few, is_safe, say_findings};
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
@@ -36,7 +36,8 @@ pub(super) struct RunArgs {
     /// Campaign folder
     #[arg(short, long, value_name = "FOLDER", default_value = "my-campaign")]
     output: PathBuf,
-    /// Replace another plan in the folder, and logs simulated with other settings
+    /// Replace another plan in the folder (see `plan --force`), and logs simulated with other
+    /// settings; logs of real drones and of another plan are never touched
     #[arg(long)]
     force: bool,
     /// Vertical air speed in measurement flights, m/s, up positive [default: 1, or 0 with --air]
@@ -63,7 +64,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     let mut shows = Vec::new();
     for flight in &mission.flights {
         let show = Show::of_plan(&flight.plan);
-        let report = checked(&show, &flight.plan, &flight.vehicle, &[])?;
+        let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few(context, false));
         say_findings(context, &report, &[]);
         if !is_safe(&report, &[]) {
             context.insist("Nothing was flown: the show is not safe as it is");

@@ -103,6 +103,7 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
             study: &result,
         })?;
     }
+    context.result(&page)?;
     context.say(&format!(
         "Flew {} flights in {flying}, all done in {watch} -> {}",
         flown.flown,
