@@ -32,8 +32,7 @@ fn counts(purpose: Purpose, kind: Kind) -> bool {
 fn windows(plan: &Plan, group: &Group, collector: &mut Collector) {
     let wanted: Vec<&Segment> =
         group.segments.iter().filter(|segment| counts(plan.purpose, segment.kind)).collect();
-    let blind: Vec<&&Segment> =
-        wanted.iter().filter(|segment| segment.window.is_none()).collect();
+    let blind: Vec<&&Segment> = wanted.iter().filter(|segment| segment.window.is_none()).collect();
     let Some(first) = blind.first() else { return };
     let lasts_s = (first.end_ms - first.start_ms) as f64 / 1000.0;
     let message = format!(

@@ -69,7 +69,8 @@ fn check_limits(input: &CheckInput<'_>, collector: &mut Collector) {
     for (name, value) in named {
         // A limit that compares false with everything would let everything pass.
         if value.is_nan() || value < 0.0 {
-            let message = format!("the limit {name} is {}: nothing can be checked against it", plain(value));
+            let message =
+                format!("the limit {name} is {}: nothing can be checked against it", plain(value));
             collector.add(0, error(vec![], None, message, "correct the vehicle's limits"));
         }
     }

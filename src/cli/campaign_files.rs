@@ -164,16 +164,10 @@ fn binaries(folder: &FlightFolder, plan: &Plan, planned: &Show, problems: &mut V
         let how = contents.drone.trajectory.difference(&there.trajectory, unit_m)?;
         Some(format!("{} does not fly the plan: {how}", path.display()))
     };
-    let found: Vec<_> =
-        paths.par_iter().zip(&planned.drones).map(checked).collect::<Vec<_>>();
+    let found: Vec<_> = paths.par_iter().zip(&planned.drones).map(checked).collect::<Vec<_>>();
     let found: Vec<_> = found.into_iter().flatten().collect();
     let place = folder.skyb_folder();
-    name_some(
-        found,
-        &format!("{}: and", place.display()),
-        "more files missing or wrong",
-        problems,
-    );
+    name_some(found, &format!("{}: and", place.display()), "more files missing or wrong", problems);
     let wanted: BTreeSet<&PathBuf> = paths.iter().collect();
     let mut stray: Vec<_> = std::fs::read_dir(&place)
         .into_iter()

@@ -99,9 +99,12 @@ pub(super) fn run(context: &Context, args: &CheckArgs) -> Result<Exit, CommandEr
     let mut reports = Vec::new();
     for subject in &subjects {
         context.check_stop()?;
-        reports.push(subject.plan.as_ref().map(|plan| {
-            checked(&subject.show, plan, &subject.vehicle, &subject.origin, few)
-        }));
+        reports.push(
+            subject
+                .plan
+                .as_ref()
+                .map(|plan| checked(&subject.show, plan, &subject.vehicle, &subject.origin, few)),
+        );
     }
     let mut passed = true;
     for (subject, report) in subjects.iter().zip(&reports) {
@@ -185,7 +188,9 @@ fn subjects(path: &Path, vehicle: &Vehicle) -> Result<Vec<Subject>, CommandError
     let beside = plan_beside(path);
     let foreign = |Loaded { path, show, plan, vehicle, mismatches }: Loaded| {
         let (plan, vehicle, origin) = match &beside {
-            Some((planned, by, file)) => (planned.clone(), by.clone(), Origin::Beside(file.clone())),
+            Some((planned, by, file)) => {
+                (planned.clone(), by.clone(), Origin::Beside(file.clone()))
+            }
             None => (plan, vehicle, Origin::Show),
         };
         Subject { path, show, plan: Some(plan), vehicle, origin, mismatches }

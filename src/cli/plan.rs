@@ -80,7 +80,10 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         let show = Show::of_plan(&flight.plan);
         let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few);
         if !context.json {
-            context.print(&words::wrap(&timetable::describe(&flight.plan), context.width))?;
+            context.print(&words::wrap(
+                &timetable::describe(&flight.plan, context.width),
+                context.width,
+            ))?;
             context.print("\n")?;
         }
         say_findings(context, &report, &args.allow);

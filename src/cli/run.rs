@@ -11,7 +11,9 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::mission_args::MissionArgs;
 use super::plan::{what_for_whom, write};
-use super::simulate::{AirArgs, AirSpecs, Simulation, air_help, air_specs, simulate, updraft};
+use super::simulate::{
+    AirArgs, AirSpecs, Simulation, air_help, air_specs, simulate, speed, updraft,
+};
 use crate::campaign;
 use crate::mission::plan::Purpose;
 use crate::show::Show;
@@ -47,7 +49,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
     calibration_updraft: f64,
     /// Horizontal wind speed in calibration flights, m/s
-    #[arg(long, value_name = "MPS", default_value_t = 0.0)]
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = speed, allow_negative_numbers = true)]
     calibration_wind: f64,
     /// Air to add in calibration flights, repeatable; as --air
     #[arg(long, value_name = "SPEC", value_parser = air_specs)]
@@ -64,7 +66,8 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     let mut shows = Vec::new();
     for flight in &mission.flights {
         let show = Show::of_plan(&flight.plan);
-        let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few(context, false));
+        let report =
+            checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few(context, false));
         say_findings(context, &report, &[]);
         if !is_safe(&report, &[]) {
             context.insist("Nothing was flown: the show is not safe as it is");

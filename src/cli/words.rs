@@ -22,6 +22,15 @@ pub(super) fn range(names: &[&str]) -> String {
     }
 }
 
+/// The text, or its beginning with dots if it has more characters.
+pub(super) fn shorten(text: &str, width: usize) -> String {
+    if text.chars().count() <= width {
+        return text.to_owned();
+    }
+    let kept: String = text.chars().take(width.saturating_sub(3)).collect();
+    format!("{kept}...")
+}
+
 /// Breaks lines longer than the terminal between words; what follows is indented by four. A word
 /// longer than a line stays whole.
 pub(super) fn wrap(text: &str, width: Option<usize>) -> String {

@@ -58,7 +58,10 @@ fn site(source: &Source<'_>) -> Result<Site, TemplateError> {
     let [lat, lon] = *site.origin.get_ref();
     if !(-85.0..=85.0).contains(&lat) || !(-180.0..=180.0).contains(&lon) {
         return Err(source
-            .error(span_of(&site.origin), format!("there is no place at {}, {}", plain(lat), plain(lon)))
+            .error(
+                span_of(&site.origin),
+                format!("there is no place at {}, {}", plain(lat), plain(lon)),
+            )
             .with_help("origin = [latitude, longitude] in degrees, latitude within 85"));
     }
     Ok(Site {
