@@ -250,8 +250,11 @@ fn check_end(track: &Track<'_>, derived: &Both, firmware: &Firmware, collector: 
 fn check_away(track: &Track<'_>, derived: &Both, firmware: &Firmware, collector: &mut Collector) {
     let (place, whose) = match (track.drone.land_at_m, track.drone.home_m) {
         (Some(place), _) => (place, "its landing place"),
-        (None, Some(home)) => (home, "its home"),
-        (None, None) => (track.start_m, "its start"),
+        // A start away from home is told as such.
+        (None, Some(home)) if (track.start_m - home).xy().norm() <= firmware.takeoff_err_m => {
+            (home, "its home")
+        }
+        (None, _) => (track.start_m, "its start"),
     };
     let away_m = (track.end_m - place).xy().norm();
     let limit_m = firmware.takeoff_err_m;

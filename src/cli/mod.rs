@@ -128,7 +128,6 @@ enum Command {
     /// Print the manual page
     Man,
     /// Print the JSON schema of a file format
-    #[command(hide = true)]
     Schema(tools::SchemaArgs),
 }
 
