@@ -22,6 +22,7 @@ use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, TruthSerie
 use crate::base::file::{FileError, read_whole, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, to_json};
+use crate::log::Log;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, InputFile, Provenance, terminal_summary};
@@ -282,7 +283,13 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
         }
         return Ok(());
     }
-    let logs = if path.is_dir() { logs_in(path)? } else { vec![path.to_owned()] };
+    let logs = if path.is_dir() {
+        logs_in(path)?
+    } else {
+        // A file that is named itself must be there and be a log; one found in a folder may be lost.
+        Log::open(path)?;
+        vec![path.to_owned()]
+    };
     if logs.is_empty() {
         return Err(CommandError::Nothing(format!("{} holds no .BIN logs", path.display())));
     }

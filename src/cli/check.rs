@@ -1,6 +1,7 @@
 //! `updraft check`: is a show safe, whoever made it?
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -29,10 +30,10 @@ const FEW: usize = 5;
   updraft check 01.skyb
   updraft check my-campaign --allow endurance
 
-A campaign is checked against its plan's limits and fence, and its files against the plan: each that
-is missing, damaged, different or of no slot is named. A file that lies in a campaign is checked
-against the plan beside it. Shows made by others are checked against their own limits and, where they
-have none, the vehicle's; without a fence of their own, against no fence.
+A campaign is checked against its plan's limits and fence, and its files against the plan: each
+that is missing, damaged, different or of no slot is named. A file that lies in a campaign is
+checked against the plan beside it. Shows made by others are checked against their own limits and,
+where they have none, the vehicle's; without a fence of their own, against no fence.
 Exit code 4: not safe.")]
 pub(super) struct CheckArgs {
     /// Campaign folder, .skyc, .skyb, zipped CSV, or a folder of .skyb files
@@ -169,13 +170,13 @@ fn show_report(
     }
     let mut text = format!("{}\n", subject.path.display());
     if let Some(report) = report {
-        text += &format!("{report}\n");
+        let _ = writeln!(text, "{report}");
         if report.counts.values().any(|count| count.omitted > 0) && !args.verbose {
             text += "(--verbose lists every finding)\n";
         }
     }
     for mismatch in &subject.mismatches {
-        text += &format!("error: {mismatch}\n");
+        let _ = writeln!(text, "error: {mismatch}");
     }
     context.print(&wrap(&text, width))
 }

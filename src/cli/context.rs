@@ -123,8 +123,13 @@ impl Context {
 /// Narrowest terminal that lines are broken for.
 const MIN_COLUMNS: usize = 30;
 
-/// Columns of the terminal, from `COLUMNS`; none where it is not set or makes no sense.
+/// Columns that standard output has: `COLUMNS`, else the terminal's; none for files and pipes.
 fn columns() -> Option<usize> {
-    let columns = std::env::var("COLUMNS").ok()?.trim().parse().ok()?;
-    (columns >= MIN_COLUMNS).then_some(columns)
+    let asked = std::env::var("COLUMNS").ok().and_then(|text| text.trim().parse().ok());
+    // Asks standard output first, then the other streams: these may be a terminal although it is not.
+    let terminal = || {
+        let size = io::stdout().is_terminal().then(terminal_size::terminal_size).flatten();
+        size.map(|(width, _)| usize::from(width.0))
+    };
+    asked.or_else(terminal).filter(|columns| *columns >= MIN_COLUMNS)
 }

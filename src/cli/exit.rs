@@ -16,6 +16,9 @@ use crate::sim::SimError;
 use crate::study::StudyError;
 use crate::vehicle::VehicleError;
 
+/// What stands between an error and its reason.
+const BECAUSE: &str = "\n  because: ";
+
 /// How a command ended. One rule for every command: what is not there or cannot be read or written
 /// is 1, what is there but wrong is 2, what is right but empty is 5. The numbers are documented in the README and do not change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -212,9 +215,6 @@ pub(super) fn as_json(text: &str, exit: Exit) -> String {
     })
     .to_string()
 }
-
-/// What stands between an error and its reason.
-const BECAUSE: &str = "\n  because: ";
 
 /// An error and its reasons, one below the other.
 pub(super) fn with_reasons(error: &dyn std::error::Error) -> String {

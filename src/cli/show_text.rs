@@ -45,9 +45,9 @@ pub(super) fn describe_show(show: &ShowSummary, width: Option<usize>) -> String 
     }
     let columns = fitting(width);
     text.push('\n');
-    push_row(&mut text, COLUMNS.map(|(name, _)| name.to_owned()), columns);
+    push_row(&mut text, &COLUMNS.map(|(name, _)| name.to_owned()), columns);
     for drone in show.drones.iter().take(MAX_ROWS) {
-        push_row(&mut text, drone_cells(drone), columns);
+        push_row(&mut text, &drone_cells(drone), columns);
     }
     if columns < COLUMNS.len() {
         text.push_str("(a wider terminal shows more columns)\n");
@@ -106,7 +106,7 @@ fn fitting(width: Option<usize>) -> usize {
         .max(1)
 }
 
-fn push_row(text: &mut String, cells: [String; COLUMNS.len()], columns: usize) {
+fn push_row(text: &mut String, cells: &[String; COLUMNS.len()], columns: usize) {
     for (index, (cell, (_, width))) in cells.iter().zip(COLUMNS).take(columns).enumerate() {
         let _ = if index == 0 {
             write!(text, "{cell:<width$}")
