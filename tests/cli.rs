@@ -7,6 +7,8 @@ mod support;
 
 #[path = "cli/analyze.rs"]
 mod analyze;
+#[path = "cli/check.rs"]
+mod check;
 #[path = "cli/help.rs"]
 mod help;
 #[path = "cli/inspect.rs"]
@@ -15,6 +17,8 @@ mod inspect;
 mod lock;
 #[path = "cli/logs.rs"]
 mod logs;
+#[path = "cli/manners.rs"]
+mod manners;
 #[path = "cli/plan.rs"]
 mod plan;
 #[path = "cli/simulate.rs"]

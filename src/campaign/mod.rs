@@ -147,6 +147,12 @@ pub enum CampaignError {
         /// The folder.
         path: PathBuf,
     },
+    /// A file where a folder is expected.
+    #[error("{} is not a campaign folder", path.display())]
+    NotFolder {
+        /// The file.
+        path: PathBuf,
+    },
     /// The folder already holds something else.
     #[error("{} already holds {what}; choose another folder or give --force", path.display())]
     Occupied {
@@ -247,6 +253,10 @@ pub fn index_path(folder: &Path) -> PathBuf {
 
 /// The flights of a campaign folder, or of a folder with one flight.
 pub fn flights(folder: &Path) -> Result<Vec<FlightFolder>, CampaignError> {
+    let found = std::fs::metadata(folder).map_err(|error| FileError::new("read", folder, error))?;
+    if !found.is_dir() {
+        return Err(CampaignError::NotFolder { path: folder.to_owned() });
+    }
     let path = index_path(folder);
     if path.is_file() {
         let index: CampaignIndex = read_json(&path)?;

@@ -235,6 +235,9 @@ fn finish(
             analysis: &analysis,
         })?;
     }
+    if let Some(page) = &page {
+        context.result(page)?;
+    }
     let place = page.map_or(String::new(), |page| format!(" -> {}", page.display()));
     let used: usize = analysis.flights.iter().map(|flight| flight.drones.len()).sum();
     let share = if used < total { format!("{used} of ") } else { String::new() };

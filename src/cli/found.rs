@@ -10,6 +10,7 @@ use crate::analysis::{LogInput, TruthSeries};
 use crate::base::file::FileError;
 use crate::base::time::GpsTime;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, LogRecord};
+use crate::log::Log;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::sim::air::truth::{self, TrueUpdraft};
@@ -58,7 +59,13 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         }
         return Ok(());
     }
-    let logs = if path.is_dir() { logs_in(path)? } else { vec![path.to_owned()] };
+    let logs = if path.is_dir() {
+        logs_in(path)?
+    } else {
+        // A file that is named itself must be there and be a log; one found in a folder may be lost.
+        Log::open(path)?;
+        vec![path.to_owned()]
+    };
     if logs.is_empty() {
         return Err(CommandError::Nothing(format!("{} holds no .BIN logs", path.display())));
     }

@@ -29,7 +29,7 @@ use crate::vehicle::{Vehicle, library};
 #[command(next_help_heading = "Simulation")]
 pub(super) struct AirArgs {
     /// Horizontal wind speed, m/s
-    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = speed)]
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = speed, allow_negative_numbers = true)]
     pub(super) wind: f64,
     /// Where the wind comes from, degrees clockwise from north
     #[arg(long, value_name = "DEG", default_value_t = 270.0, allow_hyphen_values = true)]
@@ -80,7 +80,8 @@ pub(super) fn air_help() -> String {
     )
 }
 
-fn speed(text: &str) -> Result<f64, String> {
+/// Parser of wind speeds.
+pub(super) fn speed(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=30.0).contains(&value) => Ok(value),
         _ => Err("a wind speed between 0 and 30 m/s".to_owned()),
@@ -124,8 +125,8 @@ pub(super) struct SimulateArgs {
     /// Only this flight of the campaign
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
-    /// Only these slots: 1-10,12
-    #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
+    /// Only these slots: 1-10,12 (a slot named twice is flown once)
+    #[arg(long, value_name = "SLOTS", value_parser = parse_slots, allow_hyphen_values = true)]
     drones: Option<SlotSet>,
     /// Vertical air speed, m/s, up positive
     #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]

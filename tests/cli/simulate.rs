@@ -101,7 +101,7 @@ fn some_drones_of_one_flight() {
     bench.expect(2, &["simulate", "campaign", "--drones", "2-1"]);
     let none = bench.expect(2, &["simulate", "campaign", "--drones", "3"]);
     assert!(none.err.contains("no slot 3"), "{none}");
-    bench.expect(2, &["simulate", "nothing"]);
+    bench.expect(1, &["simulate", "nothing"]);
 }
 
 /// The signal goes to the program alone, in the middle of a flight that takes long.
