@@ -107,7 +107,7 @@ pub(super) fn run(context: &Context, args: &EffectsArgs) -> Result<Exit, Command
             if context.json {
                 context.print_json(&output(&vehicle, &[effect])?)?;
             } else {
-                context.emit(&wrap(&explained(effect, &vehicle)?, context.width))?;
+                context.emit(&explained(effect, &vehicle)?)?;
             }
         }
     }

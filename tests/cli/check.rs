@@ -63,6 +63,9 @@ fn allowed_errors_are_not_called_safe() {
     assert!(planned.err.contains("Safe apart from 1 allowed finding (distance: 1)"), "{planned}");
 }
 
+/// Changes the first folder, perhaps with files of the second.
+type Change = fn(&Path, &Path);
+
 /// Each change to a campaign's files, and what the check says about it.
 #[test]
 fn every_file_of_a_campaign_is_held_to_the_plan() {
@@ -71,7 +74,6 @@ fn every_file_of_a_campaign_is_held_to_the_plan() {
     let other = ["plan", "calibration", "--grid", "1x2", "--speeds", "1,3", "-o", "other"];
     bench.expect(0, &[&other[..], &["--leg", "6", "--hover", "4", "--baseline", "10"]].concat());
     bench.expect(0, &["check", "campaign"]);
-    type Change = fn(&Path, &Path);
     let changes: [(&str, &str, Change); 9] = [
         ("stray", "skyb/03.skyb is of no slot of the plan", |here, _| {
             fs::copy(here.join("skyb/01.skyb"), here.join("skyb/03.skyb")).unwrap();

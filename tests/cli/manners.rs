@@ -189,7 +189,6 @@ fn tables_fit_a_narrow_terminal() {
         &["inspect", "campaign/skyb/01.skyb"],
         &["inspect", "campaign/logs/01.BIN"],
         &["effects"],
-        &["effects", "show", "momentum"],
         &["--help"],
     ];
     for args in commands {
