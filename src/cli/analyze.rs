@@ -10,13 +10,15 @@ use serde::Serialize;
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::leaning::leaning;
 use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::simulate::{made_by, sha256};
 use super::words;
 use crate::analysis::calibrate::{Location, Weights};
 use crate::analysis::density::Density;
-use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
+use crate::analysis::wind::Leaning;
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, TruthSeries, analyze};
 use crate::base::file::{FileError, read_whole, write_whole};
@@ -44,8 +46,8 @@ const WIDTH: usize = 100;
   updraft analyze windy --hold still/analysis.json
 
 A campaign's results go into its folder, others into --output. Without a plan, windows are found in
-the log's own desired velocity. Exit code 3: done, but some logs are missing or unusable; they are
-named.")]
+the log's own desired velocity. Exit code 3: done, but some drones gave no law or no value of the
+map; they are named, with the reason. Exit code 5: no law and no map at all.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
     #[arg(required = true)]
@@ -82,6 +84,9 @@ pub(super) struct AnalyzeOptions {
     /// Do not correct the map for air density at different heights
     #[arg(long)]
     no_density: bool,
+    /// Do not correct the map for wind on leaning drones (simulated flights of known drag)
+    #[arg(long)]
+    no_wind: bool,
     /// Windows as in the paper: medians, weighted by the samples' standard deviation
     #[arg(long)]
     paper: bool,
@@ -140,6 +145,7 @@ struct Found {
     seed: Option<u64>,
     start: Option<GpsTime>,
     density: Option<Density>,
+    leaning: Option<Leaning>,
 }
 
 /// What was asked to be analysed.
@@ -222,6 +228,7 @@ fn finish(
             true_updraft_mps: flight.true_updraft_mps,
             truth: (!flight.truth.is_empty()).then_some(&flight.truth),
             density: flight.density.filter(|_| !options.no_density),
+            leaning: flight.leaning.filter(|_| !options.no_wind),
             folder: Some(&work.root),
         })
         .collect();
@@ -257,9 +264,12 @@ fn finish(
     }
     let place = page.map_or(String::new(), |page| format!(" -> {}", page.display()));
     context.say(&format!("Analysed {} in {watch}{place}", words::count(total, "log")));
-    let lost = analysis.flights.iter().any(|flight| !flight.missing.is_empty())
-        || analysis.flights.len() < work.flights.len();
-    Ok(if lost { Exit::Losses } else { Exit::Done })
+    let lost = analysis.flights.len() < work.flights.len();
+    Ok(match analysis.what_was_found() {
+        Yield::Nothing => Exit::Nothing,
+        Yield::Whole if !lost => Exit::Done,
+        Yield::Whole | Yield::Partial => Exit::Losses,
+    })
 }
 
 /// Adds what a path holds to the work.
@@ -293,6 +303,7 @@ fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Command
         seed: None,
         start: None,
         density: plan.map(|plan| density(plan, None)),
+        leaning: None,
     });
     Ok(())
 }
@@ -314,7 +325,9 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     };
     let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
     let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
+    let flown = record.as_ref().zip(vehicle.as_ref());
     Ok(Found {
+        leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),

@@ -8,6 +8,7 @@ mod effects;
 mod effects_plot;
 pub mod exit;
 mod inspect;
+mod leaning;
 mod load;
 mod mission_args;
 mod physics;
@@ -49,7 +50,7 @@ use exit::{CommandError, Exit};
   updraft inspect my-campaign/show.skyc
 
 Exit codes: 0 done, 1 failed, 2 wrong arguments or template, 3 done with losses,
-4 a check failed, 5 nothing to work on, 130 interrupted."
+4 a check failed, 5 nothing to work on or no result at all, 130 interrupted."
 )]
 pub struct Cli {
     #[command(flatten)]

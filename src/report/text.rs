@@ -147,6 +147,7 @@ pub(super) fn rejection(rejection: Rejection) -> &'static str {
         Rejection::NotFollowing => "not following",
         Rejection::Gap => "gap in the log",
         Rejection::Incomplete => "log ends early",
+        Rejection::Manoeuvre => "moving up and down",
     }
 }
 
