@@ -112,6 +112,7 @@ pub(super) fn symbol(name: &str) -> String {
         "W" | "W_Z" => "W*".to_owned(),
         "A'" => "A′".to_owned(),
         "chi2_nu" => "χ²/ν".to_owned(),
+        "sigma_added" => "added scatter".to_owned(),
         other => clean(other),
     }
 }
