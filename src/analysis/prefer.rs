@@ -79,3 +79,49 @@ pub fn misfit(laws: &Laws) -> Option<String> {
 fn w_mps(fit: &Fit) -> Option<f64> {
     fit.parameters.iter().find(|found| found.name == "W").map(|w| w.estimate.value)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::law::{ErrorScale, Point, linear, signed_quadratic};
+
+    fn laws(pulse_us: fn(f64) -> f64) -> Laws {
+        let points: Vec<Point> = (-7..=7)
+            .filter(|rung| *rung != 0)
+            .map(|rung| {
+                let velocity_mps = 0.5 * f64::from(rung);
+                let odd = if rung % 2 == 0 { 1.0 } else { -1.0 };
+                Point {
+                    velocity_mps,
+                    pulse_us: pulse_us(velocity_mps) + odd,
+                    sigma_us: 1.0,
+                    velocity_sigma_mps: 0.0,
+                }
+            })
+            .collect();
+        Laws {
+            signed_quadratic: signed_quadratic(&points, ErrorScale::Unscaled).ok(),
+            signed_quadratic_held: None,
+            linear: linear(&points, ErrorScale::Unscaled).ok(),
+            sigma_added_us: None,
+        }
+    }
+
+    #[test]
+    fn the_shape_decides() {
+        let square = laws(|v| 1598.6 + 8.14 * v * v.abs());
+        assert_eq!(better_of(&square), Some(MapLaw::SignedQuadratic));
+        assert_eq!(misfit(&square), None);
+        let line = laws(|v| 1546.5 + 26.4 * v);
+        assert_eq!(better_of(&line), Some(MapLaw::Linear));
+        let words = misfit(&line).unwrap();
+        assert!(words.contains("does not describe this flight"), "{words}");
+        // A bent line looks like a parabola's flank: only W tells that it is none.
+        let mut bent = laws(|v| 1546.5 + 26.4 * v + 0.6 * v * v);
+        bent.linear = line.linear.clone();
+        bent.signed_quadratic.as_mut().unwrap().chi2_reduced = Some(9.0);
+        let w = w_mps(bent.signed_quadratic.as_ref().unwrap()).unwrap();
+        assert!(w.abs() > LARGEST_CALIBRATION_W_MPS, "{w}");
+        assert!(misfit(&bent).unwrap().contains("not moving air"), "{w}");
+    }
+}
