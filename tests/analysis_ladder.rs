@@ -547,10 +547,8 @@ fn measured(pulse: fn(f64) -> f64, up: fn(f64) -> f64, planned_s: f64) -> Analys
     let [ladder, _] = synthetic_plans();
     let table = Timetable::default().add(Kind::Hover, "hover", 0.0, planned_s);
     let scan = plan(Purpose::Measurement, table.segments, 2);
-    let inputs = [
-        input("calibration", Some(&ladder), &calibration),
-        input("hover", Some(&scan), &hover),
-    ];
+    let inputs =
+        [input("calibration", Some(&ladder), &calibration), input("hover", Some(&scan), &hover)];
     analyze("x", &inputs, &AnalysisOptions::default(), None, &|_, _| {}).unwrap()
 }
 

@@ -378,7 +378,7 @@ fn finish(
         });
         table = calibrate::table(&drones, paper, options.fit.weights);
         paper_table = Some(paper.number().to_owned());
-        warnings.extend(fit_cautions(flock.as_ref(), &drones));
+        warnings.extend(fit_cautions(flock.as_ref(), &drones, input.leaning));
     } else if shared.reference.is_none() {
         warnings.push(
             "no calibration was given: the air cannot be measured without laws (analyse a \

@@ -148,7 +148,9 @@ fn find_targets(
     };
     let targets = windows::planned(segments);
     if targets.is_empty() {
-        return Err("the plan has no analysis windows for this slot".to_owned());
+        return Err("the plan has no analysis windows for this slot: its legs and hovers are too \
+                    short for one"
+            .to_owned());
     }
     if flight.clock.method == Alignment::Takeoff {
         warnings

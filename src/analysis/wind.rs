@@ -83,17 +83,23 @@ impl Leaning {
                 mean: level(raw.mean),
                 trimmed: level(raw.trimmed),
                 // The spread of the corrected pulse: without that of the tilt itself.
-                ..window.pulse_phi_us.clone()
+                ..window.pulse_phi_us
             },
             velocity_mps: SampleStats {
                 median: moved.median + axial,
                 mean: moved.mean + axial,
                 trimmed: moved.trimmed + axial,
-                ..moved.clone()
+                ..*moved
             },
             ..window.clone()
         }
     }
+}
+
+/// What wind adds to the flow along the rotor axis at a lean, m/s; an upper bound where the drag is
+/// not known.
+pub(super) fn axial_of(leaning: Option<Leaning>, tilt_deg: f64) -> f64 {
+    axial_mps(leaning.map_or(CLEANEST_MPS, |leaning| leaning.drag_speed_mps), tilt_deg)
 }
 
 fn axial_mps(drag_speed_mps: f64, tilt_deg: f64) -> f64 {

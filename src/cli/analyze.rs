@@ -78,7 +78,8 @@ pub(super) struct AnalyzeOptions {
     /// Law for the map of the air
     #[arg(long, value_enum, default_value_t = LawChoice::Auto)]
     law: LawChoice,
-    /// Which part of the pulse the tilt correction multiplies
+    /// Which part of the pulse the tilt correction multiplies (in windows and laws; the map of
+    /// simulated flights of known drag has its own, see --no-wind)
     #[arg(long, value_enum, default_value_t = TiltChoice::Paper)]
     tilt: TiltChoice,
     /// Do not correct the map for air density at different heights

@@ -9,7 +9,8 @@ use crate::mission::plan::Purpose;
 use super::figure_air::{deviation, mean, mean_truth};
 use super::law;
 use super::text::{
-    NONE, clean, count, estimate, fixed, parameter, rejection, signed, symbol, unit, usable,
+    NONE, clean, count, estimate, fixed, parameter, reduced, rejection, signed, symbol, unit,
+    usable,
 };
 
 /// A row of Table I or II in words.
@@ -80,7 +81,7 @@ pub(super) fn fit_line(fit: &Fit) -> String {
         })
         .collect();
     match fit.chi2_reduced {
-        Some(chi2) => parts.push(format!("χ²/ν = {} (ν = {})", fixed(chi2, 2), fit.dof)),
+        Some(chi2) => parts.push(format!("χ²/ν = {} (ν = {})", reduced(chi2), fit.dof)),
         None => parts.push("no errors: as many parameters as windows".to_owned()),
     }
     parts.push(format!("rms {} µs over {}", fixed(fit.rms_us, 2), count(fit.points, "point")));
@@ -136,20 +137,29 @@ pub(super) fn nothing(flight: &FlightAnalysis) -> Option<String> {
     let ladder = windows().any(|window| window.kind.is_leg());
     let hover = windows().any(|window| window.kind.is_hover());
     let calibration = flight.purpose == Purpose::Calibration;
-    Some(match (calibration, ladder, hover) {
-        _ if flight.drones.is_empty() => "No result: no drone of this flight could be analysed.",
-        (true, false, _) => "No ladder found: this flight has no legs of constant vertical speed, \
-                             so that no law could be fitted.",
-        (true, true, _) => "No calibration: the ladder was found, but no law could be fitted to it \
-                            (the reasons are with the drones).",
-        (false, _, false) => "No hover found: there is nothing to measure the air in.",
-        (false, _, true) if flight.unmeasured.is_empty() => {
-            "No calibration: the air cannot be measured without laws. Analyse a calibration flight \
-             together with this one."
+    Some(
+        match (calibration, ladder, hover) {
+            _ if flight.drones.is_empty() => {
+                "No result: no drone of this flight could be analysed."
+            }
+            (true, false, _) => {
+                "No ladder found: this flight has no legs of constant vertical speed, \
+                             so that no law could be fitted."
+            }
+            (true, true, _) => {
+                "No calibration: the ladder was found, but no law could be fitted to it \
+                            (the reasons are with the drones)."
+            }
+            (false, _, false) => "No hover found: there is nothing to measure the air in.",
+            (false, _, true) if flight.unmeasured.is_empty() => {
+                "No calibration: without its laws there is no value of the air."
+            }
+            (false, _, true) => {
+                "No value of the air: no drone has a usable hover (the reasons follow)."
+            }
         }
-        (false, _, true) => "No value of the air: no drone has a usable hover (the reasons follow).",
-    }
-    .to_owned())
+        .to_owned(),
+    )
 }
 
 /// Which law a flight's numbers should be read from, in words; `None` without laws.
@@ -163,50 +173,7 @@ pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
         MapLaw::SignedQuadratic => ("signed-quadratic", chi2(quadratic), chi2(linear)),
     };
     let (this, other) = this.zip(other)?;
-    Some(format!(
-        "the {name} law fits better (χ²/ν {} against {})",
-        fixed(this, 2),
-        fixed(other, 2)
-    ))
-}
-
-/// Drones without a value of the map: (slot or name, reason), equal reasons together.
-pub(super) fn unmeasured_lines(flight: &FlightAnalysis) -> Vec<String> {
-    grouped(flight.unmeasured.iter().map(|one| (label(one.slot, &one.name), clean(&one.reason))))
-}
-
-/// Everything doubtful about the drones, equal remarks together.
-pub(super) fn note_lines(flight: &FlightAnalysis) -> Vec<String> {
-    grouped(flight.drones.iter().flat_map(|drone| {
-        let of = label(drone.slot, &drone.name);
-        flags(drone).into_iter().map(move |flag| (of.clone(), flag))
-    }))
-}
-
-fn label(slot: Option<u16>, name: &str) -> String {
-    slot.map_or_else(|| clean(name), |slot| slot.to_string())
-}
-
-fn grouped(remarks: impl Iterator<Item = (String, String)>) -> Vec<String> {
-    let mut groups: Vec<(String, Vec<String>)> = Vec::new();
-    for (of, remark) in remarks {
-        match groups.iter_mut().find(|(known, _)| *known == remark) {
-            Some((_, who)) => who.push(of),
-            None => groups.push((remark, vec![of])),
-        }
-    }
-    groups
-        .into_iter()
-        .map(|(remark, who)| {
-            let slots = who.iter().all(|one| one.parse::<u16>().is_ok());
-            let word = match (slots, who.len()) {
-                (true, 1) => "slot ",
-                (true, _) => "slots ",
-                (false, _) => "",
-            };
-            format!("{word}{}: {remark}", who.join(", "))
-        })
-        .collect()
+    Some(format!("the {name} law fits better (χ²/ν {} against {})", reduced(this), reduced(other)))
 }
 
 /// One drone's fitted parameters in words; a dash where there is none.
@@ -235,7 +202,7 @@ pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
         )
     };
     let chi2 = |fit: Option<&Fit>| {
-        fit.and_then(|fit| fit.chi2_reduced).map_or_else(|| NONE.to_owned(), |chi2| fixed(chi2, 2))
+        fit.and_then(|fit| fit.chi2_reduced).map_or_else(|| NONE.to_owned(), reduced)
     };
     DroneLaws {
         a: of(quadratic, "A"),

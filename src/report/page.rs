@@ -7,10 +7,11 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 
 use super::compare::{
     clock, comparison, drone_laws, drones_of, fit_line, flags, flock_lines, nothing, scatter_line,
-    table_heading, unmeasured_lines, windows_used,
+    table_heading, windows_used,
 };
 use super::figure_air::{self, mean_truth};
 use super::figure_drone::{self, Axes, drawable};
+use super::notes::unmeasured_lines;
 use super::text::{NONE, clean, estimate, fixed, kind, purpose, shortened, signed, slug, usable};
 use super::{Figure, Provenance, Report, ReportError, figure_laws, figure_map, glance, law};
 

@@ -6,10 +6,11 @@ use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
 use crate::mission::plan::Purpose;
 
 use super::compare::{
-    better_words, clock, comparison, drone_laws, drones_of, fleet_air, flock_lines, note_lines,
-    nothing, scatter_line, table_heading, unmeasured_lines, windows_used,
+    better_words, clock, comparison, drone_laws, drones_of, fleet_air, flock_lines, nothing,
+    scatter_line, table_heading, windows_used,
 };
 use super::figure_air::mean_truth;
+use super::notes::{note_lines, unmeasured_lines};
 use super::page::capitalised;
 use super::table::{Align, Column, lines};
 use super::text::{NONE, clean, count, fixed, purpose, shortened, signed, usable};
