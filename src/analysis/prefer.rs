@@ -117,7 +117,7 @@ mod tests {
         let words = misfit(&line).unwrap();
         assert!(words.contains("does not describe this flight"), "{words}");
         // A bent line looks like a parabola's flank: only W tells that it is none.
-        let mut bent = laws(|v| 1546.5 + 26.4 * v + 0.6 * v * v);
+        let mut bent = laws(|v| 1546.5 + 26.4 * v + 4.0 * v * v);
         bent.linear = line.linear.clone();
         bent.signed_quadratic.as_mut().unwrap().chi2_reduced = Some(9.0);
         let w = w_mps(bent.signed_quadratic.as_ref().unwrap()).unwrap();

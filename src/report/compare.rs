@@ -150,7 +150,11 @@ pub(super) fn nothing(flight: &FlightAnalysis) -> Option<String> {
                 "No calibration: the ladder was found, but no law could be fitted to it \
                             (the reasons are with the drones)."
             }
-            (false, _, false) => "No hover found: there is nothing to measure the air in.",
+            (false, false, false) => {
+                "No ladder and no hover found: nothing in this flight is steady for \
+                                  long enough."
+            }
+            (false, true, false) => "No hover found: there is nothing to measure the air in.",
             (false, _, true) if flight.unmeasured.is_empty() => {
                 "No calibration: without its laws there is no value of the air."
             }

@@ -167,7 +167,7 @@ impl Output {
             })
             .collect();
         self.line("", "");
-        self.line(DIM, &format!("  {}", table_heading(flight)));
+        self.wrapped(DIM, "  ", &table_heading(flight));
         self.table(&columns, &rows);
     }
 
@@ -177,7 +177,11 @@ impl Output {
             return;
         }
         self.line("", "");
-        self.line(DIM, "  All drones averaged: the paper's flock mapping, the lines of its Fig. 2");
+        self.wrapped(
+            DIM,
+            "  ",
+            "All drones averaged: the paper's flock mapping, the lines of its Fig. 2",
+        );
         for (law, line) in laws {
             self.wrapped("", "  ", &format!("{law}: {line}"));
         }
@@ -230,7 +234,7 @@ impl Output {
             return;
         }
         self.line("", "");
-        self.line(DIM, "  Each drone's laws, as the line of the paper's Fig. 3d");
+        self.wrapped(DIM, "  ", "Each drone's laws, as the line of the paper's Fig. 3d");
         self.table(&columns, &rows);
         let fitted = flight.drones.iter().filter(|drone| drone.laws.is_some()).count();
         if fitted > rows.len() {
@@ -308,7 +312,7 @@ impl Output {
             return;
         }
         self.line("", "");
-        self.line(DIM, "  Means over the hover (the paper's Fig. 5, averaged), seen from above, forward is up; · no data");
+        self.wrapped(DIM, "  ", "Means over the hover (the paper's Fig. 5, averaged), seen from above, forward is up; · no data");
         for row in rows {
             let mut line = String::from("  ");
             for &column in &columns {
