@@ -99,7 +99,7 @@ fn nothing_found_is_said_plainly() {
         }
     };
     assert_eq!(said(no_ladder, 0), "No ladder found");
-    assert_eq!(said(|flight| flight.map = None, 1), "No hover found");
+    assert_eq!(said(|flight| flight.map = None, 1), "No ladder and no hover found");
 }
 
 #[test]
