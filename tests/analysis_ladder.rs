@@ -531,6 +531,8 @@ fn a_signed_quadratic_that_does_not_fit_is_called_so() {
     assert!(square.warnings.is_empty(), "{:?}", square.warnings);
 }
 
+type OfTime = fn(f64) -> f64;
+
 /// Hovers of 264 s (or less, if planned so) measured with the synthetic calibration.
 fn measured(pulse: fn(f64) -> f64, up: fn(f64) -> f64, planned_s: f64) -> Analysis {
     let folder = tempfile::tempdir().unwrap();
@@ -569,7 +571,7 @@ fn a_rejected_hover_gives_no_value_and_says_why() {
     fn climbs(_: f64) -> f64 {
         0.25
     }
-    let cases: [(fn(f64) -> f64, fn(f64) -> f64, f64, &str); 3] = [
+    let cases: [(OfTime, OfTime, f64, &str); 3] = [
         (touches, still, 264.0, "a motor touched its limit"),
         (calm, swings, 264.0, "it moved up and down"),
         (calm, still, 12.0, "too short"),

@@ -30,7 +30,7 @@ pub enum Exit {
     Losses = 3,
     /// A check failed: the show is not safe as it is.
     Unsafe = 4,
-    /// There was nothing to work on: no logs, no windows.
+    /// There was nothing to work on (no logs, no windows), or an analysis gave no law and no map at all.
     Nothing = 5,
     /// Interrupted by the user; the same command goes on where it stopped.
     Interrupted = 130,
