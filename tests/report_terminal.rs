@@ -65,7 +65,7 @@ fn warnings_are_printed_in_full() {
         let joined: String = text.split_whitespace().collect();
         for wanted in analysis.warnings.iter().chain([&long("caution"), &long("note")]) {
             let wanted: String = wanted.split_whitespace().collect();
-            assert!(joined.contains(&wanted), "{width}: {:.20} is cut", wanted);
+            assert!(joined.contains(&wanted), "{width}: {wanted:.20} is cut");
         }
     }
 }
