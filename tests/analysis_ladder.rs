@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 
 use analysis_support::{Synthetic, Timetable, fixture, ladder, plan};
 use updraft::analysis::calibrate::{FitOptions, Location, Weights};
-use updraft::analysis::result::{Fit, FlightAnalysis, LostLog, Rejection, WindowStats};
+use updraft::analysis::result::{
+    Analysis, Fit, FlightAnalysis, LostLog, Rejection, WindowStats, Yield,
+};
 use updraft::analysis::{
     AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, analyze, analyze_flight,
 };
@@ -27,6 +29,7 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
         true_updraft_mps: None,
         truth: None,
         density: None,
+        leaning: None,
         folder: None,
     }
 }
@@ -505,4 +508,112 @@ fn a_second_log_of_a_slot_is_left_out_and_named() {
         flight.lost.iter().filter(|log| !log.used).map(LostLog::sentence).collect();
     assert_eq!(unused.len(), 1, "{unused:?}");
     assert!(unused[0].contains("slot 1 has a log already"), "{unused:?}");
+}
+
+#[test]
+fn chi_squared_is_told_from_before_scatter_was_added() {
+    let paths = [fixture("ladder-still.trimmed.BIN")];
+    let flight = run(None, &paths, &AnalysisOptions::default());
+    let laws = flight.drones[0].laws.as_ref().unwrap();
+    let (line, square) = (laws.linear.as_ref().unwrap(), laws.signed_quadratic.as_ref().unwrap());
+    let added = laws.sigma_added_us.unwrap();
+    println!("added {added} us, {:?} {:?}", line.chi2_reduced, square.chi2_reduced);
+    assert!(added > 0.1, "{added}");
+    // With the scatter in, the better law's would be 1 by construction.
+    assert!(line.chi2_reduced.unwrap() > 2.0 && line.p_value.unwrap() < 1e-3);
+    assert!((line.chi2 / line.dof as f64 - line.chi2_reduced.unwrap()).abs() < 1e-9);
+    let row = |flight: &FlightAnalysis, name: &str| {
+        flight.table.iter().find(|row| row.parameter == name).cloned()
+    };
+    assert_eq!(row(&flight, "sigma_added").unwrap().mean, added);
+    assert_eq!(row(&flight, "chi2_nu").unwrap().paper, None, "not the paper's statistic");
+    let as_published = run(None, &paths, &paper());
+    assert_eq!(row(&as_published, "chi2_nu").unwrap().paper.unwrap().value, 2.19);
+    assert_eq!(row(&as_published, "sigma_added"), None);
+}
+
+#[test]
+fn a_signed_quadratic_that_does_not_fit_is_called_so() {
+    let flight = run(None, &[fixture("ladder-still.trimmed.BIN")], &AnalysisOptions::default());
+    let words = flight.warnings.join("; ");
+    assert!(words.contains("signed-quadratic law does not describe this flight"), "{words}");
+    assert!(words.contains("Use A' of the line"), "{words}");
+    let square = run(None, &[fixture("square-law-ladder.trimmed.BIN")], &paper());
+    assert!(square.warnings.is_empty(), "{:?}", square.warnings);
+}
+
+type OfTime = fn(f64) -> f64;
+
+/// Hovers of 264 s (or less, if planned so) measured with the synthetic calibration.
+fn measured(pulse: fn(f64) -> f64, up: fn(f64) -> f64, planned_s: f64) -> Analysis {
+    let folder = tempfile::tempdir().unwrap();
+    let [calibration, mut hover] = synthetic_campaign(folder.path());
+    let path = folder.path().join("hover-2.BIN");
+    let log = Synthetic {
+        system_id: 2,
+        duration_s: 264.0,
+        velocity_up_mps: up,
+        pulse_us: Box::new(pulse),
+    };
+    fs::write(&path, log.write()).unwrap();
+    hover.truncate(2);
+    let [ladder, _] = synthetic_plans();
+    let table = Timetable::default().add(Kind::Hover, "hover", 0.0, planned_s);
+    let scan = plan(Purpose::Measurement, table.segments, 2);
+    let inputs =
+        [input("calibration", Some(&ladder), &calibration), input("hover", Some(&scan), &hover)];
+    analyze("x", &inputs, &AnalysisOptions::default(), None, &|_, _| {}).unwrap()
+}
+
+#[test]
+fn a_rejected_hover_gives_no_value_and_says_why() {
+    fn calm(_: f64) -> f64 {
+        1548.5
+    }
+    fn touches(time: f64) -> f64 {
+        if (100.0..101.0).contains(&time) { 1950.0 } else { 1548.5 }
+    }
+    fn still(_: f64) -> f64 {
+        0.0
+    }
+    fn swings(time: f64) -> f64 {
+        (time / 10.0 * TAU).sin()
+    }
+    fn climbs(_: f64) -> f64 {
+        0.25
+    }
+    let cases: [(OfTime, OfTime, f64, &str); 3] = [
+        (touches, still, 264.0, "a motor touched its limit"),
+        (calm, swings, 264.0, "it moved up and down"),
+        (calm, still, 12.0, "too short"),
+    ];
+    for (pulse, up, planned_s, reason) in cases {
+        let analysis = measured(pulse, up, planned_s);
+        let flight = &analysis.flights[1];
+        let of_two = flight.unmeasured.iter().find(|drone| drone.slot == Some(2)).unwrap();
+        assert!(of_two.reason.contains(reason), "{reason}: {}", of_two.reason);
+        assert_eq!(of_two.name, flight.drones[1].name);
+        let values = flight.map.as_ref().map_or(0, |map| map.drones.len());
+        assert_eq!(values + flight.unmeasured.len(), 2, "{reason}");
+        assert_eq!(analysis.what_was_found(), Yield::Partial, "{reason}");
+    }
+    let whole = measured(calm, climbs, 264.0);
+    assert!(whole.flights[1].unmeasured.is_empty(), "{:?}", whole.flights[1].unmeasured);
+}
+
+#[test]
+fn what_was_found_tells_nothing_from_something() {
+    let folder = tempfile::tempdir().unwrap();
+    let [calibration, hover] = synthetic_campaign(folder.path());
+    let found = |name, logs: &[LogInput]| {
+        let inputs = [input(name, None, logs)];
+        analyze(name, &inputs, &AnalysisOptions::default(), None, &|_, _| {}).unwrap()
+    };
+    let nothing = found("hover", &hover);
+    assert_eq!(nothing.what_was_found(), Yield::Nothing);
+    let text = updraft::report::terminal_summary(&nothing, 100, false);
+    assert!(text.contains("No calibration: without its laws"), "{text}");
+    let laws = found("calibration", &calibration);
+    assert!(matches!(laws.what_was_found(), Yield::Whole | Yield::Partial));
+    assert!(!updraft::report::terminal_summary(&laws, 100, false).contains("No "));
 }

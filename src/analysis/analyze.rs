@@ -8,16 +8,19 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::calibrate::{self, FitOptions, PaperTable};
+use super::caution::{fit_cautions, wind_caution};
 use super::density::Density;
-use super::drone::{One, Shared, law_fit, one};
+use super::drone::{One, Shared, one};
 use super::law::{LINEAR, SIGNED_QUADRATIC};
+use super::prefer::better_law;
 use super::refer::refer_calibration;
 use super::result::{
-    ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, LostLog, Missing, UpdraftMap,
+    ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, LostLog, Missing, Unmeasured,
+    UpdraftMap,
 };
 use super::slots::{SlotMatch, match_slots};
-use super::stats::mean_sd;
 use super::updraft::{self, DroneSeries};
+use super::wind::Leaning;
 use super::windows::WindowOptions;
 use crate::base::time::GpsTime;
 use crate::mission::plan::{Plan, Purpose};
@@ -52,6 +55,9 @@ pub struct FlightInput<'a> {
     /// Ground height and the vehicle's response to air density; `None`: pulses of the map are not
     /// corrected for height.
     pub density: Option<Density>,
+    /// How the vehicle leans in wind, where its drag is known; `None`: the map is not corrected for
+    /// wind, and says how wrong it may be.
+    pub leaning: Option<Leaning>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
 }
@@ -230,8 +236,8 @@ pub fn analyze_flight(
     let (slots, warnings) = match_slots(input);
     let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
     let referred = reference
-        .zip(input.density)
-        .map(|(reference, density)| refer_calibration(density, reference, &options.fit));
+        .filter(|_| input.density.is_some() || input.leaning.is_some())
+        .map(|found| refer_calibration(input.density, input.leaning, found, &options.fit));
     let map_reference = referred.as_ref().or(reference);
     let map_law = options.map_law.or_else(|| map_reference.map(better_law));
     let shared = Shared { input, options, reference, map_reference, planned_purpose, map_law };
@@ -290,33 +296,6 @@ pub fn analyze_flight(
 
 /// Unusable logs named in an error.
 const LISTED: usize = 20;
-/// Largest W of a calibration's signed quadratic that may be the air's, m/s.
-const LARGEST_CALIBRATION_W_MPS: f64 = 0.5;
-
-/// The law whose fits to the reference's drones have the lower mean reduced chi².
-///
-/// A signed quadratic that needs a strong W is a parabola's flank standing in for another curve, not
-/// air that moved: its inverse is off by that W, and the line is taken.
-fn better_law(reference: &FlightAnalysis) -> MapLaw {
-    let calm = reference.flock.as_ref().is_none_or(|laws| {
-        let quadratic = laws.signed_quadratic.as_ref();
-        let w = quadratic.and_then(|fit| fit.parameters.iter().find(|found| found.name == "W"));
-        w.is_none_or(|w| w.estimate.value.abs() <= LARGEST_CALIBRATION_W_MPS)
-    });
-    let reduced = |law: MapLaw| {
-        let values: Vec<f64> = reference
-            .drones
-            .iter()
-            .filter_map(|drone| law_fit(drone.laws.as_ref()?, law)?.chi2_reduced)
-            .collect();
-        (!values.is_empty()).then(|| mean_sd(&values).0)
-    };
-    match (reduced(MapLaw::Linear), reduced(MapLaw::SignedQuadratic)) {
-        (Some(linear), Some(quadratic)) if calm && quadratic < linear => MapLaw::SignedQuadratic,
-        (None, Some(_)) => MapLaw::SignedQuadratic,
-        _ => MapLaw::Linear,
-    }
-}
 
 /// Joins the drones' results: purpose, laws, flock, tables, map, missing.
 fn finish(
@@ -334,21 +313,31 @@ fn finish(
     });
     let mut drones = Vec::new();
     let mut updrafts = Vec::new();
+    let mut unmeasured = Vec::new();
     for One { mut drone, calibration, updraft, .. } in ones {
         if purpose == Purpose::Calibration {
             match calibration {
                 Ok(laws) => drone.laws = Some(laws),
                 Err(error) => drone.warnings.push(error.to_string()),
             }
-        } else if let Some((series, mapping)) = updraft {
-            updrafts.push((drone.slot, drone.name.clone(), drone.home_m, series, mapping));
-        } else if shared.reference.is_some() {
-            drone.warnings.push("no hover long enough to measure the air in".to_owned());
+        } else {
+            match updraft {
+                Some(Ok((series, mapping))) => {
+                    updrafts.push((drone.slot, drone.name.clone(), drone.home_m, series, mapping));
+                }
+                Some(Err(reason)) => unmeasured.push(Unmeasured {
+                    slot: drone.slot,
+                    name: drone.name.clone(),
+                    reason,
+                }),
+                None => {}
+            }
         }
         drones.push(drone);
     }
     let mut flock = None;
     let mut table = Vec::new();
+    let mut paper_table = None;
     if purpose == Purpose::Calibration {
         match calibrate::flock(&drones, &options.fit) {
             Ok(laws) => flock = Some(laws),
@@ -358,7 +347,9 @@ fn finish(
             Some(_) => PaperTable::Simulation,
             None => PaperTable::Field,
         });
-        table = calibrate::table(&drones, paper);
+        table = calibrate::table(&drones, paper, options.fit.weights);
+        paper_table = Some(paper.number().to_owned());
+        warnings.extend(fit_cautions(flock.as_ref(), &drones, input.leaning));
     } else if shared.reference.is_none() {
         warnings.push(
             "no calibration was given: the air cannot be measured without laws (analyse a \
@@ -382,6 +373,7 @@ fn finish(
             .collect()
     });
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
+    warnings.extend(map.as_ref().and_then(wind_caution));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -392,6 +384,8 @@ fn finish(
         flock,
         table,
         map,
+        unmeasured,
+        paper_table,
         warnings,
         lost: Vec::new(),
     }
@@ -416,6 +410,8 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             height_m: series.height_m,
             mapping: mapping.to_owned(),
             mean: series.mean,
+            systematic_mps: series.systematic_mps,
+            tilt_deg: series.tilt_deg,
             updraft_mps: series.at(&times),
             truth_mps: truth_of(slot),
         })
@@ -426,6 +422,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             _ => LINEAR,
         }
         .to_owned(),
+        leaning: shared.input.leaning,
         density: shared.input.density,
         flock: shared.map_reference.and_then(|reference| reference.flock.clone()),
         time_s: times.iter().map(|time| *time as f64).collect(),

@@ -309,6 +309,9 @@ fn measure_one(
     }
     if velocity.n > 0 && (velocity.mean - target.commanded_mps).abs() > options.follow_limit_mps {
         rejected.push(Rejection::NotFollowing);
+    } else if target.kind.is_hover() && velocity.sd > options.follow_limit_mps {
+        // It went up and down: on the average it stayed, but that is no hover.
+        rejected.push(Rejection::Manoeuvre);
     }
     WindowStats {
         kind: target.kind,

@@ -15,7 +15,7 @@ use super::progress::Progress;
 use super::simulate::{made_by, sha256};
 use super::words;
 use crate::analysis::calibrate::{Location, Weights};
-use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, analyze};
 use crate::base::file::{read_whole, write_whole};
@@ -42,7 +42,8 @@ const WIDTH: usize = 100;
 A campaign's results go into its folder, others into --output. Without a plan, windows are found in
 the log's own desired velocity. Whose a log is, it says itself: by its home position, else by its
 file name (07.BIN), else by its system id. Exit code 3: done, but some logs are missing, unusable,
-copies, from another place or end in the air; they are named.")]
+copies, from another place or end in the air, or some drones gave no law or no value of the map; they
+are named, with the reason. Exit code 5: no law and no map at all.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
     #[arg(required = true)]
@@ -73,12 +74,16 @@ pub(super) struct AnalyzeOptions {
     /// Law for the map of the air
     #[arg(long, value_enum, default_value_t = LawChoice::Auto)]
     law: LawChoice,
-    /// Which part of the pulse the tilt correction multiplies
+    /// Which part of the pulse the tilt correction multiplies (in windows and laws; the map of
+    /// simulated flights of known drag has its own, see --no-wind)
     #[arg(long, value_enum, default_value_t = TiltChoice::Paper)]
     tilt: TiltChoice,
     /// Do not correct the map for air density at different heights
     #[arg(long)]
     no_density: bool,
+    /// Do not correct the map for wind on leaning drones (simulated flights of known drag)
+    #[arg(long)]
+    no_wind: bool,
     /// Windows as in the paper: medians, weighted by the samples' standard deviation
     #[arg(long)]
     paper: bool,
@@ -202,6 +207,7 @@ fn finish(
             true_updraft_mps: flight.true_updraft_mps,
             truth: (!flight.truth.is_empty()).then_some(&flight.truth),
             density: flight.density.filter(|_| !options.no_density),
+            leaning: flight.leaning.filter(|_| !options.no_wind),
             folder: Some(&work.root),
         })
         .collect();
@@ -246,7 +252,11 @@ fn finish(
     let lost = used < total
         || analysis.flights.iter().any(lossy)
         || analysis.flights.len() < work.flights.len();
-    Ok(if lost { Exit::Losses } else { Exit::Done })
+    Ok(match analysis.what_was_found() {
+        Yield::Nothing => Exit::Nothing,
+        Yield::Whole if !lost => Exit::Done,
+        Yield::Whole | Yield::Partial => Exit::Losses,
+    })
 }
 
 fn load_plan(path: &Path) -> Result<Plan, CommandError> {

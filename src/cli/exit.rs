@@ -34,7 +34,8 @@ pub enum Exit {
     Losses = 3,
     /// A check failed: the show is not safe as it is.
     Unsafe = 4,
-    /// There was nothing to work on: no plan, no logs, no windows.
+    /// There was nothing to work on (no plan, no logs, no windows), or an analysis gave no law and no
+    /// map at all.
     Nothing = 5,
     /// Another process is writing into the same folder.
     Busy = 6,

@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::exit::CommandError;
+use super::leaning::leaning;
 use super::load::has_extension;
 use crate::analysis::density::Density;
+use crate::analysis::wind::Leaning;
 use crate::analysis::{LogInput, TruthSeries};
 use crate::base::file::FileError;
 use crate::base::time::GpsTime;
@@ -30,6 +32,7 @@ pub(super) struct Found {
     pub(super) seed: Option<u64>,
     pub(super) start: Option<GpsTime>,
     pub(super) density: Option<Density>,
+    pub(super) leaning: Option<Leaning>,
     /// What is doubtful about the files, one sentence each.
     pub(super) notes: Vec<String>,
 }
@@ -79,6 +82,7 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         seed: None,
         start: None,
         density: plan.map(|plan| density(plan, None)),
+        leaning: None,
         notes: Vec::new(),
     });
     Ok(())
@@ -98,7 +102,9 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
         .collect();
     let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
     let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
+    let flown = record.as_ref().zip(vehicle.as_ref());
     Ok(Found {
+        leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),

@@ -11,6 +11,7 @@ pub mod exit;
 mod flown;
 mod found;
 mod inspect;
+mod leaning;
 mod load;
 mod mission_args;
 mod physics;
@@ -54,8 +55,8 @@ use exit::{CommandError, Exit};
 
 Exit codes: 0 done; 1 failed: a file or folder is not there, or cannot be read or written; 2 wrong
 arguments or template, or a file that is of the wrong kind or broken; 3 done with losses; 4 a check
-failed; 5 nothing to work on: a folder without plan or logs; 6 another updraft
-is writing there; 130 interrupted."
+failed; 5 nothing to work on: a folder without plan or logs, or no result at all;
+6 another updraft is writing there; 130 interrupted."
 )]
 pub struct Cli {
     #[command(flatten)]
