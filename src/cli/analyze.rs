@@ -41,9 +41,9 @@ const WIDTH: usize = 100;
 
 A campaign's results go into its folder, others into --output. Without a plan, windows are found in
 the log's own desired velocity. Whose a log is, it says itself: by its home position, else by its
-file name (07.BIN), else by its system id. Exit code 3: done, but some logs are missing, unusable,
-copies, from another place or end in the air, or some drones gave no law or no value of the map; they
-are named, with the reason. Exit code 5: no law and no map at all.")]
+file name (07.BIN), else by its system id. Exit code 3: done, but logs are missing, unusable,
+copies, from another place or end in the air, or drones gave no law or no value of the map; each is
+named with its reason. Exit code 5: no law and no map at all.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
     #[arg(required = true)]
