@@ -41,7 +41,7 @@ fn lean_caution(drones: &[DroneAnalysis], leaning: Option<Leaning>) -> Option<St
         .filter(|drone| drone.laws.is_some())
         .flat_map(|drone| &drone.windows)
         .filter(|window| window.kind.is_leg() && window.rejected.is_empty())
-        .map(|window| window.tilt_deg.mean)
+        .map(|window| window.lean_deg)
         .collect();
     let tilt = mean_sd(&tilts).0;
     let axial = axial_of(leaning, tilt);

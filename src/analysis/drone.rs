@@ -128,7 +128,7 @@ fn measure(
     let referred =
         input.density.map(|density| density.refer_series(pulse_us, &seen.flight.height_m));
     let pulse_us = referred.as_ref().unwrap_or(pulse_us);
-    let lean = Lean { leaning: input.leaning, tilt_deg: &seen.corrected.tilt_deg, calibration };
+    let lean = Lean { leaning: input.leaning, calibration };
     let series = updraft::estimate(seen.flight, pulse_us, hover, fit, lean)
         .ok_or("the hover has no 10 s without a gap in the log")?;
     Ok((series, mapping))

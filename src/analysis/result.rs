@@ -192,6 +192,9 @@ pub struct WindowStats {
     pub pulse_phi_us: SampleStats,
     /// Tilt from the vertical, degrees.
     pub tilt_deg: SampleStats,
+    /// Angle of the mean attitude from the vertical, degrees: what wind does, without noise.
+    #[serde(default)]
+    pub lean_deg: f64,
     /// Estimated slow offset subtracted before fitting (field mode), us.
     pub offset_us: Option<f64>,
     /// Why the window is not used in fits; empty: it is used (if it is of the fitted kind).

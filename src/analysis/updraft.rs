@@ -8,7 +8,7 @@ use super::result::{Fit, WindowStats};
 use super::stats::{block_error, mean_sd};
 use super::wind;
 use super::wind::Leaning;
-use super::windows::Target;
+use super::windows::{Target, lean_deg};
 use crate::base::estimate::Estimate;
 use crate::flight::{Flight, Series};
 
@@ -37,7 +37,7 @@ pub struct DroneSeries {
     pub mean: Estimate,
     /// Systematic error of the mean from wind on the leaning drone, m/s.
     pub systematic_mps: f64,
-    /// Mean lean in the hover, degrees.
+    /// Lean of the mean attitude in the hover, degrees.
     pub tilt_deg: f64,
     /// Mean height above home, m.
     pub height_m: f64,
@@ -48,8 +48,6 @@ pub struct DroneSeries {
 pub struct Lean<'a> {
     /// How the vehicle leans in wind, where that is known.
     pub leaning: Option<Leaning>,
-    /// Tilt, degrees.
-    pub tilt_deg: &'a Series,
     /// The drone's windows in the calibration.
     pub calibration: &'a [WindowStats],
 }
@@ -76,18 +74,19 @@ pub fn estimate(
     let law = Law::from_fit(fit)?;
     let velocity = Running::new(&flight.velocity_up_mps, hover.start_s, hover.end_s);
     let pulse = Running::new(pulse_phi_us, hover.start_s, hover.end_s);
-    let tilt = Running::new(lean.tilt_deg, hover.start_s, hover.end_s);
+    let roll = Running::new(&flight.roll_rad, hover.start_s, hover.end_s);
+    let pitch = Running::new(&flight.pitch_rad, hover.start_s, hover.end_s);
     let half = RUNNING_S / 2.0;
     let mut values = Series::default();
     for time in pulse_phi_us.times_between(hover.start_s + half, hover.end_s - half) {
         let (Some(velocity), Some(pulse)) = (velocity.mean(*time), pulse.mean(*time)) else {
             continue;
         };
-        // The lean is averaged first: the flow that it lets through is not linear in it.
-        let through = lean
-            .leaning
-            .zip(tilt.mean(*time))
-            .map_or(0.0, |(leaning, tilt_deg)| leaning.axial_mps(tilt_deg));
+        // The attitude is averaged first: the flow that a lean lets through is not linear in it.
+        let through = lean.leaning.map_or(0.0, |leaning| {
+            let attitude = roll.mean(*time).zip(pitch.mean(*time));
+            attitude.map_or(0.0, |(roll, pitch)| leaning.axial_mps(lean_deg(roll, pitch)))
+        });
         let updraft = velocity + through - law.air_velocity_mps(pulse);
         if updraft.is_finite() {
             values.time_s.push(*time);
@@ -115,7 +114,8 @@ pub fn estimate(
     let scatter = block_error(&times, &known, BLOCK_S).unwrap_or(sd);
     let mean_pulse = mean_sd(pulse_phi_us.between(hover.start_s, hover.end_s)).0;
     let from_law = law_error_mps(law, fit, mean_pulse);
-    let tilt_deg = mean_sd(lean.tilt_deg.between(hover.start_s, hover.end_s)).0;
+    let mean_rad = |angle: &Series| mean_sd(angle.between(hover.start_s, hover.end_s)).0;
+    let tilt_deg = lean_deg(mean_rad(&flight.roll_rad), mean_rad(&flight.pitch_rad));
     let raw_pulse = mean_sd(flight.pulse_us.between(hover.start_s, hover.end_s)).0;
     let at_hover = (if raw_pulse > 0.0 { raw_pulse } else { mean_pulse }, tilt_deg);
     Some(DroneSeries {
@@ -227,8 +227,7 @@ mod tests {
     use crate::mission::plan::Kind;
 
     const RATE: f64 = 10.0;
-    static NO_TILT: Series = Series { time_s: Vec::new(), value: Vec::new() };
-    const LEVEL: Lean<'static> = Lean { leaning: None, tilt_deg: &NO_TILT, calibration: &[] };
+    const LEVEL: Lean<'static> = Lean { leaning: None, calibration: &[] };
 
     fn linear_fit() -> Fit {
         fit(Law::Linear { slope: 26.4, u0_us: 1546.5 })

@@ -72,7 +72,7 @@ impl Leaning {
 
     /// A window brought to level flight in air without wind.
     pub(super) fn level_window(self, window: &WindowStats) -> WindowStats {
-        let tilt_deg = window.tilt_deg.mean;
+        let tilt_deg = window.lean_deg;
         let raw = &window.pulse_us;
         let level = |pulse_us: f64| self.level_us(pulse_us, tilt_deg);
         let axial = self.axial_mps(tilt_deg);
@@ -128,7 +128,7 @@ pub(super) fn systematic_mps(
     let used: Vec<f64> = calibration
         .iter()
         .filter(|window| window.kind.is_leg() && window.rejected.is_empty())
-        .map(|window| whole(window.pulse_us.mean, window.tilt_deg.mean))
+        .map(|window| whole(window.pulse_us.mean, window.lean_deg))
         .collect();
     let mean = if used.is_empty() { 0.0 } else { used.iter().sum::<f64>() / used.len() as f64 };
     let (pulse_us, tilt_deg) = hover;

@@ -27,8 +27,8 @@ use crate::show::Show;
   updraft run --air field-day --truth -o field-day
 
 The calibration is flown in still air unless --calibration-updraft, --calibration-wind or
---calibration-air say otherwise; the measurement in the air that --updraft, --wind and --air say. The
-same command goes on where an interrupted one stopped.
+--calibration-air say otherwise; the measurement in the air that --updraft, --wind and --air say.
+The same command goes on where an interrupted one stopped.
 
 {}", air_help()))]
 pub(super) struct RunArgs {

@@ -200,6 +200,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
             pulse_us: stats(measured + 0.4, 4.0),
             pulse_phi_us: stats(measured, 4.0),
             tilt_deg: stats(1.2, 0.4),
+            lean_deg: 1.1,
             offset_us: None,
             rejected: if slot == 23 && v > 3.2 { vec![Rejection::Saturated] } else { Vec::new() },
         });
