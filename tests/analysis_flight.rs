@@ -8,9 +8,9 @@ mod analysis_support;
 use std::fs;
 use std::path::Path;
 
-use analysis_support::{LADDER_START_S, fixture, ladder, renamed};
+use analysis_support::{LADDER_START_S, Synthetic, fixture, ladder, renamed};
 use updraft::base::time::GpsTime;
-use updraft::flight::{Alignment, Flight, FlightError, FlightOptions};
+use updraft::flight::{Alignment, Flight, FlightError, FlightOptions, identify};
 use updraft::log::Log;
 
 fn bytes() -> Vec<u8> {
@@ -45,6 +45,44 @@ fn a_show_log_is_read_with_its_own_clock() {
     assert!((flight.height_m.at(-5.0, 1.0).unwrap()).abs() < 0.1);
     assert!((flight.voltage_v.unwrap().at(100.0, 2.0).unwrap() - 12.588).abs() < 0.01);
     assert_eq!(flight.warnings, Vec::<String>::new());
+}
+
+#[test]
+fn motors_that_lift_nothing_are_no_flight() {
+    let log = Synthetic {
+        system_id: 1,
+        duration_s: 60.0,
+        velocity_up_mps: |_| 0.0,
+        pulse_us: Box::new(|time| if time < 3.0 { 1000.0 } else { 1600.0 }),
+    };
+    let error = load(log.write(), FlightOptions::default()).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "07.BIN: no flight in this log: the motors ran, but the vehicle never rose 0.5 m above the \
+         ground"
+    );
+}
+
+#[test]
+fn a_log_that_ends_in_the_air_says_so() {
+    assert_eq!(load(bytes(), FlightOptions::default()).unwrap().cut_off_at_m, None);
+    let log = Synthetic {
+        system_id: 1,
+        duration_s: 60.0,
+        velocity_up_mps: |time| if time > 3.0 { 0.5 } else { 0.0 },
+        pulse_us: Box::new(|time| if time < 3.0 { 1000.0 } else { 1600.0 }),
+    };
+    let flight = load(log.write(), FlightOptions::default()).unwrap();
+    assert!((flight.cut_off_at_m.unwrap() - 28.5).abs() < 0.2, "{:?}", flight.cut_off_at_m);
+    assert!(flight.warnings.iter().any(|warning| warning.contains("ends in the air")));
+}
+
+#[test]
+fn home_is_where_the_flight_was_armed() {
+    let identity = identify(&Log::from_bytes(bytes()));
+    let (lat, lon) = identity.home_deg.unwrap();
+    assert!((lat + 35.363_261).abs() < 1e-5 && (lon - 149.165_23).abs() < 1e-5);
+    assert!(identity.flew);
 }
 
 #[test]

@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 
 use analysis_support::{Synthetic, Timetable, fixture, ladder, plan};
 use updraft::analysis::calibrate::{FitOptions, Location, Weights};
-use updraft::analysis::result::{Fit, FlightAnalysis, Rejection, WindowStats};
+use updraft::analysis::result::{
+    Analysis, Fit, FlightAnalysis, LostLog, Rejection, WindowStats, Yield,
+};
 use updraft::analysis::{
     AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, analyze, analyze_flight,
 };
@@ -27,6 +29,7 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
         true_updraft_mps: None,
         truth: None,
         density: None,
+        leaning: None,
         folder: None,
     }
 }
@@ -154,11 +157,15 @@ fn a_fleet_is_matched_and_what_is_lost_is_said() {
     let place = |name: &str| folder.path().join(name);
     let square = fixture("square-law-ladder.trimmed.BIN");
     // All logs carry a system id of 1 or 2, so only the file names tell four drones apart.
-    for name in ["drone-01.BIN", "drone-02.BIN", "drone-04.BIN"] {
-        fs::copy(&square, place(name)).unwrap();
+    let bytes = fs::read(&square).unwrap();
+    for (cut, name) in ["drone-01.BIN", "drone-02.BIN", "drone-04.BIN"].iter().enumerate() {
+        // The same flight, but not the same bytes.
+        fs::write(place(name), &bytes[..bytes.len() - cut]).unwrap();
     }
     fs::write(place("drone-03.BIN"), b"").unwrap();
-    let plan = plan(Purpose::Calibration, ladder(1.0), 5);
+    let mut plan = plan(Purpose::Calibration, ladder(1.0), 5);
+    // All stood on one place: only a plan without an origin does not mind.
+    (plan.site.origin_lat_deg, plan.site.origin_lon_deg) = (0.0, 0.0);
     let paths: Vec<PathBuf> =
         (1..=4).rev().map(|number| place(&format!("drone-0{number}.BIN"))).collect();
     let flight = run(Some(&plan), &paths, &paper());
@@ -171,7 +178,7 @@ fn a_fleet_is_matched_and_what_is_lost_is_said() {
         .map(|missing| (missing.slot, missing.reason.contains("empty")))
         .collect();
     assert_eq!(missing, [(3, true), (5, false)], "{:?}", flight.missing);
-    assert_eq!(flight.missing[1].reason, "no log");
+    assert_eq!(flight.missing[1].reason, "no log of Drone 5");
 
     let flock = flight.flock.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
     assert!((values(flock)[0] - 4.963).abs() < 0.002, "the average of equals is one of them");
@@ -413,7 +420,9 @@ fn the_oldest_command_message_suffices_to_find_the_windows() {
 fn damaged_logs_never_stop_the_others() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
-    let plan = plan(Purpose::Calibration, ladder(1.0), 13);
+    let mut plan = plan(Purpose::Calibration, ladder(1.0), 13);
+    // All were flown from one place: without an origin their names tell them apart.
+    (plan.site.origin_lat_deg, plan.site.origin_lon_deg) = (0.0, 0.0);
     let mut paths = vec![folder.path().join("1.BIN")];
     fs::write(&paths[0], &bytes).unwrap();
     for seed in 2..=13_usize {
@@ -430,7 +439,8 @@ fn damaged_logs_never_stop_the_others() {
         let flight = run(plan, &paths, &AnalysisOptions::default());
         let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
         assert!((values(fit)[0] - 4.963).abs() < 0.01, "the whole log is unharmed");
-        assert_eq!(flight.drones.len() + flight.missing.len() + flight.warnings.len(), 13);
+        let unused = flight.lost.iter().filter(|log| !log.used).count();
+        assert_eq!(flight.drones.len() + flight.missing.len() + unused, 13);
         let json = serde_json::to_string(&flight).unwrap();
         let back: FlightAnalysis = serde_json::from_str(&json).unwrap();
         assert_eq!(back, flight, "every number is finite, so JSON holds all of it");
@@ -487,13 +497,123 @@ fn a_log_without_id_and_number_is_matched_by_its_home() {
 
 #[test]
 fn a_second_log_of_a_slot_is_left_out_and_named() {
-    let path = fixture("square-law-ladder.trimmed.BIN");
-    let twice: Vec<LogInput> =
-        [1, 1].map(|slot| LogInput { slot: Some(slot), path: path.clone() }).to_vec();
+    let twice: Vec<LogInput> = ["square-law-ladder.trimmed.BIN", "ladder-still.trimmed.BIN"]
+        .map(|name| LogInput { slot: Some(1), path: fixture(name) })
+        .to_vec();
     let plan = plan(Purpose::Calibration, ladder(1.0), 1);
     let flight =
         analyze_flight(&input("twice", Some(&plan), &twice), &paper(), None, &|_, _| {}).unwrap();
     assert_eq!((flight.drones.len(), flight.missing.len()), (1, 0));
-    assert_eq!(flight.warnings.len(), 1, "{:?}", flight.warnings);
-    assert!(flight.warnings[0].contains("slot 1 has a log already"), "{:?}", flight.warnings);
+    let unused: Vec<String> =
+        flight.lost.iter().filter(|log| !log.used).map(LostLog::sentence).collect();
+    assert_eq!(unused.len(), 1, "{unused:?}");
+    assert!(unused[0].contains("slot 1 has a log already"), "{unused:?}");
+}
+
+#[test]
+fn chi_squared_is_told_from_before_scatter_was_added() {
+    let paths = [fixture("ladder-still.trimmed.BIN")];
+    let flight = run(None, &paths, &AnalysisOptions::default());
+    let laws = flight.drones[0].laws.as_ref().unwrap();
+    let (line, square) = (laws.linear.as_ref().unwrap(), laws.signed_quadratic.as_ref().unwrap());
+    let added = laws.sigma_added_us.unwrap();
+    println!("added {added} us, {:?} {:?}", line.chi2_reduced, square.chi2_reduced);
+    assert!(added > 0.1, "{added}");
+    // With the scatter in, the better law's would be 1 by construction.
+    assert!(line.chi2_reduced.unwrap() > 2.0 && line.p_value.unwrap() < 1e-3);
+    assert!((line.chi2 / line.dof as f64 - line.chi2_reduced.unwrap()).abs() < 1e-9);
+    let row = |flight: &FlightAnalysis, name: &str| {
+        flight.table.iter().find(|row| row.parameter == name).cloned()
+    };
+    assert_eq!(row(&flight, "sigma_added").unwrap().mean, added);
+    assert_eq!(row(&flight, "chi2_nu").unwrap().paper, None, "not the paper's statistic");
+    let as_published = run(None, &paths, &paper());
+    assert_eq!(row(&as_published, "chi2_nu").unwrap().paper.unwrap().value, 2.19);
+    assert_eq!(row(&as_published, "sigma_added"), None);
+}
+
+#[test]
+fn a_signed_quadratic_that_does_not_fit_is_called_so() {
+    let flight = run(None, &[fixture("ladder-still.trimmed.BIN")], &AnalysisOptions::default());
+    let words = flight.warnings.join("; ");
+    assert!(words.contains("signed-quadratic law does not describe this flight"), "{words}");
+    assert!(words.contains("Use A' of the line"), "{words}");
+    let square = run(None, &[fixture("square-law-ladder.trimmed.BIN")], &paper());
+    assert!(square.warnings.is_empty(), "{:?}", square.warnings);
+}
+
+type OfTime = fn(f64) -> f64;
+
+/// Hovers of 264 s (or less, if planned so) measured with the synthetic calibration.
+fn measured(pulse: fn(f64) -> f64, up: fn(f64) -> f64, planned_s: f64) -> Analysis {
+    let folder = tempfile::tempdir().unwrap();
+    let [calibration, mut hover] = synthetic_campaign(folder.path());
+    let path = folder.path().join("hover-2.BIN");
+    let log = Synthetic {
+        system_id: 2,
+        duration_s: 264.0,
+        velocity_up_mps: up,
+        pulse_us: Box::new(pulse),
+    };
+    fs::write(&path, log.write()).unwrap();
+    hover.truncate(2);
+    let [ladder, _] = synthetic_plans();
+    let table = Timetable::default().add(Kind::Hover, "hover", 0.0, planned_s);
+    let scan = plan(Purpose::Measurement, table.segments, 2);
+    let inputs =
+        [input("calibration", Some(&ladder), &calibration), input("hover", Some(&scan), &hover)];
+    analyze("x", &inputs, &AnalysisOptions::default(), None, &|_, _| {}).unwrap()
+}
+
+#[test]
+fn a_rejected_hover_gives_no_value_and_says_why() {
+    fn calm(_: f64) -> f64 {
+        1548.5
+    }
+    fn touches(time: f64) -> f64 {
+        if (100.0..101.0).contains(&time) { 1950.0 } else { 1548.5 }
+    }
+    fn still(_: f64) -> f64 {
+        0.0
+    }
+    fn swings(time: f64) -> f64 {
+        (time / 10.0 * TAU).sin()
+    }
+    fn climbs(_: f64) -> f64 {
+        0.25
+    }
+    let cases: [(OfTime, OfTime, f64, &str); 3] = [
+        (touches, still, 264.0, "a motor touched its limit"),
+        (calm, swings, 264.0, "it moved up and down"),
+        (calm, still, 12.0, "too short"),
+    ];
+    for (pulse, up, planned_s, reason) in cases {
+        let analysis = measured(pulse, up, planned_s);
+        let flight = &analysis.flights[1];
+        let of_two = flight.unmeasured.iter().find(|drone| drone.slot == Some(2)).unwrap();
+        assert!(of_two.reason.contains(reason), "{reason}: {}", of_two.reason);
+        assert_eq!(of_two.name, flight.drones[1].name);
+        let values = flight.map.as_ref().map_or(0, |map| map.drones.len());
+        assert_eq!(values + flight.unmeasured.len(), 2, "{reason}");
+        assert_eq!(analysis.what_was_found(), Yield::Partial, "{reason}");
+    }
+    let whole = measured(calm, climbs, 264.0);
+    assert!(whole.flights[1].unmeasured.is_empty(), "{:?}", whole.flights[1].unmeasured);
+}
+
+#[test]
+fn what_was_found_tells_nothing_from_something() {
+    let folder = tempfile::tempdir().unwrap();
+    let [calibration, hover] = synthetic_campaign(folder.path());
+    let found = |name, logs: &[LogInput]| {
+        let inputs = [input(name, None, logs)];
+        analyze(name, &inputs, &AnalysisOptions::default(), None, &|_, _| {}).unwrap()
+    };
+    let nothing = found("hover", &hover);
+    assert_eq!(nothing.what_was_found(), Yield::Nothing);
+    let text = updraft::report::terminal_summary(&nothing, 100, false);
+    assert!(text.contains("No calibration: without its laws"), "{text}");
+    let laws = found("calibration", &calibration);
+    assert!(matches!(laws.what_was_found(), Yield::Whole | Yield::Partial));
+    assert!(!updraft::report::terminal_summary(&laws, 100, false).contains("No "));
 }

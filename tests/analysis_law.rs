@@ -191,3 +191,22 @@ fn density_along_the_ladder_explains_table_i() {
     assert!((u0.value - 1598.6).abs() < 0.2, "{u0}");
     assert!((w.value + 0.035).abs() < 0.003, "{w}");
 }
+
+#[test]
+fn a_law_from_few_windows_claims_little() {
+    let law = Law::Linear { slope: 26.4, u0_us: 1546.5 };
+    let few = |n: usize| {
+        let mut random = stream(1, 1, Purpose::Resampling);
+        points(law, 1.0, &mut random).into_iter().take(n).collect::<Vec<_>>()
+    };
+    for scale in [ErrorScale::Unscaled, ErrorScale::Scaled] {
+        let two = linear(&few(2), scale).unwrap();
+        assert_eq!((two.dof, two.chi2_reduced), (0, None));
+        assert!(two.parameters.iter().all(|p| p.estimate.se == 0.0), "no error is known");
+        assert!(two.warnings.iter().any(|w| w.contains("no errors can be given")), "{two:?}");
+        let three = linear(&few(3), scale).unwrap();
+        assert!(three.parameters.iter().all(|p| p.estimate.se > 0.0));
+        assert!(three.warnings.iter().any(|w| w.contains("only 3 windows")), "{three:?}");
+        assert!(linear(&few(4), scale).unwrap().warnings.is_empty());
+    }
+}

@@ -169,12 +169,10 @@ fn sideways_motion_near_the_ground() {
     assert!((finding.time_s.unwrap() - 2.05).abs() < 1e-6, "from where it is 50 mm away");
     assert!(finding.message.contains("limit 0.050 m"), "{finding}");
     // A slanted landing counts from the place where it came below the take-off altitude.
-    let slanted = run(vec![drone(
-        1,
-        0.0,
-        0.0,
-        vec![line(10_000, 0.0, 0.0, 10.0), line(8_000, 8.0, 0.0, 2.0)],
-    )]);
+    let segments = vec![line(10_000, 0.0, 0.0, 10.0), line(8_000, 8.0, 0.0, 2.0)];
+    let mut slanted = drone(1, 0.0, 0.0, segments);
+    slanted.land_at_m = Some(v(8.0, 0.0, 0.0));
+    let slanted = run(vec![slanted]);
     let finding = only(&slanted, "low-lateral");
     assert!((finding.value.unwrap() - 0.49).abs() < 1e-6, "{finding}");
 }

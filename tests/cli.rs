@@ -7,10 +7,18 @@ mod support;
 
 #[path = "cli/analyze.rs"]
 mod analyze;
+#[path = "cli/check.rs"]
+mod check;
 #[path = "cli/help.rs"]
 mod help;
 #[path = "cli/inspect.rs"]
 mod inspect;
+#[path = "cli/lock.rs"]
+mod lock;
+#[path = "cli/logs.rs"]
+mod logs;
+#[path = "cli/manners.rs"]
+mod manners;
 #[path = "cli/plan.rs"]
 mod plan;
 #[path = "cli/simulate.rs"]

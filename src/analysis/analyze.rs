@@ -8,24 +8,28 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::calibrate::{self, FitOptions, PaperTable};
+use super::caution::{fit_cautions, wind_caution};
 use super::density::Density;
-use super::drone::{One, Shared, law_fit, one};
+use super::drone::{One, Shared, one};
 use super::law::{LINEAR, SIGNED_QUADRATIC};
-use super::matching::{self, Candidate};
+use super::prefer::better_law;
 use super::refer::refer_calibration;
-use super::result::{ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, Missing, UpdraftMap};
-use super::stats::mean_sd;
+use super::result::{
+    ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, LostLog, Missing, Unmeasured,
+    UpdraftMap,
+};
+use super::slots::{SlotMatch, match_slots};
 use super::updraft::{self, DroneSeries};
+use super::wind::Leaning;
 use super::windows::WindowOptions;
 use crate::base::time::GpsTime;
-use crate::flight::{Identity, identify};
-use crate::log::Log;
 use crate::mission::plan::{Plan, Purpose};
 
 /// One log of a flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogInput {
-    /// Slot of the plan, if known; else it is found by system id, file name or home.
+    /// Slot of the plan by somebody's record. Only the home position in the log counts more; without
+    /// a record, the file's number and the system id count.
     pub slot: Option<u16>,
     /// The file.
     pub path: PathBuf,
@@ -51,8 +55,19 @@ pub struct FlightInput<'a> {
     /// Ground height and the vehicle's response to air density; `None`: pulses of the map are not
     /// corrected for height.
     pub density: Option<Density>,
+    /// How the vehicle leans in wind, where its drag is known; `None`: the map is not corrected for
+    /// wind, and says how wrong it may be.
+    pub leaning: Option<Leaning>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
+}
+
+impl FlightInput<'_> {
+    /// A log's path as results give it.
+    pub(super) fn shown(&self, path: &Path) -> String {
+        let inside = self.folder.and_then(|folder| path.strip_prefix(folder).ok());
+        inside.unwrap_or(path).display().to_string()
+    }
 }
 
 /// The vertical air speed that one simulated drone met.
@@ -129,14 +144,14 @@ pub enum AnalysisError {
         name: String,
     },
     /// None of the logs could be used.
-    #[error("{name}: none of the {count} log(s) can be used; the first: {first}")]
+    #[error("{name}: none of the {count} log(s) can be used:{}", listed(reasons))]
     NothingUsable {
         /// The flight.
         name: String,
         /// Logs given.
         count: usize,
-        /// Why the first one cannot be used.
-        first: String,
+        /// Why not, one sentence for each.
+        reasons: Vec<String>,
     },
     /// The campaign has no flights.
     #[error("there is no flight to analyse")]
@@ -191,8 +206,21 @@ pub fn analyze(
     })
 }
 
-/// Analyses one flight of a fleet. A log that cannot be used is listed as missing (or as a warning,
-/// when it has no slot) and does not stop the others.
+/// Reasons one below the other; the first ones of many.
+fn listed(reasons: &[String]) -> String {
+    let mut text = String::new();
+    for reason in reasons.iter().take(LISTED) {
+        text.push_str("\n  ");
+        text.push_str(reason);
+    }
+    if reasons.len() > LISTED {
+        text.push_str("\n  and more");
+    }
+    text
+}
+
+/// Analyses one flight of a fleet. A log that cannot be used is listed as missing (or as lost, when
+/// it has no slot) and does not stop the others.
 ///
 /// `reference` is a calibration whose laws measure the air and hold A and u0 (unless
 /// [`FitOptions::hold`] gives them): each drone's own laws, else its flock mapping.
@@ -205,12 +233,11 @@ pub fn analyze_flight(
     if input.logs.is_empty() {
         return Err(AnalysisError::NoLogs { name: input.name.to_owned() });
     }
-    let mut warnings = Vec::new();
-    let slots = match_slots(input);
+    let (slots, warnings) = match_slots(input);
     let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
     let referred = reference
-        .zip(input.density)
-        .map(|(reference, density)| refer_calibration(density, reference, &options.fit));
+        .filter(|_| input.density.is_some() || input.leaning.is_some())
+        .map(|found| refer_calibration(input.density, input.leaning, found, &options.fit));
     let map_reference = referred.as_ref().or(reference);
     let map_law = options.map_law.or_else(|| map_reference.map(better_law));
     let shared = Shared { input, options, reference, map_reference, planned_purpose, map_law };
@@ -232,16 +259,24 @@ pub fn analyze_flight(
 
     let mut ones: Vec<One> = Vec::new();
     let mut reasons: BTreeMap<u16, String> = BTreeMap::new();
-    let mut first_failure = None;
+    let mut failures = Vec::new();
+    let mut lost = Vec::new();
     for ((log, slot), outcome) in work.iter().zip(outcomes) {
+        let source = input.shown(&log.path);
         match (outcome, slot) {
-            (Ok(one), _) => ones.push(one),
+            (Ok(one), _) => {
+                let cut_off = one.cut_off.clone();
+                lost.extend(cut_off.map(|reason| LostLog { source, reason, used: true }));
+                ones.push(one);
+            }
             (Err(reason), slot) => {
-                let named = with_name(&reason, &log.path);
-                first_failure.get_or_insert_with(|| named.clone());
+                // Errors name the file as it was opened; results name it as their reader finds it.
+                let reason = reason.replace(&log.path.display().to_string(), &source);
+                let failure = LostLog { source, reason, used: false };
+                failures.push(failure.sentence());
                 match slot {
-                    SlotMatch::Slot(number) => _ = reasons.entry(*number).or_insert(reason),
-                    _ => warnings.push(named),
+                    SlotMatch::Slot(slot) => _ = reasons.entry(*slot).or_insert(failure.sentence()),
+                    _ => lost.push(failure),
                 }
             }
         }
@@ -250,102 +285,17 @@ pub fn analyze_flight(
         return Err(AnalysisError::NothingUsable {
             name: input.name.to_owned(),
             count: input.logs.len(),
-            first: first_failure.unwrap_or_default(),
+            reasons: failures,
         });
     }
     if input.plan.is_some() {
         ones.sort_by_key(|one| one.drone.slot);
     }
-    Ok(finish(&shared, ones, &reasons, warnings))
+    Ok(FlightAnalysis { lost, ..finish(&shared, ones, &reasons, warnings) })
 }
 
-/// Largest W of a calibration's signed quadratic that may be the air's, m/s.
-const LARGEST_CALIBRATION_W_MPS: f64 = 0.5;
-
-enum SlotMatch {
-    Slot(u16),
-    Unplanned,
-    Refused(String),
-}
-
-/// Finds the slot of each log, and refuses logs that would be a slot's second one.
-fn match_slots(input: &FlightInput<'_>) -> Vec<SlotMatch> {
-    let Some(plan) = input.plan else {
-        return input.logs.iter().map(|_| SlotMatch::Unplanned).collect();
-    };
-    let candidates: Vec<Candidate> = input
-        .logs
-        .par_iter()
-        .map(|log| {
-            let identity = if log.slot.is_some() {
-                Identity::default()
-            } else {
-                Log::open(&log.path).map(|log| identify(&log)).unwrap_or_default()
-            };
-            Candidate {
-                given: log.slot,
-                system_id: identity.system_id,
-                file_number: matching::file_number(&log.path),
-                first_fix_deg: identity.first_fix_deg,
-            }
-        })
-        .collect();
-    let mut seen: BTreeMap<u16, &Path> = BTreeMap::new();
-    matching::slots(plan, &candidates)
-        .into_iter()
-        .zip(input.logs)
-        .map(|(slot, log)| {
-            let Some(slot) = slot else {
-                return SlotMatch::Refused(
-                    "the log fits no free slot of the plan by system id, file name or home \
-                     position; name it after its slot (07.BIN)"
-                        .to_owned(),
-                );
-            };
-            if plan.slot(slot).is_none() {
-                return SlotMatch::Refused(format!("the plan has no slot {slot}"));
-            }
-            if let Some(first) = seen.get(&slot) {
-                return SlotMatch::Refused(format!(
-                    "slot {slot} has a log already ({}); this one is not used",
-                    first.display()
-                ));
-            }
-            seen.insert(slot, &log.path);
-            SlotMatch::Slot(slot)
-        })
-        .collect()
-}
-
-fn with_name(reason: &str, path: &Path) -> String {
-    let name = path.display().to_string();
-    if reason.contains(&name) { reason.to_owned() } else { format!("{name}: {reason}") }
-}
-
-/// The law whose fits to the reference's drones have the lower mean reduced chi².
-///
-/// A signed quadratic that needs a strong W is a parabola's flank standing in for another curve, not
-/// air that moved: its inverse is off by that W, and the line is taken.
-fn better_law(reference: &FlightAnalysis) -> MapLaw {
-    let calm = reference.flock.as_ref().is_none_or(|laws| {
-        let quadratic = laws.signed_quadratic.as_ref();
-        let w = quadratic.and_then(|fit| fit.parameters.iter().find(|found| found.name == "W"));
-        w.is_none_or(|w| w.estimate.value.abs() <= LARGEST_CALIBRATION_W_MPS)
-    });
-    let reduced = |law: MapLaw| {
-        let values: Vec<f64> = reference
-            .drones
-            .iter()
-            .filter_map(|drone| law_fit(drone.laws.as_ref()?, law)?.chi2_reduced)
-            .collect();
-        (!values.is_empty()).then(|| mean_sd(&values).0)
-    };
-    match (reduced(MapLaw::Linear), reduced(MapLaw::SignedQuadratic)) {
-        (Some(linear), Some(quadratic)) if calm && quadratic < linear => MapLaw::SignedQuadratic,
-        (None, Some(_)) => MapLaw::SignedQuadratic,
-        _ => MapLaw::Linear,
-    }
-}
+/// Unusable logs named in an error.
+const LISTED: usize = 20;
 
 /// Joins the drones' results: purpose, laws, flock, tables, map, missing.
 fn finish(
@@ -363,21 +313,31 @@ fn finish(
     });
     let mut drones = Vec::new();
     let mut updrafts = Vec::new();
-    for One { mut drone, calibration, updraft } in ones {
+    let mut unmeasured = Vec::new();
+    for One { mut drone, calibration, updraft, .. } in ones {
         if purpose == Purpose::Calibration {
             match calibration {
                 Ok(laws) => drone.laws = Some(laws),
                 Err(error) => drone.warnings.push(error.to_string()),
             }
-        } else if let Some((series, mapping)) = updraft {
-            updrafts.push((drone.slot, drone.name.clone(), drone.home_m, series, mapping));
-        } else if shared.reference.is_some() {
-            drone.warnings.push("no hover long enough to measure the air in".to_owned());
+        } else {
+            match updraft {
+                Some(Ok((series, mapping))) => {
+                    updrafts.push((drone.slot, drone.name.clone(), drone.home_m, series, mapping));
+                }
+                Some(Err(reason)) => unmeasured.push(Unmeasured {
+                    slot: drone.slot,
+                    name: drone.name.clone(),
+                    reason,
+                }),
+                None => {}
+            }
         }
         drones.push(drone);
     }
     let mut flock = None;
     let mut table = Vec::new();
+    let mut paper_table = None;
     if purpose == Purpose::Calibration {
         match calibrate::flock(&drones, &options.fit) {
             Ok(laws) => flock = Some(laws),
@@ -387,7 +347,9 @@ fn finish(
             Some(_) => PaperTable::Simulation,
             None => PaperTable::Field,
         });
-        table = calibrate::table(&drones, paper);
+        table = calibrate::table(&drones, paper, options.fit.weights);
+        paper_table = Some(paper.number().to_owned());
+        warnings.extend(fit_cautions(flock.as_ref(), &drones, input.leaning));
     } else if shared.reference.is_none() {
         warnings.push(
             "no calibration was given: the air cannot be measured without laws (analyse a \
@@ -403,11 +365,15 @@ fn finish(
             .map(|slot| Missing {
                 slot: slot.slot,
                 home_m: Some([slot.home_m[0], slot.home_m[1]]),
-                reason: reasons.get(&slot.slot).cloned().unwrap_or_else(|| "no log".to_owned()),
+                reason: reasons
+                    .get(&slot.slot)
+                    .cloned()
+                    .unwrap_or_else(|| format!("no log of {}", slot.name)),
             })
             .collect()
     });
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
+    warnings.extend(map.as_ref().and_then(wind_caution));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -418,7 +384,10 @@ fn finish(
         flock,
         table,
         map,
+        unmeasured,
+        paper_table,
         warnings,
+        lost: Vec::new(),
     }
 }
 
@@ -441,6 +410,8 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             height_m: series.height_m,
             mapping: mapping.to_owned(),
             mean: series.mean,
+            systematic_mps: series.systematic_mps,
+            tilt_deg: series.tilt_deg,
             updraft_mps: series.at(&times),
             truth_mps: truth_of(slot),
         })
@@ -451,6 +422,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             _ => LINEAR,
         }
         .to_owned(),
+        leaning: shared.input.leaning,
         density: shared.input.density,
         flock: shared.map_reference.and_then(|reference| reference.flock.clone()),
         time_s: times.iter().map(|time| *time as f64).collect(),

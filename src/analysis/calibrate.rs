@@ -183,6 +183,7 @@ fn fit_points(
     let scale = options.weights.scale();
     let sigma_added_us =
         (options.weights == Weights::BlockError).then(|| added_sigma_us(points)).flatten();
+    let measured = points;
     let points = widened(points, sigma_added_us.unwrap_or(0.0));
     let held = options
         .hold
@@ -193,10 +194,24 @@ fn fit_points(
         // Without a held fit the line is the least that a calibration must give.
         linear.as_ref().map_err(Clone::clone)?;
     }
+    let untuned = |fit: Fit, of_measured: Result<Fit, FitError>| match of_measured {
+        Ok(plain) if sigma_added_us.is_some_and(|added| added > 0.0) => Fit {
+            chi2: plain.chi2,
+            chi2_reduced: plain.chi2_reduced,
+            p_value: plain.p_value,
+            ..fit
+        },
+        _ => fit,
+    };
+    let held = held?.zip(options.hold).map(|(fit, hold)| {
+        untuned(fit, law::signed_quadratic_held(measured, hold.a, hold.u0_us, scale))
+    });
     Ok(Laws {
-        signed_quadratic: law::signed_quadratic(&points, scale).ok(),
-        signed_quadratic_held: held?,
-        linear: linear.ok(),
+        signed_quadratic: law::signed_quadratic(&points, scale)
+            .ok()
+            .map(|fit| untuned(fit, law::signed_quadratic(measured, scale))),
+        signed_quadratic_held: held,
+        linear: linear.ok().map(|fit| untuned(fit, law::linear(measured, scale))),
         sigma_added_us,
     })
 }
@@ -288,6 +303,14 @@ pub enum PaperTable {
 }
 
 impl PaperTable {
+    /// Its number in the paper.
+    pub fn number(self) -> &'static str {
+        match self {
+            Self::Simulation => "I",
+            Self::Field => "II",
+        }
+    }
+
     fn value(self, law: &str, parameter: &str) -> Option<Estimate> {
         let (value, se) = match (self, law, parameter) {
             (Self::Simulation, law::SIGNED_QUADRATIC, "A") => (8.207, 0.020),
@@ -311,8 +334,16 @@ pub const SIGNED_QUADRATIC_HELD: &str = "signed quadratic, A and u0 held";
 
 type FitOf = fn(&Laws) -> Option<&Fit>;
 
+/// Name of what belongs to all laws, in tables.
+pub const BOTH_LAWS: &str = "both laws";
+/// Name of the added scatter in tables.
+pub const ADDED_SCATTER: &str = "sigma_added";
+
 /// Statistics over drones of the fitted parameters, in the rows of Tables I and II.
-pub fn table(drones: &[DroneAnalysis], paper: PaperTable) -> Vec<TableRow> {
+///
+/// The paper's chi² counts the samples' standard deviation as the error of a window: it stands beside
+/// ours only when the weights are the same ([`Weights::WindowSd`]).
+pub fn table(drones: &[DroneAnalysis], paper: PaperTable, weights: Weights) -> Vec<TableRow> {
     let laws: [(&str, FitOf); 3] = [
         (law::SIGNED_QUADRATIC, |laws| laws.signed_quadratic.as_ref()),
         (SIGNED_QUADRATIC_HELD, |laws| laws.signed_quadratic_held.as_ref()),
@@ -330,13 +361,21 @@ pub fn table(drones: &[DroneAnalysis], paper: PaperTable) -> Vec<TableRow> {
             let estimates: Vec<Estimate> =
                 fits.iter().filter_map(|fit| Some(fit.parameters.get(index)?.estimate)).collect();
             let values: Vec<f64> = estimates.iter().map(|estimate| estimate.value).collect();
-            let errors: Vec<f64> = estimates.iter().map(|estimate| estimate.se).collect();
+            let errors: Vec<f64> =
+                estimates.iter().map(|estimate| estimate.se).filter(|se| *se > 0.0).collect();
             rows.push(row(name, &parameter.name, &parameter.unit, &values, &errors, paper));
         }
         let reduced: Vec<f64> = fits.iter().filter_map(|fit| fit.chi2_reduced).collect();
         if !reduced.is_empty() {
-            rows.push(row(name, "chi2_nu", "", &reduced, &[], paper));
+            let row = row(name, "chi2_nu", "", &reduced, &[], paper);
+            let same = weights == Weights::WindowSd;
+            rows.push(TableRow { paper: row.paper.filter(|_| same), ..row });
         }
+    }
+    let added: Vec<f64> =
+        drones.iter().filter_map(|drone| drone.laws.as_ref()?.sigma_added_us).collect();
+    if !added.is_empty() {
+        rows.push(row(BOTH_LAWS, ADDED_SCATTER, "us", &added, &[], paper));
     }
     rows
 }

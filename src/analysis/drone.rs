@@ -2,9 +2,9 @@
 
 use super::analyze::{AnalysisOptions, FlightInput, LogInput, MapLaw};
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
-use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace};
+use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats};
 use super::stats::mean_sd;
-use super::updraft::{self, DroneSeries};
+use super::updraft::{self, DroneSeries, Lean};
 use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
 use crate::flight::{Alignment, Flight, FlightOptions};
@@ -24,8 +24,11 @@ pub(super) struct Shared<'a> {
 /// What one log gave.
 pub(super) struct One {
     pub(super) drone: DroneAnalysis,
+    /// Why the log lacks the flight's end.
+    pub(super) cut_off: Option<String>,
     pub(super) calibration: Result<Laws, CalibrationError>,
-    pub(super) updraft: Option<(DroneSeries, &'static str)>,
+    /// The air, with the mapping used; or why there is none. `None` without reference laws.
+    pub(super) updraft: Option<Result<(DroneSeries, &'static str), String>>,
 }
 
 /// Everything about one log.
@@ -52,24 +55,17 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     };
     let number = slot.map(|(slot, _)| slot.slot);
     let reference = shared.reference.and_then(|reference| laws_for(reference, number, &name));
-    let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _)| laws)?));
+    let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _, _)| laws)?));
     let calibration = calibrate::calibrate(&stats, &FitOptions { hold, ..options.fit });
-    let map_laws = shared.map_reference.and_then(|reference| laws_for(reference, number, &name));
-    let updraft = map_laws.and_then(|(laws, mapping)| {
-        let fit = law_fit(laws, shared.map_law?)?;
-        let hover = updraft::hover(&targets)?;
-        let referred = input
-            .density
-            .map(|density| density.refer_series(&corrected.pulse_phi_us, &flight.height_m));
-        let pulse_us = referred.as_ref().unwrap_or(&corrected.pulse_phi_us);
-        Some((updraft::estimate(&flight, pulse_us, hover, fit)?, mapping))
+    let seen = Seen { flight: &flight, corrected: &corrected, targets: &targets, windows: &stats };
+    let updraft =
+        shared.map_reference.map(|reference| measure(shared, &seen, reference, number, &name));
+    let source = input.shown(&log.path);
+    let cut_off = flight.cut_off_at_m.map(|height| {
+        format!(
+            "the log ends in the air, {height:.1} m above the ground; what it holds is analysed"
+        )
     });
-    let source = input
-        .folder
-        .and_then(|folder| log.path.strip_prefix(folder).ok())
-        .unwrap_or(&log.path)
-        .display()
-        .to_string();
     let drone = DroneAnalysis {
         slot: number,
         name,
@@ -81,7 +77,61 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         trace: trace(&flight, &corrected, options.trace_points),
         warnings,
     };
-    Ok(One { drone, calibration, updraft })
+    Ok(One { drone, cut_off, calibration, updraft })
+}
+
+/// What one log showed.
+struct Seen<'a> {
+    flight: &'a Flight,
+    corrected: &'a Corrected,
+    targets: &'a [Target],
+    windows: &'a [WindowStats],
+}
+
+/// The air over one drone's hover, or why it cannot be measured.
+fn measure(
+    shared: &Shared<'_>,
+    seen: &Seen<'_>,
+    reference: &FlightAnalysis,
+    slot: Option<u16>,
+    name: &str,
+) -> Result<(DroneSeries, &'static str), String> {
+    let Shared { input, .. } = shared;
+    let (laws, mapping, calibration) = laws_for(reference, slot, name)
+        .ok_or("the calibration has no law for it (neither its own nor the flock's)")?;
+    let fit = shared
+        .map_law
+        .and_then(|law| law_fit(laws, law))
+        .ok_or("the calibration has no fit of the law that the map uses")?;
+    let hover = updraft::hover(seen.targets).ok_or("no hover was found in the flight")?;
+    let window = seen.windows.iter().find(|window| {
+        window.kind.is_hover() && window.start_s == hover.start_s && window.end_s == hover.end_s
+    });
+    if let Some(window) = window.filter(|window| !window.rejected.is_empty()) {
+        let reasons: Vec<&str> = window.rejected.iter().map(|reason| reason.words()).collect();
+        return Err(format!(
+            "the hover from {:.0} to {:.0} s was rejected: {}",
+            hover.start_s,
+            hover.end_s,
+            reasons.join(", ")
+        ));
+    }
+    let length_s = hover.end_s - hover.start_s;
+    if length_s < updraft::RUNNING_S {
+        return Err(format!(
+            "the hover is too short: its window has {length_s:.0} s, the running mean needs {:.0} s",
+            updraft::RUNNING_S
+        ));
+    }
+    let leveled = input.leaning.map(|leaning| leaning.level_series(seen.flight, seen.corrected));
+    let pulse_us = leveled.as_ref().unwrap_or(&seen.corrected.pulse_phi_us);
+    let referred =
+        input.density.map(|density| density.refer_series(pulse_us, &seen.flight.height_m));
+    let pulse_us = referred.as_ref().unwrap_or(pulse_us);
+    let lean = Lean { leaning: input.leaning, calibration };
+    let series = updraft::estimate(seen.flight, pulse_us, hover, fit, lean)
+        .ok_or("the hover has no 10 s without a gap in the log")?;
+    Ok((series, mapping))
 }
 
 /// Windows from the plan's segments, checked against what was flown, or from the log itself.
@@ -100,7 +150,9 @@ fn find_targets(
     };
     let targets = windows::planned(segments);
     if targets.is_empty() {
-        return Err("the plan has no analysis windows for this slot".to_owned());
+        return Err("the plan has no analysis windows for this slot: its legs and hovers are too \
+                    short for one"
+            .to_owned());
     }
     if flight.clock.method == Alignment::Takeoff {
         warnings
@@ -109,18 +161,23 @@ fn find_targets(
     windows::contradiction(flight, &targets).map_or(Ok(targets), Err)
 }
 
-/// The laws of a drone in a reference calibration: its own, else the flock's.
+/// The laws of a drone in a reference calibration, and its windows there: its own, else the flock's
+/// with those of the first drone.
 fn laws_for<'a>(
     reference: &'a FlightAnalysis,
     slot: Option<u16>,
     name: &str,
-) -> Option<(&'a Laws, &'static str)> {
+) -> Option<(&'a Laws, &'static str, &'a [WindowStats])> {
     let same = |drone: &&DroneAnalysis| match (slot, drone.slot) {
         (Some(slot), Some(other)) => slot == other,
         _ => drone.name == name,
     };
-    let own = reference.drones.iter().find(same).and_then(|drone| drone.laws.as_ref());
-    own.map(|laws| (laws, "own")).or_else(|| Some((reference.flock.as_ref()?, "flock")))
+    let own = reference.drones.iter().find(same);
+    if let Some((drone, laws)) = own.and_then(|drone| Some((drone, drone.laws.as_ref()?))) {
+        return Some((laws, "own", &drone.windows));
+    }
+    let first = reference.drones.iter().find(|drone| drone.laws.is_some());
+    Some((reference.flock.as_ref()?, "flock", first.map_or(&[][..], |drone| &drone.windows)))
 }
 
 pub(super) fn law_fit(laws: &Laws, law: MapLaw) -> Option<&Fit> {

@@ -24,6 +24,9 @@ const OTHER_MINIMA_CHI2: f64 = 4.0;
 /// Rounds of the effective variance.
 const VARIANCE_ROUNDS: usize = 3;
 
+/// A law from fewer windows is warned about.
+const FEWEST_WINDOWS: usize = 4;
+
 /// One window as a point of a law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
@@ -424,13 +427,26 @@ fn describe(
         .map(|(index, ((name, unit), value))| Parameter {
             name: (*name).to_owned(),
             unit: (*unit).to_owned(),
-            estimate: Estimate::new(value, covariance[index * n + index].max(0.0).sqrt()),
+            // With as many parameters as points the fit says nothing about its own errors.
+            estimate: Estimate::new(
+                value,
+                if solution.dof == 0 { 0.0 } else { covariance[index * n + index].max(0.0).sqrt() },
+            ),
             held: !free[index],
         })
         .collect();
     let mut warnings = Vec::new();
     if !solution.converged {
         warnings.push("the optimiser ran out of patience before it converged".to_owned());
+    }
+    if points.len() < FEWEST_WINDOWS {
+        let n = points.len();
+        let dof = solution.dof;
+        warnings.push(if dof == 0 {
+            format!("only {n} windows for as many parameters: no errors can be given")
+        } else {
+            format!("only {n} windows ({dof} more than parameters): little speaks for this law")
+        });
     }
     let squares: f64 =
         points.iter().map(|p| (p.pulse_us - law.pulse_us(p.velocity_mps)).powi(2)).sum();

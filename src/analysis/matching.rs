@@ -1,23 +1,57 @@
 //! Which log belongs to which slot of a plan.
+//!
+//! What a log says about its drone counts in this order: the place where it stood when it was armed,
+//! a record's word ([`LogInput::slot`](super::LogInput::slot)), the number in its file name, its
+//! system id. Where they contradict each other, the first one counts and a warning names the logs.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use crate::base::frame::Geodetic;
 use crate::mission::plan::Plan;
 
+/// How far a home may read from its slot besides half the spacing, m: metres of plain GPS, and the
+/// show's origin set by hand on a map.
+const GPS_TOLERANCE_M: f64 = 5.0;
+/// The same for a plan of one slot, which has no neighbour to be mixed up with, m.
+const LONE_TOLERANCE_M: f64 = 20.0;
+/// Digits of the names that the autopilot gives its logs (`00000012.BIN`): they count its flights.
+const AUTOPILOT_DIGITS: usize = 8;
+/// Logs named in one warning.
+const NAMED: usize = 10;
+
 /// What a log says about who wrote it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Candidate {
+    /// For messages.
+    pub(super) name: String,
     pub(super) given: Option<u16>,
     pub(super) system_id: Option<u8>,
     pub(super) file_number: Option<u16>,
-    pub(super) first_fix_deg: Option<(f64, f64)>,
+    /// Where it stood when it was armed: latitude, longitude.
+    pub(super) home_deg: Option<(f64, f64)>,
+    /// Whether it holds a flight.
+    pub(super) flew: bool,
+    /// The first log with the same bytes.
+    pub(super) same_as: Option<usize>,
+    /// Why nothing can be read from it.
+    pub(super) unreadable: Option<String>,
 }
 
-/// The number in a file name: the last run of digits of `drone-07.BIN`.
+/// The slot of each log, or why it has none; and what contradicts itself, one sentence each.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Matched {
+    pub(super) slots: Vec<Result<u16, String>>,
+    pub(super) warnings: Vec<String>,
+}
+
+/// The number in a file name: the last run of digits of `drone-07.BIN`. The autopilot's own names
+/// have none: they count its flights.
 pub(super) fn file_number(path: &Path) -> Option<u16> {
     let stem = path.file_stem()?.to_string_lossy().into_owned();
+    if stem.len() == AUTOPILOT_DIGITS && stem.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
     let head = stem.get(..end)?;
     let start = head.rfind(|c: char| !c.is_ascii_digit()).map_or(0, |last| {
@@ -26,60 +60,291 @@ pub(super) fn file_number(path: &Path) -> Option<u16> {
     head.get(start..)?.parse().ok()
 }
 
-type Way<'a> = &'a dyn Fn(&Candidate) -> Option<u16>;
+/// Where a log's home lies on the field.
+enum Place {
+    /// No position, or a plan that is nowhere on the globe.
+    Unknown,
+    /// On the home of this slot: the next home is more than twice as far.
+    On(u16),
+    /// On the field, but between these homes, nearest first.
+    Between(Vec<u16>),
+    /// Near no home: the nearest, and how far it is, m.
+    Away(u16, f64),
+}
 
-/// Slot of each log. Given slots stand. For the others the first of these ways that gives every one
-/// of them its own slot of the plan is taken: system id, number in the file name, nearest home.
-/// Without such a way each log takes the first way that leads to a slot still free.
-pub(super) fn slots(plan: &Plan, logs: &[Candidate]) -> Vec<Option<u16>> {
-    let mut taken: BTreeSet<u16> = logs.iter().filter_map(|log| log.given).collect();
-    let open: Vec<usize> = (0..logs.len()).filter(|i| logs[*i].given.is_none()).collect();
-    let mut result: Vec<Option<u16>> = logs.iter().map(|log| log.given).collect();
-    let by_id = |log: &Candidate| log.system_id.map(u16::from).filter(|s| plan.slot(*s).is_some());
-    let by_name = |log: &Candidate| log.file_number.filter(|slot| plan.slot(*slot).is_some());
-    let by_place = |log: &Candidate| nearest_home(plan, log.first_fix_deg?);
-    let ways: [Way<'_>; 3] = [&by_id, &by_name, &by_place];
-    for way in ways {
-        let found: Vec<Option<u16>> = open.iter().map(|index| way(&logs[*index])).collect();
-        let mut all = taken.clone();
-        if found.iter().all(|slot| slot.is_some_and(|slot| all.insert(slot))) {
-            for (index, slot) in open.iter().zip(found) {
-                result[*index] = slot;
+/// The homes of a plan.
+struct Field<'a> {
+    plan: &'a Plan,
+    /// A home this far away is another place, m; `None`: the plan is nowhere on the globe.
+    limit_m: Option<f64>,
+}
+
+impl<'a> Field<'a> {
+    fn of(plan: &'a Plan) -> Self {
+        // Plans recovered from shows that do not say where they are have their origin at 0, 0.
+        let placed = plan.site.origin_lat_deg != 0.0 || plan.site.origin_lon_deg != 0.0;
+        let mut spacing_m = f64::INFINITY;
+        for (index, slot) in plan.slots.iter().enumerate() {
+            for other in plan.slots.get(index + 1..).unwrap_or_default() {
+                let (dx, dy) = (slot.home_m[0] - other.home_m[0], slot.home_m[1] - other.home_m[1]);
+                spacing_m = spacing_m.min(dx.hypot(dy));
             }
-            return result;
+        }
+        let limit_m = if spacing_m.is_finite() {
+            spacing_m / 2.0 + GPS_TOLERANCE_M
+        } else {
+            LONE_TOLERANCE_M
+        };
+        Self { plan, limit_m: placed.then_some(limit_m) }
+    }
+
+    fn place(&self, home_deg: Option<(f64, f64)>) -> Place {
+        let (Some((lat_deg, lon_deg)), Some(limit_m)) = (home_deg, self.limit_m) else {
+            return Place::Unknown;
+        };
+        let amsl_m = self.plan.site.ground_amsl_m;
+        let at = self.plan.site.frame().from_geodetic(Geodetic { lat_deg, lon_deg, amsl_m });
+        let mut distances: Vec<(f64, u16)> = (self.plan.slots.iter())
+            .map(|slot| ((slot.home_m[0] - at.x).hypot(slot.home_m[1] - at.y), slot.slot))
+            .collect();
+        distances.sort_by(|left, right| left.0.total_cmp(&right.0));
+        match distances.as_slice() {
+            [] => Place::Unknown,
+            [(nearest, slot), ..] if *nearest > limit_m => Place::Away(*slot, *nearest),
+            [(nearest, slot), (second, _), ..] if *nearest < second / 2.0 => Place::On(*slot),
+            [(_, slot)] => Place::On(*slot),
+            near => {
+                let near = near.iter().take_while(|(distance, _)| *distance <= limit_m);
+                Place::Between(near.map(|(_, slot)| *slot).collect())
+            }
         }
     }
-    for index in open {
-        let free = ways.iter().filter_map(|way| way(&logs[index])).find(|s| !taken.contains(s));
-        taken.extend(free);
-        result[index] = free;
+}
+
+/// Finds the slot of each log; see the top of this file. A slot takes one log: one with a flight
+/// before one without, then one whose name agrees, then the first.
+pub(super) fn slots(plan: &Plan, logs: &[Candidate]) -> Matched {
+    let field = Field::of(plan);
+    let places: Vec<Place> = logs.iter().map(|log| field.place(log.home_deg)).collect();
+    let mut work = Work { logs, taken: BTreeMap::new(), result: vec![None; logs.len()] };
+
+    work.refuse_copies(&places);
+    let mut standing: Vec<(usize, u16)> = Vec::new();
+    for (index, place) in places.iter().enumerate() {
+        if work.result[index].is_some() {
+            continue;
+        }
+        match place {
+            Place::On(slot) => standing.push((index, *slot)),
+            Place::Away(slot, distance_m) => {
+                work.refuse(index, away(*slot, *distance_m, field.limit_m.unwrap_or_default()));
+            }
+            Place::Unknown | Place::Between(_) => {}
+        }
+    }
+    standing.sort_by_key(|(index, slot)| {
+        let log = &logs[*index];
+        (!log.flew, log.file_number != Some(*slot) && log.given != Some(*slot))
+    });
+    for (index, slot) in standing {
+        work.claim(index, slot);
+    }
+    for (index, place) in places.iter().enumerate() {
+        let Place::Between(near) = place else { continue };
+        if work.result[index].is_some() {
+            continue;
+        }
+        let log = &logs[index];
+        let says = [log.given, log.file_number, log.system_id.map(u16::from)];
+        let said = says.into_iter().flatten().filter(|slot| near.contains(slot));
+        let slot = said.chain(near.iter().copied()).find(|slot| !work.taken.contains_key(slot));
+        work.claim(index, slot.or(near.first().copied()).unwrap_or_default());
+    }
+    for (index, log) in logs.iter().enumerate() {
+        match log.given.filter(|_| work.result[index].is_none()) {
+            Some(slot) if plan.slot(slot).is_none() => {
+                work.refuse(index, format!("the plan has no slot {slot}"));
+            }
+            Some(slot) => work.claim(index, slot),
+            None => {}
+        }
+    }
+    work.by_name(plan);
+    let contradictions = contradictions(plan, &work, &places);
+    Matched {
+        slots: work.result.into_iter().map(|slot| slot.unwrap_or_else(|| Err(nowhere()))).collect(),
+        warnings: contradictions,
+    }
+}
+
+fn away(slot: u16, distance_m: f64, limit_m: f64) -> String {
+    let distance = if distance_m < 1000.0 {
+        format!("{distance_m:.1} m")
+    } else {
+        format!("{:.1} km", distance_m / 1000.0)
+    };
+    format!(
+        "it was flown somewhere else: its home is {distance} from that of slot {slot}, the nearest \
+         (at most {limit_m:.1} m is taken for GPS error); take the log away, or plan with the origin \
+         and orientation that were flown"
+    )
+}
+
+/// Why a copy of a log is not used.
+pub(super) fn copy_of(name: &str) -> String {
+    format!("the same bytes as {name}: a copy, which is not used")
+}
+
+fn nowhere() -> String {
+    "the log fits no free slot of the plan by home position, file name or system id; name it after \
+     its slot (07.BIN)"
+        .to_owned()
+}
+
+/// Slots given out so far.
+struct Work<'a> {
+    logs: &'a [Candidate],
+    taken: BTreeMap<u16, usize>,
+    result: Vec<Option<Result<u16, String>>>,
+}
+
+impl Work<'_> {
+    /// Of logs with the same bytes keeps the one whose name agrees with what it holds, else the first.
+    fn refuse_copies(&mut self, places: &[Place]) {
+        let logs = self.logs;
+        let mut alike: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (index, log) in logs.iter().enumerate() {
+            if let Some(first) = log.same_as {
+                alike.entry(first).or_insert_with(|| vec![first]).push(index);
+            }
+        }
+        let agrees = |index: &usize| {
+            let holds = match places.get(*index) {
+                Some(Place::On(slot)) => Some(*slot),
+                _ => logs[*index].system_id.map(u16::from),
+            };
+            holds.is_some() && holds == logs[*index].file_number
+        };
+        for (first, copies) in alike {
+            let kept = copies.iter().copied().find(|index| agrees(index)).unwrap_or(first);
+            for index in copies.into_iter().filter(|index| *index != kept) {
+                self.refuse(index, copy_of(&logs[kept].name));
+            }
+        }
+    }
+
+    fn refuse(&mut self, index: usize, reason: String) {
+        // That nothing can be read says more than that nothing fits.
+        let reason = self.logs[index].unreadable.clone().unwrap_or(reason);
+        self.result[index] = Some(Err(reason));
+    }
+
+    fn claim(&mut self, index: usize, slot: u16) {
+        if let Some(first) = self.taken.get(&slot) {
+            let first = &self.logs[*first].name;
+            self.refuse(
+                index,
+                format!("slot {slot} has a log already ({first}); this one is not used"),
+            );
+        } else {
+            self.taken.insert(slot, index);
+            self.result[index] = Some(Ok(slot));
+        }
+    }
+
+    /// Logs without a known place: the first of file number and system id that gives every one of
+    /// them its own slot is taken. Without such a way each log takes the first way that leads to a
+    /// slot still free.
+    fn by_name(&mut self, plan: &Plan) {
+        let logs = self.logs;
+        let open: Vec<usize> = (0..logs.len()).filter(|i| self.result[*i].is_none()).collect();
+        let by_number = |index: usize| logs[index].file_number.filter(|s| plan.slot(*s).is_some());
+        let by_id = |index: usize| {
+            logs[index].system_id.map(u16::from).filter(|slot| plan.slot(*slot).is_some())
+        };
+        let ways: [&dyn Fn(usize) -> Option<u16>; 2] = [&by_number, &by_id];
+        let fits_all = |way: &&dyn Fn(usize) -> Option<u16>| {
+            let mut seen: BTreeSet<u16> = self.taken.keys().copied().collect();
+            open.iter().all(|index| way(*index).is_some_and(|slot| seen.insert(slot)))
+        };
+        let all = ways.iter().copied().find(fits_all);
+        for index in open {
+            let found: Vec<u16> = match all {
+                Some(way) => way(index).into_iter().collect(),
+                None => ways.iter().filter_map(|way| way(index)).collect(),
+            };
+            let free = found.iter().copied().find(|slot| !self.taken.contains_key(slot));
+            match free.or(found.first().copied()) {
+                Some(slot) => self.claim(index, slot),
+                None => self.refuse(index, nowhere()),
+            }
+        }
+    }
+}
+
+/// Logs of which weaker evidence says something else than what decided.
+fn contradictions(plan: &Plan, work: &Work<'_>, places: &[Place]) -> Vec<String> {
+    const WORDS: [&str; 4] = ["home position", "flight record", "file name", "system id"];
+    let mut found: BTreeMap<(usize, usize), Vec<String>> = BTreeMap::new();
+    for ((log, place), result) in work.logs.iter().zip(places).zip(&work.result) {
+        let Some(Ok(slot)) = result else { continue };
+        let placed = matches!(place, Place::On(_) | Place::Between(_));
+        let says =
+            [placed.then_some(*slot), log.given, log.file_number, log.system_id.map(u16::from)];
+        let Some(decided) = says.iter().position(|said| *said == Some(*slot)) else { continue };
+        for (weaker, said) in says.iter().enumerate() {
+            if let Some(said) = said.filter(|said| said != slot && plan.slot(*said).is_some()) {
+                let line = format!("{} is slot {slot}, not {said}", log.name);
+                found.entry((decided, weaker)).or_default().push(line);
+            }
+        }
+    }
+    found
+        .into_iter()
+        .map(|((decided, weaker), lines)| {
+            let (strong, weak) = (WORDS[decided.min(weaker)], WORDS[decided.max(weaker)]);
+            let more = match lines.len().saturating_sub(NAMED) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            let named: Vec<&str> = lines.iter().take(NAMED).map(String::as_str).collect();
+            format!(
+                "{strong} and {weak} disagree; {} counts: {}{more}",
+                WORDS[decided],
+                named.join(", ")
+            )
+        })
+        .collect()
+}
+
+/// For each log, the earlier one that has the very same bytes.
+pub(super) fn same_bytes(logs: &[Option<&[u8]>]) -> Vec<Option<usize>> {
+    let mut order: Vec<(usize, &[u8])> =
+        logs.iter().enumerate().filter_map(|(index, bytes)| Some((index, (*bytes)?))).collect();
+    // Logs differ early, at the first row with a time: comparing is cheaper than hashing.
+    order.sort_by(|left, right| {
+        left.1
+            .len()
+            .cmp(&right.1.len())
+            .then_with(|| left.1.cmp(right.1))
+            .then(left.0.cmp(&right.0))
+    });
+    let mut result = vec![None; logs.len()];
+    let mut first: Option<(usize, &[u8])> = None;
+    for (index, bytes) in order {
+        match first {
+            Some((earlier, same)) if same.len() == bytes.len() && same == bytes => {
+                result[index] = Some(earlier);
+            }
+            _ => first = Some((index, bytes)),
+        }
     }
     result
 }
 
-/// The slot whose home is nearest, if it is nearer than half the smallest distance between homes.
-fn nearest_home(plan: &Plan, fix_deg: (f64, f64)) -> Option<u16> {
-    let (lat_deg, lon_deg) = fix_deg;
-    let amsl_m = plan.site.ground_amsl_m;
-    let place = plan.site.frame().from_geodetic(Geodetic { lat_deg, lon_deg, amsl_m });
-    let mut distances: Vec<(f64, u16)> = plan
-        .slots
-        .iter()
-        .map(|slot| ((slot.home_m[0] - place.x).hypot(slot.home_m[1] - place.y), slot.slot))
-        .collect();
-    distances.sort_by(|left, right| left.0.total_cmp(&right.0));
-    let (nearest, slot) = *distances.first()?;
-    let limit_m = match distances.get(1) {
-        // The nearest home must be clearly nearer than the next one.
-        Some((second, _)) => (second / 2.0).min(5.0),
-        None => 100.0,
-    };
-    (nearest < limit_m).then_some(slot)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::file_number;
+    use super::{file_number, same_bytes};
     use std::path::Path;
 
     #[test]
@@ -91,8 +356,16 @@ mod tests {
             ("dröhne4ü.BIN", Some(4)),
             ("ladder-still.BIN", None),
             ("99999999.BIN", None),
+            ("00000012.BIN", None),
         ] {
             assert_eq!(file_number(Path::new(name)), number, "{name}");
         }
+    }
+
+    #[test]
+    fn copies_are_told_from_logs_of_the_same_size() {
+        let logs: [Option<&[u8]>; 6] =
+            [Some(b"abc"), Some(b"abd"), Some(b"abc"), None, Some(b"ab"), Some(b"abc")];
+        assert_eq!(same_bytes(&logs), [None, None, Some(0), None, None, Some(0)]);
     }
 }

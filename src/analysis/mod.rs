@@ -5,15 +5,19 @@
 
 mod analyze;
 pub mod calibrate;
+mod caution;
 pub mod density;
 mod drone;
 pub mod fit;
 pub mod law;
 mod matching;
+pub mod prefer;
 mod refer;
 pub mod result;
+mod slots;
 mod stats;
 pub mod updraft;
+pub mod wind;
 pub mod windows;
 
 pub use analyze::{

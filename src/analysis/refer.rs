@@ -1,8 +1,10 @@
-//! A calibration referred to the air density at the ground, for use at another height.
+//! A calibration referred to level flight and to the air density at the ground, for use in another
+//! wind and at another height.
 
 use super::calibrate::{self, FitOptions};
 use super::density::Density;
 use super::result::{FlightAnalysis, SampleStats, WindowStats};
+use super::wind::Leaning;
 
 fn refer_window(density: Density, window: &WindowStats) -> WindowStats {
     let factor = density.factor(window.height_m);
@@ -21,15 +23,24 @@ fn refer_window(density: Density, window: &WindowStats) -> WindowStats {
     }
 }
 
-/// A calibration with its laws refitted to pulses referred to the ground.
+/// A calibration with its laws refitted to windows brought to level flight, with pulses referred to
+/// the ground.
 pub(super) fn refer_calibration(
-    density: Density,
+    density: Option<Density>,
+    leaning: Option<Leaning>,
     calibration: &FlightAnalysis,
     options: &FitOptions,
 ) -> FlightAnalysis {
     let mut referred = calibration.clone();
     for drone in &mut referred.drones {
-        drone.windows = drone.windows.iter().map(|window| refer_window(density, window)).collect();
+        for window in &mut drone.windows {
+            if let Some(leaning) = leaning {
+                *window = leaning.level_window(window);
+            }
+            if let Some(density) = density {
+                *window = refer_window(density, window);
+            }
+        }
         if drone.laws.is_some() {
             drone.laws = calibrate::calibrate(&drone.windows, options).ok();
         }

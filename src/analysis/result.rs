@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::density::Density;
+use super::wind::Leaning;
 use crate::base::estimate::Estimate;
 use crate::flight::Clock;
 use crate::mission::plan::{Kind, Purpose};
@@ -47,10 +48,42 @@ pub struct FlightAnalysis {
     pub table: Vec<TableRow>,
     /// The map of the air, for measurements.
     pub map: Option<UpdraftMap>,
-    /// What is doubtful about the flight as a whole (logs that could not be used, matched or told
-    /// apart), one sentence each.
+    /// Drones of a measurement whose log was read but gave no value for the map.
+    #[serde(default)]
+    pub unmeasured: Vec<Unmeasured>,
+    /// The paper's table beside [`FlightAnalysis::table`]: `I` (simulation) or `II` (field).
+    #[serde(default)]
+    pub paper_table: Option<String>,
+    /// What is doubtful about the flight as a whole (logs that contradict each other), one sentence
+    /// each.
     #[serde(default)]
     pub warnings: Vec<String>,
+    /// Logs that could not be used, or not to the flight's end. Those of slots are in
+    /// [`FlightAnalysis::missing`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<LostLog>,
+}
+
+/// A log that could not be used, or not to the flight's end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LostLog {
+    /// The file, relative to the campaign folder where possible.
+    pub source: String,
+    /// Why.
+    pub reason: String,
+    /// Whether what it holds was analysed nevertheless.
+    pub used: bool,
+}
+
+impl LostLog {
+    /// One sentence that names the file.
+    pub fn sentence(&self) -> String {
+        if self.reason.contains(&self.source) {
+            self.reason.clone()
+        } else {
+            format!("{}: {}", self.source, self.reason)
+        }
+    }
 }
 
 /// A drone that the plan has and the analysis has not.
@@ -63,6 +96,54 @@ pub struct Missing {
     pub home_m: Option<[f64; 2]>,
     /// Why.
     pub reason: String,
+}
+
+/// A drone of a measurement without a value in the map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Unmeasured {
+    /// Slot number, if planned.
+    pub slot: Option<u16>,
+    /// Label.
+    pub name: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// How much of what was asked for an analysis gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Yield {
+    /// Every drone has its laws or its value of the map.
+    Whole,
+    /// Some drones, or some flights, have none.
+    Partial,
+    /// There is no law and no value of the map at all.
+    Nothing,
+}
+
+impl FlightAnalysis {
+    /// Drones that have what the flight was for: laws, or a value of the map.
+    pub fn results(&self) -> usize {
+        match self.purpose {
+            Purpose::Calibration => self.drones.iter().filter(|one| one.laws.is_some()).count(),
+            Purpose::Measurement => self.map.as_ref().map_or(0, |map| map.drones.len()),
+        }
+    }
+}
+
+impl Analysis {
+    /// How much of what was asked for there is.
+    pub fn what_was_found(&self) -> Yield {
+        let whole = |flight: &FlightAnalysis| {
+            flight.missing.is_empty() && flight.results() == flight.drones.len()
+        };
+        if self.flights.iter().all(|flight| flight.results() == 0) {
+            Yield::Nothing
+        } else if self.flights.iter().all(whole) {
+            Yield::Whole
+        } else {
+            Yield::Partial
+        }
+    }
 }
 
 /// One drone of one flight.
@@ -111,6 +192,9 @@ pub struct WindowStats {
     pub pulse_phi_us: SampleStats,
     /// Tilt from the vertical, degrees.
     pub tilt_deg: SampleStats,
+    /// Angle of the mean attitude from the vertical, degrees: what wind does, without noise.
+    #[serde(default)]
+    pub lean_deg: f64,
     /// Estimated slow offset subtracted before fitting (field mode), us.
     pub offset_us: Option<f64>,
     /// Why the window is not used in fits; empty: it is used (if it is of the fitted kind).
@@ -129,6 +213,21 @@ pub enum Rejection {
     Gap,
     /// The log ends before the window does.
     Incomplete,
+    /// The vertical velocity wandered by more than 0.3 m/s (standard deviation) in a hover.
+    Manoeuvre,
+}
+
+impl Rejection {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Saturated => "a motor touched its limit",
+            Self::NotFollowing => "it did not follow the command",
+            Self::Gap => "the log has a gap",
+            Self::Incomplete => "the log ends early",
+            Self::Manoeuvre => "it moved up and down",
+        }
+    }
 }
 
 /// Location and spread of the samples in a window.
@@ -159,8 +258,10 @@ pub struct Laws {
     pub signed_quadratic_held: Option<Fit>,
     /// `u = A' V + u0`.
     pub linear: Option<Fit>,
-    /// Standard deviation added to every window's own error so that the better law's chi² is its
-    /// degrees of freedom, us; `None` when the weights do not ask for it.
+    /// Scatter of the windows beyond their own measured noise, us: the standard deviation that was
+    /// added to every window's error before the fits, chosen so that the better law's chi² became its
+    /// degrees of freedom. It is turbulence longer than a window and what the law does not describe.
+    /// `None` when the weights do not ask for it or there are no degrees of freedom.
     #[serde(default)]
     pub sigma_added_us: Option<f64>,
 }
@@ -174,9 +275,10 @@ pub struct Fit {
     pub covariance: Vec<f64>,
     /// Points fitted.
     pub points: usize,
-    /// Sum of squared residuals over sigma.
+    /// Sum of squared residuals over the windows' own errors, before any scatter was added to them
+    /// ([`Laws::sigma_added_us`]).
     pub chi2: f64,
-    /// chi2 over the degrees of freedom; `None` without any.
+    /// That over the degrees of freedom; `None` without any. A statistic: nothing was tuned for it.
     pub chi2_reduced: Option<f64>,
     /// Probability of a chi² at least this large if the law and the sigmas are right.
     #[serde(default)]
@@ -198,7 +300,7 @@ pub struct Parameter {
     pub name: String,
     /// Unit: `us/(m/s)²`, `us`, `m/s`, `us/(m/s)`.
     pub unit: String,
-    /// Value and standard error.
+    /// Value and standard error; the error is 0, and unknown, without degrees of freedom.
     pub estimate: Estimate,
     /// Held, not fitted.
     pub held: bool,
@@ -243,6 +345,9 @@ pub struct Trace {
 pub struct UpdraftMap {
     /// Law used for the inversion: `linear` or `signed quadratic`.
     pub law: String,
+    /// How the wind on the leaning drones was corrected for; absent: it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leaning: Option<Leaning>,
     /// Density that pulses were referred to before the inversion; absent: not corrected for height.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density: Option<Density>,
@@ -270,6 +375,13 @@ pub struct DroneUpdraft {
     pub mapping: String,
     /// Mean over the hover with its standard error, m/s, up positive.
     pub mean: Estimate,
+    /// Systematic error of the mean from wind on the leaning drone, m/s: a bound, not a standard
+    /// error, and the same in sign for drones in the same wind.
+    #[serde(default)]
+    pub systematic_mps: f64,
+    /// Mean lean in the hover, degrees.
+    #[serde(default)]
+    pub tilt_deg: f64,
     /// Running 10 s estimate at each of [`UpdraftMap::time_s`], m/s; null where the log has none.
     pub updraft_mps: Vec<Option<f64>>,
     /// True value at the same times, when it is known.

@@ -4,9 +4,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::law::Law;
-use super::result::Fit;
+use super::result::{Fit, WindowStats};
 use super::stats::{block_error, mean_sd};
-use super::windows::Target;
+use super::wind;
+use super::wind::Leaning;
+use super::windows::{Target, lean_deg};
 use crate::base::estimate::Estimate;
 use crate::flight::{Flight, Series};
 
@@ -33,8 +35,21 @@ pub struct DroneSeries {
     pub updraft_mps: Vec<Option<f64>>,
     /// Mean over the hover. Its error joins the scatter of 20 s blocks and the errors of the law.
     pub mean: Estimate,
+    /// Systematic error of the mean from wind on the leaning drone, m/s.
+    pub systematic_mps: f64,
+    /// Lean of the mean attitude in the hover, degrees.
+    pub tilt_deg: f64,
     /// Mean height above home, m.
     pub height_m: f64,
+}
+
+/// What the lean of a drone does to its estimate.
+#[derive(Clone, Copy, Debug)]
+pub struct Lean<'a> {
+    /// How the vehicle leans in wind, where that is known.
+    pub leaning: Option<Leaning>,
+    /// The drone's windows in the calibration.
+    pub calibration: &'a [WindowStats],
 }
 
 /// The longest hover among the windows: where a measurement looks.
@@ -54,17 +69,25 @@ pub fn estimate(
     pulse_phi_us: &Series,
     hover: &Target,
     fit: &Fit,
+    lean: Lean<'_>,
 ) -> Option<DroneSeries> {
     let law = Law::from_fit(fit)?;
     let velocity = Running::new(&flight.velocity_up_mps, hover.start_s, hover.end_s);
     let pulse = Running::new(pulse_phi_us, hover.start_s, hover.end_s);
+    let roll = Running::new(&flight.roll_rad, hover.start_s, hover.end_s);
+    let pitch = Running::new(&flight.pitch_rad, hover.start_s, hover.end_s);
     let half = RUNNING_S / 2.0;
     let mut values = Series::default();
     for time in pulse_phi_us.times_between(hover.start_s + half, hover.end_s - half) {
         let (Some(velocity), Some(pulse)) = (velocity.mean(*time), pulse.mean(*time)) else {
             continue;
         };
-        let updraft = velocity - law.air_velocity_mps(pulse);
+        // The attitude is averaged first: the flow that a lean lets through is not linear in it.
+        let through = lean.leaning.map_or(0.0, |leaning| {
+            let attitude = roll.mean(*time).zip(pitch.mean(*time));
+            attitude.map_or(0.0, |(roll, pitch)| leaning.axial_mps(lean_deg(roll, pitch)))
+        });
+        let updraft = velocity + through - law.air_velocity_mps(pulse);
         if updraft.is_finite() {
             values.time_s.push(*time);
             values.value.push(updraft);
@@ -91,10 +114,16 @@ pub fn estimate(
     let scatter = block_error(&times, &known, BLOCK_S).unwrap_or(sd);
     let mean_pulse = mean_sd(pulse_phi_us.between(hover.start_s, hover.end_s)).0;
     let from_law = law_error_mps(law, fit, mean_pulse);
+    let mean_rad = |angle: &Series| mean_sd(angle.between(hover.start_s, hover.end_s)).0;
+    let tilt_deg = lean_deg(mean_rad(&flight.roll_rad), mean_rad(&flight.pitch_rad));
+    let raw_pulse = mean_sd(flight.pulse_us.between(hover.start_s, hover.end_s)).0;
+    let at_hover = (if raw_pulse > 0.0 { raw_pulse } else { mean_pulse }, tilt_deg);
     Some(DroneSeries {
         first_s,
         updraft_mps,
         mean: Estimate::new(mean, scatter.hypot(from_law)),
+        systematic_mps: wind::systematic_mps(lean.leaning, law, at_hover, lean.calibration),
+        tilt_deg,
         height_m: mean_sd(flight.height_m.between(hover.start_s, hover.end_s)).0,
     })
 }
@@ -198,6 +227,7 @@ mod tests {
     use crate::mission::plan::Kind;
 
     const RATE: f64 = 10.0;
+    const LEVEL: Lean<'static> = Lean { leaning: None, calibration: &[] };
 
     fn linear_fit() -> Fit {
         fit(Law::Linear { slope: 26.4, u0_us: 1546.5 })
@@ -246,7 +276,7 @@ mod tests {
         ] {
             for truth in [-3.0, -0.4, 0.7, 2.0] {
                 let (flight, pulse) = flown(law, |_| truth);
-                let found = estimate(&flight, &pulse, &hover(), &fit(law)).unwrap();
+                let found = estimate(&flight, &pulse, &hover(), &fit(law), LEVEL).unwrap();
                 assert!((found.mean.value - truth).abs() < 1e-3, "{law:?}: {}", found.mean);
                 assert!(found.mean.se > 0.0, "the law's own error is in");
                 let first_and_last = (found.first_s, found.updraft_mps.len());
@@ -265,7 +295,7 @@ mod tests {
             time_s: keep.iter().map(|i| pulse.time_s[*i]).collect(),
             value: keep.iter().map(|i| pulse.value[*i]).collect(),
         };
-        let found = estimate(&flight, &pulse, &hover(), &linear_fit()).unwrap();
+        let found = estimate(&flight, &pulse, &hover(), &linear_fit(), LEVEL).unwrap();
         let at = |time: i64| found.at(&[time])[0];
         assert!((at(130).unwrap() - 0.5).abs() < 1e-9);
         assert!((at(170).unwrap() + 0.5).abs() < 1e-9);
@@ -278,7 +308,7 @@ mod tests {
         let law = Law::Linear { slope: 26.4, u0_us: 1546.5 };
         let wave = |time: f64| 0.8 * (time / 60.0 * std::f64::consts::TAU).sin();
         let (flight, pulse) = flown(law, wave);
-        let found = estimate(&flight, &pulse, &hover(), &linear_fit()).unwrap();
+        let found = estimate(&flight, &pulse, &hover(), &linear_fit(), LEVEL).unwrap();
         // A centred 10 s mean keeps the phase and damps a 60 s wave by sinc(pi/6) = 0.955.
         for time in [20_i64, 75, 130, 222] {
             let expected = 0.9549 * wave(time as f64);

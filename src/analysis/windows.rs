@@ -259,6 +259,12 @@ pub fn correct_tilt(flight: &Flight, tilt: Tilt) -> Corrected {
     corrected
 }
 
+/// Angle between the vertical and the rotor axis at a mean roll and pitch, degrees. The mean of
+/// [`Corrected::tilt_deg`] is not that: noise of the attitude only ever adds to an angle.
+pub(super) fn lean_deg(roll_rad: f64, pitch_rad: f64) -> f64 {
+    pitch_rad.tan().hypot(roll_rad.tan()).atan().to_degrees()
+}
+
 /// Interpolated value; at the ends of the log, where one neighbour is missing, the other one's.
 fn nearby(series: &Series, time_s: f64) -> Option<f64> {
     series.at(time_s, GAP_S).or_else(|| series.latest(time_s, GAP_S)).or_else(|| {
@@ -309,6 +315,9 @@ fn measure_one(
     }
     if velocity.n > 0 && (velocity.mean - target.commanded_mps).abs() > options.follow_limit_mps {
         rejected.push(Rejection::NotFollowing);
+    } else if target.kind.is_hover() && velocity.sd > options.follow_limit_mps {
+        // It went up and down: on the average it stayed, but that is no hover.
+        rejected.push(Rejection::Manoeuvre);
     }
     WindowStats {
         kind: target.kind,
@@ -321,6 +330,10 @@ fn measure_one(
         pulse_us: stats(&flight.pulse_us),
         pulse_phi_us: pulse_phi,
         tilt_deg: stats(&corrected.tilt_deg),
+        lean_deg: lean_deg(
+            mean(flight.roll_rad.between(start, end)),
+            mean(flight.pitch_rad.between(start, end)),
+        ),
         offset_us: None,
         rejected,
     }

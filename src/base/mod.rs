@@ -6,5 +6,6 @@ pub mod crc;
 pub mod estimate;
 pub mod file;
 pub mod frame;
+pub mod number;
 pub mod rng;
 pub mod time;

@@ -12,6 +12,7 @@
 //!   analysis.json  report/index.html
 //! ```
 
+pub mod lock;
 pub mod write;
 
 use std::io;
@@ -22,6 +23,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::base::crc::file_crc32;
 use crate::base::file::{FileError, read_whole};
 use crate::base::time::GpsTime;
 use crate::mission::Plan;
@@ -87,6 +89,29 @@ pub struct LogRecord {
     pub file: String,
     /// Size, bytes.
     pub bytes: u64,
+    /// CRC-32 (that of ZIP files) of the content; absent in records of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crc32: Option<u32>,
+}
+
+impl LogRecord {
+    /// Takes down a log as it is on the disk.
+    pub fn of(slot: u16, path: &Path) -> Result<Self, FileError> {
+        let (bytes, crc32) = file_crc32(path)?;
+        let file = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
+        Ok(Self { slot, file, bytes, crc32: Some(crc32) })
+    }
+
+    /// How a file differs from what was taken down, in words; `None`: it is the same.
+    pub fn difference(&self, path: &Path) -> Result<Option<String>, FileError> {
+        let size = std::fs::metadata(path).map_err(|error| FileError::new("read", path, error))?;
+        if size.len() != self.bytes {
+            return Ok(Some(format!("it has {} bytes, not {}", size.len(), self.bytes)));
+        }
+        let Some(recorded) = self.crc32 else { return Ok(None) };
+        let (_, found) = file_crc32(path)?;
+        Ok((found != recorded).then(|| "its bytes were changed".to_owned()))
+    }
 }
 
 /// Name and version of the flight record format.
@@ -111,6 +136,21 @@ pub enum CampaignError {
     #[error("{} holds no plan.json and no campaign.json; make one with `updraft plan`", path.display())]
     NoPlan {
         /// The folder.
+        path: PathBuf,
+    },
+    /// Another process is writing into the folder.
+    #[error(
+        "another updraft is writing into {}; wait until it is done, or choose another folder",
+        path.display()
+    )]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file where a folder is expected.
+    #[error("{} is not a campaign folder", path.display())]
+    NotFolder {
+        /// The file.
         path: PathBuf,
     },
     /// The folder already holds something else.
@@ -213,6 +253,10 @@ pub fn index_path(folder: &Path) -> PathBuf {
 
 /// The flights of a campaign folder, or of a folder with one flight.
 pub fn flights(folder: &Path) -> Result<Vec<FlightFolder>, CampaignError> {
+    let found = std::fs::metadata(folder).map_err(|error| FileError::new("read", folder, error))?;
+    if !found.is_dir() {
+        return Err(CampaignError::NotFolder { path: folder.to_owned() });
+    }
     let path = index_path(folder);
     if path.is_file() {
         let index: CampaignIndex = read_json(&path)?;

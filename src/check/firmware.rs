@@ -15,6 +15,8 @@ use crate::show::derive::{self, DeriveParams, Derived, derive};
 
 /// Climb below the take-off altitude from which the catch-up becomes large, m/s.
 const GENTLE_CLIMB_MPS: f64 = 1.0;
+/// LAND_ALT_LOW, m: below it the firmware lands at LAND_SPEED, above it at a speed that no show knows.
+const LAND_ALT_LOW_M: f64 = 10.0;
 /// How far the end may be from the take-off altitude above ground, m.
 const END_TOLERANCE_M: f64 = 0.5;
 /// Hover at the end that firmware 4.6 may leave out, s.
@@ -96,6 +98,7 @@ pub(super) fn check(input: &CheckInput<'_>, tracks: &[Track<'_>], collector: &mu
         if check_validity(track, derived, firmware, collector) {
             check_climb(track, derived, collector);
             check_end(track, derived, firmware, collector);
+            check_away(track, derived, firmware, collector);
         }
     }
     check_early_landing(&flown, &derived, collector);
@@ -223,12 +226,45 @@ fn check_end(track: &Track<'_>, derived: &Both, firmware: &Firmware, collector: 
     let ground_m = track.drone.land_at_m.map_or(track.ground_m, |place| place.z);
     let end_m = track.end_m.z - ground_m;
     if (end_m - alt_m).abs() > END_TOLERANCE_M {
-        let message = format!(
-            "ends {end_m:.3} m above ground, recommended {alt_m:.3} m: firmware 4.4 starts to land where the trajectory ends"
-        );
-        let kind = (Severity::Warning, "firmware-end");
+        // Shows are flown from ground to ground: a high end is left to LAND mode, out of formation.
+        let high = end_m > LAND_ALT_LOW_M;
+        let severity = if high { Severity::Error } else { Severity::Warning };
+        let message = if high {
+            format!(
+                "ends {end_m:.3} m above ground, recommended {alt_m:.3} m, at most {LAND_ALT_LOW_M:.3} m: both firmwares leave the show there and land (4.6: or return home, by SHOW_POST_ACTION) at speeds that the show does not set"
+            )
+        } else {
+            format!(
+                "ends {end_m:.3} m above ground, recommended {alt_m:.3} m: firmware 4.4 starts to land where the trajectory ends"
+            )
+        };
+        let kind = (severity, "firmware-end");
         let remedy = "end with a vertical descent to the take-off altitude";
         let values = (end_m, alt_m, "m");
+        let time_s = derived.v44.landing_s;
+        collector.add(track.index, finding(track, kind, time_s, values, message, remedy));
+    }
+}
+
+/// A drone lands below the end of its trajectory: elsewhere than it is meant to is told.
+fn check_away(track: &Track<'_>, derived: &Both, firmware: &Firmware, collector: &mut Collector) {
+    let (place, whose) = match (track.drone.land_at_m, track.drone.home_m) {
+        (Some(place), _) => (place, "its landing place"),
+        // A start away from home is told as such.
+        (None, Some(home)) if (track.start_m - home).xy().norm() <= firmware.takeoff_err_m => {
+            (home, "its home")
+        }
+        (None, _) => (track.start_m, "its start"),
+    };
+    let away_m = (track.end_m - place).xy().norm();
+    let limit_m = firmware.takeoff_err_m;
+    if away_m > limit_m {
+        let message = format!(
+            "ends {away_m:.3} m from {whose}, more than {limit_m:.3} m: the firmware lands it below that end, and it will not arm there for the next flight"
+        );
+        let kind = (Severity::Warning, "firmware-away");
+        let remedy = "end the trajectory above the home, or give the landing place (landAt)";
+        let values = (away_m, limit_m, "m");
         let time_s = derived.v44.landing_s;
         collector.add(track.index, finding(track, kind, time_s, values, message, remedy));
     }

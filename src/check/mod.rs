@@ -24,7 +24,9 @@ mod fence;
 mod firmware;
 mod format;
 mod ground;
+mod ladder;
 mod lateral;
+mod limits;
 mod motion;
 mod pair;
 mod report;
@@ -42,7 +44,7 @@ pub use report::{CheckReport, Count, Finding, Margin, Severity};
 
 pub use crate::mission::formation::MAX_DRONES;
 
-use crate::mission::plan::Fence;
+use crate::mission::plan::{Fence, Plan};
 use crate::show::Show;
 use crate::vehicle::{Autopilot, Limits};
 use report::Collector;
@@ -95,6 +97,12 @@ pub struct CheckInput<'a> {
     pub limits: &'a Limits,
     /// The fence, if there is one.
     pub fence: Option<&'a Fence>,
+    /// Whether the fence has a top; a polygon that a show file brings has none.
+    pub fence_has_top: bool,
+    /// The vehicle's own limits, against which [`CheckInput::limits`] may have been loosened.
+    pub stock: Option<&'a Limits>,
+    /// The plan that the show was made from, if it was: what it is to measure is checked too.
+    pub plan: Option<&'a Plan>,
     /// What decides how the firmware reads a trajectory.
     pub firmware: Firmware,
     /// Everything else.
@@ -110,6 +118,7 @@ pub const NAMES: &[&str] = &[
     "endurance",
     "fence",
     "fence-altitude",
+    "firmware-away",
     "firmware-climb",
     "firmware-early-landing",
     "firmware-end",
@@ -118,6 +127,9 @@ pub const NAMES: &[&str] = &[
     "firmware-takeoff",
     "ground-distance",
     "home",
+    "ladder-speeds",
+    "ladder-window",
+    "limits",
     "low-lateral",
     "mixed-starts",
     "same-home",
@@ -137,7 +149,16 @@ impl<'a> CheckInput<'a> {
     /// A show and limits, without a fence, with default firmware and options.
     pub fn new(show: &'a Show, limits: &'a Limits) -> Self {
         let (firmware, options) = (Firmware::default(), Options::default());
-        Self { show, limits, fence: None, firmware, options }
+        Self {
+            show,
+            limits,
+            fence: None,
+            fence_has_top: true,
+            stock: None,
+            plan: None,
+            firmware,
+            options,
+        }
     }
 
     /// The same for an autopilot with these parameters.
@@ -151,6 +172,24 @@ impl<'a> CheckInput<'a> {
     #[must_use]
     pub fn with_fence(self, fence: Option<&'a Fence>) -> Self {
         Self { fence, ..self }
+    }
+
+    /// The same with the polygon of a fence whose top is not known, if there is one.
+    #[must_use]
+    pub fn with_polygon(self, fence: Option<&'a Fence>) -> Self {
+        Self { fence, fence_has_top: false, ..self }
+    }
+
+    /// The same for a show made from a plan.
+    #[must_use]
+    pub fn with_plan(self, plan: &'a Plan) -> Self {
+        Self { plan: Some(plan), ..self }
+    }
+
+    /// The same with the vehicle's own limits: where the limits are looser, the report says so.
+    #[must_use]
+    pub fn with_stock(self, stock: &'a Limits) -> Self {
+        Self { stock: Some(stock), ..self }
     }
 }
 
@@ -185,11 +224,18 @@ pub fn check(input: &CheckInput<'_>) -> CheckReport {
         .map(|((index, drone), _)| Track::new(index, drone, AIRBORNE_ABOVE_M, horizon_ms))
         .collect();
 
+    limits::check(input, &mut collector);
+    if let Some(plan) = input.plan {
+        ladder::check(plan, &mut collector);
+    }
     ground::check(&tracks, &mut collector);
     distance::check(input, &tracks, horizon_ms, &mut collector);
     watch_drones(input, &tracks, &mut collector);
     format::check(&tracks, &mut collector);
     firmware::check(input, &tracks, &mut collector);
+    if input.fence.is_none() {
+        collector.note("no fence in this show: nothing says how far a drone may stray");
+    }
     collector.finish(show.drones.len(), duration_ms as f64 / 1000.0)
 }
 
@@ -208,7 +254,11 @@ fn watch_drones(input: &CheckInput<'_>, tracks: &[Track<'_>], collector: &mut Co
             watches.push(lateral::watch(track, lateral, firmware.takeoff_alt_m));
             watches.push(endurance::watch(track, endurance, firmware.land_speed_mps));
             if let Some((polygon, quantities)) = &fence {
-                watches.extend(fence::watch(track, polygon, *quantities));
+                let [clearance, altitude] = fence::watch(track, polygon, *quantities);
+                watches.push(clearance);
+                if input.fence_has_top {
+                    watches.push(altitude);
+                }
             }
             watches
         })

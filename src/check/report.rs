@@ -6,6 +6,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::number::{brief, fixed};
+
 /// How bad a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -86,6 +88,8 @@ pub struct CheckReport {
     pub counts: BTreeMap<&'static str, Count>,
     /// The worst value of each quantity that was checked.
     pub margins: Vec<Margin>,
+    /// What was not checked, and against what the rest was, one sentence each.
+    pub notes: Vec<String>,
 }
 
 impl CheckReport {
@@ -117,10 +121,10 @@ impl fmt::Display for Quantity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(value, unit) = *self;
         match unit {
-            "" => write!(f, "{value:.0}"),
-            "B" | "mm" | "drones" | "times" => write!(f, "{value:.0} {unit}"),
-            "s" => write!(f, "{value:.1} {unit}"),
-            _ => write!(f, "{value:.2} {unit}"),
+            "" => f.write_str(&fixed(value, 0)),
+            "B" | "mm" | "drones" | "times" => write!(f, "{} {unit}", fixed(value, 0)),
+            "s" => write!(f, "{} {unit}", fixed(value, 1)),
+            _ => write!(f, "{} {unit}", brief(value)),
         }
     }
 }
@@ -195,7 +199,7 @@ impl fmt::Display for CheckReport {
         for (check, count) in &self.counts {
             if count.omitted > 0 {
                 let least = if count.at_least { "at least " } else { "" };
-                writeln!(f, "{check}: {least}{} more like these", count.omitted)?;
+                writeln!(f, "{check}: and {least}{} more", count.omitted)?;
             }
         }
         if !self.margins.is_empty() {
@@ -208,6 +212,9 @@ impl fmt::Display for CheckReport {
             let worst = Quantity(margin.value, margin.unit).to_string();
             write!(f, "{:<17} {worst:>12} {limit:>12}  {}", margin.check, margin.quantity)?;
             writeln!(f, "{}", margin.place())?;
+        }
+        for note in &self.notes {
+            writeln!(f, "note: {note}")?;
         }
         let number = |count: usize, word: &str| match count {
             1 => format!("1 {word}"),
@@ -231,6 +238,7 @@ pub(super) struct Collector {
     kept: BTreeMap<&'static str, Vec<(usize, Finding)>>,
     counts: BTreeMap<&'static str, Count>,
     margins: Vec<Margin>,
+    notes: Vec<String>,
 }
 
 /// Errors first, then by time, then by the drone's place in the show; the message settles ties.
@@ -246,7 +254,13 @@ fn by_urgency(a: &(usize, Finding), b: &(usize, Finding)) -> std::cmp::Ordering 
 impl Collector {
     /// Keeps at most this many findings of each check.
     pub(super) fn new(per_check: usize) -> Self {
-        Self { per_check, kept: BTreeMap::new(), counts: BTreeMap::new(), margins: Vec::new() }
+        Self {
+            per_check,
+            kept: BTreeMap::new(),
+            counts: BTreeMap::new(),
+            margins: Vec::new(),
+            notes: Vec::new(),
+        }
     }
 
     /// Adds a finding about the drone with this index (the first of them, if several).
@@ -258,7 +272,7 @@ impl Collector {
         }
         let kept = self.kept.entry(finding.check).or_default();
         kept.push((drone, finding));
-        if kept.len() > 4 * self.per_check + 64 {
+        if kept.len() > self.per_check.saturating_mul(4).saturating_add(64) {
             kept.sort_by(by_urgency);
             kept.truncate(self.per_check);
         }
@@ -274,8 +288,13 @@ impl Collector {
         self.margins.push(margin);
     }
 
+    /// Adds something that the reader must know about the whole check.
+    pub(super) fn note(&mut self, note: impl Into<String>) {
+        self.notes.push(note.into());
+    }
+
     pub(super) fn finish(self, drones: usize, duration_s: f64) -> CheckReport {
-        let Self { per_check, kept, mut counts, margins } = self;
+        let Self { per_check, kept, mut counts, margins, notes } = self;
         let mut all = Vec::new();
         for (check, mut findings) in kept {
             findings.sort_by(by_urgency);
@@ -287,7 +306,7 @@ impl Collector {
         }
         all.sort_by(by_urgency);
         let findings = all.into_iter().map(|(_, finding)| finding).collect();
-        CheckReport { drones, duration_s, findings, counts, margins }
+        CheckReport { drones, duration_s, findings, counts, margins, notes }
     }
 }
 
@@ -322,7 +341,7 @@ mod tests {
         assert_eq!(names, ["Drone 0", "Drone 1", "Drone 2"]);
         assert!(report.findings.iter().all(|f| f.severity == Severity::Error));
         assert_eq!((report.errors(), report.warnings()), (1000, 1000));
-        assert!(report.to_string().contains("speed-up: 1997 more like these"), "{report}");
+        assert!(report.to_string().contains("speed-up: and 1997 more"), "{report}");
         assert_eq!(report.to_string().matches("help: slow down").count(), 1);
     }
 

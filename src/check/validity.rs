@@ -4,6 +4,7 @@ use super::fence::usable;
 use super::report::{Collector, Finding, Severity};
 use super::track::name_of;
 use super::{CheckInput, MAX_DRONES};
+use crate::base::number::plain;
 use crate::show::ShowDrone;
 use crate::show::trajectory::Path;
 
@@ -68,7 +69,8 @@ fn check_limits(input: &CheckInput<'_>, collector: &mut Collector) {
     for (name, value) in named {
         // A limit that compares false with everything would let everything pass.
         if value.is_nan() || value < 0.0 {
-            let message = format!("the limit {name} is {value}: nothing can be checked against it");
+            let message =
+                format!("the limit {name} is {}: nothing can be checked against it", plain(value));
             collector.add(0, error(vec![], None, message, "correct the vehicle's limits"));
         }
     }

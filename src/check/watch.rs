@@ -3,6 +3,7 @@
 use super::bernstein::Poly;
 use super::report::{Collector, Finding, Margin, Severity};
 use super::track::Track;
+use crate::base::number::fixed;
 
 /// Precision of extrema, in the unit of the quantity.
 const PRECISION: f64 = 1e-6;
@@ -150,10 +151,11 @@ pub(super) fn report<'t>(
         for stretch in &watch.stretches {
             let value = sign * stretch.worst;
             let message = format!(
-                "{} {value:.3} {unit} at {:.3} s, limit {:.3} {unit}",
+                "{} {} {unit} at {:.3} s, limit {} {unit}",
                 what.verb,
+                fixed(value, 3),
                 stretch.worst_s,
-                what.limit,
+                fixed(what.limit, 3),
                 unit = what.unit,
             );
             let finding = Finding {

@@ -1,6 +1,5 @@
 //! `updraft analyze`: logs become laws, a map of the air, and a report.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -10,28 +9,25 @@ use serde::Serialize;
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::found::{Found, Work, find, stem};
 use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::simulate::{made_by, sha256};
 use super::words;
 use crate::analysis::calibrate::{Location, Weights};
-use crate::analysis::density::Density;
-use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
-use crate::analysis::{AnalysisOptions, FlightInput, LogInput, MapLaw, TruthSeries, analyze};
-use crate::base::file::{FileError, read_whole, write_whole};
+use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, analyze};
+use crate::base::file::{read_whole, write_whole};
 use crate::base::time::GpsTime;
-use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, to_json};
+use crate::campaign::{self, to_json};
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, InputFile, Provenance, terminal_summary};
-use crate::sim::air::truth::{self, TrueUpdraft};
-use crate::vehicle::{Vehicle, library};
+use crate::vehicle::library;
 
 /// Largest log that is hashed, bytes.
 const MAX_LOG_BYTES: u64 = 4 << 30;
-/// Exponent of density for electric rotors with a real thrust curve.
-const REAL_ROTOR_EXPONENT: f64 = 0.4;
 /// Width of the terminal summary, columns.
 const WIDTH: usize = 100;
 
@@ -44,8 +40,10 @@ const WIDTH: usize = 100;
   updraft analyze windy --hold still/analysis.json
 
 A campaign's results go into its folder, others into --output. Without a plan, windows are found in
-the log's own desired velocity. Exit code 3: done, but some logs are missing or unusable; they are
-named.")]
+the log's own desired velocity. Whose a log is, it says itself: by its home position, else by its
+file name (07.BIN), else by its system id. Exit code 3: done, but logs are missing, unusable,
+copies, from another place or end in the air, or drones gave no law or no value of the map; each is
+named with its reason. Exit code 5: no law and no map at all.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
     #[arg(required = true)]
@@ -76,12 +74,16 @@ pub(super) struct AnalyzeOptions {
     /// Law for the map of the air
     #[arg(long, value_enum, default_value_t = LawChoice::Auto)]
     law: LawChoice,
-    /// Which part of the pulse the tilt correction multiplies
+    /// Which part of the pulse the tilt correction multiplies (in windows and laws; the map of
+    /// simulated flights of known drag has its own, see --no-wind)
     #[arg(long, value_enum, default_value_t = TiltChoice::Paper)]
     tilt: TiltChoice,
     /// Do not correct the map for air density at different heights
     #[arg(long)]
     no_density: bool,
+    /// Do not correct the map for wind on leaning drones (simulated flights of known drag)
+    #[arg(long)]
+    no_wind: bool,
     /// Windows as in the paper: medians, weighted by the samples' standard deviation
     #[arg(long)]
     paper: bool,
@@ -129,27 +131,6 @@ impl AnalyzeOptions {
     }
 }
 
-/// One flight found behind a path.
-struct Found {
-    name: String,
-    plan: Option<Plan>,
-    purpose: Option<Purpose>,
-    logs: Vec<LogInput>,
-    true_updraft_mps: Option<f64>,
-    truth: BTreeMap<u16, TruthSeries>,
-    seed: Option<u64>,
-    start: Option<GpsTime>,
-    density: Option<Density>,
-}
-
-/// What was asked to be analysed.
-struct Work {
-    title: String,
-    /// Paths in the report are shown relative to this.
-    root: PathBuf,
-    flights: Vec<Found>,
-}
-
 /// What `--json` prints.
 #[derive(Serialize)]
 struct AnalyzeOutput<'a> {
@@ -187,6 +168,7 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         })?;
         work.flights.iter_mut().for_each(|flight| flight.start = Some(start));
     }
+    let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
     finish(context, &work, &args.options, args.hold.as_deref(), output.as_deref())
 }
 
@@ -210,6 +192,9 @@ fn finish(
 ) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start();
     let reference = hold.map(read_reference).transpose()?;
+    for note in work.flights.iter().flat_map(|flight| &flight.notes) {
+        context.warn(note);
+    }
     let inputs: Vec<_> = work
         .flights
         .iter()
@@ -222,6 +207,7 @@ fn finish(
             true_updraft_mps: flight.true_updraft_mps,
             truth: (!flight.truth.is_empty()).then_some(&flight.truth),
             density: flight.density.filter(|_| !options.no_density),
+            leaning: flight.leaning.filter(|_| !options.no_wind),
             folder: Some(&work.root),
         })
         .collect();
@@ -255,143 +241,22 @@ fn finish(
             analysis: &analysis,
         })?;
     }
+    if let Some(page) = &page {
+        context.result(page)?;
+    }
     let place = page.map_or(String::new(), |page| format!(" -> {}", page.display()));
-    context.say(&format!("Analysed {} in {watch}{place}", words::count(total, "log")));
-    let lost = analysis.flights.iter().any(|flight| !flight.missing.is_empty())
+    let used: usize = analysis.flights.iter().map(|flight| flight.drones.len()).sum();
+    let share = if used < total { format!("{used} of ") } else { String::new() };
+    context.say(&format!("Analysed {share}{} in {watch}{place}", words::count(total, "log")));
+    let lossy = |flight: &FlightAnalysis| !flight.missing.is_empty() || !flight.lost.is_empty();
+    let lost = used < total
+        || analysis.flights.iter().any(lossy)
         || analysis.flights.len() < work.flights.len();
-    Ok(if lost { Exit::Losses } else { Exit::Done })
-}
-
-/// Adds what a path holds to the work.
-fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), CommandError> {
-    if path.is_dir() && campaign::is_campaign(path) {
-        let index = campaign::index_path(path);
-        if index.is_file() && work.title.is_empty() {
-            work.title = campaign::read_json::<CampaignIndex>(&index)?.title;
-        }
-        for folder in campaign::flights(path)? {
-            let flight = found_flight(&folder)?;
-            if work.title.is_empty() {
-                work.title =
-                    flight.plan.as_ref().map_or_else(String::new, |plan| plan.title.clone());
-            }
-            work.flights.push(flight);
-        }
-        return Ok(());
-    }
-    let logs = if path.is_dir() { logs_in(path)? } else { vec![path.to_owned()] };
-    if logs.is_empty() {
-        return Err(CommandError::Nothing(format!("{} holds no .BIN logs", path.display())));
-    }
-    work.flights.push(Found {
-        name: stem(path),
-        plan: plan.cloned(),
-        purpose: None,
-        logs: logs.into_iter().map(|path| LogInput { slot: None, path }).collect(),
-        true_updraft_mps: None,
-        truth: BTreeMap::new(),
-        seed: None,
-        start: None,
-        density: plan.map(|plan| density(plan, None)),
-    });
-    Ok(())
-}
-
-fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
-    let plan = folder.read_plan()?;
-    let record = folder.read_record()?.filter(|record| record_holds(folder, record));
-    let logs = match &record {
-        // A record says which log is whose.
-        Some(record) => record
-            .logs
-            .iter()
-            .map(|log| LogInput { slot: Some(log.slot), path: folder.logs().join(&log.file) })
-            .collect(),
-        None if folder.logs().is_dir() => {
-            logs_in(&folder.logs())?.into_iter().map(|path| LogInput { slot: None, path }).collect()
-        }
-        None => Vec::new(),
-    };
-    let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
-    let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
-    Ok(Found {
-        density: Some(density(&plan, vehicle.as_ref())),
-        name: plan.name.clone(),
-        purpose: Some(plan.purpose),
-        plan: Some(plan),
-        logs,
-        true_updraft_mps: record
-            .as_ref()
-            .filter(|record| record.air.is_empty())
-            .map(|record| record.air_mps[2]),
-        truth,
-        start: record.as_ref().map(|record| record.start),
-        seed: record.map(|record| record.seed),
+    Ok(match analysis.what_was_found() {
+        Yield::Nothing => Exit::Nothing,
+        Yield::Whole if !lost => Exit::Done,
+        Yield::Whole | Yield::Partial => Exit::Losses,
     })
-}
-
-/// Whether the logs are still those that the record speaks of: somebody may have put the logs of real
-/// drones in their place.
-fn record_holds(folder: &FlightFolder, record: &FlightRecord) -> bool {
-    record.logs.iter().all(|log| {
-        let size = std::fs::metadata(folder.logs().join(&log.file)).map(|file| file.len());
-        // A log that is gone is a loss, not another flight.
-        size.map_or(true, |bytes| bytes == log.bytes)
-    })
-}
-
-/// The true air beside a simulated flight's logs, for the slots that have it.
-fn true_air(
-    folder: &FlightFolder,
-    plan: &Plan,
-) -> Result<BTreeMap<u16, TruthSeries>, CommandError> {
-    let mut found = BTreeMap::new();
-    for slot in &plan.slots {
-        let path = folder.truth(slot.slot, plan.slots.len());
-        if path.is_file() {
-            let TrueUpdraft { first_s, updraft_mps } =
-                truth::read(&path).map_err(|error| CommandError::Failed(error.to_string()))?;
-            found.insert(slot.slot, TruthSeries { first_s, updraft_mps });
-        }
-    }
-    Ok(found)
-}
-
-/// How the map is corrected for air density: by the thrust curve that the vehicle's autopilot is set
-/// for (none: linear thrust).
-fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
-    let linear = vehicle.is_some_and(|vehicle| vehicle.autopilot.mot_thst_expo == 0.0);
-    Density {
-        ground_amsl_m: plan.site.ground_amsl_m,
-        exponent: if linear { 1.0 } else { REAL_ROTOR_EXPONENT },
-    }
-}
-
-/// Whether a path is a finished log: what an interrupted run or copy left is not.
-fn is_log(path: &Path) -> bool {
-    let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-    has_extension(path, "bin") && !hidden
-}
-
-/// The logs in a folder and in its direct subfolders (one per drone, as SD cards are often copied).
-fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
-    let mut logs = Vec::new();
-    let list = |folder: &Path| -> Result<Vec<PathBuf>, FileError> {
-        let fail = |source| FileError::new("read", folder, source);
-        let entries = std::fs::read_dir(folder).map_err(fail)?;
-        let mut paths =
-            entries.map(|entry| Ok(entry.map_err(fail)?.path())).collect::<Result<Vec<_>, _>>()?;
-        paths.sort();
-        Ok(paths)
-    };
-    for path in list(folder)? {
-        if path.is_dir() {
-            logs.extend(list(&path)?.into_iter().filter(|path| is_log(path)));
-        } else if is_log(&path) {
-            logs.push(path);
-        }
-    }
-    Ok(logs)
 }
 
 fn load_plan(path: &Path) -> Result<Plan, CommandError> {
@@ -420,12 +285,6 @@ fn read_reference(path: &Path) -> Result<FlightAnalysis, CommandError> {
         .ok_or_else(|| {
             CommandError::Usage(format!("{} has no calibration to hold", path.display()))
         })
-}
-
-fn stem(path: &Path) -> String {
-    let name = path.file_stem().or(path.file_name());
-    let text = name.map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    if text.is_empty() { "logs".to_owned() } else { text }
 }
 
 /// Flights of several campaigns may have the same name: the folder's name tells them apart.

@@ -1,6 +1,7 @@
 //! What every command gets: where to print, how much to say, and whether to stop.
 
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,12 +9,13 @@ use serde::Serialize;
 
 use super::Global;
 use super::exit::CommandError;
+use crate::campaign::lock::FolderLock;
 
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an option of the command line")]
 pub(super) struct Context {
-    /// Say only what went wrong.
+    /// Say only what went wrong, and print only the path of the result.
     pub(super) quiet: bool,
     /// One JSON object on standard output instead of tables.
     pub(super) json: bool,
@@ -21,6 +23,8 @@ pub(super) struct Context {
     pub(super) color: bool,
     /// Whether progress bars make sense.
     pub(super) interactive: bool,
+    /// Columns of the terminal that standard output is read on; none for files and pipes.
+    pub(super) width: Option<usize>,
     stop: Arc<AtomicBool>,
 }
 
@@ -46,6 +50,7 @@ impl Context {
             json: global.json,
             color,
             interactive: io::stderr().is_terminal() && !global.quiet && !global.no_progress,
+            width: columns(),
             stop,
         };
         if let Err(error) = installed {
@@ -64,9 +69,32 @@ impl Context {
         if self.stop.load(Ordering::SeqCst) { Err(CommandError::Interrupted) } else { Ok(()) }
     }
 
-    /// Data, on standard output.
-    #[expect(clippy::unused_self, reason = "prints like the other methods")]
+    /// Locks a campaign folder for this process; dropped, it is free again.
+    pub(super) fn lock(&self, folder: &Path) -> Result<FolderLock, CommandError> {
+        let lock = FolderLock::take(folder)?;
+        if !lock.is_held() {
+            self.warn(&format!(
+                "{} cannot be locked on this file system: let no other updraft write into it",
+                folder.display()
+            ));
+        }
+        Ok(lock)
+    }
+
+    /// A table or a summary, on standard output, unless quiet.
     pub(super) fn print(&self, text: &str) -> Result<(), CommandError> {
+        if self.quiet { Ok(()) } else { self.emit(text) }
+    }
+
+    /// The file or folder that the command made: on standard output when that is all that is asked
+    /// for.
+    pub(super) fn result(&self, path: &Path) -> Result<(), CommandError> {
+        if self.quiet && !self.json { self.emit(&format!("{}\n", path.display())) } else { Ok(()) }
+    }
+
+    /// What the user asked for, on standard output, also when quiet.
+    #[expect(clippy::unused_self, reason = "prints like the other methods")]
+    pub(super) fn emit(&self, text: &str) -> Result<(), CommandError> {
         let mut out = io::stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
         match written {
@@ -83,7 +111,7 @@ impl Context {
         let mut text = serde_json::to_string_pretty(value)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
         text.push('\n');
-        self.print(&text)
+        self.emit(&text)
     }
 
     /// Talk, on standard error, unless quiet.
@@ -103,4 +131,18 @@ impl Context {
     pub(super) fn insist(&self, text: &str) {
         let _ = writeln!(io::stderr().lock(), "{text}");
     }
+}
+
+/// Narrowest terminal that lines are broken for.
+const MIN_COLUMNS: usize = 30;
+
+/// Columns that standard output has: `COLUMNS`, else the terminal's; none for files and pipes.
+fn columns() -> Option<usize> {
+    let asked = std::env::var("COLUMNS").ok().and_then(|text| text.trim().parse().ok());
+    // Asks standard output first, then the other streams: these may be a terminal although it is not.
+    let terminal = || {
+        let size = io::stdout().is_terminal().then(terminal_size::terminal_size).flatten();
+        size.map(|(width, _)| usize::from(width.0))
+    };
+    asked.or_else(terminal).filter(|columns| *columns >= MIN_COLUMNS)
 }

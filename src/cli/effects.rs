@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::context::Context;
 use super::effects_plot::{svg, text_plot};
 use super::exit::{CommandError, Exit};
+use super::words::wrap;
 use crate::base::file::write_whole;
 use crate::effects::definition::{Hook, Signal};
 use crate::effects::doc::{curve, number, size_text};
@@ -106,7 +107,7 @@ pub(super) fn run(context: &Context, args: &EffectsArgs) -> Result<Exit, Command
             if context.json {
                 context.print_json(&output(&vehicle, &[effect])?)?;
             } else {
-                context.print(&explained(effect, &vehicle)?)?;
+                context.emit(&explained(effect, &vehicle)?)?;
             }
         }
     }
@@ -144,7 +145,7 @@ fn list(context: &Context, vehicle: &Vehicle) -> Result<(), CommandError> {
         "\n* acts on this vehicle. Sizes are over the range that `updraft effects show NAME` plots; \
          effects\nof one class leave the same trace in a flight of the paper's protocol.\n"
     );
-    context.print(&text)
+    context.emit(&wrap(&text, context.width))
 }
 
 fn is_on(effect: &dyn Effect, vehicle: &Vehicle) -> bool {

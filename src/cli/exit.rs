@@ -16,22 +16,29 @@ use crate::sim::SimError;
 use crate::study::StudyError;
 use crate::vehicle::VehicleError;
 
-/// How a command ended. The numbers are documented in the README and do not change.
+/// What stands between an error and its reason.
+const BECAUSE: &str = "\n  because: ";
+
+/// How a command ended. One rule for every command: what is not there or cannot be read or written
+/// is 1, what is there but wrong is 2, what is right but empty is 5. The numbers are documented in the README and do not change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
     /// Done.
     Done = 0,
-    /// Something unexpected: a disk is full, a file cannot be read.
+    /// A file or folder is not there, or cannot be read or written; anything unexpected.
     Failed = 1,
-    /// The arguments or a template are wrong.
+    /// The arguments or a template are wrong, or a file is of the wrong kind or broken.
     Usage = 2,
     /// Done, but something was lost and is named.
     Losses = 3,
     /// A check failed: the show is not safe as it is.
     Unsafe = 4,
-    /// There was nothing to work on: no logs, no windows.
+    /// There was nothing to work on (no plan, no logs, no windows), or an analysis gave no law and no
+    /// map at all.
     Nothing = 5,
+    /// Another process is writing into the same folder.
+    Busy = 6,
     /// Interrupted by the user; the same command goes on where it stopped.
     Interrupted = 130,
 }
@@ -136,26 +143,28 @@ impl CommandError {
     /// The exit code for this error.
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Mission(error) if matches!(**error, MissionError::File(_)) => Exit::Failed,
-            Self::Load(error) if matches!(**error, LoadError::File(_)) => Exit::Failed,
-            Self::Study(error) if matches!(**error, StudyError::Record { .. }) => Exit::Failed,
-            Self::Study(error) if matches!(**error, StudyError::NoReference { .. }) => {
-                Exit::Nothing
-            }
-            Self::Vehicle(VehicleError::File(_))
+            Self::Mission(error) => of_mission(error),
+            Self::Vehicle(error) => of_vehicle(error),
+            Self::Campaign(error) => of_campaign(error),
+            Self::Load(error) => match &**error {
+                LoadError::File(_) => Exit::Failed,
+                LoadError::Campaign(error) => of_campaign(error),
+                LoadError::Vehicle(error) => of_vehicle(error),
+                _ => Exit::Usage,
+            },
+            Self::Study(error) => match &**error {
+                StudyError::Record { .. } => Exit::Failed,
+                StudyError::NoStudy { name } => of_name(name),
+                StudyError::NoReference { .. } => Exit::Nothing,
+                _ => Exit::Usage,
+            },
+            Self::Log(LogError::Open { .. })
             | Self::File(_)
             | Self::Write(_)
             | Self::Sim(_)
             | Self::Report(_)
             | Self::Failed(_) => Exit::Failed,
-            Self::Mission(_)
-            | Self::Study(_)
-            | Self::Vehicle(_)
-            | Self::Effect(_)
-            | Self::Campaign(_)
-            | Self::Load(_)
-            | Self::Log(_)
-            | Self::Usage(_) => Exit::Usage,
+            Self::Effect(_) | Self::Log(_) | Self::Usage(_) => Exit::Usage,
             Self::Nothing(_) => Exit::Nothing,
             Self::Interrupted => Exit::Interrupted,
             Self::BrokenPipe => Exit::Done,
@@ -163,7 +172,55 @@ impl CommandError {
     }
 }
 
+/// A file that is not there or cannot be read: 1. One that is wrong: 2.
+fn of_mission(error: &MissionError) -> Exit {
+    match error {
+        MissionError::File(_) => Exit::Failed,
+        MissionError::Vehicle(error) => of_vehicle(error),
+        MissionError::NoTemplate { name } => of_name(name),
+        _ => Exit::Usage,
+    }
+}
+
+fn of_vehicle(error: &VehicleError) -> Exit {
+    match error {
+        VehicleError::File(_) => Exit::Failed,
+        VehicleError::Unknown { name, .. } => of_name(name),
+        _ => Exit::Usage,
+    }
+}
+
+fn of_campaign(error: &CampaignError) -> Exit {
+    match error {
+        CampaignError::File(_) => Exit::Failed,
+        CampaignError::NoPlan { .. } => Exit::Nothing,
+        CampaignError::Busy { .. } => Exit::Busy,
+        _ => Exit::Usage,
+    }
+}
+
+/// What is neither a file nor built in: a path is a file that is not there, a word is a wrong name.
+fn of_name(name: &str) -> Exit {
+    let is_path = name.contains(['/', '\\', '.']);
+    if is_path { Exit::Failed } else { Exit::Usage }
+}
+
+/// An error as one line of JSON, for `--json`.
+pub(super) fn as_json(text: &str, exit: Exit) -> String {
+    let mut parts = text.split(BECAUSE);
+    let error = parts.next().unwrap_or_default();
+    let error = error.strip_prefix("error: ").unwrap_or(error);
+    let because: Vec<_> = parts.collect();
+    serde_json::json!({
+        "schema": "updraft.error/1",
+        "exit": exit as u8,
+        "error": error,
+        "because": because,
+    })
+    .to_string()
+}
+
 /// An error and its reasons, one below the other.
 pub(super) fn with_reasons(error: &dyn std::error::Error) -> String {
-    with_causes(error, "\n  because: ")
+    with_causes(error, BECAUSE)
 }

@@ -11,6 +11,7 @@ use super::exit::{CommandError, Exit};
 use super::load::{LoadError, MAX_SKYB_BYTES, has_extension, read_show};
 use super::show_text::{describe_show, describe_skyb};
 use super::timetable;
+use super::words::{shorten, wrap};
 use crate::base::file::read_whole;
 use crate::campaign::{self, FlightFolder};
 use crate::log::{Inventory, Log, ScanStats};
@@ -71,19 +72,25 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
     if context.json {
         context.print_json(&InspectDocument { schema: "updraft.inspect/1", found: &found })?;
     } else {
-        context.print(&match &found {
-            InspectOutput::Log(inventory) => describe_log(path, inventory),
-            InspectOutput::Show(show) => format!("{}: {}", path.display(), describe_show(show)),
-            InspectOutput::Skyb(file) => format!("{}: {}", path.display(), describe_skyb(file)),
-            InspectOutput::Plans(plans) => {
-                plans.iter().map(timetable::describe).collect::<Vec<_>>().join("\n")
+        let text = match &found {
+            InspectOutput::Log(inventory) => describe_log(path, inventory, context.width),
+            InspectOutput::Show(show) => {
+                format!("{}: {}", path.display(), describe_show(show, context.width))
             }
-        })?;
+            InspectOutput::Skyb(file) => format!("{}: {}", path.display(), describe_skyb(file)),
+            InspectOutput::Plans(plans) => plans
+                .iter()
+                .map(|plan| timetable::describe(plan, context.width))
+                .collect::<Vec<_>>()
+                .join("\n"),
+        };
+        context.emit(&wrap(&text, context.width))?;
     }
     Ok(Exit::Done)
 }
 
-fn describe_log(path: &Path, log: &Inventory) -> String {
+fn describe_log(path: &Path, log: &Inventory, width: Option<usize>) -> String {
+    let fields_width = width.map_or(60, |width| width.saturating_sub(37).clamp(12, 60));
     let mut text = format!("{}: {:.2} MB", path.display(), log.size_bytes as f64 / 1e6);
     if let Some(duration_s) = log.duration_s {
         let _ = write!(text, ", {duration_s:.1} s");
@@ -105,7 +112,7 @@ fn describe_log(path: &Path, log: &Inventory) -> String {
             message.count,
             message.bytes as f64 / 1e3,
             rate,
-            shorten(&fields.join(","), 60)
+            shorten(&fields.join(","), fields_width)
         );
     }
     text.push('\n');
@@ -130,12 +137,4 @@ fn describe_damage(text: &mut String, stats: ScanStats) {
             let _ = writeln!(text, "damage: {count} {what}");
         }
     }
-}
-
-fn shorten(text: &str, width: usize) -> String {
-    if text.chars().count() <= width {
-        return text.to_owned();
-    }
-    let kept: String = text.chars().take(width - 3).collect();
-    format!("{kept}...")
 }

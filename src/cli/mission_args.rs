@@ -13,10 +13,10 @@ pub(super) struct MissionArgs {
     #[arg(long, value_name = "RxC", value_parser = parse_grid)]
     pub(super) grid: Option<(i64, i64)>,
     /// Number of drones, when the grid is not full
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) drones: Option<i64>,
     /// Distance between neighbours, m
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub(super) spacing: Option<f64>,
     /// Latitude and longitude of the grid's centre, degrees
     #[arg(long, value_name = "LAT,LON", value_parser = parse_origin, allow_hyphen_values = true)]
@@ -31,25 +31,25 @@ pub(super) struct MissionArgs {
     #[arg(long, value_name = "NAME")]
     pub(super) vehicle: Option<String>,
     /// Speeds of the ladder in the order they are flown, m/s
-    #[arg(long, value_name = "V,V,...", value_delimiter = ',')]
+    #[arg(long, value_name = "V,V,...", allow_hyphen_values = true, value_delimiter = ',')]
     pub(super) speeds: Vec<f64>,
     /// Duration of each leg of the ladder, s
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(super) leg: Option<f64>,
     /// Duration of the hovers between legs, s
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(super) hover: Option<f64>,
     /// Height of the lower hovers above ground, m
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub(super) baseline: Option<f64>,
     /// Height of the measurement hover above ground, m
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub(super) height: Option<f64>,
     /// Duration of the measurement hover, s
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(super) duration: Option<f64>,
     /// Acceleration of ramps between legs, m/s² (0: steps)
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
     pub(super) ramp: Option<f64>,
     /// Any other value of the template: --set grid.spacing_m=5, --set hover.duration_s=60
     #[arg(long, value_name = "KEY=VALUE")]

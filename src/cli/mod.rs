@@ -1,13 +1,17 @@
 //! The command line: arguments, one file per subcommand, exit codes.
 
 mod analyze;
+mod campaign_files;
 mod check;
 mod clock;
 mod context;
 mod effects;
 mod effects_plot;
 pub mod exit;
+mod flown;
+mod found;
 mod inspect;
+mod leaning;
 mod load;
 mod mission_args;
 mod physics;
@@ -24,6 +28,7 @@ mod words;
 use std::io::Write as _;
 use std::process::ExitCode;
 
+use clap::builder::FalseyValueParser;
 use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 
 use context::Context;
@@ -48,8 +53,10 @@ use exit::{CommandError, Exit};
   updraft analyze my-campaign                     also a folder of logs, or one log
   updraft inspect my-campaign/show.skyc
 
-Exit codes: 0 done, 1 failed, 2 wrong arguments or template, 3 done with losses,
-4 a check failed, 5 nothing to work on, 130 interrupted."
+Exit codes: 0 done; 1 failed: a file or folder is not there, or cannot be read or written; 2 wrong
+arguments or template, or a file that is of the wrong kind or broken; 3 done with losses; 4 a check
+failed; 5 nothing to work on: a folder without plan or logs, or no result at all;
+6 another updraft is writing there; 130 interrupted."
 )]
 pub struct Cli {
     #[command(flatten)]
@@ -62,16 +69,30 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 pub struct Global {
     /// One JSON object on standard output instead of tables
+    ///
+    /// When the command fails, standard output stays empty and the last line of standard error is one
+    /// JSON object with the schema updraft.error/1; warnings are lines of text there.
     #[arg(long, global = true)]
     json: bool,
-    /// Say only what went wrong
+    /// Say only what is wrong, and print only the path of what was made
+    ///
+    /// Standard error then has warnings and errors alone, standard output one line: the folder
+    /// (plan), the page (analyze, run, sweep), or nothing (check, simulate, physics). What was asked
+    /// for itself is printed as ever: --json, inspect, effects, completions, man, schema.
     #[arg(short, long, global = true)]
     quiet: bool,
     /// When to use colours (NO_COLOR is honoured)
     #[arg(long, global = true, value_enum, default_value_t = ColorChoice::Auto)]
     color: ColorChoice,
     /// No progress bars
-    #[arg(long, global = true, env = "UPDRAFT_NO_PROGRESS")]
+    #[arg(
+        long,
+        global = true,
+        env = "UPDRAFT_NO_PROGRESS",
+        action = clap::ArgAction::SetTrue,
+        value_parser = FalseyValueParser::new(),
+        hide_env_values = true
+    )]
     no_progress: bool,
 }
 
@@ -107,13 +128,10 @@ enum Command {
     /// Say what is in a file
     Inspect(inspect::InspectArgs),
     /// Print a shell's completion script
-    #[command(hide = true)]
     Completions(tools::CompletionsArgs),
     /// Print the manual page
-    #[command(hide = true)]
     Man,
     /// Print the JSON schema of a file format
-    #[command(hide = true)]
     Schema(tools::SchemaArgs),
 }
 
@@ -122,7 +140,13 @@ pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            let _ = error.print();
+            let asked = std::env::args_os().any(|word| word == "--json");
+            if error.use_stderr() && asked {
+                let text = error.to_string();
+                complain(&exit::as_json(text.trim_end(), Exit::Usage));
+            } else {
+                let _ = error.print();
+            }
             return if error.use_stderr() { Exit::Usage.into() } else { Exit::Done.into() };
         }
     };
@@ -133,11 +157,20 @@ pub fn main() -> ExitCode {
             if !matches!(error, CommandError::BrokenPipe) {
                 let text = exit::with_reasons(&error);
                 let prefix = if text.starts_with("error") { "" } else { "error: " };
-                let _ = writeln!(std::io::stderr().lock(), "{prefix}{text}");
+                if context.json {
+                    complain(&exit::as_json(&text, error.exit()));
+                } else {
+                    complain(&format!("{prefix}{text}"));
+                }
             }
             error.exit().into()
         }
     }
+}
+
+/// The last line on standard error.
+fn complain(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
 fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::check::{checked, say_findings};
+use super::check::{Origin, allowed, checked, few, is_safe, known, say_findings, verdict};
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
@@ -34,11 +34,19 @@ pub(super) struct PlanArgs {
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// Replace another plan in the folder
+    ///
+    /// Overwrites template.toml, vehicle.toml, plan.json, show.skyc, show.csv.zip and skyb/NN.skyb
+    /// (in a campaign also campaign.toml and campaign.json), and deletes skyb/NN.skyb of slots that
+    /// the new plan does not have. Everything else stays as it is. A folder with logs of another plan
+    /// is refused: logs are never deleted or overwritten.
     #[arg(long)]
     force: bool,
     /// Plan and check, write nothing
     #[arg(long)]
     dry_run: bool,
+    /// List every finding, not only the first few of each kind (--json always does)
+    #[arg(short, long)]
+    verbose: bool,
     /// Write the show although this check fails (by its name; may be repeated)
     #[arg(long, value_name = "CHECK")]
     allow: Vec<String>,
@@ -62,23 +70,29 @@ struct FlightOutput<'a> {
 
 pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start();
+    known(&args.allow)?;
+    let few = few(context, args.verbose);
     let mission = args.mission.resolve(&args.template)?;
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(&mission.name));
     let mut reports = Vec::new();
     let mut safe = true;
     for flight in &mission.flights {
         let show = Show::of_plan(&flight.plan);
-        let report = checked(&show, &flight.plan, &flight.vehicle, &args.allow)?;
+        let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few);
         if !context.json {
-            context.print(&timetable::describe(&flight.plan))?;
+            context.print(&words::wrap(
+                &timetable::describe(&flight.plan, context.width),
+                context.width,
+            ))?;
             context.print("\n")?;
         }
         say_findings(context, &report, &args.allow);
-        safe &= super::check::is_safe(&report, &args.allow);
+        safe &= is_safe(&report, &args.allow);
         reports.push((show, report));
     }
     let written = safe && !args.dry_run;
     if written {
+        let _lock = context.lock(&folder)?;
         write(context, &mission, &reports, &folder, args.force)?;
     }
     if context.json {
@@ -97,9 +111,14 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         context.insist("Nothing was written: the show is not safe as it is");
         return Ok(Exit::Unsafe);
     }
+    let allowed = allowed(reports.iter().map(|(_, report)| report), &args.allow);
+    if !allowed.is_empty() {
+        context.insist(&format!("{}: written as asked for", verdict(true, &allowed)));
+    }
     if args.dry_run {
         context.say(&format!("Would write {}", folder.display()));
     } else {
+        context.result(&folder)?;
         context.say(&format!(
             "Planned {} in {watch} -> {}",
             what_for_whom(&mission),

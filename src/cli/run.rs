@@ -5,13 +5,15 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::analyze::{AnalyzeOptions, analyze_campaign};
-use super::check::{checked, is_safe, say_findings};
+use super::check::{Origin, checked, few, is_safe, say_findings};
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::mission_args::MissionArgs;
 use super::plan::{what_for_whom, write};
-use super::simulate::{AirArgs, AirSpecs, Simulation, air_help, air_specs, simulate, updraft};
+use super::simulate::{
+    AirArgs, AirSpecs, Simulation, air_help, air_specs, simulate, speed, updraft,
+};
 use crate::campaign;
 use crate::mission::plan::Purpose;
 use crate::show::Show;
@@ -25,8 +27,8 @@ use crate::show::Show;
   updraft run --air field-day --truth -o field-day
 
 The calibration is flown in still air unless --calibration-updraft, --calibration-wind or
---calibration-air say otherwise; the measurement in the air that --updraft, --wind and --air say. The
-same command goes on where an interrupted one stopped.
+--calibration-air say otherwise; the measurement in the air that --updraft, --wind and --air say.
+The same command goes on where an interrupted one stopped.
 
 {}", air_help()))]
 pub(super) struct RunArgs {
@@ -36,7 +38,8 @@ pub(super) struct RunArgs {
     /// Campaign folder
     #[arg(short, long, value_name = "FOLDER", default_value = "my-campaign")]
     output: PathBuf,
-    /// Replace another plan in the folder, and logs simulated with other settings
+    /// Replace another plan in the folder (see `plan --force`), and logs simulated with other
+    /// settings; logs of real drones and of another plan are never touched
     #[arg(long)]
     force: bool,
     /// Vertical air speed in measurement flights, m/s, up positive [default: 1, or 0 with --air]
@@ -46,7 +49,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
     calibration_updraft: f64,
     /// Horizontal wind speed in calibration flights, m/s
-    #[arg(long, value_name = "MPS", default_value_t = 0.0)]
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = speed, allow_negative_numbers = true)]
     calibration_wind: f64,
     /// Air to add in calibration flights, repeatable; as --air
     #[arg(long, value_name = "SPEC", value_parser = air_specs)]
@@ -63,7 +66,8 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     let mut shows = Vec::new();
     for flight in &mission.flights {
         let show = Show::of_plan(&flight.plan);
-        let report = checked(&show, &flight.plan, &flight.vehicle, &[])?;
+        let report =
+            checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few(context, false));
         say_findings(context, &report, &[]);
         if !is_safe(&report, &[]) {
             context.insist("Nothing was flown: the show is not safe as it is");
@@ -71,6 +75,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
         }
         shows.push((show, report));
     }
+    let _lock = context.lock(&args.output)?;
     write(context, &mission, &shows, &args.output, args.force)?;
     context.say(&format!(
         "Planned {} in {watch} -> {}",

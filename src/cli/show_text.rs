@@ -9,8 +9,8 @@ use crate::show::summary::{DroneSummary, ShowSummary, SkybSummary};
 /// Drones listed one by one.
 const MAX_ROWS: usize = 60;
 
-/// A show: head, bounds, one line per drone.
-pub(super) fn describe_show(show: &ShowSummary) -> String {
+/// A show: head, bounds, one line per drone with as many columns as fit.
+pub(super) fn describe_show(show: &ShowSummary, width: Option<usize>) -> String {
     let mut text = String::new();
     let count = show.drones.len();
     let title = show.title.as_deref().map_or(String::new(), |title| format!("\"{title}\", "));
@@ -43,21 +43,14 @@ pub(super) fn describe_show(show: &ShowSummary) -> String {
     if !extras.is_empty() {
         let _ = writeln!(text, "{}", extras.join(", "));
     }
-    let _ = writeln!(
-        text,
-        "\n{:<14} {:>24} {:>9} {:>7} {:>6} {:>6} {:>9} {:>15} {:>15}",
-        "drone",
-        "start m",
-        "lasts s",
-        "pieces",
-        "skyb B",
-        "unit",
-        "error mm",
-        "flown by 4.4, s",
-        "flown by 4.6, s"
-    );
+    let columns = fitting(width);
+    text.push('\n');
+    push_row(&mut text, &COLUMNS.map(|(name, _)| name.to_owned()), columns);
     for drone in show.drones.iter().take(MAX_ROWS) {
-        describe_drone(&mut text, drone);
+        push_row(&mut text, &drone_cells(drone), columns);
+    }
+    if columns < COLUMNS.len() {
+        text.push_str("(a wider terminal shows more columns)\n");
     }
     if count > MAX_ROWS {
         let _ = writeln!(text, "... and {} more", count - MAX_ROWS);
@@ -86,7 +79,45 @@ fn describe_remarks(text: &mut String, show: &ShowSummary) {
     }
 }
 
-fn describe_drone(text: &mut String, drone: &DroneSummary) {
+/// Heads and widths of the table of drones.
+const COLUMNS: [(&str, usize); 9] = [
+    ("drone", 14),
+    ("start m", 24),
+    ("lasts s", 9),
+    ("pieces", 7),
+    ("skyb B", 6),
+    ("unit", 6),
+    ("error mm", 9),
+    ("flown by 4.4, s", 15),
+    ("flown by 4.6, s", 15),
+];
+
+/// How many columns of the table fit a terminal.
+fn fitting(width: Option<usize>) -> usize {
+    let Some(width) = width else { return COLUMNS.len() };
+    let mut used = 0;
+    COLUMNS
+        .iter()
+        .take_while(|(_, column)| {
+            used += column + 1;
+            used <= width + 1
+        })
+        .count()
+        .max(1)
+}
+
+fn push_row(text: &mut String, cells: &[String; COLUMNS.len()], columns: usize) {
+    for (index, (cell, (_, width))) in cells.iter().zip(COLUMNS).take(columns).enumerate() {
+        let _ = if index == 0 {
+            write!(text, "{cell:<width$}")
+        } else {
+            write!(text, " {cell:>width$}")
+        };
+    }
+    text.push('\n');
+}
+
+fn drone_cells(drone: &DroneSummary) -> [String; COLUMNS.len()] {
     let [x, y, z] = drone.start_m;
     let takeoff = |time: Option<f64>, landing: f64| {
         time.map_or("refused".to_owned(), |time| format!("{time:.2}..{landing:.1}"))
@@ -99,16 +130,17 @@ fn describe_drone(text: &mut String, drone: &DroneSummary) {
         ),
         None => ("none".to_owned(), String::new(), String::new()),
     };
-    let _ = writeln!(
-        text,
-        "{:<14} {:>24} {:>9.3} {:>7} {bytes:>6} {unit:>6} {error:>9} {:>15} {:>15}",
-        drone.name,
+    [
+        drone.name.clone(),
         format!("{x:.2}, {y:.2}, {z:.2}"),
-        drone.duration_s,
-        drone.pieces.iter().sum::<usize>(),
+        format!("{:.3}", drone.duration_s),
+        drone.pieces.iter().sum::<usize>().to_string(),
+        bytes,
+        unit,
+        error,
         takeoff(drone.derived_44.takeoff_s, drone.derived_44.landing_s),
         takeoff(drone.derived_46.takeoff_s, drone.derived_46.landing_s),
-    );
+    ]
 }
 
 /// One binary show: blocks, lights, trajectory.

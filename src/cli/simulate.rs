@@ -11,31 +11,25 @@ use sha2::{Digest, Sha256};
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::flown::{changed_logs, prepare, taken_down, write_record};
 use super::progress::Progress;
 use super::words;
-use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
-use crate::base::time::GpsTime;
-use crate::campaign::{self, FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
+use crate::campaign::{self, FlightFolder};
 use crate::effects;
 use crate::mission::Plan;
+use crate::mission::plan::Slot;
 use crate::show::{Show, Trajectory};
 use crate::sim::air::spec::{self, Air, AirSpec};
 use crate::sim::air::truth;
 use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, fly_to_file};
 use crate::vehicle::{Vehicle, library};
 
-/// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
-/// same seed gives the same bytes.
-const START_UNIX_MS: i64 = 1_780_315_200_000;
-/// Largest plan that is hashed, bytes.
-const MAX_PLAN_BYTES: u64 = 256 << 20;
-
 /// Motion of the air and seed of a simulated flight, shared by `simulate` and `run`.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Simulation")]
 pub(super) struct AirArgs {
     /// Horizontal wind speed, m/s
-    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = speed)]
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = speed, allow_negative_numbers = true)]
     pub(super) wind: f64,
     /// Where the wind comes from, degrees clockwise from north
     #[arg(long, value_name = "DEG", default_value_t = 270.0, allow_hyphen_values = true)]
@@ -86,7 +80,8 @@ pub(super) fn air_help() -> String {
     )
 }
 
-fn speed(text: &str) -> Result<f64, String> {
+/// Parser of wind speeds.
+pub(super) fn speed(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=30.0).contains(&value) => Ok(value),
         _ => Err("a wind speed between 0 and 30 m/s".to_owned()),
@@ -121,7 +116,7 @@ impl AirArgs {
   updraft simulate my-campaign --drones 1-10,12 --full-logs
 
 Logs that are there and were flown with the same settings are kept: an interrupted run goes on where
-it stopped.
+it stopped. Logs that are not as they were flown (cut short, damaged) are flown again.
 
 {}", air_help()))]
 pub(super) struct SimulateArgs {
@@ -130,8 +125,8 @@ pub(super) struct SimulateArgs {
     /// Only this flight of the campaign
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
-    /// Only these slots: 1-10,12
-    #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
+    /// Only these slots: 1-10,12 (a slot named twice is flown once)
+    #[arg(long, value_name = "SLOTS", value_parser = parse_slots, allow_hyphen_values = true)]
     drones: Option<SlotSet>,
     /// Vertical air speed, m/s, up positive
     #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
@@ -216,6 +211,7 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
         only: args.drones.clone(),
         force: args.force,
     };
+    let _lock = context.lock(&args.campaign)?;
     let mut flights = Vec::new();
     for folder in &folders {
         let plan = folder.read_plan()?;
@@ -265,8 +261,15 @@ pub(super) fn simulate(
         .iter()
         .filter(|slot| simulation.only.as_ref().is_none_or(|set| set.0.contains(&slot.slot)))
         .collect();
-    let open: Vec<_> =
-        wanted.iter().copied().filter(|slot| !folder.log(slot.slot, count).exists()).collect();
+    let changed = changed_logs(folder, &record, &wanted, count)?;
+    for (slot, how) in &changed {
+        let path = folder.log(*slot, count);
+        context.warn(&format!("{} is not as it was flown ({how}): flown again", path.display()));
+    }
+    record.logs.retain(|log| !changed.contains_key(&log.slot));
+    let is_open =
+        |slot: &&Slot| changed.contains_key(&slot.slot) || !folder.log(slot.slot, count).exists();
+    let open: Vec<_> = wanted.iter().copied().filter(is_open).collect();
     let kept = wanted.len() - open.len();
     let start = record.start;
     let frame = plan.site.frame();
@@ -309,6 +312,8 @@ pub(super) fn simulate(
         })
         .collect();
     progress.finish();
+    record.logs = taken_down(folder, plan, &record, &open)?;
+    write_record(folder, &record)?;
     context.check_stop()?;
     let mut failed = Vec::new();
     let mut saturated = Vec::new();
@@ -319,8 +324,6 @@ pub(super) fn simulate(
             Err(error) => failed.push(super::exit::with_reasons(&error)),
         }
     }
-    record.logs = present_logs(folder, plan)?;
-    write_record(folder, &record)?;
     let bytes = record.logs.iter().map(|log| log.bytes).sum();
     for error in &failed {
         context.warn(error);
@@ -345,104 +348,6 @@ pub(super) fn simulate(
         failed,
         saturated,
     })
-}
-
-/// The folder's record: a matching one is continued, another one refused or replaced.
-fn prepare(
-    folder: &FlightFolder,
-    plan: &Plan,
-    simulation: &Simulation,
-    vehicle: &Vehicle,
-) -> Result<FlightRecord, CommandError> {
-    let plan_bytes = read_whole(&folder.plan(), MAX_PLAN_BYTES)?;
-    let vehicle_text = toml::to_string(vehicle)
-        .map_err(|error| CommandError::Failed(format!("failed to write the vehicle: {error}")))?;
-    let start = GpsTime::from_unix_ms(START_UNIX_MS)
-        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
-    let record = FlightRecord {
-        schema: FLIGHT_SCHEMA.to_owned(),
-        made_by: made_by(),
-        source: "simulator".to_owned(),
-        seed: simulation.seed,
-        vehicle: vehicle.name.clone(),
-        vehicle_sha256: sha256(vehicle_text.as_bytes()),
-        air_mps: simulation.air.uniform_mps,
-        air: simulation.air.texts(),
-        start,
-        full_logs: simulation.full_logs,
-        plan_sha256: sha256(&plan_bytes),
-        logs: Vec::new(),
-    };
-    create_folder(&folder.logs())?;
-    sweep_partial(&folder.logs())?;
-    match folder.read_record()? {
-        Some(existing) if existing.source != record.source => {
-            return Err(CommandError::Usage(format!(
-                "{} holds logs of real drones; simulate into another campaign",
-                folder.logs().display()
-            )));
-        }
-        Some(existing) => {
-            let same = FlightRecord { logs: Vec::new(), ..existing } == record;
-            if !same && !simulation.force {
-                return Err(CommandError::Usage(format!(
-                    "{} holds logs flown with other settings; give --force to replace them, or use \
-                     another folder",
-                    folder.logs().display()
-                )));
-            }
-            if !same {
-                remove_logs(folder, plan)?;
-            }
-        }
-        None if !present_logs(folder, plan)?.is_empty() => {
-            return Err(CommandError::Usage(format!(
-                "{} holds logs that this program did not simulate; use another folder",
-                folder.logs().display()
-            )));
-        }
-        None => {}
-    }
-    write_record(folder, &record)?;
-    Ok(record)
-}
-
-/// Removes a flight's logs and the truth that they were flown in.
-fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
-    let logs = present_logs(folder, plan)?;
-    let paths = logs.iter().map(|log| folder.logs().join(&log.file));
-    let truths = plan.slots.iter().map(|slot| folder.truth(slot.slot, plan.slots.len()));
-    for path in paths.chain(truths.filter(|path| path.exists())) {
-        std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
-    }
-    Ok(())
-}
-
-/// The logs of a plan's slots that are there.
-fn present_logs(folder: &FlightFolder, plan: &Plan) -> Result<Vec<LogRecord>, CommandError> {
-    let count = plan.slots.len();
-    let mut logs = Vec::new();
-    for slot in &plan.slots {
-        let path = folder.log(slot.slot, count);
-        match std::fs::metadata(&path) {
-            Ok(metadata) => logs.push(LogRecord {
-                slot: slot.slot,
-                file: path
-                    .file_name()
-                    .map_or_else(String::new, |name| name.to_string_lossy().into()),
-                bytes: metadata.len(),
-            }),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => return Err(FileError::new("read", &path, error).into()),
-        }
-    }
-    Ok(logs)
-}
-
-fn write_record(folder: &FlightFolder, record: &FlightRecord) -> Result<(), CommandError> {
-    let json = to_json(record)
-        .map_err(|error| CommandError::Failed(format!("failed to make the record: {error}")))?;
-    Ok(write_whole(&folder.record(), &json)?)
 }
 
 /// Program and version, for records.

@@ -16,8 +16,9 @@ use crate::report::{self, Provenance};
 use crate::study::result::StudyResult;
 use crate::study::{Settings, StudyPlan, Work, evaluate};
 
-/// Width of the terminal summary, columns.
+/// Width of the terminal summary, columns: at most, and at least.
 const WIDTH: usize = 100;
+const MIN_WIDTH: usize = 60;
 
 /// Arguments of `updraft sweep`.
 #[derive(Debug, Args)]
@@ -65,6 +66,7 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
     let watch = Stopwatch::start();
     let study = StudyPlan::load(&args.study)?;
     refuse_campaign(&args.output)?;
+    let _lock = context.lock(&args.output)?;
     let settings = Settings { seed: args.seed, keep_logs: args.keep_logs, force: args.force };
     let work = Work::open(&study, &args.output, settings)?;
     let (total, open) = (work.total(), work.open_flights());
@@ -91,7 +93,8 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
         context.warn(&format!("{}: {}", lost.name, lost.reason));
     }
     if !context.json {
-        context.print(&report::study_summary(&result, WIDTH, context.color))?;
+        let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
+        context.print(&report::study_summary(&result, width, context.color))?;
     }
     let page = write(args, &result)?;
     if context.json {
@@ -103,6 +106,7 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
             study: &result,
         })?;
     }
+    context.result(&page)?;
     context.say(&format!(
         "Flew {} flights in {flying}, all done in {watch} -> {}",
         flown.flown,

@@ -2,14 +2,41 @@
 
 use std::fmt::Write as _;
 
-use super::words::count;
+use super::words::{count, shorten};
 use crate::mission::plan::{Group, Kind, Plan, Segment};
 
 /// Most rows of a timetable before the middle is left out.
 const MAX_ROWS: usize = 60;
 
-/// The plan's head and the timetable of each group.
-pub(super) fn describe(plan: &Plan) -> String {
+/// Columns of a row without its label and window.
+const BARE: usize = 39;
+/// Columns of the label, at most and at least.
+const LABEL: [usize; 2] = [28, 12];
+/// Columns that the window takes at most.
+const WINDOW: usize = 17;
+
+/// What fits a row.
+#[derive(Clone, Copy)]
+struct Room {
+    label: usize,
+    windows: bool,
+}
+
+impl Room {
+    fn of(width: Option<usize>) -> Self {
+        let [most, least] = LABEL;
+        match width {
+            Some(width) if width < BARE + most + WINDOW => {
+                Self { label: width.saturating_sub(BARE).clamp(least, most), windows: false }
+            }
+            _ => Self { label: most, windows: true },
+        }
+    }
+}
+
+/// The plan's head and the timetable of each group; narrow terminals get no window column.
+pub(super) fn describe(plan: &Plan, width: Option<usize>) -> String {
+    let room = Room::of(width);
     let mut text = String::new();
     let _ = write!(text, "{}: {}", plan.title, count(plan.slots.len(), "drone"));
     if let Some(grid) = plan.grid {
@@ -27,7 +54,10 @@ pub(super) fn describe(plan: &Plan) -> String {
         plan.vehicle
     );
     for group in &plan.groups {
-        describe_group(&mut text, plan, group);
+        describe_group(&mut text, plan, group, room);
+    }
+    if !room.windows {
+        text.push_str("(a wider terminal shows the analysis windows too)\n");
     }
     for line in &plan.briefing {
         let _ = writeln!(text, "note: {line}");
@@ -35,7 +65,7 @@ pub(super) fn describe(plan: &Plan) -> String {
     text
 }
 
-fn describe_group(text: &mut String, plan: &Plan, group: &Group) {
+fn describe_group(text: &mut String, plan: &Plan, group: &Group, room: Room) {
     if plan.groups.len() > 1 {
         let index = plan.groups.iter().position(|other| std::ptr::eq(other, group));
         let members =
@@ -50,8 +80,14 @@ fn describe_group(text: &mut String, plan: &Plan, group: &Group) {
     }
     let _ = writeln!(
         text,
-        "\n{:>8}  {:<28} {:>8} {:>9} {:>9}  window s",
-        "time", "segment", "lasts s", "height m", "m/s"
+        "\n{:>8}  {:<label$} {:>8} {:>9} {:>9}{}",
+        "time",
+        "segment",
+        "lasts s",
+        "height m",
+        "m/s",
+        if room.windows { "  window s" } else { "" },
+        label = room.label,
     );
     let shown: Vec<_> =
         group.segments.iter().filter(|segment| segment.kind != Kind::Ramp).collect();
@@ -62,14 +98,14 @@ fn describe_group(text: &mut String, plan: &Plan, group: &Group) {
             }
             continue;
         }
-        describe_segment(text, segment);
+        describe_segment(text, segment, room);
     }
     if let Some(last) = group.segments.last() {
         let _ = writeln!(text, "{:>8}  end", clock(last.end_ms));
     }
 }
 
-fn describe_segment(text: &mut String, segment: &Segment) {
+fn describe_segment(text: &mut String, segment: &Segment, room: Room) {
     let [vx, vy, vz] = segment.velocity_mps;
     let speed = if vx == 0.0 && vy == 0.0 {
         if vz == 0.0 { String::new() } else { format!("{vz:+.2}") }
@@ -81,18 +117,19 @@ fn describe_segment(text: &mut String, segment: &Segment) {
     } else {
         format!("-> {:.1}", segment.to_m[2])
     };
-    let window = segment.window.map_or(String::new(), |window| {
+    let window = segment.window.filter(|_| room.windows).map_or(String::new(), |window| {
         let at = |ms: u64| ms as f64 / 1000.0;
         format!("{:.1}..{:.1}", at(window.start_ms), at(window.end_ms))
     });
     let line = format!(
-        "{:>8}  {:<28} {:>8.1} {:>9} {:>9}  {}",
+        "{:>8}  {:<label$} {:>8.1} {:>9} {:>9}  {}",
         clock(segment.start_ms),
-        segment.label,
+        shorten(&segment.label, room.label),
         (segment.end_ms - segment.start_ms) as f64 / 1000.0,
         height,
         speed,
-        window
+        window,
+        label = room.label,
     );
     let _ = writeln!(text, "{}", line.trim_end());
 }

@@ -72,7 +72,7 @@ pub(super) fn completions(
 ) -> Result<Exit, CommandError> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "updraft", &mut script);
-    context.print(&String::from_utf8_lossy(&script))?;
+    context.emit(&String::from_utf8_lossy(&script))?;
     Ok(Exit::Done)
 }
 
@@ -81,7 +81,7 @@ pub(super) fn man(context: &Context, command: clap::Command) -> Result<Exit, Com
     clap_mangen::Man::new(command)
         .render(&mut page)
         .map_err(|error| CommandError::Failed(format!("failed to make the page: {error}")))?;
-    context.print(&String::from_utf8_lossy(&page))?;
+    context.emit(&String::from_utf8_lossy(&page))?;
     Ok(Exit::Done)
 }
 
@@ -90,6 +90,6 @@ pub(super) fn schema(context: &Context, args: &SchemaArgs) -> Result<Exit, Comma
         .format
         .schema()
         .map_err(|error| CommandError::Failed(format!("failed to make the schema: {error}")))?;
-    context.print(&schema)?;
+    context.emit(&schema)?;
     Ok(Exit::Done)
 }

@@ -63,14 +63,21 @@ impl Messages {
         Self::select(log, WANTED)
     }
 
-    /// Only what tells drones apart: parameters and places.
+    /// Only what tells drones apart: parameters, places, and when it flew.
     pub(super) fn read_identity(log: &Log) -> Self {
         let wanted: Vec<Select<'static>> = WANTED
             .iter()
-            .filter(|select| matches!(select.message, "PARM" | "GPS"))
+            .filter(|select| matches!(select.message, "PARM" | "GPS" | "ARM" | "EV" | "SHOW"))
             .copied()
+            .chain([Select { message: "RCOU", fields: &["TimeUS", "TimeMS", "C1", "Ch1"] }])
             .collect();
         Self::select(log, &wanted)
+    }
+
+    /// When motor outputs were logged, as the times of a channel.
+    pub(super) fn output_times(&self) -> Option<Series> {
+        let rows = self.rows("RCOU")?;
+        rows.series("C1", |pulse| pulse).or_else(|| rows.series("Ch1", |pulse| pulse))
     }
 
     /// MAVLink system id.
@@ -300,7 +307,12 @@ impl Messages {
 
     /// Latitude and longitude of GPS rows with a 3-D fix: (board time s, degrees, degrees).
     pub(super) fn places(&self) -> Vec<(f64, f64, f64)> {
-        self.fixes("Lat", "Lng")
+        let mut places = self.fixes("Lat", "Lng");
+        // Damaged rows, and receivers that claim a fix at 0, 0 before they have one.
+        places.retain(|(_, lat, lon)| {
+            lat.abs() <= 90.0 && lon.abs() <= 180.0 && (*lat != 0.0 || *lon != 0.0)
+        });
+        places
     }
 
     fn fixes(&self, first: &str, second: &str) -> Vec<(f64, f64, f64)> {

@@ -11,6 +11,10 @@ use crate::log::Log;
 const MARGIN_S: f64 = 2.0;
 /// A silence in a channel longer than this is worth a warning, s.
 const GAP_S: f64 = 1.0;
+/// A vehicle that never rises above this did not fly, m.
+const LEAST_HEIGHT_M: f64 = 0.5;
+/// A log that ends higher than this with its motors running was cut off, m.
+const CUT_OFF_M: f64 = 1.0;
 /// Motors that never exceed their lower limit by this much did not fly, us.
 const IDLE_US: f64 = 20.0;
 
@@ -90,6 +94,21 @@ pub(super) fn load(
         .first()
         .is_some_and(|first| *first > pulse_limits_us.0 + IDLE_US);
     let ground_m = if starts_in_air { 0.0 } else { ground_height_m(&ekf.height, flight.0) };
+    let heights = ekf.height.between(flight.0, flight.1).iter().copied();
+    let highest_m = heights.fold(f64::NEG_INFINITY, f64::max);
+    if !starts_in_air && highest_m.is_finite() && highest_m - ground_m < LEAST_HEIGHT_M {
+        return Err(no_flight(format!(
+            "the motors ran, but the vehicle never rose {LEAST_HEIGHT_M} m above the ground"
+        )));
+    }
+    let running = pulse.value.last().is_some_and(|last| *last > pulse_limits_us.0 + IDLE_US);
+    let cut_off_at_m = running.then(|| end_height_m(&pulse, &ekf.height, flight.1, ground_m));
+    let cut_off_at_m = cut_off_at_m.flatten().filter(|height| *height > CUT_OFF_M);
+    if let Some(height) = cut_off_at_m {
+        warnings.push(format!(
+            "the log ends in the air, {height:.1} m above the ground; what it holds is analysed"
+        ));
+    }
     let mut height_m = cut(ekf.height);
     for height in &mut height_m.value {
         *height -= ground_m;
@@ -129,11 +148,19 @@ pub(super) fn load(
         stages: stages.into_iter().map(|(time, stage)| (show(time), stage)).collect(),
         armed_s: armed.into_iter().map(|(start, end)| (show(start), show(end))).collect(),
         pulse_limits_us,
+        cut_off_at_m,
         first_fix_deg: place.map(|(_, latitude, longitude)| (latitude, longitude)),
         scan: messages.scan,
         clock,
         warnings,
     })
+}
+
+/// How high the vehicle was at the end of its log, if it was still armed then, m.
+fn end_height_m(pulse: &Series, height: &Series, disarmed_s: f64, ground_m: f64) -> Option<f64> {
+    let end = pulse.span()?.1.min(height.span()?.1);
+    let armed = disarmed_s >= end - GAP_S;
+    height.value.last().filter(|_| armed).map(|height| height - ground_m)
 }
 
 fn scan_warnings(messages: &Messages) -> Vec<String> {

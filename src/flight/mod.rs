@@ -81,6 +81,9 @@ pub struct Flight {
     pub pulse_limits_us: (f64, f64),
     /// Place where the vehicle was armed or first had a fix: (latitude, longitude), degrees.
     pub first_fix_deg: Option<(f64, f64)>,
+    /// How high above its home the vehicle was when the log ended with its motors running, m;
+    /// `None`: the log goes on until the vehicle is on the ground.
+    pub cut_off_at_m: Option<f64>,
     /// What the reader met besides good messages.
     pub scan: ScanStats,
     /// What is doubtful about this log, one sentence each.
@@ -134,20 +137,46 @@ pub enum FlightError {
     },
 }
 
+/// A first fix this long after arming is still near home, s.
+const SOON_S: f64 = 10.0;
+
 /// What a log says about who wrote it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Identity {
     /// MAVLink system id, if the log has the parameter.
     pub system_id: Option<u8>,
-    /// First place with a 3-D fix: (latitude, longitude), degrees. Logging begins at arming.
-    pub first_fix_deg: Option<(f64, f64)>,
+    /// Where the vehicle stood when it was armed for its flight: (latitude, longitude), degrees.
+    /// Without a flight, the first place with a 3-D fix; `None` as well if it was in the air before
+    /// it had one.
+    pub home_deg: Option<(f64, f64)>,
+    /// Whether the log holds a flight: motors armed for some seconds, with their outputs.
+    pub flew: bool,
 }
 
 /// Reads only what tells drones apart.
 pub fn identify(log: &Log) -> Identity {
-    let messages = channels::Messages::read_identity(log);
-    let first_fix_deg = messages.places().first().map(|(_, lat, lon)| (*lat, *lon));
-    Identity { system_id: messages.system_id(), first_fix_deg }
+    let mut messages = channels::Messages::read_identity(log);
+    messages.keep_one_boot();
+    let flight = messages.output_times().and_then(|times| {
+        let armed = pick::armed(&messages, &times);
+        pick::flight(&armed, &pick::stages(&messages), &times)
+    });
+    let places = messages.places();
+    let home = match &flight {
+        // The last fix on the ground, else the first one soon after.
+        Some(((armed_s, _), _)) => {
+            let before = places.partition_point(|(time, ..)| time <= armed_s);
+            let soon = |(time, ..): &&(f64, f64, f64)| *time <= armed_s + SOON_S;
+            (before.checked_sub(1).and_then(|last| places.get(last)))
+                .or_else(|| places.get(before).filter(soon))
+        }
+        None => places.first(),
+    };
+    Identity {
+        system_id: messages.system_id(),
+        home_deg: home.map(|(_, lat, lon)| (*lat, *lon)),
+        flew: flight.is_some(),
+    }
 }
 
 impl Flight {

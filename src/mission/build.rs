@@ -6,6 +6,7 @@ use super::plan::{Fence, Group, PLAN_SCHEMA, Plan, Site};
 use super::source::Source;
 use super::steps::{Offset, Timeline};
 use super::template::{FlightTemplate, span_of};
+use crate::base::number::plain;
 use crate::vehicle::{Limits, Vehicle};
 
 /// Makes the plan of one flight. `path` and `text` are the template's, for messages.
@@ -57,7 +58,10 @@ fn site(source: &Source<'_>) -> Result<Site, TemplateError> {
     let [lat, lon] = *site.origin.get_ref();
     if !(-85.0..=85.0).contains(&lat) || !(-180.0..=180.0).contains(&lon) {
         return Err(source
-            .error(span_of(&site.origin), format!("there is no place at {lat}, {lon}"))
+            .error(
+                span_of(&site.origin),
+                format!("there is no place at {}, {}", plain(lat), plain(lon)),
+            )
             .with_help("origin = [latitude, longitude] in degrees, latitude within 85"));
     }
     Ok(Site {

@@ -6,6 +6,7 @@ use toml::Spanned;
 
 use super::error::TemplateError;
 use super::template::{FlightTemplate, Quantity, span_of};
+use crate::base::number::plain;
 
 /// A template with its text, for reading values and making errors that point at them.
 pub(super) struct Source<'a> {
@@ -49,7 +50,7 @@ impl Source<'_> {
         let (low, high) = (range.start(), range.end());
         let gap = if unit.is_empty() { "" } else { " " };
         Err(self
-            .error(span, format!("{what} cannot be {value}{gap}{unit}"))
+            .error(span, format!("{what} cannot be {}{gap}{unit}", plain(value)))
             .with_help(format!("allowed: {low} to {high}{gap}{unit}")))
     }
 

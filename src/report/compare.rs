@@ -1,13 +1,16 @@
 //! Fleet tables beside the paper's values, and the words that a page and a terminal share.
 
-use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, TableRow, UpdraftMap};
+use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow, UpdraftMap};
+use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 use crate::flight::Alignment;
+use crate::mission::plan::Purpose;
 
 use super::figure_air::{deviation, mean, mean_truth};
 use super::law;
 use super::text::{
-    NONE, clean, count, estimate, fixed, parameter, rejection, signed, symbol, unit, usable,
+    NONE, clean, count, estimate, fixed, parameter, reduced, rejection, signed, symbol, unit,
+    usable,
 };
 
 /// A row of Table I or II in words.
@@ -77,8 +80,9 @@ pub(super) fn fit_line(fit: &Fit) -> String {
             format!("{} = {} {}{held}", symbol(&p.name), estimate(p.estimate), unit(&p.unit))
         })
         .collect();
-    if let Some(chi2) = fit.chi2_reduced {
-        parts.push(format!("χ²/ν = {} (ν = {})", fixed(chi2, 2), fit.dof));
+    match fit.chi2_reduced {
+        Some(chi2) => parts.push(format!("χ²/ν = {} (ν = {})", reduced(chi2), fit.dof)),
+        None => parts.push("no errors: as many parameters as windows".to_owned()),
     }
     parts.push(format!("rms {} µs over {}", fixed(fit.rms_us, 2), count(fit.points, "point")));
     parts.join(", ")
@@ -99,6 +103,83 @@ pub(super) fn flock_lines(flight: &FlightAnalysis) -> Vec<(&'static str, String)
     .collect()
 }
 
+/// What had to be added to the windows' own noise, in words; `None` where nothing was asked for.
+pub(super) fn scatter_line(laws: &Laws) -> Option<String> {
+    let added = laws.sigma_added_us.filter(|added| usable(*added))?;
+    Some(if added > 0.0 {
+        format!(
+            "added scatter: {} µs on every window, beyond its own noise, so that the errors above \
+             hold for the better law (turbulence longer than a window, and what the law does not \
+             describe); χ²/ν is from before that",
+            significant(added)
+        )
+    } else {
+        "added scatter: none; the better law describes the windows to within their own noise"
+            .to_owned()
+    })
+}
+
+/// The paper's table that a flight's parameters stand beside, in words.
+pub(super) fn table_heading(flight: &FlightAnalysis) -> String {
+    match flight.paper_table.as_deref() {
+        Some("I") => "Fitted parameters, as the paper's Table I (simulation)".to_owned(),
+        Some("II") => "Fitted parameters, as the paper's Table II (field)".to_owned(),
+        _ => "Fitted parameters beside the paper's".to_owned(),
+    }
+}
+
+/// Why a flight gave nothing at all, in plain words; `None` where it gave something.
+pub(super) fn nothing(flight: &FlightAnalysis) -> Option<String> {
+    if flight.results() > 0 {
+        return None;
+    }
+    let windows = || flight.drones.iter().flat_map(|drone| &drone.windows);
+    let ladder = windows().any(|window| window.kind.is_leg());
+    let hover = windows().any(|window| window.kind.is_hover());
+    let calibration = flight.purpose == Purpose::Calibration;
+    Some(
+        match (calibration, ladder, hover) {
+            _ if flight.drones.is_empty() => {
+                "No result: no drone of this flight could be analysed."
+            }
+            (true, false, _) => {
+                "No ladder found: this flight has no legs of constant vertical speed, \
+                             so that no law could be fitted."
+            }
+            (true, true, _) => {
+                "No calibration: the ladder was found, but no law could be fitted to it \
+                            (the reasons are with the drones)."
+            }
+            (false, false, false) => {
+                "No ladder and no hover found: nothing in this flight is steady for \
+                                  long enough."
+            }
+            (false, true, false) => "No hover found: there is nothing to measure the air in.",
+            (false, _, true) if flight.unmeasured.is_empty() => {
+                "No calibration: without its laws there is no value of the air."
+            }
+            (false, _, true) => {
+                "No value of the air: no drone has a usable hover (the reasons follow)."
+            }
+        }
+        .to_owned(),
+    )
+}
+
+/// Which law a flight's numbers should be read from, in words; `None` without laws.
+pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
+    let laws = law::flight_laws(flight)?;
+    let (linear, quadratic) = (laws.linear.as_ref(), laws.signed_quadratic.as_ref());
+    let chi2 = |fit: Option<&Fit>| fit.and_then(|fit| fit.chi2_reduced).filter(|v| usable(*v));
+    let better = prefer::better_of(laws)?;
+    let (name, this, other) = match better {
+        MapLaw::Linear => ("linear", chi2(linear), chi2(quadratic)),
+        MapLaw::SignedQuadratic => ("signed-quadratic", chi2(quadratic), chi2(linear)),
+    };
+    let (this, other) = this.zip(other)?;
+    Some(format!("the {name} law fits better (χ²/ν {} against {})", reduced(this), reduced(other)))
+}
+
 /// One drone's fitted parameters in words; a dash where there is none.
 pub(super) struct DroneLaws {
     pub(super) a: String,
@@ -108,6 +189,8 @@ pub(super) struct DroneLaws {
     pub(super) slope: String,
     pub(super) linear_u0: String,
     pub(super) linear_chi2: String,
+    /// Added scatter, us.
+    pub(super) scatter: String,
 }
 
 /// The drone's laws in words.
@@ -123,7 +206,7 @@ pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
         )
     };
     let chi2 = |fit: Option<&Fit>| {
-        fit.and_then(|fit| fit.chi2_reduced).map_or_else(|| NONE.to_owned(), |chi2| fixed(chi2, 2))
+        fit.and_then(|fit| fit.chi2_reduced).map_or_else(|| NONE.to_owned(), reduced)
     };
     DroneLaws {
         a: of(quadratic, "A"),
@@ -133,6 +216,11 @@ pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
         slope: of(linear, "A'"),
         linear_u0: of(linear, "u0"),
         linear_chi2: chi2(linear),
+        scatter: drone
+            .laws
+            .as_ref()
+            .and_then(|laws| laws.sigma_added_us)
+            .map_or_else(|| NONE.to_owned(), |added| fixed(added, 2)),
     }
 }
 
@@ -188,6 +276,9 @@ pub(super) struct FleetAir {
     pub(super) sd: f64,
     pub(super) lowest: f64,
     pub(super) highest: f64,
+    /// Mean standard error and mean systematic error of one drone, m/s.
+    pub(super) se: f64,
+    pub(super) systematic: f64,
     /// Root mean square of estimate minus truth over drones, m/s.
     pub(super) rms_error: Option<f64>,
     pub(super) n: usize,
@@ -205,6 +296,8 @@ pub(super) fn fleet_air(map: &UpdraftMap) -> Option<FleetAir> {
         sd: deviation(means.clone()).unwrap_or(0.0),
         lowest: means.clone().fold(f64::INFINITY, f64::min),
         highest: means.clone().fold(f64::NEG_INFINITY, f64::max),
+        se: mean(map.drones.iter().map(|drone| drone.mean.se)).unwrap_or(0.0),
+        systematic: mean(map.drones.iter().map(|drone| drone.systematic_mps)).unwrap_or(0.0),
         rms_error: mean(squares).map(f64::sqrt),
         n: means.count(),
     })

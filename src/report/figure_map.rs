@@ -106,7 +106,11 @@ fn empty_places(analysis: &Analysis, flight: &FlightAnalysis) -> Vec<(u16, [f64;
         .missing
         .iter()
         .filter_map(|missing| homes.get(&missing.slot).map(|&home| (missing.slot, home)));
-    missing.collect()
+    let unmeasured = flight.unmeasured.iter().filter_map(|drone| {
+        let slot = drone.slot?;
+        homes.get(&slot).map(|&home| (slot, home))
+    });
+    missing.chain(unmeasured).collect()
 }
 
 /// Places of a rectangular grid that none of these positions takes; empty where they form no grid.

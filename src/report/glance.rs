@@ -6,9 +6,10 @@ use minijinja::context;
 use minijinja::value::Value;
 
 use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 
-use super::compare::{drones_of, flags, fleet_air};
+use super::compare::{better_words, drones_of, flags, fleet_air, nothing};
 use super::page::capitalised;
 use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable, value_of};
 use super::{figure_air, law};
@@ -49,7 +50,12 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
     }
     for flight in &analysis.flights {
         let Some(air) = flight.map.as_ref().and_then(fleet_air) else { continue };
-        let note = format!("± {} m/s between drones", fixed(air.sd, 2));
+        let systematic = if air.systematic > 0.005 {
+            format!(", ± {} systematic", fixed(air.systematic, 2))
+        } else {
+            String::new()
+        };
+        let note = format!("± {} m/s between drones{systematic}", fixed(air.sd, 2));
         tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
         if let Some(rms) = air.rms_error {
             let note = format!("m/s, {}", count(air.n, "drone"));
@@ -95,8 +101,14 @@ fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
         ("linear", "A'", "A′, linear law"),
     ];
     let laws = law::flight_laws(flight);
+    // The numbers of the law that describes the flight; the other one's would only mislead.
+    let better = match laws.and_then(prefer::better_of) {
+        Some(MapLaw::Linear) => "linear",
+        _ => "signed quadratic",
+    };
     wanted
         .into_iter()
+        .filter(|(law_name, _, _)| *law_name == better)
         .filter_map(|(law_name, name, label)| {
             let row = flight
                 .table
@@ -142,6 +154,9 @@ pub(super) fn verdict(analysis: &Analysis) -> Vec<String> {
             if fitted > 0 {
                 let _ = write!(text, ", laws fitted for {fitted}");
             }
+            if let Some(words) = better_words(flight) {
+                let _ = write!(text, ", {words}");
+            }
             if let Some(air) = flight.map.as_ref().and_then(fleet_air) {
                 let _ = write!(
                     text,
@@ -154,7 +169,17 @@ pub(super) fn verdict(analysis: &Analysis) -> Vec<String> {
             if noted > 0 {
                 let _ = write!(text, ", {} with notes", count(noted, "drone"));
             }
+            if !flight.unmeasured.is_empty() {
+                let _ = write!(
+                    text,
+                    ", {} without a value in the map",
+                    count(flight.unmeasured.len(), "drone")
+                );
+            }
             text.push('.');
+            if let Some(words) = nothing(flight) {
+                let _ = write!(text, " {words}");
+            }
             text
         })
         .collect()

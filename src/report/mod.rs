@@ -20,6 +20,7 @@ mod figure_map;
 mod figure_study;
 mod glance;
 mod law;
+mod notes;
 mod page;
 mod sheet;
 mod study_page;

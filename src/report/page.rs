@@ -6,11 +6,13 @@ use minijinja::{Environment, UndefinedBehavior, context};
 use crate::analysis::result::{Analysis, FlightAnalysis};
 
 use super::compare::{
-    clock, comparison, drone_laws, drones_of, fit_line, flags, flock_lines, windows_used,
+    clock, comparison, drone_laws, drones_of, fit_line, flags, flock_lines, nothing, scatter_line,
+    table_heading, windows_used,
 };
 use super::figure_air::{self, mean_truth};
 use super::figure_drone::{self, Axes, drawable};
-use super::text::{NONE, clean, estimate, fixed, kind, purpose, shortened, signed, slug};
+use super::notes::unmeasured_lines;
+use super::text::{NONE, clean, estimate, fixed, kind, purpose, shortened, signed, slug, usable};
 use super::{Figure, Provenance, Report, ReportError, figure_laws, figure_map, glance, law};
 
 const PAGE: &str = include_str!("../../templates/report/report.html");
@@ -175,8 +177,16 @@ fn flight_section(
         head,
         rows_open => rows.len() <= 10,
         rows,
+        nothing => nothing(flight),
+        table_heading => table_heading(flight),
+        scatter => law::flight_laws(flight).and_then(scatter_line),
+        unmeasured => unmeasured_lines(flight),
+        cautions => flight.warnings.iter().map(|w| clean(w)).collect::<Vec<_>>(),
+        leaning => flight.map.as_ref().is_some_and(|map| map.leaning.is_some()),
         missing_open => missing.len() <= 2 * OPEN_LIMIT,
         missing,
+        lost => flight.lost.iter().map(|log| clean(&log.sentence())).collect::<Vec<_>>(),
+        doubts => flight.warnings.iter().map(|doubt| clean(doubt)).collect::<Vec<_>>(),
     }
 }
 
@@ -270,6 +280,7 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("slot", true),
         ("drone", false),
         ("W* (m/s)", true),
+        ("systematic ± (m/s)", true),
         ("true W (m/s)", true),
         ("mapping", false),
         ("A (µs/(m/s)²)", true),
@@ -279,6 +290,7 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("A′ (µs/(m/s))", true),
         ("u₀ linear (µs)", true),
         ("χ²/ν linear", true),
+        ("added scatter (µs)", true),
         ("windows", true),
         ("clock", false),
     ];
@@ -295,6 +307,8 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 drone.slot.map_or_else(none, |slot| slot.to_string()),
                 shortened(&drone.name, 28),
                 air.map_or_else(none, |air| estimate(air.mean)),
+                air.filter(|air| usable(air.systematic_mps) && air.systematic_mps > 0.0)
+                    .map_or_else(none, |air| fixed(air.systematic_mps, 2)),
                 air.and_then(mean_truth).map_or_else(none, |truth| fixed(truth, 3)),
                 air.map_or_else(none, |air| clean(&air.mapping)),
                 laws.a,
@@ -304,6 +318,7 @@ fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 laws.slope,
                 laws.linear_u0,
                 laws.linear_chi2,
+                laws.scatter,
                 if drone.windows.is_empty() { none() } else { windows_used(drone) },
                 clock(drone).to_owned(),
             ];

@@ -6,16 +6,17 @@ use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
 use crate::mission::plan::Purpose;
 
 use super::compare::{
-    clock, comparison, drone_laws, drones_of, flags, fleet_air, flock_lines, windows_used,
+    better_words, clock, comparison, drone_laws, drones_of, fleet_air, flock_lines, nothing,
+    scatter_line, table_heading, windows_used,
 };
 use super::figure_air::mean_truth;
+use super::notes::{note_lines, unmeasured_lines};
+use super::page::capitalised;
 use super::table::{Align, Column, lines};
 use super::text::{NONE, clean, count, fixed, purpose, shortened, signed, usable};
 
-/// Above so many drones the table of drones shows only those with flags.
+/// The table of drones shows no more; all are in the report.
 const DRONE_LIMIT: usize = 64;
-/// Lists longer than this are cut, with the number of what follows.
-const LIST_LIMIT: usize = 20;
 
 const BOLD: &str = "\u{1b}[1m";
 const DIM: &str = "\u{1b}[2m";
@@ -41,10 +42,7 @@ pub fn terminal_summary(analysis: &Analysis, width: usize, color: bool) -> Strin
     for flight in &analysis.flights {
         out.flight(flight);
     }
-    if !analysis.warnings.is_empty() {
-        out.line("", "");
-        out.list("Warnings", &analysis.warnings.iter().map(|w| clean(w)).collect::<Vec<_>>());
-    }
+    out.list("Warnings", &analysis.warnings.iter().map(|w| clean(w)).collect::<Vec<_>>());
     out.text
 }
 
@@ -68,7 +66,12 @@ impl Output {
     fn wrapped(&mut self, style: &str, indent: &str, text: &str) {
         let room = self.width.saturating_sub(indent.chars().count()).max(10);
         let mut current = String::new();
-        for word in text.split(' ') {
+        // A word longer than the line (a path, say) is broken: nothing is left out.
+        let pieces = text.split(' ').flat_map(|word| {
+            let letters: Vec<char> = word.chars().collect();
+            letters.chunks(room).map(|piece| piece.iter().collect()).collect::<Vec<String>>()
+        });
+        for word in pieces {
             let longer = current.chars().count() + 1 + word.chars().count();
             if !current.is_empty() && longer > room {
                 self.line(style, &format!("{indent}{current}"));
@@ -77,7 +80,7 @@ impl Output {
             if !current.is_empty() {
                 current.push(' ');
             }
-            current.push_str(word);
+            current.push_str(&word);
         }
         self.line(style, &format!("{indent}{current}"));
     }
@@ -88,13 +91,15 @@ impl Output {
         }
     }
 
+    /// A list in full: warnings are never cut.
     fn list(&mut self, heading: &str, items: &[String]) {
-        self.line(YELLOW, &format!("{heading} ({})", items.len()));
-        for item in items.iter().take(LIST_LIMIT) {
-            self.wrapped("", "  ", item);
+        if items.is_empty() {
+            return;
         }
-        if items.len() > LIST_LIMIT {
-            self.line(DIM, &format!("  and {} more", items.len() - LIST_LIMIT));
+        self.line("", "");
+        self.line(YELLOW, &format!("{heading} ({})", items.len()));
+        for item in items {
+            self.wrapped("", "  ", &format!("- {item}"));
         }
     }
 
@@ -109,21 +114,25 @@ impl Output {
             format!(", simulated in a true updraft of {} m/s", signed(w, 2))
         });
         self.line(DIM, &format!("  {source}{truth}"));
+        if let Some(words) = nothing(flight) {
+            self.wrapped(YELLOW, "  ", &words);
+        }
+        if let Some(words) = better_words(flight) {
+            self.wrapped("", "  ", &format!("{}.", capitalised(&words)));
+        }
         self.fleet_table(flight);
         self.flock(flight);
         if let Some(map) = &flight.map {
             self.map(map);
         }
         self.drones(flight);
-        if !flight.missing.is_empty() {
-            let missing: Vec<String> = flight
-                .missing
-                .iter()
-                .map(|missing| format!("slot {}: {}", missing.slot, clean(&missing.reason)))
-                .collect();
-            self.line("", "");
-            self.list("  Missing drones", &missing);
-        }
+        self.list("  Notes on drones", &note_lines(flight));
+        self.list("  Drones without a value in the map", &unmeasured_lines(flight));
+        self.list("  Missing drones", &missing_lines(flight));
+        let lost: Vec<String> = flight.lost.iter().map(|log| clean(&log.sentence())).collect();
+        self.list("  Lost logs", &lost);
+        let warnings: Vec<String> = flight.warnings.iter().map(|w| clean(w)).collect();
+        self.list("  Cautions", &warnings);
     }
 
     fn fleet_table(&mut self, flight: &FlightAnalysis) {
@@ -160,6 +169,7 @@ impl Output {
             })
             .collect();
         self.line("", "");
+        self.wrapped(DIM, "  ", &table_heading(flight));
         self.table(&columns, &rows);
     }
 
@@ -169,9 +179,16 @@ impl Output {
             return;
         }
         self.line("", "");
-        self.line(DIM, "  all drones averaged (flock mapping)");
+        self.wrapped(
+            DIM,
+            "  ",
+            "All drones averaged: the paper's flock mapping, the lines of its Fig. 2",
+        );
         for (law, line) in laws {
             self.wrapped("", "  ", &format!("{law}: {line}"));
+        }
+        if let Some(line) = flight.flock.as_ref().and_then(scatter_line) {
+            self.wrapped("", "  ", &line);
         }
     }
 
@@ -184,22 +201,20 @@ impl Output {
             column("W*", Align::Right, 0),
             column("χ²/ν", Align::Right, 6),
             column("A′", Align::Right, 0),
+            column("χ²/ν (linear)", Align::Right, 6),
             column("u₀ (linear)", Align::Right, 5),
             column("windows", Align::Right, 4),
+            column("added µs", Align::Right, 4),
             column("clock", Align::Left, 7),
-            column("notes", Align::Left, 0),
         ];
-        // In a measurement the map says it all; only what is doubtful is worth a line.
-        let fitted = flight.drones.iter().any(|drone| drone.laws.is_some());
-        let calibration = fitted || flight.purpose == Purpose::Calibration;
-        let all = calibration && flight.drones.len() <= DRONE_LIMIT;
+        // In a measurement the map says it all.
+        let calibration = flight.purpose == Purpose::Calibration;
         let rows: Vec<Vec<String>> = flight
             .drones
             .iter()
-            .map(|drone| (drone, flags(drone)))
-            .filter(|(_, flags)| all || !flags.is_empty())
+            .filter(|drone| calibration && drone.laws.is_some())
             .take(DRONE_LIMIT)
-            .map(|(drone, flags)| {
+            .map(|drone| {
                 let laws = drone_laws(drone);
                 vec![
                     drone.slot.map_or_else(|| NONE.to_owned(), |slot| slot.to_string()),
@@ -209,28 +224,23 @@ impl Output {
                     laws.w,
                     laws.chi2,
                     laws.slope,
+                    laws.linear_chi2,
                     laws.linear_u0,
                     if drone.windows.is_empty() { NONE.to_owned() } else { windows_used(drone) },
+                    laws.scatter,
                     clock(drone).to_owned(),
-                    flags.join("; "),
                 ]
             })
             .collect();
-        if flight.drones.is_empty() {
-            self.line("", "");
-            self.line(YELLOW, "  No drone of this flight could be analysed.");
+        if rows.is_empty() {
+            return;
         }
-        if !rows.is_empty() {
-            self.line("", "");
-            if !all {
-                let n = flight.drones.len();
-                let more = if calibration { "; all are in the report" } else { "" };
-                self.line(DIM, &format!("  {} of {n} drones have notes{more}", rows.len()));
-            }
-            self.table(&columns, &rows);
-        }
-        if calibration && !fitted && flight.flock.is_none() {
-            self.line(YELLOW, "  No laws were fitted in this flight.");
+        self.line("", "");
+        self.wrapped(DIM, "  ", "Each drone's laws, as the line of the paper's Fig. 3d");
+        self.table(&columns, &rows);
+        let fitted = flight.drones.iter().filter(|drone| drone.laws.is_some()).count();
+        if fitted > rows.len() {
+            self.line(DIM, &format!("  and {} more, in the report", fitted - rows.len()));
         }
     }
 
@@ -252,6 +262,19 @@ impl Output {
                 signed(air.highest, 2),
                 clean(&map.law),
             ),
+        );
+        let systematic = if air.systematic > 0.005 {
+            format!(
+                "; systematic, from wind on the leaning drones: {} m/s",
+                fixed(air.systematic, 2)
+            )
+        } else {
+            String::new()
+        };
+        self.wrapped(
+            "",
+            "  ",
+            &format!("standard error of one drone: {} m/s{systematic}", fixed(air.se, 3)),
         );
         if let Some(rms) = air.rms_error {
             let known = map.drones.iter().filter(|drone| mean_truth(drone).is_some()).count();
@@ -291,7 +314,7 @@ impl Output {
             return;
         }
         self.line("", "");
-        self.line(DIM, "  seen from above, forward is up; · where there is no data");
+        self.wrapped(DIM, "  ", "Means over the hover (the paper's Fig. 5, averaged), seen from above, forward is up; · no data");
         for row in rows {
             let mut line = String::from("  ");
             for &column in &columns {
@@ -309,6 +332,11 @@ impl Output {
             let _ = writeln!(self.text, "{}", line.trim_end());
         }
     }
+}
+
+fn missing_lines(flight: &FlightAnalysis) -> Vec<String> {
+    let line = |slot: u16, reason: &str| format!("slot {slot}: {}", clean(reason));
+    flight.missing.iter().map(|missing| line(missing.slot, &missing.reason)).collect()
 }
 
 fn column(head: &'static str, align: Align, drop: u8) -> Column {

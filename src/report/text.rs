@@ -96,6 +96,11 @@ fn minus(text: &str) -> String {
     text.replace('-', "−")
 }
 
+/// A reduced chi²: decimals only where they mean something.
+pub(super) fn reduced(chi2: f64) -> String {
+    fixed(chi2, if chi2.abs() < 100.0 { 2 } else { 0 })
+}
+
 /// Units with the Greek letter.
 pub(super) fn unit(unit: &str) -> String {
     let unit = clean(unit);
@@ -112,6 +117,7 @@ pub(super) fn symbol(name: &str) -> String {
         "W" | "W_Z" => "W*".to_owned(),
         "A'" => "A′".to_owned(),
         "chi2_nu" => "χ²/ν".to_owned(),
+        "sigma_added" => "scatter".to_owned(),
         other => clean(other),
     }
 }
@@ -147,6 +153,7 @@ pub(super) fn rejection(rejection: Rejection) -> &'static str {
         Rejection::NotFollowing => "not following",
         Rejection::Gap => "gap in the log",
         Rejection::Incomplete => "log ends early",
+        Rejection::Manoeuvre => "moving up and down",
     }
 }
 

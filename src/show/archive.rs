@@ -103,6 +103,16 @@ impl<'a> Archive<'a> {
     }
 }
 
+/// Unpacks every entry of an archive, so that the checksum of each is compared.
+///
+/// # Errors
+///
+/// When it is no ZIP archive, looks hostile, or an entry is damaged; the error names the entry.
+pub fn verify(bytes: &[u8]) -> Result<(), SkycError> {
+    let archive = Archive::open(bytes, Limits::default())?;
+    archive.names().try_for_each(|name| archive.unpack(name).map(drop))
+}
+
 /// What is suspicious about the name of an entry, if anything.
 fn path_trick(name: &str) -> Option<&'static str> {
     if name.is_empty() {

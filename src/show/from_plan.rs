@@ -129,6 +129,10 @@ impl Show {
                 max_velocity_z_mps: Some(limits.max_speed_down_mps),
                 max_velocity_z_up_mps: Some(limits.max_speed_up_mps),
                 min_distance_m: Some(limits.min_distance_m),
+                max_acceleration_mps2: Some(limits.max_acceleration_mps2),
+                max_velocity_step_mps: Some(limits.max_velocity_step_mps),
+                endurance_s: Some(limits.endurance_s),
+                endurance_reserve: Some(limits.endurance_reserve),
             }),
             fence_polygon_m: plan.fence.polygon_m.clone(),
             phases_s: takeoff_end

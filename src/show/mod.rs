@@ -16,6 +16,8 @@ pub mod trajectory;
 
 use nalgebra::Vector3;
 
+pub use archive::verify as verify_archive;
+
 use crate::base::frame::ShowFrame;
 pub use trajectory::{Path, Segment, Trajectory};
 
@@ -95,4 +97,12 @@ pub struct Validation {
     pub max_velocity_z_up_mps: Option<f64>,
     /// Smallest distance between drones, m.
     pub min_distance_m: Option<f64>,
+    /// Largest acceleration within a piece, m/s² (`maxAcceleration`; other tools ignore it).
+    pub max_acceleration_mps2: Option<f64>,
+    /// Largest jump of velocity between pieces, m/s (`maxVelocityStep`; other tools ignore it).
+    pub max_velocity_step_mps: Option<f64>,
+    /// Time a full battery carries the vehicle in hover, s (`endurance`; other tools ignore it).
+    pub endurance_s: Option<f64>,
+    /// Share of it that must be left (`enduranceReserve`; other tools ignore it).
+    pub endurance_reserve: Option<f64>,
 }

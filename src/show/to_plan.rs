@@ -24,8 +24,6 @@ const SAME_VELOCITY_MPS: f64 = 0.01;
 const JOINT_M: f64 = 0.001;
 /// Shortest vertical piece that counts as a rung, ms.
 const MIN_LEG_MS: u64 = 5_000;
-/// Fence room around a show that brings no fence, m.
-const FENCE_ROOM_M: f64 = 20.0;
 
 impl Plan {
     /// Recovers a plan from a show; `vehicle` gives the limits that the show does not state.
@@ -52,6 +50,7 @@ impl Plan {
         let all = || groups.iter().flat_map(|group| &group.segments);
         let duration_ms = all().map(|segment| segment.end_ms).max().unwrap_or(0);
         let ladder = all().filter(|segment| segment.kind.is_leg()).count() >= 2;
+        let limits = limits(show, vehicle.limits);
         let title = show.title.clone().unwrap_or_else(|| "Show".to_owned());
         let mut briefing = Vec::new();
         if curved {
@@ -67,8 +66,8 @@ impl Plan {
             purpose: if ladder { Purpose::Calibration } else { Purpose::Measurement },
             vehicle: vehicle.name.clone(),
             site: site(show),
-            limits: limits(show, vehicle.limits),
-            fence: fence(show),
+            fence: fence(show, &limits),
+            limits,
             grid: None,
             slots,
             groups,
@@ -279,44 +278,30 @@ fn limits(show: &Show, mut limits: Limits) -> Limits {
         (stated.max_velocity_z_mps, &mut limits.max_speed_down_mps),
         (stated.max_velocity_z_up_mps.or(stated.max_velocity_z_mps), &mut limits.max_speed_up_mps),
         (stated.min_distance_m, &mut limits.min_distance_m),
+        (stated.max_acceleration_mps2, &mut limits.max_acceleration_mps2),
+        (stated.max_velocity_step_mps, &mut limits.max_velocity_step_mps),
+        (stated.endurance_s, &mut limits.endurance_s),
     ];
     for (value, limit) in fields {
         if let Some(value) = value.filter(|value| value.is_finite() && *value > 0.0) {
             *limit = value;
         }
     }
+    // A reserve of nothing may be meant.
+    if let Some(reserve) = stated.endurance_reserve.filter(|value| (0.0..1.0).contains(value)) {
+        limits.endurance_reserve = reserve;
+    }
     limits
 }
 
-fn fence(show: &Show) -> Fence {
-    let (mut low, mut high, mut top_m) = ([f64::MAX; 2], [f64::MIN; 2], 0.0_f64);
-    let mut buffer = [Vector3::zeros(); 8];
-    for drone in &show.drones {
-        let start = drone.trajectory.start_m;
-        let hold = Path::Hold;
-        let standing = hold.control_points(start, &mut buffer).to_vec();
-        let mut visit = |point: &Vector3<f64>| {
-            for axis in 0..2 {
-                low[axis] = low[axis].min(point[axis]);
-                high[axis] = high[axis].max(point[axis]);
-            }
-            top_m = top_m.max(point.z);
-        };
-        standing.iter().for_each(&mut visit);
-        for piece in drone.trajectory.pieces() {
-            piece.path.control_points(piece.from_m, &mut buffer).iter().for_each(&mut visit);
-        }
+/// The polygon that the show brings, if it does: none is made up. A show file knows no top of the
+/// fence; the altitude limit stands in its place.
+fn fence(show: &Show, limits: &Limits) -> Fence {
+    Fence {
+        polygon_m: show.fence_polygon_m.clone(),
+        max_altitude_m: limits.max_altitude_m,
+        margin_m: 0.0,
     }
-    let polygon_m = if show.fence_polygon_m.len() >= 3 {
-        show.fence_polygon_m.clone()
-    } else if show.drones.is_empty() {
-        Vec::new()
-    } else {
-        let ([x0, y0], [x1, y1]) =
-            (low.map(|value| value - FENCE_ROOM_M), high.map(|value| value + FENCE_ROOM_M));
-        vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
-    };
-    Fence { polygon_m, max_altitude_m: top_m + FENCE_ROOM_M, margin_m: 0.0 }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Vector3;
 
-use super::air::{Atmosphere, Surroundings, density_ratio};
+use super::air::{Atmosphere, DensityNearby, Surroundings};
 use super::autopilot::Autopilot;
 use super::autopilot::director::{Stage, takeoff_time_s};
 use super::autopilot::motors::Spool;
@@ -181,6 +181,7 @@ pub fn fly_with<R: Recorder>(
     let mut tally = Tally::default();
     let mut around = Surroundings { air_velocity_mps: Vector3::zeros(), density_ratio: 1.0 };
     let mut air = setup.atmosphere.sampler(drone);
+    let mut density = DensityNearby::about(home_amsl_m);
     let mut stop_at_s = f64::INFINITY;
     let mut step: u64 = 0;
     loop {
@@ -190,7 +191,7 @@ pub fn fly_with<R: Recorder>(
             let place = &plant.motion().position_m;
             around = Surroundings {
                 air_velocity_mps: air.air_velocity(place, time_s),
-                density_ratio: density_ratio(setup.frame.origin.amsl_m + place.z),
+                density_ratio: density.ratio(setup.frame.origin.amsl_m + place.z),
             };
             // Checked here, as the drag's dead band would take NaN for no wind.
             if !around.air_velocity_mps.iter().all(|speed| speed.is_finite()) {
@@ -236,8 +237,9 @@ pub fn fly_with<R: Recorder>(
 
 /// AirSim's motor interface: the command is linear in the pulse, 1000..2000 us, whatever the
 /// autopilot's own settings are.
+#[inline]
 pub(super) fn command(pulse_us: u16) -> f64 {
-    (f64::from(pulse_us) - 1000.0) / 1000.0
+    (f64::from(pulse_us) - 1000.0) * 1e-3
 }
 
 /// Arming time on the grid of the steps.

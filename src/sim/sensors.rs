@@ -82,6 +82,7 @@ impl Sensors {
     }
 
     /// One step: the estimate of the present motion.
+    #[inline]
     pub fn sense(&mut self, truth: &Motion) -> Estimate {
         if self.countdown == 0 {
             self.countdown = STEPS_PER_DRAW;
@@ -101,6 +102,7 @@ impl Sensors {
         }
     }
 
+    #[inline(never)]
     fn draw(&mut self) {
         for i in 0..ERRORS {
             let draw: f64 = StandardNormal.sample(&mut self.rng);
@@ -110,6 +112,7 @@ impl Sensors {
     }
 
     /// Three independent values near to normal: sums of uniform ones, all from one draw.
+    #[inline]
     fn white(&mut self, deviation: f64) -> Vector3<f64> {
         // The sum of three uniform whole numbers below 2^7: mean 190.5, variance 3 (2^14 - 1) / 12.
         let scale = deviation / 63.998;
@@ -117,13 +120,14 @@ impl Sensors {
         let one = |shift: u32| {
             let part = bits >> shift;
             let sum = (part & 0x7F) + (part >> 7 & 0x7F) + (part >> 14 & 0x7F);
-            (sum as f64 - 190.5) * scale
+            (f64::from(sum as u32) - 190.5) * scale
         };
         Vector3::new(one(0), one(21), one(42))
     }
 }
 
 /// A rotation turned further by small angles about its own axes, to first order.
+#[inline]
 fn slightly_turned(rotation: &Matrix3<f64>, forward: f64, left: f64, up: f64) -> Matrix3<f64> {
     let [x, y, z] = [0, 1, 2].map(|axis| rotation.column(axis));
     Matrix3::from_columns(&[

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Vehicle, VehicleError};
-use crate::base::file::read_whole;
+use crate::base::file::{FileError, read_whole};
 
 /// Largest vehicle file that is read, bytes.
 const MAX_VEHICLE_BYTES: u64 = 1 << 20;
@@ -50,7 +50,14 @@ pub fn load(name: &str) -> Result<Vehicle, VehicleError> {
         return Vehicle::from_toml(&String::from_utf8_lossy(&bytes), name);
     }
     let plain = name.strip_prefix("templates/vehicles/").unwrap_or(name);
-    builtin(plain.strip_suffix(".toml").unwrap_or(plain))
+    builtin(plain.strip_suffix(".toml").unwrap_or(plain)).map_err(|error| {
+        // A path is a file that is not there, not a wrong name.
+        if name.contains(['/', '\\', '.']) {
+            FileError::new("read", path, std::io::ErrorKind::NotFound.into()).into()
+        } else {
+            error
+        }
+    })
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub enum VehicleError {
         source: Box<toml::de::Error>,
     },
     /// A number outside of what makes sense.
-    #[error("the vehicle file {name}: {key} = {value} is not allowed; it must be {allowed}")]
+    #[error("the vehicle file {name}: {key} = {} is not allowed; it must be {allowed}", crate::base::number::plain(*value))]
     Value {
         /// The file or built-in name.
         name: String,

@@ -63,7 +63,7 @@ pub fn calm(number: usize, x: f64, y: f64) -> ShowDrone {
     drone(number, x, y, segments)
 }
 
-/// Climbs at 1 m/s to 10 m, does `middle` from (x, y, 10), and lands from (to_x, to_y).
+/// Climbs at 1 m/s to 10 m, does `middle` from (x, y, 10), and lands from (to_x, to_y), as it is meant to.
 pub fn flight(
     number: usize,
     (x, y): (f64, f64),
@@ -73,7 +73,7 @@ pub fn flight(
     let mut segments = vec![line(10_000, x, y, 10.0)];
     segments.extend(middle);
     segments.push(line(10_000, to_x, to_y, 2.5));
-    drone(number, x, y, segments)
+    ShowDrone { land_at_m: Some(v(to_x, to_y, 0.0)), ..drone(number, x, y, segments) }
 }
 
 pub fn show(drones: Vec<ShowDrone>) -> Show {

@@ -40,10 +40,11 @@ fn a_missing_log_is_a_loss_that_is_named() {
 fn an_unfinished_log_is_never_analysed() {
     let bench = Bench::new();
     bench.fly();
-    let clean = bench.expect(0, &["analyze", "campaign/logs", "--no-report"]);
+    // Legs of 6 s are too short to be found without the plan: nothing is a result of its own.
+    let clean = bench.expect(5, &["analyze", "campaign/logs", "--no-report"]);
     let log = fs::read(bench.path("campaign/logs/01.BIN")).unwrap();
     fs::write(bench.path("campaign/logs/.partial-x1.BIN"), &log[..log.len() / 2]).unwrap();
-    let analysed = bench.expect(0, &["analyze", "campaign/logs", "--no-report"]);
+    let analysed = bench.expect(5, &["analyze", "campaign/logs", "--no-report"]);
     assert_eq!(analysed.out, clean.out);
     assert!(analysed.err.starts_with("Analysed 2 logs in "), "{analysed}");
 }
@@ -52,7 +53,9 @@ fn an_unfinished_log_is_never_analysed() {
 fn one_log_needs_no_plan() {
     let bench = Bench::new();
     bench.fly();
-    let one = bench.expect(0, &["analyze", "campaign/logs/01.BIN", "--no-report"]);
+    // Legs of 6 s are too short to be told from transfers: that is said, and is no success.
+    let one = bench.expect(5, &["analyze", "campaign/logs/01.BIN", "--no-report"]);
+    assert!(one.out.contains("No ladder and no hover found"), "{one}");
     assert!(one.err.starts_with("Analysed 1 log in "), "{one}");
     let planned = ["analyze", "campaign/logs", "--plan", "campaign", "-o", "out"];
     bench.expect(0, &planned);
@@ -77,4 +80,56 @@ fn nothing_to_work_on() {
     let missing = bench.run(&["analyze", "not-there"]);
     assert!(matches!(missing.code, Some(1 | 2 | 5)), "{missing}");
     assert!(missing.err.contains("not-there"), "{missing}");
+}
+
+#[test]
+fn nothing_found_is_no_success() {
+    let bench = Bench::new();
+    let hover = ["plan", "hover", "--grid", "1x1", "--duration", "30", "--height", "20"];
+    bench.expect(0, &[&hover[..], &["-o", "campaign"]].concat());
+    bench.expect(0, &["simulate", "campaign"]);
+    let analysed = bench.expect(5, &["analyze", "campaign"]);
+    assert!(analysed.out.contains("No calibration"), "{analysed}");
+    let page = fs::read_to_string(bench.path("campaign/report/index.html")).unwrap();
+    assert!(page.contains("No calibration") && !page.contains("<svg"), "no empty figures");
+}
+
+/// Map values and their stated uncertainty: (value, two standard errors and the systematic error).
+fn map_of(ended: &crate::support::Ended) -> Vec<(f64, f64)> {
+    let value = ended.json("updraft.analyze/1");
+    let drones = value["analysis"]["flights"][1]["map"]["drones"].as_array().unwrap().clone();
+    let number = |drone: &serde_json::Value, path: &str| drone.pointer(path).unwrap().as_f64();
+    drones
+        .iter()
+        .map(|drone| {
+            let stated = 2.0 * number(drone, "/mean/se").unwrap()
+                + number(drone, "/systematic_mps").unwrap();
+            (number(drone, "/mean/value").unwrap(), stated)
+        })
+        .collect()
+}
+
+#[test]
+fn wind_biases_the_map_by_less_than_is_stated() {
+    let bench = Bench::new();
+    for (calibration, hover) in [("0", "0"), ("0", "5"), ("0", "10"), ("10", "10"), ("10", "0")] {
+        let wind = ["--calibration-wind", calibration, "--wind", hover];
+        let flown =
+            ["run", "--grid", "1x1", "--duration", "40", "--speeds", "1,2,3", "--leg", "15"];
+        let place = ["--updraft", "1", "-o", "campaign", "--force", "--quiet"];
+        bench.expect(0, &[&flown[..], &wind, &place].concat());
+        for corrected in [true, false] {
+            let mut words = vec!["analyze", "campaign", "--no-report", "--json", "--quiet"];
+            words.extend((!corrected).then_some("--no-wind"));
+            let ended = bench.expect(0, &words);
+            let (value, stated) = map_of(&ended)[0];
+            println!("wind {calibration}, {hover}, corrected {corrected}: {value} ± {stated}");
+            assert!((value - 1.0).abs() < stated, "{value} ± {stated}");
+            if corrected {
+                assert!((value - 1.0).abs() < 0.06 && stated < 0.5, "{value} ± {stated}");
+            } else if hover == "10" {
+                assert!(ended.out.contains("wind: the drones leaned 4"), "{ended}");
+            }
+        }
+    }
 }

@@ -29,6 +29,43 @@ fn only_missing_logs_are_flown_again() {
 }
 
 #[test]
+fn a_log_that_is_not_as_it_was_flown_is_flown_again() {
+    let bench = Bench::new();
+    bench.fly();
+    let logs = bench.path("campaign/logs");
+    let before = contents(&logs);
+    let whole = fs::read(logs.join("02.BIN")).unwrap();
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 2] ^= 1;
+    for damaged in [&whole[..whole.len() / 2], &whole[..0], &flipped] {
+        fs::write(logs.join("02.BIN"), damaged).unwrap();
+        let again = bench.expect(0, &["simulate", "campaign"]);
+        let size = format!("it has {} bytes, not {}", damaged.len(), whole.len());
+        let how = if damaged.len() == whole.len() { "its bytes were changed" } else { &size };
+        let warning =
+            format!("warning: campaign/logs/02.BIN is not as it was flown ({how}): flown again\n");
+        assert!(again.err.starts_with(&warning), "{again}");
+        assert!(again.err.contains("Flew calibration: 2 logs"), "{again}");
+        assert!(contents(&logs) == before, "the same bytes again");
+    }
+    // Another slot's flight alone does not forget what is known of this one.
+    fs::write(logs.join("02.BIN"), &whole[..100]).unwrap();
+    bench.expect(0, &["simulate", "campaign", "--drones", "1"]);
+    let again = bench.expect(0, &["simulate", "campaign"]);
+    assert!(again.err.contains("02.BIN is not as it was flown"), "{again}");
+    // A real drone's log in its place is not the simulator's to replace.
+    let real = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/ladder-still.trimmed.BIN");
+    fs::copy(real, logs.join("02.BIN")).unwrap();
+    let refused = bench.expect(2, &["simulate", "campaign"]);
+    assert_eq!(
+        refused.err,
+        "error: campaign/logs/02.BIN was not simulated by this program; move it away, or use \
+         another folder\n"
+    );
+    assert_eq!(fs::read(logs.join("02.BIN")).unwrap(), fs::read(real).unwrap());
+}
+
+#[test]
 fn other_settings_do_not_mix_with_logs() {
     let bench = Bench::new();
     bench.fly();
@@ -64,7 +101,7 @@ fn some_drones_of_one_flight() {
     bench.expect(2, &["simulate", "campaign", "--drones", "2-1"]);
     let none = bench.expect(2, &["simulate", "campaign", "--drones", "3"]);
     assert!(none.err.contains("no slot 3"), "{none}");
-    bench.expect(2, &["simulate", "nothing"]);
+    bench.expect(1, &["simulate", "nothing"]);
 }
 
 /// The signal goes to the program alone, in the middle of a flight that takes long.

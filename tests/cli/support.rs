@@ -37,7 +37,7 @@ impl Bench {
             .current_dir(self.0.path())
             .env_remove("NO_COLOR")
             .env_remove("UPDRAFT_NO_PROGRESS")
-            .env("COLUMNS", "100");
+            .env("COLUMNS", "120");
         command
     }
 

@@ -211,6 +211,10 @@ impl Reader<'_> {
                 max_velocity_z_mps: number("maxVelocityZ"),
                 max_velocity_z_up_mps: number("maxVelocityZUp"),
                 min_distance_m: number("minDistance"),
+                max_acceleration_mps2: number("maxAcceleration"),
+                max_velocity_step_mps: number("maxVelocityStep"),
+                endurance_s: number("endurance"),
+                endurance_reserve: number("enduranceReserve"),
             });
         }
         if let Some(fence) = self.documents.child(node, "geofence")? {

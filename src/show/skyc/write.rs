@@ -158,6 +158,10 @@ fn settings(show: &Show) -> Result<Value, String> {
             ("maxVelocityZ", limits.max_velocity_z_mps),
             ("maxVelocityZUp", limits.max_velocity_z_up_mps),
             ("minDistance", limits.min_distance_m),
+            ("maxAcceleration", limits.max_acceleration_mps2),
+            ("maxVelocityStep", limits.max_velocity_step_mps),
+            ("endurance", limits.endurance_s),
+            ("enduranceReserve", limits.endurance_reserve),
         ] {
             if let Some(value) = value {
                 finite(key, &[value])?;

@@ -18,7 +18,7 @@ mod waves;
 
 use nalgebra::Vector3;
 
-pub use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
+pub use crate::base::air::{DensityNearby, SEA_LEVEL_DENSITY, density_ratio};
 pub use allen::{AllenThermals, Thermal};
 pub use drone_constant::DroneConstant;
 pub use field::{FieldScales, RandomField};

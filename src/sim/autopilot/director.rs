@@ -135,6 +135,7 @@ impl<'a> Director<'a> {
     }
 
     /// One step: moves the stages on, and gives the goals.
+    #[inline]
     pub fn update(&mut self, time_s: f64, estimate: &Estimate, motors: &mut Motors) -> Goals {
         let mut restart = false;
         match self.stage {
@@ -175,6 +176,7 @@ impl<'a> Director<'a> {
     }
 
     /// Evaluates the trajectory as the fork does at SHOW_CTRL_RATE.
+    #[inline(never)]
     fn sample(&mut self, time_s: f64) {
         let mut state = self.cursor.state_at(time_s);
         // Altitudes are sent as whole centimetres, cut off; the addition is for fractions such as
@@ -195,6 +197,7 @@ impl<'a> Director<'a> {
         self.target_age = 0;
     }
 
+    #[inline(never)]
     fn land(&mut self, estimate: &Estimate, motors: &mut Motors) {
         let mut square = 0.0;
         for (filter, sample) in
@@ -221,6 +224,7 @@ impl<'a> Director<'a> {
         }
     }
 
+    #[inline]
     fn goals(&self, estimate: &Estimate, restart: bool) -> Goals {
         let floor = Kinematics::at(Vector1::new(self.home_m.z + p::SHOW_TAKEOFF_ALT));
         match self.stage {

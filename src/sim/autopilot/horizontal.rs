@@ -24,11 +24,11 @@ pub struct Horizontal {
     /// What was wanted when the lean was limited, else zero.
     stuck: Vector2<f64>,
     smoothing: f64,
+    smoothing_per_dt: f64,
     limits: Approach,
     to_position: RootLaw,
     limit_mps2: f64,
     dt_s: f64,
-    per_dt: f64,
 }
 
 impl Horizontal {
@@ -50,12 +50,12 @@ impl Horizontal {
             integral: Vector2::zeros(),
             stuck: Vector2::zeros(),
             smoothing: dt_s / (dt_s + constant_s),
+            smoothing_per_dt: 1.0 / (dt_s + constant_s),
             limits: Approach::new(p::WPNAV_SPEED, p::WPNAV_ACCEL, jerk_mps3, dt_s),
             // Without a step: the firmware does not guard this one against overshoot.
             to_position: RootLaw::new(p::PSC_POSXY_P, p::WPNAV_ACCEL, 0.0),
             limit_mps2: GRAVITY * p::ANGLE_MAX_DEG.to_radians().tan(),
             dt_s,
-            per_dt: 1.0 / dt_s,
         }
     }
 
@@ -68,6 +68,7 @@ impl Horizontal {
     }
 
     /// One step: the acceleration wanted, show frame, m/s². Without a goal it comes to a stop.
+    #[inline]
     pub fn update(&mut self, goal: Option<&Kinematics<2>>, estimate: &Estimate) -> Vector2<f64> {
         self.target.advance_within(self.dt_s, &self.stuck, &self.position_error, &self.error);
         let none = Vector2::zeros();
@@ -86,25 +87,28 @@ impl Horizontal {
             self.derivative = none;
         } else {
             let before = self.error;
-            self.error += (raw - self.error) * self.smoothing;
-            let slope = (self.error - before) * self.per_dt;
-            self.derivative += (slope - self.derivative) * self.smoothing;
+            let keep = 1.0 - self.smoothing;
+            self.error = raw * self.smoothing + before * keep;
+            self.derivative =
+                (self.error - before) * self.smoothing_per_dt + self.derivative * keep;
         }
         self.integrate();
-        let wanted = self.target.acceleration
-            + self.error * p::PSC_VELXY_P
-            + self.integral
-            + self.derivative * p::PSC_VELXY_D;
+        let wanted = (self.target.acceleration + self.integral)
+            + (self.error * p::PSC_VELXY_P + self.derivative * p::PSC_VELXY_D);
         self.acceleration_target = limited(wanted, self.limit_mps2);
         self.stuck = if self.acceleration_target == wanted { none } else { wanted };
         self.acceleration_target
     }
 
+    #[inline]
     fn integrate(&mut self) {
         let step = self.error * (p::PSC_VELXY_I * self.dt_s);
-        let before = self.integral.norm_squared();
+        let before = self.integral;
         self.integral += step;
-        let most = if step.dot(&self.stuck) > 0.0 { before.sqrt() } else { p::PSC_VELXY_IMAX };
-        self.integral = limited(self.integral, most);
+        // Into a limit that holds the lean it may turn, but not grow.
+        if step.dot(&self.stuck) > 0.0 {
+            self.integral = limited(self.integral, before.norm());
+        }
+        self.integral = limited(self.integral, p::PSC_VELXY_IMAX);
     }
 }

@@ -72,6 +72,7 @@ impl<'a> Autopilot<'a> {
     }
 
     /// One control step; returns the pulse width of each rotor, whole us.
+    #[inline]
     pub fn update(&mut self, time_s: f64, estimate: &Estimate) -> [u16; ROTORS] {
         let goals = self.director.update(time_s, estimate, &mut self.motors);
         if self.motors.spool == Spool::Flying {
@@ -80,14 +81,13 @@ impl<'a> Autopilot<'a> {
                 self.horizontal.restart(estimate);
             }
             let push = self.horizontal.update(goals.horizontal.as_ref(), estimate);
-            let direction = Vector3::new(push.x, push.y, GRAVITY);
-            let direction = direction * direction.norm().recip();
-            let torque = self.attitude.update(direction, estimate);
             self.throttle_in = if self.director.touchdown == Touchdown::Complete {
                 self.vertical.relax(estimate, self.throttle_in)
             } else {
                 self.vertical.update(&goals.vertical, estimate, self.motors.limits)
             };
+            let direction = Vector3::new(push.x, push.y, GRAVITY);
+            let torque = self.attitude.update(&direction, estimate);
             let boosted = self.throttle_in * self.boost(estimate);
             let height_m = estimate.position_m.z - self.home_m.z;
             self.motors.set_density(height_m, |height_m| self.air.ratio(height_m));
@@ -103,11 +103,14 @@ impl<'a> Autopilot<'a> {
     }
 
     /// What the throttle is multiplied by for the tilt.
+    #[inline]
     pub fn boost(&self, estimate: &Estimate) -> f64 {
         1.0 / estimate.rotation[(2, 2)].max(0.1)
     }
 
     /// On the ground, the controllers start from where the vehicle is and from no throttle.
+    #[cold]
+    #[inline(never)]
     fn stand(&mut self, estimate: &Estimate) {
         self.horizontal = Horizontal::new(estimate.position_m.xy(), self.dt_s);
         self.attitude = Attitude::new(self.dt_s);
@@ -115,6 +118,7 @@ impl<'a> Autopilot<'a> {
     }
 
     /// Whether a rotor is at an end of its range in flight, or the throttle is.
+    #[inline]
     pub fn saturated(&self) -> bool {
         let (low, high) = self.motors.pulse_range_us();
         let at_end = |pulse: &u16| *pulse <= low || *pulse >= high;

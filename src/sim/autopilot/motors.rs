@@ -36,9 +36,11 @@ pub struct Motors {
     /// Limits that were hit in this step.
     pub limits: ThrottleLimits,
     throttle_filter: LowPass,
+    curve: Curve,
     expo: f64,
     spin_min: f64,
     spin_span: f64,
+    pulse_range_us: (u16, u16),
     density_gain: f64,
     density_height_m: f64,
     voltage_limits: (f64, f64),
@@ -60,9 +62,11 @@ impl Motors {
             throttle: 0.0,
             limits: ThrottleLimits::default(),
             throttle_filter: LowPass::new(p::THROTTLE_FLT, dt_s),
+            curve: Curve::new(settings.mot_thst_expo),
             expo: settings.mot_thst_expo,
             spin_min: settings.mot_spin_min,
             spin_span: settings.mot_spin_max - settings.mot_spin_min,
+            pulse_range_us: (whole_us(settings.mot_spin_min), whole_us(settings.mot_spin_max)),
             density_gain: 1.0,
             density_height_m: f64::NEG_INFINITY,
             voltage_limits: (
@@ -77,12 +81,14 @@ impl Motors {
     }
 
     /// Smallest and largest pulse in flight, us.
+    #[inline]
     pub fn pulse_range_us(&self) -> (u16, u16) {
-        (whole_us(self.spin_min), whole_us(self.spin_min + self.spin_span))
+        self.pulse_range_us
     }
 
     /// Tells the motors the height above home (m) and how to find the density of the air there, as a
     /// share of that at sea level, for its compensation.
+    #[inline]
     pub fn set_density(&mut self, height_m: f64, ratio: impl FnOnce(f64) -> f64) {
         if (height_m - self.density_height_m).abs() >= DENSITY_STEP_M {
             self.density_height_m = height_m;
@@ -104,6 +110,7 @@ impl Motors {
     }
 
     /// One step with the boosted throttle and the torque demands (forward, left, up).
+    #[inline]
     pub fn update(&mut self, throttle: f64, torque: &Vector3<f64>) {
         match self.spool {
             Spool::Stopped => self.hold(0.0),
@@ -117,6 +124,7 @@ impl Motors {
         }
     }
 
+    #[inline(never)]
     fn hold(&mut self, actuator: f64) {
         self.pulses_us = [whole_us(actuator); ROTORS];
         self.throttle_filter.value = 0.0;
@@ -124,16 +132,35 @@ impl Motors {
         self.limits = ThrottleLimits { upper: false, lower: true };
     }
 
+    #[inline]
     fn fly(&mut self, throttle: f64, torque: &Vector3<f64>) {
-        self.throttle = self.throttle_filter.apply(throttle).clamp(0.0, 1.0);
+        let filtered = self.throttle_filter.apply(throttle);
+        let [roll, pitch, yaw] = (torque * (0.5 * self.gain)).into();
+        let share = LAYOUT.map(|(forward, left, turn)| left * roll - forward * pitch + turn * yaw);
+        let wanted = filtered * self.gain;
+        // No rotor's share is greater than this: most of the time nothing has to give way.
+        let reach = roll.abs() + pitch.abs() + yaw.abs();
+        let free = filtered > 0.0 && filtered < 1.0 && wanted > reach && wanted + reach < 1.0;
+        let thrust = if free {
+            self.throttle = filtered;
+            self.limits = ThrottleLimits::default();
+            share.map(|share| wanted + share)
+        } else {
+            self.limited(filtered, share)
+        };
+        let output = self.curve.actuators(thrust.map(|thrust| thrust * self.lift));
+        let slope = self.spin_span * self.per_voltage;
+        self.pulses_us = output.map(|output| whole_us(self.spin_min + slope * output));
+    }
+
+    /// Thrust of each rotor where the throttle or a rotor may be at an end of its range.
+    #[cold]
+    #[inline(never)]
+    fn limited(&mut self, throttle: f64, share: [f64; ROTORS]) -> [f64; ROTORS] {
+        self.throttle = throttle.clamp(0.0, 1.0);
         self.throttle_filter.value = self.throttle;
         self.limits = ThrottleLimits { upper: self.throttle >= 1.0, lower: self.throttle <= 0.0 };
-        let gain = self.gain;
-        let wanted = self.throttle * gain;
-        let mut share = [0.0; ROTORS];
-        for (share, (forward, left, turn)) in share.iter_mut().zip(LAYOUT) {
-            *share = 0.5 * gain * (left * torque.x - forward * torque.y + turn * torque.z);
-        }
+        let wanted = self.throttle * self.gain;
         // Attitude before throttle: the collective gives way where a rotor would leave its range.
         let low = share.iter().copied().fold(0.0, f64::min);
         let high = share.iter().copied().fold(0.0, f64::max);
@@ -144,24 +171,46 @@ impl Motors {
         } else {
             wanted
         };
-        for (pulse, share) in self.pulses_us.iter_mut().zip(share) {
-            let thrust = (collective + share * scale).clamp(0.0, 1.0);
-            let output = (curve(thrust * self.lift, self.expo) * self.per_voltage).min(1.0);
-            *pulse = whole_us(self.spin_min + self.spin_span * output);
-        }
+        share.map(|share| (collective + share * scale).clamp(0.0, 1.0))
     }
 }
 
 /// Actuator share for a thrust share: the inverse of (1 - expo) a + expo a².
-fn curve(thrust: f64, expo: f64) -> f64 {
-    if expo.abs() < 1e-6 {
-        return thrust;
+#[derive(Clone, Copy, Debug)]
+struct Curve {
+    linear: f64,
+    square: f64,
+    four_expo: f64,
+    per_two_expo: f64,
+    straight: bool,
+}
+
+impl Curve {
+    fn new(expo: f64) -> Self {
+        let linear = 1.0 - expo;
+        Self {
+            linear,
+            square: linear * linear,
+            four_expo: 4.0 * expo,
+            per_two_expo: 1.0 / (2.0 * expo),
+            straight: expo.abs() < 1e-6,
+        }
     }
-    let linear = 1.0 - expo;
-    ((linear * linear + 4.0 * expo * thrust).max(0.0).sqrt() - linear) / (2.0 * expo)
+
+    #[inline]
+    fn actuators(&self, thrust: [f64; ROTORS]) -> [f64; ROTORS] {
+        if self.straight {
+            return thrust;
+        }
+        thrust.map(|thrust| {
+            let root = (self.square + self.four_expo * thrust).max(0.0).sqrt();
+            (root - self.linear) * self.per_two_expo
+        })
+    }
 }
 
 /// Pulse of an actuator share: the fraction is cut off, as the firmware does.
+#[inline]
 fn whole_us(actuator: f64) -> u16 {
     // The small addition keeps decimal fractions such as 0.95 from falling below their value.
     (p::MOT_PWM_MIN + (p::MOT_PWM_MAX - p::MOT_PWM_MIN) * actuator + 1e-9) as u16
@@ -227,7 +276,7 @@ mod tests {
     fn thrust_curve_is_inverted_exactly() {
         for expo in [-0.3, 0.0, 0.5, 0.65, 1.0] {
             for thrust in [0.0, 0.2, 0.7, 1.0] {
-                let actuator = curve(thrust, expo);
+                let [actuator, ..] = Curve::new(expo).actuators([thrust; ROTORS]);
                 let back = (1.0 - expo) * actuator + expo * actuator * actuator;
                 assert!((back - thrust).abs() < 1e-12, "{expo} {thrust}");
             }

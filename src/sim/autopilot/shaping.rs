@@ -48,6 +48,7 @@ impl<const N: usize> Kinematics<N> {
     }
 
     /// Moves on at the present acceleration.
+    #[inline]
     pub fn advance(&mut self, dt_s: f64) {
         self.position += (self.velocity + self.acceleration * (dt_s / 2.0)) * dt_s;
         self.velocity += self.acceleration * dt_s;
@@ -56,6 +57,7 @@ impl<const N: usize> Kinematics<N> {
     /// Moves on, but not away from a vehicle that can give no more in the direction of `stuck`
     /// (zero: free): neither in position while that is ahead by `ahead`, nor in velocity while that
     /// is ahead by `faster`.
+    #[inline]
     pub fn advance_within(
         &mut self,
         dt_s: f64,
@@ -78,12 +80,14 @@ impl<const N: usize> Kinematics<N> {
     }
 
     /// Turns the acceleration towards meeting `goal` in position and velocity.
+    #[inline]
     pub fn approach(&mut self, goal: &Self, limits: &Approach, dt_s: f64) {
         let catch_up = limits.to_position.rate(goal.position - self.position, limits.speed);
         self.approach_velocity(&(catch_up + goal.velocity), &goal.acceleration, limits, dt_s);
     }
 
     /// Turns the acceleration towards a velocity.
+    #[inline]
     pub fn approach_velocity(
         &mut self,
         velocity: &SVector<f64, N>,
@@ -118,7 +122,8 @@ const NOTHING: f64 = 1e-12;
 /// deceleration can still stop. Never overshoots within one step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RootLaw {
-    stiffness: f64,
+    /// Gain near zero, 1/s.
+    near: f64,
     brake: f64,
     linear_to: f64,
     steps_per_s: f64,
@@ -127,9 +132,11 @@ pub(super) struct RootLaw {
 impl RootLaw {
     pub(super) fn new(stiffness: f64, brake: f64, dt_s: f64) -> Self {
         let linear_to = brake / (stiffness * stiffness);
-        Self { stiffness, brake, linear_to, steps_per_s: 1.0 / dt_s }
+        let steps_per_s = 1.0 / dt_s;
+        Self { near: stiffness.min(steps_per_s), brake, linear_to, steps_per_s }
     }
 
+    #[inline]
     pub(super) fn rate<const N: usize>(
         &self,
         error: SVector<f64, N>,
@@ -141,15 +148,26 @@ impl RootLaw {
         }
         if square <= self.linear_to * self.linear_to {
             // Most of the time; needs no square root.
-            return limited(error * self.stiffness.min(self.steps_per_s), limit);
+            return limited(error * self.near, limit);
         }
-        let size = square.sqrt();
+        self.far(error, square.sqrt(), limit)
+    }
+
+    /// Apart, so that its roots and its division are made only when they are needed.
+    #[inline(never)]
+    fn far<const N: usize>(
+        &self,
+        error: SVector<f64, N>,
+        size: f64,
+        limit: f64,
+    ) -> SVector<f64, N> {
         let rate = (2.0 * self.brake * (size - self.linear_to / 2.0)).sqrt();
         error * (rate.min(size * self.steps_per_s).min(limit) / size)
     }
 }
 
 /// A vector cut to a length.
+#[inline]
 pub(super) fn limited<const N: usize>(vector: SVector<f64, N>, limit: f64) -> SVector<f64, N> {
     let square = vector.norm_squared();
     if square > limit * limit { shortened(vector, limit) } else { vector }

@@ -115,11 +115,13 @@ impl Vertical {
     }
 
     /// One step: throttle before the boost for tilt, not limited.
+    #[inline]
     pub fn update(&mut self, goal: &Goal, estimate: &Estimate, limits: ThrottleLimits) -> f64 {
         self.shape(goal, limits);
         self.throttle(estimate, limits)
     }
 
+    #[inline]
     fn throttle(&mut self, estimate: &Estimate, limits: ThrottleLimits) -> f64 {
         let height_m = estimate.position_m.z;
         let (below, above) = self.reach_m;
@@ -147,6 +149,7 @@ impl Vertical {
     ///
     /// The firmware asks for a wanted speed of exactly 0, which its single precision next to never
     /// leaves after a show has moved: its logs keep one hover throttle throughout.
+    #[inline]
     pub fn learn_hover(&mut self, throttle: f64, estimate: &Estimate) {
         let level = estimate.rotation[(2, 2)] > 0.996;
         let still = self.target.velocity.x == 0.0 && estimate.velocity_mps.z.abs() < 0.6;
@@ -157,6 +160,7 @@ impl Vertical {
         }
     }
 
+    #[inline]
     fn shape(&mut self, goal: &Goal, limits: ThrottleLimits) {
         let descending = matches!(goal, Goal::Land(_));
         let stuck = Vector1::new(match limits {

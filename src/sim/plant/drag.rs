@@ -46,6 +46,7 @@ impl Drag {
     }
 
     /// Adds the drag at a velocity of the body relative to the air, body axes, m/s.
+    #[inline]
     pub fn add_loads(&self, relative_mps: &Vector3<f64>, density_ratio: f64, loads: &mut Loads) {
         let density = density_ratio * SEA_LEVEL_DENSITY;
         loads.force_n -= relative_mps.zip_map(&self.factor_m2, |speed, factor| {

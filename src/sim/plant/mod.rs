@@ -115,6 +115,7 @@ impl Plant {
     }
 
     /// Present motion.
+    #[inline]
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
@@ -131,6 +132,7 @@ impl Plant {
 
     /// Mean acceleration by which the ground stopped the fall in the last step, m/s² upward: what an
     /// accelerometer feels of a touchdown; 0 otherwise.
+    #[inline]
     pub fn impact_mps2(&self) -> f64 {
         self.impact_mps2
     }
@@ -152,28 +154,40 @@ impl Plant {
     ///
     /// The velocity-Verlet scheme of AirSim's FastPhysicsEngine: drag at the velocity expected in
     /// the middle of the step, velocity with the mean of old and new acceleration.
+    #[inline]
     pub fn step(&mut self, command: &[f64; ROTORS], around: &Surroundings) {
+        if self.effects.any() {
+            self.step_affected(command, around);
+        } else {
+            let air =
+                Air { velocity_mps: around.air_velocity_mps, density_ratio: around.density_ratio };
+            self.step_in(&air, &Change::default(), command);
+        }
+    }
+
+    /// One step with effects; apart, so that the one without is compiled for factors of 1.
+    #[inline(never)]
+    fn step_affected(&mut self, command: &[f64; ROTORS], around: &Surroundings) {
+        let now = &self.motion;
+        let middle_mps = now.velocity_mps + now.acceleration_mps2 * (self.dt_s / 2.0);
+        let (air, change, command) = self.affected(command, around, &middle_mps);
+        self.step_in(&air, &change, &command);
+    }
+
+    /// One step in this air, with these changes of the loads.
+    #[inline]
+    fn step_in(&mut self, air: &Air, change: &Change, command: &[f64; ROTORS]) {
         let half_s = self.dt_s / 2.0;
         let now = &self.motion;
         let middle_mps = now.velocity_mps + now.acceleration_mps2 * half_s;
         let middle_radps = now.rate_radps + now.angular_acceleration * half_s;
 
-        let mut loads = Loads::default();
-        let (air, change, command) = if self.effects.any() {
-            let affected = self.affected(command, around, &middle_mps);
-            loads.force_n = affected.1.force_n;
-            affected
-        } else {
-            let air =
-                Air { velocity_mps: around.air_velocity_mps, density_ratio: around.density_ratio };
-            (air, Change::default(), *command)
-        };
-        let now = &self.motion;
+        let mut loads = Loads { force_n: change.force_n, torque_nm: Vector3::zeros() };
         let relative = now.rotation.tr_mul(&(middle_mps - air.velocity_mps));
         if let Some(sitl) = &mut self.sitl {
-            sitl.add_loads(&command, &relative, &middle_radps, air.density_ratio, &mut loads);
+            sitl.add_loads(command, &relative, &middle_radps, air.density_ratio, &mut loads);
         } else {
-            self.rotors.add_loads(air.density_ratio, &change, &mut loads);
+            self.rotors.add_loads(air.density_ratio, change, &mut loads);
             self.drag.add_loads(&relative, air.density_ratio, &mut loads);
         }
 
@@ -191,7 +205,7 @@ impl Plant {
         next.attitude = turned(next.attitude, middle_radps * self.dt_s);
         next.rotation = *next.attitude.to_rotation_matrix().matrix();
 
-        self.rotors.advance(&command, air.density_ratio * change.torque);
+        self.rotors.advance(command, air.density_ratio * change.torque);
         self.rest_on_ground();
     }
 
@@ -238,37 +252,47 @@ impl Plant {
     }
 
     /// The ground carries what would sink into it, and holds it level: drones stand on their legs.
+    #[inline]
     fn rest_on_ground(&mut self) {
-        let motion = &mut self.motion;
+        let motion = &self.motion;
         let stood = self.on_ground;
         self.impact_mps2 = 0.0;
         self.on_ground = motion.position_m.z <= self.ground_z_m && motion.velocity_mps.z <= 0.0;
         if self.on_ground {
-            if !stood {
-                self.impact_mps2 = -motion.velocity_mps.z / self.dt_s;
-            }
-            let heading = motion.rotation * Vector3::x();
-            let yaw = heading.y.atan2(heading.x);
-            motion.position_m.z = self.ground_z_m;
-            motion.velocity_mps = Vector3::zeros();
-            motion.acceleration_mps2 = Vector3::zeros();
-            motion.rate_radps = Vector3::zeros();
-            motion.angular_acceleration = Vector3::zeros();
-            motion.attitude = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
-            motion.rotation = *motion.attitude.to_rotation_matrix().matrix();
+            self.stand(stood);
         }
+    }
+
+    /// Stands on the ground; `stood`: as in the step before.
+    #[cold]
+    #[inline(never)]
+    fn stand(&mut self, stood: bool) {
+        let motion = &mut self.motion;
+        if !stood {
+            self.impact_mps2 = -motion.velocity_mps.z / self.dt_s;
+        }
+        let heading = motion.rotation * Vector3::x();
+        let yaw = heading.y.atan2(heading.x);
+        motion.position_m.z = self.ground_z_m;
+        motion.velocity_mps = Vector3::zeros();
+        motion.acceleration_mps2 = Vector3::zeros();
+        motion.rate_radps = Vector3::zeros();
+        motion.angular_acceleration = Vector3::zeros();
+        motion.attitude = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+        motion.rotation = *motion.attitude.to_rotation_matrix().matrix();
     }
 }
 
 /// An attitude turned further by a small body-axes rotation vector.
+#[inline]
 fn turned(attitude: UnitQuaternion<f64>, turn_rad: Vector3<f64>) -> UnitQuaternion<f64> {
     // Half angles of a control step are at most some hundredths of a radian: this series of the
     // sine and cosine is exact to the last digits there, and the normalisation does the rest.
-    let half = turn_rad / 2.0;
+    let half = turn_rad * 0.5;
     let square = half.norm_squared();
-    let vector = half * (1.0 - square / 6.0);
+    let vector = half * (1.0 - square * (1.0 / 6.0));
     let step =
-        Quaternion::new(1.0 - square / 2.0 + square * square / 24.0, vector.x, vector.y, vector.z);
+        Quaternion::new(1.0 - square * (0.5 - square * (1.0 / 24.0)), vector.x, vector.y, vector.z);
     let product = attitude.into_inner() * step;
     // One step of Newton's iteration for 1/norm: the product's norm is off 1 by rounding only.
     let correction = 1.5 - 0.5 * product.norm_squared();

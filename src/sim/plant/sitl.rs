@@ -91,6 +91,7 @@ impl Sitl {
 
     /// Adds the loads of commands (share of 1000..2000 us) at a velocity relative to the air and
     /// turn rates, both in body axes; `density_ratio` is that of the standard atmosphere.
+    #[inline(never)]
     pub fn add_loads(
         &mut self,
         command: &[f64; ROTORS],

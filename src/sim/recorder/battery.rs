@@ -54,8 +54,8 @@ impl Battery {
             self.used_j += own.amps * own.volts * interval_s;
             return;
         }
-        let load = plant.rotors().total_output() / self.hover_output;
-        self.current_a = 0.3 + self.hover_a * load.max(0.0).powf(1.5);
+        let load = (plant.rotors().total_output() / self.hover_output).max(0.0);
+        self.current_a = 0.3 + self.hover_a * load * load.sqrt();
         self.used_as += self.current_a * interval_s;
         self.used_j += self.current_a * self.volts() * interval_s;
     }

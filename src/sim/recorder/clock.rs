@@ -31,12 +31,14 @@ impl Clock {
     }
 
     /// Board time (TimeUS) of a show time, us.
+    #[inline]
     pub(super) fn board_us(&self, show_us: i64) -> i64 {
         show_us + self.offset_us
     }
 
     /// Week and millisecond of the GPS solution that a row at this show time reports, if a step of
     /// `step_us` at it is the first one to have it.
+    #[inline]
     pub(super) fn fix(&self, show_us: i64, step_us: i64) -> Option<(i64, i64)> {
         let now_us = self.start_ms * 1000 + show_us - GPS_LATENCY_US;
         let age_us = now_us.rem_euclid(GPS_INTERVAL_US);

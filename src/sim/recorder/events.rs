@@ -35,6 +35,7 @@ impl Events {
     }
 
     /// Writes rows for what changed.
+    #[inline]
     pub(super) fn write<W: Write>(
         &mut self,
         log: &mut LogWriter<W>,
@@ -51,6 +52,17 @@ impl Events {
         if now == *self {
             return Ok(0);
         }
+        self.write_changes(log, now, board_us)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn write_changes<W: Write>(
+        &mut self,
+        log: &mut LogWriter<W>,
+        now: Self,
+        board_us: i64,
+    ) -> io::Result<u64> {
         let before = std::mem::replace(self, now);
         let time = I(board_us);
         let reached = |state| before.touchdown < state && now.touchdown >= state;

@@ -67,6 +67,7 @@ fn messages(full: bool) -> Vec<&'static MessageDef> {
 }
 
 impl<W: Write> Recorder for LogRecorder<'_, W> {
+    #[inline]
     fn record(&mut self, moment: &Moment<'_>) -> io::Result<()> {
         let board_us = self.clock.board_us(moment.time_us);
         let log = &mut self.log;

@@ -6,7 +6,7 @@ use crate::log::Value::{Float as F, Int as I};
 use crate::log::{LogWriter, catalog};
 
 use super::Moment;
-use super::view::{Euler, View};
+use super::view::{Euler, View, course_deg};
 
 /// POS and XKF1 of one EKF core: 10 Hz rows.
 pub(super) fn write<W: Write>(
@@ -84,7 +84,7 @@ pub(super) fn write_gps<W: Write>(
             F(globe.lon_deg),
             F(globe.amsl_m),
             F(velocity.xy().norm()),
-            F(velocity.y.atan2(velocity.x).to_degrees().rem_euclid(360.0)),
+            F(course_deg(velocity.x, velocity.y)),
             F(velocity.z),
             F(0.0),
             I(1),

@@ -11,6 +11,8 @@ use crate::base::frame::{Geodetic, ShowFrame, metres_per_degree};
 pub(super) struct View {
     sin: f64,
     cos: f64,
+    /// Of show x, clockwise from north, 0..360.
+    heading_deg: f64,
     home_m: Vector3<f64>,
     /// Home, which is also the EKF's origin.
     pub(super) home: Geodetic,
@@ -31,7 +33,14 @@ impl View {
     pub(super) fn new(frame: &ShowFrame, home_m: Vector3<f64>) -> Self {
         let (sin, cos) = frame.orientation_deg.to_radians().sin_cos();
         let home = frame.to_geodetic(home_m);
-        Self { sin, cos, home_m, home, metres_per_degree: metres_per_degree(home.lat_deg) }
+        Self {
+            sin,
+            cos,
+            heading_deg: course_deg(cos, sin),
+            home_m,
+            home,
+            metres_per_degree: metres_per_degree(home.lat_deg),
+        }
     }
 
     /// A vector of the show frame as north, east, down.
@@ -62,7 +71,7 @@ impl View {
         Euler {
             roll_deg: left_up.atan2(up_up).to_degrees(),
             pitch_deg: (-forward.z).clamp(-1.0, 1.0).asin().to_degrees(),
-            yaw_deg: forward.y.atan2(forward.x).to_degrees().rem_euclid(360.0),
+            yaw_deg: course_deg(forward.x, forward.y),
         }
     }
 
@@ -72,9 +81,15 @@ impl View {
         Euler {
             roll_deg: (-direction.y).clamp(-1.0, 1.0).asin().to_degrees(),
             pitch_deg: (-direction.x).atan2(direction.z).to_degrees(),
-            yaw_deg: self.sin.atan2(self.cos).to_degrees().rem_euclid(360.0),
+            yaw_deg: self.heading_deg,
         }
     }
+}
+
+/// Direction of a vector, clockwise from north, 0..360 degrees.
+pub(super) fn course_deg(north: f64, east: f64) -> f64 {
+    let degrees = east.atan2(north).to_degrees();
+    if degrees < 0.0 { degrees + 360.0 } else { degrees }
 }
 
 /// Body axes forward, left, up to forward, right, down.

@@ -60,11 +60,13 @@ impl Linear {
     }
 
     /// Sum of the rotors' present outputs, 0..4, as shares of full thrust.
+    #[inline]
     pub fn total_output(&self) -> f64 {
         self.output.iter().sum()
     }
 
     /// Adds thrust and torque at the present output.
+    #[inline]
     pub fn add_loads(&self, density_ratio: f64, change: &Change, loads: &mut Loads) {
         let [mut thrust, mut roll, mut pitch, mut yaw] = [0.0; 4];
         for ((forward, left, turn), output) in LAYOUT.into_iter().zip(self.output) {
@@ -98,6 +100,7 @@ impl Linear {
     }
 
     /// Moves the rotors on by one step towards `command` (0..1 of full thrust).
+    #[inline]
     pub fn advance(&mut self, command: &[f64; ROTORS]) {
         self.output = self.filtered;
         for (state, command) in self.filtered.iter_mut().zip(command) {

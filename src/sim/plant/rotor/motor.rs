@@ -76,6 +76,7 @@ impl Motor {
     }
 
     /// Adds thrust and torque at the present speeds.
+    #[inline]
     pub fn add_loads(&self, density_ratio: f64, change: &Change, loads: &mut Loads) {
         let [mut thrust, mut roll, mut pitch, mut yaw] = [0.0; 4];
         for ((forward, left, turn), square) in LAYOUT.into_iter().zip(self.squares()) {
@@ -93,6 +94,7 @@ impl Motor {
 
     /// Moves the motors on by one step; `torque` is the rotors' torque over that in still air at
     /// sea level.
+    #[inline]
     pub fn advance(&mut self, command: &[f64; ROTORS], torque: f64) {
         let quadratic =
             self.law.resistance_ohm * self.torque_factor * torque.max(LEAST_TORQUE) / self.constant;

@@ -1,0 +1,83 @@
+//! What a reader must know before using a flight's numbers, in plain words.
+
+use super::prefer::misfit;
+use super::result::{DroneAnalysis, Laws, UpdraftMap};
+use super::stats::mean_sd;
+use super::wind::{Leaning, axial_of};
+
+/// A systematic error above this is worth a sentence, m/s.
+const WORTH_SAYING_MPS: f64 = 0.05;
+
+/// A law from fewer windows is warned about.
+const FEWEST_WINDOWS: usize = 4;
+
+/// About the laws of a calibration: the flock's, or its only drone's.
+pub(super) fn fit_cautions(
+    flock: Option<&Laws>,
+    drones: &[DroneAnalysis],
+    leaning: Option<Leaning>,
+) -> Vec<String> {
+    if drones.iter().all(|drone| drone.laws.is_none()) {
+        return vec![
+            "no law was fitted: no drone has a usable speed ladder (the reasons are with the drones)"
+                .to_owned(),
+        ];
+    }
+    let few = flock.and_then(|laws| laws.linear.as_ref()).map(|fit| fit.points);
+    let few = few.filter(|points| *points < FEWEST_WINDOWS).map(|points| {
+        format!(
+            "the laws rest on {points} windows of vertical motion only: this is hardly a ladder, and \
+             their errors are not known well, or not at all"
+        )
+    });
+    let misfit = flock.and_then(misfit);
+    few.into_iter().chain(misfit).chain(lean_caution(drones, leaning)).collect()
+}
+
+/// About wind in a calibration: its W* is not only the air's.
+fn lean_caution(drones: &[DroneAnalysis], leaning: Option<Leaning>) -> Option<String> {
+    let tilts: Vec<f64> = drones
+        .iter()
+        .filter(|drone| drone.laws.is_some())
+        .flat_map(|drone| &drone.windows)
+        .filter(|window| window.kind.is_leg() && window.rejected.is_empty())
+        .map(|window| window.lean_deg)
+        .collect();
+    let tilt = mean_sd(&tilts).0;
+    let axial = axial_of(leaning, tilt);
+    if axial <= WORTH_SAYING_MPS {
+        return None;
+    }
+    let size = if leaning.is_some() { "about" } else { "up to" };
+    Some(format!(
+        "wind: the drones leaned {tilt:.1} degrees in the ladder. Wind along the rotor axis of a \
+         leaning drone reads as sinking air: {size} {axial:.2} m/s of the fitted W* is that, and A \
+         and u0 are off with it{}",
+        if leaning.is_some() { " (the map is corrected for it, this table is not)" } else { "" }
+    ))
+}
+
+/// About wind: the drones leaned, and that is corrected for or not.
+pub(super) fn wind_caution(map: &UpdraftMap) -> Option<String> {
+    let errors: Vec<f64> = map.drones.iter().map(|drone| drone.systematic_mps).collect();
+    let error = mean_sd(&errors).0;
+    if error <= WORTH_SAYING_MPS {
+        return None;
+    }
+    let tilts: Vec<f64> = map.drones.iter().map(|drone| drone.tilt_deg).collect();
+    let tilt = mean_sd(&tilts).0;
+    Some(if map.leaning.is_some() {
+        format!(
+            "wind: the drones leaned {tilt:.1} degrees in the hover. What wind does to a leaning \
+             drone is corrected with the drag of the simulated vehicle; what is left may be \
+             {error:.2} m/s, of the same sign for all drones (stated as the systematic error)"
+        )
+    } else {
+        format!(
+            "wind: the drones leaned {tilt:.1} degrees in the hover, and a lean in hover or \
+             calibration reads as sinking air. Without the drag of these drones nothing is \
+             corrected: the map may be off by up to {error:.2} m/s, in the same direction \
+             for all drones (stated as the systematic error). Fly in still air where that matters"
+        )
+    })
+}

@@ -1,0 +1,99 @@
+//! Whether a plan can measure what it is flown for: windows to look at, and speeds to tell apart.
+
+use std::collections::BTreeSet;
+
+use super::report::{Collector, Finding, Severity};
+use crate::mission::plan::{Group, Kind, Plan, Purpose, Segment};
+
+/// Speeds that a law needs at least: one gives one equation for two unknowns.
+const MIN_SPEEDS: usize = 2;
+/// Speeds closer than this are the same, m/s.
+const SAME_SPEED_MPS: f64 = 0.01;
+
+/// Warns of segments that the analysis will leave out, and of ladders from which no law can come.
+pub(super) fn check(plan: &Plan, collector: &mut Collector) {
+    for group in &plan.groups {
+        windows(plan, group, collector);
+    }
+    if plan.purpose == Purpose::Calibration {
+        speeds(plan, collector);
+    }
+}
+
+/// Whether a segment is flown to be looked at.
+fn counts(purpose: Purpose, kind: Kind) -> bool {
+    match purpose {
+        Purpose::Calibration => kind.is_leg() || kind == Kind::Horizontal,
+        Purpose::Measurement => kind == Kind::Hover || kind.is_leg() || kind == Kind::Horizontal,
+    }
+}
+
+/// One warning for all segments of a group without a window.
+fn windows(plan: &Plan, group: &Group, collector: &mut Collector) {
+    let wanted: Vec<&Segment> =
+        group.segments.iter().filter(|segment| counts(plan.purpose, segment.kind)).collect();
+    let blind: Vec<&&Segment> = wanted.iter().filter(|segment| segment.window.is_none()).collect();
+    let Some(first) = blind.first() else { return };
+    let lasts_s = (first.end_ms - first.start_ms) as f64 / 1000.0;
+    let message = format!(
+        "{} of {} segments to be analysed (group {}) are too short for an analysis window, first \"{}\" of {lasts_s:.1} s: they will not count",
+        blind.len(),
+        wanted.len(),
+        group.name,
+        first.label,
+    );
+    collector.add(
+        0,
+        Finding {
+            time_s: Some(first.start_ms as f64 / 1000.0),
+            value: Some(lasts_s),
+            unit: "s",
+            ..warning("ladder-window", message, "fly them longer, or settle and trim less")
+        },
+    );
+}
+
+/// A ladder of one speed, or of none that can be looked at.
+fn speeds(plan: &Plan, collector: &mut Collector) {
+    let speeds: BTreeSet<i64> = plan
+        .groups
+        .iter()
+        .flat_map(|group| &group.segments)
+        .filter(|segment| segment.kind.is_leg() && segment.window.is_some())
+        .map(|segment| (segment.velocity_mps[2].abs() / SAME_SPEED_MPS).round() as i64)
+        .collect();
+    if speeds.len() >= MIN_SPEEDS {
+        return;
+    }
+    let message = match speeds.first() {
+        None => "the ladder has no leg with an analysis window: no law can be fitted".to_owned(),
+        Some(speed) => format!(
+            "all legs of the ladder have the same speed, {:.2} m/s: no law can be fitted to fewer than {MIN_SPEEDS} speeds",
+            *speed as f64 * SAME_SPEED_MPS
+        ),
+    };
+    let remedy = "fly legs at two speeds or more; the paper's ladder has seven";
+    collector.add(
+        0,
+        Finding {
+            value: Some(speeds.len() as f64),
+            limit: Some(MIN_SPEEDS as f64),
+            ..warning("ladder-speeds", message, remedy)
+        },
+    );
+}
+
+fn warning(check: &'static str, message: String, remedy: &'static str) -> Finding {
+    Finding {
+        severity: Severity::Warning,
+        check,
+        drones: vec![],
+        time_s: None,
+        end_s: None,
+        value: None,
+        limit: None,
+        unit: "",
+        message,
+        remedy,
+    }
+}

@@ -1,0 +1,170 @@
+//! The logs of a simulated flight and their record: what is there, what fits, what was changed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::exit::CommandError;
+use super::simulate::{Simulation, made_by, sha256};
+use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
+use crate::base::time::GpsTime;
+use crate::campaign::{FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
+use crate::log::{Log, Select};
+use crate::mission::Plan;
+use crate::mission::plan::Slot;
+use crate::vehicle::Vehicle;
+
+/// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
+/// same seed gives the same bytes.
+const START_UNIX_MS: i64 = 1_780_315_200_000;
+/// Largest plan that is hashed, bytes.
+const MAX_PLAN_BYTES: u64 = 256 << 20;
+
+/// The folder's record: a matching one is continued, another one refused or replaced.
+pub(super) fn prepare(
+    folder: &FlightFolder,
+    plan: &Plan,
+    simulation: &Simulation,
+    vehicle: &Vehicle,
+) -> Result<FlightRecord, CommandError> {
+    let plan_bytes = read_whole(&folder.plan(), MAX_PLAN_BYTES)?;
+    let vehicle_text = toml::to_string(vehicle)
+        .map_err(|error| CommandError::Failed(format!("failed to write the vehicle: {error}")))?;
+    let start = GpsTime::from_unix_ms(START_UNIX_MS)
+        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
+    let mut record = FlightRecord {
+        schema: FLIGHT_SCHEMA.to_owned(),
+        made_by: made_by(),
+        source: "simulator".to_owned(),
+        seed: simulation.seed,
+        vehicle: vehicle.name.clone(),
+        vehicle_sha256: sha256(vehicle_text.as_bytes()),
+        air_mps: simulation.air.uniform_mps,
+        air: simulation.air.texts(),
+        start,
+        full_logs: simulation.full_logs,
+        plan_sha256: sha256(&plan_bytes),
+        logs: Vec::new(),
+    };
+    create_folder(&folder.logs())?;
+    sweep_partial(&folder.logs())?;
+    match folder.read_record()? {
+        Some(existing) if existing.source != record.source => {
+            return Err(CommandError::Usage(format!(
+                "{} holds logs of real drones; simulate into another campaign",
+                folder.logs().display()
+            )));
+        }
+        Some(existing) => {
+            let logs = existing.logs.clone();
+            let same = FlightRecord { logs: Vec::new(), ..existing } == record;
+            if !same && !simulation.force {
+                return Err(CommandError::Usage(format!(
+                    "{} holds logs flown with other settings; give --force to replace them, or use \
+                     another folder",
+                    folder.logs().display()
+                )));
+            }
+            if same {
+                record.logs = logs;
+            } else {
+                remove_logs(folder, plan)?;
+            }
+        }
+        None if !present_logs(folder, plan).is_empty() => {
+            return Err(CommandError::Usage(format!(
+                "{} holds logs that this program did not simulate; use another folder",
+                folder.logs().display()
+            )));
+        }
+        None => {}
+    }
+    write_record(folder, &record)?;
+    Ok(record)
+}
+
+/// Removes a flight's logs and the truth that they were flown in.
+fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
+    let paths = present_logs(folder, plan).into_iter().map(|(_, path)| path);
+    let truths = plan.slots.iter().map(|slot| folder.truth(slot.slot, plan.slots.len()));
+    for path in paths.chain(truths.filter(|path| path.exists())) {
+        std::fs::remove_file(&path).map_err(|error| FileError::new("remove", &path, error))?;
+    }
+    Ok(())
+}
+
+/// The logs of a plan's slots that are there.
+fn present_logs(folder: &FlightFolder, plan: &Plan) -> Vec<(u16, PathBuf)> {
+    let count = plan.slots.len();
+    let paths = plan.slots.iter().map(|slot| (slot.slot, folder.log(slot.slot, count)));
+    paths.filter(|(_, path)| path.exists()).collect()
+}
+
+/// The record's entries of the logs that are there; those that it lacks, and those of drones just
+/// flown, are made from the files.
+pub(super) fn taken_down(
+    folder: &FlightFolder,
+    plan: &Plan,
+    record: &FlightRecord,
+    flown: &[&Slot],
+) -> Result<Vec<LogRecord>, CommandError> {
+    let flown: BTreeSet<u16> = flown.iter().map(|slot| slot.slot).collect();
+    let known: BTreeMap<u16, &LogRecord> = (record.logs.iter())
+        .filter(|log| log.crc32.is_some() && !flown.contains(&log.slot))
+        .map(|log| (log.slot, log))
+        .collect();
+    let logs: Result<Vec<_>, FileError> = (present_logs(folder, plan).par_iter())
+        .map(|(slot, path)| match known.get(slot) {
+            Some(log) => Ok((*log).clone()),
+            None => LogRecord::of(*slot, path),
+        })
+        .collect();
+    Ok(logs?)
+}
+
+/// Logs that are not as they were flown, and how they differ. What somebody else put in their place
+/// is not ours to replace.
+pub(super) fn changed_logs(
+    folder: &FlightFolder,
+    record: &FlightRecord,
+    wanted: &[&Slot],
+    count: usize,
+) -> Result<BTreeMap<u16, String>, CommandError> {
+    let known: BTreeMap<u16, &LogRecord> = record.logs.iter().map(|log| (log.slot, log)).collect();
+    let changed: Result<Vec<_>, CommandError> = wanted
+        .par_iter()
+        .filter_map(|slot| {
+            let path = folder.log(slot.slot, count);
+            let log = known.get(&slot.slot).filter(|_| path.exists())?;
+            match log.difference(&path) {
+                Ok(None) => None,
+                Ok(Some(_)) if is_of_others(&path) => Some(Err(CommandError::Usage(format!(
+                    "{} was not simulated by this program; move it away, or use another folder",
+                    path.display()
+                )))),
+                Ok(Some(how)) => Some(Ok((slot.slot, how))),
+                Err(error) => Some(Err(error.into())),
+            }
+        })
+        .collect();
+    Ok(changed?.into_iter().collect())
+}
+
+/// Whether a file is a log of another firmware than the simulator's.
+fn is_of_others(path: &Path) -> bool {
+    let Ok(log) = Log::open(path) else { return false };
+    let (tables, _) = log.select(&[Select { message: "MSG", fields: &["Message"] }]);
+    let texts: Vec<&String> =
+        tables.iter().filter_map(|table| table.text("Message")).flatten().collect();
+    !texts.is_empty() && !texts.iter().any(|text| text.contains("(updraft)"))
+}
+
+pub(super) fn write_record(
+    folder: &FlightFolder,
+    record: &FlightRecord,
+) -> Result<(), CommandError> {
+    let json = to_json(record)
+        .map_err(|error| CommandError::Failed(format!("failed to make the record: {error}")))?;
+    Ok(write_whole(&folder.record(), &json)?)
+}

@@ -1,0 +1,222 @@
+//! The flights behind the paths given to `updraft analyze`: plans, logs and what is known of them.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::exit::CommandError;
+use super::leaning::leaning;
+use super::load::has_extension;
+use crate::analysis::density::Density;
+use crate::analysis::wind::Leaning;
+use crate::analysis::{LogInput, TruthSeries};
+use crate::base::file::FileError;
+use crate::base::time::GpsTime;
+use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, LogRecord};
+use crate::log::Log;
+use crate::mission::Plan;
+use crate::mission::plan::Purpose;
+use crate::sim::air::truth::{self, TrueUpdraft};
+use crate::vehicle::{Vehicle, library};
+
+/// Exponent of density for electric rotors with a real thrust curve.
+const REAL_ROTOR_EXPONENT: f64 = 0.4;
+
+/// One flight found behind a path.
+pub(super) struct Found {
+    pub(super) name: String,
+    pub(super) plan: Option<Plan>,
+    pub(super) purpose: Option<Purpose>,
+    pub(super) logs: Vec<LogInput>,
+    pub(super) true_updraft_mps: Option<f64>,
+    pub(super) truth: BTreeMap<u16, TruthSeries>,
+    pub(super) seed: Option<u64>,
+    pub(super) start: Option<GpsTime>,
+    pub(super) density: Option<Density>,
+    pub(super) leaning: Option<Leaning>,
+    /// What is doubtful about the files, one sentence each.
+    pub(super) notes: Vec<String>,
+}
+
+/// What was asked to be analysed.
+pub(super) struct Work {
+    pub(super) title: String,
+    /// Paths in the report are shown relative to this.
+    pub(super) root: PathBuf,
+    pub(super) flights: Vec<Found>,
+}
+
+/// Adds what a path holds to the work.
+pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), CommandError> {
+    if path.is_dir() && campaign::is_campaign(path) {
+        let index = campaign::index_path(path);
+        if index.is_file() && work.title.is_empty() {
+            work.title = campaign::read_json::<CampaignIndex>(&index)?.title;
+        }
+        for folder in campaign::flights(path)? {
+            let flight = found_flight(&folder)?;
+            if work.title.is_empty() {
+                work.title =
+                    flight.plan.as_ref().map_or_else(String::new, |plan| plan.title.clone());
+            }
+            work.flights.push(flight);
+        }
+        return Ok(());
+    }
+    let logs = if path.is_dir() {
+        logs_in(path)?
+    } else {
+        // A file that is named itself must be there and be a log; one found in a folder may be lost.
+        Log::open(path)?;
+        vec![path.to_owned()]
+    };
+    if logs.is_empty() {
+        return Err(CommandError::Nothing(format!("{} holds no .BIN logs", path.display())));
+    }
+    work.flights.push(Found {
+        name: stem(path),
+        plan: plan.cloned(),
+        purpose: None,
+        logs: logs.into_iter().map(|path| LogInput { slot: None, path }).collect(),
+        true_updraft_mps: None,
+        truth: BTreeMap::new(),
+        seed: None,
+        start: None,
+        density: plan.map(|plan| density(plan, None)),
+        leaning: None,
+        notes: Vec::new(),
+    });
+    Ok(())
+}
+
+fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
+    let plan = folder.read_plan()?;
+    let files = if folder.logs().is_dir() { logs_in(&folder.logs())? } else { Vec::new() };
+    let mut notes = Vec::new();
+    let record = match folder.read_record()? {
+        Some(record) => held_record(folder, record, &files, &mut notes),
+        None => None,
+    };
+    let logs = files
+        .into_iter()
+        .map(|path| LogInput { slot: recorded_slot(folder, record.as_ref(), &path), path })
+        .collect();
+    let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
+    let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
+    let flown = record.as_ref().zip(vehicle.as_ref());
+    Ok(Found {
+        leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
+        density: Some(density(&plan, vehicle.as_ref())),
+        name: plan.name.clone(),
+        purpose: Some(plan.purpose),
+        plan: Some(plan),
+        logs,
+        true_updraft_mps: record
+            .as_ref()
+            .filter(|record| record.air.is_empty())
+            .map(|record| record.air_mps[2]),
+        truth,
+        start: record.as_ref().map(|record| record.start),
+        seed: record.map(|record| record.seed),
+        notes,
+    })
+}
+
+/// The record, if most of the logs are still those that it speaks of: somebody may have put the logs
+/// of real drones in their place. Says where files and record differ.
+fn held_record(
+    folder: &FlightFolder,
+    record: FlightRecord,
+    files: &[PathBuf],
+    notes: &mut Vec<String>,
+) -> Option<FlightRecord> {
+    let mut held = 0;
+    for log in &record.logs {
+        let path = folder.logs().join(&log.file);
+        if !path.exists() {
+            continue;
+        }
+        match log.difference(&path) {
+            Ok(None) => held += 1,
+            Ok(Some(how)) => notes.push(format!(
+                "{} is not the log that flight.json speaks of: {how}",
+                path.display()
+            )),
+            // The analysis says why it cannot be read.
+            Err(_) => {}
+        }
+    }
+    let holds = record.logs.is_empty() || (held > 0 && 2 * held >= files.len());
+    if !holds && !files.is_empty() {
+        *notes = vec![format!(
+            "{} speaks of other logs than those beside it: it is not used",
+            folder.record().display()
+        )];
+    }
+    holds.then_some(record)
+}
+
+/// Whose log a file is by the record.
+fn recorded_slot(folder: &FlightFolder, record: Option<&FlightRecord>, path: &Path) -> Option<u16> {
+    let named = |log: &&LogRecord| folder.logs().join(&log.file) == path;
+    record?.logs.iter().find(named).map(|log| log.slot)
+}
+
+/// The true air beside a simulated flight's logs, for the slots that have it.
+fn true_air(
+    folder: &FlightFolder,
+    plan: &Plan,
+) -> Result<BTreeMap<u16, TruthSeries>, CommandError> {
+    let mut found = BTreeMap::new();
+    for slot in &plan.slots {
+        let path = folder.truth(slot.slot, plan.slots.len());
+        if path.is_file() {
+            let TrueUpdraft { first_s, updraft_mps } =
+                truth::read(&path).map_err(|error| CommandError::Failed(error.to_string()))?;
+            found.insert(slot.slot, TruthSeries { first_s, updraft_mps });
+        }
+    }
+    Ok(found)
+}
+
+/// How the map is corrected for air density: by the thrust curve that the vehicle's autopilot is set
+/// for (none: linear thrust).
+fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
+    let linear = vehicle.is_some_and(|vehicle| vehicle.autopilot.mot_thst_expo == 0.0);
+    Density {
+        ground_amsl_m: plan.site.ground_amsl_m,
+        exponent: if linear { 1.0 } else { REAL_ROTOR_EXPONENT },
+    }
+}
+
+/// Whether a path is a finished log: what an interrupted run or copy left is not.
+fn is_log(path: &Path) -> bool {
+    let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    has_extension(path, "bin") && !hidden
+}
+
+/// The logs in a folder and in its direct subfolders (one per drone, as SD cards are often copied).
+fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
+    let mut logs = Vec::new();
+    let list = |folder: &Path| -> Result<Vec<PathBuf>, FileError> {
+        let fail = |source| FileError::new("read", folder, source);
+        let entries = std::fs::read_dir(folder).map_err(fail)?;
+        let mut paths =
+            entries.map(|entry| Ok(entry.map_err(fail)?.path())).collect::<Result<Vec<_>, _>>()?;
+        paths.sort();
+        Ok(paths)
+    };
+    for path in list(folder)? {
+        if path.is_dir() {
+            logs.extend(list(&path)?.into_iter().filter(|path| is_log(path)));
+        } else if is_log(&path) {
+            logs.push(path);
+        }
+    }
+    Ok(logs)
+}
+
+pub(super) fn stem(path: &Path) -> String {
+    let name = path.file_stem().or(path.file_name());
+    let text = name.map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    if text.is_empty() { "logs".to_owned() } else { text }
+}

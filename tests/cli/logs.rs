@@ -1,0 +1,178 @@
+//! Logs that are copies, broken, swapped or from somewhere else: matched by what they hold, or named.
+
+use std::fs;
+
+use insta::assert_snapshot;
+
+use crate::support::{Bench, Ended, SHORT};
+
+/// What is said about logs: the lists below the tables, and standard error without times.
+fn said(ended: &Ended) -> String {
+    let lists = ["  Missing drones", "  Lost logs", "  Cautions"];
+    let from = lists.iter().filter_map(|list| ended.out.find(list)).min();
+    let out = from.and_then(|from| ended.out.get(from..)).unwrap_or_default();
+    let mut err = String::new();
+    for line in ended.err.lines() {
+        err.push_str(line.split(" in ").next().unwrap_or_default());
+        err.push('\n');
+    }
+    format!("{out}-- err\n{err}")
+}
+
+impl Bench {
+    fn analyze(&self, code: i32) -> Ended {
+        self.expect(code, &["analyze", "campaign", "--no-report"])
+    }
+
+    fn log(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path("campaign/logs").join(name)).unwrap()
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) {
+        fs::write(self.path("campaign/logs").join(name), bytes).unwrap();
+    }
+
+    /// The slots of the analysed drones by file.
+    fn matched(&self, code: i32) -> Vec<(String, u64)> {
+        let args = ["analyze", "campaign", "--no-report", "--json", "--quiet"];
+        let value = self.expect(code, &args).json("updraft.analyze/1");
+        let drones = value["analysis"]["flights"][0]["drones"].as_array().unwrap().clone();
+        let one = |drone: &serde_json::Value| {
+            (drone["source"].as_str().unwrap().to_owned(), drone["slot"].as_u64().unwrap())
+        };
+        drones.iter().map(one).collect()
+    }
+}
+
+fn pairs(list: [(&str, u64); 2]) -> Vec<(String, u64)> {
+    list.iter().map(|(name, slot)| ((*name).to_owned(), *slot)).collect()
+}
+
+#[test]
+fn a_log_from_somewhere_else_is_refused() {
+    let bench = Bench::new();
+    bench.fly();
+    let away = ["plan", "calibration", "--grid", "1x2", "-o", "away", "--origin", "47.48,19.07"];
+    bench.expect(0, &[&away[..], SHORT].concat());
+    bench.expect(0, &["simulate", "away", "--seed", "2"]);
+    fs::copy(bench.path("away/logs/02.BIN"), bench.path("campaign/logs/02.BIN")).unwrap();
+    assert_snapshot!(said(&bench.analyze(3)));
+
+    // None is from here.
+    fs::copy(bench.path("away/logs/01.BIN"), bench.path("campaign/logs/01.BIN")).unwrap();
+    assert_snapshot!(said(&bench.analyze(5)));
+}
+
+#[test]
+fn a_log_of_another_grid_is_refused_where_it_stands_on_no_slot() {
+    let bench = Bench::new();
+    bench.fly();
+    let wide = ["plan", "calibration", "--grid", "1x2", "--spacing", "40", "-o", "wide"];
+    bench.expect(0, &[&wide[..], SHORT].concat());
+    bench.expect(0, &["simulate", "wide"]);
+    fs::copy(bench.path("wide/logs/01.BIN"), bench.path("campaign/logs/01.BIN")).unwrap();
+    let analysed = bench.analyze(3);
+    assert!(analysed.out.contains("its home is 16.5 m from that of slot 1"), "{analysed}");
+}
+
+#[test]
+fn the_same_bytes_twice_are_one_log() {
+    let bench = Bench::new();
+    bench.fly();
+    // The copy bears the name of slot 1, the original that of slot 2.
+    bench.put("01.BIN", &bench.log("02.BIN"));
+    assert_snapshot!(said(&bench.analyze(3)));
+    assert_eq!(bench.matched(3), [("logs/02.BIN".to_owned(), 2)]);
+    // Without a plan these legs are too short for a law.
+    let unplanned = bench.expect(5, &["analyze", "campaign/logs", "--no-report"]);
+    assert!(unplanned.out.contains("the same bytes as 01.BIN"), "{unplanned}");
+    assert!(unplanned.err.starts_with("Analysed 1 of 2 logs in "), "{unplanned}");
+}
+
+#[test]
+fn swapped_logs_go_where_they_stood() {
+    let bench = Bench::new();
+    bench.fly();
+    let (one, two) = (bench.log("01.BIN"), bench.log("02.BIN"));
+    bench.put("01.BIN", &two);
+    bench.put("02.BIN", &one);
+    assert_eq!(bench.matched(0), pairs([("logs/02.BIN", 1), ("logs/01.BIN", 2)]));
+    fs::remove_file(bench.path("campaign/logs/flight.json")).unwrap();
+    assert_snapshot!(said(&bench.analyze(0)));
+}
+
+#[test]
+fn the_record_does_not_hide_logs() {
+    let bench = Bench::new();
+    bench.fly();
+    let logs = bench.path("campaign/logs");
+    fs::rename(logs.join("01.BIN"), logs.join("left.BIN")).unwrap();
+    fs::rename(logs.join("02.BIN"), logs.join("00000009.BIN")).unwrap();
+    assert_eq!(bench.matched(0), pairs([("logs/left.BIN", 1), ("logs/00000009.BIN", 2)]));
+
+    // A record that names other slots than the logs do.
+    fs::rename(logs.join("left.BIN"), logs.join("01.BIN")).unwrap();
+    fs::rename(logs.join("00000009.BIN"), logs.join("02.BIN")).unwrap();
+    let path = logs.join("flight.json");
+    let mut record: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    record["logs"][0]["slot"] = 2.into();
+    record["logs"][1]["slot"] = 1.into();
+    fs::write(&path, record.to_string()).unwrap();
+    assert_eq!(bench.matched(0), pairs([("logs/01.BIN", 1), ("logs/02.BIN", 2)]));
+
+    // An extra log that belongs to no slot.
+    bench.put("notes.BIN", b"no log at all");
+    let mut more = bench.log("02.BIN");
+    more.extend_from_slice(b"tail");
+    bench.put("again.BIN", &more);
+    assert_snapshot!(said(&bench.analyze(3)));
+}
+
+#[test]
+fn without_a_plan_every_unusable_log_is_named() {
+    let bench = Bench::new();
+    bench.fly();
+    let whole = bench.log("01.BIN");
+    fs::create_dir(bench.path("field")).unwrap();
+    let put = |name: &str, bytes: &[u8]| fs::write(bench.path("field").join(name), bytes).unwrap();
+    put("whole.BIN", &whole);
+    put("copy.BIN", &whole);
+    put("empty.BIN", b"");
+    put("early.BIN", &whole[..whole.len() / 100]);
+    put("text.BIN", b"these are notes and not a log");
+    put("cut.BIN", &bench.log("02.BIN")[..whole.len() * 2 / 3]);
+    // 5 and not 3, as without a plan these legs are too short for a law.
+    let analysed = bench.expect(5, &["analyze", "field", "--no-report"]);
+    assert_snapshot!(said(&analysed));
+    let value = bench
+        .expect(5, &["analyze", "field", "--no-report", "--json", "--quiet"])
+        .json("updraft.analyze/1");
+    let lost = value["analysis"]["flights"][0]["lost"].as_array().unwrap();
+    let used = lost.iter().filter(|log| log["used"] == true).count();
+    assert_eq!((lost.len(), used), (5, 1));
+    bench.expect(5, &["analyze", "field", "-o", "out"]);
+    let page = fs::read_to_string(bench.path("out/report/index.html")).unwrap();
+    assert!(page.contains("Lost logs (5)") && page.contains("it is empty"));
+}
+
+#[test]
+fn a_log_without_take_off_is_no_flight() {
+    let bench = Bench::new();
+    bench.fly();
+    // Only the seconds on the ground: armed, with its motors started.
+    let whole = bench.log("01.BIN");
+    let lift_off = (1..100).map(|percent| whole.len() / 100 * percent);
+    let mut reasons = Vec::new();
+    for end in lift_off {
+        fs::write(bench.path("ground.BIN"), &whole[..end]).unwrap();
+        let ended = bench.run(&["analyze", "ground.BIN", "--no-report"]);
+        if ended.code != Some(5) {
+            break;
+        }
+        let reason = ended.err.lines().last().unwrap_or_default().trim().to_owned();
+        if !reasons.contains(&reason) {
+            reasons.push(reason);
+        }
+    }
+    assert!(reasons.iter().any(|reason| reason.contains("no flight in this log")), "{reasons:?}");
+}
