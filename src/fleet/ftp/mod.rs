@@ -4,7 +4,7 @@ mod exchange;
 pub mod get;
 pub mod list;
 pub mod put;
-mod reads;
+pub(crate) mod reads;
 pub mod sum;
 
 use crate::link::frame::{MavMessage, dialect};

@@ -83,7 +83,7 @@ impl PartFile {
         let mut journal = open(&journal_path(path))?;
         let read = |source| FileError::new("read", &journal_path(path), source);
         let mut bytes = Vec::new();
-        journal.by_ref().take(MOST_JOURNAL).read_to_end(&mut bytes).map_err(read)?;
+        (&mut journal).take(MOST_JOURNAL).read_to_end(&mut bytes).map_err(read)?;
         let (valid, have) = read_journal(&bytes, &identity);
         let length = file.metadata().map_err(read)?.len();
         let mut part = Self {
