@@ -142,6 +142,7 @@ fn all_but_the_drone_that_is_gone_come_home_whole_through_everything() {
     for (run, stop) in [(1, 17 * S), (2, 43 * S)] {
         pull(&mut net, &logs, &wanted, &options(run), &mut StopAt(stop)).unwrap();
         assert!(tear_journals(&logs) > 0);
+        println!("run {run}: {} home", Shelf::open(&logs, "").unwrap().manifest.logs.len());
     }
     let outcomes = pull(&mut net, &logs, &wanted, &options(3), &mut NoWatch).unwrap();
     println!("{} s", net.now() / S);

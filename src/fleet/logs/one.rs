@@ -431,7 +431,7 @@ impl PullOne {
             return match Sample::new(part.path(), self.size, &[tail(first), tail(last)]) {
                 Err(error) => self.fail(error.to_string(), "run again"),
                 Ok(sample) if self.reason.is_none() => {
-                    let get = Get::new(self.caller.another(), &target.source, sample, self.get());
+                    let get = Get::new(self.caller.another(), &target.source, sample, self.get_sample());
                     Stage::Probe(Box::new(get), part)
                 }
                 Ok(sample) => Stage::LogProbe(Box::new(self.log_get(sample)), part),
@@ -450,7 +450,13 @@ impl PullOne {
             patience: self.options.patience,
             most_size: self.options.most_size,
             budget: self.budget.clone(),
+            ..GetOptions::default()
         }
+    }
+
+    /// To look at a sample.
+    fn get_sample(&self) -> GetOptions {
+        GetOptions { up_to: self.size, ..self.get() }
     }
 
     fn log_get<S: crate::fleet::sink::Sink>(&self, sink: S) -> LogGet<S> {
@@ -574,7 +580,7 @@ impl PullOne {
         match Sample::new(part.path(), self.size, &ranges) {
             Err(error) => self.fail(error.to_string(), "run again"),
             Ok(sample) if self.reason.is_none() => {
-                let get = Get::new(self.caller.another(), &target.source, sample, self.get());
+                let get = Get::new(self.caller.another(), &target.source, sample, self.get_sample());
                 Stage::Sample(Box::new(get), part, sums)
             }
             Ok(sample) => Stage::LogSample(Box::new(self.log_get(sample)), part, sums),

@@ -23,7 +23,7 @@ impl Pace {
     /// At most so many.
     pub fn new(most: usize) -> Self {
         let most = most.max(1) as f64;
-        Self { at_once: most.min(4.0), most, since: None, bytes: 0, last: 0.0, best: 0.0 }
+        Self { at_once: most.min(8.0), most, since: None, bytes: 0, last: 0.0, best: 0.0 }
     }
 
     /// So many now.

@@ -264,6 +264,7 @@ pub struct Sample {
     have: Intervals,
     /// Something differs.
     pub differs: bool,
+    size: u64,
 }
 
 impl Sample {
@@ -281,7 +282,7 @@ impl Sample {
             have.insert(start, end);
             at = end;
         }
-        Ok(Self { file, have, differs: false })
+        Ok(Self { file, have, differs: false, size })
     }
 }
 
@@ -291,7 +292,7 @@ impl Sink for Sample {
     }
 
     fn put(&mut self, _now: Micros, offset: u64, data: &[u8]) -> Result<u64, String> {
-        let end = offset + data.len() as u64;
+        let end = (offset + data.len() as u64).min(self.size);
         let mut at = offset;
         let mut new = 0;
         while let Some((start, stop)) = self.have.gap(at, end) {
