@@ -1,0 +1,9 @@
+//! Bringing logs home: [`pull::pull`] from many drones over the air,
+//! [`verify::verify`] what is there.
+
+pub mod manifest;
+pub mod one;
+pub mod pace;
+pub mod part;
+pub mod pull;
+pub mod verify;
