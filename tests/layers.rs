@@ -17,6 +17,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("link", &["base"]),
     ("protocol", &["base"]),
     ("campaign", &["base", "vehicle", "mission", "show", "check"]),
+    (
+        "fleet",
+        &[
+            "base", "vehicle", "mission", "show", "check", "log", "link", "protocol", "campaign",
+        ],
+    ),
     ("effects", &["base", "vehicle"]),
     ("sim", &["base", "vehicle", "mission", "show", "log", "effects"]),
     ("virtual_fleet", &["base", "vehicle", "mission", "show", "sim", "log", "link", "protocol"]),

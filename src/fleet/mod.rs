@@ -1,0 +1,25 @@
+//! The station's side of a flight with real (or virtual) vehicles: what is known of them, what is
+//! put on them, and what they are told.
+//!
+//! Everything that talks is a [`crate::link::drive::Machine`]: it has no socket, clock or thread,
+//! and its refusals are values that say what is wrong, with which drone, and what to do. Safety
+//! comes before convenience: nothing is armed without a deliberate second step, a show is loaded
+//! whole or cleared, and the fence is never switched off.
+
+//TMP pub mod abort;
+pub mod command;
+//TMP pub mod dry_run;
+pub mod fence;
+pub mod greet;
+//TMP pub mod guided;
+//TMP pub mod journal;
+pub mod messages;
+pub mod params;
+//TMP pub mod preflight;
+pub mod required;
+pub mod slots;
+//TMP pub mod start;
+pub mod telemetry;
+//TMP pub mod upload;
+pub mod vehicle_clock;
+//TMP pub mod watch;
