@@ -80,7 +80,7 @@ pub struct Requirement {
 
 /// LOG_BITMASK: attitude, GPS, control tuning, navigation tuning, battery, rotor outputs, motors.
 const LOG_BITS: u32 = 1 << 1 | 1 << 2 | 1 << 4 | 1 << 5 | 1 << 9 | 1 << 10 | 1 << 17;
-/// Return no lower than this, m: above people and cars, below any show.
+/// A return climbs to at most so much below the top of the fence, m.
 const FENCE_GAP_M: f64 = 5.0;
 
 /// What a plan requires of a vehicle; the fence's own parameters are those of
@@ -96,7 +96,7 @@ pub fn requirements(plan: &Plan, show_firmware: bool) -> Vec<Requirement> {
             "the analysis needs rotor outputs, attitude, position and battery in the log",
         ),
         require("FENCE_ENABLE", Wanted::Is(1.0), "no show is flown without a fence"),
-        require("FS_THR_ENABLE", Wanted::AtLeast(0.0), "what happens without RC must be known"),
+        require("FS_CRASH_CHECK", Wanted::Is(1.0), "motors stop after a crash"),
         require(
             "FS_EKF_ACTION",
             Wanted::AtLeast(1.0),
@@ -128,11 +128,18 @@ pub fn requirements(plan: &Plan, show_firmware: bool) -> Vec<Requirement> {
             ),
         ]);
     } else {
-        all.push(require(
-            "GUID_TIMEOUT",
-            Wanted::AtMost(3.0),
-            "a drone that hears no targets any more must stop",
-        ));
+        all.extend([
+            require(
+                "GUID_TIMEOUT",
+                Wanted::AtMost(3.0),
+                "a drone that hears no targets any more must stop",
+            ),
+            require(
+                "FS_GCS_ENABLE",
+                Wanted::AtLeast(1.0),
+                "a drone that is flown by the station must return when it loses it",
+            ),
+        ]);
     }
     all
 }
