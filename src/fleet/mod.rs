@@ -6,21 +6,21 @@
 //! comes before convenience: nothing is armed without a deliberate second step, a show is loaded
 //! whole or cleared, and the fence is never switched off.
 
-//TMP pub mod abort;
+pub mod abort;
 pub mod command;
 //TMP pub mod dry_run;
 pub mod fence;
 pub mod greet;
-//TMP pub mod guided;
+pub mod guided;
 pub mod journal;
 pub mod messages;
 pub mod params;
-//TMP pub mod preflight;
+pub mod preflight;
 pub mod put_file;
 pub mod required;
 pub mod slots;
-//TMP pub mod start;
+pub mod start;
 pub mod telemetry;
 pub mod upload;
 pub mod vehicle_clock;
-//TMP pub mod watch;
+pub mod watch;
