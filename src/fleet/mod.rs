@@ -8,7 +8,7 @@
 
 pub mod abort;
 pub mod command;
-//TMP pub mod dry_run;
+pub mod dry_run;
 pub mod fence;
 pub mod greet;
 pub mod guided;
