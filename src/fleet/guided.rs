@@ -60,10 +60,10 @@ pub enum GuidedError {
     #[error("the start time has passed before the drone could be armed: set a new one")]
     TooLate,
     /// It does not arm.
-    #[error("the drone did not arm or take off in time{}", said(.said))]
+    #[error("the drone did not arm or take off in time, and was told to land; it says: {said}")]
     NoTakeoff {
         /// What it said last.
-        said: Option<String>,
+        said: String,
     },
     /// It left GUIDED in the air: its pilot, its fence or a failsafe has taken over.
     #[error("the drone left GUIDED ({mode}) at {show_s} s: nothing more was sent to it")]
@@ -79,10 +79,6 @@ pub enum GuidedError {
         /// Show time, whole s.
         show_s: i64,
     },
-}
-
-fn said(text: &Option<String>) -> String {
-    text.as_ref().map_or(String::new(), |text| format!(": it says \"{text}\""))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,6 +104,8 @@ pub struct Guided {
     flight: Flight,
     takeoff_alt_m: f64,
     takeoff_s: Option<f64>,
+    /// Until then the drone stays at the take-off altitude, show time s.
+    climbs_from_s: f64,
     refused: Option<String>,
     phase: Phase,
     next: Micros,
@@ -119,7 +117,9 @@ pub struct Guided {
     above_home_m: f64,
     heading_deg: Option<f64>,
     boot_ms: u32,
-    said: Option<String>,
+    said: String,
+    /// Why it lands before its time.
+    failed: Option<GuidedError>,
 }
 
 impl Guided {
@@ -133,6 +133,7 @@ impl Guided {
             flight,
             takeoff_alt_m: params.takeoff_alt_m,
             takeoff_s: derived.takeoff_s,
+            climbs_from_s: derived.reaches_takeoff_alt_s.unwrap_or(0.0),
             refused,
             phase: Phase::Wait,
             next: 0,
@@ -143,7 +144,8 @@ impl Guided {
             above_home_m: 0.0,
             heading_deg: None,
             boot_ms: 0,
-            said: None,
+            said: "nothing".to_owned(),
+            failed: None,
         }
     }
 
@@ -170,8 +172,7 @@ impl Guided {
         let place = self.flight.frame.to_geodetic(state.position_m);
         let mut neu = self.flight.frame.to_neu(state.velocity_mps);
         let mut above_home_m = state.position_m.z - trajectory.start_m.z;
-        let climbing = derive(trajectory, Firmware::V44, &DeriveParams::default());
-        if climbing.reaches_takeoff_alt_s.is_some_and(|reached| show_s < reached) {
+        if show_s < self.climbs_from_s {
             above_home_m = above_home_m.max(self.takeoff_alt_m);
             neu.z = 0.0;
         }
@@ -197,6 +198,10 @@ impl Guided {
         Some(GuidedError::TakenOver { mode, show_s: show_s as i64 })
     }
 
+    fn is_high(&self) -> bool {
+        self.above_home_m >= JOIN_AT * self.takeoff_alt_m
+    }
+
     fn end_s(&self) -> f64 {
         self.flight.trajectory.duration_ms() as f64 / 1000.0
     }
@@ -217,9 +222,10 @@ impl Guided {
             Phase::Arm | Phase::Ready | Phase::Takeoff
                 if show_s > takeoff_s + TAKEOFF_WITHIN_S =>
             {
-                // Whatever it does now, it must not take off later.
-                let said = self.said.clone();
-                Step::Done(Err(GuidedError::NoTakeoff { said }))
+                // Whatever it was told before, it must not take off later.
+                self.failed = Some(GuidedError::NoTakeoff { said: self.said.clone() });
+                self.go(Phase::Land, now);
+                Step::Wait(now)
             }
             Phase::Arm if self.armed && self.mode == Some(GUIDED) => {
                 self.go(Phase::Ready, now);
@@ -241,7 +247,7 @@ impl Guided {
                 Step::Wait(now)
             }
             Phase::Takeoff => {
-                let high = self.above_home_m >= JOIN_AT * self.takeoff_alt_m;
+                let high = self.is_high();
                 let wanted_m = self.flight.trajectory.state_at(show_s).position_m.z
                     - self.flight.trajectory.start_m.z;
                 if high && wanted_m >= self.above_home_m {
@@ -270,13 +276,13 @@ impl Guided {
                 self.targets += 1;
                 Step::send(position_target(self.drone, self.boot_ms, &self.target(show_s)))
             }
-            Phase::Land if !self.armed => Step::Done(Ok(())),
+            Phase::Land if !self.armed => Step::Done(self.failed.take().map_or(Ok(()), Err)),
             Phase::Land => {
                 self.next = now + REPEAT;
                 if self.mode == Some(LAND) {
                     Step::Wait(self.next)
                 } else if let Some(error) = self.taken_over(show_s) {
-                    Step::Done(Err(error))
+                    Step::Done(Err(self.failed.take().unwrap_or(error)))
                 } else {
                     Step::send(set_mode(self.drone, LAND, 0))
                 }
@@ -292,20 +298,26 @@ impl Machine for Guided {
         match message {
             MavMessage::HEARTBEAT(beat) => {
                 self.heard = Some(now);
+                let armed = beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED);
+                if (self.mode, self.armed) != (Some(beat.custom_mode), armed) {
+                    self.next = self.next.min(now);
+                }
                 self.mode = Some(beat.custom_mode);
-                let armed = MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
-                self.armed = beat.base_mode.contains(armed);
+                self.armed = armed;
             }
             MavMessage::GLOBAL_POSITION_INT(at) => {
                 self.boot_ms = at.time_boot_ms;
                 self.above_home_m = f64::from(at.relative_alt) / 1000.0;
+                if self.phase == Phase::Takeoff && self.is_high() {
+                    self.next = self.next.min(now);
+                }
                 // The heading at arming is kept.
                 if at.hdg != u16::MAX && matches!(self.phase, Phase::Wait | Phase::Arm) {
                     self.heading_deg = Some(f64::from(at.hdg) / 100.0);
                 }
             }
             MavMessage::SYSTEM_TIME(time) => self.flight.clock.read(now, time.time_unix_usec),
-            MavMessage::STATUSTEXT(text) => self.said = Some(super::messages::chars(&text.text[..])),
+            MavMessage::STATUSTEXT(text) => self.said = super::messages::chars(&text.text[..]),
             MavMessage::COMMAND_ACK(ack)
                 if self.phase == Phase::Arm
                     && ack.command == MavCmd::MAV_CMD_COMPONENT_ARM_DISARM
@@ -332,17 +344,8 @@ impl Machine for Guided {
         if now >= heard + LOST {
             return Step::Done(Err(GuidedError::Lost { show_s: show_s as i64 }));
         }
-        let arrived = self.phase == Phase::Arm && self.armed && self.mode == Some(GUIDED)
-            || self.phase == Phase::Land && !self.armed
-            || self.phase == Phase::Takeoff;
-        if now < self.next && !arrived {
+        if now < self.next {
             return Step::Wait(self.next);
-        }
-        if now < self.next && self.phase == Phase::Takeoff {
-            let high = self.above_home_m >= JOIN_AT * self.takeoff_alt_m;
-            if !high {
-                return Step::Wait(self.next);
-            }
         }
         self.fly(now, show_s, takeoff_s)
     }
