@@ -19,9 +19,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("campaign", &["base", "vehicle", "mission", "show", "check"]),
     (
         "fleet",
-        &[
-            "base", "vehicle", "mission", "show", "check", "log", "link", "protocol", "campaign",
-        ],
+        &["base", "vehicle", "mission", "show", "check", "log", "link", "protocol", "campaign"],
     ),
     ("effects", &["base", "vehicle"]),
     ("sim", &["base", "vehicle", "mission", "show", "log", "effects"]),

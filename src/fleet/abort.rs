@@ -118,9 +118,8 @@ impl Abort {
                 Some(Aborted::Confirmed(self.wanted()))
             }
             (Some(false), _) => {
-                let quiet = |status: Status| {
-                    !status.has(flag::AUTHORIZED) && status.start_tow_s < 0
-                };
+                let quiet =
+                    |status: Status| !status.has(flag::AUTHORIZED) && status.start_tow_s < 0;
                 // Without show mode there is no status to wait for.
                 let stock = self.status.is_none() && now >= begun + STATUS_WITHIN;
                 (stock || self.status.is_some_and(quiet)).then_some(Aborted::Grounded)

@@ -292,7 +292,8 @@ impl Machine for PutFence {
                 };
             }
             if let Phase::Acknowledge = self.phase {
-                let params = SetParams::new(drone, self.fence.params()).with_patience(self.patience);
+                let params =
+                    SetParams::new(drone, self.fence.params()).with_patience(self.patience);
                 self.phase = Phase::Params(params);
                 return Step::send(fence_ack(drone));
             }

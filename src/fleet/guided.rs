@@ -219,9 +219,7 @@ impl Guided {
                 self.go(Phase::Arm, now);
                 Step::Wait(now)
             }
-            Phase::Arm | Phase::Ready | Phase::Takeoff
-                if show_s > takeoff_s + TAKEOFF_WITHIN_S =>
-            {
+            Phase::Arm | Phase::Ready | Phase::Takeoff if show_s > takeoff_s + TAKEOFF_WITHIN_S => {
                 // Whatever it was told before, it must not take off later.
                 self.failed = Some(GuidedError::NoTakeoff { said: self.said.clone() });
                 self.go(Phase::Land, now);

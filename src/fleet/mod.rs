@@ -1,23 +1,28 @@
 //! The station's side of a flight with real (or virtual) vehicles: what is known of them, what is
-//! put on them, and what they are told.
+//! put on them, what they are told, what is watched, and their logs.
 //!
-//! Everything that talks is a [`crate::link::drive::Machine`]: it has no socket, clock or thread,
-//! and its refusals are values that say what is wrong, with which drone, and what to do. Safety
-//! comes before convenience: nothing is armed without a deliberate second step, a show is loaded
-//! whole or cleared, and the fence is never switched off.
+//! Everything that talks is a [`crate::link::drive::Machine`], a conversation with one drone, many
+//! at once: it has no socket, clock or thread, and its refusals are values that say what is wrong
+//! and what to do. Safety comes before convenience: nothing is armed without a deliberate second
+//! step, a show is loaded whole or cleared, and the fence is never switched off.
 
 pub mod abort;
+pub mod budget;
 pub mod command;
 pub mod dry_run;
 pub mod fence;
+pub mod ftp;
 pub mod greet;
 pub mod guided;
+pub mod intervals;
 pub mod journal;
 pub mod messages;
 pub mod params;
 pub mod preflight;
 pub mod put_file;
 pub mod required;
+pub mod rtt;
+pub mod sink;
 pub mod slots;
 pub mod start;
 pub mod telemetry;

@@ -57,8 +57,8 @@ pub struct Cell {
 
 /// Headings of the cells of a [`Row`].
 pub const COLUMNS: [&str; 11] = [
-    "link", "firmware", "show", "origin", "position", "GPS", "prearm", "battery", "fence",
-    "start", "params",
+    "link", "firmware", "show", "origin", "position", "GPS", "prearm", "battery", "fence", "start",
+    "params",
 ];
 
 /// One drone.

@@ -211,8 +211,7 @@ pub fn stands(plan: &Plan, telemetry: &Telemetry, now: Micros) -> BTreeMap<Drone
         let place = frame.from_geodetic(position.place);
         let at_m = [place.x, place.y];
         let distance = |slot: &crate::mission::plan::Slot| distance_m(at_m, slot.home_m);
-        let nearest =
-            plan.slots.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        let nearest = plan.slots.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         Some((*drone, Stand { nearest: nearest.slot, distance_m: distance(nearest), at_m }))
     };
     telemetry.drones.iter().filter_map(stand).collect()

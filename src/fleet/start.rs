@@ -112,9 +112,8 @@ pub fn clocks(
     most_apart_s: f64,
     now: Micros,
 ) -> ClockSpread {
-    let list = |drones: &[DroneId]| {
-        drones.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-    };
+    let list =
+        |drones: &[DroneId]| drones.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let mut known = Vec::new();
     let mut unknown = Vec::new();
     let mut rate = 1.0_f64;
@@ -329,11 +328,9 @@ impl Start {
             Phase::Authorized => {
                 StartConfig { start_tow_s, authorization: 1, countdown_ms: LEAVE_TIME }
             }
-            Phase::Cancelled => StartConfig {
-                start_tow_s: CLEAR_TIME,
-                authorization: 0,
-                countdown_ms: CLEAR_TIME,
-            },
+            Phase::Cancelled => {
+                StartConfig { start_tow_s: CLEAR_TIME, authorization: 0, countdown_ms: CLEAR_TIME }
+            }
         })
     }
 

@@ -337,7 +337,8 @@ mod tests {
     #[test]
     fn up_is_positive() {
         let mut drone = Drone::default();
-        let at = dialect::GLOBAL_POSITION_INT_DATA { vz: -150, hdg: u16::MAX, ..Default::default() };
+        let at =
+            dialect::GLOBAL_POSITION_INT_DATA { vz: -150, hdg: u16::MAX, ..Default::default() };
         drone.on_message(1, &MavMessage::GLOBAL_POSITION_INT(at));
         let (_, position) = drone.position.unwrap();
         assert_eq!(position.neu_mps, [0.0, 0.0, 1.5]);

@@ -5,16 +5,15 @@
 
 use super::command::{Command, CommandError};
 use super::fence::{Fence, FenceError, PutFence, degrees_1e7};
+use super::ftp::{Caller, FtpError};
 use super::messages::{command_int, command_long, set_mode};
-use super::put_file::{PutError, PutFile};
+use super::put_file::PutFile;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::mission::plan::Site;
-use crate::protocol::show::{
-    FROM_DRONE, NO_AMSL_MM, SHOW_FILE, SHOW_MODE, Stage, Status, flag,
-};
+use crate::protocol::show::{FROM_DRONE, NO_AMSL_MM, SHOW_FILE, SHOW_MODE, Stage, Status, flag};
 use dialect::{MavCmd, MavModeFlag, MavResult};
 
 /// A vehicle boots within this, and says so.
@@ -70,7 +69,7 @@ pub enum UploadError {
     Mode(#[source] CommandError),
     /// The file.
     #[error("the show file is not on the drone")]
-    File(#[source] PutError),
+    File(#[source] FtpError),
     /// The origin.
     #[error("the show's origin is not set")]
     Origin(#[source] CommandError),
@@ -168,6 +167,7 @@ enum Phase {
 pub struct Upload {
     drone: DroneId,
     load: Load,
+    numbers: u32,
     phase: Phase,
     started: Option<Micros>,
     off_since: Option<Micros>,
@@ -183,11 +183,13 @@ pub struct Upload {
 const STEPS: u64 = 6;
 
 impl Upload {
-    /// Loads this onto a vehicle.
-    pub fn new(drone: DroneId, load: Load) -> Self {
+    /// Loads this onto a vehicle. `numbers` should differ from run to run (see
+    /// [`Caller::new`]).
+    pub fn new(drone: DroneId, load: Load, numbers: u32) -> Self {
         Self {
             drone,
             load,
+            numbers,
             phase: Phase::Wait,
             started: None,
             off_since: None,
@@ -231,7 +233,9 @@ impl Upload {
             .is_some_and(|status| matches!(status.stage, Stage::WaitForStart | Stage::Landed));
         if ready && self.armed == Some(false) {
             let skyb = std::mem::take(&mut self.load.skyb);
-            self.phase = Phase::File(PutFile::new(self.drone, SHOW_FILE, skyb));
+            // Numbers of an earlier session must not come again.
+            let caller = Caller::new(self.drone, self.numbers.wrapping_add(now as u32));
+            self.phase = Phase::File(PutFile::new(caller, SHOW_FILE, skyb));
             self.step = 1;
             return None;
         }
