@@ -156,6 +156,10 @@ impl Obliging {
         }
         self.next = now + BEAT;
         self.beats += 1;
+        // What it still lacks of a fence it asks for again.
+        if self.fence.len() < usize::from(self.receiving) && self.beats.is_multiple_of(2) {
+            out.push(fence_request(self.drone, self.fence.len() as u16));
+        }
         out.push(self.position(now));
         if self.show {
             let data = self.status.to_data();
@@ -228,6 +232,7 @@ impl Obliging {
         match command {
             MavCmd::MAV_CMD_USER_1 if first == 0.0 => {
                 let loaded = self.files.values().any(|file| !file.is_empty());
+                self.status.flags &= !flag::LOADED;
                 self.status.flags |= if loaded { flag::LOADED } else { 0 };
             }
             MavCmd::MAV_CMD_USER_1 => {

@@ -76,10 +76,12 @@ impl Fence {
         let report = check(&CheckInput::new(show, &plan.limits).with_fence(Some(fence)));
         let broken = report.findings.iter().find(|finding| {
             finding.severity == Severity::Error
-                && matches!(finding.check.as_ref(), "fence" | "fence-altitude" | "validity")
+                && matches!(finding.check, "fence" | "fence-altitude" | "validity")
         });
         if let Some(finding) = broken {
-            return Err(FenceRefusal::Smaller { finding: finding.message.clone() });
+            let (drones, message) = (finding.drones.join(", "), &finding.message);
+            let finding = format!("{drones} {message}: {}", finding.remedy);
+            return Err(FenceRefusal::Smaller { finding });
         }
         let frame = plan.site.frame();
         let corner = |[x, y]: &[f64; 2]| {
@@ -138,6 +140,8 @@ pub enum FenceError {
     Param(#[source] SetError),
 }
 
+/// The fence is sent so often at most when another is read back.
+const ROUNDS: u32 = 3;
 /// While uploading the vehicle asks for what it lacks, so that silence means a lost end.
 const UPLOAD_SILENCE: Micros = 3 * S;
 
@@ -160,6 +164,11 @@ pub struct PutFence {
     tries: u32,
     next: Micros,
     wanted: Option<u16>,
+    /// All corners were sent: if the vehicle's word for it is lost, reading them tells.
+    all_sent: bool,
+    /// What the vehicle said against it last; it may still take it.
+    objection: Option<String>,
+    rounds: u32,
     read: Vec<(i32, i32)>,
     failed: Option<FenceError>,
 }
@@ -175,6 +184,9 @@ impl PutFence {
             tries: 0,
             next: 0,
             wanted: None,
+            all_sent: false,
+            objection: None,
+            rounds: 0,
             read: Vec::new(),
             failed: None,
         }
@@ -192,13 +204,23 @@ impl PutFence {
         }
         match result {
             MavMissionResult::MAV_MISSION_ACCEPTED => self.go(Phase::Count),
-            // An old upload of someone else was given up; ours goes on.
+            // A repeated corner, or another station's upload that ends: ours may go on.
             MavMissionResult::MAV_MISSION_OPERATION_CANCELLED
-            | MavMissionResult::MAV_MISSION_INVALID_SEQUENCE => {}
-            other => {
-                let reason = format!("{other:?}").to_lowercase().replace('_', " ");
-                self.failed = Some(FenceError::Refused { reason });
-            }
+            | MavMissionResult::MAV_MISSION_INVALID_SEQUENCE
+            | MavMissionResult::MAV_MISSION_DENIED
+            | MavMissionResult::MAV_MISSION_ERROR => self.objection = Some(words(result)),
+            other => self.failed = Some(FenceError::Refused { reason: words(other) }),
+        }
+    }
+
+    /// Sent again a few times: a repeated message of an earlier attempt may have crossed it.
+    fn differs(&mut self, difference: String) {
+        self.rounds += 1;
+        if self.rounds < ROUNDS {
+            self.all_sent = false;
+            self.go(Phase::Send);
+        } else {
+            self.failed = Some(FenceError::Different { difference });
         }
     }
 
@@ -211,8 +233,7 @@ impl PutFence {
             self.read.clear();
             self.go(Phase::Read);
         } else {
-            let difference = format!("it has {count} corners, not {sent}");
-            self.failed = Some(FenceError::Different { difference });
+            self.differs(format!("it has {count} corners, not {sent}"));
         }
     }
 
@@ -223,7 +244,7 @@ impl PutFence {
         let wanted = self.fence.corners_1e7[self.read.len()];
         let inclusion = MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION;
         if item.command != inclusion || (item.x, item.y) != wanted {
-            let difference = format!(
+            self.differs(format!(
                 "corner {} is {} {} ({:?}), not {} {}",
                 item.seq + 1,
                 item.x,
@@ -231,8 +252,7 @@ impl PutFence {
                 item.command,
                 wanted.0,
                 wanted.1
-            );
-            self.failed = Some(FenceError::Different { difference });
+            ));
             return;
         }
         self.read.push(wanted);
@@ -246,6 +266,10 @@ impl PutFence {
     fn doing(&self) -> &'static str {
         if matches!(self.phase, Phase::Send) { "sent" } else { "read back" }
     }
+}
+
+fn words(result: MavMissionResult) -> String {
+    format!("{result:?}").trim_start_matches("MAV_MISSION_").to_lowercase().replace('_', " ")
 }
 
 impl Machine for PutFence {
@@ -282,6 +306,7 @@ impl Machine for PutFence {
                 && let Some(corner) = self.fence.corners_1e7.get(usize::from(seq))
             {
                 self.next = now + UPLOAD_SILENCE;
+                self.all_sent |= seq + 1 == count;
                 return Step::send(fence_corner(drone, seq, count, *corner));
             }
             if let Phase::Params(params) = &mut self.phase {
@@ -300,8 +325,14 @@ impl Machine for PutFence {
             if now < self.next {
                 return Step::Wait(self.next);
             }
+            if matches!(self.phase, Phase::Send) && self.all_sent {
+                self.go(Phase::Count);
+            }
             if self.tries >= self.patience.tries {
-                return Step::Done(Err(FenceError::Silent { doing: self.doing() }));
+                return Step::Done(Err(match self.objection.take() {
+                    Some(reason) => FenceError::Refused { reason },
+                    None => FenceError::Silent { doing: self.doing() },
+                }));
             }
             self.tries += 1;
             self.next = now + self.patience.every;

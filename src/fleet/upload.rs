@@ -251,11 +251,15 @@ impl Upload {
         }
         let until = started + BOOT_WITHIN;
         if now >= until {
-            return refuse(match self.status {
-                Some(status) => UploadError::NotReady { stage: status.stage },
-                None if self.heard => UploadError::NotShowFirmware,
-                None => UploadError::Silent,
-            });
+            return match self.status {
+                Some(status) => {
+                    // Whatever was on it before must not be flown by mistake.
+                    self.fail(UploadError::NotReady { stage: status.stage });
+                    None
+                }
+                None if self.heard => refuse(UploadError::NotShowFirmware),
+                None => refuse(UploadError::Silent),
+            };
         }
         let again = off_since.filter(|_| !self.entered).map_or(until, |since| since + ENTER_AFTER);
         Some(Step::Wait(again.clamp(now, until)))
@@ -356,10 +360,10 @@ impl Machine for Upload {
                 }
                 Phase::Mode(part) => {
                     if let Err(error) = part!(part) {
-                        let why = UploadError::Mode(error);
-                        return Step::Done(Err(Refused { why, left: Left::Untouched }));
+                        self.fail(UploadError::Mode(error));
+                    } else {
+                        self.phase = Phase::Wait;
                     }
-                    self.phase = Phase::Wait;
                 }
                 Phase::File(part) => match part!(part) {
                     Ok(written) => {
