@@ -99,7 +99,11 @@ impl Obliging {
                 self.status.flags |= flag::ORIGIN_SET | flag::ORIENTATION_SET;
                 out.push(ack(c.command));
             }
-            MavMessage::PARAM_REQUEST_READ(p) => self.param(&chars(&p.param_id[..]), out),
+            MavMessage::PARAM_REQUEST_READ(p) => {
+                let numbered = usize::try_from(p.param_index).ok();
+                let name = numbered.and_then(|index| self.params.keys().nth(index).cloned());
+                self.param(&name.unwrap_or_else(|| chars(&p.param_id[..])), out);
+            }
             MavMessage::PARAM_SET(p) => {
                 let name = chars(&p.param_id[..]);
                 if !self.only_these_params || self.params.contains_key(&name) {
