@@ -112,7 +112,7 @@ fn every_no_go_is_said_in_words() {
     case(&of(|of| of.health.as_mut().unwrap().1.battery_percent = Some(20)));
     case(&of(|of| of.health.as_mut().unwrap().1.battery_percent = None));
     case(&of(|of| of.armed.as_mut().unwrap().1 = true));
-    case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 9e-6));
+    case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 2.4e-5));
     case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 3e-5));
     case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 1.0));
     case(&of(|of| of.position = None));
@@ -232,7 +232,7 @@ fn every_refusal_of_a_start_is_said() {
 fn an_abort_reaches_everyone_at_once() {
     let plan = plan();
     for (seed, faults) in (0..10).map(|seed| (seed, bad())).chain([(0, Faults::default())]) {
-        let (mut net, _) = ready(&plan, faults, seed);
+        let (mut net, telemetry) = ready(&plan, faults, seed);
         for (id, vehicle) in &mut net.vehicles {
             let inner = &mut vehicle.inner;
             inner.armed = id.system != 6;
@@ -242,8 +242,10 @@ fn an_abort_reaches_everyone_at_once() {
             inner.status.start_tow_s = 443_029;
         }
         let began = net.now();
-        let machines: BTreeMap<_, _> =
-            all().into_iter().map(|id| (id, Abort::new(id, Action::Return))).collect();
+        let machines: BTreeMap<_, _> = all()
+            .into_iter()
+            .map(|id| (id, Abort::new(id, Action::Return, telemetry.get(id))))
+            .collect();
         let done = drive(&mut net, machines, ALL_AT_ONCE, &mut NoWatch).unwrap();
         assert_eq!(done.len(), 6);
         for (id, aborted) in done {
@@ -284,7 +286,7 @@ fn a_return_that_is_refused_becomes_a_landing_and_silence_is_said() {
             self.0.poll(now)
         }
     }
-    let mut refused = NoReturn(Abort::new(drone(1), Action::Return));
+    let mut refused = NoReturn(Abort::new(drone(1), Action::Return, None));
     let _ = refused.poll(0);
     for _ in 0..3 {
         refused.on_message(
@@ -298,7 +300,7 @@ fn a_return_that_is_refused_becomes_a_landing_and_silence_is_said() {
     }
     let machines = BTreeMap::from([
         (drone(1), refused),
-        (drone(2), NoReturn(Abort::new(drone(2), Action::Land))),
+        (drone(2), NoReturn(Abort::new(drone(2), Action::Land, None))),
     ]);
     let done = drive(&mut net, machines, ALL_AT_ONCE, &mut NoWatch).unwrap();
     assert_eq!(done[&drone(1)], Aborted::Confirmed(Action::Land));

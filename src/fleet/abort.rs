@@ -6,6 +6,7 @@
 //! else is sent meanwhile.
 
 use super::messages::{LAND, RTL, set_mode, start_packet};
+use super::telemetry::Drone;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Step};
 use crate::link::frame::{MavMessage, dialect};
@@ -19,6 +20,8 @@ pub const ALL_AT_ONCE: usize = usize::MAX;
 const EVERY: Micros = 200 * MS;
 /// Repeated for so long.
 const GIVE_UP: Micros = 120 * S;
+/// What is heard sooner may have been sent before the abort.
+const SETTLE: Micros = S;
 /// The show firmware's status comes within this.
 const STATUS_WITHIN: Micros = 3 * S;
 /// A return that is refused so often becomes a landing.
@@ -82,22 +85,31 @@ pub struct Abort {
     armed: Option<bool>,
     mode: Option<u32>,
     status: Option<Status>,
+    /// A heartbeat and a status that were surely sent after the first word of the abort.
+    grounded: bool,
+    quiet: Option<bool>,
     told: u32,
     refusals: u32,
 }
 
 impl Abort {
-    /// Aborts the flight of a drone. What is heard of it from now on counts, nothing older.
-    pub fn new(drone: DroneId, action: Action) -> Self {
+    /// Aborts the flight of a drone. `known`: what was heard of it until now; one that stands
+    /// disarmed is not pulled out of its mode. It cannot fly before its next heartbeats: arming
+    /// comes eight seconds before the take-off.
+    pub fn new(drone: DroneId, action: Action, known: Option<&Drone>) -> Self {
+        let armed = known.and_then(Drone::is_armed);
+        let status = known.and_then(|known| known.status).map(|(_, status)| status);
         Self {
             drone,
             action,
             begun: None,
             next: 0,
             cancel_next: false,
-            armed: None,
+            armed,
             mode: None,
-            status: None,
+            status,
+            grounded: false,
+            quiet: None,
             told: 0,
             refusals: 0,
         }
@@ -117,12 +129,10 @@ impl Abort {
             (Some(true), Some(mode)) if mode == self.wanted().mode() => {
                 Some(Aborted::Confirmed(self.wanted()))
             }
-            (Some(false), _) => {
-                let quiet =
-                    |status: Status| !status.has(flag::AUTHORIZED) && status.start_tow_s < 0;
+            (Some(false), _) if self.grounded => {
                 // Without show mode there is no status to wait for.
                 let stock = self.status.is_none() && now >= begun + STATUS_WITHIN;
-                (stock || self.status.is_some_and(quiet)).then_some(Aborted::Grounded)
+                (stock || self.quiet == Some(true)).then_some(Aborted::Grounded)
             }
             _ => None,
         }
@@ -132,19 +142,22 @@ impl Abort {
 impl Machine for Abort {
     type Done = Aborted;
 
-    fn on_message(&mut self, _now: Micros, message: &MavMessage) {
-        if self.told == 0 {
-            return;
-        }
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        let Some(begun) = self.begun else { return };
+        let after = now >= begun + SETTLE;
         match message {
             MavMessage::HEARTBEAT(beat) => {
                 let armed = MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
                 self.armed = Some(beat.base_mode.contains(armed));
+                self.grounded = after && self.armed == Some(false);
                 self.mode = Some(beat.custom_mode);
             }
             MavMessage::DATA16(data) if data.mavtype == FROM_DRONE => {
                 let length = usize::from(data.len).min(data.data.len());
-                self.status = Some(Status::from_data(&data.data[..length]));
+                let status = Status::from_data(&data.data[..length]);
+                self.status = Some(status);
+                let quiet = !status.has(flag::AUTHORIZED) && status.start_tow_s < 0;
+                self.quiet = after.then_some(quiet);
             }
             MavMessage::COMMAND_ACK(ack)
                 if ack.command == MavCmd::MAV_CMD_DO_SET_MODE
