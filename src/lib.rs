@@ -11,6 +11,7 @@
 //! * [`show`]: plans become trajectories and Skybrush files (`.skyc`, `.skyb`, zipped CSV), and back.
 //! * [`check`]: exact safety checks on the trajectory pieces.
 //! * [`effects`]: physics beyond the base model, each piece stated once, for simulator and analysis.
+//! * [`fleet`]: real vehicles over MAVLink: uploads, preflight, start, watch, abort.
 //! * [`sim`]: the embedded simulator flies a show and writes the same `.BIN` logs as a drone.
 //! * [`log`]: the ArduPilot DataFlash format, reader and writer.
 //! * [`flight`]: one drone's log as time series in show time.

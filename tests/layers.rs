@@ -18,13 +18,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("protocol", &["base"]),
     ("skybrush_server", &["base", "link"]),
     ("campaign", &["base", "vehicle", "mission", "show", "check"]),
+    (
+        "fleet",
+        &["base", "vehicle", "mission", "show", "check", "log", "link", "protocol", "campaign"],
+    ),
     ("effects", &["base", "vehicle"]),
     ("sim", &["base", "vehicle", "mission", "show", "log", "effects"]),
     ("virtual_fleet", &["base", "vehicle", "mission", "show", "sim", "log", "link", "protocol"]),
-    (
-        "fleet",
-        &["base", "vehicle", "mission", "show", "log", "link", "protocol", "campaign"],
-    ),
     ("flight", &["base", "vehicle", "mission", "log"]),
     ("analysis", &["base", "vehicle", "mission", "log", "flight"]),
     ("study", &["base", "vehicle", "mission", "show", "sim", "log", "flight", "analysis"]),

@@ -67,7 +67,9 @@ pub enum FtpError {
         most: u64,
     },
     /// The written file differs.
-    #[error("the file on the vehicle differs from what was sent (checksum {found:08x}, not {right:08x})")]
+    #[error(
+        "the file on the vehicle differs from what was sent (checksum {found:08x}, not {right:08x})"
+    )]
     Checksum {
         /// Of the vehicle's file.
         found: u32,

@@ -1,0 +1,203 @@
+//! Ends a flight: every drone returns or lands, now.
+//!
+//! One machine per drone, all at once (give [`ALL_AT_ONCE`] to
+//! [`drive`](crate::link::drive::drive)): each says so every 200 ms until its drone's own
+//! heartbeat confirms it. A drone that is not flying has its start taken back instead. Nothing
+//! else is sent meanwhile.
+
+use super::messages::{LAND, RTL, set_mode, start_packet};
+use super::telemetry::Drone;
+use crate::link::clock::{MS, Micros, S};
+use crate::link::drive::{Machine, Step};
+use crate::link::frame::{MavMessage, dialect};
+use crate::link::id::DroneId;
+use crate::protocol::show::{CLEAR_TIME, FROM_DRONE, StartConfig, Status, flag};
+use dialect::{MavCmd, MavModeFlag, MavResult};
+
+/// For `drive`: no drone waits for another.
+pub const ALL_AT_ONCE: usize = usize::MAX;
+/// Time between repetitions.
+const EVERY: Micros = 200 * MS;
+/// Repeated for so long.
+const GIVE_UP: Micros = 120 * S;
+/// What is heard sooner may have been sent before the abort.
+const SETTLE: Micros = S;
+/// The show firmware's status comes within this.
+const STATUS_WITHIN: Micros = 3 * S;
+/// A return that is refused so often becomes a landing.
+const REFUSALS: u32 = 3;
+
+/// What drones in the air do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Return to where they took off, and land there.
+    Return,
+    /// Land where they are.
+    Land,
+}
+
+impl Action {
+    /// Its flight mode.
+    pub fn mode(self) -> u32 {
+        match self {
+            Self::Return => RTL,
+            Self::Land => LAND,
+        }
+    }
+}
+
+/// How an abort ended for one drone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aborted {
+    /// Its heartbeat says that it does this; for a return that was refused, that it lands.
+    Confirmed(Action),
+    /// It was not flying, and has no start time any more.
+    Grounded,
+    /// Nothing was confirmed: it may fly on. It was told so often.
+    Unconfirmed {
+        /// How often.
+        told: u32,
+    },
+}
+
+impl std::fmt::Display for Aborted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Confirmed(Action::Return) => f.write_str("returns"),
+            Self::Confirmed(Action::Land) => f.write_str("lands"),
+            Self::Grounded => f.write_str("on the ground, its start is taken back"),
+            Self::Unconfirmed { told } => {
+                write!(f, "NOT CONFIRMED after {told} tries: use its remote control")
+            }
+        }
+    }
+}
+
+/// Aborts the flight of one drone.
+#[derive(Clone, Debug)]
+pub struct Abort {
+    drone: DroneId,
+    action: Action,
+    begun: Option<Micros>,
+    next: Micros,
+    /// The second of the two messages of a round is still to be sent.
+    cancel_next: bool,
+    armed: Option<bool>,
+    mode: Option<u32>,
+    status: Option<Status>,
+    /// A heartbeat and a status that were surely sent after the first word of the abort.
+    grounded: bool,
+    quiet: Option<bool>,
+    told: u32,
+    refusals: u32,
+}
+
+impl Abort {
+    /// Aborts the flight of a drone. `known`: what was heard of it until now; one that stands
+    /// disarmed is not pulled out of its mode. It cannot fly before its next heartbeats: arming
+    /// comes eight seconds before the take-off.
+    pub fn new(drone: DroneId, action: Action, known: Option<&Drone>) -> Self {
+        let armed = known.and_then(Drone::is_armed);
+        let status = known.and_then(|known| known.status).map(|(_, status)| status);
+        Self {
+            drone,
+            action,
+            begun: None,
+            next: 0,
+            cancel_next: false,
+            armed,
+            mode: None,
+            status,
+            grounded: false,
+            quiet: None,
+            told: 0,
+            refusals: 0,
+        }
+    }
+
+    /// Armed, but not in the air: there it lands at once, where a return might not disarm.
+    fn wanted(&self) -> Action {
+        let on_ground = self.status.is_some_and(|status| {
+            use crate::protocol::show::Stage;
+            matches!(status.stage, Stage::Init | Stage::WaitForStart | Stage::Landed)
+        });
+        if on_ground { Action::Land } else { self.action }
+    }
+
+    fn outcome(&self, now: Micros, begun: Micros) -> Option<Aborted> {
+        match (self.armed, self.mode) {
+            (Some(true), Some(mode)) if mode == self.wanted().mode() => {
+                Some(Aborted::Confirmed(self.wanted()))
+            }
+            (Some(false), _) if self.grounded => {
+                // Without show mode there is no status to wait for.
+                let stock = self.status.is_none() && now >= begun + STATUS_WITHIN;
+                (stock || self.quiet == Some(true)).then_some(Aborted::Grounded)
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Machine for Abort {
+    type Done = Aborted;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        let Some(begun) = self.begun else { return };
+        let after = now >= begun + SETTLE;
+        match message {
+            MavMessage::HEARTBEAT(beat) => {
+                let armed = MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
+                self.armed = Some(beat.base_mode.contains(armed));
+                self.grounded = after && self.armed == Some(false);
+                self.mode = Some(beat.custom_mode);
+            }
+            MavMessage::DATA16(data) if data.mavtype == FROM_DRONE => {
+                let length = usize::from(data.len).min(data.data.len());
+                let status = Status::from_data(&data.data[..length]);
+                self.status = Some(status);
+                let quiet = !status.has(flag::AUTHORIZED) && status.start_tow_s < 0;
+                self.quiet = after.then_some(quiet);
+            }
+            MavMessage::COMMAND_ACK(ack)
+                if ack.command == MavCmd::MAV_CMD_DO_SET_MODE
+                    && ack.result != MavResult::MAV_RESULT_ACCEPTED =>
+            {
+                self.refusals += 1;
+                if self.refusals >= REFUSALS {
+                    // A drone that does not know where it is cannot return; it can land.
+                    self.action = Action::Land;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Aborted> {
+        let begun = *self.begun.get_or_insert(now);
+        if let Some(outcome) = self.outcome(now, begun) {
+            return Step::Done(outcome);
+        }
+        if self.cancel_next {
+            self.cancel_next = false;
+            let start =
+                StartConfig { start_tow_s: CLEAR_TIME, authorization: 0, countdown_ms: CLEAR_TIME };
+            return Step::send(start_packet(&start));
+        }
+        if now < self.next {
+            return Step::Wait(self.next);
+        }
+        if now >= begun + GIVE_UP {
+            return Step::Done(Aborted::Unconfirmed { told: self.told });
+        }
+        self.next = now + EVERY;
+        self.told += 1;
+        self.cancel_next = true;
+        // A drone on the ground stays in its mode; before it is known, both are said.
+        if self.armed == Some(false) {
+            return self.poll(now);
+        }
+        let confirmation = self.told.min(255) as u8 - 1;
+        Step::send(set_mode(self.drone, self.wanted().mode(), confirmation))
+    }
+}

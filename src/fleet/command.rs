@@ -1,0 +1,154 @@
+//! Commands with their answer: repeated until the vehicle accepts, refuses or stays silent.
+
+use crate::link::clock::{Micros, S};
+use crate::link::drive::{Machine, Step};
+use crate::link::frame::{MavMessage, dialect};
+use dialect::{MavCmd, MavResult};
+
+/// How often something is repeated before it counts as unanswered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// Time between repetitions.
+    pub every: Micros,
+    /// How often it is sent at most.
+    pub tries: u32,
+}
+
+impl Default for Patience {
+    /// Ten times a second apart: with a fifth of the frames lost each way, one in 25,000
+    /// conversations fails.
+    fn default() -> Self {
+        Self { every: S, tries: 10 }
+    }
+}
+
+/// A vehicle that works on a command has so long between two signs of it.
+const PROGRESS_WITHIN: Micros = 30 * S;
+
+/// A command that did not work.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CommandError {
+    /// No answer.
+    #[error(
+        "no answer to \"{what}\" after {tries} tries: bring the drone nearer to the radio, or \
+         restart it, and try again"
+    )]
+    Silent {
+        /// What was asked.
+        what: String,
+        /// How often.
+        tries: u32,
+    },
+    /// The vehicle refuses.
+    #[error("the drone refuses \"{what}\": {reason}")]
+    Refused {
+        /// What was asked.
+        what: String,
+        /// The vehicle's answer in words.
+        reason: &'static str,
+        /// Its number (MAV_RESULT).
+        result: u8,
+    },
+}
+
+/// One command to one vehicle.
+#[derive(Clone, Debug)]
+pub struct Command {
+    what: String,
+    message: MavMessage,
+    command: MavCmd,
+    patience: Patience,
+    tries: u32,
+    next: Micros,
+    in_progress: bool,
+    answer: Option<MavResult>,
+}
+
+impl Command {
+    /// A COMMAND_LONG or COMMAND_INT, as [`super::messages`] makes them; `what` says in words
+    /// what is asked. Other messages are never answered.
+    pub fn new(what: impl Into<String>, message: MavMessage) -> Self {
+        let command = match &message {
+            MavMessage::COMMAND_LONG(c) => c.command,
+            MavMessage::COMMAND_INT(c) => c.command,
+            _ => MavCmd::DEFAULT,
+        };
+        Self {
+            what: what.into(),
+            message,
+            command,
+            patience: Patience::default(),
+            tries: 0,
+            next: 0,
+            in_progress: false,
+            answer: None,
+        }
+    }
+
+    /// The same with other patience.
+    #[must_use]
+    pub fn with_patience(self, patience: Patience) -> Self {
+        Self { patience, ..self }
+    }
+}
+
+impl Machine for Command {
+    type Done = Result<(), CommandError>;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        let MavMessage::COMMAND_ACK(ack) = message else { return };
+        if ack.command != self.command || self.tries == 0 {
+            return;
+        }
+        match ack.result {
+            MavResult::MAV_RESULT_IN_PROGRESS => {
+                self.in_progress = true;
+                self.next = now + PROGRESS_WITHIN;
+            }
+            // It may be able to in a moment.
+            MavResult::MAV_RESULT_TEMPORARILY_REJECTED if self.tries < self.patience.tries => {}
+            result => self.answer = Some(result),
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        match self.answer {
+            Some(MavResult::MAV_RESULT_ACCEPTED) => return Step::Done(Ok(())),
+            Some(result) => {
+                return Step::Done(Err(CommandError::Refused {
+                    what: self.what.clone(),
+                    reason: reason(result),
+                    result: result as u8,
+                }));
+            }
+            None => {}
+        }
+        if now < self.next {
+            return Step::Wait(self.next);
+        }
+        if self.tries >= self.patience.tries || self.in_progress {
+            let (what, tries) = (self.what.clone(), self.tries);
+            return Step::Done(Err(CommandError::Silent { what, tries }));
+        }
+        if let MavMessage::COMMAND_LONG(command) = &mut self.message {
+            command.confirmation = self.tries.min(255) as u8;
+        }
+        self.tries += 1;
+        self.next = now + self.patience.every;
+        Step::send(self.message.clone())
+    }
+}
+
+fn reason(result: MavResult) -> &'static str {
+    match result {
+        MavResult::MAV_RESULT_ACCEPTED => "accepted",
+        MavResult::MAV_RESULT_TEMPORARILY_REJECTED => "not now (temporarily rejected)",
+        MavResult::MAV_RESULT_DENIED => "denied",
+        MavResult::MAV_RESULT_UNSUPPORTED => {
+            "its firmware does not know the command: is it the show firmware?"
+        }
+        MavResult::MAV_RESULT_FAILED => "failed",
+        MavResult::MAV_RESULT_CANCELLED => "cancelled",
+        _ => "not in this form",
+    }
+}

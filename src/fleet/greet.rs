@@ -1,0 +1,83 @@
+//! The first words with a vehicle: which firmware it has, and that it tells its time.
+//!
+//! Vehicles of the show firmware say nothing of their clock unasked (all stream rates are 0), and
+//! without it no start time can be set.
+
+use super::messages::command_long;
+use crate::link::clock::{Micros, S};
+use crate::link::drive::{Machine, Step};
+use crate::link::frame::{MavMessage, dialect};
+use crate::link::id::DroneId;
+use dialect::MavCmd;
+
+const SYSTEM_TIME: f32 = 2.0;
+const AUTOPILOT_VERSION: f32 = 148.0;
+/// The vehicle tells its time so often, us of its own clock.
+const TIME_EVERY_US: f32 = 1e6;
+/// Greeted so often before it is left alone.
+const TRIES: u32 = 10;
+
+/// What a vehicle answered to a greeting.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Greeted {
+    /// It tells its time.
+    pub clock: bool,
+    /// It said which firmware it has.
+    pub version: bool,
+}
+
+/// Asks for the clock and the version, until both come or it gives up.
+#[derive(Clone, Debug)]
+pub struct Greet {
+    drone: DroneId,
+    heard: Greeted,
+    tries: u32,
+    to_send: Vec<MavMessage>,
+    next: Micros,
+}
+
+impl Greet {
+    /// Greets a vehicle.
+    pub fn new(drone: DroneId) -> Self {
+        Self { drone, heard: Greeted::default(), tries: 0, to_send: Vec::new(), next: 0 }
+    }
+
+    fn ask(&self, command: MavCmd, first: f32, second: f32) -> MavMessage {
+        command_long(self.drone, command, [first, second, 0.0, 0.0, 0.0, 0.0, 0.0], 0)
+    }
+}
+
+impl Machine for Greet {
+    type Done = Greeted;
+
+    fn on_message(&mut self, _now: Micros, message: &MavMessage) {
+        match message {
+            MavMessage::SYSTEM_TIME(_) => self.heard.clock = true,
+            MavMessage::AUTOPILOT_VERSION(_) => self.heard.version = true,
+            _ => {}
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Greeted> {
+        if let Some(message) = self.to_send.pop() {
+            return Step::send(message);
+        }
+        // Asked for at least once: a clock that is heard already may be told at another rate.
+        let done = self.tries > 0 && self.heard.clock && self.heard.version;
+        if done || (self.tries >= TRIES && now >= self.next) {
+            return Step::Done(self.heard);
+        }
+        if now < self.next {
+            return Step::Wait(self.next);
+        }
+        if !self.heard.version {
+            let command = MavCmd::MAV_CMD_REQUEST_MESSAGE;
+            self.to_send.push(self.ask(command, AUTOPILOT_VERSION, 0.0));
+        }
+        let command = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL;
+        self.to_send.push(self.ask(command, SYSTEM_TIME, TIME_EVERY_US));
+        self.tries += 1;
+        self.next = now + S;
+        Step::Wait(now)
+    }
+}

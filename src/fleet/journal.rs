@@ -1,0 +1,58 @@
+//! What happened, line by line, in the campaign folder: `fleet-journal.ndjson`.
+//!
+//! Every line is one JSON object and is on the disk before the next thing is done, so that what
+//! led to an accident is not lost with the station.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::base::file::{FileError, create_folder};
+use crate::link::id::DroneId;
+
+/// Name of the journal in a campaign folder.
+pub const JOURNAL_FILE: &str = "fleet-journal.ndjson";
+
+/// One line.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Entry<'a, T> {
+    /// Unix time of the station, us.
+    pub unix_us: u64,
+    /// The vehicle; absent: the station, or all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drone: Option<DroneId>,
+    /// What happened.
+    #[serde(flatten)]
+    pub event: &'a T,
+}
+
+/// The journal, open for appending.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+impl Journal {
+    /// Opens the journal of a folder; what is there stays.
+    pub fn open(folder: &Path) -> Result<Self, FileError> {
+        create_folder(folder)?;
+        let path = folder.join(JOURNAL_FILE);
+        let file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&path)
+            .map_err(|source| FileError::new("open the journal", &path, source))?;
+        Ok(Self { path, file })
+    }
+
+    /// Appends a line.
+    pub fn write<T: Serialize>(&mut self, entry: &Entry<'_, T>) -> Result<(), FileError> {
+        let fail = |source| FileError::new("write the journal", &self.path, source);
+        let mut line = serde_json::to_vec(entry).map_err(|error| fail(error.into()))?;
+        line.push(b'\n');
+        self.file.write_all(&line).and_then(|()| self.file.flush()).map_err(fail)
+    }
+}

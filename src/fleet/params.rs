@@ -1,0 +1,300 @@
+//! Parameters: read some, read all, set with read-back.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use super::command::Patience;
+use super::messages::{chars, param_list, param_read, param_read_index, param_set};
+use crate::link::clock::{Micros, S};
+use crate::link::drive::{Machine, Progress, Step};
+use crate::link::frame::MavMessage;
+use crate::link::id::DroneId;
+
+/// Requests on their way at once.
+const AT_ONCE: usize = 6;
+/// ArduPilot has about 1,350 parameters; more than this is no answer of it.
+const MOST: u16 = 8_192;
+
+/// Whether a parameter has a value, up to what a 32-bit float keeps.
+pub fn same(value: f32, wanted: f32) -> bool {
+    value == wanted || (value - wanted).abs() <= wanted.abs() * 1e-6
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Open {
+    next: Micros,
+    tries: u32,
+    /// For sets: the vehicle has echoed the value, and is asked for it once more.
+    echoed: bool,
+}
+
+/// Reads parameters by name. Done with those that answered; the firmware does not answer for
+/// names it does not have, so that absent names are missing or unheard.
+#[derive(Clone, Debug)]
+pub struct ReadParams {
+    drone: DroneId,
+    patience: Patience,
+    waiting: VecDeque<String>,
+    open: BTreeMap<String, Open>,
+    total: u64,
+    values: BTreeMap<String, f32>,
+}
+
+impl ReadParams {
+    /// Reads these.
+    pub fn new(drone: DroneId, names: impl IntoIterator<Item = String>) -> Self {
+        let waiting: VecDeque<String> = names.into_iter().collect();
+        let total = waiting.len() as u64;
+        let (open, values) = (BTreeMap::new(), BTreeMap::new());
+        Self { drone, patience: Patience::default(), waiting, open, total, values }
+    }
+
+    /// The same with other patience.
+    #[must_use]
+    pub fn with_patience(self, patience: Patience) -> Self {
+        Self { patience, ..self }
+    }
+}
+
+impl Machine for ReadParams {
+    type Done = BTreeMap<String, f32>;
+
+    fn on_message(&mut self, _now: Micros, message: &MavMessage) {
+        let MavMessage::PARAM_VALUE(value) = message else { return };
+        let name = chars(&value.param_id[..]);
+        if self.open.remove(&name).is_some() {
+            self.values.insert(name, value.param_value);
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        while self.open.len() < AT_ONCE {
+            let Some(name) = self.waiting.pop_front() else { break };
+            self.open.insert(name, Open::default());
+        }
+        let (patience, drone) = (self.patience, self.drone);
+        self.open.retain(|_, open| open.tries < patience.tries || now < open.next);
+        for (name, open) in &mut self.open {
+            if now >= open.next {
+                open.tries += 1;
+                open.next = now + patience.every;
+                return Step::send(param_read(drone, name));
+            }
+        }
+        if self.open.is_empty() && self.waiting.is_empty() {
+            return Step::Done(std::mem::take(&mut self.values));
+        }
+        Step::Wait(self.open.values().map(|open| open.next).min().unwrap_or(now))
+    }
+
+    fn progress(&self) -> Progress {
+        Progress { done: self.values.len() as u64, total: self.total }
+    }
+}
+
+/// A parameter that could not be set.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SetError {
+    /// No answer, or the parameter does not exist.
+    #[error(
+        "no answer when {name} is set to {wanted}: the firmware has no such parameter, or the \
+         radio does not reach the drone"
+    )]
+    Silent {
+        /// Its name.
+        name: String,
+        /// What it should be.
+        wanted: f32,
+    },
+    /// The vehicle keeps another value.
+    #[error("{name} is {is} after it was set to {wanted}: the drone does not take the value")]
+    NotTaken {
+        /// Its name.
+        name: String,
+        /// What it should be.
+        wanted: f32,
+        /// What it is.
+        is: f32,
+    },
+}
+
+/// Sets parameters one after the other, each read back before the next; ends at the first that
+/// fails.
+#[derive(Clone, Debug)]
+pub struct SetParams {
+    drone: DroneId,
+    patience: Patience,
+    values: VecDeque<(String, f32)>,
+    open: Open,
+    last: Option<f32>,
+    total: u64,
+}
+
+impl SetParams {
+    /// Sets these, in this order.
+    pub fn new(drone: DroneId, values: impl IntoIterator<Item = (String, f32)>) -> Self {
+        let values: VecDeque<_> = values.into_iter().collect();
+        let total = values.len() as u64;
+        let patience = Patience::default();
+        Self { drone, patience, values, open: Open::default(), last: None, total }
+    }
+
+    /// The same with other patience.
+    #[must_use]
+    pub fn with_patience(self, patience: Patience) -> Self {
+        Self { patience, ..self }
+    }
+}
+
+impl Machine for SetParams {
+    type Done = Result<(), SetError>;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        let MavMessage::PARAM_VALUE(value) = message else { return };
+        let Some((name, wanted)) = self.values.front() else { return };
+        if self.open.tries == 0 || chars(&value.param_id[..]) != *name {
+            return;
+        }
+        self.last = Some(value.param_value);
+        if !same(value.param_value, *wanted) {
+            // Sent before the vehicle heard of it, or not taken: set again, in its time.
+            self.open.echoed = false;
+        } else if self.open.echoed {
+            self.values.pop_front();
+            self.open = Open::default();
+            self.last = None;
+        } else {
+            self.open.echoed = true;
+            self.open.next = now;
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        let Some((name, wanted)) = self.values.front() else { return Step::Done(Ok(())) };
+        if now < self.open.next {
+            return Step::Wait(self.open.next);
+        }
+        // An echo is followed by one question that is not a try of its own.
+        if self.open.tries >= 2 * self.patience.tries {
+            let (name, wanted) = (name.clone(), *wanted);
+            return Step::Done(Err(match self.last {
+                Some(is) if !same(is, wanted) => SetError::NotTaken { name, wanted, is },
+                _ => SetError::Silent { name, wanted },
+            }));
+        }
+        self.open.tries += if self.open.echoed { 1 } else { 2 };
+        self.open.next = now + self.patience.every;
+        Step::send(if self.open.echoed {
+            param_read(self.drone, name)
+        } else {
+            param_set(self.drone, name, *wanted)
+        })
+    }
+
+    fn progress(&self) -> Progress {
+        Progress { done: self.total - self.values.len() as u64, total: self.total }
+    }
+}
+
+/// A list of parameters that is not whole.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("only {got} of {total} parameters came: bring the drone nearer to the radio and try again")]
+pub struct ListError {
+    /// How many came.
+    pub got: usize,
+    /// How many there are; 0: nothing came at all.
+    pub total: u16,
+}
+
+/// Reads all parameters: the stream first, then what it lost, one by one.
+#[derive(Clone, Debug)]
+pub struct ListParams {
+    drone: DroneId,
+    patience: Patience,
+    total: u16,
+    indices: BTreeSet<u16>,
+    values: BTreeMap<String, f32>,
+    open: BTreeMap<u16, Open>,
+    list: Open,
+}
+
+/// The stream counts as ended when nothing has come for so long.
+const STREAM_GAP: Micros = 2 * S;
+
+impl ListParams {
+    /// All parameters of a vehicle.
+    pub fn new(drone: DroneId) -> Self {
+        Self {
+            drone,
+            patience: Patience::default(),
+            total: 0,
+            indices: BTreeSet::new(),
+            values: BTreeMap::new(),
+            open: BTreeMap::new(),
+            list: Open::default(),
+        }
+    }
+}
+
+impl Machine for ListParams {
+    type Done = Result<BTreeMap<String, f32>, ListError>;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        let MavMessage::PARAM_VALUE(value) = message else { return };
+        // The answer to a request by name has no number.
+        if value.param_index == u16::MAX || value.param_count > MOST {
+            return;
+        }
+        self.total = value.param_count;
+        if value.param_index < self.total {
+            self.indices.insert(value.param_index);
+            self.open.remove(&value.param_index);
+            self.values.insert(chars(&value.param_id[..]), value.param_value);
+            self.list.next = now + STREAM_GAP;
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        let whole = self.total > 0 && self.indices.len() == usize::from(self.total);
+        if whole {
+            return Step::Done(Ok(std::mem::take(&mut self.values)));
+        }
+        let failed = ListError { got: self.indices.len(), total: self.total };
+        if self.total == 0 {
+            if now < self.list.next {
+                return Step::Wait(self.list.next);
+            }
+            if self.list.tries >= self.patience.tries {
+                return Step::Done(Err(failed));
+            }
+            self.list.tries += 1;
+            self.list.next = now + STREAM_GAP;
+            return Step::send(param_list(self.drone));
+        }
+        if now < self.list.next && self.open.is_empty() {
+            return Step::Wait(self.list.next);
+        }
+        for index in 0..self.total {
+            if self.open.len() >= AT_ONCE {
+                break;
+            }
+            if !self.indices.contains(&index) {
+                self.open.entry(index).or_default();
+            }
+        }
+        for (index, open) in &mut self.open {
+            if now >= open.next {
+                if open.tries >= self.patience.tries {
+                    return Step::Done(Err(failed));
+                }
+                open.tries += 1;
+                open.next = now + self.patience.every;
+                return Step::send(param_read_index(self.drone, *index));
+            }
+        }
+        Step::Wait(self.open.values().map(|open| open.next).min().unwrap_or(now))
+    }
+
+    fn progress(&self) -> Progress {
+        Progress { done: self.indices.len() as u64, total: self.total.into() }
+    }
+}

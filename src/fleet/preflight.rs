@@ -1,0 +1,420 @@
+//! The table before a start: per drone everything that must be right, and go or no-go in words
+//! that crews know.
+//!
+//! What is not known is not taken for good: a drone that does not report something is no-go.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::required::Standing;
+use super::slots::{self, FleetTable, SlotProblem};
+use super::start::{ClockSpread, clocks};
+use super::telemetry::{Drone, SILENT_AFTER, Telemetry};
+use crate::link::clock::Micros;
+use crate::link::id::DroneId;
+use crate::mission::Plan;
+use crate::protocol::show::{Stage, flag, preflight};
+
+/// What counts as good enough.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Fewest satellites.
+    pub satellites: u8,
+    /// Worst horizontal accuracy, m.
+    pub h_acc_m: f64,
+    /// Least share of messages that must arrive.
+    pub link_quality: f64,
+    /// Clocks may differ by so much, s.
+    pub clock_spread_s: f64,
+    /// Whether vehicles without show mode may fly (guided by the station).
+    pub stock: bool,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { satellites: 8, h_acc_m: 2.5, link_quality: 0.6, clock_spread_s: 1.0, stock: false }
+    }
+}
+
+/// What is known besides telemetry.
+#[derive(Clone, Debug, Default)]
+pub struct Known {
+    /// Drones whose upload of this flight's show ended well; others may carry an old show.
+    pub loaded: BTreeSet<DroneId>,
+    /// Drones whose fence was read back, for those whose status does not tell.
+    pub fenced: BTreeSet<DroneId>,
+    /// How their parameters stand; drones that are not here were not asked.
+    pub params: BTreeMap<DroneId, Standing>,
+}
+
+/// One thing that was looked at.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cell {
+    /// What is shown.
+    pub text: String,
+    /// Why it is no-go; `None`: it is good.
+    pub no_go: Option<String>,
+}
+
+/// Headings of the cells of a [`Row`].
+pub const COLUMNS: [&str; 11] = [
+    "link", "firmware", "show", "origin", "position", "GPS", "prearm", "battery", "fence", "start",
+    "params",
+];
+
+/// One drone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Its slot.
+    pub slot: u16,
+    /// The drone.
+    pub drone: DroneId,
+    /// In the order of [`COLUMNS`].
+    pub cells: Vec<Cell>,
+}
+
+impl Row {
+    /// Whether it may fly.
+    pub fn go(&self) -> bool {
+        self.cells.iter().all(|cell| cell.no_go.is_none())
+    }
+}
+
+/// The whole table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Preflight {
+    /// The drones, by slot.
+    pub rows: Vec<Row>,
+    /// What concerns more than one drone.
+    pub fleet: Vec<String>,
+}
+
+impl Preflight {
+    /// Go or no-go.
+    pub fn go(&self) -> bool {
+        !self.rows.is_empty() && self.fleet.is_empty() && self.rows.iter().all(Row::go)
+    }
+}
+
+fn good(text: impl Into<String>) -> Cell {
+    Cell { text: text.into(), no_go: None }
+}
+
+fn bad(text: impl Into<String>, why: impl Into<String>) -> Cell {
+    Cell { text: text.into(), no_go: Some(why.into()) }
+}
+
+/// Charge that a flight needs, % of a full battery: its duration, and the reserve that the
+/// vehicle's limits demand.
+pub fn charge_needed(plan: &Plan) -> f64 {
+    let flight_s = plan.duration_ms as f64 / 1000.0;
+    let limits = &plan.limits;
+    100.0 * (flight_s / limits.endurance_s.max(1.0) + limits.endurance_reserve)
+}
+
+/// Makes the table.
+pub fn preflight(
+    plan: &Plan,
+    table: &FleetTable,
+    telemetry: &Telemetry,
+    known: &Known,
+    limits: &Limits,
+    now: Micros,
+) -> Preflight {
+    let problems = slots::check_stands(plan, table, telemetry, now);
+    let mut fleet: Vec<String> = problems
+        .iter()
+        .filter(|problem| of_drone(problem).is_none())
+        .map(ToString::to_string)
+        .collect();
+    let drones: BTreeSet<DroneId> = table.drones.iter().map(|line| line.drone).collect();
+    if let ClockSpread::Apart { text, .. } = clocks(telemetry, &drones, limits.clock_spread_s, now)
+    {
+        fleet.push(text);
+    }
+    let silent = Drone::default();
+    let rows = table
+        .drones
+        .iter()
+        .map(|line| {
+            let known_of = telemetry.get(line.drone).unwrap_or(&silent);
+            let stand = problems.iter().find(|problem| of_drone(problem) == Some(line.drone));
+            let look = Look { plan, limits, now, drone: line.drone, of: known_of, known };
+            Row { slot: line.slot, drone: line.drone, cells: look.cells(line.slot, stand) }
+        })
+        .collect();
+    Preflight { rows, fleet }
+}
+
+/// Problems that belong into a drone's own row.
+fn of_drone(problem: &SlotProblem) -> Option<DroneId> {
+    match problem {
+        SlotProblem::NoPosition { drone, .. }
+        | SlotProblem::WrongSlot { drone, .. }
+        | SlotProblem::TooFar { drone, .. } => Some(*drone),
+        _ => None,
+    }
+}
+
+struct Look<'a> {
+    plan: &'a Plan,
+    limits: &'a Limits,
+    now: Micros,
+    drone: DroneId,
+    of: &'a Drone,
+    known: &'a Known,
+}
+
+impl Look<'_> {
+    fn cells(&self, slot: u16, stand: Option<&SlotProblem>) -> Vec<Cell> {
+        vec![
+            self.link(),
+            self.firmware(),
+            self.show(),
+            self.origin(),
+            self.position(slot, stand),
+            self.gps(),
+            self.prearm(),
+            self.battery(),
+            self.fence(),
+            self.start(),
+            self.params(),
+        ]
+    }
+
+    fn is_stock(&self) -> bool {
+        self.of.has_show_firmware() == Some(false)
+    }
+
+    /// A value that is fresh enough to be believed.
+    fn fresh<T: Copy>(&self, value: Option<(Micros, T)>) -> Option<T> {
+        let (at, value) = value?;
+        (self.now.saturating_sub(at) <= SILENT_AFTER).then_some(value)
+    }
+
+    fn link(&self) -> Cell {
+        if self.of.heard == 0 && self.of.mode.is_none() {
+            return bad("silent", "was never heard: is it on?");
+        }
+        let silent = self.now.saturating_sub(self.of.heard);
+        if silent > SILENT_AFTER {
+            return bad("silent", format!("has been silent for {} s", silent / 1_000_000));
+        }
+        match self.of.link_quality() {
+            None => bad("?", "is not heard for long enough to judge its link: wait a few seconds"),
+            Some(quality) if quality < self.limits.link_quality => {
+                let percent = quality * 100.0;
+                let why = format!("only {percent:.0} % of its messages arrive: look at its radio");
+                bad(format!("{percent:.0}%"), why)
+            }
+            Some(quality) => good(format!("{:.0}%", quality * 100.0)),
+        }
+    }
+
+    fn firmware(&self) -> Cell {
+        let text = self.of.version.map_or_else(
+            || if self.of.status.is_some() { "show".to_owned() } else { "?".to_owned() },
+            |version| version.to_string(),
+        );
+        match self.of.has_show_firmware() {
+            None => bad(text, "does not say which firmware it has"),
+            Some(false) if !self.limits.stock => {
+                bad(text, "has no show firmware: fly it in guided mode, or leave it out")
+            }
+            Some(_) => good(text),
+        }
+    }
+
+    fn show(&self) -> Cell {
+        if self.is_stock() {
+            return good("guided");
+        }
+        let Some(status) = self.fresh(self.of.status) else {
+            return bad("?", "sends no show status");
+        };
+        if !status.has(flag::LOADED) {
+            return bad("none", "has no show data: upload the show");
+        }
+        if !self.known.loaded.contains(&self.drone) {
+            return bad("old?", "carries a show that was not uploaded now: upload the show");
+        }
+        good("loaded")
+    }
+
+    fn origin(&self) -> Cell {
+        if self.is_stock() {
+            return good("-");
+        }
+        match self.fresh(self.of.status) {
+            None => bad("?", "sends no show status"),
+            Some(status) if !status.has(flag::ORIGIN_SET) => {
+                bad("none", "origin not set: upload the show")
+            }
+            Some(status) if !status.has(flag::ORIENTATION_SET) => {
+                bad("no orientation", "orientation not set: upload the show")
+            }
+            Some(status) if status.preflight & preflight::NOT_CONFIGURED != 0 => {
+                bad("refused", "says that show, origin or orientation are missing")
+            }
+            Some(_) => good("set"),
+        }
+    }
+
+    fn position(&self, slot: u16, problem: Option<&SlotProblem>) -> Cell {
+        let frame = self.plan.site.frame();
+        let home = self.plan.slot(slot).map(|slot| slot.home_m);
+        let distance_m = self.of.position.zip(home).map(|((_, position), home)| {
+            let at = frame.from_geodetic(position.place);
+            (at.x - home[0]).hypot(at.y - home[1])
+        });
+        let far = |m: f64| if m < 1000.0 { format!("{m:.1} m") } else { "far".to_owned() };
+        let text = distance_m.map_or_else(|| "?".to_owned(), far);
+        if let Some(problem) = problem {
+            return bad(text, problem.to_string());
+        }
+        let away = preflight::NOT_AT_TAKEOFF;
+        match self.fresh(self.of.status) {
+            Some(status) if status.preflight & away != 0 => {
+                bad(text, "is not at its take-off position, it says: is the origin right?")
+            }
+            _ => good(text),
+        }
+    }
+
+    fn gps(&self) -> Cell {
+        let Some(gps) = self.fresh(self.of.gps) else { return bad("?", "does not report its GPS") };
+        let accuracy = gps.h_acc_m.map_or(String::new(), |m| format!(" {m:.1} m"));
+        let text = format!("{} sats{accuracy}", gps.satellites);
+        let no_time = self.fresh(self.of.status).is_some_and(|s| s.has(flag::NO_GPS_TIME));
+        if gps.fix < 3 {
+            bad("no fix", "has no 3D GPS fix yet")
+        } else if gps.satellites < self.limits.satellites {
+            let why = format!("sees {} satellites only: wait", gps.satellites);
+            bad(text, why)
+        } else if gps.h_acc_m.is_some_and(|m| m > self.limits.h_acc_m) {
+            bad(text, format!("knows its place to{accuracy} only: wait"))
+        } else if no_time {
+            bad(text, "has an invalid GPS timestamp: wait for the time")
+        } else if self.of.clock.gps_ms(self.now).is_none() {
+            bad(text, "does not tell its GPS time")
+        } else {
+            good(text)
+        }
+    }
+
+    fn prearm(&self) -> Cell {
+        if self.of.is_armed() == Some(true) {
+            return bad("armed", "is armed already: disarm it");
+        }
+        match self.fresh(self.of.health).and_then(|health| health.prearm_ok) {
+            None => bad("?", "does not report its arming checks"),
+            Some(true) => good("ok"),
+            Some(false) => {
+                let reason = self.of.prearm_reason().unwrap_or("it has not said why yet");
+                bad("fails", format!("fails its arming checks: {reason}"))
+            }
+        }
+    }
+
+    fn battery(&self) -> Cell {
+        let Some(health) = self.fresh(self.of.health) else {
+            return bad("?", "does not report its battery");
+        };
+        let volts = health.battery_v.map_or(String::new(), |v| format!(" {v:.1} V"));
+        let needed = charge_needed(self.plan);
+        match health.battery_percent {
+            None => bad(format!("?{volts}"), "does not know its battery's charge"),
+            Some(percent) if f64::from(percent) < needed => bad(
+                format!("{percent}%{volts}"),
+                format!("has {percent} % charge, the flight needs {needed:.0} %: change battery"),
+            ),
+            Some(percent) => good(format!("{percent}%{volts}")),
+        }
+    }
+
+    fn fence(&self) -> Cell {
+        match self.fresh(self.of.status) {
+            Some(status) if status.has(flag::FENCE_BREACHED) => {
+                bad("breached", "is outside of its fence: is the origin right?")
+            }
+            Some(status) if !status.has(flag::FENCE_ON) => {
+                bad("off", "geofence not set: upload the show")
+            }
+            Some(_) => good("on"),
+            None if self.is_stock() && self.known.fenced.contains(&self.drone) => good("on"),
+            None => bad("?", "does not report its fence: put it there again"),
+        }
+    }
+
+    fn start(&self) -> Cell {
+        if self.is_stock() {
+            return good("-");
+        }
+        let Some(status) = self.fresh(self.of.status) else {
+            return bad("?", "sends no show status");
+        };
+        if status.has(flag::AUTHORIZED) {
+            return bad("authorized", "is authorized to start already: cancel the start first");
+        }
+        if status.has(flag::START_SET) && status.start_tow_s >= 0 {
+            return bad(
+                format!("at {}", status.start_tow_s),
+                "has a start time already: cancel the start first",
+            );
+        }
+        match status.stage {
+            Stage::WaitForStart => good("waiting"),
+            Stage::Landed => bad("landed", "has flown: restart it, or leave and enter show mode"),
+            Stage::Off => bad("off", "is not in show mode: upload the show"),
+            Stage::Error => bad("error", "is in an error: restart it"),
+            stage => bad(stage.to_string(), format!("is not waiting for a start ({stage})")),
+        }
+    }
+
+    fn params(&self) -> Cell {
+        match self.known.params.get(&self.drone) {
+            None => bad("?", "its parameters were not checked"),
+            Some(standing) => match standing.wrong.first() {
+                Some(wrong) => bad(format!("{} wrong", standing.wrong.len()), wrong.to_string()),
+                None if standing.failed.is_some() => bad("failed", "a parameter was not set"),
+                None if standing.changed.is_empty() => good("ok"),
+                None => good(format!("{} changed", standing.changed.len())),
+            },
+        }
+    }
+}
+
+impl std::fmt::Display for Preflight {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut lines: Vec<Vec<String>> = Vec::new();
+        lines.push(["slot", "drone"].iter().chain(&COLUMNS).map(ToString::to_string).collect());
+        for row in &self.rows {
+            let mut line = vec![row.slot.to_string(), row.drone.to_string()];
+            line.extend(row.cells.iter().map(|cell| {
+                let mark = if cell.no_go.is_some() { "!" } else { "" };
+                format!("{}{mark}", cell.text)
+            }));
+            lines.push(line);
+        }
+        let widths: Vec<usize> = (0..COLUMNS.len() + 2)
+            .map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0))
+            .collect();
+        for line in &lines {
+            let mut text = String::new();
+            for (cell, width) in line.iter().zip(&widths) {
+                text.push_str(&format!("{cell:<width$}  "));
+            }
+            writeln!(f, "{}", text.trim_end())?;
+        }
+        for row in &self.rows {
+            for why in row.cells.iter().filter_map(|cell| cell.no_go.as_deref()) {
+                writeln!(f, "NO-GO drone {} (slot {}): {why}", row.drone, row.slot)?;
+            }
+        }
+        for why in &self.fleet {
+            writeln!(f, "NO-GO: {why}")?;
+        }
+        let ready = self.rows.iter().filter(|row| row.go()).count();
+        let verdict = if self.go() { "GO" } else { "NO-GO" };
+        writeln!(f, "{verdict}: {ready} of {} drones are ready", self.rows.len())
+    }
+}

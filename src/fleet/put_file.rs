@@ -1,0 +1,83 @@
+//! Puts a file on a vehicle, unless it is there already.
+
+use super::ftp::put::Put;
+use super::ftp::sum::Sum;
+use super::ftp::{Caller, FtpError};
+use crate::base::crc::ap_crc32;
+use crate::link::clock::{Micros, S};
+use crate::link::drive::{Machine, Progress, Step};
+use crate::link::frame::MavMessage;
+
+/// Given up after so long without an answer.
+const PATIENCE: Micros = 15 * S;
+
+#[derive(Debug)]
+enum Phase {
+    Look(Sum),
+    Put(Put),
+}
+
+/// Puts one file, after a look at the checksum of what is there.
+#[derive(Debug)]
+pub struct PutFile {
+    caller: Caller,
+    path: &'static str,
+    content: Vec<u8>,
+    phase: Phase,
+}
+
+impl PutFile {
+    /// This content as the file `path`. Done with whether it had to be written.
+    pub fn new(mut caller: Caller, path: &'static str, content: Vec<u8>) -> Self {
+        let size = content.len() as u64;
+        let phase = Phase::Look(Sum::new(caller.another(), path, size, PATIENCE));
+        Self { caller, path, content, phase }
+    }
+}
+
+impl Machine for PutFile {
+    type Done = Result<bool, FtpError>;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        match &mut self.phase {
+            Phase::Look(sum) => sum.on_message(now, message),
+            Phase::Put(put) => put.on_message(now, message),
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        if let Phase::Look(sum) = &mut self.phase {
+            match sum.poll(now) {
+                Step::Send(message) => return Step::Send(message),
+                Step::Wait(until) => return Step::Wait(until),
+                Step::Done(Ok(sum)) if sum == ap_crc32(&self.content) => {
+                    return Step::Done(Ok(false));
+                }
+                Step::Done(Err(error @ FtpError::Silent { .. })) => {
+                    return Step::Done(Err(error));
+                }
+                // Another file, or none.
+                Step::Done(_) => {
+                    let content = std::mem::take(&mut self.content);
+                    let caller = self.caller.another();
+                    self.phase = Phase::Put(Put::new(caller, self.path, content, PATIENCE));
+                }
+            }
+        }
+        match &mut self.phase {
+            Phase::Put(put) => match put.poll(now) {
+                Step::Send(message) => Step::Send(message),
+                Step::Wait(until) => Step::Wait(until),
+                Step::Done(done) => Step::Done(done.map(|()| true)),
+            },
+            Phase::Look(_) => Step::Wait(now),
+        }
+    }
+
+    fn progress(&self) -> Progress {
+        match &self.phase {
+            Phase::Look(_) => Progress::default(),
+            Phase::Put(put) => put.progress(),
+        }
+    }
+}

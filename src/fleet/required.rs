@@ -1,0 +1,387 @@
+//! Parameters that must hold for a flight that is to be analysed and survived, and why.
+//!
+//! They are read and compared; they are changed only when that is allowed, what was changed is
+//! written down with its old value, and can be put back.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::command::Patience;
+use super::params::{ReadParams, SetError, SetParams, same};
+use crate::link::clock::Micros;
+use crate::link::drive::{Machine, Progress, Step};
+use crate::link::frame::MavMessage;
+use crate::link::id::DroneId;
+use crate::mission::Plan;
+
+/// What a parameter must be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Wanted {
+    /// This value.
+    Is(f32),
+    /// At least this.
+    AtLeast(f32),
+    /// At most this.
+    AtMost(f32),
+    /// These bits are set, whatever the others are.
+    HasBits(u32),
+    /// These bits are not set, whatever the others are.
+    LacksBits(u32),
+}
+
+impl Wanted {
+    /// Whether a value is right.
+    pub fn holds(self, value: f32) -> bool {
+        match self {
+            Self::Is(wanted) => same(value, wanted),
+            Self::AtLeast(least) => value >= least,
+            Self::AtMost(most) => value <= most,
+            Self::HasBits(bits) => value as u32 & bits == bits,
+            Self::LacksBits(bits) => value as u32 & bits == 0,
+        }
+    }
+
+    /// The nearest right value.
+    pub fn mend(self, value: f32) -> f32 {
+        match self {
+            Self::Is(wanted) => wanted,
+            Self::AtLeast(least) => value.max(least),
+            Self::AtMost(most) => value.min(most),
+            Self::HasBits(bits) => (value as u32 | bits) as f32,
+            Self::LacksBits(bits) => (value as u32 & !bits) as f32,
+        }
+    }
+}
+
+impl std::fmt::Display for Wanted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Is(value) => write!(f, "{value}"),
+            Self::AtLeast(value) => write!(f, "{value} or more"),
+            Self::AtMost(value) => write!(f, "{value} or less"),
+            Self::HasBits(bits) => write!(f, "to have all bits of {bits}"),
+            Self::LacksBits(bits) => write!(f, "to have no bit of {bits}"),
+        }
+    }
+}
+
+/// A parameter that must hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Requirement {
+    /// Its name.
+    pub name: &'static str,
+    /// What it must be.
+    pub wanted: Wanted,
+    /// Why, as a sentence's end: "LOG_FILE_DSRMROT must be 1: every flight ...".
+    pub why: &'static str,
+}
+
+/// LOG_BITMASK: attitude, GPS, control tuning, navigation tuning, battery, rotor outputs, motors.
+const LOG_BITS: u32 = 1 << 1 | 1 << 2 | 1 << 4 | 1 << 5 | 1 << 9 | 1 << 10 | 1 << 17;
+/// A return climbs to at most so much below the top of the fence, m.
+const FENCE_GAP_M: f64 = 5.0;
+
+/// What a plan requires of a vehicle; the fence's own parameters are those of
+/// [`super::fence::Fence::params`].
+pub fn requirements(plan: &Plan, show_firmware: bool) -> Vec<Requirement> {
+    let require = |name, wanted, why| Requirement { name, wanted, why };
+    let mut all = vec![
+        require("LOG_FILE_DSRMROT", Wanted::Is(1.0), "every flight gets a log of its own"),
+        require("LOG_BACKEND_TYPE", Wanted::HasBits(1), "the log is written to the SD card"),
+        require(
+            "LOG_BITMASK",
+            Wanted::HasBits(LOG_BITS),
+            "the analysis needs rotor outputs, attitude, position and battery in the log",
+        ),
+        require("FENCE_ENABLE", Wanted::Is(1.0), "no show is flown without a fence"),
+        require("FS_CRASH_CHECK", Wanted::Is(1.0), "motors stop after a crash"),
+        require(
+            "FS_EKF_ACTION",
+            Wanted::AtLeast(1.0),
+            "a drone that does not know where it is must land",
+        ),
+        require(
+            "BATT_FS_LOW_ACT",
+            Wanted::AtLeast(1.0),
+            "a drone with an empty battery must come down on its own",
+        ),
+        require(
+            "RTL_ALT",
+            Wanted::AtMost(((plan.fence.max_altitude_m - FENCE_GAP_M) * 100.0) as f32),
+            "a return must stay below the top of the fence (cm)",
+        ),
+        require("RTL_ALT_FINAL", Wanted::Is(0.0), "a return ends on the ground"),
+        require("ARMING_CHECK", Wanted::AtLeast(1.0), "no drone starts unchecked"),
+    ];
+    if show_firmware {
+        all.extend([
+            require("SHOW_CTRL_RATE", Wanted::AtLeast(10.0), "the trajectory is followed at 10 Hz"),
+            require("SHOW_CTRL_MODE", Wanted::HasBits(1), "velocity feed-forward is on"),
+            require("SHOW_VEL_FF_GAIN", Wanted::Is(1.0), "commanded speeds are flown in full"),
+            require("SHOW_SYNC_MODE", Wanted::Is(1.0), "all drones start by GPS time"),
+            require(
+                "SHOW_TAKEOFF_ERR",
+                Wanted::AtMost(3.0),
+                "a drone on a wrong place must not take off",
+            ),
+        ]);
+    } else {
+        all.extend([
+            require(
+                "GUID_TIMEOUT",
+                Wanted::AtMost(3.0),
+                "a drone that hears no targets any more must stop",
+            ),
+            require(
+                "FS_GCS_ENABLE",
+                Wanted::AtLeast(1.0),
+                "a drone that is flown by the station must return when it loses it",
+            ),
+        ]);
+    }
+    all
+}
+
+/// A parameter that is not what it must be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// The requirement.
+    pub requirement: Requirement,
+    /// What it is; `None`: the drone did not answer for it.
+    pub is: Option<f32>,
+}
+
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Requirement { name, wanted, why } = &self.requirement;
+        match self.is {
+            Some(is) => write!(f, "{name} is {is}, it must be {wanted}: {why}"),
+            None => write!(
+                f,
+                "{name} cannot be read (it must be {wanted}): the firmware has no such \
+                 parameter, or the radio does not reach the drone"
+            ),
+        }
+    }
+}
+
+/// A change that was made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// The parameter.
+    pub name: String,
+    /// Its value before.
+    pub was: f32,
+    /// Its value since.
+    pub now: f32,
+}
+
+/// How the parameters of a vehicle stand.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Standing {
+    /// What is still wrong.
+    pub wrong: Vec<Difference>,
+    /// What was changed, also when something went wrong afterwards.
+    pub changed: Vec<Change>,
+    /// Why a change did not work.
+    pub failed: Option<SetError>,
+    /// What was read.
+    pub values: BTreeMap<String, f32>,
+}
+
+impl Standing {
+    /// Whether everything is as it must be.
+    pub fn is_right(&self) -> bool {
+        self.wrong.is_empty() && self.failed.is_none()
+    }
+}
+
+#[derive(Clone, Debug)]
+enum Phase {
+    Read(ReadParams),
+    Set(VecDeque<(Difference, f32)>, Option<SetParams>),
+    Over,
+}
+
+/// Reads what is required and, if allowed, mends it.
+#[derive(Clone, Debug)]
+pub struct CheckParams {
+    drone: DroneId,
+    requirements: Vec<Requirement>,
+    may_change: bool,
+    patience: Patience,
+    phase: Phase,
+    standing: Standing,
+}
+
+impl CheckParams {
+    /// Checks these; with `may_change` mends what is wrong.
+    pub fn new(drone: DroneId, requirements: Vec<Requirement>, may_change: bool) -> Self {
+        let patience = Patience { tries: 8, ..Patience::default() };
+        let names = requirements.iter().map(|requirement| requirement.name.to_owned());
+        let read = ReadParams::new(drone, names).with_patience(patience);
+        let (phase, standing) = (Phase::Read(read), Standing::default());
+        Self { drone, requirements, may_change, patience, phase, standing }
+    }
+
+    fn compare(&mut self, values: BTreeMap<String, f32>) {
+        let mut to_mend = VecDeque::new();
+        for requirement in &self.requirements {
+            let is = values.get(requirement.name).copied();
+            if is.is_some_and(|is| requirement.wanted.holds(is)) {
+                continue;
+            }
+            let difference = Difference { requirement: requirement.clone(), is };
+            match is {
+                Some(is) if self.may_change => {
+                    to_mend.push_back((difference, requirement.wanted.mend(is)));
+                }
+                _ => self.standing.wrong.push(difference),
+            }
+        }
+        self.standing.values = values;
+        self.phase = Phase::Set(to_mend, None);
+    }
+}
+
+impl Machine for CheckParams {
+    type Done = Standing;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        match &mut self.phase {
+            Phase::Read(read) => read.on_message(now, message),
+            Phase::Set(_, Some(set)) => set.on_message(now, message),
+            Phase::Set(_, None) | Phase::Over => {}
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Standing> {
+        loop {
+            match &mut self.phase {
+                Phase::Read(read) => match read.poll(now) {
+                    Step::Send(message) => return Step::Send(message),
+                    Step::Wait(until) => return Step::Wait(until),
+                    Step::Done(values) => self.compare(values),
+                },
+                Phase::Set(to_mend, set) => {
+                    let Some((difference, value)) = to_mend.front() else {
+                        self.phase = Phase::Over;
+                        continue;
+                    };
+                    let name = difference.requirement.name;
+                    let patience = self.patience;
+                    let set = set.get_or_insert_with(|| {
+                        SetParams::new(self.drone, [(name.to_owned(), *value)])
+                            .with_patience(patience)
+                    });
+                    match set.poll(now) {
+                        Step::Send(message) => return Step::Send(message),
+                        Step::Wait(until) => return Step::Wait(until),
+                        Step::Done(done) => {
+                            let was = difference.is.unwrap_or(*value);
+                            // A set without an answer may have worked: it is written down, too.
+                            let change = Change { name: name.to_owned(), was, now: *value };
+                            self.standing.changed.push(change);
+                            self.standing.values.insert(name.to_owned(), *value);
+                            if let Err(error) = done {
+                                self.standing.values.insert(name.to_owned(), was);
+                                self.standing.failed = Some(error);
+                                let rest = to_mend.drain(..).map(|(difference, _)| difference);
+                                self.standing.wrong.extend(rest);
+                                self.phase = Phase::Over;
+                                continue;
+                            }
+                            to_mend.pop_front();
+                            if let Phase::Set(_, set) = &mut self.phase {
+                                *set = None;
+                            }
+                        }
+                    }
+                }
+                Phase::Over => return Step::Done(std::mem::take(&mut self.standing)),
+            }
+        }
+    }
+
+    fn progress(&self) -> Progress {
+        match &self.phase {
+            Phase::Read(read) => read.progress(),
+            Phase::Set(..) | Phase::Over => {
+                let total = self.requirements.len() as u64;
+                Progress { done: total, total }
+            }
+        }
+    }
+}
+
+/// Name and version of the file of changes.
+pub const CHANGES_SCHEMA: &str = "updraft.changes/1";
+/// Its name in a campaign folder.
+pub const CHANGES_FILE: &str = "fleet-changes.json";
+
+/// `fleet-changes.json`: every parameter changed on a vehicle, with the value it had at first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Changes {
+    /// Format name and version: `updraft.changes/1`.
+    pub schema: String,
+    /// Per vehicle; the newest value counts, the first one is restored.
+    pub drones: Vec<DroneChanges>,
+}
+
+/// The changes of one vehicle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DroneChanges {
+    /// The vehicle.
+    pub drone: DroneId,
+    /// What was changed.
+    pub changes: Vec<Change>,
+}
+
+impl Default for Changes {
+    fn default() -> Self {
+        Self { schema: CHANGES_SCHEMA.to_owned(), drones: Vec::new() }
+    }
+}
+
+impl Changes {
+    /// Adds changes of a vehicle; of a parameter that was changed before, the first old value is
+    /// kept.
+    pub fn add(&mut self, drone: DroneId, changes: &[Change]) {
+        if changes.is_empty() {
+            return;
+        }
+        let index = self.drones.iter().position(|entry| entry.drone == drone);
+        let index = index.unwrap_or_else(|| {
+            self.drones.push(DroneChanges { drone, changes: Vec::new() });
+            self.drones.len() - 1
+        });
+        let known = &mut self.drones[index].changes;
+        for change in changes {
+            match known.iter_mut().find(|old| old.name == change.name) {
+                Some(old) => old.now = change.now,
+                None => known.push(change.clone()),
+            }
+        }
+        self.drones.sort_by_key(|entry| entry.drone);
+    }
+
+    /// A machine per vehicle that puts the old values back. Once it is done, the vehicle's entry
+    /// can be taken out with [`Changes::forget`].
+    pub fn restore(&self) -> BTreeMap<DroneId, SetParams> {
+        let machine = |entry: &DroneChanges| {
+            let values = entry.changes.iter().map(|change| (change.name.clone(), change.was));
+            (entry.drone, SetParams::new(entry.drone, values.collect::<Vec<_>>()))
+        };
+        self.drones.iter().map(machine).collect()
+    }
+
+    /// Forgets a vehicle whose values are restored.
+    pub fn forget(&mut self, drone: DroneId) {
+        self.drones.retain(|entry| entry.drone != drone);
+    }
+}

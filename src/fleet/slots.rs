@@ -1,0 +1,353 @@
+//! Which vehicle flies which slot: the table of a campaign, held against where each one stands.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::telemetry::Telemetry;
+use crate::base::file::write_whole;
+use crate::campaign::{CampaignError, read_json, to_json};
+use crate::link::clock::{Micros, S};
+use crate::link::id::DroneId;
+use crate::mission::Plan;
+
+/// Name and version of the table's format.
+pub const FLEET_SCHEMA: &str = "updraft.fleet/1";
+/// Its name in a flight's folder.
+pub const FLEET_FILE: &str = "fleet.json";
+/// A position older than this does not say where a drone stands.
+const FRESH: Micros = 5 * S;
+
+/// `fleet.json`: which vehicle flies which slot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FleetTable {
+    /// Format name and version: `updraft.fleet/1`.
+    pub schema: String,
+    /// The vehicles, in slot order.
+    pub drones: Vec<Assignment>,
+}
+
+/// One line of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Assignment {
+    /// Number of the slot, from 1.
+    pub slot: u16,
+    /// The vehicle.
+    pub drone: DroneId,
+}
+
+impl FleetTable {
+    /// A table of these; sorted by slot.
+    pub fn new(drones: impl IntoIterator<Item = (DroneId, u16)>) -> Self {
+        let mut drones: Vec<Assignment> =
+            drones.into_iter().map(|(drone, slot)| Assignment { slot, drone }).collect();
+        drones.sort_by_key(|line| (line.slot, line.drone));
+        Self { schema: FLEET_SCHEMA.to_owned(), drones }
+    }
+
+    /// Where it lies in a flight's folder.
+    pub fn path(folder: &Path) -> PathBuf {
+        folder.join(FLEET_FILE)
+    }
+
+    /// Reads it.
+    pub fn read(folder: &Path) -> Result<Self, CampaignError> {
+        let path = Self::path(folder);
+        let table: Self = read_json(&path)?;
+        if table.schema == FLEET_SCHEMA {
+            Ok(table)
+        } else {
+            let reason = format!("this program reads \"{FLEET_SCHEMA}\", not \"{}\"", table.schema);
+            Err(CampaignError::Json { path, reason })
+        }
+    }
+
+    /// Writes it.
+    pub fn write(&self, folder: &Path) -> Result<(), CampaignError> {
+        let path = Self::path(folder);
+        let json = to_json(self).map_err(|error| CampaignError::Json {
+            path: path.clone(),
+            reason: error.to_string(),
+        })?;
+        Ok(write_whole(&path, &json)?)
+    }
+
+    /// The slot of a vehicle.
+    pub fn slot_of(&self, drone: DroneId) -> Option<u16> {
+        self.drones.iter().find(|line| line.drone == drone).map(|line| line.slot)
+    }
+
+    /// Vehicles by slot.
+    pub fn by_slot(&self) -> BTreeMap<u16, DroneId> {
+        self.drones.iter().map(|line| (line.slot, line.drone)).collect()
+    }
+
+    /// Slots by vehicle.
+    pub fn by_drone(&self) -> BTreeMap<DroneId, u16> {
+        self.drones.iter().map(|line| (line.drone, line.slot)).collect()
+    }
+}
+
+/// Why vehicles and slots do not fit together.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SlotProblem {
+    /// The table names a slot that the plan does not have.
+    #[error("drone {drone} is to fly slot {slot}, but the plan has {slots} slots")]
+    NoSuchSlot {
+        /// The vehicle.
+        drone: DroneId,
+        /// The slot.
+        slot: u16,
+        /// How many there are.
+        slots: usize,
+    },
+    /// Two vehicles for one slot in the table.
+    #[error("slot {slot} is given to drones {first} and {second}: take one of them out")]
+    DoubledSlot {
+        /// The slot.
+        slot: u16,
+        /// One vehicle.
+        first: DroneId,
+        /// The other.
+        second: DroneId,
+    },
+    /// One vehicle for two slots in the table.
+    #[error("drone {drone} is given slots {first} and {second}: it can fly one")]
+    DoubledDrone {
+        /// The vehicle.
+        drone: DroneId,
+        /// One slot.
+        first: u16,
+        /// The other.
+        second: u16,
+    },
+    /// A slot without a vehicle.
+    #[error("slot {slot} has no drone: put one there, or plan the flight with fewer")]
+    Empty {
+        /// The slot.
+        slot: u16,
+    },
+    /// Its place is not known.
+    #[error("drone {drone} (slot {slot}) does not say where it stands: is it on, with GPS?")]
+    NoPosition {
+        /// The vehicle.
+        drone: DroneId,
+        /// Its slot.
+        slot: u16,
+    },
+    /// It stands nearest to another slot.
+    #[error(
+        "drone {drone} is to fly slot {slot} but stands on slot {stands}: move it {distance_m:.1} \
+         m, or let the table follow where the drones stand"
+    )]
+    WrongSlot {
+        /// The vehicle.
+        drone: DroneId,
+        /// Its slot.
+        slot: u16,
+        /// Where it stands.
+        stands: u16,
+        /// How far it is from its slot, m.
+        distance_m: f64,
+    },
+    /// It stands near its slot, but not near enough.
+    #[error(
+        "drone {drone} stands {distance_m:.1} m from slot {slot}, {allowed_m:.1} m are allowed: \
+         move it there"
+    )]
+    TooFar {
+        /// The vehicle.
+        drone: DroneId,
+        /// The slot.
+        slot: u16,
+        /// How far it is, m.
+        distance_m: f64,
+        /// How far it may be, m.
+        allowed_m: f64,
+    },
+    /// Two stand on one slot.
+    #[error("drones {first} and {second} both stand on slot {slot}: move one of them")]
+    BothOn {
+        /// The slot.
+        slot: u16,
+        /// One vehicle.
+        first: DroneId,
+        /// The other.
+        second: DroneId,
+    },
+    /// A vehicle that belongs to no slot.
+    #[error("drone {drone} is on but has no slot: switch it off, or give it one")]
+    Unassigned {
+        /// The vehicle.
+        drone: DroneId,
+    },
+}
+
+/// Where a vehicle stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stand {
+    /// The nearest slot.
+    pub nearest: u16,
+    /// How far that is, m, horizontally.
+    pub distance_m: f64,
+    /// Place in the show frame, m.
+    pub at_m: [f64; 2],
+}
+
+/// Where all vehicles with a fresh position stand.
+pub fn stands(plan: &Plan, telemetry: &Telemetry, now: Micros) -> BTreeMap<DroneId, Stand> {
+    let frame = plan.site.frame();
+    let stand = |(drone, known): (&DroneId, &super::telemetry::Drone)| {
+        let (at, position) = known.position?;
+        // Without a fix the firmware sends a place of zeros.
+        let nowhere = position.place.lat_deg == 0.0 && position.place.lon_deg == 0.0;
+        if nowhere || now.saturating_sub(at) > FRESH {
+            return None;
+        }
+        let place = frame.from_geodetic(position.place);
+        let at_m = [place.x, place.y];
+        let distance = |slot: &crate::mission::plan::Slot| distance_m(at_m, slot.home_m);
+        let nearest = plan.slots.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        Some((*drone, Stand { nearest: nearest.slot, distance_m: distance(nearest), at_m }))
+    };
+    telemetry.drones.iter().filter_map(stand).collect()
+}
+
+fn distance_m(at_m: [f64; 2], home_m: [f64; 3]) -> f64 {
+    (at_m[0] - home_m[0]).hypot(at_m[1] - home_m[1])
+}
+
+/// How far a drone may stand from its slot, m: under half the grid's spacing, and under what the
+/// firmware allows ([`Plan`]s keep drones further apart than twice that).
+pub fn allowed_m(plan: &Plan) -> f64 {
+    let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
+    (0.4 * spacing_m).min(2.5)
+}
+
+/// Everything that is wrong with a table on its own.
+pub fn check_table(plan: &Plan, table: &FleetTable) -> Vec<SlotProblem> {
+    let mut problems = Vec::new();
+    let (mut slots, mut drones) = (BTreeMap::new(), BTreeMap::new());
+    for Assignment { slot, drone } in table.drones.iter().copied() {
+        if plan.slot(slot).is_none() {
+            problems.push(SlotProblem::NoSuchSlot { drone, slot, slots: plan.slots.len() });
+        }
+        if let Some(first) = slots.insert(slot, drone) {
+            problems.push(SlotProblem::DoubledSlot { slot, first, second: drone });
+        }
+        if let Some(first) = drones.insert(drone, slot) {
+            problems.push(SlotProblem::DoubledDrone { drone, first, second: slot });
+        }
+    }
+    let empty = plan.slots.iter().filter(|slot| !slots.contains_key(&slot.slot));
+    problems.extend(empty.map(|slot| SlotProblem::Empty { slot: slot.slot }));
+    problems
+}
+
+/// Everything that is wrong with a table and with where the vehicles stand.
+pub fn check_stands(
+    plan: &Plan,
+    table: &FleetTable,
+    telemetry: &Telemetry,
+    now: Micros,
+) -> Vec<SlotProblem> {
+    let mut problems = check_table(plan, table);
+    let stands = stands(plan, telemetry, now);
+    let allowed_m = allowed_m(plan);
+    let mut on: BTreeMap<u16, DroneId> = BTreeMap::new();
+    for Assignment { slot, drone } in table.drones.iter().copied() {
+        let Some(home) = plan.slot(slot) else { continue };
+        let Some(stand) = stands.get(&drone) else {
+            problems.push(SlotProblem::NoPosition { drone, slot });
+            continue;
+        };
+        let distance_m = distance_m(stand.at_m, home.home_m);
+        if stand.nearest != slot && distance_m > allowed_m {
+            let stands = stand.nearest;
+            problems.push(SlotProblem::WrongSlot { drone, slot, stands, distance_m });
+        } else if distance_m > allowed_m {
+            problems.push(SlotProblem::TooFar { drone, slot, distance_m, allowed_m });
+        }
+    }
+    for (drone, stand) in &stands {
+        if stand.distance_m <= allowed_m
+            && let Some(first) = on.insert(stand.nearest, *drone)
+        {
+            let slot = stand.nearest;
+            problems.push(SlotProblem::BothOn { slot, first, second: *drone });
+        }
+    }
+    let named: BTreeSet<DroneId> = table.drones.iter().map(|line| line.drone).collect();
+    let unnamed = telemetry.drones.keys().filter(|drone| !named.contains(drone));
+    problems.extend(unnamed.map(|drone| SlotProblem::Unassigned { drone: *drone }));
+    problems
+}
+
+/// The table that follows from where the vehicles stand: each flies the slot it stands on.
+///
+/// # Errors
+/// Every slot without a vehicle, with two, and every vehicle that stands on none.
+pub fn propose(
+    plan: &Plan,
+    telemetry: &Telemetry,
+    now: Micros,
+) -> Result<FleetTable, Vec<SlotProblem>> {
+    let stands = stands(plan, telemetry, now);
+    let table = FleetTable::new(stands.iter().map(|(drone, stand)| (*drone, stand.nearest)));
+    let mut seen = BTreeSet::new();
+    let mut problems = check_stands(plan, &table, telemetry, now);
+    // Two drones on one place are one problem, however it is found.
+    problems.retain(|problem| match problem {
+        SlotProblem::DoubledSlot { slot, .. } | SlotProblem::BothOn { slot, .. } => {
+            seen.insert(*slot)
+        }
+        _ => true,
+    });
+    if problems.is_empty() { Ok(table) } else { Err(problems) }
+}
+
+/// Who stands where, as a picture of the grid seen from above: the show's x axis points up, so
+/// that it is as one sees it looking along the show's orientation. `.` is an empty slot, `?` two
+/// drones on one; drones beside the grid are listed below.
+pub fn picture(plan: &Plan, telemetry: &Telemetry, now: Micros) -> String {
+    let stands = stands(plan, telemetry, now);
+    let allowed_m = allowed_m(plan);
+    let mut cells: BTreeMap<u16, String> = BTreeMap::new();
+    let mut beside = Vec::new();
+    for (drone, stand) in &stands {
+        if stand.distance_m <= allowed_m {
+            let cell = cells.entry(stand.nearest);
+            cell.and_modify(|text| "?".clone_into(text)).or_insert_with(|| drone.to_string());
+        } else {
+            beside.push(format!(
+                "  drone {drone}: {:.1} m from slot {}, at x {:.1} y {:.1} m\n",
+                stand.distance_m, stand.nearest, stand.at_m[0], stand.at_m[1]
+            ));
+        }
+    }
+    let rows = plan.slots.iter().map(|slot| slot.row).max().unwrap_or(0);
+    let columns = plan.slots.iter().map(|slot| slot.column).max().unwrap_or(0);
+    let width = cells.values().map(String::len).max().unwrap_or(1).max(2);
+    let mut text = String::new();
+    for row in (0..=rows).rev() {
+        let mut line = String::new();
+        for column in (0..=columns).rev() {
+            let slot = plan.slots.iter().find(|slot| slot.row == row && slot.column == column);
+            let cell = match slot {
+                Some(slot) => cells.get(&slot.slot).map_or(".", String::as_str),
+                None => "",
+            };
+            line.push_str(&format!(" {cell:>width$}"));
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text.push_str("  (up: along the show's x axis");
+    text.push_str(&format!(", {:.0} degrees from north)\n", plan.site.orientation_deg));
+    text.extend(beside);
+    text
+}

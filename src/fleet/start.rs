@@ -1,0 +1,352 @@
+//! Sets the time of a start, and authorizes it as a second, deliberate step.
+//!
+//! A start packet has no address: it is broadcast once a second, and everyone who hears it obeys.
+//! Whether a drone has taken it is read from its status packets. Times are the vehicles' own:
+//! GPS seconds of the week, from their own clocks.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::messages::start_packet;
+use super::telemetry::{SILENT_AFTER, Telemetry};
+use crate::base::time::{GpsTime, WEEK_S};
+use crate::link::clock::{Micros, S};
+use crate::link::frame::MavMessage;
+use crate::link::id::DroneId;
+use crate::protocol::show::{CLEAR_TIME, LEAVE_TIME, StartConfig, flag};
+
+/// How a start is set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartOptions {
+    /// From the decision to the start, s of the vehicles' time.
+    pub lead_s: f64,
+    /// Clocks may differ by so much, s.
+    pub clock_spread_s: f64,
+    /// Authorization after this is refused, s before the start: the firmware sets its home 10 s
+    /// and arms 8 s before take-off.
+    pub authorize_before_s: f64,
+}
+
+impl Default for StartOptions {
+    fn default() -> Self {
+        Self { lead_s: 30.0, clock_spread_s: 1.0, authorize_before_s: 12.0 }
+    }
+}
+
+/// Shortest lead that leaves time for both steps and the firmware's own, s.
+const LEAST_LEAD_S: f64 = 20.0;
+/// Longest: a start is not set for days, s. Times of the past half week read as passed.
+const MOST_LEAD_S: f64 = 12.0 * 3600.0;
+
+/// Why no start is set or authorized.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StartRefusal {
+    /// Nobody is to fly.
+    #[error("there is no drone to start")]
+    NoDrones,
+    /// The lead is too short or too long.
+    #[error(
+        "a lead of {lead_s} s is not possible: give {LEAST_LEAD_S} to {MOST_LEAD_S} s; the \
+         drones set their home and arm in the last 10 s"
+    )]
+    Lead {
+        /// What was asked for, s.
+        lead_s: f64,
+    },
+    /// Clocks that are not known or do not agree.
+    #[error("{text}")]
+    Clocks {
+        /// In words, with the drones.
+        text: String,
+    },
+    /// Not every drone has the start time.
+    #[error("not authorized: {} without the start time: {}", count(.late), names(.late))]
+    Late {
+        /// Which, and what each has.
+        late: Vec<(DroneId, Readback)>,
+    },
+    /// It is too late for it.
+    #[error(
+        "not authorized: {left_s:.0} s are left to the start, {needed_s:.0} s are needed; cancel \
+         it and set a new one"
+    )]
+    TooLate {
+        /// Time left, s.
+        left_s: f64,
+        /// Time needed, s.
+        needed_s: f64,
+    },
+}
+
+fn count(late: &[(DroneId, Readback)]) -> String {
+    if late.len() == 1 { "1 drone is".to_owned() } else { format!("{} drones are", late.len()) }
+}
+
+fn names(late: &[(DroneId, Readback)]) -> String {
+    let name = |(drone, readback): &(DroneId, Readback)| format!("{drone} ({readback})");
+    late.iter().map(name).collect::<Vec<_>>().join(", ")
+}
+
+/// How the clocks of vehicles stand to each other.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ClockSpread {
+    /// They agree: GPS time now, ms since the GPS epoch (the middle one), and the greatest rate.
+    Agree {
+        /// GPS time of the vehicles, ms since the GPS epoch.
+        gps_ms: f64,
+        /// Seconds of the vehicles per second of the station.
+        rate: f64,
+    },
+    /// They do not, or some are not known.
+    Apart {
+        /// In words, with the drones and what to do.
+        text: String,
+        /// The drones it is about.
+        drones: Vec<DroneId>,
+    },
+}
+
+/// Compares the clocks of these vehicles.
+pub fn clocks(
+    telemetry: &Telemetry,
+    drones: &BTreeSet<DroneId>,
+    most_apart_s: f64,
+    now: Micros,
+) -> ClockSpread {
+    let list =
+        |drones: &[DroneId]| drones.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let mut known = Vec::new();
+    let mut unknown = Vec::new();
+    let mut rate = 1.0_f64;
+    for drone in drones {
+        let clock = telemetry.get(*drone).map(|of| &of.clock);
+        let fresh = clock.filter(|clock| clock.age(now).is_some_and(|age| age <= 2 * SILENT_AFTER));
+        match fresh.and_then(|clock| Some((clock.gps_ms(now)?, clock.rate()))) {
+            Some((gps_ms, of)) => {
+                known.push((gps_ms, *drone));
+                rate = rate.max(of);
+            }
+            None => unknown.push(*drone),
+        }
+    }
+    if !unknown.is_empty() {
+        let text = format!(
+            "the GPS time of drones {} is not known: wait for their GPS, or switch them off",
+            list(&unknown)
+        );
+        return ClockSpread::Apart { text, drones: unknown };
+    }
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (Some(first), Some(last)) = (known.first(), known.last()) else {
+        return ClockSpread::Apart { text: StartRefusal::NoDrones.to_string(), drones: vec![] };
+    };
+    let middle = known[known.len() / 2].0;
+    if last.0 - first.0 <= most_apart_s * 1000.0 {
+        return ClockSpread::Agree { gps_ms: middle, rate };
+    }
+    let off: Vec<DroneId> = known
+        .iter()
+        .filter(|(gps_ms, _)| (gps_ms - middle).abs() > most_apart_s * 500.0)
+        .map(|(_, drone)| *drone)
+        .collect();
+    let text = format!(
+        "the clocks differ by {:.1} s (drones {}), {most_apart_s} s are allowed: they would not \
+         start together; restart these drones",
+        (last.0 - first.0) / 1000.0,
+        list(&off)
+    );
+    ClockSpread::Apart { text, drones: off }
+}
+
+/// What a drone's status says of its start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Readback {
+    /// Nothing fresh is heard of it.
+    Silent,
+    /// It has no start time.
+    NoTime,
+    /// It has another start time: GPS second of week.
+    OtherTime(i32),
+    /// It has the time, and is not authorized.
+    Set,
+    /// It has the time and is authorized.
+    Authorized,
+}
+
+impl std::fmt::Display for Readback {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Silent => f.write_str("not heard"),
+            Self::NoTime => f.write_str("no start time"),
+            Self::OtherTime(tow) => write!(f, "start time {tow}"),
+            Self::Set => f.write_str("not authorized"),
+            Self::Authorized => f.write_str("authorized"),
+        }
+    }
+}
+
+/// What is broadcast at present.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// The time, without authorization.
+    Announced,
+    /// Time and authorization.
+    Authorized,
+    /// Neither.
+    Cancelled,
+}
+
+/// A start: says what to broadcast and when, and who has taken it.
+#[derive(Clone, Debug)]
+pub struct Start {
+    drones: BTreeSet<DroneId>,
+    start_gps_ms: i64,
+    options: StartOptions,
+    phase: Phase,
+    next: Micros,
+}
+
+impl Start {
+    /// Sets a start so many seconds ahead. Nothing is authorized by it.
+    pub fn announce(
+        drones: BTreeSet<DroneId>,
+        telemetry: &Telemetry,
+        options: StartOptions,
+        now: Micros,
+    ) -> Result<Self, StartRefusal> {
+        if drones.is_empty() {
+            return Err(StartRefusal::NoDrones);
+        }
+        if !(LEAST_LEAD_S..=MOST_LEAD_S).contains(&options.lead_s) {
+            return Err(StartRefusal::Lead { lead_s: options.lead_s });
+        }
+        match clocks(telemetry, &drones, options.clock_spread_s, now) {
+            ClockSpread::Apart { text, .. } => Err(StartRefusal::Clocks { text }),
+            ClockSpread::Agree { gps_ms, .. } => {
+                let second = ((gps_ms / 1000.0) + options.lead_s).ceil() as i64;
+                let start_gps_ms = second * 1000;
+                Ok(Self { drones, start_gps_ms, options, phase: Phase::Announced, next: 0 })
+            }
+        }
+    }
+
+    /// Show time 0.
+    pub fn time(&self) -> Option<GpsTime> {
+        GpsTime::from_total_ms(self.start_gps_ms)
+    }
+
+    /// The same as the firmware has it: GPS second of week.
+    pub fn second_of_week(&self) -> i32 {
+        (self.start_gps_ms / 1000).rem_euclid(i64::from(WEEK_S)) as i32
+    }
+
+    /// The drones that are to start.
+    pub fn drones(&self) -> &BTreeSet<DroneId> {
+        &self.drones
+    }
+
+    /// What is broadcast at present.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Time left to the start by the vehicles' clocks, s (negative after it); `None`: no clock.
+    pub fn left_s(&self, telemetry: &Telemetry, now: Micros) -> Option<f64> {
+        self.gps_ms(telemetry, now).map(|gps_ms| (self.start_gps_ms as f64 - gps_ms) / 1000.0)
+    }
+
+    fn gps_ms(&self, telemetry: &Telemetry, now: Micros) -> Option<f64> {
+        let clock = |drone: &DroneId| telemetry.get(*drone)?.clock.gps_ms(now);
+        let mut times: Vec<f64> = self.drones.iter().filter_map(clock).collect();
+        times.sort_by(f64::total_cmp);
+        times.get(times.len() / 2).copied()
+    }
+
+    fn rate(&self, telemetry: &Telemetry) -> f64 {
+        let rate = |drone: &DroneId| telemetry.get(*drone).map_or(1.0, |of| of.clock.rate());
+        self.drones.iter().map(rate).fold(1.0, f64::max)
+    }
+
+    /// What each drone says of its start, by status packets that are fresh.
+    pub fn readback(&self, telemetry: &Telemetry, now: Micros) -> BTreeMap<DroneId, Readback> {
+        let of = |drone: &DroneId| {
+            let status = telemetry.get(*drone).and_then(|known| known.status);
+            let fresh = status.filter(|(at, _)| now.saturating_sub(*at) <= SILENT_AFTER);
+            match fresh {
+                None => Readback::Silent,
+                Some((_, status)) if status.start_tow_s < 0 => Readback::NoTime,
+                Some((_, status)) if status.start_tow_s != self.second_of_week() => {
+                    Readback::OtherTime(status.start_tow_s)
+                }
+                Some((_, status)) if status.has(flag::AUTHORIZED) => Readback::Authorized,
+                Some(_) => Readback::Set,
+            }
+        };
+        self.drones.iter().map(|drone| (*drone, of(drone))).collect()
+    }
+
+    /// Drones that have not taken what is broadcast.
+    pub fn late(&self, telemetry: &Telemetry, now: Micros) -> Vec<(DroneId, Readback)> {
+        let taken = |readback| match self.phase {
+            Phase::Announced => matches!(readback, Readback::Set | Readback::Authorized),
+            Phase::Authorized => readback == Readback::Authorized,
+            Phase::Cancelled => readback == Readback::NoTime,
+        };
+        let all = self.readback(telemetry, now).into_iter();
+        all.filter(|(_, readback)| !taken(*readback)).collect()
+    }
+
+    /// Authorizes the start: the second step, on a person's word. Every drone must have the start
+    /// time by then, and there must be time left.
+    pub fn authorize(&mut self, telemetry: &Telemetry, now: Micros) -> Result<(), StartRefusal> {
+        let needed_s = self.options.authorize_before_s;
+        let left_s = self.left_s(telemetry, now).unwrap_or(0.0);
+        if left_s < needed_s || self.phase == Phase::Cancelled {
+            return Err(StartRefusal::TooLate { left_s, needed_s });
+        }
+        let late = self.late(telemetry, now);
+        if !late.is_empty() {
+            return Err(StartRefusal::Late { late });
+        }
+        self.phase = Phase::Authorized;
+        self.next = now;
+        Ok(())
+    }
+
+    /// Takes time and authorization back. Goes on being broadcast until [`Start::late`] is empty.
+    pub fn cancel(&mut self, now: Micros) {
+        self.phase = Phase::Cancelled;
+        self.next = now;
+    }
+
+    /// What is broadcast in this phase.
+    pub fn packet(&self) -> MavMessage {
+        let start_tow_s = self.second_of_week();
+        start_packet(&match self.phase {
+            Phase::Announced => {
+                StartConfig { start_tow_s, authorization: 0, countdown_ms: LEAVE_TIME }
+            }
+            Phase::Authorized => {
+                StartConfig { start_tow_s, authorization: 1, countdown_ms: LEAVE_TIME }
+            }
+            Phase::Cancelled => {
+                StartConfig { start_tow_s: CLEAR_TIME, authorization: 0, countdown_ms: CLEAR_TIME }
+            }
+        })
+    }
+
+    /// The packet to broadcast if it is due, once a second of the vehicles' time; never after the
+    /// start, when a start time would be taken for next week's.
+    pub fn due(&mut self, telemetry: &Telemetry, now: Micros) -> Option<MavMessage> {
+        let over = self.left_s(telemetry, now).is_some_and(|left_s| left_s <= 0.0);
+        if now < self.next || (over && self.phase != Phase::Cancelled) {
+            return None;
+        }
+        self.next = now + (S as f64 / self.rate(telemetry).max(1.0)) as Micros;
+        Some(self.packet())
+    }
+
+    /// When [`Start::due`] wants to be asked again.
+    pub fn next(&self) -> Micros {
+        self.next
+    }
+}

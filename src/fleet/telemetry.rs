@@ -1,0 +1,347 @@
+//! What is known of each vehicle, from what it says unasked.
+//!
+//! Memory is bounded: the last value of everything, and the last few texts.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::messages::chars;
+use super::vehicle_clock::VehicleClock;
+use crate::base::frame::Geodetic;
+use crate::link::clock::{Micros, S};
+use crate::link::drive::Watch;
+use crate::link::frame::{MavMessage, dialect};
+use crate::link::id::DroneId;
+use crate::link::net::Received;
+use crate::protocol::show::{CAPABILITY, FROM_DRONE, Status};
+
+/// Texts kept per vehicle.
+pub const TEXTS: usize = 16;
+/// Longest text, characters: those of several pieces end here.
+const TEXT: usize = 250;
+/// Positions that the link's quality is taken from.
+const BEATS: usize = 20;
+
+/// Which firmware a vehicle has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Version {
+    /// Whether it is the show firmware.
+    pub show: bool,
+    /// Major, minor, patch.
+    pub number: [u8; 3],
+}
+
+impl std::fmt::Display for Version {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [major, minor, patch] = self.number;
+        let kind = if self.show { "show" } else { "stock" };
+        write!(f, "{kind} {major}.{minor}.{patch}")
+    }
+}
+
+/// Where a vehicle is and how it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Position {
+    /// Its place.
+    pub place: Geodetic,
+    /// Above home, m.
+    pub above_home_m: f64,
+    /// Velocity north, east, up, m/s.
+    pub neu_mps: [f64; 3],
+    /// Heading, degrees clockwise from north, if known.
+    pub heading_deg: Option<f64>,
+}
+
+/// GPS receiver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gps {
+    /// Fix type: 3 is 3-D, 4 differential, 5 and 6 RTK.
+    pub fix: u8,
+    /// Satellites.
+    pub satellites: u8,
+    /// Horizontal accuracy, m, if known.
+    pub h_acc_m: Option<f64>,
+}
+
+/// Battery and health.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Health {
+    /// Whether all arming checks pass; `None`: the firmware does not say.
+    pub prearm_ok: Option<bool>,
+    /// Battery, V, if measured.
+    pub battery_v: Option<f64>,
+    /// Charge left, %, if known.
+    pub battery_percent: Option<u8>,
+}
+
+/// What a vehicle said in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Text {
+    /// When its last piece came.
+    pub at: Micros,
+    /// 0 emergency ... 3 error, 4 warning, 6 info.
+    pub severity: u8,
+    /// The words.
+    pub text: String,
+    id: u16,
+}
+
+/// A value and when it came.
+pub type Heard<T> = Option<(Micros, T)>;
+
+/// What is known of one vehicle.
+#[derive(Clone, Debug, Default)]
+pub struct Drone {
+    /// When anything came last.
+    pub heard: Micros,
+    /// Flight mode, from the heartbeat.
+    pub mode: Heard<u32>,
+    /// Whether the motors may run, from the heartbeat.
+    pub armed: Heard<bool>,
+    /// The show firmware's status packet.
+    pub status: Heard<Status>,
+    /// Where it is.
+    pub position: Heard<Position>,
+    /// GPS receiver.
+    pub gps: Heard<Gps>,
+    /// Battery and health.
+    pub health: Heard<Health>,
+    /// Its clock.
+    pub clock: VehicleClock,
+    /// Which firmware.
+    pub version: Option<Version>,
+    /// What it said, oldest first.
+    pub texts: VecDeque<Text>,
+    /// Texts ever said; larger than `texts` once some are forgotten.
+    pub texts_said: u64,
+    beats: VecDeque<u32>,
+}
+
+impl Drone {
+    /// Whether it flies the show firmware; `None`: not known yet.
+    pub fn has_show_firmware(&self) -> Option<bool> {
+        if self.status.is_some() {
+            return Some(true);
+        }
+        self.version.map(|version| version.show)
+    }
+
+    /// Whether the motors may run; `None`: no heartbeat yet.
+    pub fn is_armed(&self) -> Option<bool> {
+        self.armed.map(|(_, armed)| armed)
+    }
+
+    /// Share of its regular messages that arrive, by the vehicle's own clock in them; `None`:
+    /// too few to tell.
+    pub fn link_quality(&self) -> Option<f64> {
+        let gaps: Vec<u32> = self.beats.iter().zip(self.beats.iter().skip(1)).map(gap).collect();
+        if gaps.len() < 5 {
+            return None;
+        }
+        // The usual gap is the smallest; a repeated or reordered one is not in the list.
+        let usual = gaps.iter().copied().min().unwrap_or(0).max(1);
+        let span: u64 = gaps.iter().copied().map(u64::from).sum();
+        let sent = (span as f64 / f64::from(usual)).round().max(1.0);
+        Some((gaps.len() as f64 / sent).min(1.0))
+    }
+
+    /// The newest text that says why arming is refused, without its prefix.
+    pub fn prearm_reason(&self) -> Option<&str> {
+        let said = |text: &'_ Text| text.text.starts_with("PreArm: ");
+        let text = self.texts.iter().rev().find(|text| said(text))?;
+        text.text.strip_prefix("PreArm: ")
+    }
+
+    /// Takes a message of it.
+    pub fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        self.heard = now;
+        match message {
+            MavMessage::HEARTBEAT(beat) => {
+                self.mode = Some((now, beat.custom_mode));
+                let armed = dialect::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
+                self.armed = Some((now, beat.base_mode.contains(armed)));
+            }
+            MavMessage::DATA16(data) if data.mavtype == FROM_DRONE => {
+                let length = usize::from(data.len).min(data.data.len());
+                self.status = Some((now, Status::from_data(&data.data[..length])));
+            }
+            MavMessage::GLOBAL_POSITION_INT(at) => {
+                self.beat(at.time_boot_ms);
+                self.position = Some((now, position(at)));
+            }
+            MavMessage::GPS_RAW_INT(gps) => {
+                let h_acc_m = (gps.h_acc > 0).then(|| f64::from(gps.h_acc) / 1000.0);
+                let (fix, satellites) = (gps.fix_type as u8, gps.satellites_visible);
+                self.gps = Some((now, Gps { fix, satellites, h_acc_m }));
+            }
+            MavMessage::SYS_STATUS(status) => self.health = Some((now, health(status))),
+            MavMessage::SYSTEM_TIME(time) => self.clock.read(now, time.time_unix_usec),
+            MavMessage::STATUSTEXT(text) => self.text(now, text),
+            MavMessage::AUTOPILOT_VERSION(version) => {
+                let [_, patch, minor, major] = version.flight_sw_version.to_le_bytes();
+                let show = version.capabilities.bits() & CAPABILITY != 0;
+                self.version = Some(Version { show, number: [major, minor, patch] });
+            }
+            _ => {}
+        }
+    }
+
+    fn beat(&mut self, boot_ms: u32) {
+        match self.beats.back() {
+            // Reordered or repeated; after a restart the clock begins anew.
+            Some(last) if boot_ms <= *last && last - boot_ms < 10_000 => return,
+            Some(last) if boot_ms <= *last => self.beats.clear(),
+            _ => {}
+        }
+        self.beats.push_back(boot_ms);
+        if self.beats.len() > BEATS {
+            self.beats.pop_front();
+        }
+    }
+
+    fn text(&mut self, now: Micros, text: &dialect::STATUSTEXT_DATA) {
+        let words = chars(&text.text[..]);
+        if text.id != 0
+            && text.chunk_seq > 0
+            && let Some(last) = self.texts.back_mut()
+            && last.id == text.id
+        {
+            last.at = now;
+            last.text.extend(words.chars());
+            last.text = last.text.chars().take(TEXT).collect();
+            return;
+        }
+        self.texts_said += 1;
+        let severity = text.severity as u8;
+        self.texts.push_back(Text { at: now, severity, text: words, id: text.id });
+        if self.texts.len() > TEXTS {
+            self.texts.pop_front();
+        }
+    }
+}
+
+fn gap((earlier, later): (&u32, &u32)) -> u32 {
+    later - earlier
+}
+
+fn position(at: &dialect::GLOBAL_POSITION_INT_DATA) -> Position {
+    let mps = |cm: i16| f64::from(cm) / 100.0;
+    Position {
+        place: Geodetic {
+            lat_deg: f64::from(at.lat) / 1e7,
+            lon_deg: f64::from(at.lon) / 1e7,
+            amsl_m: f64::from(at.alt) / 1000.0,
+        },
+        above_home_m: f64::from(at.relative_alt) / 1000.0,
+        neu_mps: [mps(at.vx), mps(at.vy), -mps(at.vz)],
+        heading_deg: (at.hdg != u16::MAX).then(|| f64::from(at.hdg) / 100.0),
+    }
+}
+
+fn health(status: &dialect::SYS_STATUS_DATA) -> Health {
+    let prearm = dialect::MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK;
+    let known = status.onboard_control_sensors_enabled.contains(prearm);
+    let volts = f64::from(status.voltage_battery) / 1000.0;
+    Health {
+        prearm_ok: known.then(|| status.onboard_control_sensors_health.contains(prearm)),
+        battery_v: (status.voltage_battery != u16::MAX).then_some(volts),
+        battery_percent: u8::try_from(status.battery_remaining).ok().filter(|left| *left <= 100),
+    }
+}
+
+/// What is known of all vehicles.
+#[derive(Clone, Debug, Default)]
+pub struct Telemetry {
+    /// By vehicle; those heard at least once.
+    pub drones: BTreeMap<DroneId, Drone>,
+}
+
+/// After so long without anything a drone counts as silent.
+pub const SILENT_AFTER: Micros = 5 * S;
+
+impl Telemetry {
+    /// One vehicle, if it was ever heard.
+    pub fn get(&self, drone: DroneId) -> Option<&Drone> {
+        self.drones.get(&drone)
+    }
+}
+
+impl Watch for Telemetry {
+    fn on_message(&mut self, now: Micros, received: &Received) {
+        self.drones.entry(received.from).or_default().on_message(now, &received.message);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(id: u16, chunk_seq: u8, text: &str) -> MavMessage {
+        MavMessage::STATUSTEXT(dialect::STATUSTEXT_DATA {
+            text: text.into(),
+            id,
+            chunk_seq,
+            ..Default::default()
+        })
+    }
+
+    #[test]
+    fn texts_are_joined_and_the_oldest_forgotten() {
+        let mut drone = Drone::default();
+        drone.on_message(1, &said(3, 0, "PreArm: Need "));
+        drone.on_message(2, &said(3, 1, "Position Estimate"));
+        assert_eq!(drone.prearm_reason(), Some("Need Position Estimate"));
+        for number in 0..100 {
+            drone.on_message(3, &said(0, 0, &number.to_string()));
+        }
+        assert_eq!((drone.texts.len(), drone.texts_said), (TEXTS, 101));
+        for seq in 1..=255 {
+            drone.on_message(4, &said(9, seq, &"x".repeat(50)));
+        }
+        assert_eq!(drone.texts.back().unwrap().text.len(), TEXT);
+    }
+
+    #[test]
+    fn quality_is_the_share_that_arrives_at_any_rate_of_time() {
+        let mut drone = Drone::default();
+        for number in 0..40_u32 {
+            // Every fourth one is lost, some come twice.
+            if number % 4 != 3 {
+                let beat = dialect::GLOBAL_POSITION_INT_DATA {
+                    time_boot_ms: 500 * number,
+                    ..Default::default()
+                };
+                drone.on_message(u64::from(number), &MavMessage::GLOBAL_POSITION_INT(beat.clone()));
+                drone.on_message(u64::from(number), &MavMessage::GLOBAL_POSITION_INT(beat));
+            }
+        }
+        let quality = drone.link_quality().unwrap();
+        assert!((quality - 0.75).abs() < 0.05, "{quality}");
+    }
+
+    #[test]
+    fn the_firmware_is_known_from_its_version_or_its_status() {
+        let mut drone = Drone::default();
+        assert_eq!(drone.has_show_firmware(), None);
+        let mut version = dialect::AUTOPILOT_VERSION_DATA {
+            flight_sw_version: u32::from_be_bytes([4, 6, 1, 255]),
+            ..Default::default()
+        };
+        drone.on_message(1, &MavMessage::AUTOPILOT_VERSION(version.clone()));
+        assert_eq!(drone.version.unwrap().to_string(), "stock 4.6.1");
+        assert_eq!(drone.has_show_firmware(), Some(false));
+        version.capabilities = dialect::MavProtocolCapability::from_bits_retain(CAPABILITY);
+        drone.on_message(1, &MavMessage::AUTOPILOT_VERSION(version));
+        assert_eq!(drone.version.unwrap().to_string(), "show 4.6.1");
+    }
+
+    #[test]
+    fn up_is_positive() {
+        let mut drone = Drone::default();
+        let at =
+            dialect::GLOBAL_POSITION_INT_DATA { vz: -150, hdg: u16::MAX, ..Default::default() };
+        drone.on_message(1, &MavMessage::GLOBAL_POSITION_INT(at));
+        let (_, position) = drone.position.unwrap();
+        assert_eq!(position.neu_mps, [0.0, 0.0, 1.5]);
+        assert_eq!(position.heading_deg, None);
+    }
+}

@@ -1,0 +1,479 @@
+//! Loads a show onto a vehicle: file, origin, fence, reload, and a look at what it says then.
+//!
+//! It ends with a show that is loaded whole, or with a refusal that says why and a vehicle whose
+//! show is cleared. A vehicle that is armed or authorized is not touched.
+
+use super::command::{Command, CommandError};
+use super::fence::{Fence, FenceError, PutFence, degrees_1e7};
+use super::ftp::{Caller, FtpError};
+use super::messages::{command_int, command_long, set_mode};
+use super::put_file::PutFile;
+use crate::link::clock::{Micros, S};
+use crate::link::drive::{Machine, Progress, Step};
+use crate::link::frame::{MavMessage, dialect};
+use crate::link::id::DroneId;
+use crate::mission::plan::Site;
+use crate::protocol::show::{FROM_DRONE, NO_AMSL_MM, SHOW_FILE, SHOW_MODE, Stage, Status, flag};
+use dialect::{MavCmd, MavModeFlag, MavResult};
+
+/// A vehicle boots within this, and says so.
+const BOOT_WITHIN: Micros = 60 * S;
+/// A vehicle that is in no show mode for so long is told to enter it.
+const ENTER_AFTER: Micros = 3 * S;
+/// Status packets so soon after an answer may have been sent before it.
+const SETTLE: Micros = S;
+/// The status says what is loaded within this.
+const STATUS_WITHIN: Micros = 15 * S;
+/// So many status packets in a row must say that all is well.
+const AGREEING: u32 = 2;
+/// Clearing is repeated so often.
+const CLEAR_TRIES: u32 = 20;
+
+/// What is loaded onto a vehicle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Load {
+    /// The `.skyb` file of its slot.
+    pub skyb: Vec<u8>,
+    /// Where the show is.
+    pub site: Site,
+    /// The fence around it.
+    pub fence: Fence,
+}
+
+/// Why a show is not on a vehicle.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UploadError {
+    /// Nothing was heard.
+    #[error("nothing is heard of the drone: is it on, and does the radio reach it?")]
+    Silent,
+    /// It says nothing of a show.
+    #[error(
+        "the drone sends no show status: its firmware has no show mode; fly it in guided mode, or \
+         install the show firmware"
+    )]
+    NotShowFirmware,
+    /// Its motors may run.
+    #[error("the drone is armed: it is not touched; disarm it first")]
+    Armed,
+    /// It may take off any time.
+    #[error("the drone's start is authorized: it is not touched; cancel the start first")]
+    Authorized,
+    /// It does not get to where it waits for a start.
+    #[error("the drone does not enter show mode (stage {stage}): restart it")]
+    NotReady {
+        /// The stage it is in.
+        stage: Stage,
+    },
+    /// Show mode was refused.
+    #[error("the drone does not enter show mode")]
+    Mode(#[source] CommandError),
+    /// The file.
+    #[error("the show file is not on the drone")]
+    File(#[source] FtpError),
+    /// The origin.
+    #[error("the show's origin is not set")]
+    Origin(#[source] CommandError),
+    /// The fence.
+    #[error("the fence is not on the drone")]
+    Fence(#[source] FenceError),
+    /// It does not load the file.
+    #[error(
+        "the drone does not load the show: the file or what its firmware derives from it is not \
+         accepted; look at `updraft check`, and at the drone's messages"
+    )]
+    Reload(#[source] CommandError),
+    /// It says that it has no show after having loaded it.
+    #[error(
+        "the drone says that it has no show, or no valid take-off time, after loading it: look at \
+         `updraft check`; a file that is missing on board looks like this, too"
+    )]
+    NotLoaded,
+    /// It says that the origin is not set.
+    #[error("the drone says that its origin is not set: try again")]
+    NoOrigin,
+    /// It says that the orientation is not set.
+    #[error("the drone says that its orientation is not set: try again")]
+    NoOrientation,
+    /// It says that the fence is off.
+    #[error("the drone says that its fence is off: look at its FENCE parameters and try again")]
+    FenceOff,
+    /// It says nothing more.
+    #[error("the drone sends no status after loading the show: bring it nearer and try again")]
+    NoStatus,
+}
+
+/// What became of the show on a vehicle after a refusal.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Left {
+    /// Nothing was changed.
+    Untouched,
+    /// No show is loaded.
+    Cleared,
+    /// Nobody knows: clearing was not confirmed.
+    Unknown,
+}
+
+/// A refusal, and what is on the vehicle now.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refused {
+    /// Why.
+    pub why: UploadError,
+    /// What is on the vehicle.
+    pub left: Left,
+}
+
+impl std::fmt::Display for Refused {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.why)?;
+        let mut source = std::error::Error::source(&self.why);
+        while let Some(error) = source {
+            write!(f, ": {error}")?;
+            source = error.source();
+        }
+        f.write_str(match self.left {
+            Left::Untouched => " (nothing was changed on the drone)",
+            Left::Cleared => " (the show on the drone was cleared)",
+            Left::Unknown => {
+                " (AN OLD SHOW MAY STILL BE LOADED: clearing it was not confirmed; switch the \
+                 drone off)"
+            }
+        })
+    }
+}
+
+impl std::error::Error for Refused {}
+
+/// A show that is loaded whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Loaded {
+    /// Whether the file had to be written; it was there already otherwise.
+    pub written: bool,
+}
+
+#[derive(Debug)]
+enum Phase {
+    Wait,
+    Mode(Command),
+    File(PutFile),
+    Origin(Command),
+    Fence(Box<PutFence>),
+    Reload(Command),
+    Flags { since: Micros, agreeing: u32, last: Option<Status> },
+    Clear(Clear, UploadError),
+}
+
+/// Loads a show onto one vehicle.
+#[derive(Debug)]
+pub struct Upload {
+    drone: DroneId,
+    load: Load,
+    numbers: u32,
+    phase: Phase,
+    started: Option<Micros>,
+    off_since: Option<Micros>,
+    entered: bool,
+    heard: bool,
+    armed: Option<bool>,
+    status: Option<Status>,
+    written: bool,
+    step: u64,
+}
+
+/// Steps in [`Upload::progress`].
+const STEPS: u64 = 6;
+
+impl Upload {
+    /// Loads this onto a vehicle. `numbers` should differ from run to run (see
+    /// [`Caller::new`]).
+    pub fn new(drone: DroneId, load: Load, numbers: u32) -> Self {
+        Self {
+            drone,
+            load,
+            numbers,
+            phase: Phase::Wait,
+            started: None,
+            off_since: None,
+            entered: false,
+            heard: false,
+            armed: None,
+            status: None,
+            written: false,
+            step: 0,
+        }
+    }
+
+    fn origin(&self) -> Command {
+        let site = &self.load.site;
+        let place =
+            (degrees_1e7(site.origin_lat_deg), degrees_1e7(site.origin_lon_deg), NO_AMSL_MM as f32);
+        let params = [0.0, 0.0, 0.0, site.orientation_deg.rem_euclid(360.0) as f32];
+        let message = command_int(self.drone, MavCmd::MAV_CMD_USER_2, params, place);
+        Command::new("set the show's origin", message)
+    }
+
+    /// What keeps the vehicle from being touched at all.
+    fn untouchable(&self) -> Option<UploadError> {
+        let authorized = self.status.is_some_and(|status| status.has(flag::AUTHORIZED));
+        match self.armed {
+            Some(true) => Some(UploadError::Armed),
+            _ if authorized => Some(UploadError::Authorized),
+            _ => None,
+        }
+    }
+
+    /// Waits for the stage from which shows start.
+    fn wait(&mut self, now: Micros) -> Option<Step<Result<Loaded, Refused>>> {
+        let started = *self.started.get_or_insert(now);
+        let refuse = |why| Some(Step::Done(Err(Refused { why, left: Left::Untouched })));
+        if let Some(why) = self.untouchable() {
+            return refuse(why);
+        }
+        let ready = self
+            .status
+            .is_some_and(|status| matches!(status.stage, Stage::WaitForStart | Stage::Landed));
+        if ready && self.armed == Some(false) {
+            let skyb = std::mem::take(&mut self.load.skyb);
+            // Numbers of an earlier session must not come again.
+            let caller = Caller::new(self.drone, self.numbers.wrapping_add(now as u32));
+            self.phase = Phase::File(PutFile::new(caller, SHOW_FILE, skyb));
+            self.step = 1;
+            return None;
+        }
+        let is_off = self.status.is_some_and(|status| status.stage == Stage::Off);
+        let off_since = is_off.then(|| *self.off_since.get_or_insert(now));
+        self.off_since = off_since;
+        let ripe = off_since.is_some_and(|since| now >= since + ENTER_AFTER);
+        if ripe && !self.entered && self.armed == Some(false) {
+            self.entered = true;
+            let message = set_mode(self.drone, SHOW_MODE, 0);
+            self.phase = Phase::Mode(Command::new("enter show mode", message));
+            return None;
+        }
+        let until = started + BOOT_WITHIN;
+        if now >= until {
+            return match self.status {
+                Some(status) => {
+                    // Whatever was on it before must not be flown by mistake.
+                    self.fail(UploadError::NotReady { stage: status.stage });
+                    None
+                }
+                None if self.heard => refuse(UploadError::NotShowFirmware),
+                None => refuse(UploadError::Silent),
+            };
+        }
+        let again = off_since.filter(|_| !self.entered).map_or(until, |since| since + ENTER_AFTER);
+        Some(Step::Wait(again.clamp(now, until)))
+    }
+
+    fn fail(&mut self, why: UploadError) {
+        self.phase = Phase::Clear(Clear::new(self.drone), why);
+    }
+
+    /// What the status packets after loading say.
+    fn flags(&mut self, now: Micros) -> Option<Step<Result<Loaded, Refused>>> {
+        let Phase::Flags { since, agreeing, last } = &self.phase else { return None };
+        if *agreeing >= AGREEING {
+            self.step = STEPS;
+            return Some(Step::Done(Ok(Loaded { written: self.written })));
+        }
+        let until = *since + STATUS_WITHIN;
+        if now < until {
+            return Some(Step::Wait(until));
+        }
+        let why = last.map_or(UploadError::NoStatus, |status| {
+            missing(&status).unwrap_or(UploadError::NoStatus)
+        });
+        self.fail(why);
+        None
+    }
+}
+
+/// The first thing that is missing on a vehicle, by its status.
+fn missing(status: &Status) -> Option<UploadError> {
+    [
+        (flag::LOADED, UploadError::NotLoaded),
+        (flag::ORIGIN_SET, UploadError::NoOrigin),
+        (flag::ORIENTATION_SET, UploadError::NoOrientation),
+        (flag::FENCE_ON, UploadError::FenceOff),
+    ]
+    .into_iter()
+    .find(|(flag, _)| !status.has(*flag))
+    .map(|(_, error)| error)
+}
+
+fn reload(drone: DroneId) -> Command {
+    let message = command_long(drone, MavCmd::MAV_CMD_USER_1, [0.0; 7], 0);
+    Command::new("load the show", message)
+}
+
+impl Machine for Upload {
+    type Done = Result<Loaded, Refused>;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        self.heard = true;
+        match message {
+            MavMessage::HEARTBEAT(beat) => {
+                let armed = MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
+                self.armed = Some(beat.base_mode.contains(armed));
+            }
+            MavMessage::DATA16(data) if data.mavtype == FROM_DRONE => {
+                let length = usize::from(data.len).min(data.data.len());
+                let status = Status::from_data(&data.data[..length]);
+                self.status = Some(status);
+                if let Phase::Flags { since, agreeing, last } = &mut self.phase
+                    && now >= *since + SETTLE
+                {
+                    *last = Some(status);
+                    *agreeing = if missing(&status).is_none() { *agreeing + 1 } else { 0 };
+                }
+            }
+            _ => {}
+        }
+        match &mut self.phase {
+            Phase::Mode(part) | Phase::Origin(part) | Phase::Reload(part) => {
+                part.on_message(now, message);
+            }
+            Phase::File(part) => part.on_message(now, message),
+            Phase::Fence(part) => part.on_message(now, message),
+            Phase::Clear(part, _) => part.on_message(now, message),
+            Phase::Wait | Phase::Flags { .. } => {}
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        // Runs a part; what it ends with decides how it goes on.
+        macro_rules! part {
+            ($part:expr) => {
+                match $part.poll(now) {
+                    Step::Send(message) => return Step::Send(message),
+                    Step::Wait(until) => return Step::Wait(until),
+                    Step::Done(done) => done,
+                }
+            };
+        }
+        loop {
+            match &mut self.phase {
+                Phase::Wait => {
+                    if let Some(step) = self.wait(now) {
+                        return step;
+                    }
+                }
+                Phase::Mode(part) => {
+                    if let Err(error) = part!(part) {
+                        self.fail(UploadError::Mode(error));
+                    } else {
+                        self.phase = Phase::Wait;
+                    }
+                }
+                Phase::File(part) => match part!(part) {
+                    Ok(written) => {
+                        self.written = written;
+                        self.step = 2;
+                        self.phase = Phase::Origin(self.origin());
+                    }
+                    Err(error) => self.fail(UploadError::File(error)),
+                },
+                Phase::Origin(part) => match part!(part) {
+                    Ok(()) => {
+                        self.step = 3;
+                        let put = PutFence::new(self.drone, self.load.fence.clone());
+                        self.phase = Phase::Fence(Box::new(put));
+                    }
+                    Err(error) => self.fail(UploadError::Origin(error)),
+                },
+                Phase::Fence(part) => match part!(part) {
+                    Ok(()) => {
+                        self.step = 4;
+                        self.phase = Phase::Reload(reload(self.drone));
+                    }
+                    Err(error) => self.fail(UploadError::Fence(error)),
+                },
+                Phase::Reload(part) => match part!(part) {
+                    Ok(()) => {
+                        self.step = 5;
+                        self.phase = Phase::Flags { since: now, agreeing: 0, last: None };
+                    }
+                    Err(error) => self.fail(UploadError::Reload(error)),
+                },
+                Phase::Flags { .. } => {
+                    if let Some(step) = self.flags(now) {
+                        return step;
+                    }
+                }
+                Phase::Clear(part, why) => {
+                    let why = why.clone();
+                    let left = if part!(part).is_ok() { Left::Cleared } else { Left::Unknown };
+                    return Step::Done(Err(Refused { why, left }));
+                }
+            }
+        }
+    }
+
+    fn progress(&self) -> Progress {
+        Progress { done: self.step, total: STEPS }
+    }
+}
+
+/// A show that could not be cleared.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "clearing the show was not confirmed: switch the drone off, or bring it nearer and try again"
+)]
+pub struct NotCleared;
+
+/// Clears the show of a vehicle, until its status says that none is loaded.
+#[derive(Clone, Debug)]
+pub struct Clear {
+    drone: DroneId,
+    tries: u32,
+    next: Micros,
+    accepted: Option<Micros>,
+    cleared: bool,
+}
+
+impl Clear {
+    /// Clears the show of a vehicle; for those that an interrupted upload left, too.
+    pub fn new(drone: DroneId) -> Self {
+        Self { drone, tries: 0, next: 0, accepted: None, cleared: false }
+    }
+}
+
+impl Machine for Clear {
+    type Done = Result<(), NotCleared>;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        match message {
+            MavMessage::COMMAND_ACK(ack)
+                if ack.command == MavCmd::MAV_CMD_USER_1
+                    && ack.result == MavResult::MAV_RESULT_ACCEPTED
+                    && self.tries > 0 =>
+            {
+                self.accepted.get_or_insert(now);
+            }
+            // An answer to an earlier reload looks the same: the status decides.
+            MavMessage::DATA16(data) if data.mavtype == FROM_DRONE => {
+                let length = usize::from(data.len).min(data.data.len());
+                let loaded = Status::from_data(&data.data[..length]).has(flag::LOADED);
+                let settled = self.accepted.is_some_and(|at| now >= at + SETTLE);
+                self.cleared |= settled && !loaded;
+            }
+            _ => {}
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        if self.cleared {
+            return Step::Done(Ok(()));
+        }
+        if now < self.next {
+            return Step::Wait(self.next);
+        }
+        if self.tries >= CLEAR_TRIES {
+            return Step::Done(Err(NotCleared));
+        }
+        self.tries += 1;
+        self.next = now + S;
+        let params = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        Step::send(command_long(self.drone, MavCmd::MAV_CMD_USER_1, params, 0))
+    }
+}

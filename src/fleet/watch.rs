@@ -1,0 +1,404 @@
+//! Looks at a running show: where every drone is against its trajectory, and what goes wrong.
+//!
+//! A [`Monitor`] takes all messages, keeps the [`Telemetry`], and tells [`Event`]s in the order
+//! in which they become known. It does nothing on its own: aborting is a person's decision.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::messages::mode_name;
+use super::preflight::charge_needed;
+use super::slots::FleetTable;
+use super::telemetry::{Drone, Telemetry};
+use crate::base::frame::ShowFrame;
+use crate::link::clock::{MS, Micros, S};
+use crate::link::drive::Watch;
+use crate::link::id::DroneId;
+use crate::link::net::Received;
+use crate::mission::Plan;
+use crate::protocol::show::{Stage, flag};
+use crate::show::Trajectory;
+
+/// When something is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Distance from the trajectory, m.
+    pub far_m: f64,
+    /// Silence.
+    pub silent: Micros,
+    /// Charge, %; told once below the landing reserve by default of the plan.
+    pub battery_percent: f64,
+}
+
+impl Limits {
+    /// Three metres (as the firmware itself tells), three seconds, the plan's reserve.
+    pub fn of(plan: &Plan) -> Self {
+        let battery_percent = 100.0 * plan.limits.endurance_reserve;
+        Self { far_m: 3.0, silent: 3 * S, battery_percent }
+    }
+}
+
+/// What is told of one drone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum Event {
+    /// It is in another stage of the show.
+    Stage {
+        /// The firmware's number.
+        number: u8,
+        /// In words.
+        stage: String,
+    },
+    /// It is in another flight mode.
+    Mode {
+        /// Its name.
+        mode: String,
+    },
+    /// Its motors may run, or may not any more.
+    Armed {
+        /// Which.
+        armed: bool,
+    },
+    /// Nothing has been heard of it for too long.
+    Silent {
+        /// How long, s.
+        seconds: u64,
+    },
+    /// It is heard again.
+    HeardAgain,
+    /// It is far from where it should be.
+    Far {
+        /// How far, m.
+        distance_m: f64,
+        /// Show time, s.
+        show_s: f64,
+    },
+    /// It is near its trajectory again.
+    NearAgain,
+    /// Its battery is low.
+    BatteryLow {
+        /// What is left, %.
+        percent: u8,
+    },
+    /// It has left its fence.
+    FenceBreached,
+    /// It says something of weight.
+    Says {
+        /// 0 emergency ... 3 error, 4 warning.
+        severity: u8,
+        /// In its words.
+        text: String,
+    },
+}
+
+impl Event {
+    /// Whether a person must look at it at once.
+    pub fn is_alarm(&self) -> bool {
+        match self {
+            Self::Silent { .. }
+            | Self::Far { .. }
+            | Self::BatteryLow { .. }
+            | Self::FenceBreached => true,
+            Self::Says { severity, .. } => *severity <= 3,
+            Self::Stage { number, .. } => Stage::from_number(*number) == Stage::Error,
+            _ => false,
+        }
+    }
+}
+
+impl std::fmt::Display for Event {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stage { stage, .. } => f.write_str(stage),
+            Self::Mode { mode } => write!(f, "flight mode {mode}"),
+            Self::Armed { armed: true } => f.write_str("armed"),
+            Self::Armed { armed: false } => f.write_str("disarmed"),
+            Self::Silent { seconds } => write!(f, "not heard for {seconds} s"),
+            Self::HeardAgain => f.write_str("heard again"),
+            Self::Far { distance_m, show_s } => {
+                write!(f, "{distance_m:.1} m from its trajectory at {show_s:.1} s")
+            }
+            Self::NearAgain => f.write_str("near its trajectory again"),
+            Self::BatteryLow { percent } => write!(f, "battery low: {percent} %"),
+            Self::FenceBreached => f.write_str("has left its fence"),
+            Self::Says { text, .. } => write!(f, "says: {text}"),
+        }
+    }
+}
+
+/// An event and whose it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Told {
+    /// When it became known.
+    pub at: Micros,
+    /// The drone.
+    pub drone: DroneId,
+    /// What happened.
+    pub event: Event,
+}
+
+/// How one drone flies at present.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Flying {
+    /// Show time by its own clock, s.
+    pub show_s: Option<f64>,
+    /// Distance from where it should be, m; while it performs.
+    pub distance_m: Option<f64>,
+    /// Whether it has flown and is on the ground again, or never will.
+    pub over: bool,
+}
+
+struct Watched {
+    trajectory: Trajectory,
+    flying: Flying,
+    stage: Option<Stage>,
+    mode: Option<u32>,
+    armed: Option<bool>,
+    was_armed: bool,
+    silent: bool,
+    far: bool,
+    low: bool,
+    breached: bool,
+    texts: u64,
+}
+
+/// Events kept until they are taken; the oldest go first.
+const MOST_EVENTS: usize = 10_000;
+/// Drones are looked at so often.
+const LOOK: Micros = 100 * MS;
+/// Nobody takes off later than this after the time at which it should; see the firmware's window.
+const TOO_LATE_S: f64 = 30.0;
+
+/// Watches a show.
+pub struct Monitor {
+    /// What is known of every vehicle, also of those that are not watched.
+    pub telemetry: Telemetry,
+    frame: ShowFrame,
+    limits: Limits,
+    start_gps_ms: Option<i64>,
+    watched: BTreeMap<DroneId, Watched>,
+    told: VecDeque<Told>,
+    next: Micros,
+}
+
+impl Monitor {
+    /// Watches the drones of a table, each against its slot's trajectory. `telemetry`: what is
+    /// known already.
+    pub fn new(plan: &Plan, table: &FleetTable, telemetry: Telemetry, limits: Limits) -> Self {
+        let watched = table.drones.iter().filter_map(|line| {
+            let trajectory = Trajectory::of_slot(plan, plan.slot(line.slot)?);
+            let texts = telemetry.get(line.drone).map_or(0, |of| of.texts_said);
+            let watched = Watched {
+                trajectory,
+                flying: Flying::default(),
+                stage: None,
+                mode: None,
+                armed: None,
+                was_armed: false,
+                silent: false,
+                far: false,
+                low: false,
+                breached: false,
+                texts,
+            };
+            Some((line.drone, watched))
+        });
+        Self {
+            frame: plan.site.frame(),
+            limits,
+            start_gps_ms: None,
+            watched: watched.collect(),
+            told: VecDeque::new(),
+            next: 0,
+            telemetry,
+        }
+    }
+
+    /// The start: show time 0, ms since the GPS epoch; `None` takes it back.
+    pub fn set_start(&mut self, start_gps_ms: Option<i64>) {
+        self.start_gps_ms = start_gps_ms;
+    }
+
+    /// Events since the last call.
+    pub fn take_events(&mut self) -> Vec<Told> {
+        self.told.drain(..).collect()
+    }
+
+    /// How each drone flies.
+    pub fn flying(&self) -> impl Iterator<Item = (DroneId, Flying)> {
+        self.watched.iter().map(|(drone, watched)| (*drone, watched.flying))
+    }
+
+    /// Whether every drone has flown and is on the ground again, or never will take off. A drone
+    /// that is silent is waited for until it should have landed.
+    pub fn is_over(&self) -> bool {
+        self.watched.values().all(|watched| watched.flying.over)
+    }
+
+    fn look(&mut self, now: Micros) {
+        self.next = now + LOOK;
+        let Self { telemetry, watched, told, limits, frame, start_gps_ms, .. } = self;
+        for (drone, watched) in watched {
+            let Some(of) = telemetry.drones.get(drone) else { continue };
+            let mut tell = |event| {
+                if told.len() >= MOST_EVENTS {
+                    told.pop_front();
+                }
+                told.push_back(Told { at: now, drone: *drone, event });
+            };
+            watched.look(now, of, limits, frame, *start_gps_ms, &mut tell);
+        }
+    }
+}
+
+impl Watch for Monitor {
+    fn on_message(&mut self, now: Micros, received: &Received) {
+        self.telemetry.on_message(now, received);
+        if now >= self.next {
+            self.look(now);
+        }
+    }
+
+    fn stop(&mut self, now: Micros) -> bool {
+        if now >= self.next {
+            self.look(now);
+        }
+        false
+    }
+}
+
+impl Watched {
+    fn look(
+        &mut self,
+        now: Micros,
+        of: &Drone,
+        limits: &Limits,
+        frame: &ShowFrame,
+        start_gps_ms: Option<i64>,
+        tell: &mut dyn FnMut(Event),
+    ) {
+        self.states(of, tell);
+        let silence = now.saturating_sub(of.heard);
+        let silent = silence > limits.silent;
+        if silent != self.silent {
+            self.silent = silent;
+            let seconds = silence / S;
+            tell(if silent { Event::Silent { seconds } } else { Event::HeardAgain });
+        }
+        if let Some((_, health)) = of.health
+            && let Some(percent) = health.battery_percent
+            && f64::from(percent) < limits.battery_percent
+            && !self.low
+        {
+            self.low = true;
+            tell(Event::BatteryLow { percent });
+        }
+        let gps_ms = of.clock.gps_ms(now);
+        self.flying.show_s =
+            start_gps_ms.zip(gps_ms).map(|(start, gps_ms)| (gps_ms - start as f64) / 1000.0);
+        self.distance(of, limits, frame, start_gps_ms, tell);
+        self.flying.over = self.over(now, of);
+    }
+
+    fn states(&mut self, of: &Drone, tell: &mut dyn FnMut(Event)) {
+        if let Some((_, status)) = of.status {
+            if self.stage.is_some_and(|stage| stage != status.stage) {
+                let stage = status.stage.to_string();
+                tell(Event::Stage { number: status.stage.number(), stage });
+            }
+            self.stage = Some(status.stage);
+            let breached = status.has(flag::FENCE_BREACHED);
+            if breached && !self.breached {
+                tell(Event::FenceBreached);
+            }
+            self.breached = breached;
+        }
+        if let Some((_, mode)) = of.mode {
+            if self.mode.is_some_and(|old| old != mode) {
+                tell(Event::Mode { mode: mode_name(mode) });
+            }
+            self.mode = Some(mode);
+        }
+        if let Some((_, armed)) = of.armed {
+            if self.armed.is_some_and(|old| old != armed) {
+                tell(Event::Armed { armed });
+            }
+            self.armed = Some(armed);
+            self.was_armed |= armed;
+        }
+        let new = (of.texts_said - self.texts.min(of.texts_said)) as usize;
+        self.texts = of.texts_said;
+        for text in of.texts.iter().skip(of.texts.len().saturating_sub(new)) {
+            if text.severity <= 4 {
+                tell(Event::Says { severity: text.severity, text: text.text.clone() });
+            }
+        }
+    }
+
+    /// Where it is against where it should have been when it said so.
+    fn distance(
+        &mut self,
+        of: &Drone,
+        limits: &Limits,
+        frame: &ShowFrame,
+        start_gps_ms: Option<i64>,
+        tell: &mut dyn FnMut(Event),
+    ) {
+        let performing = match self.stage {
+            Some(stage) => stage == Stage::Performing,
+            // Without show mode: while it is guided.
+            None => self.armed == Some(true) && self.mode == Some(super::messages::GUIDED),
+        };
+        self.flying.distance_m = None;
+        let (Some((at, position)), Some(start)) = (of.position, start_gps_ms) else { return };
+        let Some(gps_ms) = of.clock.gps_ms(at).filter(|_| performing) else { return };
+        let show_s = (gps_ms - start as f64) / 1000.0;
+        let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
+        if show_s < 0.0 || show_s > end_s {
+            return;
+        }
+        let mut place = frame.from_geodetic(position.place);
+        // Heights are above home, wherever the vehicle believes the sea to be.
+        place.z = position.above_home_m + self.trajectory.start_m.z;
+        let wanted: Vector3<f64> = self.trajectory.state_at(show_s).position_m;
+        let distance_m = (place - wanted).norm();
+        self.flying.distance_m = Some(distance_m);
+        // A margin, so that one at the limit is not told again and again.
+        if !self.far && distance_m > limits.far_m {
+            self.far = true;
+            tell(Event::Far { distance_m, show_s });
+        } else if self.far && distance_m < 0.7 * limits.far_m {
+            self.far = false;
+            tell(Event::NearAgain);
+        }
+    }
+
+    fn over(&self, now: Micros, of: &Drone) -> bool {
+        if self.armed == Some(true) && !self.silent {
+            return false;
+        }
+        let Some(show_s) = self.flying.show_s else { return false };
+        let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
+        let _ = (now, of);
+        match self.stage {
+            _ if self.silent => show_s > end_s + 60.0,
+            _ if self.was_armed => show_s > 0.0,
+            Some(Stage::Landed | Stage::Error) => show_s > 0.0,
+            _ => show_s > TOO_LATE_S + self.wait_s(),
+        }
+    }
+
+    /// Until then a drone of a later group stands on the ground, s.
+    fn wait_s(&self) -> f64 {
+        let mut pieces = self.trajectory.pieces();
+        let first = pieces.find(|piece| piece.end_m() != self.trajectory.start_m);
+        first.map_or(0.0, |piece| piece.start_ms as f64 / 1000.0)
+    }
+}
+
+/// The landing reserve and what a flight needs, %: for tables.
+pub fn charge(plan: &Plan) -> (f64, f64) {
+    (100.0 * plan.limits.endurance_reserve, charge_needed(plan))
+}
