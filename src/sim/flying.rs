@@ -11,9 +11,7 @@ use super::autopilot::director::{Abort, Stage};
 use super::autopilot::motors::Spool;
 use super::autopilot::params as p;
 use super::error::SimError;
-use super::flight::{
-    FlightSetup, FlightSummary, STEP_S, STEP_US, armed_at_us, command, validate,
-};
+use super::flight::{FlightSetup, FlightSummary, STEP_S, STEP_US, armed_at_us, command, validate};
 use super::plant::{Motion, Plant};
 use super::recorder::{Moment, Recorder};
 use super::sensors::Sensors;
@@ -79,9 +77,8 @@ impl<'a> Flight<'a> {
         let give_up_s = end_s
             + setup.trajectory.end_m().z.max(0.0) / p::LAND_SPEED.min(p::WPNAV_SPEED_DN)
             + LANDING_PATIENCE_S;
-        let late_us = armed_s.map_or(i64::MIN, |armed_s| {
-            ((armed_s * 1e6) as i64).div_euclid(STEP_US) * STEP_US
-        });
+        let late_us = armed_s
+            .map_or(i64::MIN, |armed_s| ((armed_s * 1e6) as i64).div_euclid(STEP_US) * STEP_US);
         Ok(Self {
             setup: *setup,
             pilot,
@@ -215,6 +212,11 @@ impl<'a> Flight<'a> {
         self.pilot.director.stage
     }
 
+    /// How the show was left, if it was.
+    pub fn aborted(&self) -> Option<Abort> {
+        self.pilot.director.aborted
+    }
+
     /// True motion, show frame.
     pub fn motion(&self) -> &Motion {
         self.plant.motion()
@@ -283,8 +285,7 @@ impl Tally {
         let mut summary = self.summary;
         summary.max_error_xy_m = self.max_square_m2.sqrt();
         if self.performing_steps > 0 {
-            summary.saturated_share =
-                self.saturated_steps as f64 / self.performing_steps as f64;
+            summary.saturated_share = self.saturated_steps as f64 / self.performing_steps as f64;
         }
         summary
     }

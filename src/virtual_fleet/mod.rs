@@ -5,4 +5,9 @@
 //! fleet with a bad radio link also runs in one thread, in simulated time ([`lossy::LossyNet`]).
 
 pub mod endpoint;
+pub mod ftp_server;
+pub mod log_server;
 pub mod lossy;
+pub mod storage;
+pub mod vehicle;
+pub mod world;
