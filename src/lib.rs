@@ -31,6 +31,7 @@ pub mod campaign;
 pub mod check;
 pub mod cli;
 pub mod effects;
+pub mod fleet;
 pub mod flight;
 pub mod link;
 pub mod log;

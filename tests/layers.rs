@@ -19,10 +19,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("campaign", &["base", "vehicle", "mission", "show", "check"]),
     ("effects", &["base", "vehicle"]),
     ("sim", &["base", "vehicle", "mission", "show", "log", "effects"]),
-    (
-        "virtual_fleet",
-        &["base", "vehicle", "mission", "show", "sim", "effects", "log", "link", "protocol"],
-    ),
+    ("virtual_fleet", &["base", "vehicle", "mission", "show", "sim", "log", "link", "protocol"]),
+    ("fleet", &["base", "vehicle", "mission", "show", "log", "link", "protocol", "campaign"]),
     ("flight", &["base", "vehicle", "mission", "log"]),
     ("analysis", &["base", "vehicle", "mission", "log", "flight"]),
     ("study", &["base", "vehicle", "mission", "show", "sim", "log", "flight", "analysis"]),

@@ -5,8 +5,8 @@
 mod vehicle_support;
 
 use nalgebra::Vector3;
-use updraft::link::frame::dialect::{self, MavResult};
 use updraft::link::frame::MavMessage;
+use updraft::link::frame::dialect::{self, MavResult};
 use updraft::link::net::Net as _;
 use updraft::protocol::show::{self, Stage, flag, preflight};
 use updraft::sim::fly;

@@ -16,6 +16,7 @@ mod recorded;
 pub mod recorder;
 pub mod sensors;
 
+pub use crate::effects::Reading as BatteryReading;
 pub use air::{Atmosphere, Uniform};
 pub use error::SimError;
 pub use flight::{FlightSetup, FlightSummary, Hooks, fly, fly_to_file, fly_with, fly_without_log};

@@ -5,6 +5,7 @@
 //! fleet with a bad radio link also runs in one thread, in simulated time ([`lossy::LossyNet`]).
 
 pub mod endpoint;
+pub mod files;
 pub mod ftp_server;
 pub mod log_server;
 pub mod lossy;

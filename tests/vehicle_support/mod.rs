@@ -115,8 +115,7 @@ impl<'w> Crew<'w> {
     pub fn new(world: &'w World<'w>, count: u8, change: impl Fn(&mut VehicleSetup)) -> Self {
         let vehicles = (1..=count).map(|system| {
             let [x, y] = slot_m(system);
-            let mut setup =
-                VehicleSetup::new(system.into(), system, Vector3::new(x, y, 0.0));
+            let mut setup = VehicleSetup::new(system.into(), system, Vector3::new(x, y, 0.0));
             setup.boot = BootTimes::short();
             change(&mut setup);
             let storage = Box::new(MemoryStorage::default());
@@ -182,8 +181,7 @@ impl<'w> Crew<'w> {
                 }
                 MavMessage::SYS_STATUS(status) => {
                     let bit = dialect::MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK;
-                    self.ready
-                        .insert(system, status.onboard_control_sensors_health.contains(bit));
+                    self.ready.insert(system, status.onboard_control_sensors_health.contains(bit));
                 }
                 MavMessage::STATUSTEXT(text) => {
                     let text = String::from_utf8_lossy(&text.text[..]).into_owned();

@@ -4,13 +4,12 @@ use nalgebra::Vector3;
 
 use super::{VirtualVehicle, error, text};
 use crate::base::time::GpsTime;
-use crate::effects::Reading;
 use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, dialect};
 use crate::protocol::show::Stage;
 use crate::sim::autopilot::director::{self, Abort};
 use crate::sim::autopilot::params::ARM_BEFORE_TAKEOFF_S;
-use crate::sim::{FlightSetup, Hooks, RecordedFlight};
+use crate::sim::{BatteryReading, FlightSetup, Hooks, RecordedFlight};
 
 /// An arming that comes by so little too late is on time: the grid of ticks is coarser.
 const ON_TIME_S: f64 = 1.0;
@@ -37,7 +36,7 @@ impl Airborne<'_> {
         self.flight.flight.motion().velocity_mps
     }
 
-    pub(super) fn battery(&self) -> Option<Reading> {
+    pub(super) fn battery(&self) -> Option<BatteryReading> {
         self.flight.flight.battery()
     }
 

@@ -1,0 +1,39 @@
+//! What a link may be asked to carry.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use crate::link::clock::Micros;
+
+/// A limit of bytes per second, shared by the conversations on a link.
+#[derive(Clone, Debug)]
+pub struct Budget(Rc<RefCell<Bucket>>);
+
+#[derive(Debug)]
+struct Bucket {
+    per_s: f64,
+    /// May be below zero: what was asked for on credit is paid back before more is asked for.
+    tokens: f64,
+    at: Micros,
+}
+
+impl Budget {
+    /// So many bytes per second, on average.
+    pub fn new(bytes_per_s: f64) -> Self {
+        Self(Rc::new(RefCell::new(Bucket { per_s: bytes_per_s.max(1.0), tokens: 0.0, at: 0 })))
+    }
+
+    /// Takes so many bytes; an error is the time to ask again.
+    pub fn take(&self, now: Micros, bytes: u64) -> Result<(), Micros> {
+        let mut bucket = self.0.borrow_mut();
+        let passed_s = now.saturating_sub(bucket.at) as f64 / 1e6;
+        bucket.at = now;
+        // Half a second of idling is made up for, no more.
+        bucket.tokens = (bucket.tokens + passed_s * bucket.per_s).min(bucket.per_s / 2.0);
+        if bucket.tokens < 0.0 {
+            return Err(now + (-bucket.tokens / bucket.per_s * 1e6) as Micros + 1);
+        }
+        bucket.tokens -= bytes as f64;
+        Ok(())
+    }
+}

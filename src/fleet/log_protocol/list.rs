@@ -1,0 +1,114 @@
+//! Which logs a drone has.
+
+use std::collections::BTreeMap;
+
+use super::{LogProtocolError, list_message, says_armed};
+use crate::link::clock::{MS, Micros, S};
+use crate::link::drive::{Machine, Progress, Step};
+use crate::link::frame::MavMessage;
+use crate::link::id::DroneId;
+
+/// Entries that may be late are waited for so long.
+const QUIET: Micros = 700 * MS;
+
+/// One log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Number, from 1; the last is the newest.
+    pub id: u16,
+    /// Size when it was listed, bytes.
+    pub size: u64,
+    /// When it was begun, Unix seconds; 0: the vehicle did not know.
+    pub time_utc_s: u32,
+}
+
+/// Lists the logs; entries that were lost are asked for again, by their numbers.
+#[derive(Debug)]
+pub struct LogList {
+    drone: DroneId,
+    patience: Micros,
+    /// How many logs there are, once an entry has said so.
+    count: Option<u16>,
+    entries: BTreeMap<u16, Entry>,
+    asked: Option<Micros>,
+    pause: Micros,
+    heard: Option<Micros>,
+    armed: bool,
+}
+
+impl LogList {
+    /// All logs of `drone`. Gives up after `patience` without an answer.
+    pub fn new(drone: DroneId, patience: Micros) -> Self {
+        Self {
+            drone,
+            patience,
+            count: None,
+            entries: BTreeMap::new(),
+            asked: None,
+            pause: QUIET,
+            heard: None,
+            armed: false,
+        }
+    }
+
+    /// The first run of numbers without an entry.
+    fn missing(&self) -> Option<(u16, u16)> {
+        let Some(count) = self.count else { return Some((0, u16::MAX)) };
+        let first = (1..=count).find(|id| !self.entries.contains_key(id))?;
+        let last = (first..=count).take_while(|id| !self.entries.contains_key(id)).last();
+        Some((first, last.unwrap_or(first)))
+    }
+}
+
+impl Machine for LogList {
+    type Done = Result<Vec<Entry>, LogProtocolError>;
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        if says_armed(message) && self.asked.is_some() {
+            self.armed = true;
+        }
+        let MavMessage::LOG_ENTRY(entry) = message else { return };
+        if self.asked.is_none() || entry.id > entry.num_logs {
+            return;
+        }
+        self.heard = Some(now);
+        self.pause = QUIET;
+        self.count = Some(entry.num_logs);
+        if entry.id > 0 {
+            let listed =
+                Entry { id: entry.id, size: entry.size.into(), time_utc_s: entry.time_utc };
+            self.entries.insert(entry.id, listed);
+        }
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        if self.armed {
+            return Step::Done(Err(LogProtocolError::Armed));
+        }
+        let Some((first, last)) = self.missing() else {
+            return Step::Done(Ok(self.entries.values().copied().collect()));
+        };
+        let heard = *self.heard.get_or_insert(now);
+        if now >= heard + self.patience {
+            return Step::Done(Err(LogProtocolError::Silent { seconds: self.patience / S }));
+        }
+        let quiet_since = self.asked.map(|asked| asked.max(heard));
+        match quiet_since {
+            Some(since) if now < since + self.pause => Step::Wait(since + self.pause),
+            _ => {
+                if self.asked.is_some() {
+                    self.pause = (self.pause * 3 / 2).min(4 * S);
+                }
+                self.asked = Some(now);
+                Step::send(list_message(self.drone, first, last))
+            }
+        }
+    }
+
+    fn progress(&self) -> Progress {
+        Progress {
+            done: self.entries.len() as u64,
+            total: u64::from(self.count.unwrap_or_default()),
+        }
+    }
+}

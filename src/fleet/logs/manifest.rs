@@ -1,0 +1,155 @@
+//! `logs/manifest.json`: what was brought home, from whom, and how it was verified.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::part::PartFile;
+use crate::base::file::{FileError, write_whole};
+use crate::campaign::{CampaignError, read_json, to_json};
+use crate::link::id::DroneId;
+
+/// Name and version of the format.
+pub const MANIFEST_SCHEMA: &str = "updraft.logs/1";
+
+/// `logs/manifest.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Format name and version: `updraft.logs/1`.
+    pub schema: String,
+    /// Program and version.
+    pub made_by: String,
+    /// The logs, by file name.
+    pub logs: Vec<ManifestEntry>,
+}
+
+/// One log.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ManifestEntry {
+    /// File name beside the manifest.
+    pub file: String,
+    /// Slot of the plan.
+    pub slot: u16,
+    /// The drone, if it came over the air.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drone: Option<DroneId>,
+    /// Number of the log on the drone; each boot has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub boot: Option<u32>,
+    /// Its path on the drone, `log N` by the log messages, or the imported file's path.
+    pub source: String,
+    /// Size, bytes.
+    pub size_bytes: u64,
+    /// SHA-256, hexadecimal.
+    pub sha256: String,
+    /// How it came.
+    pub method: Method,
+    /// Why not by a better way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method_reason: Option<String>,
+    /// How it was compared with the drone's.
+    pub verified: Verified,
+    /// How often it was begun or continued.
+    pub attempts: u32,
+    /// When it was whole, Unix seconds.
+    pub at_unix_s: u64,
+}
+
+/// How a log came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// MAVFTP.
+    Mavftp,
+    /// LOG_REQUEST_DATA.
+    LogMessages,
+    /// Copied from a card.
+    Import,
+}
+
+/// How a log was compared with the drone's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Verified {
+    /// Checksum over the whole file, computed by the drone too.
+    Checksum,
+    /// Its size, and some pieces that were read again.
+    Sample,
+    /// Read again from the card.
+    Copy,
+}
+
+/// A folder of logs with its manifest.
+#[derive(Debug)]
+pub struct Shelf {
+    folder: PathBuf,
+    /// What is in it.
+    pub manifest: Manifest,
+}
+
+impl Shelf {
+    /// Opens the folder; an empty manifest if there is none. `made_by` is for what is added.
+    ///
+    /// # Errors
+    /// When the manifest cannot be read, or names files outside of its folder.
+    pub fn open(folder: &Path, made_by: &str) -> Result<Self, CampaignError> {
+        let path = folder.join("manifest.json");
+        let made_by = made_by.to_owned();
+        let schema = MANIFEST_SCHEMA.to_owned();
+        let manifest = if path.exists() {
+            let mut manifest: Manifest = read_json(&path)?;
+            let wrong = if manifest.schema == schema {
+                let outside = |entry: &&ManifestEntry| !is_inside(&entry.file);
+                let outside = manifest.logs.iter().find(outside);
+                outside.map(|entry| format!("a log's file cannot be \"{}\"", entry.file))
+            } else {
+                Some(format!("this program reads \"{schema}\", not \"{}\"", manifest.schema))
+            };
+            if let Some(reason) = wrong {
+                return Err(CampaignError::Json { path, reason });
+            }
+            manifest.made_by = made_by;
+            manifest
+        } else {
+            Manifest { schema, made_by, logs: Vec::new() }
+        };
+        Ok(Self { folder: folder.to_owned(), manifest })
+    }
+
+    /// Path of a file in it.
+    pub fn path(&self, file: &str) -> PathBuf {
+        self.folder.join(file)
+    }
+
+    /// The entry of a file.
+    pub fn entry(&self, file: &str) -> Option<&ManifestEntry> {
+        self.manifest.logs.iter().find(|entry| entry.file == file)
+    }
+
+    /// Writes an entry.
+    pub fn add(&mut self, entry: ManifestEntry) -> Result<(), FileError> {
+        self.manifest.logs.retain(|other| other.file != entry.file);
+        self.manifest.logs.push(entry);
+        self.manifest.logs.sort_by(|a, b| a.file.cmp(&b.file));
+        let path = self.folder.join("manifest.json");
+        let bytes = to_json(&self.manifest)
+            .map_err(|source| FileError::new("write", &path, source))?;
+        write_whole(&path, &bytes)
+    }
+
+    /// Gives a finished part its name, with its entry. The entry is first: a part without its
+    /// name is continued by the next run, a file without an entry would be anybody's.
+    pub fn finish(&mut self, part: PartFile, entry: ManifestEntry) -> Result<(), FileError> {
+        self.add(entry)?;
+        part.finish()
+    }
+}
+
+/// A plain file name, or one in the folder of older logs.
+fn is_inside(file: &str) -> bool {
+    let file = file.strip_prefix("older/").unwrap_or(file);
+    !file.is_empty() && !file.starts_with('.') && !file.contains(['/', '\\', ':'])
+}

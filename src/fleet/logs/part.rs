@@ -1,0 +1,364 @@
+//! A download that survives: the bytes so far, and a journal of which they are.
+//!
+//! `NN.BIN.part` holds bytes at their places; `NN.BIN.journal` is only appended to. A range is
+//! written into the journal after its bytes are on the disk, and each line has a checksum, so
+//! that after a kill or a power loss every line that can be read tells the truth.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest as _, Sha256};
+
+use crate::base::crc::{ApCrc32, ap_crc32};
+use crate::base::file::FileError;
+use crate::fleet::intervals::Intervals;
+use crate::fleet::sink::Sink;
+use crate::link::clock::{Micros, S};
+
+const HEAD: &str = "updraft.part/1";
+/// What may be lost of a download by a power loss: bytes, or time.
+const SYNC_BYTES: u64 = 4 << 20;
+const SYNC_EVERY: Micros = 5 * S;
+/// A journal is never longer, bytes.
+const MOST_JOURNAL: u64 = 256 << 20;
+/// Ranges in one line.
+const RANGES_PER_LINE: usize = 256;
+
+/// A download in a file.
+#[derive(Debug)]
+pub struct PartFile {
+    path: PathBuf,
+    file: File,
+    journal: File,
+    identity: String,
+    have: Intervals,
+    /// Written, but not yet in the journal.
+    fresh: Intervals,
+    position: u64,
+    synced: Option<Micros>,
+}
+
+/// Checksums of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sums {
+    /// Size, bytes.
+    pub size: u64,
+    /// As the vehicle computes it.
+    pub crc32: u32,
+    /// Lower case, hexadecimal.
+    pub sha256: String,
+}
+
+/// Where the part of a final file is kept.
+pub fn part_path(path: &Path) -> PathBuf {
+    with_suffix(path, ".part")
+}
+
+/// Where its journal is kept.
+pub fn journal_path(path: &Path) -> PathBuf {
+    with_suffix(path, ".journal")
+}
+
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    PathBuf::from(name)
+}
+
+impl PartFile {
+    /// Continues the download of the final file `path`, or begins it. `identity` says which file
+    /// of which drone it is: a part of another is begun anew.
+    ///
+    /// # Errors
+    /// When the files cannot be opened or written.
+    pub fn open(path: &Path, identity: &str) -> Result<Self, FileError> {
+        let open = |path: &Path| {
+            let mut options = OpenOptions::new();
+            options.read(true).write(true).create(true).truncate(false);
+            options.open(path).map_err(|source| FileError::new("open", path, source))
+        };
+        let identity = identity.replace(['\n', '\r'], " ");
+        let file = open(&part_path(path))?;
+        let mut journal = open(&journal_path(path))?;
+        let read = |source| FileError::new("read", &journal_path(path), source);
+        let mut bytes = Vec::new();
+        journal.by_ref().take(MOST_JOURNAL).read_to_end(&mut bytes).map_err(read)?;
+        let (valid, have) = read_journal(&bytes, &identity);
+        let length = file.metadata().map_err(read)?.len();
+        let mut part = Self {
+            path: path.to_owned(),
+            file,
+            journal,
+            identity,
+            have: Intervals::default(),
+            fresh: Intervals::default(),
+            position: u64::MAX,
+            synced: None,
+        };
+        match have {
+            Some(have) if have.end() <= length => {
+                // What is torn must not run into what follows.
+                part.journal.set_len(valid).map_err(read)?;
+                part.journal.seek(SeekFrom::End(0)).map_err(read)?;
+                part.have = have;
+            }
+            _ => part.clear()?,
+        }
+        Ok(part)
+    }
+
+    /// Begins anew.
+    pub fn clear(&mut self) -> Result<(), FileError> {
+        self.have = Intervals::default();
+        self.fresh = Intervals::default();
+        self.position = u64::MAX;
+        let line = line(&format!("{HEAD} {}", self.identity));
+        let result = self
+            .journal
+            .set_len(0)
+            .and_then(|()| self.journal.seek(SeekFrom::Start(0)))
+            .and_then(|_| self.file.set_len(0))
+            .and_then(|()| self.journal.write_all(line.as_bytes()))
+            .and_then(|()| self.journal.sync_data());
+        result.map_err(|source| FileError::new("write", &journal_path(&self.path), source))
+    }
+
+    /// The final file's path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes everything so far into the journal.
+    pub fn sync(&mut self) -> Result<(), FileError> {
+        let fail = |source| FileError::new("write", &part_path(&self.path), source);
+        if self.fresh.count() == 0 {
+            return Ok(());
+        }
+        self.file.sync_data().map_err(fail)?;
+        let ranges: Vec<String> =
+            self.fresh.iter().map(|(start, end)| format!("{start}-{end}")).collect();
+        let text: String =
+            ranges.chunks(RANGES_PER_LINE).map(|some| line(&some.join(" "))).collect();
+        self.journal
+            .write_all(text.as_bytes())
+            .and_then(|()| self.journal.sync_data())
+            .map_err(|source| FileError::new("write", &journal_path(&self.path), source))?;
+        self.fresh = Intervals::default();
+        Ok(())
+    }
+
+    /// Cuts or keeps the file at `size` bytes and reads it through.
+    pub fn sums(&mut self, size: u64) -> Result<Sums, FileError> {
+        self.sync()?;
+        let path = part_path(&self.path);
+        self.file.set_len(size).map_err(|source| FileError::new("cut", &path, source))?;
+        sums(&path)
+    }
+
+    /// Gives the finished file its name; its journal goes.
+    pub fn finish(mut self) -> Result<(), FileError> {
+        self.sync()?;
+        let part = part_path(&self.path);
+        let fail = |source| FileError::new("rename", &part, source);
+        self.file.sync_all().map_err(fail)?;
+        fs::rename(&part, &self.path).map_err(fail)?;
+        // A journal without its part is begun anew by the next download; no harm.
+        let _ = fs::remove_file(journal_path(&self.path));
+        if let Some(folder) = self.path.parent().and_then(|folder| File::open(folder).ok()) {
+            let _ = folder.sync_all();
+        }
+        Ok(())
+    }
+}
+
+impl Sink for PartFile {
+    fn have(&self) -> &Intervals {
+        &self.have
+    }
+
+    fn put(&mut self, now: Micros, offset: u64, data: &[u8]) -> Result<u64, String> {
+        let end = offset + data.len() as u64;
+        if self.have.contains(offset, end) {
+            return Ok(0);
+        }
+        let explain = |error: &dyn std::fmt::Display| {
+            format!(
+                "cannot write {}: {error}; make room and run again, what came is kept",
+                part_path(&self.path).display()
+            )
+        };
+        if self.position != offset {
+            self.file.seek(SeekFrom::Start(offset)).map_err(|error| explain(&error))?;
+        }
+        self.file.write_all(data).map_err(|error| explain(&error))?;
+        self.position = end;
+        let new = self.have.insert(offset, end);
+        self.fresh.insert(offset, end);
+        let synced = *self.synced.get_or_insert(now);
+        if self.fresh.total() >= SYNC_BYTES || now >= synced + SYNC_EVERY {
+            self.synced = Some(now);
+            if let Err(error) = self.sync() {
+                return Err(format!("{error}: {}", error.source));
+            }
+        }
+        Ok(new)
+    }
+}
+
+fn line(text: &str) -> String {
+    format!("{text} *{:08x}\n", ap_crc32(text.as_bytes()))
+}
+
+/// The lines that are whole: their length, and the ranges if the identity is right.
+fn read_journal(bytes: &[u8], identity: &str) -> (u64, Option<Intervals>) {
+    let mut have = None;
+    let mut valid = 0;
+    for whole in bytes.split_inclusive(|byte| *byte == b'\n') {
+        let text = whole.strip_suffix(b"\n").and_then(|text| std::str::from_utf8(text).ok());
+        let Some((text, sum)) = text.and_then(|text| text.rsplit_once(" *")) else { break };
+        if u32::from_str_radix(sum, 16) != Ok(ap_crc32(text.as_bytes())) {
+            break;
+        }
+        match &mut have {
+            None if text == format!("{HEAD} {identity}") => have = Some(Intervals::default()),
+            None => return (0, None),
+            Some(have) => {
+                for range in text.split(' ') {
+                    let range = range.split_once('-');
+                    let range = range.and_then(|(a, b)| a.parse().ok().zip(b.parse().ok()));
+                    if let Some((start, end)) = range {
+                        have.insert(start, end);
+                    }
+                }
+            }
+        }
+        valid += whole.len() as u64;
+    }
+    (valid, have)
+}
+
+/// Reads a file through.
+pub fn sums(path: &Path) -> Result<Sums, FileError> {
+    let fail = |source| FileError::new("read", path, source);
+    let mut file = File::open(path).map_err(fail)?;
+    let (mut crc32, mut sha256, mut size) = (ApCrc32::default(), Sha256::new(), 0);
+    let mut bytes = vec![0; 1 << 18];
+    loop {
+        let read = file.read(&mut bytes).map_err(fail)?;
+        if read == 0 {
+            break;
+        }
+        crc32.update(&bytes[..read]);
+        sha256.update(&bytes[..read]);
+        size += read as u64;
+    }
+    let sha256 = sha256.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok(Sums { size, crc32: crc32.value(), sha256 })
+}
+
+/// Compares pieces of the vehicle's file with those of a part, and keeps nothing.
+#[derive(Debug)]
+pub struct Sample {
+    file: File,
+    have: Intervals,
+    /// Something differs.
+    pub differs: bool,
+}
+
+impl Sample {
+    /// Compares these ranges of the part of `path`, whose file has `size` bytes.
+    pub fn new(path: &Path, size: u64, ranges: &[(u64, u64)]) -> Result<Self, FileError> {
+        let part = part_path(path);
+        let file = File::open(&part).map_err(|source| FileError::new("open", &part, source))?;
+        let mut wanted = Intervals::default();
+        for &(start, end) in ranges {
+            wanted.insert(start, end.min(size));
+        }
+        let mut have = Intervals::default();
+        let mut at = 0;
+        while let Some((start, end)) = wanted.gap(at, size) {
+            have.insert(start, end);
+            at = end;
+        }
+        Ok(Self { file, have, differs: false })
+    }
+}
+
+impl Sink for Sample {
+    fn have(&self) -> &Intervals {
+        &self.have
+    }
+
+    fn put(&mut self, _now: Micros, offset: u64, data: &[u8]) -> Result<u64, String> {
+        let end = offset + data.len() as u64;
+        let mut at = offset;
+        let mut new = 0;
+        while let Some((start, stop)) = self.have.gap(at, end) {
+            let mut ours = vec![0; (stop - start) as usize];
+            let read = self.file.seek(SeekFrom::Start(start));
+            let read = read.and_then(|_| self.file.read_exact(&mut ours));
+            let theirs = &data[(start - offset) as usize..(stop - offset) as usize];
+            self.differs |= read.is_err() || ours != theirs;
+            new += self.have.insert(start, stop);
+            at = stop;
+        }
+        Ok(new)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_journal_says_is_there_and_the_rest_is_asked_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("01.BIN");
+        let mut part = PartFile::open(&path, "drone=1 source=a").unwrap();
+        part.put(0, 10, b"abcdef").unwrap();
+        part.put(S, 100, b"xyz").unwrap();
+        part.sync().unwrap();
+        part.put(S, 200, b"not in the journal").unwrap();
+        drop(part);
+        let mut journal = OpenOptions::new().append(true).open(journal_path(&path)).unwrap();
+        journal.write_all(b"200-218 *0000").unwrap();
+        for _ in 0..2 {
+            let part = PartFile::open(&path, "drone=1 source=a").unwrap();
+            let have: Vec<_> = part.have().iter().collect();
+            assert_eq!(have, [(10, 16), (100, 103)]);
+        }
+        let mut part = PartFile::open(&path, "drone=1 source=a").unwrap();
+        part.put(0, 300, b"more").unwrap();
+        part.sync().unwrap();
+        let part = PartFile::open(&path, "drone=1 source=a").unwrap();
+        assert_eq!(part.have().total(), 13);
+        let other = PartFile::open(&path, "drone=2 source=a").unwrap();
+        assert_eq!(other.have().total(), 0);
+    }
+
+    #[test]
+    fn a_part_that_lost_bytes_is_begun_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("01.BIN");
+        let mut part = PartFile::open(&path, "a").unwrap();
+        part.put(0, 0, &[7; 100]).unwrap();
+        part.sync().unwrap();
+        part.file.set_len(50).unwrap();
+        drop(part);
+        assert_eq!(PartFile::open(&path, "a").unwrap().have().total(), 0);
+    }
+
+    #[test]
+    fn a_sample_finds_a_difference() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("01.BIN");
+        fs::write(part_path(&path), b"0123456789").unwrap();
+        let mut sample = Sample::new(&path, 10, &[(2, 4), (8, 12)]).unwrap();
+        assert_eq!(sample.have.gap(0, 10), Some((2, 4)));
+        sample.put(0, 0, b"xx23").unwrap();
+        assert!(!sample.differs);
+        sample.put(0, 7, b"x8X").unwrap();
+        assert!(sample.differs && sample.have.gap(0, 10).is_none());
+    }
+}

@@ -1,0 +1,9 @@
+//! A fleet of real drones: what is sent to them, what is watched, and their logs.
+//!
+//! Everything is a conversation ([`crate::link::drive::Machine`]) with one drone, many at once.
+
+pub mod budget;
+pub mod ftp;
+pub mod intervals;
+pub mod rtt;
+pub mod sink;

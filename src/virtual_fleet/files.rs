@@ -1,0 +1,93 @@
+//! The files of a vehicle and both ways to them: a vehicle that does nothing else.
+
+use super::endpoint::Endpoint;
+use super::ftp_server::FtpServer;
+use super::log_server::LogServer;
+use super::storage::Storage;
+use crate::link::clock::{Micros, S};
+use crate::link::frame::{MavMessage, dialect};
+use crate::link::station::STATION;
+
+/// Storage with its MAVFTP and log servers.
+#[derive(Debug)]
+pub struct FileVehicle<S> {
+    /// The files.
+    pub storage: S,
+    /// MAVFTP; `None`: the vehicle does not speak it.
+    pub ftp: Option<FtpServer>,
+    /// The log messages.
+    pub logs: LogServer,
+    /// Whether it is armed.
+    pub is_armed: bool,
+    /// Silent until then: it boots.
+    pub boots_until: Micros,
+    /// Packets per second of a server, for servers after a boot.
+    packets_per_s: f64,
+    log_folder: String,
+    next_heartbeat: Micros,
+}
+
+impl<S: Storage> FileVehicle<S> {
+    /// A vehicle with these files, logs in `log_folder`, sending at most so many packets per
+    /// second (0: no limit).
+    pub fn new(storage: S, log_folder: &str, packets_per_s: f64) -> Self {
+        Self {
+            storage,
+            ftp: Some(FtpServer::new(packets_per_s)),
+            logs: LogServer::new(log_folder, packets_per_s),
+            is_armed: false,
+            boots_until: 0,
+            packets_per_s,
+            log_folder: log_folder.to_owned(),
+            next_heartbeat: 0,
+        }
+    }
+
+    /// Loses everything but its files, and is silent for a while.
+    pub fn reboot(&mut self, now: Micros, lasts: Micros) {
+        self.ftp = self.ftp.as_ref().map(|_| FtpServer::new(self.packets_per_s));
+        self.logs = LogServer::new(&self.log_folder, self.packets_per_s);
+        self.boots_until = now + lasts;
+    }
+}
+
+impl<S: Storage> Endpoint for FileVehicle<S> {
+    fn on_message(&mut self, now: Micros, message: &MavMessage, out: &mut Vec<MavMessage>) {
+        if now < self.boots_until {
+            return;
+        }
+        if let Some(ftp) = &mut self.ftp {
+            ftp.on_message(STATION.system, message);
+        }
+        self.logs.on_message(message, self.is_armed, &self.storage, out);
+    }
+
+    fn poll(&mut self, now: Micros, out: &mut Vec<MavMessage>) -> Micros {
+        if now < self.boots_until {
+            return self.boots_until;
+        }
+        if now >= self.next_heartbeat {
+            self.next_heartbeat = now + S;
+            out.push(heartbeat(self.is_armed));
+        }
+        let ftp =
+            self.ftp.as_mut().map_or(Micros::MAX, |ftp| ftp.poll(now, &mut self.storage, out));
+        let logs = self.logs.poll(now, self.is_armed, &self.storage, out);
+        ftp.min(logs).min(self.next_heartbeat)
+    }
+}
+
+fn heartbeat(is_armed: bool) -> MavMessage {
+    let mut base_mode = dialect::MavModeFlag::empty();
+    if is_armed {
+        base_mode |= dialect::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
+    }
+    MavMessage::HEARTBEAT(dialect::HEARTBEAT_DATA {
+        custom_mode: 0,
+        mavtype: dialect::MavType::MAV_TYPE_QUADROTOR,
+        autopilot: dialect::MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        base_mode,
+        system_status: dialect::MavState::MAV_STATE_STANDBY,
+        mavlink_version: 3,
+    })
+}
