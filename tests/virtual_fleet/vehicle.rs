@@ -1,8 +1,4 @@
-//! The virtual vehicle on the wire, against what the show firmware was measured to do.
-
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
-
-mod vehicle_support;
+//! One vehicle, and nine, in simulated time.
 
 use nalgebra::Vector3;
 use updraft::link::frame::MavMessage;
@@ -11,7 +7,8 @@ use updraft::link::net::Net as _;
 use updraft::protocol::show::{self, Stage, flag, preflight};
 use updraft::sim::fly;
 use updraft::virtual_fleet::vehicle::BootTimes;
-use vehicle_support::{Crew, Field, file, show_of};
+
+use super::support::{Crew, Field, file, show_of, sideways};
 
 #[test]
 fn it_boots_as_the_firmware_does() {
@@ -266,6 +263,7 @@ fn a_drone_off_its_slot_fails_its_check_and_gives_up() {
     assert_eq!(crew.status(1).stage, Stage::Error);
     crew.long(1, 176, [1.0, 0.0]);
     crew.long(1, 176, [1.0, 127.0]);
+    crew.start_in(30.0);
     crew.run_for(2.0);
     assert_eq!((crew.status(1).stage, crew.status(1).preflight), (Stage::WaitForStart, 0));
 }
@@ -333,7 +331,7 @@ fn a_drone_in_flight_returns_or_lands_when_told() {
     let field = Field::new();
     let world = field.world();
     for (mode, far_m) in [(6.0, 0.0), (9.0, 9.0)] {
-        let mut crew = Crew::prepared_with(&world, 1, &vehicle_support::sideways());
+        let mut crew = Crew::prepared_with(&world, 1, &sideways());
         let start = crew.start_in(20.0);
         crew.run_until(start + 18.0);
         assert_eq!(crew.status(1).stage, Stage::Performing);

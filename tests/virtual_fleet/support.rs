@@ -16,21 +16,21 @@ use updraft::sim::{FlightSetup, Hooks, Uniform};
 use updraft::vehicle::Vehicle;
 use updraft::vehicle::library::builtin;
 use updraft::virtual_fleet::lossy::{Faults, LossyNet};
-use updraft::virtual_fleet::storage::MemoryStorage;
+use updraft::virtual_fleet::storage::{MemoryStorage, Storage};
 use updraft::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use updraft::virtual_fleet::world::World;
 
 const TOW_AT_0: u32 = 100_000;
 const GPS_AT_0: GpsTime = GpsTime { week: 2445, tow_ms: TOW_AT_0 * 1000 };
 
-pub struct Field {
+pub(crate) struct Field {
     vehicle: Vehicle,
     air: Uniform,
-    frame: ShowFrame,
+    pub(crate) frame: ShowFrame,
 }
 
 impl Field {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let origin = Geodetic { lat_deg: 47.473_313_1, lon_deg: 19.062_057_4, amsl_m: 150.0 };
         Self {
             vehicle: builtin("airsim-generic-quad").unwrap(),
@@ -39,11 +39,11 @@ impl Field {
         }
     }
 
-    pub fn world(&self) -> World<'_> {
+    pub(crate) fn world(&self) -> World<'_> {
         World::new(&self.vehicle, &self.air, self.frame, 7, GPS_AT_0)
     }
 
-    pub fn flight<'a>(
+    pub(crate) fn flight<'a>(
         &'a self,
         drone: &'a ShowDrone,
         slot: u16,
@@ -67,7 +67,7 @@ impl Field {
 }
 
 /// Climbs at 1 m/s, waits 3 s, and comes down to 2.5 m in 5 s.
-pub fn show_of([x, y]: [f64; 2], height_m: f64) -> ShowDrone {
+pub(crate) fn show_of([x, y]: [f64; 2], height_m: f64) -> ShowDrone {
     let at = |z| Path::Line(Vector3::new(x, y, z));
     let segments = vec![
         Segment { duration_ms: (height_m * 1000.0) as u32, path: at(height_m) },
@@ -79,7 +79,7 @@ pub fn show_of([x, y]: [f64; 2], height_m: f64) -> ShowDrone {
 }
 
 /// Climbs to 10 m, and goes 20 m along x at 1 m/s.
-pub fn sideways() -> ShowDrone {
+pub(crate) fn sideways() -> ShowDrone {
     let segments = [(10_000, 0.0), (20_000, 20.0)].map(|(duration_ms, x)| Segment {
         duration_ms,
         path: Path::Line(Vector3::new(x, 0.0, 10.0)),
@@ -88,19 +88,46 @@ pub fn sideways() -> ShowDrone {
     ShowDrone { trajectory, ..ShowDrone::default() }
 }
 
-pub fn file(drone: &ShowDrone) -> Vec<u8> {
+/// Up and down between 20 and 60 m at 2 m/s for eight minutes.
+pub(crate) fn ladder([x, y]: [f64; 2]) -> ShowDrone {
+    let to = |z, duration_ms| Segment { duration_ms, path: Path::Line(Vector3::new(x, y, z)) };
+    let mut segments = vec![to(20.0, 10_000)];
+    for _ in 0..8 {
+        segments.extend([to(60.0, 20_000), to(60.0, 10_000), to(20.0, 20_000), to(20.0, 10_000)]);
+    }
+    segments.push(to(2.5, 8_750));
+    let trajectory = Trajectory { start_m: Vector3::new(x, y, 0.0), segments };
+    ShowDrone { trajectory, ..ShowDrone::default() }
+}
+
+/// GPS second of week, and GPS time, of a link time in s.
+pub(crate) fn tow_at(seconds: i64) -> i32 {
+    TOW_AT_0 as i32 + seconds as i32
+}
+
+pub(crate) fn gps_at(seconds: i64) -> GpsTime {
+    GpsTime::from_total_ms(GPS_AT_0.total_ms() + seconds * 1000).unwrap()
+}
+
+pub(crate) fn read(storage: &dyn Storage, name: &str) -> Vec<u8> {
+    let mut bytes = vec![0; storage.size(name).unwrap() as usize];
+    assert_eq!(storage.read_at(name, 0, &mut bytes), Ok(bytes.len()));
+    bytes
+}
+
+pub(crate) fn file(drone: &ShowDrone) -> Vec<u8> {
     skyb::write(drone, &SkybOptions::default()).unwrap().bytes
 }
 
-pub fn slot_m(system: u8) -> [f64; 2] {
+pub(crate) fn slot_m(system: u8) -> [f64; 2] {
     let index = f64::from(system - 1);
     [(index % 3.0).floor() * 5.0, (index / 3.0).floor() * 5.0]
 }
 
-pub struct Crew<'w> {
-    pub net: LossyNet<VirtualVehicle<'w>>,
-    pub heard: Vec<(u8, MavMessage)>,
-    pub texts: Vec<String>,
+pub(crate) struct Crew<'w> {
+    pub(crate) net: LossyNet<VirtualVehicle<'w>>,
+    pub(crate) heard: Vec<(u8, MavMessage)>,
+    pub(crate) texts: Vec<String>,
     statuses: BTreeMap<u8, Status>,
     ready: BTreeMap<u8, bool>,
     stages: BTreeMap<u8, BTreeMap<u8, f64>>,
@@ -112,7 +139,7 @@ fn id(system: u8) -> DroneId {
 }
 
 impl<'w> Crew<'w> {
-    pub fn new(world: &'w World<'w>, count: u8, change: impl Fn(&mut VehicleSetup)) -> Self {
+    pub(crate) fn new(world: &'w World<'w>, count: u8, change: impl Fn(&mut VehicleSetup)) -> Self {
         let vehicles = (1..=count).map(|system| {
             let [x, y] = slot_m(system);
             let mut setup = VehicleSetup::new(system.into(), system, Vector3::new(x, y, 0.0));
@@ -133,7 +160,7 @@ impl<'w> Crew<'w> {
     }
 
     /// Uploaded, and ready to fly.
-    pub fn prepared(world: &'w World<'w>, count: u8) -> Self {
+    pub(crate) fn prepared(world: &'w World<'w>, count: u8) -> Self {
         let mut crew = Self::new(world, count, |_| {});
         crew.run_until(5.0);
         for system in 1..=count {
@@ -142,7 +169,7 @@ impl<'w> Crew<'w> {
         crew
     }
 
-    pub fn prepared_with(world: &'w World<'w>, system: u8, show: &ShowDrone) -> Self {
+    pub(crate) fn prepared_with(world: &'w World<'w>, system: u8, show: &ShowDrone) -> Self {
         let mut crew = Self::new(world, system, |_| {});
         crew.run_until(5.0);
         crew.load(system, show);
@@ -159,15 +186,15 @@ impl<'w> Crew<'w> {
         assert!(self.is_ready(system), "{:?}", self.texts);
     }
 
-    pub fn now(&self) -> f64 {
+    pub(crate) fn now(&self) -> f64 {
         self.net.now() as f64 * 1e-6
     }
 
-    pub fn run_for(&mut self, seconds: f64) {
+    pub(crate) fn run_for(&mut self, seconds: f64) {
         self.run_until(self.now() + seconds);
     }
 
-    pub fn run_until(&mut self, seconds: f64) {
+    pub(crate) fn run_until(&mut self, seconds: f64) {
         let until = (seconds * 1e6) as u64;
         while let Some(received) = self.net.recv(until).unwrap() {
             let system = received.from.system;
@@ -193,51 +220,47 @@ impl<'w> Crew<'w> {
         }
     }
 
-    pub fn status(&self, system: u8) -> Status {
+    pub(crate) fn status(&self, system: u8) -> Status {
         self.statuses[&system]
     }
 
-    pub fn is_ready(&self, system: u8) -> bool {
+    pub(crate) fn is_ready(&self, system: u8) -> bool {
         self.ready[&system]
     }
 
     /// When each stage was told first, link time s.
-    pub fn stage_times(&self, system: u8) -> &BTreeMap<u8, f64> {
+    pub(crate) fn stage_times(&self, system: u8) -> &BTreeMap<u8, f64> {
         &self.stages[&system]
     }
 
-    pub fn vehicle(&self, system: u8) -> &VirtualVehicle<'w> {
+    pub(crate) fn vehicle(&self, system: u8) -> &VirtualVehicle<'w> {
         &self.net.vehicles[&id(system)]
     }
 
-    pub fn is_armed(&self, system: u8) -> bool {
+    pub(crate) fn is_armed(&self, system: u8) -> bool {
         self.vehicle(system).is_armed()
     }
 
-    pub fn has_folder(&self, system: u8, name: &str) -> bool {
+    pub(crate) fn has_folder(&self, system: u8, name: &str) -> bool {
         self.vehicle(system).storage.list(name).is_ok()
     }
 
-    pub fn log_names(&self, system: u8) -> Vec<String> {
+    pub(crate) fn log_names(&self, system: u8) -> Vec<String> {
         let entries = self.vehicle(system).storage.list("logs").unwrap();
         entries.into_iter().map(|entry| entry.name).collect()
     }
 
-    pub fn log(&self, system: u8, name: &str) -> Vec<u8> {
-        let name = format!("logs/{name}");
-        let storage = &self.vehicle(system).storage;
-        let mut bytes = vec![0; storage.size(&name).unwrap() as usize];
-        assert_eq!(storage.read_at(&name, 0, &mut bytes), Ok(bytes.len()));
-        bytes
+    pub(crate) fn log(&self, system: u8, name: &str) -> Vec<u8> {
+        read(self.vehicle(system).storage.as_ref(), &format!("logs/{name}"))
     }
 
-    pub fn put_show(&mut self, system: u8, bytes: &[u8]) {
+    pub(crate) fn put_show(&mut self, system: u8, bytes: &[u8]) {
         let storage = &mut self.net.vehicles.get_mut(&id(system)).unwrap().storage;
         storage.create(SHOW_FILE).unwrap();
         storage.write_at(SHOW_FILE, 0, bytes).unwrap();
     }
 
-    pub fn count(&self, name: &str) -> usize {
+    pub(crate) fn count(&self, name: &str) -> usize {
         let starts = |message: &MavMessage| {
             let text = format!("{message:?}");
             text.starts_with(&format!("{name}("))
@@ -245,7 +268,7 @@ impl<'w> Crew<'w> {
         self.heard.iter().filter(|(_, message)| starts(message)).count()
     }
 
-    pub fn send(&mut self, system: u8, message: MavMessage) {
+    pub(crate) fn send(&mut self, system: u8, message: MavMessage) {
         self.net.send(id(system), &message).unwrap();
         self.run_for(0.02);
     }
@@ -258,7 +281,12 @@ impl<'w> Crew<'w> {
         ack.unwrap()
     }
 
-    pub fn long(&mut self, system: u8, number: u16, [param1, param2]: [f32; 2]) -> MavResult {
+    pub(crate) fn long(
+        &mut self,
+        system: u8,
+        number: u16,
+        [param1, param2]: [f32; 2],
+    ) -> MavResult {
         let command = match number {
             176 => MavCmd::MAV_CMD_DO_SET_MODE,
             246 => MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
@@ -283,7 +311,7 @@ impl<'w> Crew<'w> {
         self.result()
     }
 
-    pub fn set_origin(&mut self, system: u8) -> MavResult {
+    pub(crate) fn set_origin(&mut self, system: u8) -> MavResult {
         let origin = self.frame.origin;
         self.send(
             system,
@@ -301,7 +329,7 @@ impl<'w> Crew<'w> {
         self.result()
     }
 
-    pub fn set(&mut self, system: u8, name: &str, value: f32) {
+    pub(crate) fn set(&mut self, system: u8, name: &str, value: f32) {
         self.send(
             system,
             MavMessage::PARAM_SET(dialect::PARAM_SET_DATA {
@@ -314,7 +342,7 @@ impl<'w> Crew<'w> {
         );
     }
 
-    pub fn params(&self) -> BTreeMap<String, f32> {
+    pub(crate) fn params(&self) -> BTreeMap<String, f32> {
         let values = self.heard.iter().filter_map(|(_, message)| match message {
             MavMessage::PARAM_VALUE(value) => {
                 let name = String::from_utf8_lossy(&value.param_id[..]).into_owned();
@@ -326,15 +354,15 @@ impl<'w> Crew<'w> {
     }
 
     /// Allows a start so many seconds ahead (in whole seconds); when it will be, link time s.
-    pub fn start_in(&mut self, seconds: f64) -> f64 {
+    pub(crate) fn start_in(&mut self, seconds: f64) -> f64 {
         let start = (self.now() + seconds).ceil();
         self.start_at(start, true);
         start
     }
 
-    pub fn start_at(&mut self, start: f64, authorized: bool) {
+    pub(crate) fn start_at(&mut self, start: f64, authorized: bool) {
         let start = StartConfig {
-            start_tow_s: TOW_AT_0 as i32 + start as i32,
+            start_tow_s: tow_at(start as i64),
             authorization: u8::from(authorized),
             countdown_ms: updraft::protocol::show::LEAVE_TIME,
         };
@@ -343,11 +371,11 @@ impl<'w> Crew<'w> {
         self.net.broadcast(&MavMessage::DATA16(packet)).unwrap();
     }
 
-    pub fn start_time(&self, start: f64) -> GpsTime {
-        GpsTime::from_total_ms(GPS_AT_0.total_ms() + start as i64 * 1000).unwrap()
+    pub(crate) fn start_time(&self, start: f64) -> GpsTime {
+        gps_at(start as i64)
     }
 
-    pub fn ask_for_logs(&mut self, system: u8) {
+    pub(crate) fn ask_for_logs(&mut self, system: u8) {
         let wanted = dialect::LOG_REQUEST_LIST_DATA {
             start: 0,
             end: 0xFFFF,
@@ -357,7 +385,7 @@ impl<'w> Crew<'w> {
         self.send(system, MavMessage::LOG_REQUEST_LIST(wanted));
     }
 
-    pub fn capabilities(&self) -> u64 {
+    pub(crate) fn capabilities(&self) -> u64 {
         let found = self.heard.iter().find_map(|(_, message)| match message {
             MavMessage::AUTOPILOT_VERSION(version) => Some(version.capabilities.bits()),
             _ => None,
@@ -365,7 +393,7 @@ impl<'w> Crew<'w> {
         found.unwrap()
     }
 
-    pub fn upload_fence(&mut self, system: u8, corners: &[Vector3<f64>], says: u8) {
+    pub(crate) fn upload_fence(&mut self, system: u8, corners: &[Vector3<f64>], says: u8) {
         let fence = MavMissionType::MAV_MISSION_TYPE_FENCE;
         self.send(
             system,
@@ -396,7 +424,7 @@ impl<'w> Crew<'w> {
         }
     }
 
-    pub fn mission_results(&self) -> Vec<u8> {
+    pub(crate) fn mission_results(&self) -> Vec<u8> {
         let results = self.heard.iter().filter_map(|(_, message)| match message {
             MavMessage::MISSION_ACK(ack) => Some(ack.mavtype as u8),
             _ => None,
@@ -404,7 +432,7 @@ impl<'w> Crew<'w> {
         results.collect()
     }
 
-    pub fn download_fence(&mut self, system: u8) -> Vec<u16> {
+    pub(crate) fn download_fence(&mut self, system: u8) -> Vec<u16> {
         let fence = MavMissionType::MAV_MISSION_TYPE_FENCE;
         self.heard.clear();
         self.send(
