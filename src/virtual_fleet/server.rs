@@ -96,7 +96,7 @@ impl Running {
         self.now.load(Ordering::Relaxed)
     }
 
-    /// Vehicles that fly, or have just flown.
+    /// Vehicles that fly, or whose log is still being written.
     pub fn busy(&self) -> u64 {
         self.busy.load(Ordering::Relaxed)
     }
@@ -186,6 +186,10 @@ struct Post<'w> {
 }
 
 impl Post<'_> {
+    fn is_busy(&self) -> bool {
+        self.vehicle.is_busy() || self.vehicle.is_writing()
+    }
+
     /// Takes what has come, and goes on to this time; returns the frames to send.
     fn round(&mut self, now: Micros) -> Vec<Vec<u8>> {
         let mut out = Vec::new();
@@ -231,7 +235,7 @@ fn run<'w>(
     let mut step = ROUND;
     while !running.end.load(Ordering::Relaxed) {
         let begun = clock.now();
-        let is_busy = posts.iter().any(|post| post.vehicle.is_busy());
+        let is_busy = posts.iter().any(Post::is_busy);
         let passed = begun.saturating_sub(last);
         let whole_rounds = match options.pace {
             Pace::Speed(speed) => speed > SMOOTH_SPEED,
@@ -268,7 +272,7 @@ fn run<'w>(
             let _ = posts[index].socket.send_to(&frame, options.station);
         }
         running.now.store(now, Ordering::Relaxed);
-        let busy = posts.iter().filter(|post| post.vehicle.is_busy()).count();
+        let busy = posts.iter().filter(|post| post.is_busy()).count();
         running.busy.store(busy as u64, Ordering::Relaxed);
         let round = if posts.iter().any(|post| post.is_sending) { TRANSFER_ROUND } else { ROUND };
         let left = round.saturating_sub(clock.now().saturating_sub(begun));

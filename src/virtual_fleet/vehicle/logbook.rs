@@ -24,6 +24,11 @@ impl Logbook {
         Self { folder: folder.to_owned(), open: None, waiting: Vec::new(), disarmed: None }
     }
 
+    /// Whether something is still to be written, without a flight.
+    pub(super) fn is_growing(&self) -> bool {
+        self.disarmed.is_some()
+    }
+
     /// Arming: goes on in the file of this boot, or begins one.
     pub(super) fn open(&mut self, storage: &mut dyn Storage) {
         self.flush(storage);

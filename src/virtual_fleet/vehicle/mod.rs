@@ -171,9 +171,14 @@ impl<'w> VirtualVehicle<'w> {
         self.airborne.as_ref().is_some_and(Airborne::is_armed)
     }
 
-    /// Whether it flies, or has just flown and its log still grows.
+    /// Whether it flies, or has just landed.
     pub fn is_busy(&self) -> bool {
         self.airborne.is_some()
+    }
+
+    /// Whether its log still grows, though it has landed.
+    pub fn is_writing(&self) -> bool {
+        self.logbook.is_growing()
     }
 
     /// Stage of its show.
