@@ -28,7 +28,7 @@ pub struct PutFile {
 
 impl PutFile {
     /// This content as the file `path`. Done with whether it had to be written.
-    pub fn new(mut caller: Caller, path: &'static str, content: Vec<u8>) -> Self {
+    pub fn new(caller: Caller, path: &'static str, content: Vec<u8>) -> Self {
         let size = content.len() as u64;
         let phase = Phase::Look(Sum::new(caller.another(), path, size, PATIENCE));
         Self { caller, path, content, phase }

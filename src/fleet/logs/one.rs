@@ -341,10 +341,8 @@ impl PullOne {
     /// From logs in the order of their numbers.
     fn choose(&mut self, logs: &[(u32, String, u64)]) -> Stage {
         let Some((newest, ..)) = logs.last() else {
-            return self.fail(
-                "the drone has no logs".to_owned(),
-                "check its card and LOG_BACKEND_TYPE",
-            );
+            return self
+                .fail("the drone has no logs".to_owned(), "check its card and LOG_BACKEND_TYPE");
         };
         let newest = *newest;
         let wanted = |number: u32| match self.options.which {
@@ -381,8 +379,7 @@ impl PullOne {
             let path = shelf.path(&target.file);
             let is_there = shelf.entry(&target.file).is_some_and(|entry| {
                 entry.source == target.source
-                    && std::fs::metadata(&path)
-                        .is_ok_and(|about| about.len() == entry.size_bytes)
+                    && std::fs::metadata(&path).is_ok_and(|about| about.len() == entry.size_bytes)
             });
             (path, is_there)
         };
@@ -427,11 +424,13 @@ impl PullOne {
         if looks && part.have().total() > 0 {
             let last = part.have().iter().last().unwrap_or_default();
             let first = part.have().iter().next().unwrap_or_default();
-            let tail = |(start, end): (u64, u64)| (end.saturating_sub(SAMPLE_BYTES).max(start), end);
+            let tail =
+                |(start, end): (u64, u64)| (end.saturating_sub(SAMPLE_BYTES).max(start), end);
             return match Sample::new(part.path(), self.size, &[tail(first), tail(last)]) {
                 Err(error) => self.fail(error.to_string(), "run again"),
                 Ok(sample) if self.reason.is_none() => {
-                    let get = Get::new(self.caller.another(), &target.source, sample, self.get_sample());
+                    let get =
+                        Get::new(self.caller.another(), &target.source, sample, self.get_sample());
                     Stage::Probe(Box::new(get), part)
                 }
                 Ok(sample) => Stage::LogProbe(Box::new(self.log_get(sample)), part),
@@ -563,8 +562,7 @@ impl PullOne {
         let Some(target) = &self.target else { return Stage::Over };
         if is_settled {
             let source = target.source.clone();
-            let sum =
-                Sum::new(self.caller.another(), &source, self.size, self.options.patience);
+            let sum = Sum::new(self.caller.another(), &source, self.size, self.options.patience);
             return Stage::Sum(sum, part, sums);
         }
         self.sample(part, sums)
@@ -580,19 +578,15 @@ impl PullOne {
         match Sample::new(part.path(), self.size, &ranges) {
             Err(error) => self.fail(error.to_string(), "run again"),
             Ok(sample) if self.reason.is_none() => {
-                let get = Get::new(self.caller.another(), &target.source, sample, self.get_sample());
+                let get =
+                    Get::new(self.caller.another(), &target.source, sample, self.get_sample());
                 Stage::Sample(Box::new(get), part, sums)
             }
             Ok(sample) => Stage::LogSample(Box::new(self.log_get(sample)), part, sums),
         }
     }
 
-    fn on_summed(
-        &mut self,
-        part: PartFile,
-        sums: Sums,
-        outcome: Result<u32, FtpError>,
-    ) -> Stage {
+    fn on_summed(&mut self, part: PartFile, sums: Sums, outcome: Result<u32, FtpError>) -> Stage {
         match outcome {
             Ok(sum) if sum == sums.crc32 => self.finish(part, sums, Verified::Checksum),
             // It may have grown between the list and the checksum.
@@ -716,9 +710,7 @@ impl PullOne {
                 },
                 Stage::LogSample(get, part, sums)
             ),
-            Stage::Over => {
-                (Stage::Over, Next::Step(Step::Done(std::mem::take(&mut self.done))))
-            }
+            Stage::Over => (Stage::Over, Next::Step(Step::Done(std::mem::take(&mut self.done)))),
         }
     }
 }
