@@ -275,6 +275,7 @@ fn a_return_that_is_refused_becomes_a_landing_and_silence_is_said() {
         vehicle.inner.status.stage = Stage::Performing;
     }
     net.vehicles.get_mut(&drone(2)).unwrap().fault = Fault::Silent;
+    pass(&mut net, 100 * MS, &mut NoWatch);
     struct NoReturn(Abort);
     impl Machine for NoReturn {
         type Done = Aborted;

@@ -266,7 +266,7 @@ pub fn check_stands(
             continue;
         };
         let distance_m = distance_m(stand.at_m, home.home_m);
-        if stand.nearest != slot && distance_m > allowed_m {
+        if stand.nearest != slot && stand.distance_m <= allowed_m {
             let stands = stand.nearest;
             problems.push(SlotProblem::WrongSlot { drone, slot, stands, distance_m });
         } else if distance_m > allowed_m {
