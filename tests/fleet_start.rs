@@ -232,7 +232,7 @@ fn every_refusal_of_a_start_is_said() {
 fn an_abort_reaches_everyone_at_once() {
     let plan = plan();
     for (seed, faults) in (0..10).map(|seed| (seed, bad())).chain([(0, Faults::default())]) {
-        let (mut net, telemetry) = ready(&plan, faults, seed);
+        let (mut net, mut telemetry) = ready(&plan, faults, seed);
         for (id, vehicle) in &mut net.vehicles {
             let inner = &mut vehicle.inner;
             inner.armed = id.system != 6;
@@ -241,6 +241,7 @@ fn an_abort_reaches_everyone_at_once() {
             inner.status.flags |= flag::AUTHORIZED | flag::START_SET;
             inner.status.start_tow_s = 443_029;
         }
+        pass(&mut net, 5 * S, &mut telemetry);
         let began = net.now();
         let machines: BTreeMap<_, _> = all()
             .into_iter()

@@ -60,7 +60,7 @@ fn over_a_good_link_nothing_is_asked_for_twice() {
 /// Share of a link's capacity that carried useful bytes, of what the loss leaves.
 fn efficiency(drones: u8, loss: f64) -> (f64, f64) {
     const CAPACITY: f64 = 100_000.0;
-    const LENGTH: usize = 600_000;
+    let length = 4_800_000 / usize::from(drones);
     let faults = Faults {
         loss,
         delay: 20 * MS,
@@ -69,18 +69,19 @@ fn efficiency(drones: u8, loss: f64) -> (f64, f64) {
         queue: 300 * MS,
         ..Faults::default()
     };
-    let pps = 500.0 / f64::from(drones);
-    let mut net = fleet(drones, LENGTH, pps.max(60.0), faults, 3);
+    // More than the link carries, as vehicles on a fast radio do.
+    let pps = if drones == 1 { 500.0 } else { 125.0 };
+    let mut net = fleet(drones, length, pps, faults, 3);
     let machines = (1..=drones)
         .map(|system| {
             let caller = Caller::new(drone(system), 7);
             (drone(system), Get::new(caller, LOG, Memory::default(), GetOptions::default()))
         })
         .collect();
-    let done = drive(&mut net, machines, drones.into(), &mut NoWatch).unwrap();
+    let done = drive(&mut net, machines, 4, &mut NoWatch).unwrap();
     let useful: u64 = done.values().map(|got| got.tally.new_bytes).sum();
     let again: u64 = done.values().map(|got| got.tally.again_bytes).sum();
-    assert_eq!(useful, LENGTH as u64 * u64::from(drones));
+    assert_eq!(useful, length as u64 * u64::from(drones));
     // Of a frame of 239 data bytes (10 header, 3 + 12 payload, 2 checksum).
     let payload = 239.0 / 266.0;
     let took_s = net.now() as f64 / 1e6;
@@ -90,13 +91,15 @@ fn efficiency(drones: u8, loss: f64) -> (f64, f64) {
 
 #[test]
 fn a_limited_link_is_used_to_nine_tenths_of_what_its_loss_leaves() {
+    let mut worst: f64 = 1.0;
     for (drones, loss) in
         [(1, 0.0), (8, 0.0), (8, 0.01), (8, 0.1), (8, 0.2), (1, 0.01), (1, 0.1), (1, 0.2)]
     {
         let (share, again) = efficiency(drones, loss);
         println!("{drones} drones, loss {loss}: {share:.3} used, {again:.3} again");
-        assert!(share >= 0.9, "{drones} drones, loss {loss}: {share}");
+        worst = worst.min(share);
     }
+    assert!(worst >= 0.9, "{worst}");
 }
 
 #[test]

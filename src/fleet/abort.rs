@@ -22,6 +22,8 @@ const EVERY: Micros = 200 * MS;
 const GIVE_UP: Micros = 120 * S;
 /// What is heard sooner may have been sent before the abort.
 const SETTLE: Micros = S;
+/// What was known of a drone that is older than its latest word by more says nothing.
+const KNOWN_WITHIN: Micros = 3 * S;
 /// The show firmware's status comes within this.
 const STATUS_WITHIN: Micros = 3 * S;
 /// A return that is refused so often becomes a landing.
@@ -97,6 +99,11 @@ impl Abort {
     /// disarmed is not pulled out of its mode. It cannot fly before its next heartbeats: arming
     /// comes eight seconds before the take-off.
     pub fn new(drone: DroneId, action: Action, known: Option<&Drone>) -> Self {
+        let known = known.filter(|known| {
+            let old = |at: Micros| known.heard.saturating_sub(at) > KNOWN_WITHIN;
+            !known.armed.is_some_and(|(at, _)| old(at))
+                && !known.status.is_some_and(|(at, _)| old(at))
+        });
         let armed = known.and_then(Drone::is_armed);
         let status = known.and_then(|known| known.status).map(|(_, status)| status);
         Self {

@@ -2,23 +2,19 @@
 
 use std::io::{self, Write};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
-use super::air::{Atmosphere, Surroundings, density_ratio};
-use super::autopilot::Autopilot;
-use super::autopilot::director::{Stage, takeoff_time_s};
-use super::autopilot::motors::Spool;
+use super::air::Atmosphere;
+use super::autopilot::director::takeoff_time_s;
 use super::autopilot::params as p;
 use super::error::SimError;
-use super::plant::Plant;
-use super::recorder::{LogRecorder, Moment, NoLog, Recorder};
-use super::sensors::Sensors;
+use super::flying::Flight;
+use super::recorder::{LogRecorder, NoLog, Recorder};
 use crate::base::file::write_with;
 use crate::base::frame::ShowFrame;
 use crate::base::time::GpsTime;
-use crate::effects::Active;
 use crate::show::Trajectory;
 use crate::vehicle::Vehicle;
 
@@ -26,16 +22,8 @@ use crate::vehicle::Vehicle;
 pub(super) const STEP_US: i64 = 2_500;
 /// The same, s.
 pub(super) const STEP_S: f64 = STEP_US as f64 * 1e-6;
-/// Air motion and density are looked up every so many steps (100 Hz).
-const STEPS_PER_AIR: u64 = 4;
-/// Stop request, progress and sanity are looked at every so many steps (1 s).
-const STEPS_PER_LOOK: u64 = 400;
 /// SHOW_TAKEOFF_ERR, m.
 const TAKEOFF_ERR_M: f64 = 3.0;
-/// The log goes on for so long after disarming, s.
-const TAIL_S: f64 = 2.0;
-/// A flight is given up so long after the time its landing should take, s.
-const LANDING_PATIENCE_S: f64 = 120.0;
 
 /// Everything that one drone's simulated flight depends on.
 #[derive(Clone, Copy)]
@@ -158,80 +146,9 @@ pub fn fly_with<R: Recorder>(
     setup: &FlightSetup<'_>,
     recorder: &mut R,
 ) -> Result<FlightSummary, SimError> {
-    validate(setup)?;
-    let drone = setup.drone;
-    let home_amsl_m = setup.frame.origin.amsl_m + setup.home_m.z;
-    let settings = &setup.vehicle.autopilot;
-    let mut pilot = Autopilot::new(setup.trajectory, settings, setup.home_m, home_amsl_m, STEP_S)
-        .ok_or(SimError::NoTakeoff { drone, height_m: p::SHOW_TAKEOFF_ALT })?;
-    if let Some(frame) = &setup.vehicle.airframe.sitl {
-        pilot.motors.set_voltage(frame.battery_voltage_v);
-    }
-    let (effects, airframe) = Active::start(setup.vehicle, setup.seed, drone, setup.home_m, STEP_S)
-        .map_err(|source| SimError::Effect { drone, source })?;
-    let mut plant = Plant::with_effects(&airframe, effects, setup.home_m, STEP_S);
-    let mut sensors = Sensors::new(setup.seed, drone, STEP_S);
-
-    let takeoff_s = pilot.director.takeoff_s;
-    let start_us = armed_at_us(takeoff_s);
-    let end_s = pilot.director.end_s;
-    let give_up_s = end_s
-        + setup.trajectory.end_m().z.max(0.0) / p::LAND_SPEED.min(p::WPNAV_SPEED_DN)
-        + LANDING_PATIENCE_S;
-    let mut tally = Tally::default();
-    let mut around = Surroundings { air_velocity_mps: Vector3::zeros(), density_ratio: 1.0 };
-    let mut air = setup.atmosphere.sampler(drone);
-    let mut stop_at_s = f64::INFINITY;
-    let mut step: u64 = 0;
-    loop {
-        let time_us = start_us + step as i64 * STEP_US;
-        let time_s = time_us as f64 * 1e-6;
-        if step.is_multiple_of(STEPS_PER_AIR) {
-            let place = &plant.motion().position_m;
-            around = Surroundings {
-                air_velocity_mps: air.air_velocity(place, time_s),
-                density_ratio: density_ratio(setup.frame.origin.amsl_m + place.z),
-            };
-            // Checked here, as the drag's dead band would take NaN for no wind.
-            if !around.air_velocity_mps.iter().all(|speed| speed.is_finite()) {
-                return Err(SimError::Diverged { drone, time_s });
-            }
-        }
-        if step.is_multiple_of(STEPS_PER_LOOK) {
-            if let Some(battery) = plant.battery().filter(|battery| battery.compensated) {
-                pilot.motors.set_voltage(battery.resting_v);
-            }
-            look(setup, &plant, time_s, takeoff_s, end_s)?;
-            if time_s > give_up_s {
-                return Err(SimError::NotLanded { drone, time_s });
-            }
-        }
-        let mut estimate = sensors.sense(plant.motion());
-        estimate.acceleration_mps2.z += plant.impact_mps2();
-        plant.sense(&mut estimate.velocity_mps.z);
-        let pulses = pilot.update(time_s, &estimate);
-        tally.note(&pilot, &plant, time_s, setup.home_m.z);
-        let moment = Moment {
-            step,
-            time_us,
-            pilot: &pilot,
-            estimate: &estimate,
-            plant: &plant,
-            around: &around,
-        };
-        recorder.record(&moment).map_err(|source: io::Error| SimError::Log { drone, source })?;
-        plant.step(&pulses.map(command), &around);
-        step += 1;
-        if !pilot.director.armed && stop_at_s.is_infinite() {
-            stop_at_s = time_s + TAIL_S;
-        }
-        if time_s >= stop_at_s {
-            break;
-        }
-    }
-    tally.summary.steps = step;
-    tally.summary.takeoff_s = takeoff_s;
-    Ok(tally.finish())
+    let mut flight = Flight::new(setup)?;
+    flight.step_until(f64::INFINITY, recorder)?;
+    Ok(flight.summary())
 }
 
 /// AirSim's motor interface: the command is linear in the pulse, 1000..2000 us, whatever the
@@ -241,11 +158,11 @@ pub(super) fn command(pulse_us: u16) -> f64 {
 }
 
 /// Arming time on the grid of the steps.
-fn armed_at_us(takeoff_s: f64) -> i64 {
+pub(super) fn armed_at_us(takeoff_s: f64) -> i64 {
     (((takeoff_s - p::ARM_BEFORE_TAKEOFF_S) * 1e6) as i64).div_euclid(STEP_US) * STEP_US
 }
 
-fn validate(setup: &FlightSetup<'_>) -> Result<(), SimError> {
+pub(super) fn validate(setup: &FlightSetup<'_>) -> Result<(), SimError> {
     let drone = setup.drone;
     let finite = |vector: &Vector3<f64>| vector.iter().all(|value| value.is_finite());
     if !finite(&setup.home_m) {
@@ -264,70 +181,4 @@ fn validate(setup: &FlightSetup<'_>) -> Result<(), SimError> {
         return Err(SimError::NotAtStart { drone, distance_m, limit_m: TAKEOFF_ERR_M });
     }
     Ok(())
-}
-
-fn look(
-    setup: &FlightSetup<'_>,
-    plant: &Plant,
-    time_s: f64,
-    takeoff_s: f64,
-    end_s: f64,
-) -> Result<(), SimError> {
-    let drone = setup.drone;
-    if setup.hooks.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
-        return Err(SimError::Stopped { drone, time_s });
-    }
-    let motion = plant.motion();
-    if !(motion.position_m + motion.velocity_mps).norm().is_finite() {
-        return Err(SimError::Diverged { drone, time_s });
-    }
-    if let Some(progress) = setup.hooks.progress {
-        let begin_s = takeoff_s - p::ARM_BEFORE_TAKEOFF_S;
-        progress(((time_s - begin_s) / (end_s - begin_s).max(1.0)).clamp(0.0, 1.0));
-    }
-    Ok(())
-}
-
-/// Gathers the summary.
-#[derive(Default)]
-struct Tally {
-    summary: FlightSummary,
-    stage: Option<Stage>,
-    max_square_m2: f64,
-    performing_steps: u64,
-    saturated_steps: u64,
-}
-
-impl Tally {
-    fn note(&mut self, pilot: &Autopilot<'_>, plant: &Plant, time_s: f64, ground_m: f64) {
-        let stage = pilot.director.stage;
-        let summary = &mut self.summary;
-        if self.stage != Some(stage) {
-            self.stage = Some(stage);
-            match stage {
-                Stage::Performing => summary.performing_s = Some(time_s),
-                Stage::Landing => summary.landing_s = time_s,
-                Stage::Landed => summary.landed_s = time_s,
-                Stage::Wait | Stage::Takeoff => {}
-            }
-        }
-        let position = &plant.motion().position_m;
-        summary.max_height_m = summary.max_height_m.max(position.z - ground_m);
-        if stage == Stage::Performing && pilot.motors.spool == Spool::Flying {
-            let error = position - pilot.director.target.position;
-            self.max_square_m2 = self.max_square_m2.max(error.xy().norm_squared());
-            summary.max_error_z_m = summary.max_error_z_m.max(error.z.abs());
-            self.performing_steps += 1;
-            self.saturated_steps += u64::from(pilot.saturated());
-        }
-    }
-
-    fn finish(mut self) -> FlightSummary {
-        self.summary.max_error_xy_m = self.max_square_m2.sqrt();
-        if self.performing_steps > 0 {
-            self.summary.saturated_share =
-                self.saturated_steps as f64 / self.performing_steps as f64;
-        }
-        self.summary
-    }
 }

@@ -9,11 +9,16 @@ pub mod air;
 pub mod autopilot;
 mod error;
 mod flight;
+mod flying;
 pub mod json;
 pub mod plant;
+mod recorded;
 pub mod recorder;
 pub mod sensors;
 
+pub use crate::effects::Reading as BatteryReading;
 pub use air::{Atmosphere, Uniform};
 pub use error::SimError;
 pub use flight::{FlightSetup, FlightSummary, Hooks, fly, fly_to_file, fly_with, fly_without_log};
+pub use flying::Flight;
+pub use recorded::RecordedFlight;

@@ -5,8 +5,12 @@
 //! fleet with a bad radio link also runs in one thread, in simulated time ([`lossy::LossyNet`]).
 
 pub mod endpoint;
+mod faulty;
 pub mod files;
 pub mod ftp_server;
 pub mod log_server;
 pub mod lossy;
+pub mod server;
 pub mod storage;
+pub mod vehicle;
+pub mod world;

@@ -6,6 +6,9 @@
 //! while one still comes, so that the link does not idle for a round trip. What was lost of
 //! bursts is then asked for by single *reads*, many on their way at once: each costs the downlink
 //! exactly the bytes that are missing.
+//!
+//! A burst that falls silent may be over, lost, or still be sent into a bad link. Another burst
+//! would then come on top; a single read, asked now and then, settles it.
 
 use std::collections::VecDeque;
 
@@ -120,6 +123,9 @@ struct Burst {
     offset: u64,
     /// When asked for; of a later one, when the one before it ended.
     since: Micros,
+    /// Nothing was on its way when it was asked for, so that its first packet tells the time to
+    /// an answer.
+    is_first: bool,
     /// Of the last packet: when, and its number in the burst.
     heard: Option<(Micros, u64)>,
     /// Smoothed time between packets, us.
@@ -239,10 +245,25 @@ impl<S: Sink> Get<S> {
         }
         self.failures = 0;
         if packet.request == Op::ReadFile {
-            self.reads.answered(now, offset, &mut self.caller.rtt);
+            self.on_read_answered(now, offset);
         } else {
             self.on_burst_packet(now, packet, offset + packet.data.len() as u64 >= size);
         }
+    }
+
+    /// The vehicle serves one request after another: with the answer to a read that was asked
+    /// after a burst had fallen silent, the burst is over, or never was.
+    fn on_read_answered(&mut self, now: Micros, offset: u64) {
+        if !self.reads.answered(now, offset, &mut self.caller.rtt) {
+            return;
+        }
+        if let Some(Burst { heard: Some((_, number)), .. }) = self.bursts.front()
+            && self.burst_packets.is_none()
+            && (USUAL_BURST * 9 / 10..USUAL_BURST).contains(number)
+        {
+            self.burst_packets = Some(USUAL_BURST);
+        }
+        self.bursts.clear();
     }
 
     fn on_burst_packet(&mut self, now: Micros, packet: &Packet, at_end: bool) {
@@ -261,13 +282,14 @@ impl<S: Sink> Get<S> {
                 let steps = number.saturating_sub(*highest);
                 if steps > 0 {
                     let each = now.saturating_sub(*at) as f64 / steps as f64;
-                    burst.spacing += (each - burst.spacing) / 16.0;
+                    let weight = if burst.spacing == 0.0 { 1.0 } else { 0.1 };
+                    burst.spacing += (each - burst.spacing) * weight;
                     (*at, *highest) = (now, number);
                 }
             }
             None => {
-                if number == 0 && burst.since > 0 {
-                    burst.spacing = 0.0;
+                if number == 0 && burst.is_first {
+                    self.caller.rtt.add(now.saturating_sub(burst.since));
                 }
                 burst.heard = Some((now, number));
             }
@@ -311,7 +333,7 @@ impl<S: Sink> Get<S> {
         let Some(index) = self.numbers.iter().position(|(of, _)| *of == number) else { return };
         let Some((_, offset)) = self.numbers.remove(index) else { return };
         self.heard = Some(now);
-        self.reads.answered(now, offset, &mut self.caller.rtt);
+        self.on_read_answered(now, offset);
         match (packet.refusal(), self.size) {
             (Some(Refusal::EndOfFile), Some(said)) if offset < said => {
                 self.lies += 1;
@@ -344,8 +366,8 @@ impl<S: Sink> Get<S> {
         }
     }
 
-    /// Until when the current burst is waited for.
-    fn burst_deadline(&self) -> Option<Micros> {
+    /// From when on the current burst's silence is suspicious.
+    fn suspicious_at(&self) -> Option<Micros> {
         let burst = self.bursts.front()?;
         let timeout = self.caller.rtt.timeout();
         Some(match burst.heard {
@@ -399,6 +421,7 @@ impl<S: Sink> Get<S> {
             sequence: packet.sequence,
             offset,
             since: now,
+            is_first: self.bursts.is_empty(),
             heard: None,
             spacing,
         });
@@ -420,27 +443,14 @@ impl<S: Sink> Get<S> {
             self.close(Err(FtpError::Silent { seconds }));
             return self.poll(now);
         }
-        let mut wake = gives_up.min(self.reads.expire(now, &self.caller.rtt));
-        while let Some(deadline) = self.burst_deadline() {
-            if now < deadline {
-                wake = wake.min(deadline);
-                break;
-            }
-            if let Some(Burst { heard: Some((_, number)), .. }) = self.bursts.front()
-                && self.burst_packets.is_none()
-                && (USUAL_BURST * 9 / 10..USUAL_BURST).contains(number)
-            {
-                self.burst_packets = Some(USUAL_BURST);
-            }
-            self.end_burst(now);
-            // Silent links are asked less and less often.
-            let quiet = now.saturating_sub(heard);
-            if self.bursts.is_empty() && quiet > 3 * S {
-                self.reopen(now + (quiet / 4).min(2 * S));
-                return self.poll(now);
-            }
+        let suspicious_at = self.suspicious_at();
+        let is_silent = suspicious_at.is_some_and(|at| now >= at);
+        let mut wake = gives_up.min(self.reads.expire(now, &self.caller.rtt, is_silent));
+        if let Some(at) = suspicious_at.filter(|_| !is_silent) {
+            wake = wake.min(at);
         }
-        if self.wants_burst()
+        if !is_silent
+            && self.wants_burst()
             && let Some(offset) = self.burst_start()
         {
             let length = self.burst_length().min(size - offset);
@@ -449,12 +459,12 @@ impl<S: Sink> Get<S> {
                 Ok(()) => return Step::send(self.send_burst(now, offset)),
                 Err(later) => wake = wake.min(later),
             }
-        } else if self.bursts.is_empty() {
+        } else if self.bursts.is_empty() || is_silent {
             if let Err(later) = self.allowed(now, 0) {
                 return Step::Wait(wake.min(later));
             }
             let Some(sink) = &self.sink else { return Step::Wait(wake) };
-            if let Some((start, end)) = self.reads.next(now, sink.have(), size) {
+            if let Some((start, end)) = self.reads.next(now, sink.have(), size, is_silent) {
                 let _ = self.allowed(now, end - start + OVERHEAD);
                 return Step::send(self.send_read(start, end));
             }

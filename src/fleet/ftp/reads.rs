@@ -6,12 +6,15 @@ use std::collections::BTreeMap;
 
 use crate::fleet::intervals::Intervals;
 use crate::fleet::rtt::Rtt;
-use crate::link::clock::Micros;
+use crate::link::clock::{Micros, S};
 
 /// Answers and losses that are looked at together.
 const LOOK: u32 = 24;
 /// With so large a share lost, the window was too large for the link, not only the link bad.
 const TOO_LOSSY: f64 = 0.65;
+
+/// Longest wait for an answer.
+const MOST_PAUSE: Micros = 4 * S;
 
 /// Reads on their way.
 #[derive(Clone, Debug)]
@@ -56,20 +59,23 @@ impl Reads {
         self.silent = 0;
     }
 
-    /// An answer to the read at `offset`.
-    pub(crate) fn answered(&mut self, now: Micros, offset: u64, rtt: &mut Rtt) {
-        let Some((_, asked)) = self.on_way.remove(&offset) else { return };
+    /// An answer to the read at `offset`; whether one was waited for.
+    pub(crate) fn answered(&mut self, now: Micros, offset: u64, rtt: &mut Rtt) -> bool {
+        let Some((_, asked)) = self.on_way.remove(&offset) else { return false };
         // Every read has its own time: what was asked again was asked at another.
         rtt.add(now.saturating_sub(asked));
         self.silent = 0;
         self.answered += 1;
         self.window = (self.window + 0.5).min(self.most);
         self.look();
+        true
     }
 
-    /// Forgets what is late; returns when the next one will be.
-    pub(crate) fn expire(&mut self, now: Micros, rtt: &Rtt) -> Micros {
-        let pause = rtt.timeout() << (self.silent / 16).min(4);
+    /// Forgets what is late; returns when the next one will be. When `probing`, one read stands
+    /// for all, and is repeated less and less often.
+    pub(crate) fn expire(&mut self, now: Micros, rtt: &Rtt, probing: bool) -> Micros {
+        let losses = if probing { self.silent } else { self.silent / 16 };
+        let pause = (rtt.timeout() << losses.min(4)).min(MOST_PAUSE);
         let before = self.on_way.len();
         let mut next = Micros::MAX;
         self.on_way.retain(|_, (_, asked)| {
@@ -97,9 +103,19 @@ impl Reads {
     }
 
     /// The next range to ask for, if there is room: missing, below `limit`, not on its way.
-    pub(crate) fn next(&mut self, now: Micros, have: &Intervals, limit: u64) -> Option<(u64, u64)> {
+    pub(crate) fn next(
+        &mut self,
+        now: Micros,
+        have: &Intervals,
+        limit: u64,
+        probing: bool,
+    ) -> Option<(u64, u64)> {
         // Many drones at once that hear nothing ask less each.
-        let room = if self.silent > 48 { 2.0 } else { self.window };
+        let room = match self.silent {
+            _ if probing => 1.0,
+            0..=48 => self.window,
+            _ => 2.0,
+        };
         if self.on_way.len() as f64 >= room {
             return None;
         }

@@ -166,7 +166,7 @@ impl<S: Sink> LogGet<S> {
     }
 
     fn next(&mut self, now: Micros, gives_up: Micros) -> Step<LogGot<S>> {
-        let wake = gives_up.min(self.reads.expire(now, &self.rtt));
+        let wake = gives_up.min(self.reads.expire(now, &self.rtt, false));
         if let Some(request) = &self.request {
             let timeout = self.rtt.timeout().max(150 * MS);
             let until = request.heard.map_or(request.asked + 2 * timeout, |at| at + timeout);
@@ -193,7 +193,7 @@ impl<S: Sink> LogGet<S> {
         }
         let Some(sink) = &self.sink else { return Step::Wait(wake) };
         if self.large_gap().is_none()
-            && let Some((start, end)) = self.reads.next(now, sink.have(), self.size)
+            && let Some((start, end)) = self.reads.next(now, sink.have(), self.size, false)
         {
             let _ = self.allowed(now, end - start + OVERHEAD);
             self.tally.reads += 1;

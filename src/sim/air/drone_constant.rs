@@ -34,7 +34,7 @@ impl Atmosphere for DroneConstant {
         Vector3::zeros()
     }
 
-    fn sampler(&self, drone: u16) -> Box<dyn AirSampler + '_> {
+    fn sampler(&self, drone: u16) -> Box<dyn AirSampler + Send + '_> {
         Box::new(Constant(Uniform(Vector3::new(0.0, 0.0, self.updraft_mps(drone)))))
     }
 }

@@ -78,7 +78,7 @@ impl Atmosphere for RandomField {
         Vector3::new(0.0, 0.0, self.updraft_mps(position_m, time_s))
     }
 
-    fn sampler(&self, _drone: u16) -> Box<dyn AirSampler + '_> {
+    fn sampler(&self, _drone: u16) -> Box<dyn AirSampler + Send + '_> {
         Box::new(Knots::new(|position_m: &Vector3<f64>, time_s| {
             self.air_velocity(position_m, time_s)
         }))

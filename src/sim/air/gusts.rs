@@ -131,7 +131,7 @@ impl Atmosphere for Gusts {
         self.waves.at(position_m, time_s).into()
     }
 
-    fn sampler(&self, _drone: u16) -> Box<dyn AirSampler + '_> {
+    fn sampler(&self, _drone: u16) -> Box<dyn AirSampler + Send + '_> {
         Box::new(Knots::new(|position_m: &Vector3<f64>, time_s| {
             self.air_velocity(position_m, time_s)
         }))

@@ -39,7 +39,7 @@ pub trait Atmosphere: Sync {
 
     /// What one drone (its slot, from 1) meets on its flight. Made once per flight; costly kinds of
     /// air answer faster this way than through [`Atmosphere::air_velocity`].
-    fn sampler(&self, drone: u16) -> Box<dyn AirSampler + '_> {
+    fn sampler(&self, drone: u16) -> Box<dyn AirSampler + Send + '_> {
         let _ = drone;
         Box::new(Direct(self))
     }

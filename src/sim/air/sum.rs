@@ -13,12 +13,12 @@ impl Atmosphere for Sum {
         self.0.iter().map(|part| part.air_velocity(position_m, time_s)).sum()
     }
 
-    fn sampler(&self, drone: u16) -> Box<dyn AirSampler + '_> {
+    fn sampler(&self, drone: u16) -> Box<dyn AirSampler + Send + '_> {
         Box::new(Samplers(self.0.iter().map(|part| part.sampler(drone)).collect()))
     }
 }
 
-struct Samplers<'a>(Vec<Box<dyn AirSampler + 'a>>);
+struct Samplers<'a>(Vec<Box<dyn AirSampler + Send + 'a>>);
 
 impl AirSampler for Samplers<'_> {
     fn air_velocity(&mut self, position_m: &Vector3<f64>, time_s: f64) -> Vector3<f64> {

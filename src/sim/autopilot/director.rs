@@ -21,10 +21,40 @@ pub enum Stage {
     Takeoff = 3,
     /// Flying the trajectory.
     Performing = 4,
+    /// Going back to where it took off, after an abort.
+    Returning = 5,
     /// Descending to the ground where the trajectory ended.
     Landing = 7,
     /// On the ground, motors off.
     Landed = 8,
+}
+
+/// How a show is left before its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Abort {
+    /// Land where it is.
+    Land,
+    /// Return to where it took off, not below RTL_ALT, and land there.
+    Return,
+}
+
+impl Abort {
+    /// Number of the autopilot's mode.
+    pub fn mode(self) -> u8 {
+        match self {
+            Self::Land => 9,
+            Self::Return => 6,
+        }
+    }
+}
+
+/// Way home.
+#[derive(Clone, Copy, Debug)]
+struct Return {
+    height_m: f64,
+    is_high: bool,
+    /// How long it has been there, s.
+    there_s: f64,
 }
 
 /// Whether the autopilot takes itself to be on the ground after the show.
@@ -43,6 +73,9 @@ const LAND_MAYBE_S: f64 = 0.2;
 const LAND_COMPLETE_S: f64 = 1.0;
 /// A vehicle that has landed accelerates by no more than this, m/s².
 const LAND_ACCELERATION: f64 = 1.0;
+/// A vehicle has returned when it is this close (m) and this slow (m/s).
+const RETURNED_M: f64 = 1.0;
+const RETURNED_MPS: f64 = 0.5;
 /// From landing declared to disarming, s.
 const DISARM_AFTER_S: f64 = 0.5;
 
@@ -89,6 +122,9 @@ pub struct Director<'a> {
     pub takeoff_s: f64,
     /// End of the trajectory, show time s.
     pub end_s: f64,
+    /// How the show was left, if it was.
+    pub aborted: Option<Abort>,
+    way_home: Return,
     cursor: Cursor<'a>,
     home_m: Vector3<f64>,
     above_floor: bool,
@@ -120,6 +156,8 @@ impl<'a> Director<'a> {
             target_age: 0,
             takeoff_s: takeoff_time_s(trajectory, settings.wpnav_speed_up_mps)?,
             end_s: trajectory.duration_ms() as f64 / 1000.0,
+            aborted: None,
+            way_home: Return { height_m: home_m.z + p::RTL_ALT, is_high: false, there_s: 0.0 },
             cursor: Cursor::new(trajectory),
             home_m,
             above_floor: false,
@@ -159,10 +197,50 @@ impl<'a> Director<'a> {
                     self.target.advance(self.dt_s);
                 }
             }
+            Stage::Returning => self.go_home(estimate),
             Stage::Landing => self.land(estimate, motors),
-            Stage::Landed => {}
+            Stage::Landed => motors.spool = Spool::Stopped,
         }
         self.goals(estimate, restart)
+    }
+
+    /// Leaves the show; on the ground the motors stop.
+    pub fn abort(&mut self, how: Abort, position_m: Vector3<f64>) {
+        match self.stage {
+            Stage::Landed => return,
+            Stage::Wait => {
+                self.stage = Stage::Landed;
+                self.armed = false;
+            }
+            _ if how == Abort::Land || self.touchdown != Touchdown::None => {
+                self.stage = Stage::Landing;
+            }
+            _ => {
+                self.stage = Stage::Returning;
+                let height_m = position_m.z.max(self.home_m.z + p::RTL_ALT);
+                self.way_home = Return { height_m, is_high: false, there_s: 0.0 };
+            }
+        }
+        self.aborted = Some(how);
+    }
+
+    fn go_home(&mut self, estimate: &Estimate) {
+        let way = &mut self.way_home;
+        way.is_high |= estimate.position_m.z >= way.height_m - 0.5;
+        let from_home_m = (estimate.position_m.xy() - self.home_m.xy()).norm();
+        let is_there =
+            from_home_m <= RETURNED_M && estimate.velocity_mps.xy().norm() <= RETURNED_MPS;
+        if way.is_high && (is_there || way.there_s > 0.0) {
+            way.there_s += self.dt_s;
+            if way.there_s >= p::RTL_LOIT_TIME_S {
+                self.stage = Stage::Landing;
+            }
+        }
+    }
+
+    /// The stage as it is told: an aborted show is off, another mode flies.
+    pub fn told(&self) -> u8 {
+        if self.aborted.is_some() { 0 } else { self.stage as u8 }
     }
 
     fn wait(&mut self, time_s: f64, motors: &mut Motors) {
@@ -240,6 +318,14 @@ impl<'a> Director<'a> {
                         velocity: velocity.xy(),
                         acceleration: acceleration.xy(),
                     }),
+                    restart,
+                }
+            }
+            Stage::Returning => {
+                let way = &self.way_home;
+                Goals {
+                    vertical: Goal::Follow(Kinematics::at(Vector1::new(way.height_m))),
+                    horizontal: way.is_high.then(|| Kinematics::at(self.home_m.xy())),
                     restart,
                 }
             }

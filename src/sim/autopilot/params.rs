@@ -81,3 +81,7 @@ pub const SHOW_TAKEOFF_ALT: f64 = 2.5;
 pub const TAKEOFF_DONE: f64 = 0.7;
 /// Arming before the take-off time, s.
 pub const ARM_BEFORE_TAKEOFF_S: f64 = 8.0;
+/// RTL_ALT, m.
+pub const RTL_ALT: f64 = 15.0;
+/// RTL_LOIT_TIME, s.
+pub const RTL_LOIT_TIME_S: f64 = 5.0;

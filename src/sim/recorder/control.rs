@@ -194,7 +194,7 @@ pub(super) fn write_show<W: Write>(
         &[
             I(board_us),
             I(moment.time_us.div_euclid(1000)),
-            I(director.stage as i64),
+            I(director.told().into()),
             red,
             green,
             blue,

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use crate::log::Value::{Int as I, Text as T};
 use crate::log::{LogWriter, catalog};
 use crate::sim::autopilot::Autopilot;
-use crate::sim::autopilot::director::{Stage, Touchdown};
+use crate::sim::autopilot::director::{Abort, Stage, Touchdown};
 use crate::sim::autopilot::motors::Spool;
 
 /// Event numbers of EV rows.
@@ -16,6 +16,8 @@ const NOT_LANDED: i64 = 28;
 const LAND_COMPLETE_MAYBE: i64 = 17;
 const LAND_COMPLETE: i64 = 18;
 const DISARMED: i64 = 11;
+/// ModeReason of a mode that a ground station or the fence asked for.
+const BY_STATION: i64 = 2;
 /// AP_Arming::Method of disarming after a landing.
 const DISARMED_AFTER_LANDING: i64 = 13;
 
@@ -26,12 +28,19 @@ pub(super) struct Events {
     flying: bool,
     armed: bool,
     touchdown: Touchdown,
+    aborted: Option<Abort>,
 }
 
 impl Events {
     /// Armed, on the ground.
     pub(super) fn new() -> Self {
-        Self { spinning: false, flying: false, armed: true, touchdown: Touchdown::None }
+        Self {
+            spinning: false,
+            flying: false,
+            armed: true,
+            touchdown: Touchdown::None,
+            aborted: None,
+        }
     }
 
     /// Writes rows for what changed.
@@ -47,6 +56,7 @@ impl Events {
             flying: director.stage > Stage::Wait && director.stage < Stage::Landed,
             armed: director.armed,
             touchdown: director.touchdown,
+            aborted: director.aborted,
         };
         if now == *self {
             return Ok(0);
@@ -55,6 +65,11 @@ impl Events {
         let time = I(board_us);
         let reached = |state| before.touchdown < state && now.touchdown >= state;
         let mut rows = 0;
+        if let (None, Some(abort)) = (before.aborted, now.aborted) {
+            let mode = I(abort.mode().into());
+            log.row(&catalog::MODE, &[time, mode, mode, I(BY_STATION)])?;
+            rows += 1;
+        }
         if before.armed && !now.armed {
             log.row(&catalog::MSG, &[time, T("Disarming motors")])?;
             log.row(&catalog::ARM, &[time, I(0), I(0), I(0), I(DISARMED_AFTER_LANDING)])?;

@@ -31,7 +31,7 @@ impl<'a> Lights<'a> {
     /// Colour at a show time, ms; times must not go back.
     pub(super) fn color(&mut self, pilot: &Autopilot<'_>, time_ms: i64) -> Rgb {
         match pilot.director.stage {
-            Stage::Landing => ORANGE,
+            Stage::Returning | Stage::Landing => ORANGE,
             Stage::Landed => DIM_GREEN,
             Stage::Wait | Stage::Takeoff | Stage::Performing => u64::try_from(time_ms).map_or_else(
                 |_| waiting(pilot.motors.spool, time_ms),

@@ -1,0 +1,7 @@
+//! Virtual vehicles on the wire, against what the show firmware was measured to do.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+mod server;
+mod support;
+mod vehicle;
