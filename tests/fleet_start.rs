@@ -121,7 +121,7 @@ fn every_no_go_is_said_in_words() {
     case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 1.0));
     case(&of(|of| of.position = None));
     case(&of(|of| *of = updraft::fleet::telemetry::Drone::default()));
-    case(&of(|of| of.clock = updraft::fleet::vehicle_clock::VehicleClock::default()));
+    case(&of(|of| of.clock = VehicleClock::default()));
     case(&|_, _, known| {
         known.loaded.remove(&drone(1));
     });
@@ -455,15 +455,13 @@ fn a_stock_vehicle_is_guided_along_its_trajectory() {
     let frame = plan.site.frame();
     let mut vehicle = Obliging::new(drone(2), false, frame.to_geodetic(trajectory.start_m));
     let start_gps_ms =
-        updraft::base::time::GpsTime::from_unix_ms((vehicle.unix_us / 1000) as i64 + 30_000)
-            .unwrap()
-            .total_ms();
+        GpsTime::from_unix_ms((vehicle.unix_us / 1000) as i64 + 30_000).unwrap().total_ms();
     let flight = Flight {
         trajectory: trajectory.clone(),
         frame,
         start_gps_ms,
         yaw_rad: None,
-        clock: updraft::fleet::vehicle_clock::VehicleClock::default(),
+        clock: VehicleClock::default(),
     };
     let (lines, done) = dry_run(Guided::new(drone(2), flight), &mut vehicle, 100_000);
     assert_eq!(done, Some(Ok(())));

@@ -404,7 +404,7 @@ impl std::fmt::Display for Preflight {
         for line in &lines {
             let mut text = String::new();
             for (cell, width) in line.iter().zip(&widths) {
-                text.push_str(&format!("{cell:<width$}  "));
+                let _ = std::fmt::Write::write_fmt(&mut text, format_args!("{cell:<width$}  "));
             }
             writeln!(f, "{}", text.trim_end())?;
         }
