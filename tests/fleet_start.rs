@@ -4,13 +4,15 @@ mod fleet_show_support;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fleet_show_support::{A_WHILE, Fault, Net, bad, drone, fleet, pass, plan, table};
+use fleet_show_support::{A_WHILE, Fault, Net, Scripted, bad, drone, fleet, pass, plan, table};
 use insta::assert_snapshot;
+use updraft::base::time::GpsTime;
 use updraft::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
 use updraft::fleet::command::{Command, CommandError};
 use updraft::fleet::dry_run::{Obliging, dry_run};
 use updraft::fleet::greet::Greet;
 use updraft::fleet::guided::{Flight, Guided};
+use updraft::fleet::journal::{Entry, JOURNAL_FILE, Journal};
 use updraft::fleet::messages::{self, LAND, RTL};
 use updraft::fleet::params::{ListParams, ReadParams, SetParams};
 use updraft::fleet::preflight::{Known, Limits, Preflight, preflight};
@@ -18,6 +20,8 @@ use updraft::fleet::required::{Changes, CheckParams, Standing, requirements};
 use updraft::fleet::slots::{self, FleetTable};
 use updraft::fleet::start::{Phase, Start, StartOptions, StartRefusal};
 use updraft::fleet::telemetry::Telemetry;
+use updraft::fleet::vehicle_clock::VehicleClock;
+use updraft::fleet::watch::{self, Monitor};
 use updraft::link::clock::{MS, S};
 use updraft::link::drive::{Machine, NoWatch, drive};
 use updraft::link::frame::MavMessage;
@@ -117,7 +121,7 @@ fn every_no_go_is_said_in_words() {
     case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 1.0));
     case(&of(|of| of.position = None));
     case(&of(|of| *of = updraft::fleet::telemetry::Drone::default()));
-    case(&of(|of| of.clock = updraft::fleet::vehicle_clock::VehicleClock::default()));
+    case(&of(|of| of.clock = VehicleClock::default()));
     case(&|_, _, known| {
         known.loaded.remove(&drone(1));
     });
@@ -232,7 +236,7 @@ fn every_refusal_of_a_start_is_said() {
 fn an_abort_reaches_everyone_at_once() {
     let plan = plan();
     for (seed, faults) in (0..10).map(|seed| (seed, bad())).chain([(0, Faults::default())]) {
-        let (mut net, telemetry) = ready(&plan, faults, seed);
+        let (mut net, mut telemetry) = ready(&plan, faults, seed);
         for (id, vehicle) in &mut net.vehicles {
             let inner = &mut vehicle.inner;
             inner.armed = id.system != 6;
@@ -241,6 +245,7 @@ fn an_abort_reaches_everyone_at_once() {
             inner.status.flags |= flag::AUTHORIZED | flag::START_SET;
             inner.status.start_tow_s = 443_029;
         }
+        pass(&mut net, 5 * S, &mut telemetry);
         let began = net.now();
         let machines: BTreeMap<_, _> = all()
             .into_iter()
@@ -275,6 +280,7 @@ fn a_return_that_is_refused_becomes_a_landing_and_silence_is_said() {
         vehicle.inner.status.stage = Stage::Performing;
     }
     net.vehicles.get_mut(&drone(2)).unwrap().fault = Fault::Silent;
+    pass(&mut net, 100 * MS, &mut NoWatch);
     struct NoReturn(Abort);
     impl Machine for NoReturn {
         type Done = Aborted;
@@ -449,15 +455,13 @@ fn a_stock_vehicle_is_guided_along_its_trajectory() {
     let frame = plan.site.frame();
     let mut vehicle = Obliging::new(drone(2), false, frame.to_geodetic(trajectory.start_m));
     let start_gps_ms =
-        updraft::base::time::GpsTime::from_unix_ms((vehicle.unix_us / 1000) as i64 + 30_000)
-            .unwrap()
-            .total_ms();
+        GpsTime::from_unix_ms((vehicle.unix_us / 1000) as i64 + 30_000).unwrap().total_ms();
     let flight = Flight {
         trajectory: trajectory.clone(),
         frame,
         start_gps_ms,
         yaw_rad: None,
-        clock: updraft::fleet::vehicle_clock::VehicleClock::default(),
+        clock: VehicleClock::default(),
     };
     let (lines, done) = dry_run(Guided::new(drone(2), flight), &mut vehicle, 100_000);
     assert_eq!(done, Some(Ok(())));
@@ -467,4 +471,115 @@ fn a_stock_vehicle_is_guided_along_its_trajectory() {
     assert!((duration_s - 4.0..duration_s).contains(&flown_s), "{flown_s} of {duration_s} s");
     let shown = lines[..12].iter().chain(&lines[lines.len() - 3..]);
     assert_snapshot!(shown.cloned().collect::<Vec<_>>().join("\n"));
+}
+
+#[test]
+fn stock_vehicles_are_guided_over_a_slow_link_and_watched() {
+    let plan = plan();
+    let faults = Faults { loss: 0.05, delay: 100 * MS, jitter: 20 * MS, ..Faults::default() };
+    let mut net = fleet(&plan, false, faults, 3);
+    let mut telemetry = Telemetry::default();
+    pass(&mut net, A_WHILE, &mut telemetry);
+    let table = slots::propose(&plan, &telemetry, net.now()).unwrap();
+    let now_ms = telemetry.drones[&drone(1)].clock.gps_ms(net.now()).unwrap();
+    let start_gps_ms = (now_ms / 1000.0).ceil() as i64 * 1000 + 20_000;
+    let guided = |id: DroneId| {
+        let flight = Flight {
+            trajectory: Trajectory::of_slot(&plan, plan.slot(id.system.into()).unwrap()),
+            frame: plan.site.frame(),
+            start_gps_ms,
+            yaw_rad: Some(0.0),
+            clock: telemetry.drones[&id].clock.clone(),
+        };
+        (id, Guided::new(id, flight))
+    };
+    let machines: BTreeMap<_, _> = all().into_iter().map(guided).collect();
+    let mut monitor = Monitor::new(&plan, &table, telemetry, watch::Limits::of(&plan));
+    monitor.set_start(Some(start_gps_ms));
+    let done = drive(&mut net, machines, ALL_AT_ONCE, &mut monitor).unwrap();
+    assert!(done.values().all(Result::is_ok), "{done:?}");
+    let events = monitor.take_events();
+    assert!(!events.iter().any(|told| told.event.is_alarm()), "{events:?}");
+    pass(&mut net, 5 * S, &mut monitor);
+    assert!(monitor.is_over());
+}
+
+#[test]
+fn every_refusal_of_a_guided_flight_is_said() {
+    let plan = plan();
+    let trajectory = Trajectory::of_slot(&plan, &plan.slots[1]);
+    let frame = plan.site.frame();
+    let place = frame.to_geodetic(trajectory.start_m);
+    let start = |ahead_s: i64| {
+        let unix_ms = (Obliging::new(drone(2), false, place).unix_us / 1000) as i64;
+        GpsTime::from_unix_ms(unix_ms + ahead_s * 1000).unwrap().total_ms()
+    };
+    let flight = |trajectory: &Trajectory, ahead_s| Flight {
+        trajectory: trajectory.clone(),
+        frame,
+        start_gps_ms: start(ahead_s),
+        yaw_rad: None,
+        clock: VehicleClock::default(),
+    };
+    let mut lines = Vec::new();
+    let mut case = |trajectory: &Trajectory, ahead_s, fault: Fault| {
+        let vehicle = Scripted::new(Obliging::new(drone(2), false, place), fault);
+        let mut net = Net::new(BTreeMap::from([(drone(2), vehicle)]), Faults::default(), 1);
+        let machine = Guided::new(drone(2), flight(trajectory, ahead_s));
+        let machines = BTreeMap::from([(drone(2), machine)]);
+        let done = drive(&mut net, machines, 1, &mut NoWatch).unwrap();
+        lines.push(done[&drone(2)].as_ref().unwrap_err().to_string());
+    };
+    case(&Trajectory::default(), 30, Fault::None);
+    case(&trajectory, 30, Fault::Silent);
+    case(&trajectory, -30, Fault::None);
+    let arm = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+    case(&trajectory, 30, Fault::Refuses(arm, MavResult::MAV_RESULT_FAILED));
+    let takeoff = MavCmd::MAV_CMD_NAV_TAKEOFF;
+    case(&trajectory, 30, Fault::Ignores(takeoff));
+    assert_snapshot!(lines.join("\n"));
+}
+
+#[test]
+fn a_monitor_tells_what_goes_wrong() {
+    let plan = plan();
+    let (mut net, telemetry) = ready(&plan, Faults::default(), 1);
+    let start = telemetry.drones[&drone(1)].clock.gps_ms(net.now()).unwrap() as i64 - 15_000;
+    let mut monitor = Monitor::new(&plan, &table(&plan), telemetry, watch::Limits::of(&plan));
+    monitor.set_start(Some(start));
+    pass(&mut net, S, &mut monitor);
+    assert_eq!(monitor.take_events(), []);
+    for vehicle in net.vehicles.values_mut() {
+        vehicle.inner.armed = true;
+        vehicle.inner.status.stage = Stage::Performing;
+        vehicle.inner.above_home_m = 30.0;
+    }
+    let change = |net: &mut Net, system: u8, change: fn(&mut Scripted)| {
+        change(net.vehicles.get_mut(&drone(system)).unwrap());
+    };
+    change(&mut net, 1, |v| v.inner.above_home_m = 20.0);
+    change(&mut net, 2, |v| v.inner.status.flags |= flag::FENCE_BREACHED);
+    change(&mut net, 3, |v| v.fault = Fault::Silent);
+    change(&mut net, 4, |v| v.inner.mode = RTL);
+    change(&mut net, 5, |v| v.inner.status.stage = Stage::Error);
+    pass(&mut net, 5 * S, &mut monitor);
+    change(&mut net, 1, |v| v.inner.above_home_m = 30.0);
+    change(&mut net, 3, |v| v.fault = Fault::None);
+    change(&mut net, 6, |v| v.inner.armed = false);
+    pass(&mut net, 3 * S, &mut monitor);
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = Journal::open(folder.path()).unwrap();
+    let events = monitor.take_events();
+    for told in &events {
+        let (unix_us, drone) = (1_795_143_537_000_000 + told.at, Some(told.drone));
+        journal.write(&Entry { unix_us, drone, event: &told.event }).unwrap();
+    }
+    let text = |told: &watch::Told| {
+        let mark = if told.event.is_alarm() { " !" } else { "" };
+        format!("{:.1} s drone {}: {}{mark}", told.at as f64 / 1e6, told.drone, told.event)
+    };
+    let lines: Vec<String> = events.iter().map(text).collect();
+    assert_snapshot!("events", lines.join("\n"));
+    let written = std::fs::read_to_string(folder.path().join(JOURNAL_FILE)).unwrap();
+    assert_snapshot!("journal", written);
 }

@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 
 use fleet_show_support::{Fault, Net, bad, drone, fleet, load, one, plan};
 use insta::assert_snapshot;
+use updraft::fleet::clear::Clear;
 use updraft::fleet::dry_run::{Obliging, dry_run};
 use updraft::fleet::fence::{Fence, PutFence};
-use updraft::fleet::upload::{Clear, Upload};
+use updraft::fleet::upload::Upload;
 use updraft::link::drive::{Machine as _, NoWatch, Step, drive};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{MavCmd, MavResult};

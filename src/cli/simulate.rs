@@ -18,7 +18,8 @@ use crate::campaign::{self, FlightFolder};
 use crate::effects;
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
-use crate::show::{Show, Trajectory};
+use crate::show::quantise::as_flown;
+use crate::show::{Show, ShowDrone, Trajectory};
 use crate::sim::air::spec::{self, Air, AirSpec};
 use crate::sim::air::truth;
 use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, fly_to_file};
@@ -274,9 +275,8 @@ pub(super) fn simulate(
     let start = record.start;
     let frame = plan.site.frame();
     let show = Show::of_plan(plan);
-    let lights: BTreeMap<u16, &[u8]> = (plan.slots.iter().zip(&show.drones))
-        .map(|(slot, drone)| (slot.slot, drone.lights.as_slice()))
-        .collect();
+    let drones: BTreeMap<u16, &ShowDrone> =
+        plan.slots.iter().zip(&show.drones).map(|(slot, drone)| (slot.slot, drone)).collect();
     let air = spec::build(&simulation.air, &frame, simulation.seed, &plan.name);
     if simulation.truth {
         wanted.par_iter().try_for_each(|slot| {
@@ -289,17 +289,22 @@ pub(super) fn simulate(
         .par_iter()
         .map(|slot| {
             context.check_stop()?;
-            let trajectory = Trajectory::of_slot(plan, slot);
+            // What is uploaded to a drone, so that simulated and virtual fleets log the same.
+            let drone =
+                drones.get(&slot.slot).copied().map_or_else(|| Ok(ShowDrone::default()), as_flown);
+            let drone = drone.map_err(|error| {
+                CommandError::Failed(format!("slot {} has no .skyb file: {error}", slot.slot))
+            })?;
             let setup = FlightSetup {
                 vehicle: &vehicle,
-                trajectory: &trajectory,
+                trajectory: &drone.trajectory,
                 home_m: slot.home_m.into(),
                 frame,
                 atmosphere: &air,
                 seed: simulation.seed,
                 drone: slot.slot,
                 start,
-                lights: lights.get(&slot.slot).copied().unwrap_or_default(),
+                lights: &drone.lights,
                 full_logs: simulation.full_logs,
                 hooks: Hooks { progress: None, stop: Some(context.stop_flag()) },
             };

@@ -11,7 +11,7 @@ use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Step};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
-use crate::protocol::show::{CLEAR_TIME, FROM_DRONE, StartConfig, Status, flag};
+use crate::protocol::show::{CLEAR_TIME, FROM_DRONE, Stage, StartConfig, Status, flag};
 use dialect::{MavCmd, MavModeFlag, MavResult};
 
 /// For `drive`: no drone waits for another.
@@ -22,6 +22,8 @@ const EVERY: Micros = 200 * MS;
 const GIVE_UP: Micros = 120 * S;
 /// What is heard sooner may have been sent before the abort.
 const SETTLE: Micros = S;
+/// What was known of a drone that is older than its latest word by more says nothing.
+const KNOWN_WITHIN: Micros = 3 * S;
 /// The show firmware's status comes within this.
 const STATUS_WITHIN: Micros = 3 * S;
 /// A return that is refused so often becomes a landing.
@@ -97,6 +99,11 @@ impl Abort {
     /// disarmed is not pulled out of its mode. It cannot fly before its next heartbeats: arming
     /// comes eight seconds before the take-off.
     pub fn new(drone: DroneId, action: Action, known: Option<&Drone>) -> Self {
+        let known = known.filter(|known| {
+            let old = |at: Micros| known.heard.saturating_sub(at) > KNOWN_WITHIN;
+            !known.armed.is_some_and(|(at, _)| old(at))
+                && !known.status.is_some_and(|(at, _)| old(at))
+        });
         let armed = known.and_then(Drone::is_armed);
         let status = known.and_then(|known| known.status).map(|(_, status)| status);
         Self {
@@ -115,19 +122,21 @@ impl Abort {
         }
     }
 
-    /// Armed, but not in the air: there it lands at once, where a return might not disarm.
-    fn wanted(&self) -> Action {
-        let on_ground = self.status.is_some_and(|status| {
-            use crate::protocol::show::Stage;
+    /// Armed, but not in the air: there it lands at once, where a return might not disarm. Kept,
+    /// as leaving the show ends its stages.
+    fn decide(&mut self) {
+        let on_ground = |status: Status| {
             matches!(status.stage, Stage::Init | Stage::WaitForStart | Stage::Landed)
-        });
-        if on_ground { Action::Land } else { self.action }
+        };
+        if self.status.is_some_and(on_ground) {
+            self.action = Action::Land;
+        }
     }
 
     fn outcome(&self, now: Micros, begun: Micros) -> Option<Aborted> {
         match (self.armed, self.mode) {
-            (Some(true), Some(mode)) if mode == self.wanted().mode() => {
-                Some(Aborted::Confirmed(self.wanted()))
+            (Some(true), Some(mode)) if mode == self.action.mode() => {
+                Some(Aborted::Confirmed(self.action))
             }
             (Some(false), _) if self.grounded => {
                 // Without show mode there is no status to wait for.
@@ -175,6 +184,7 @@ impl Machine for Abort {
 
     fn poll(&mut self, now: Micros) -> Step<Aborted> {
         let begun = *self.begun.get_or_insert(now);
+        self.decide();
         if let Some(outcome) = self.outcome(now, begun) {
             return Step::Done(outcome);
         }
@@ -198,6 +208,6 @@ impl Machine for Abort {
             return self.poll(now);
         }
         let confirmation = self.told.min(255) as u8 - 1;
-        Step::send(set_mode(self.drone, self.wanted().mode(), confirmation))
+        Step::send(set_mode(self.drone, self.action.mode(), confirmation))
     }
 }

@@ -56,7 +56,7 @@ pub enum CommandError {
 pub struct Command {
     what: String,
     message: MavMessage,
-    command: MavCmd,
+    asked: MavCmd,
     patience: Patience,
     tries: u32,
     next: Micros,
@@ -68,7 +68,7 @@ impl Command {
     /// A COMMAND_LONG or COMMAND_INT, as [`super::messages`] makes them; `what` says in words
     /// what is asked. Other messages are never answered.
     pub fn new(what: impl Into<String>, message: MavMessage) -> Self {
-        let command = match &message {
+        let asked = match &message {
             MavMessage::COMMAND_LONG(c) => c.command,
             MavMessage::COMMAND_INT(c) => c.command,
             _ => MavCmd::DEFAULT,
@@ -76,7 +76,7 @@ impl Command {
         Self {
             what: what.into(),
             message,
-            command,
+            asked,
             patience: Patience::default(),
             tries: 0,
             next: 0,
@@ -97,7 +97,7 @@ impl Machine for Command {
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {
         let MavMessage::COMMAND_ACK(ack) = message else { return };
-        if ack.command != self.command || self.tries == 0 {
+        if ack.command != self.asked || self.tries == 0 {
             return;
         }
         match ack.result {

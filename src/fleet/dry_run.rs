@@ -116,7 +116,9 @@ impl Obliging {
             }
             MavMessage::PARAM_REQUEST_LIST(_) => {
                 let names: Vec<String> = self.params.keys().cloned().collect();
-                names.iter().for_each(|name| self.param(name, out));
+                for name in &names {
+                    self.param(name, out);
+                }
             }
             MavMessage::MISSION_COUNT(m) => {
                 self.fence.clear();

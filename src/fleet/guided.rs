@@ -60,7 +60,7 @@ pub enum GuidedError {
     #[error("the start time has passed before the drone could be armed: set a new one")]
     TooLate,
     /// It does not arm.
-    #[error("the drone did not arm or take off in time, and was told to land; it says: {said}")]
+    #[error("the drone did not arm or take off in time and is not flown; it says: {said}")]
     NoTakeoff {
         /// What it said last.
         said: String,

@@ -46,6 +46,9 @@ pub struct Known {
     pub params: BTreeMap<DroneId, Standing>,
 }
 
+/// The link of a drone that is not heard.
+const SILENT: &str = "silent";
+
 /// One thing that was looked at.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cell {
@@ -193,11 +196,11 @@ impl Look<'_> {
 
     fn link(&self) -> Cell {
         if self.of.heard == 0 && self.of.mode.is_none() {
-            return bad("silent", "was never heard: is it on?");
+            return bad(SILENT, "was never heard: is it on?");
         }
         let silent = self.now.saturating_sub(self.of.heard);
         if silent > SILENT_AFTER {
-            return bad("silent", format!("has been silent for {} s", silent / 1_000_000));
+            return bad(SILENT, format!("has been silent for {} s", silent / 1_000_000));
         }
         match self.of.link_quality() {
             None => bad("?", "is not heard for long enough to judge its link: wait a few seconds"),
@@ -401,12 +404,15 @@ impl std::fmt::Display for Preflight {
         for line in &lines {
             let mut text = String::new();
             for (cell, width) in line.iter().zip(&widths) {
-                text.push_str(&format!("{cell:<width$}  "));
+                let _ = std::fmt::Write::write_fmt(&mut text, format_args!("{cell:<width$}  "));
             }
             writeln!(f, "{}", text.trim_end())?;
         }
         for row in &self.rows {
-            for why in row.cells.iter().filter_map(|cell| cell.no_go.as_deref()) {
+            // Of a silent drone nothing else is known either.
+            let silent = row.cells.first().is_some_and(|cell| cell.text == SILENT);
+            let shown = if silent { 1 } else { row.cells.len() };
+            for why in row.cells.iter().take(shown).filter_map(|cell| cell.no_go.as_deref()) {
                 writeln!(f, "NO-GO drone {} (slot {}): {why}", row.drone, row.slot)?;
             }
         }

@@ -1,6 +1,7 @@
 //! Which vehicle flies which slot: the table of a campaign, held against where each one stands.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -266,7 +267,7 @@ pub fn check_stands(
             continue;
         };
         let distance_m = distance_m(stand.at_m, home.home_m);
-        if stand.nearest != slot && distance_m > allowed_m {
+        if stand.nearest != slot && stand.distance_m <= allowed_m {
             let stands = stand.nearest;
             problems.push(SlotProblem::WrongSlot { drone, slot, stands, distance_m });
         } else if distance_m > allowed_m {
@@ -341,13 +342,13 @@ pub fn picture(plan: &Plan, telemetry: &Telemetry, now: Micros) -> String {
                 Some(slot) => cells.get(&slot.slot).map_or(".", String::as_str),
                 None => "",
             };
-            line.push_str(&format!(" {cell:>width$}"));
+            let _ = write!(line, " {cell:>width$}");
         }
         text.push_str(line.trim_end());
         text.push('\n');
     }
     text.push_str("  (up: along the show's x axis");
-    text.push_str(&format!(", {:.0} degrees from north)\n", plan.site.orientation_deg));
+    let _ = writeln!(text, ", {:.0} degrees from north)", plan.site.orientation_deg);
     text.extend(beside);
     text
 }

@@ -199,7 +199,7 @@ pub enum Phase {
 #[derive(Clone, Debug)]
 pub struct Start {
     drones: BTreeSet<DroneId>,
-    start_gps_ms: i64,
+    at_gps_ms: i64,
     options: StartOptions,
     phase: Phase,
     next: Micros,
@@ -223,20 +223,20 @@ impl Start {
             ClockSpread::Apart { text, .. } => Err(StartRefusal::Clocks { text }),
             ClockSpread::Agree { gps_ms, .. } => {
                 let second = ((gps_ms / 1000.0) + options.lead_s).ceil() as i64;
-                let start_gps_ms = second * 1000;
-                Ok(Self { drones, start_gps_ms, options, phase: Phase::Announced, next: 0 })
+                let at_gps_ms = second * 1000;
+                Ok(Self { drones, at_gps_ms, options, phase: Phase::Announced, next: 0 })
             }
         }
     }
 
     /// Show time 0.
     pub fn time(&self) -> Option<GpsTime> {
-        GpsTime::from_total_ms(self.start_gps_ms)
+        GpsTime::from_total_ms(self.at_gps_ms)
     }
 
     /// The same as the firmware has it: GPS second of week.
     pub fn second_of_week(&self) -> i32 {
-        (self.start_gps_ms / 1000).rem_euclid(i64::from(WEEK_S)) as i32
+        (self.at_gps_ms / 1000).rem_euclid(i64::from(WEEK_S)) as i32
     }
 
     /// The drones that are to start.
@@ -251,7 +251,7 @@ impl Start {
 
     /// Time left to the start by the vehicles' clocks, s (negative after it); `None`: no clock.
     pub fn left_s(&self, telemetry: &Telemetry, now: Micros) -> Option<f64> {
-        self.gps_ms(telemetry, now).map(|gps_ms| (self.start_gps_ms as f64 - gps_ms) / 1000.0)
+        self.gps_ms(telemetry, now).map(|gps_ms| (self.at_gps_ms as f64 - gps_ms) / 1000.0)
     }
 
     fn gps_ms(&self, telemetry: &Telemetry, now: Micros) -> Option<f64> {

@@ -206,7 +206,7 @@ impl Drone {
             && last.id == text.id
         {
             last.at = now;
-            last.text.extend(words.chars());
+            last.text.push_str(&words);
             last.text = last.text.chars().take(TEXT).collect();
             return;
         }

@@ -3,6 +3,7 @@
 //! It ends with a show that is loaded whole, or with a refusal that says why and a vehicle whose
 //! show is cleared. A vehicle that is armed or authorized is not touched.
 
+use super::clear::Clear;
 use super::command::{Command, CommandError};
 use super::fence::{Fence, FenceError, PutFence, degrees_1e7};
 use super::ftp::{Caller, FtpError};
@@ -14,7 +15,7 @@ use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::mission::plan::Site;
 use crate::protocol::show::{FROM_DRONE, NO_AMSL_MM, SHOW_FILE, SHOW_MODE, Stage, Status, flag};
-use dialect::{MavCmd, MavModeFlag, MavResult};
+use dialect::{MavCmd, MavModeFlag};
 
 /// A vehicle boots within this, and says so.
 const BOOT_WITHIN: Micros = 60 * S;
@@ -26,8 +27,6 @@ const SETTLE: Micros = S;
 const STATUS_WITHIN: Micros = 15 * S;
 /// So many status packets in a row must say that all is well.
 const AGREEING: u32 = 2;
-/// Clearing is repeated so often.
-const CLEAR_TRIES: u32 = 20;
 
 /// What is loaded onto a vehicle.
 #[derive(Clone, Debug, PartialEq)]
@@ -411,69 +410,5 @@ impl Machine for Upload {
 
     fn progress(&self) -> Progress {
         Progress { done: self.step, total: STEPS }
-    }
-}
-
-/// A show that could not be cleared.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "clearing the show was not confirmed: switch the drone off, or bring it nearer and try again"
-)]
-pub struct NotCleared;
-
-/// Clears the show of a vehicle, until its status says that none is loaded.
-#[derive(Clone, Debug)]
-pub struct Clear {
-    drone: DroneId,
-    tries: u32,
-    next: Micros,
-    accepted: Option<Micros>,
-    cleared: bool,
-}
-
-impl Clear {
-    /// Clears the show of a vehicle; for those that an interrupted upload left, too.
-    pub fn new(drone: DroneId) -> Self {
-        Self { drone, tries: 0, next: 0, accepted: None, cleared: false }
-    }
-}
-
-impl Machine for Clear {
-    type Done = Result<(), NotCleared>;
-
-    fn on_message(&mut self, now: Micros, message: &MavMessage) {
-        match message {
-            MavMessage::COMMAND_ACK(ack)
-                if ack.command == MavCmd::MAV_CMD_USER_1
-                    && ack.result == MavResult::MAV_RESULT_ACCEPTED
-                    && self.tries > 0 =>
-            {
-                self.accepted.get_or_insert(now);
-            }
-            // An answer to an earlier reload looks the same: the status decides.
-            MavMessage::DATA16(data) if data.mavtype == FROM_DRONE => {
-                let length = usize::from(data.len).min(data.data.len());
-                let loaded = Status::from_data(&data.data[..length]).has(flag::LOADED);
-                let settled = self.accepted.is_some_and(|at| now >= at + SETTLE);
-                self.cleared |= settled && !loaded;
-            }
-            _ => {}
-        }
-    }
-
-    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
-        if self.cleared {
-            return Step::Done(Ok(()));
-        }
-        if now < self.next {
-            return Step::Wait(self.next);
-        }
-        if self.tries >= CLEAR_TRIES {
-            return Step::Done(Err(NotCleared));
-        }
-        self.tries += 1;
-        self.next = now + S;
-        let params = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        Step::send(command_long(self.drone, MavCmd::MAV_CMD_USER_1, params, 0))
     }
 }

@@ -150,6 +150,7 @@ pub struct Flying {
     pub over: bool,
 }
 
+#[expect(clippy::struct_excessive_bools, reason = "what was told, each on its own")]
 struct Watched {
     trajectory: Trajectory,
     flying: Flying,
@@ -299,7 +300,7 @@ impl Watched {
         self.flying.show_s =
             start_gps_ms.zip(gps_ms).map(|(start, gps_ms)| (gps_ms - start as f64) / 1000.0);
         self.distance(of, limits, frame, start_gps_ms, tell);
-        self.flying.over = self.over(now, of);
+        self.flying.over = self.over();
     }
 
     fn states(&mut self, of: &Drone, tell: &mut dyn FnMut(Event)) {
@@ -375,13 +376,12 @@ impl Watched {
         }
     }
 
-    fn over(&self, now: Micros, of: &Drone) -> bool {
+    fn over(&self) -> bool {
         if self.armed == Some(true) && !self.silent {
             return false;
         }
         let Some(show_s) = self.flying.show_s else { return false };
         let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
-        let _ = (now, of);
         match self.stage {
             _ if self.silent => show_s > end_s + 60.0,
             _ if self.was_armed => show_s > 0.0,

@@ -1,10 +1,11 @@
-//! What whole units cost: the deviation of each drone's `.skyb` file from its trajectory.
+//! What whole units cost: the deviation of each drone's `.skyb` file from its trajectory, and what
+//! is flown of it.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Show;
 use super::skyb::{self, Quantisation, SkybError, SkybOptions};
+use super::{Show, ShowDrone};
 
 /// The `.skyb` file of one drone, in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,6 +23,15 @@ pub struct DroneQuantisation {
     /// Deviation from the trajectory.
     #[serde(flatten)]
     pub deviation: Quantisation,
+}
+
+/// What a drone flies when it is given this show: its `.skyb` file, read as the firmware reads it.
+///
+/// # Errors
+/// When the show does not fit into a file.
+pub fn as_flown(drone: &ShowDrone) -> Result<ShowDrone, SkybError> {
+    let file = skyb::write(drone, &SkybOptions::default())?;
+    Ok(skyb::read(&file.bytes)?.drone)
 }
 
 /// Writes each drone's `.skyb` file in memory and reports what that costs, in the order of the drones.
