@@ -5,13 +5,13 @@ mod fleet_transfer_support;
 use std::collections::BTreeMap;
 
 use fleet_transfer_support::{Net, content, drone, fleet};
+use updraft::base::crc::ap_crc32;
 use updraft::fleet::ftp::get::{Get, GetOptions};
 use updraft::fleet::ftp::list::List;
 use updraft::fleet::ftp::put::Put;
 use updraft::fleet::ftp::sum::Sum;
 use updraft::fleet::ftp::{Caller, FtpError};
 use updraft::fleet::sink::Memory;
-use updraft::base::crc::ap_crc32;
 use updraft::link::clock::{MS, S};
 use updraft::link::drive::{Machine, NoWatch, drive};
 use updraft::link::net::Net as _;
@@ -75,10 +75,7 @@ fn efficiency(drones: u8, loss: f64) -> (f64, f64) {
     let machines = (1..=drones)
         .map(|system| {
             let caller = Caller::new(drone(system), 7);
-            (
-                drone(system),
-                Get::new(caller, LOG, Memory::default(), GetOptions::default()),
-            )
+            (drone(system), Get::new(caller, LOG, Memory::default(), GetOptions::default()))
         })
         .collect();
     let done = drive(&mut net, machines, 3, &mut NoWatch).unwrap();

@@ -20,10 +20,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("effects", &["base", "vehicle"]),
     ("sim", &["base", "vehicle", "mission", "show", "log", "effects"]),
     ("virtual_fleet", &["base", "vehicle", "mission", "show", "sim", "log", "link", "protocol"]),
-    (
-        "fleet",
-        &["base", "vehicle", "mission", "show", "log", "link", "protocol", "campaign"],
-    ),
+    ("fleet", &["base", "vehicle", "mission", "show", "log", "link", "protocol", "campaign"]),
     ("flight", &["base", "vehicle", "mission", "log"]),
     ("analysis", &["base", "vehicle", "mission", "log", "flight"]),
     ("study", &["base", "vehicle", "mission", "show", "sim", "log", "flight", "analysis"]),

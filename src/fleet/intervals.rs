@@ -57,8 +57,7 @@ impl Intervals {
 
     /// Whether a whole range is in it.
     pub fn contains(&self, start: u64, end: u64) -> bool {
-        start >= end
-            || self.ranges.range(..=start).next_back().is_some_and(|(_, &its)| its >= end)
+        start >= end || self.ranges.range(..=start).next_back().is_some_and(|(_, &its)| its >= end)
     }
 
     /// The first range at or behind `from`, below `limit`, that is not in it.

@@ -28,9 +28,9 @@ impl Rtt {
 
     /// An answer is lost when it takes longer.
     pub fn timeout(&self) -> Micros {
-        let time = self.seen.map_or(FIRST, |(mean, deviation)| {
-            (mean + 4.0 * deviation).max(1.5 * mean) as Micros
-        });
+        let time = self
+            .seen
+            .map_or(FIRST, |(mean, deviation)| (mean + 4.0 * deviation).max(1.5 * mean) as Micros);
         time.clamp(LEAST, MOST)
     }
 }

@@ -70,7 +70,8 @@ impl<S: Storage> Endpoint for FileVehicle<S> {
             self.next_heartbeat = now + S;
             out.push(heartbeat(self.is_armed));
         }
-        let ftp = self.ftp.as_mut().map_or(Micros::MAX, |ftp| ftp.poll(now, &mut self.storage, out));
+        let ftp =
+            self.ftp.as_mut().map_or(Micros::MAX, |ftp| ftp.poll(now, &mut self.storage, out));
         let logs = self.logs.poll(now, self.is_armed, &self.storage, out);
         ftp.min(logs).min(self.next_heartbeat)
     }

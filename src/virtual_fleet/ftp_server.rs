@@ -134,9 +134,7 @@ impl FtpServer {
         let station = burst.station;
         let mut bytes = vec![0; usize::from(burst.size).min(MOST_DATA)];
         let read = match &self.open {
-            Some(open) => {
-                storage.read_at(&open.name, u64::from(burst.answer.offset), &mut bytes)
-            }
+            Some(open) => storage.read_at(&open.name, u64::from(burst.answer.offset), &mut bytes),
             None => Err(StorageError::NotFound),
         };
         let mut answer = burst.answer.clone();

@@ -105,13 +105,14 @@ impl Storage for MemoryStorage {
         let own = |name: &String| name.rsplit('/').next().unwrap_or_default().to_owned();
         let folders = self.folders.iter().filter(here);
         let files = self.files.iter().filter(|(name, _)| here(name));
-        let mut entries: Vec<Entry> = folders
-            .map(|name| Entry { name: own(name), size: None })
-            .chain(files.map(|(name, content)| Entry {
-                name: own(name),
-                size: Some(content.len() as u64),
-            }))
-            .collect();
+        let mut entries: Vec<Entry> =
+            folders
+                .map(|name| Entry { name: own(name), size: None })
+                .chain(files.map(|(name, content)| Entry {
+                    name: own(name),
+                    size: Some(content.len() as u64),
+                }))
+                .collect();
         entries.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(entries)
     }

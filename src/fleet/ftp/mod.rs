@@ -67,7 +67,9 @@ pub enum FtpError {
         most: u64,
     },
     /// The written file differs.
-    #[error("the file on the vehicle differs from what was sent (checksum {found:08x}, not {right:08x})")]
+    #[error(
+        "the file on the vehicle differs from what was sent (checksum {found:08x}, not {right:08x})"
+    )]
     Checksum {
         /// Of the vehicle's file.
         found: u32,
@@ -107,8 +109,7 @@ impl Caller {
     pub fn new(drone: DroneId, start: u32) -> Self {
         let mixed = start.wrapping_mul(0x9E37_79B1);
         let session = 1 + ((mixed >> 24) % 250) as u8;
-        let numbers =
-            Numbers { sequence: mixed as u16, session, open: None, rtt: Rtt::default() };
+        let numbers = Numbers { sequence: mixed as u16, session, open: None, rtt: Rtt::default() };
         Self { drone, numbers: Rc::new(RefCell::new(numbers)) }
     }
 

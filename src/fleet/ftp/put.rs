@@ -77,7 +77,9 @@ impl Put {
     fn on_created(&mut self, now: Micros, outcome: Result<Packet, Refusal>) {
         match outcome {
             Ok(_) => self.stage = Stage::Write(Writing::default()),
-            Err(refusal @ Refusal::Fail) => self.again(now + BUSY_PAUSE, "creating the file", refusal),
+            Err(refusal @ Refusal::Fail) => {
+                self.again(now + BUSY_PAUSE, "creating the file", refusal)
+            }
             Err(refusal) => {
                 let what = "creating the file";
                 self.stage = Stage::Over(Err(FtpError::Refused { what, refusal }));

@@ -38,8 +38,7 @@ impl Machine for Sum {
             Some(Err(refusal)) => self.over = Some(Err(FtpError::Refused { what, refusal })),
             Some(Ok(packet)) => {
                 let sum: Option<[u8; 4]> = packet.data.get(..4).and_then(|b| b.try_into().ok());
-                self.over =
-                    Some(sum.map(u32::from_le_bytes).ok_or(FtpError::Nonsense { what }));
+                self.over = Some(sum.map(u32::from_le_bytes).ok_or(FtpError::Nonsense { what }));
             }
         }
     }

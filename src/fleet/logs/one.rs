@@ -24,6 +24,8 @@ use crate::protocol::ftp::Refusal;
 /// MAVFTP is given up for the log messages when a drone that is heard does not answer for so
 /// long.
 const FTP_PATIENCE: Micros = 12 * S;
+/// A drone whose last heartbeat is older is not heard.
+const HEARD: Micros = 4 * S;
 /// A log that still grows is continued so often; then what was listed is taken.
 const MOST_ROUNDS: u32 = 3;
 /// A log that turns out to be another is begun anew so often.
@@ -132,6 +134,7 @@ pub struct PullOne {
     reason: Option<String>,
     heartbeat: Option<Micros>,
     started: Option<Micros>,
+    now: Micros,
     tally: Tally,
     done: OneDone,
     held: u64,
@@ -189,6 +192,7 @@ impl PullOne {
             reason: None,
             heartbeat: None,
             started: None,
+            now: 0,
             tally: Tally::default(),
             done: OneDone::default(),
             held: 0,
@@ -229,7 +233,12 @@ impl PullOne {
         )
     }
 
-    fn list(&mut self, patience: Micros) -> Option<List> {
+    /// Whether its heartbeats come.
+    fn is_heard(&self) -> bool {
+        self.heartbeat.is_some_and(|at| self.now < at + HEARD)
+    }
+
+    fn list(&self, patience: Micros) -> Option<List> {
         let folder = self.options.folders.get(self.folder)?;
         Some(List::new(self.caller.another(), folder, patience))
     }
@@ -292,22 +301,20 @@ impl PullOne {
                     None => self.fall_back("MAVFTP shows no folder of logs".to_owned()),
                 };
             }
-            Err(FtpError::Silent { .. }) if self.heartbeat.is_none() => {
-                return match self.list(self.options.patience) {
-                    // A drone that is only just being switched on.
-                    Some(list) if self.rounds == 0 => {
-                        self.rounds = 1;
-                        Stage::List(list)
-                    }
-                    _ => {
-                        let seconds = (self.options.patience + FTP_PATIENCE) / S;
-                        self.fail_silent(FtpError::Silent { seconds }.to_string())
-                    }
+            // A drone that is only just being switched on, or boots.
+            Err(FtpError::Silent { .. }) if !self.is_heard() => {
+                let heard = self.heartbeat.or(self.started).unwrap_or(self.now);
+                if self.now >= heard + self.options.patience {
+                    let seconds = self.now.saturating_sub(heard) / S;
+                    return self.fail_silent(FtpError::Silent { seconds }.to_string());
+                }
+                return match self.list(FTP_PATIENCE) {
+                    Some(list) => Stage::List(list),
+                    None => Stage::Over,
                 };
             }
             Err(error) => return self.fall_back(format!("MAVFTP: {error}")),
         };
-        self.rounds = 0;
         let Some(folder) = self.options.folders.get(self.folder) else { return Stage::Over };
         let mut logs: Vec<(u32, String, u64)> = names
             .into_iter()
@@ -341,10 +348,8 @@ impl PullOne {
     /// From logs in the order of their numbers.
     fn choose(&mut self, logs: &[(u32, String, u64)]) -> Stage {
         let Some((newest, ..)) = logs.last() else {
-            return self.fail(
-                "the drone has no logs".to_owned(),
-                "check its card and LOG_BACKEND_TYPE",
-            );
+            return self
+                .fail("the drone has no logs".to_owned(), "check its card and LOG_BACKEND_TYPE");
         };
         let newest = *newest;
         let wanted = |number: u32| match self.options.which {
@@ -381,8 +386,7 @@ impl PullOne {
             let path = shelf.path(&target.file);
             let is_there = shelf.entry(&target.file).is_some_and(|entry| {
                 entry.source == target.source
-                    && std::fs::metadata(&path)
-                        .is_ok_and(|about| about.len() == entry.size_bytes)
+                    && std::fs::metadata(&path).is_ok_and(|about| about.len() == entry.size_bytes)
             });
             (path, is_there)
         };
@@ -427,11 +431,13 @@ impl PullOne {
         if looks && part.have().total() > 0 {
             let last = part.have().iter().last().unwrap_or_default();
             let first = part.have().iter().next().unwrap_or_default();
-            let tail = |(start, end): (u64, u64)| (end.saturating_sub(SAMPLE_BYTES).max(start), end);
+            let tail =
+                |(start, end): (u64, u64)| (end.saturating_sub(SAMPLE_BYTES).max(start), end);
             return match Sample::new(part.path(), self.size, &[tail(first), tail(last)]) {
                 Err(error) => self.fail(error.to_string(), "run again"),
                 Ok(sample) if self.reason.is_none() => {
-                    let get = Get::new(self.caller.another(), &target.source, sample, self.get_sample());
+                    let get =
+                        Get::new(self.caller.another(), &target.source, sample, self.get_sample());
                     Stage::Probe(Box::new(get), part)
                 }
                 Ok(sample) => Stage::LogProbe(Box::new(self.log_get(sample)), part),
@@ -526,7 +532,7 @@ impl PullOne {
             Ok(size) => {
                 self.size = size;
                 self.rounds += 1;
-                match self.list(FTP_PATIENCE) {
+                match self.list(self.options.patience) {
                     Some(list) => Stage::Relist(list, part),
                     None => self.compare(part, false),
                 }
@@ -563,8 +569,7 @@ impl PullOne {
         let Some(target) = &self.target else { return Stage::Over };
         if is_settled {
             let source = target.source.clone();
-            let sum =
-                Sum::new(self.caller.another(), &source, self.size, self.options.patience);
+            let sum = Sum::new(self.caller.another(), &source, self.size, self.options.patience);
             return Stage::Sum(sum, part, sums);
         }
         self.sample(part, sums)
@@ -580,25 +585,21 @@ impl PullOne {
         match Sample::new(part.path(), self.size, &ranges) {
             Err(error) => self.fail(error.to_string(), "run again"),
             Ok(sample) if self.reason.is_none() => {
-                let get = Get::new(self.caller.another(), &target.source, sample, self.get_sample());
+                let get =
+                    Get::new(self.caller.another(), &target.source, sample, self.get_sample());
                 Stage::Sample(Box::new(get), part, sums)
             }
             Ok(sample) => Stage::LogSample(Box::new(self.log_get(sample)), part, sums),
         }
     }
 
-    fn on_summed(
-        &mut self,
-        part: PartFile,
-        sums: Sums,
-        outcome: Result<u32, FtpError>,
-    ) -> Stage {
+    fn on_summed(&mut self, part: PartFile, sums: Sums, outcome: Result<u32, FtpError>) -> Stage {
         match outcome {
             Ok(sum) if sum == sums.crc32 => self.finish(part, sums, Verified::Checksum),
             // It may have grown between the list and the checksum.
             Ok(_) if self.rounds < MOST_ROUNDS => {
                 self.rounds += 1;
-                match self.list(FTP_PATIENCE) {
+                match self.list(self.options.patience) {
                     Some(list) => Stage::Relist(list, part),
                     None => self.restart(part, "the checksum differs"),
                 }
@@ -716,9 +717,7 @@ impl PullOne {
                 },
                 Stage::LogSample(get, part, sums)
             ),
-            Stage::Over => {
-                (Stage::Over, Next::Step(Step::Done(std::mem::take(&mut self.done))))
-            }
+            Stage::Over => (Stage::Over, Next::Step(Step::Done(std::mem::take(&mut self.done)))),
         }
     }
 }
@@ -763,6 +762,7 @@ impl Machine for PullOne {
 
     fn poll(&mut self, now: Micros) -> Step<Self::Done> {
         self.started.get_or_insert(now);
+        self.now = now;
         loop {
             let stage = std::mem::replace(&mut self.stage, Stage::Over);
             let (stage, next) = self.advance(now, stage);
