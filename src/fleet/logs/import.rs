@@ -75,7 +75,7 @@ pub fn identity(log: &Log) -> Identity {
     };
     let names = parameters.text("Name").unwrap_or_default();
     let values = parameters.number("Value").unwrap_or_default();
-    let system = names.iter().zip(values).filter(|(name, _)| *name == "SYSID_THISMAV").last();
+    let system = names.iter().zip(values).rfind(|(name, _)| *name == "SYSID_THISMAV");
     let is_id = |value: f64| (1.0..=255.0).contains(&value);
     let fixed = |row: usize| at(positions, "Status", row).is_some_and(|status| status >= 3.0);
     let rows: Vec<usize> = (0..positions.rows).filter(|row| fixed(*row)).collect();

@@ -1,11 +1,11 @@
 //! One drone's logs: list, download, compare, give the file its name.
 
 use std::cell::RefCell;
-use std::path::PathBuf;
 use std::rc::Rc;
 
 use super::manifest::{ManifestEntry, Method, Shelf, Verified};
 use super::part::{PartFile, Sample, Sums};
+use crate::base::file::create_folder;
 use crate::fleet::budget::Budget;
 use crate::fleet::ftp::get::{Get, GetOptions, Got, Tally};
 use crate::fleet::ftp::list::{List, Listed};
@@ -14,7 +14,7 @@ use crate::fleet::ftp::{Caller, FtpError};
 use crate::fleet::log_protocol::LogProtocolError;
 use crate::fleet::log_protocol::get::{LogGet, LogGot};
 use crate::fleet::log_protocol::list::{Entry, LogList};
-use crate::fleet::sink::Sink as _;
+use crate::fleet::sink::Sink;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::{MavMessage, dialect};
@@ -160,7 +160,7 @@ enum Stage {
 /// What a stage wants: a step of the link's, or it is over and another follows.
 enum Next {
     Step(Step<OneDone>),
-    Go(Stage),
+    Go(Box<Stage>),
 }
 
 impl PullOne {
@@ -402,21 +402,17 @@ impl PullOne {
         (self.size, self.rounds, self.restarts) = (target.size, 0, 0);
         let identity = format!("drone={} source={}", self.drone, target.source);
         self.target = Some(target);
-        match self.open_part(path, &identity) {
-            Ok(part) => self.begin(part, true),
-            Err(stage) => stage,
-        }
-    }
-
-    fn open_part(&mut self, path: PathBuf, identity: &str) -> Result<PartFile, Stage> {
         let opened = path
             .parent()
-            .map_or(Ok(()), crate::base::file::create_folder)
-            .and_then(|()| PartFile::open(&path, identity));
-        opened.map_err(|error| {
-            let reason = format!("{error}: {}", error.source);
-            self.fail(reason, "make the folder writable, or make room, and run again")
-        })
+            .map_or(Ok(()), create_folder)
+            .and_then(|()| PartFile::open(&path, &identity));
+        match opened {
+            Ok(part) => self.begin(part, true),
+            Err(error) => {
+                let reason = format!("{error}: {}", error.source);
+                self.fail(reason, "make the folder writable, or make room, and run again")
+            }
+        }
     }
 
     /// Downloads what the part lacks; a part of an earlier run is looked at first.
@@ -465,7 +461,7 @@ impl PullOne {
         GetOptions { up_to: self.size, ..self.get() }
     }
 
-    fn log_get<S: crate::fleet::sink::Sink>(&self, sink: S) -> LogGet<S> {
+    fn log_get<S: Sink>(&self, sink: S) -> LogGet<S> {
         let id = self.target.as_ref().map_or(0, |target| target.number) as u16;
         LogGet::new(self.drone, id, self.size, sink, self.options.patience)
             .with_budget(self.budget.clone())
@@ -475,6 +471,9 @@ impl PullOne {
     fn restart(&mut self, mut part: PartFile, why: &str) -> Stage {
         self.restarts += 1;
         if self.restarts > MOST_RESTARTS {
+            if self.reason.is_none() {
+                return self.fall_back(format!("MAVFTP: {why}, {} times", self.restarts));
+            }
             return self.fail(
                 format!("{why}, {} times", self.restarts),
                 "wait until the drone has closed its log (15 s after disarming) and run again",
@@ -667,12 +666,12 @@ impl PullOne {
                 match $machine.poll(now) {
                     Step::Send(message) => ($stage, Next::Step(Step::Send(message))),
                     Step::Wait(until) => ($stage, Next::Step(Step::Wait(until))),
-                    Step::Done($done) => (Stage::Over, Next::Go($next)),
+                    Step::Done($done) => (Stage::Over, Next::Go(Box::new($next))),
                 }
             };
         }
         match stage {
-            Stage::Start => (Stage::Over, Next::Go(self.start())),
+            Stage::Start => (Stage::Over, Next::Go(Box::new(self.start()))),
             Stage::List(mut list) => {
                 machine!(list, done => self.on_list(done), Stage::List(list))
             }
@@ -771,7 +770,7 @@ impl Machine for PullOne {
                     self.stage = stage;
                     return step;
                 }
-                Next::Go(stage) => self.stage = stage,
+                Next::Go(stage) => self.stage = *stage,
             }
         }
     }

@@ -47,7 +47,7 @@ impl Pace {
         let rate = bytes.saturating_sub(self.bytes) as f64 / (passed as f64 / 1e6);
         self.since = Some(now);
         self.bytes = bytes;
-        self.rate = if self.rate == 0.0 { rate } else { (self.rate + rate) / 2.0 };
+        self.rate = if self.rate == 0.0 { rate } else { self.rate.midpoint(rate) };
         self.best = (self.best * FORGETS).max(self.rate);
         // With fewer drones than allowed the number is not what limits.
         if busy < self.at_once() {
