@@ -5,5 +5,7 @@
 pub mod budget;
 pub mod ftp;
 pub mod intervals;
+pub mod log_protocol;
+pub mod logs;
 pub mod rtt;
 pub mod sink;

@@ -1,12 +1,17 @@
 //! One request and its answer.
 
 use super::{Caller, FtpError, answer};
-use crate::link::clock::{Micros, S};
+use crate::link::clock::{MS, Micros, S};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::{Op, Packet, Refusal};
 
 /// Longest pause between repetitions.
 const MOST_PAUSE: Micros = 3 * S;
+
+/// A vehicle gives up a session of somebody else when it has been idle for 3 s.
+const BUSY: Micros = 3_300 * MS;
+/// After one of ours was closed.
+const SHORT_BUSY: Micros = 20 * MS;
 
 /// A request that is repeated, with its number, until it is answered.
 #[derive(Clone, Debug)]
@@ -18,12 +23,17 @@ pub struct Exchange {
     /// Given to the vehicle before the first repetition, beyond the link's own time.
     work: Micros,
     patience: Micros,
+    /// The vehicle holds another session open: ask again then.
+    not_before: Micros,
+    /// Sessions of earlier runs or conversations, to be closed first.
+    stale: Option<u8>,
+    close_first: Option<u8>,
 }
 
 /// What an exchange wants.
 pub enum Wish {
     /// Send this, and ask again.
-    Send(MavMessage),
+    Send(Box<MavMessage>),
     /// Nothing until then.
     Wait(Micros),
     /// Give up.
@@ -32,8 +42,18 @@ pub enum Wish {
 
 impl Exchange {
     /// A request; `patience` without any answer ends it.
-    pub fn new(caller: &mut Caller, request: Packet, patience: Micros) -> Self {
-        Self { packet: caller.number(request), first: None, sent: 0, tries: 0, work: 0, patience }
+    pub fn new(caller: &Caller, request: Packet, patience: Micros) -> Self {
+        Self {
+            packet: caller.number(request),
+            first: None,
+            sent: 0,
+            tries: 0,
+            work: 0,
+            patience,
+            not_before: 0,
+            stale: None,
+            close_first: None,
+        }
     }
 
     /// The vehicle may take so long for it.
@@ -50,25 +70,37 @@ impl Exchange {
         if now >= first + self.patience {
             return Wish::Silent(FtpError::Silent { seconds: self.patience / S });
         }
-        let pause = caller.rtt.timeout().saturating_mul(1 << self.tries.min(6)) / 2;
-        let pause = pause.max(caller.rtt.timeout()).min(MOST_PAUSE) + self.work;
+        if let Some(session) = self.close_first.take() {
+            let mut packet = caller.number(Packet::request(Op::TerminateSession));
+            packet.session = session;
+            return Wish::Send(Box::new(caller.message(&packet)));
+        }
+        if now < self.not_before {
+            return Wish::Wait(self.not_before.min(first + self.patience));
+        }
+        let timeout = caller.timeout();
+        let pause = timeout.saturating_mul(1 << self.tries.min(6)) / 2;
+        let pause = pause.max(timeout).min(MOST_PAUSE) + self.work;
         if self.tries > 0 && now < self.sent + pause {
             return Wish::Wait((self.sent + pause).min(first + self.patience));
         }
         self.tries += 1;
         self.sent = now;
-        Wish::Send(caller.message(&self.packet))
+        Wish::Send(Box::new(caller.message(&self.packet)))
     }
 
     /// The answer, if the message is it. The session may be another than the request's: newer
     /// vehicles give their own.
     pub fn on_message(
-        &self,
+        &mut self,
         now: Micros,
         message: &MavMessage,
-        caller: &mut Caller,
+        caller: &Caller,
     ) -> Option<Result<Packet, Refusal>> {
         let packet = answer(message)?;
+        if packet.request == Op::BurstReadFile && packet.session != self.packet.session {
+            self.stale = Some(packet.session);
+        }
         let opens = matches!(self.packet.op, Op::OpenFileRO | Op::CreateFile);
         let fits = packet.sequence == self.packet.sequence.wrapping_add(1)
             && packet.request == self.packet.op
@@ -77,16 +109,36 @@ impl Exchange {
             return None;
         }
         if self.tries == 1 && self.work == 0 {
-            caller.rtt.add(now.saturating_sub(self.sent));
+            caller.add_rtt(now.saturating_sub(self.sent));
         }
         match packet.refusal() {
+            Some(Refusal::InvalidSession | Refusal::NoSessionsAvailable) => {
+                self.wait_for_other(now, caller);
+                None
+            }
             Some(refusal) => Some(Err(refusal)),
             None => {
                 if opens {
-                    caller.session = packet.session;
+                    caller.opened(packet.session);
+                }
+                if self.packet.op == Op::TerminateSession {
+                    caller.closed();
                 }
                 Some(Ok(packet))
             }
         }
+    }
+
+    /// The vehicle holds a file open, for another session. If that was ours it is closed;
+    /// otherwise the vehicle gives it up when it has not sent anything for a while, and each of
+    /// its refusals begins that time anew.
+    fn wait_for_other(&mut self, now: Micros, caller: &Caller) {
+        let ours = self.stale.take().or(caller.left_open());
+        self.close_first = ours.filter(|session| *session != self.packet.session);
+        let pause = if self.close_first.is_some() { SHORT_BUSY } else { BUSY };
+        caller.closed();
+        self.not_before = now + pause;
+        self.tries = 0;
+        self.packet = caller.number(self.packet.clone());
     }
 }

@@ -47,13 +47,15 @@ pub struct GetOptions {
     pub patience: Micros,
     /// Refuses larger files, bytes.
     pub most_size: u64,
+    /// Takes no more of a larger file, bytes.
+    pub up_to: u64,
     /// What the link may be asked to carry; none: anything.
     pub budget: Option<Budget>,
 }
 
 impl Default for GetOptions {
     fn default() -> Self {
-        Self { patience: 60 * S, most_size: 2 << 30, budget: None }
+        Self { patience: 60 * S, most_size: 2 << 30, up_to: u64::MAX, budget: None }
     }
 }
 
@@ -101,8 +103,6 @@ pub struct Get<S> {
     /// Single reads by number, for refusals, which name no offset.
     numbers: VecDeque<(u16, u64)>,
     heard: Option<Micros>,
-    /// A session of an earlier run that still talks to this station.
-    stale: Option<u8>,
     lies: u32,
     failures: u32,
     tally: Tally,
@@ -114,7 +114,8 @@ enum Stage {
     Closed(Micros),
     Opening(Exchange),
     Reading,
-    Closing(Exchange, Result<u64, FtpError>),
+    /// Once it is answered, or not, it is over.
+    Closing(Option<Exchange>, Result<u64, FtpError>),
 }
 
 #[derive(Debug)]
@@ -148,7 +149,6 @@ impl<S: Sink> Get<S> {
             reads: Reads::new(PIECE, MOST_READS),
             numbers: VecDeque::new(),
             heard: None,
-            stale: None,
             lies: 0,
             failures: 0,
             tally: Tally::default(),
@@ -173,8 +173,8 @@ impl<S: Sink> Get<S> {
     fn close(&mut self, result: Result<u64, FtpError>) {
         let request = Packet::request(Op::TerminateSession);
         // The vehicle also closes it by itself, so nobody waits long for the answer.
-        let exchange = Exchange::new(&mut self.caller, request, 2 * S);
-        self.stage = Stage::Closing(exchange, result);
+        let exchange = Exchange::new(&self.caller, request, 2 * S);
+        self.stage = Stage::Closing(Some(exchange), result);
     }
 
     /// The vehicle has lost the session: it booted, or somebody else took it.
@@ -190,7 +190,7 @@ impl<S: Sink> Get<S> {
         let what = "opening the file";
         let packet = match outcome {
             Ok(packet) => packet,
-            Err(Refusal::InvalidSession | Refusal::NoSessionsAvailable | Refusal::Fail) => {
+            Err(Refusal::Fail) => {
                 return self.reopen(now + BUSY_PAUSE);
             }
             Err(refusal) => return self.close(Err(FtpError::Refused { what, refusal })),
@@ -209,15 +209,12 @@ impl<S: Sink> Get<S> {
         }
         self.heard = Some(now);
         // A log that still grows is brought up to what it was; see the logs' room for the rest.
-        self.size.get_or_insert(size);
+        self.size.get_or_insert(size.min(self.options.up_to));
         self.stage = Stage::Reading;
     }
 
     fn on_packet(&mut self, now: Micros, packet: &Packet) {
-        if packet.session != self.caller.session {
-            if packet.op == Op::Ack && packet.request == Op::BurstReadFile {
-                self.stale = Some(packet.session);
-            }
+        if packet.session != self.caller.session() {
             return;
         }
         match (packet.op, packet.request) {
@@ -254,9 +251,8 @@ impl<S: Sink> Get<S> {
     /// The vehicle serves one request after another: with the answer to a read that was asked
     /// after a burst had fallen silent, the burst is over, or never was.
     fn on_read_answered(&mut self, now: Micros, offset: u64) {
-        if !self.reads.answered(now, offset, &mut self.caller.rtt) {
-            return;
-        }
+        let Some(took) = self.reads.answered(now, offset) else { return };
+        self.caller.add_rtt(took);
         if let Some(Burst { heard: Some((_, number)), .. }) = self.bursts.front()
             && self.burst_packets.is_none()
             && (USUAL_BURST * 9 / 10..USUAL_BURST).contains(number)
@@ -277,22 +273,19 @@ impl<S: Sink> Get<S> {
         self.bursts.drain(..index);
         let Some(burst) = self.bursts.front_mut() else { return };
         let number = number(burst);
-        match &mut burst.heard {
-            Some((at, highest)) => {
-                let steps = number.saturating_sub(*highest);
-                if steps > 0 {
-                    let each = now.saturating_sub(*at) as f64 / steps as f64;
-                    let weight = if burst.spacing == 0.0 { 1.0 } else { 0.1 };
-                    burst.spacing += (each - burst.spacing) * weight;
-                    (*at, *highest) = (now, number);
-                }
+        if let Some((at, highest)) = &mut burst.heard {
+            let steps = number.saturating_sub(*highest);
+            if steps > 0 {
+                let each = now.saturating_sub(*at) as f64 / steps as f64;
+                let weight = if burst.spacing == 0.0 { 1.0 } else { 0.1 };
+                burst.spacing += (each - burst.spacing) * weight;
+                (*at, *highest) = (now, number);
             }
-            None => {
-                if number == 0 && burst.is_first {
-                    self.caller.rtt.add(now.saturating_sub(burst.since));
-                }
-                burst.heard = Some((now, number));
+        } else {
+            if number == 0 && burst.is_first {
+                self.caller.add_rtt(now.saturating_sub(burst.since));
             }
+            burst.heard = Some((now, number));
         }
         if packet.burst_complete {
             self.burst_packets = Some(number + 1);
@@ -369,7 +362,7 @@ impl<S: Sink> Get<S> {
     /// From when on the current burst's silence is suspicious.
     fn suspicious_at(&self) -> Option<Micros> {
         let burst = self.bursts.front()?;
-        let timeout = self.caller.rtt.timeout();
+        let timeout = self.caller.timeout();
         Some(match burst.heard {
             None => burst.since + 2 * timeout,
             Some((at, _)) => at + timeout.max((burst.spacing * 24.0) as Micros).max(150 * MS),
@@ -445,7 +438,7 @@ impl<S: Sink> Get<S> {
         }
         let suspicious_at = self.suspicious_at();
         let is_silent = suspicious_at.is_some_and(|at| now >= at);
-        let mut wake = gives_up.min(self.reads.expire(now, &self.caller.rtt, is_silent));
+        let mut wake = gives_up.min(self.reads.expire(now, self.caller.timeout(), is_silent));
         if let Some(at) = suspicious_at.filter(|_| !is_silent) {
             wake = wake.min(at);
         }
@@ -500,12 +493,7 @@ impl<S: Sink> Get<S> {
         self.tally.opened += 1;
         self.caller.new_session();
         let request = Packet::request(Op::OpenFileRO).with_data(self.path.as_bytes());
-        self.stage = Stage::Opening(Exchange::new(&mut self.caller, request, left));
-        if let Some(session) = self.stale.take() {
-            let mut packet = self.caller.number(Packet::request(Op::TerminateSession));
-            packet.session = session;
-            return Step::send(self.caller.message(&packet));
-        }
+        self.stage = Stage::Opening(Exchange::new(&self.caller, request, left));
         self.poll(now)
     }
 }
@@ -523,26 +511,15 @@ impl<S: Sink> Machine for Get<S> {
                 }
             }
             Stage::Opening(exchange) => {
-                if let Some(outcome) = exchange.on_message(now, message, &mut self.caller) {
+                if let Some(outcome) = exchange.on_message(now, message, &self.caller) {
                     self.on_opened(now, outcome);
-                } else if let Some(packet) = answer(message)
-                    && packet.op == Op::Ack
-                    && packet.request == Op::BurstReadFile
-                {
-                    self.stale = Some(packet.session);
                 }
             }
-            Stage::Closing(exchange, _) => {
-                if exchange.on_message(now, message, &mut self.caller).is_some() {
-                    // Any answer will do: over at the next look.
-                    self.heard = Some(now);
-                    if let Stage::Closing(exchange, _) = &mut self.stage {
-                        *exchange = Exchange::new(
-                            &mut self.caller,
-                            Packet::request(Op::TerminateSession),
-                            0,
-                        );
-                    }
+            Stage::Closing(waiting, _) => {
+                if let Some(exchange) = waiting
+                    && exchange.on_message(now, message, &self.caller).is_some()
+                {
+                    *waiting = None;
                 }
             }
         }
@@ -554,7 +531,7 @@ impl<S: Sink> Machine for Get<S> {
             Stage::Closed(_) => self.open(now),
             Stage::Reading => self.poll_reading(now),
             Stage::Opening(exchange) => match exchange.poll(now, &self.caller) {
-                Wish::Send(message) => Step::send(message),
+                Wish::Send(message) => Step::Send(message),
                 Wish::Wait(until) => Step::Wait(until),
                 Wish::Silent(_) => {
                     let seconds = self.options.patience / S;
@@ -562,12 +539,14 @@ impl<S: Sink> Machine for Get<S> {
                     self.poll(now)
                 }
             },
-            Stage::Closing(exchange, result) => {
+            Stage::Closing(waiting, result) => {
+                // Nobody waits for a vehicle that does not answer.
                 let is_silent = matches!(result, Err(FtpError::Silent { .. }));
-                match exchange.poll(now, &self.caller) {
-                    Wish::Send(message) if !is_silent => Step::send(message),
-                    Wish::Wait(until) if !is_silent => Step::Wait(until),
-                    _ => match self.sink.take() {
+                let wish = waiting.as_mut().filter(|_| !is_silent);
+                match wish.map(|exchange| exchange.poll(now, &self.caller)) {
+                    Some(Wish::Send(message)) => Step::Send(message),
+                    Some(Wish::Wait(until)) => Step::Wait(until),
+                    Some(Wish::Silent(_)) | None => match self.sink.take() {
                         Some(sink) => {
                             Step::Done(Got { sink, result: result.clone(), tally: self.tally })
                         }

@@ -34,8 +34,8 @@ pub struct List {
 
 impl List {
     /// The names in `folder`.
-    pub fn new(mut caller: Caller, folder: &str, patience: Micros) -> Self {
-        let exchange = Exchange::new(&mut caller, request(folder, 0), patience);
+    pub fn new(caller: Caller, folder: &str, patience: Micros) -> Self {
+        let exchange = Exchange::new(&caller, request(folder, 0), patience);
         let folder = folder.to_owned();
         Self { caller, folder, patience, exchange, seen: 0, names: Vec::new(), over: None }
     }
@@ -72,7 +72,7 @@ impl Machine for List {
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {
         let what = "the list of files";
-        match self.exchange.on_message(now, message, &mut self.caller) {
+        match self.exchange.on_message(now, message, &self.caller) {
             None => {}
             Some(Err(Refusal::EndOfFile)) => self.over = Some(Ok(())),
             Some(Err(refusal)) => self.over = Some(Err(FtpError::Refused { what, refusal })),
@@ -84,7 +84,7 @@ impl Machine for List {
                     return;
                 }
                 let request = request(&self.folder, self.seen);
-                self.exchange = Exchange::new(&mut self.caller, request, self.patience);
+                self.exchange = Exchange::new(&self.caller, request, self.patience);
             }
         }
     }
@@ -96,7 +96,7 @@ impl Machine for List {
             None => {}
         }
         match self.exchange.poll(now, &self.caller) {
-            Wish::Send(message) => Step::send(message),
+            Wish::Send(message) => Step::Send(message),
             Wish::Wait(until) => Step::Wait(until),
             Wish::Silent(error) => Step::Done(Err(error)),
         }

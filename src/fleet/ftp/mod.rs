@@ -4,9 +4,13 @@ mod exchange;
 pub mod get;
 pub mod list;
 pub mod put;
-mod reads;
+pub(crate) mod reads;
 pub mod sum;
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::link::station::{AUTOPILOT, STATION};
@@ -83,14 +87,20 @@ pub enum FtpError {
     Sink(String),
 }
 
-/// Numbers requests to one drone.
+/// Numbers requests to one drone. Clones count on together.
 #[derive(Clone, Debug)]
 pub struct Caller {
     drone: DroneId,
+    numbers: Rc<RefCell<Numbers>>,
+}
+
+#[derive(Debug)]
+struct Numbers {
     sequence: u16,
     session: u8,
-    /// How long its answers take.
-    pub rtt: Rtt,
+    /// A session that the vehicle may still hold open.
+    open: Option<u8>,
+    rtt: Rtt,
 }
 
 impl Caller {
@@ -99,30 +109,64 @@ impl Caller {
     pub fn new(drone: DroneId, start: u32) -> Self {
         let mixed = start.wrapping_mul(0x9E37_79B1);
         let session = 1 + ((mixed >> 24) % 250) as u8;
-        Self { drone, sequence: mixed as u16, session, rtt: Rtt::default() }
+        let numbers = Numbers { sequence: mixed as u16, session, open: None, rtt: Rtt::default() };
+        Self { drone, numbers: Rc::new(RefCell::new(numbers)) }
     }
 
-    /// For another conversation after this one: other numbers, the same experience.
+    /// For another conversation after this one.
     #[must_use]
-    pub fn another(&mut self) -> Self {
-        self.new_session();
+    pub fn another(&self) -> Self {
+        self.skip();
         self.clone()
     }
 
-    fn new_session(&mut self) {
-        self.session = 1 + self.session % 250;
+    fn session(&self) -> u8 {
+        self.numbers.borrow().session
+    }
+
+    /// The vehicle has opened a file.
+    fn opened(&self, session: u8) {
+        let mut numbers = self.numbers.borrow_mut();
+        numbers.session = session;
+        numbers.open = Some(session);
+    }
+
+    /// What the vehicle may hold open is closed.
+    fn closed(&self) {
+        self.numbers.borrow_mut().open = None;
+    }
+
+    fn left_open(&self) -> Option<u8> {
+        self.numbers.borrow().open
+    }
+
+    fn timeout(&self) -> Micros {
+        self.numbers.borrow().rtt.timeout()
+    }
+
+    fn add_rtt(&self, took: Micros) {
+        self.numbers.borrow_mut().rtt.add(took);
+    }
+
+    fn new_session(&self) {
+        {
+            let mut numbers = self.numbers.borrow_mut();
+            numbers.session = 1 + numbers.session % 250;
+        }
         self.skip();
     }
 
     /// Goes on with numbers that no burst so far has used.
-    fn skip(&mut self) {
-        self.sequence = self.sequence.wrapping_add(NUMBERS_PER_BURST);
+    fn skip(&self) {
+        let mut numbers = self.numbers.borrow_mut();
+        numbers.sequence = numbers.sequence.wrapping_add(NUMBERS_PER_BURST);
     }
 
-    fn number(&mut self, mut packet: Packet) -> Packet {
-        self.sequence = self.sequence.wrapping_add(1);
-        packet.sequence = self.sequence;
-        packet.session = self.session;
+    fn number(&self, mut packet: Packet) -> Packet {
+        let mut numbers = self.numbers.borrow_mut();
+        numbers.sequence = numbers.sequence.wrapping_add(1);
+        packet.sequence = numbers.sequence;
+        packet.session = numbers.session;
         packet
     }
 

@@ -62,7 +62,7 @@ impl Put {
         if op != Op::TerminateSession {
             packet = packet.with_data(self.path.as_bytes());
         }
-        Exchange::new(&mut self.caller, packet, self.patience)
+        Exchange::new(&self.caller, packet, self.patience)
     }
 
     /// Begins anew, or gives up.
@@ -74,12 +74,12 @@ impl Put {
         };
     }
 
-    fn on_created(&mut self, now: Micros, outcome: Result<Packet, Refusal>) {
+    fn on_created(&mut self, now: Micros, outcome: Result<(), Refusal>) {
         match outcome {
-            Ok(_) => self.stage = Stage::Write(Writing::default()),
-            Err(
-                refusal @ (Refusal::InvalidSession | Refusal::NoSessionsAvailable | Refusal::Fail),
-            ) => self.again(now + BUSY_PAUSE, "creating the file", refusal),
+            Ok(()) => self.stage = Stage::Write(Writing::default()),
+            Err(refusal @ Refusal::Fail) => {
+                self.again(now + BUSY_PAUSE, "creating the file", refusal);
+            }
             Err(refusal) => {
                 let what = "creating the file";
                 self.stage = Stage::Over(Err(FtpError::Refused { what, refusal }));
@@ -89,7 +89,7 @@ impl Put {
 
     fn on_written(&mut self, now: Micros, packet: &Packet) {
         let Stage::Write(writing) = &mut self.stage else { return };
-        if packet.session != self.caller.session || packet.request != Op::WriteFile {
+        if packet.session != self.caller.session() || packet.request != Op::WriteFile {
             return;
         }
         let number = packet.sequence.wrapping_sub(1);
@@ -104,7 +104,7 @@ impl Put {
             return;
         }
         if tries == 1 {
-            self.caller.rtt.add(now.saturating_sub(sent));
+            self.caller.add_rtt(now.saturating_sub(sent));
         }
         writing.acknowledged += (self.content.len() - offset).min(MOST_DATA);
         if writing.acknowledged >= self.content.len() {
@@ -146,8 +146,8 @@ impl Put {
         let mut wake = heard + self.patience;
         let mut late = None;
         for (number, (offset, sent, tries)) in &mut writing.on_way {
-            let pause = (self.caller.rtt.timeout() << (*tries).min(4)) / 2;
-            let pause = pause.clamp(self.caller.rtt.timeout(), 3 * S);
+            let pause = (self.caller.timeout() << (*tries).min(4)) / 2;
+            let pause = pause.clamp(self.caller.timeout(), 3 * S);
             if now >= *sent + pause {
                 *sent = now;
                 *tries += 1;
@@ -170,7 +170,7 @@ impl Put {
         let end = (offset + MOST_DATA).min(self.content.len());
         let mut packet = Packet::request(Op::WriteFile).with_data(&self.content[offset..end]);
         packet.sequence = number;
-        packet.session = self.caller.session;
+        packet.session = self.caller.session();
         packet.offset = offset as u32;
         Some(Step::send(self.caller.message(&packet)))
     }
@@ -180,10 +180,10 @@ impl Machine for Put {
     type Done = Result<(), FtpError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {
-        match &self.stage {
+        match &mut self.stage {
             Stage::Create(exchange) => {
-                if let Some(outcome) = exchange.on_message(now, message, &mut self.caller) {
-                    self.on_created(now, outcome);
+                if let Some(outcome) = exchange.on_message(now, message, &self.caller) {
+                    self.on_created(now, outcome.map(drop));
                 }
             }
             Stage::Write(_) => {
@@ -192,12 +192,12 @@ impl Machine for Put {
                 }
             }
             Stage::Close(exchange) => {
-                if exchange.on_message(now, message, &mut self.caller).is_some() {
+                if exchange.on_message(now, message, &self.caller).is_some() {
                     self.stage = Stage::Compare(self.ask(Op::CalcFileCRC32));
                 }
             }
             Stage::Compare(exchange) => {
-                if let Some(outcome) = exchange.on_message(now, message, &mut self.caller) {
+                if let Some(outcome) = exchange.on_message(now, message, &self.caller) {
                     self.on_compared(outcome);
                 }
             }
@@ -221,7 +221,7 @@ impl Machine for Put {
         match &mut self.stage {
             Stage::Create(exchange) | Stage::Close(exchange) | Stage::Compare(exchange) => {
                 match exchange.poll(now, &self.caller) {
-                    Wish::Send(message) => Step::send(message),
+                    Wish::Send(message) => Step::Send(message),
                     Wish::Wait(until) => Step::Wait(until),
                     Wish::Silent(error) => Step::Done(Err(error)),
                 }

@@ -5,7 +5,6 @@
 use std::collections::BTreeMap;
 
 use crate::fleet::intervals::Intervals;
-use crate::fleet::rtt::Rtt;
 use crate::link::clock::{Micros, S};
 
 /// Answers and losses that are looked at together.
@@ -59,23 +58,21 @@ impl Reads {
         self.silent = 0;
     }
 
-    /// An answer to the read at `offset`; whether one was waited for.
-    pub(crate) fn answered(&mut self, now: Micros, offset: u64, rtt: &mut Rtt) -> bool {
-        let Some((_, asked)) = self.on_way.remove(&offset) else { return false };
-        // Every read has its own time: what was asked again was asked at another.
-        rtt.add(now.saturating_sub(asked));
+    /// An answer to the read at `offset`; how long it took, if one was waited for.
+    pub(crate) fn answered(&mut self, now: Micros, offset: u64) -> Option<Micros> {
+        let (_, asked) = self.on_way.remove(&offset)?;
         self.silent = 0;
         self.answered += 1;
         self.window = (self.window + 0.5).min(self.most);
         self.look();
-        true
+        Some(now.saturating_sub(asked))
     }
 
     /// Forgets what is late; returns when the next one will be. When `probing`, one read stands
     /// for all, and is repeated less and less often.
-    pub(crate) fn expire(&mut self, now: Micros, rtt: &Rtt, probing: bool) -> Micros {
+    pub(crate) fn expire(&mut self, now: Micros, timeout: Micros, probing: bool) -> Micros {
         let losses = if probing { self.silent } else { self.silent / 16 };
-        let pause = (rtt.timeout() << losses.min(4)).min(MOST_PAUSE);
+        let pause = (timeout << losses.min(4)).min(MOST_PAUSE);
         let before = self.on_way.len();
         let mut next = Micros::MAX;
         self.on_way.retain(|_, (_, asked)| {

@@ -20,10 +20,10 @@ pub struct Sum {
 
 impl Sum {
     /// Of the file `path`, which has about `size` bytes.
-    pub fn new(mut caller: Caller, path: &str, size: u64, patience: Micros) -> Self {
+    pub fn new(caller: Caller, path: &str, size: u64, patience: Micros) -> Self {
         let request = Packet::request(Op::CalcFileCRC32).with_data(path.as_bytes());
         let work = size.saturating_mul(S) / SLOWEST;
-        let exchange = Exchange::new(&mut caller, request, patience).with_work(work);
+        let exchange = Exchange::new(&caller, request, patience).with_work(work);
         Self { caller, exchange, over: None }
     }
 }
@@ -33,7 +33,7 @@ impl Machine for Sum {
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {
         let what = "the checksum";
-        match self.exchange.on_message(now, message, &mut self.caller) {
+        match self.exchange.on_message(now, message, &self.caller) {
             None => {}
             Some(Err(refusal)) => self.over = Some(Err(FtpError::Refused { what, refusal })),
             Some(Ok(packet)) => {
@@ -48,7 +48,7 @@ impl Machine for Sum {
             return Step::Done(over.clone());
         }
         match self.exchange.poll(now, &self.caller) {
-            Wish::Send(message) => Step::send(message),
+            Wish::Send(message) => Step::Send(message),
             Wish::Wait(until) => Step::Wait(until),
             Wish::Silent(error) => Step::Done(Err(error)),
         }

@@ -127,7 +127,9 @@ impl<S: Sink> LogGet<S> {
             }
             Err(reason) => self.over = Some(Err(LogProtocolError::Sink(reason))),
         }
-        self.reads.answered(now, offset, &mut self.rtt);
+        if let Some(took) = self.reads.answered(now, offset) {
+            self.rtt.add(took);
+        }
         if let Some(request) = &mut self.request
             && (request.start..request.end).contains(&offset)
         {
@@ -166,7 +168,7 @@ impl<S: Sink> LogGet<S> {
     }
 
     fn next(&mut self, now: Micros, gives_up: Micros) -> Step<LogGot<S>> {
-        let wake = gives_up.min(self.reads.expire(now, &self.rtt, false));
+        let wake = gives_up.min(self.reads.expire(now, self.rtt.timeout(), false));
         if let Some(request) = &self.request {
             let timeout = self.rtt.timeout().max(150 * MS);
             let until = request.heard.map_or(request.asked + 2 * timeout, |at| at + timeout);

@@ -135,8 +135,8 @@ impl Shelf {
         self.manifest.logs.push(entry);
         self.manifest.logs.sort_by(|a, b| a.file.cmp(&b.file));
         let path = self.folder.join("manifest.json");
-        let bytes = to_json(&self.manifest)
-            .map_err(|source| FileError::new("write", &path, source))?;
+        let bytes =
+            to_json(&self.manifest).map_err(|source| FileError::new("write", &path, source))?;
         write_whole(&path, &bytes)
     }
 

@@ -83,7 +83,7 @@ impl PartFile {
         let mut journal = open(&journal_path(path))?;
         let read = |source| FileError::new("read", &journal_path(path), source);
         let mut bytes = Vec::new();
-        journal.by_ref().take(MOST_JOURNAL).read_to_end(&mut bytes).map_err(read)?;
+        (&mut journal).take(MOST_JOURNAL).read_to_end(&mut bytes).map_err(read)?;
         let (valid, have) = read_journal(&bytes, &identity);
         let length = file.metadata().map_err(read)?.len();
         let mut part = Self {
@@ -253,7 +253,7 @@ pub fn sums(path: &Path) -> Result<Sums, FileError> {
         sha256.update(&bytes[..read]);
         size += read as u64;
     }
-    let sha256 = sha256.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    let sha256 = format!("{:x}", sha256.finalize());
     Ok(Sums { size, crc32: crc32.value(), sha256 })
 }
 
@@ -264,6 +264,7 @@ pub struct Sample {
     have: Intervals,
     /// Something differs.
     pub differs: bool,
+    size: u64,
 }
 
 impl Sample {
@@ -281,7 +282,7 @@ impl Sample {
             have.insert(start, end);
             at = end;
         }
-        Ok(Self { file, have, differs: false })
+        Ok(Self { file, have, differs: false, size })
     }
 }
 
@@ -291,7 +292,7 @@ impl Sink for Sample {
     }
 
     fn put(&mut self, _now: Micros, offset: u64, data: &[u8]) -> Result<u64, String> {
-        let end = offset + data.len() as u64;
+        let end = (offset + data.len() as u64).min(self.size);
         let mut at = offset;
         let mut new = 0;
         while let Some((start, stop)) = self.have.gap(at, end) {

@@ -1,0 +1,10 @@
+//! Bringing logs home: [`pull::pull`] from many drones over the air, [`import::import`] from
+//! cards, [`verify::verify`] what is there.
+
+pub mod import;
+pub mod manifest;
+pub mod one;
+pub mod pace;
+pub mod part;
+pub mod pull;
+pub mod verify;

@@ -1,0 +1,207 @@
+//! Many drones' logs at once.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, VecDeque};
+use std::path::Path;
+use std::rc::Rc;
+
+use super::manifest::Shelf;
+use super::one::{OneDone, OneOptions, PullOne};
+use super::pace::Pace;
+use crate::campaign::CampaignError;
+use crate::fleet::budget::Budget;
+use crate::link::clock::{MS, Micros, S};
+use crate::link::drive::{Machine as _, Step, Watch};
+use crate::link::error::NetError;
+use crate::link::id::DroneId;
+use crate::link::net::Net;
+
+/// A drone that has been silent for so long holds no other drone back.
+const SILENT: Micros = 5 * S;
+/// The stop request is looked at so often, at least.
+const LOOK: Micros = 100 * MS;
+
+/// A drone whose logs are wanted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wanted {
+    /// The drone.
+    pub drone: DroneId,
+    /// Its slot in the plan.
+    pub slot: u16,
+    /// Name of the slot's log file: `07.BIN`.
+    pub file: String,
+}
+
+/// How logs are pulled.
+#[derive(Clone, Debug)]
+pub struct PullOptions {
+    /// For each drone.
+    pub each: OneOptions,
+    /// Drones of a network at once, at most.
+    pub at_once: usize,
+    /// What is asked of each network, bytes per second; none: what it carries.
+    pub bytes_per_s: Option<f64>,
+    /// Program and version, for the manifest.
+    pub made_by: String,
+}
+
+/// Why nothing could be pulled at all.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PullError {
+    /// The link is gone.
+    #[error(transparent)]
+    Net(#[from] NetError),
+    /// The folder's manifest is wrong.
+    #[error(transparent)]
+    Shelf(#[from] CampaignError),
+}
+
+/// What became of a drone's log.
+#[derive(Clone, Debug)]
+pub enum Outcome {
+    /// Home: now, earlier, or partly; see [`OneDone::failure`].
+    Done(OneDone),
+    /// The run was stopped before.
+    Stopped,
+}
+
+/// Pulls logs into the folder `logs`. One drone's trouble is its own: it is in its outcome.
+///
+/// # Errors
+/// When the link is gone, or the folder's manifest cannot be read.
+pub fn pull(
+    net: &mut dyn Net,
+    logs: &Path,
+    wanted: &[Wanted],
+    options: &PullOptions,
+    watch: &mut dyn Watch,
+) -> Result<BTreeMap<DroneId, Outcome>, PullError> {
+    let shelf = Rc::new(RefCell::new(Shelf::open(logs, &options.made_by)?));
+    let mut outcomes: BTreeMap<DroneId, Outcome> = BTreeMap::new();
+    let mut lanes: BTreeMap<u16, Lane> = BTreeMap::new();
+    for one in wanted {
+        let lane = lanes.entry(one.drone.network).or_insert_with(|| Lane::new(options));
+        let each = options.each.clone();
+        let shelf = Rc::clone(&shelf);
+        let machine =
+            PullOne::new(one.drone, one.slot, &one.file, shelf, each, lane.budget.clone());
+        lane.waiting.push_back((one.drone, machine));
+        outcomes.insert(one.drone, Outcome::Stopped);
+    }
+    loop {
+        let now = net.now();
+        if watch.stop(now) {
+            return Ok(outcomes);
+        }
+        for lane in lanes.values_mut() {
+            lane.start(now);
+            let due: Vec<DroneId> = lane.due(now).collect();
+            for drone in due {
+                lane.advance(net, drone, &mut outcomes, watch)?;
+            }
+        }
+        if lanes.values().all(Lane::is_over) {
+            return Ok(outcomes);
+        }
+        let next = lanes.values().filter_map(Lane::wakes).min().unwrap_or(now);
+        let until = next.clamp(now, now + LOOK);
+        let mut wait = until;
+        while let Some(received) = net.recv(wait)? {
+            let now = net.now();
+            watch.on_message(now, &received);
+            let lane = lanes.get_mut(&received.from.network);
+            if let Some(lane) = lane
+                && let Some(running) = lane.running.get_mut(&received.from)
+            {
+                running.machine.on_message(now, &received.message);
+                lane.advance(net, received.from, &mut outcomes, watch)?;
+            }
+            wait = now;
+            if now >= until {
+                break;
+            }
+        }
+    }
+}
+
+/// One network.
+struct Lane {
+    waiting: VecDeque<(DroneId, PullOne)>,
+    running: BTreeMap<DroneId, Running>,
+    pace: Pace,
+    budget: Option<Budget>,
+    /// New bytes of drones that are done.
+    bytes: u64,
+}
+
+struct Running {
+    machine: PullOne,
+    wakes: Micros,
+    started: Micros,
+}
+
+impl Lane {
+    fn new(options: &PullOptions) -> Self {
+        Self {
+            waiting: VecDeque::new(),
+            running: BTreeMap::new(),
+            pace: Pace::new(options.at_once),
+            budget: options.bytes_per_s.map(Budget::new),
+            bytes: 0,
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.waiting.is_empty() && self.running.is_empty()
+    }
+
+    fn wakes(&self) -> Option<Micros> {
+        self.running.values().map(|running| running.wakes).min()
+    }
+
+    fn due(&self, now: Micros) -> impl Iterator<Item = DroneId> + '_ {
+        self.running.iter().filter(move |(_, one)| one.wakes <= now).map(|(drone, _)| *drone)
+    }
+
+    fn start(&mut self, now: Micros) {
+        let is_busy = |one: &&Running| {
+            now < one.machine.heard().unwrap_or(one.started).max(one.started) + SILENT
+        };
+        let mut busy = self.running.values().filter(is_busy).count();
+        let bytes: u64 = self.running.values().map(|one| one.machine.new_bytes()).sum();
+        self.pace.look(now, self.bytes + bytes, busy);
+        while busy < self.pace.at_once() {
+            let Some((drone, machine)) = self.waiting.pop_front() else { return };
+            self.running.insert(drone, Running { machine, wakes: now, started: now });
+            busy += 1;
+        }
+    }
+
+    fn advance(
+        &mut self,
+        net: &mut dyn Net,
+        drone: DroneId,
+        outcomes: &mut BTreeMap<DroneId, Outcome>,
+        watch: &mut dyn Watch,
+    ) -> Result<(), NetError> {
+        let Some(running) = self.running.get_mut(&drone) else { return Ok(()) };
+        loop {
+            match running.machine.poll(net.now()) {
+                Step::Send(message) => net.send(drone, &message)?,
+                Step::Wait(until) => {
+                    running.wakes = until;
+                    watch.on_progress(drone, running.machine.progress(), false);
+                    return Ok(());
+                }
+                Step::Done(done) => {
+                    watch.on_progress(drone, running.machine.progress(), true);
+                    self.bytes += running.machine.new_bytes();
+                    outcomes.insert(drone, Outcome::Done(done));
+                    self.running.remove(&drone);
+                    return Ok(());
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Whether a folder of logs is still what its manifest says.
+
+use std::path::Path;
+
+use super::manifest::{ManifestEntry, Shelf};
+use super::part::sums;
+use crate::campaign::CampaignError;
+use crate::log::Log;
+
+/// One log of a manifest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checked {
+    /// As the manifest has it.
+    pub entry: ManifestEntry,
+    /// What is wrong; empty: nothing.
+    pub faults: Vec<Fault>,
+}
+
+/// What is wrong with a log.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// It cannot be read.
+    #[error("cannot be read: {0}; pull or import it again")]
+    Unreadable(String),
+    /// Another size.
+    #[error("has {found} bytes, {right} when it came; pull or import it again")]
+    Size {
+        /// Now, bytes.
+        found: u64,
+        /// By the manifest, bytes.
+        right: u64,
+    },
+    /// Another content.
+    #[error("has changed since it came (another SHA-256); pull or import it again")]
+    Changed,
+    /// Whole, but no log.
+    #[error("is what the drone had, but no log that can be read: {0}")]
+    NotALog(String),
+}
+
+/// Checks every log of the manifest in `folder`: size, SHA-256, and whether it is a log.
+///
+/// # Errors
+/// When the manifest cannot be read.
+pub fn verify(folder: &Path) -> Result<Vec<Checked>, CampaignError> {
+    let shelf = Shelf::open(folder, "")?;
+    let check = |entry: &ManifestEntry| {
+        let path = shelf.path(&entry.file);
+        let mut faults = Vec::new();
+        match sums(&path) {
+            Err(error) => faults.push(Fault::Unreadable(error.source.to_string())),
+            Ok(found) if found.size != entry.size_bytes => {
+                faults.push(Fault::Size { found: found.size, right: entry.size_bytes });
+            }
+            Ok(found) if found.sha256 != entry.sha256 => faults.push(Fault::Changed),
+            Ok(_) => {
+                if let Err(error) = Log::open(&path) {
+                    faults.push(Fault::NotALog(error.to_string()));
+                }
+            }
+        }
+        Checked { entry: entry.clone(), faults }
+    };
+    Ok(shelf.manifest.logs.iter().map(check).collect())
+}
