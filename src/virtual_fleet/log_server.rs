@@ -50,7 +50,9 @@ impl LogServer {
     /// Logs in the order of their numbers; id 1 is the first.
     fn logs(&self, storage: &dyn Storage) -> Vec<(String, u32)> {
         let entries = storage.list(&self.folder).unwrap_or_default();
-        let logs = entries.into_iter().filter(|entry| entry.name.ends_with(".BIN"));
+        let logs = entries.into_iter().filter(|entry| {
+            entry.name.rsplit_once('.').is_some_and(|(_, end)| end.eq_ignore_ascii_case("bin"))
+        });
         logs.filter_map(|entry| {
             let size = u32::try_from(entry.size?).unwrap_or(u32::MAX);
             Some((format!("{}/{}", self.folder, entry.name), size))

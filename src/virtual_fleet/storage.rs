@@ -219,7 +219,7 @@ impl Storage for FolderStorage {
             if about.is_symlink() {
                 continue;
             }
-            let size = about.is_file().then(|| about.len());
+            let size = about.is_file().then_some(about.len());
             entries.push(Entry { name: entry.file_name().to_string_lossy().into_owned(), size });
         }
         entries.sort_by(|a, b| a.name.cmp(&b.name));

@@ -33,7 +33,7 @@ pub struct Exchange {
 /// What an exchange wants.
 pub enum Wish {
     /// Send this, and ask again.
-    Send(MavMessage),
+    Send(Box<MavMessage>),
     /// Nothing until then.
     Wait(Micros),
     /// Give up.
@@ -73,7 +73,7 @@ impl Exchange {
         if let Some(session) = self.close_first.take() {
             let mut packet = caller.number(Packet::request(Op::TerminateSession));
             packet.session = session;
-            return Wish::Send(caller.message(&packet));
+            return Wish::Send(Box::new(caller.message(&packet)));
         }
         if now < self.not_before {
             return Wish::Wait(self.not_before.min(first + self.patience));
@@ -86,7 +86,7 @@ impl Exchange {
         }
         self.tries += 1;
         self.sent = now;
-        Wish::Send(caller.message(&self.packet))
+        Wish::Send(Box::new(caller.message(&self.packet)))
     }
 
     /// The answer, if the message is it. The session may be another than the request's: newer

@@ -273,22 +273,19 @@ impl<S: Sink> Get<S> {
         self.bursts.drain(..index);
         let Some(burst) = self.bursts.front_mut() else { return };
         let number = number(burst);
-        match &mut burst.heard {
-            Some((at, highest)) => {
-                let steps = number.saturating_sub(*highest);
-                if steps > 0 {
-                    let each = now.saturating_sub(*at) as f64 / steps as f64;
-                    let weight = if burst.spacing == 0.0 { 1.0 } else { 0.1 };
-                    burst.spacing += (each - burst.spacing) * weight;
-                    (*at, *highest) = (now, number);
-                }
+        if let Some((at, highest)) = &mut burst.heard {
+            let steps = number.saturating_sub(*highest);
+            if steps > 0 {
+                let each = now.saturating_sub(*at) as f64 / steps as f64;
+                let weight = if burst.spacing == 0.0 { 1.0 } else { 0.1 };
+                burst.spacing += (each - burst.spacing) * weight;
+                (*at, *highest) = (now, number);
             }
-            None => {
-                if number == 0 && burst.is_first {
-                    self.caller.add_rtt(now.saturating_sub(burst.since));
-                }
-                burst.heard = Some((now, number));
+        } else {
+            if number == 0 && burst.is_first {
+                self.caller.add_rtt(now.saturating_sub(burst.since));
             }
+            burst.heard = Some((now, number));
         }
         if packet.burst_complete {
             self.burst_packets = Some(number + 1);
@@ -534,7 +531,7 @@ impl<S: Sink> Machine for Get<S> {
             Stage::Closed(_) => self.open(now),
             Stage::Reading => self.poll_reading(now),
             Stage::Opening(exchange) => match exchange.poll(now, &self.caller) {
-                Wish::Send(message) => Step::send(message),
+                Wish::Send(message) => Step::Send(message),
                 Wish::Wait(until) => Step::Wait(until),
                 Wish::Silent(_) => {
                     let seconds = self.options.patience / S;
@@ -547,7 +544,7 @@ impl<S: Sink> Machine for Get<S> {
                 let is_silent = matches!(result, Err(FtpError::Silent { .. }));
                 let wish = waiting.as_mut().filter(|_| !is_silent);
                 match wish.map(|exchange| exchange.poll(now, &self.caller)) {
-                    Some(Wish::Send(message)) => Step::send(message),
+                    Some(Wish::Send(message)) => Step::Send(message),
                     Some(Wish::Wait(until)) => Step::Wait(until),
                     Some(Wish::Silent(_)) | None => match self.sink.take() {
                         Some(sink) => {

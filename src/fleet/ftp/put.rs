@@ -74,11 +74,11 @@ impl Put {
         };
     }
 
-    fn on_created(&mut self, now: Micros, outcome: Result<Packet, Refusal>) {
+    fn on_created(&mut self, now: Micros, outcome: Result<(), Refusal>) {
         match outcome {
-            Ok(_) => self.stage = Stage::Write(Writing::default()),
+            Ok(()) => self.stage = Stage::Write(Writing::default()),
             Err(refusal @ Refusal::Fail) => {
-                self.again(now + BUSY_PAUSE, "creating the file", refusal)
+                self.again(now + BUSY_PAUSE, "creating the file", refusal);
             }
             Err(refusal) => {
                 let what = "creating the file";
@@ -183,7 +183,7 @@ impl Machine for Put {
         match &mut self.stage {
             Stage::Create(exchange) => {
                 if let Some(outcome) = exchange.on_message(now, message, &self.caller) {
-                    self.on_created(now, outcome);
+                    self.on_created(now, outcome.map(drop));
                 }
             }
             Stage::Write(_) => {
@@ -221,7 +221,7 @@ impl Machine for Put {
         match &mut self.stage {
             Stage::Create(exchange) | Stage::Close(exchange) | Stage::Compare(exchange) => {
                 match exchange.poll(now, &self.caller) {
-                    Wish::Send(message) => Step::send(message),
+                    Wish::Send(message) => Step::Send(message),
                     Wish::Wait(until) => Step::Wait(until),
                     Wish::Silent(error) => Step::Done(Err(error)),
                 }

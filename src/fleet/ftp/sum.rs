@@ -48,7 +48,7 @@ impl Machine for Sum {
             return Step::Done(over.clone());
         }
         match self.exchange.poll(now, &self.caller) {
-            Wish::Send(message) => Step::send(message),
+            Wish::Send(message) => Step::Send(message),
             Wish::Wait(until) => Step::Wait(until),
             Wish::Silent(error) => Step::Done(Err(error)),
         }

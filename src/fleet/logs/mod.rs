@@ -1,6 +1,7 @@
-//! Bringing logs home: [`pull::pull`] from many drones over the air,
-//! [`verify::verify`] what is there.
+//! Bringing logs home: [`pull::pull`] from many drones over the air, [`import::import`] from
+//! cards, [`verify::verify`] what is there.
 
+pub mod import;
 pub mod manifest;
 pub mod one;
 pub mod pace;

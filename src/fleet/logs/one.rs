@@ -1,11 +1,11 @@
 //! One drone's logs: list, download, compare, give the file its name.
 
 use std::cell::RefCell;
-use std::path::PathBuf;
 use std::rc::Rc;
 
 use super::manifest::{ManifestEntry, Method, Shelf, Verified};
 use super::part::{PartFile, Sample, Sums};
+use crate::base::file::create_folder;
 use crate::fleet::budget::Budget;
 use crate::fleet::ftp::get::{Get, GetOptions, Got, Tally};
 use crate::fleet::ftp::list::{List, Listed};
@@ -14,7 +14,7 @@ use crate::fleet::ftp::{Caller, FtpError};
 use crate::fleet::log_protocol::LogProtocolError;
 use crate::fleet::log_protocol::get::{LogGet, LogGot};
 use crate::fleet::log_protocol::list::{Entry, LogList};
-use crate::fleet::sink::Sink as _;
+use crate::fleet::sink::Sink;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::{MavMessage, dialect};
@@ -24,6 +24,8 @@ use crate::protocol::ftp::Refusal;
 /// MAVFTP is given up for the log messages when a drone that is heard does not answer for so
 /// long.
 const FTP_PATIENCE: Micros = 12 * S;
+/// A drone whose last heartbeat is older is not heard.
+const HEARD: Micros = 4 * S;
 /// A log that still grows is continued so often; then what was listed is taken.
 const MOST_ROUNDS: u32 = 3;
 /// A log that turns out to be another is begun anew so often.
@@ -132,6 +134,7 @@ pub struct PullOne {
     reason: Option<String>,
     heartbeat: Option<Micros>,
     started: Option<Micros>,
+    now: Micros,
     tally: Tally,
     done: OneDone,
     held: u64,
@@ -157,7 +160,7 @@ enum Stage {
 /// What a stage wants: a step of the link's, or it is over and another follows.
 enum Next {
     Step(Step<OneDone>),
-    Go(Stage),
+    Go(Box<Stage>),
 }
 
 impl PullOne {
@@ -189,6 +192,7 @@ impl PullOne {
             reason: None,
             heartbeat: None,
             started: None,
+            now: 0,
             tally: Tally::default(),
             done: OneDone::default(),
             held: 0,
@@ -229,7 +233,12 @@ impl PullOne {
         )
     }
 
-    fn list(&mut self, patience: Micros) -> Option<List> {
+    /// Whether its heartbeats come.
+    fn is_heard(&self) -> bool {
+        self.heartbeat.is_some_and(|at| self.now < at + HEARD)
+    }
+
+    fn list(&self, patience: Micros) -> Option<List> {
         let folder = self.options.folders.get(self.folder)?;
         Some(List::new(self.caller.another(), folder, patience))
     }
@@ -292,22 +301,20 @@ impl PullOne {
                     None => self.fall_back("MAVFTP shows no folder of logs".to_owned()),
                 };
             }
-            Err(FtpError::Silent { .. }) if self.heartbeat.is_none() => {
-                return match self.list(self.options.patience) {
-                    // A drone that is only just being switched on.
-                    Some(list) if self.rounds == 0 => {
-                        self.rounds = 1;
-                        Stage::List(list)
-                    }
-                    _ => {
-                        let seconds = (self.options.patience + FTP_PATIENCE) / S;
-                        self.fail_silent(FtpError::Silent { seconds }.to_string())
-                    }
+            // A drone that is only just being switched on, or boots.
+            Err(FtpError::Silent { .. }) if !self.is_heard() => {
+                let heard = self.heartbeat.or(self.started).unwrap_or(self.now);
+                if self.now >= heard + self.options.patience {
+                    let seconds = self.now.saturating_sub(heard) / S;
+                    return self.fail_silent(FtpError::Silent { seconds }.to_string());
+                }
+                return match self.list(FTP_PATIENCE) {
+                    Some(list) => Stage::List(list),
+                    None => Stage::Over,
                 };
             }
             Err(error) => return self.fall_back(format!("MAVFTP: {error}")),
         };
-        self.rounds = 0;
         let Some(folder) = self.options.folders.get(self.folder) else { return Stage::Over };
         let mut logs: Vec<(u32, String, u64)> = names
             .into_iter()
@@ -395,21 +402,17 @@ impl PullOne {
         (self.size, self.rounds, self.restarts) = (target.size, 0, 0);
         let identity = format!("drone={} source={}", self.drone, target.source);
         self.target = Some(target);
-        match self.open_part(path, &identity) {
-            Ok(part) => self.begin(part, true),
-            Err(stage) => stage,
-        }
-    }
-
-    fn open_part(&mut self, path: PathBuf, identity: &str) -> Result<PartFile, Stage> {
         let opened = path
             .parent()
-            .map_or(Ok(()), crate::base::file::create_folder)
-            .and_then(|()| PartFile::open(&path, identity));
-        opened.map_err(|error| {
-            let reason = format!("{error}: {}", error.source);
-            self.fail(reason, "make the folder writable, or make room, and run again")
-        })
+            .map_or(Ok(()), create_folder)
+            .and_then(|()| PartFile::open(&path, &identity));
+        match opened {
+            Ok(part) => self.begin(part, true),
+            Err(error) => {
+                let reason = format!("{error}: {}", error.source);
+                self.fail(reason, "make the folder writable, or make room, and run again")
+            }
+        }
     }
 
     /// Downloads what the part lacks; a part of an earlier run is looked at first.
@@ -458,7 +461,7 @@ impl PullOne {
         GetOptions { up_to: self.size, ..self.get() }
     }
 
-    fn log_get<S: crate::fleet::sink::Sink>(&self, sink: S) -> LogGet<S> {
+    fn log_get<S: Sink>(&self, sink: S) -> LogGet<S> {
         let id = self.target.as_ref().map_or(0, |target| target.number) as u16;
         LogGet::new(self.drone, id, self.size, sink, self.options.patience)
             .with_budget(self.budget.clone())
@@ -468,6 +471,9 @@ impl PullOne {
     fn restart(&mut self, mut part: PartFile, why: &str) -> Stage {
         self.restarts += 1;
         if self.restarts > MOST_RESTARTS {
+            if self.reason.is_none() {
+                return self.fall_back(format!("MAVFTP: {why}, {} times", self.restarts));
+            }
             return self.fail(
                 format!("{why}, {} times", self.restarts),
                 "wait until the drone has closed its log (15 s after disarming) and run again",
@@ -525,7 +531,7 @@ impl PullOne {
             Ok(size) => {
                 self.size = size;
                 self.rounds += 1;
-                match self.list(FTP_PATIENCE) {
+                match self.list(self.options.patience) {
                     Some(list) => Stage::Relist(list, part),
                     None => self.compare(part, false),
                 }
@@ -592,7 +598,7 @@ impl PullOne {
             // It may have grown between the list and the checksum.
             Ok(_) if self.rounds < MOST_ROUNDS => {
                 self.rounds += 1;
-                match self.list(FTP_PATIENCE) {
+                match self.list(self.options.patience) {
                     Some(list) => Stage::Relist(list, part),
                     None => self.restart(part, "the checksum differs"),
                 }
@@ -660,12 +666,12 @@ impl PullOne {
                 match $machine.poll(now) {
                     Step::Send(message) => ($stage, Next::Step(Step::Send(message))),
                     Step::Wait(until) => ($stage, Next::Step(Step::Wait(until))),
-                    Step::Done($done) => (Stage::Over, Next::Go($next)),
+                    Step::Done($done) => (Stage::Over, Next::Go(Box::new($next))),
                 }
             };
         }
         match stage {
-            Stage::Start => (Stage::Over, Next::Go(self.start())),
+            Stage::Start => (Stage::Over, Next::Go(Box::new(self.start()))),
             Stage::List(mut list) => {
                 machine!(list, done => self.on_list(done), Stage::List(list))
             }
@@ -755,6 +761,7 @@ impl Machine for PullOne {
 
     fn poll(&mut self, now: Micros) -> Step<Self::Done> {
         self.started.get_or_insert(now);
+        self.now = now;
         loop {
             let stage = std::mem::replace(&mut self.stage, Stage::Over);
             let (stage, next) = self.advance(now, stage);
@@ -763,7 +770,7 @@ impl Machine for PullOne {
                     self.stage = stage;
                     return step;
                 }
-                Next::Go(stage) => self.stage = stage,
+                Next::Go(stage) => self.stage = *stage,
             }
         }
     }

@@ -3,9 +3,15 @@
 use crate::link::clock::{Micros, S};
 
 /// What is looked at together.
-const LOOK: Micros = 2 * S;
+const LOOK: Micros = 4 * S;
+/// Fewer bytes than this share of the best: too many at once.
+const HURTS: f64 = 0.6;
+/// The best is forgotten at this rate per look: a link may get worse.
+const FORGETS: f64 = 0.97;
+/// Never fewer, if there are as many: a drone spends most of its time waiting for answers.
+const LEAST: f64 = 4.0;
 
-/// Raises the number while that brings more bytes, and lowers it when it brings clearly fewer: a
+/// Raises the number while that does no harm, and lowers it when clearly fewer bytes come: a
 /// radio network carries more in all from several drones than from one, until their packets
 /// collide. Loss by itself is no reason: noise takes its share from few drones as from many.
 #[derive(Clone, Copy, Debug)]
@@ -14,8 +20,8 @@ pub struct Pace {
     most: f64,
     since: Option<Micros>,
     bytes: u64,
-    /// Bytes per second at the last look, and the best of late.
-    last: f64,
+    /// Bytes per second, smoothed, and the best of late.
+    rate: f64,
     best: f64,
 }
 
@@ -23,7 +29,7 @@ impl Pace {
     /// At most so many.
     pub fn new(most: usize) -> Self {
         let most = most.max(1) as f64;
-        Self { at_once: most.min(8.0), most, since: None, bytes: 0, last: 0.0, best: 0.0 }
+        Self { at_once: most.min(8.0), most, since: None, bytes: 0, rate: 0.0, best: 0.0 }
     }
 
     /// So many now.
@@ -41,16 +47,18 @@ impl Pace {
         let rate = bytes.saturating_sub(self.bytes) as f64 / (passed as f64 / 1e6);
         self.since = Some(now);
         self.bytes = bytes;
-        let is_full = busy >= self.at_once();
-        if is_full && rate < 0.7 * self.best {
-            self.at_once = (self.at_once * 0.7).max(1.0);
-            // What was best then may not be possible any more.
-            self.best = rate;
-        } else if is_full && rate > 1.03 * self.last {
+        self.rate = if self.rate == 0.0 { rate } else { self.rate.midpoint(rate) };
+        self.best = (self.best * FORGETS).max(self.rate);
+        // With fewer drones than allowed the number is not what limits.
+        if busy < self.at_once() {
+            return;
+        }
+        if self.rate < HURTS * self.best {
+            self.at_once = (self.at_once * 0.7).max(LEAST.min(self.most));
+            self.best = self.rate;
+        } else {
             self.at_once = (self.at_once + 1.0).min(self.most);
         }
-        self.last = rate;
-        self.best = self.best.max(rate);
     }
 }
 
@@ -58,22 +66,23 @@ impl Pace {
 mod tests {
     use super::*;
 
-    /// The number that it comes to when so many drones give so much.
-    fn settles(rate: impl Fn(usize) -> f64) -> usize {
+    /// Mean of the rate over the second half, if so many drones give so much.
+    fn mean(rate: impl Fn(usize) -> f64) -> f64 {
         let mut pace = Pace::new(50);
-        let mut bytes = 0;
-        for second in 0..400 {
-            bytes += rate(pace.at_once()) as u64;
-            pace.look(second * S, bytes, 50);
+        let mut bytes = 0.0;
+        for second in 0..2000 {
+            let half = if second < 1000 { 0.0 } else { 1.0 };
+            bytes += half * rate(pace.at_once());
+            pace.look(second * S, 1_000_000 + bytes as u64, 50);
         }
-        pace.at_once()
+        bytes / 1000.0
     }
 
     #[test]
-    fn it_rises_while_that_helps_and_falls_when_it_hurts() {
-        assert_eq!(settles(|n| 1000.0 * n as f64), 50);
-        assert!(settles(|n| 1000.0 * (n as f64).min(10.0)) < 14);
-        let collapsing = |n: usize| if n > 8 { 2000.0 } else { 1000.0 * n as f64 };
-        assert!(settles(collapsing) <= 9);
+    fn it_rises_while_that_does_no_harm_and_falls_when_it_hurts() {
+        assert!(mean(|n| 1000.0 * n as f64) > 40_000.0);
+        assert!(mean(|n| 1000.0 * (n as f64).min(10.0)) > 9_800.0);
+        let collapsing = |n: usize| if n > 12 { 1000.0 } else { 1000.0 * n as f64 };
+        assert!(mean(collapsing) > 6_000.0, "{}", mean(collapsing));
     }
 }

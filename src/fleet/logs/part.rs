@@ -253,7 +253,7 @@ pub fn sums(path: &Path) -> Result<Sums, FileError> {
         sha256.update(&bytes[..read]);
         size += read as u64;
     }
-    let sha256 = sha256.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    let sha256 = format!("{:x}", sha256.finalize());
     Ok(Sums { size, crc32: crc32.value(), sha256 })
 }
 

@@ -81,7 +81,6 @@ impl VirtualVehicle<'_> {
                 self.reboot(now);
                 ACCEPTED
             }
-            PREFLIGHT_REBOOT => UNSUPPORTED,
             SET_MESSAGE_INTERVAL => {
                 if self.streams.set(now, first as u32, second) {
                     ACCEPTED

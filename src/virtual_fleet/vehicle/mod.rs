@@ -191,7 +191,7 @@ impl<'w> VirtualVehicle<'w> {
 
     /// Where it is, show frame, m.
     pub fn position_m(&self) -> Vector3<f64> {
-        self.airborne.as_ref().map_or(self.stands_m, |airborne| airborne.position_m())
+        self.airborne.as_ref().map_or(self.stands_m, Airborne::position_m)
     }
 
     /// Puts it somewhere else (show frame, m), as a crew does; not while it flies.

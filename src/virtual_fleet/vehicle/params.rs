@@ -130,14 +130,14 @@ impl Params {
             MavMessage::PARAM_REQUEST_LIST(_) => {
                 self.asked = (0..self.values.len() as u16).collect();
             }
-            MavMessage::PARAM_REQUEST_READ(wanted) => match u16::try_from(wanted.param_index) {
-                Ok(index) => out.extend(self.answer(index)),
-                Err(_) => {
-                    let name = text(&wanted.param_id[..]);
-                    let index = self.values.keys().position(|key| *key == name);
-                    out.extend(index.and_then(|index| self.answer(index as u16)));
-                }
-            },
+            MavMessage::PARAM_REQUEST_READ(wanted) => {
+                let name = text(&wanted.param_id[..]);
+                // A negative index asks by name.
+                let index = u16::try_from(wanted.param_index).ok().or_else(|| {
+                    self.values.keys().position(|key| *key == name).map(|index| index as u16)
+                });
+                out.extend(index.and_then(|index| self.answer(index)));
+            }
             MavMessage::PARAM_SET(wanted) => {
                 let name = text(&wanted.param_id[..]);
                 let found = self.values.iter_mut().enumerate().find(|(_, (key, _))| **key == name);

@@ -96,6 +96,7 @@ impl Streams {
 
 /// What there is to say.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a bit of a message")]
 pub(super) struct Telling {
     pub(super) boot_ms: u32,
     pub(super) gps: Option<GpsTime>,

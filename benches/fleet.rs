@@ -1,0 +1,46 @@
+//! File transfer: `cargo bench --bench fleet`.
+//!
+//! CPU for a megabyte, with frames encoded and decoded on both ends, over a link without limits.
+
+use std::collections::BTreeMap;
+
+use divan::Bencher;
+use divan::counter::BytesCount;
+use updraft::fleet::ftp::Caller;
+use updraft::fleet::ftp::get::{Get, GetOptions};
+use updraft::fleet::sink::Memory;
+use updraft::link::drive::{NoWatch, drive};
+use updraft::link::id::DroneId;
+use updraft::virtual_fleet::files::FileVehicle;
+use updraft::virtual_fleet::lossy::{Faults, LossyNet};
+use updraft::virtual_fleet::storage::MemoryStorage;
+
+const SIZE: usize = 1_000_000;
+const LOG: &str = "/APM/LOGS/00000001.BIN";
+
+fn main() {
+    divan::main();
+}
+
+#[divan::bench(args = [0.0, 0.2])]
+fn get_a_megabyte(bencher: Bencher<'_, '_>, loss: f64) {
+    let drone = DroneId { network: 0, system: 1 };
+    bencher
+        .counter(BytesCount::new(SIZE))
+        .with_inputs(|| {
+            let mut storage = MemoryStorage::default();
+            storage.put(LOG, vec![7; SIZE]).expect("a plain name");
+            let vehicle = FileVehicle::new(storage, "/APM/LOGS", 0.0);
+            LossyNet::new(
+                BTreeMap::from([(drone, vehicle)]),
+                Faults { loss, ..Faults::default() },
+                1,
+            )
+        })
+        .bench_values(|mut net| {
+            let get =
+                Get::new(Caller::new(drone, 1), LOG, Memory::default(), GetOptions::default());
+            let machines = BTreeMap::from([(drone, get)]);
+            drive(&mut net, machines, 1, &mut NoWatch).expect("a simulated link stays open")
+        });
+}
