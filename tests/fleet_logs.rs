@@ -160,7 +160,7 @@ fn all_but_the_drone_that_is_gone_come_home_whole_through_everything() {
     let names: Vec<String> = fs::read_dir(&logs)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-        .filter(|name| !name.ends_with(".BIN"))
+        .filter(|name| Path::new(name).extension().is_none_or(|extension| extension != "BIN"))
         .collect();
     assert_eq!(names, ["manifest.json"]);
     let shelf = Shelf::open(&logs, "").unwrap();

@@ -1,5 +1,7 @@
 //! File transfer with drones over a bad radio, in simulated time.
 
+#![expect(clippy::unwrap_used, reason = "a simulated link stays open")]
+
 mod fleet_transfer_support;
 
 use std::collections::BTreeMap;

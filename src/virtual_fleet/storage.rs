@@ -118,11 +118,12 @@ impl Storage for MemoryStorage {
     }
 
     fn size(&self, name: &str) -> Result<u64, StorageError> {
-        self.get(name).map(|content| content.len() as u64).ok_or(StorageError::NotFound)
+        let content = self.files.get(&plain_name(name)?).ok_or(StorageError::NotFound)?;
+        Ok(content.len() as u64)
     }
 
     fn read_at(&self, name: &str, offset: u64, into: &mut [u8]) -> Result<usize, StorageError> {
-        let content = self.get(name).ok_or(StorageError::NotFound)?;
+        let content = self.files.get(&plain_name(name)?).ok_or(StorageError::NotFound)?;
         let rest = usize::try_from(offset).ok().and_then(|offset| content.get(offset..));
         let rest = rest.unwrap_or_default();
         let length = rest.len().min(into.len());
