@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use crate::link::clock::{Clock, Micros};
+
 /// Measures how long a step takes, for people.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stopwatch(Instant);
@@ -30,5 +32,29 @@ impl std::fmt::Display for Stopwatch {
         } else {
             write!(f, "{} min {:.0} s", (seconds / 60.0).floor(), seconds % 60.0)
         }
+    }
+}
+
+/// The computer's clocks, for everything that talks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SystemClock(Instant);
+
+impl SystemClock {
+    /// Link time begins now.
+    #[expect(clippy::disallowed_methods, reason = "the command line is where time comes from")]
+    pub(super) fn start() -> Self {
+        Self(Instant::now())
+    }
+}
+
+impl Clock for SystemClock {
+    fn now(&self) -> Micros {
+        self.0.elapsed().as_micros() as Micros
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "the command line is where time comes from")]
+    fn unix_us(&self) -> u64 {
+        let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        since.map_or(0, |since| since.as_micros() as u64)
     }
 }

@@ -5,11 +5,15 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use std::path::Path;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::command::Patience;
 use super::params::{ReadParams, SetError, SetParams, same};
+use crate::base::file::write_whole;
+use crate::campaign::{CampaignError, read_json, to_json};
 use crate::link::clock::Micros;
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
@@ -349,6 +353,36 @@ impl Default for Changes {
 }
 
 impl Changes {
+    /// The file of a folder; empty if there is none.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, CampaignError> {
+        let path = folder.join(CHANGES_FILE);
+        if !path.exists() {
+            return Ok(Self::default());
+        }
+        let changes: Self = read_json(&path)?;
+        if changes.schema == CHANGES_SCHEMA {
+            Ok(changes)
+        } else {
+            let (right, found) = (CHANGES_SCHEMA, &changes.schema);
+            let reason = format!("this program reads \"{right}\", not \"{found}\"");
+            Err(CampaignError::Json { path, reason })
+        }
+    }
+
+    /// Writes the file of a folder.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), CampaignError> {
+        let path = folder.join(CHANGES_FILE);
+        let json = to_json(self)
+            .map_err(|error| CampaignError::Json { path: path.clone(), reason: error.to_string() })?;
+        Ok(write_whole(&path, &json)?)
+    }
+
     /// Adds changes of a vehicle; of a parameter that was changed before, the first old value is
     /// kept.
     pub fn add(&mut self, drone: DroneId, changes: &[Change]) {

@@ -173,7 +173,7 @@ impl<'w> VirtualVehicle<'w> {
 
     /// Whether it flies, or has just landed.
     pub fn is_busy(&self) -> bool {
-        self.airborne.is_some()
+        self.airborne.is_some() || self.show.is_counting_down()
     }
 
     /// Whether its log still grows, though it has landed.

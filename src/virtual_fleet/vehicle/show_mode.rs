@@ -123,6 +123,11 @@ impl<'w> ShowMode<'w> {
         }));
     }
 
+    /// Whether it will take off by itself.
+    pub(super) fn is_counting_down(&self) -> bool {
+        self.authorized && self.start_us.is_some() && self.stage == Stage::WaitForStart
+    }
+
     /// Takes the mode.
     pub(super) fn enter(&mut self) {
         self.stage = Stage::Init;

@@ -1,0 +1,115 @@
+//! `--connect`: from words to links.
+
+use std::net::{SocketAddr, UdpSocket};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use clap::Args;
+
+use crate::cli::clock::SystemClock;
+use crate::cli::exit::CommandError;
+use crate::link::address::{Address, Way, links};
+use crate::link::clock::Clock as _;
+use crate::link::signing::Key;
+use crate::link::station::{Setup, Station};
+
+/// How drones are reached.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Links")]
+pub(in crate::cli) struct ConnectArgs {
+    /// Where the drones are, repeatable: udpin:HOST:PORT (listen), udpout:HOST:PORT, tcp:HOST:PORT,
+    /// serial:DEVICE:BAUD, a file with one of these per line, skybrush://HOST:PORT (through Skybrush
+    /// Server), or sim (virtual drones)
+    ///
+    /// 1@udpin:... puts a link into network 1: system ids are one byte, and the same id in another
+    /// network is another drone.
+    #[arg(long, value_name = "LINK", default_value = "udpin:0.0.0.0:14550")]
+    pub(in crate::cli) connect: Vec<String>,
+    /// File with the signing key: everything is signed, and what is not signed with it is refused
+    #[arg(long, value_name = "FILE")]
+    pub(in crate::cli) key: Option<PathBuf>,
+    /// Wait so long for drones to be heard, s
+    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = seconds)]
+    pub(in crate::cli) wait: f64,
+}
+
+/// Parser of waiting times.
+pub(in crate::cli) fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=86_400.0).contains(&value) => Ok(value),
+        _ => Err("a time between 0 and 86400 s".to_owned()),
+    }
+}
+
+/// What is behind `--connect`.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::cli) enum Target {
+    /// Links to drones.
+    Links(Vec<Address>),
+    /// Virtual drones of our own.
+    Sim,
+    /// A Skybrush Server: `host:port` of its TCP interface.
+    Server(String),
+}
+
+impl ConnectArgs {
+    /// What the words mean.
+    pub(in crate::cli) fn target(&self) -> Result<Target, CommandError> {
+        let usage = |text: String| CommandError::Usage(text);
+        if let [only] = self.connect.as_slice() {
+            if only == "sim" {
+                return Ok(Target::Sim);
+            }
+            if let Some(server) = only.strip_prefix("skybrush://") {
+                let server = server.trim_end_matches('/');
+                let has_port = server.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
+                let address = if has_port { server.to_owned() } else { format!("{server}:5001") };
+                return Ok(Target::Server(address));
+            }
+        }
+        let mut all = Vec::new();
+        for words in &self.connect {
+            if words == "sim" || words.starts_with("skybrush://") {
+                return Err(usage(format!("--connect {words} goes with no other link")));
+            }
+            all.extend(links(words).map_err(|error| usage(error.to_string()))?);
+        }
+        Ok(Target::Links(all))
+    }
+
+    /// Opens the links.
+    pub(in crate::cli) fn open(&self, links: Vec<Address>) -> Result<Station, CommandError> {
+        let key = match &self.key {
+            Some(path) => Some(Key::from_file(path).map_err(|error| {
+                CommandError::Usage(crate::cli::exit::with_reasons(&error))
+            })?),
+            None => None,
+        };
+        station(links, key, SystemClock::start())
+    }
+}
+
+/// Opens links with a clock.
+pub(in crate::cli) fn station(
+    links: Vec<Address>,
+    key: Option<Key>,
+    clock: SystemClock,
+) -> Result<Station, CommandError> {
+    Station::open(Setup { links, key, clock: Arc::new(clock) })
+        .map_err(|error| CommandError::Failed(crate::cli::exit::with_reasons(&error)))
+}
+
+/// A link that virtual drones on this computer find, on a free port, and the port's address.
+pub(in crate::cli) fn own_link() -> Result<(Address, SocketAddr), CommandError> {
+    let free = || -> std::io::Result<SocketAddr> {
+        UdpSocket::bind(("127.0.0.1", 0))?.local_addr()
+    };
+    let address = free()
+        .map_err(|error| CommandError::Failed(format!("no free UDP port on this computer: {error}")))?;
+    Ok((Address { network: 0, way: Way::UdpIn(address.to_string()) }, address))
+}
+
+/// Differs from run to run, for sequence numbers that answers of an earlier run must not match.
+pub(in crate::cli) fn run_number() -> u32 {
+    (SystemClock::start().unix_us() / 1000) as u32
+}

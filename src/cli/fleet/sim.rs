@@ -1,0 +1,97 @@
+//! Virtual drones: the fleet of `--connect sim`, of `run`, and of `fleet virtual`.
+
+use std::net::SocketAddr;
+
+use super::connect::{own_link, station};
+use crate::base::time::GpsTime;
+use crate::cli::clock::SystemClock;
+use crate::cli::exit::{CommandError, with_reasons};
+use crate::link::clock::{Micros, S};
+use crate::link::station::Station;
+use crate::mission::Plan;
+use crate::mission::plan::Slot;
+use crate::sim::Atmosphere;
+use crate::vehicle::Vehicle;
+use crate::virtual_fleet::lossy::Faults;
+use crate::virtual_fleet::server::{Pace, Running, ServerOptions, serve};
+use crate::virtual_fleet::storage::MemoryStorage;
+use crate::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
+use crate::virtual_fleet::world::World;
+
+/// Most virtual drones: system ids of one network, without those of ground stations.
+pub(in crate::cli) const MOST_DRONES: usize = 253;
+
+/// What virtual drones fly in, and how well they are heard.
+pub(in crate::cli) struct Hangar<'a> {
+    pub(in crate::cli) plan: &'a Plan,
+    /// The slots that have a drone.
+    pub(in crate::cli) slots: Vec<&'a Slot>,
+    pub(in crate::cli) vehicle: &'a Vehicle,
+    pub(in crate::cli) air: &'a dyn Atmosphere,
+    pub(in crate::cli) seed: u64,
+    pub(in crate::cli) full_logs: bool,
+    /// GPS time when they are switched on.
+    pub(in crate::cli) switched_on: GpsTime,
+    pub(in crate::cli) pace: Pace,
+    pub(in crate::cli) faults: Faults,
+    pub(in crate::cli) boot: BootTimes,
+}
+
+impl Hangar<'_> {
+    /// Switches the drones on, on this computer, and runs `body` with a station that hears them.
+    pub(in crate::cli) fn open<T>(
+        &self,
+        body: impl FnOnce(&mut Station) -> Result<T, CommandError>,
+    ) -> Result<T, CommandError> {
+        let (link, address) = own_link()?;
+        let clock = SystemClock::start();
+        let mut station = station(vec![link], None, clock)?;
+        self.serve(address, clock, |_| body(&mut station))?
+    }
+
+    /// Switches the drones on; they look for a station at this address.
+    pub(in crate::cli) fn serve<T>(
+        &self,
+        station: SocketAddr,
+        clock: SystemClock,
+        body: impl FnOnce(&Running) -> T,
+    ) -> Result<T, CommandError> {
+        if self.slots.len() > MOST_DRONES {
+            return Err(CommandError::Usage(format!(
+                "{} virtual drones do not fit into one network, which has {MOST_DRONES} system ids",
+                self.slots.len()
+            )));
+        }
+        let mut world = World::new(
+            self.vehicle,
+            self.air,
+            self.plan.site.frame(),
+            self.seed,
+            self.switched_on,
+        );
+        world.full_logs = self.full_logs;
+        let vehicles = self
+            .slots
+            .iter()
+            .enumerate()
+            .map(|(index, slot)| {
+                let system = index as u8 + 1;
+                let mut setup = VehicleSetup::new(slot.slot, system, slot.home_m.into());
+                setup.boot = self.boot;
+                VirtualVehicle::new(&world, setup, Box::new(MemoryStorage::default()), 0)
+            })
+            .collect();
+        let options = ServerOptions {
+            station,
+            pace: self.pace,
+            faults: self.faults,
+            seed: self.seed,
+        };
+        let served = serve(vehicles, &options, &clock, body);
+        let (given, _) = served.map_err(|error| CommandError::Failed(with_reasons(&error)))?;
+        Ok(given)
+    }
+}
+
+/// From switching on to a start that is the same every time, vehicle time.
+pub(in crate::cli) const TO_START: Micros = 40 * S;
