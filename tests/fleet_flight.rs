@@ -1,5 +1,7 @@
 //! A whole show with virtual vehicles, from the first word to the landing, in simulated time.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;

@@ -1,5 +1,8 @@
 //! Preflight, start, watch and abort with vehicles that do what they are told, in simulated time.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+#![expect(clippy::items_after_statements, reason = "a test's helper beside its use")]
+
 mod fleet_show_support;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,5 +1,7 @@
 //! Shows are loaded whole or refused, over good and bad links, in simulated time.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
 mod fleet_show_support;
 
 use std::collections::BTreeMap;
