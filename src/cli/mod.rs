@@ -8,11 +8,14 @@ mod context;
 mod effects;
 mod effects_plot;
 pub mod exit;
+mod fleet;
 mod flown;
+mod fly;
 mod found;
 mod inspect;
 mod leaning;
 mod load;
+mod logs;
 mod mission_args;
 mod physics;
 mod plan;
@@ -117,6 +120,12 @@ enum Command {
     Check(check::CheckArgs),
     /// Fly a campaign in the embedded simulator
     Simulate(simulate::SimulateArgs),
+    /// Fly a campaign: upload, preflight, start, watch, logs
+    Fly(fly::FlyArgs),
+    /// The steps of a flight one by one
+    Fleet(fleet::FleetArgs),
+    /// List, bring home, check and import logs
+    Logs(logs::LogsArgs),
     /// Fly the real firmware's simulator in our physics and our air
     Physics(physics::PhysicsArgs),
     /// Turn logs into calibration laws, a map of the air and a report
@@ -179,6 +188,9 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Plan(args) => plan::run(context, &args),
         Command::Check(args) => check::run(context, &args),
         Command::Simulate(args) => simulate::run(context, &args),
+        Command::Fly(args) => fly::run(context, &args),
+        Command::Fleet(args) => fleet::run(context, &args),
+        Command::Logs(args) => logs::run(context, &args),
         Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
         Command::Sweep(args) => sweep::run(context, &args),

@@ -14,7 +14,7 @@ use super::exit::{CommandError, Exit};
 use super::flown::{changed_logs, prepare, taken_down, write_record};
 use super::progress::Progress;
 use super::words;
-use crate::campaign::{self, FlightFolder};
+use crate::campaign::{self, FlightFolder, FlightRecord};
 use crate::effects;
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
@@ -232,14 +232,25 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
     Ok(if failed { Exit::Losses } else { Exit::Done })
 }
 
-/// Flies one flight; logs that are there and fit are kept.
-pub(super) fn simulate(
+/// A flight that is about to be flown.
+pub(super) struct Ready<'a> {
+    pub(super) vehicle: Vehicle,
+    pub(super) record: FlightRecord,
+    /// The slots asked for.
+    pub(super) wanted: Vec<&'a Slot>,
+    /// Those of them that have no log yet.
+    pub(super) open: Vec<&'a Slot>,
+    pub(super) air: crate::sim::air::Sum,
+}
+
+/// Resolves a flight's vehicle and air, and finds what is still to be flown. Logs that are there and
+/// fit are kept.
+pub(super) fn make_ready<'a>(
     context: &Context,
     folder: &FlightFolder,
-    plan: &Plan,
+    plan: &'a Plan,
     simulation: &Simulation,
-) -> Result<Flown, CommandError> {
-    let watch = Stopwatch::start();
+) -> Result<Ready<'a>, CommandError> {
     let mut vehicle = match &simulation.vehicle {
         Some(vehicle) => vehicle.clone(),
         None => library::load(&folder.vehicle().display().to_string())?,
@@ -271,12 +282,7 @@ pub(super) fn simulate(
     let is_open =
         |slot: &&Slot| changed.contains_key(&slot.slot) || !folder.log(slot.slot, count).exists();
     let open: Vec<_> = wanted.iter().copied().filter(is_open).collect();
-    let kept = wanted.len() - open.len();
-    let start = record.start;
     let frame = plan.site.frame();
-    let show = Show::of_plan(plan);
-    let drones: BTreeMap<u16, &ShowDrone> =
-        plan.slots.iter().zip(&show.drones).map(|(slot, drone)| (slot.slot, drone)).collect();
     let air = spec::build(&simulation.air, &frame, simulation.seed, &plan.name);
     if simulation.truth {
         wanted.par_iter().try_for_each(|slot| {
@@ -284,6 +290,23 @@ pub(super) fn simulate(
             truth::write(&path, &air, &Trajectory::of_slot(plan, slot), slot.slot, &frame)
         })?;
     }
+    Ok(Ready { vehicle, record, wanted, open, air })
+}
+
+/// Flies one flight; logs that are there and fit are kept.
+pub(super) fn simulate(
+    context: &Context,
+    folder: &FlightFolder,
+    plan: &Plan,
+    simulation: &Simulation,
+) -> Result<Flown, CommandError> {
+    let watch = Stopwatch::start();
+    let ready = make_ready(context, folder, plan, simulation)?;
+    let Ready { vehicle, record, open, air, .. } = &ready;
+    let (start, frame, count) = (record.start, plan.site.frame(), plan.slots.len());
+    let show = Show::of_plan(plan);
+    let drones: BTreeMap<u16, &ShowDrone> =
+        plan.slots.iter().zip(&show.drones).map(|(slot, drone)| (slot.slot, drone)).collect();
     let progress = Progress::new(context, "flying", open.len() as u64);
     let results: Vec<Result<FlightSummary, CommandError>> = open
         .par_iter()
@@ -296,11 +319,11 @@ pub(super) fn simulate(
                 CommandError::Failed(format!("slot {} has no .skyb file: {error}", slot.slot))
             })?;
             let setup = FlightSetup {
-                vehicle: &vehicle,
+                vehicle,
                 trajectory: &drone.trajectory,
                 home_m: slot.home_m.into(),
                 frame,
-                atmosphere: &air,
+                atmosphere: air,
                 seed: simulation.seed,
                 drone: slot.slot,
                 start,
@@ -317,18 +340,38 @@ pub(super) fn simulate(
         })
         .collect();
     progress.finish();
-    record.logs = taken_down(folder, plan, &record, &open)?;
-    write_record(folder, &record)?;
-    context.check_stop()?;
-    let mut failed = Vec::new();
     let mut saturated = Vec::new();
+    let mut failed = Vec::new();
+    let mut stopped = false;
     for (slot, result) in open.iter().zip(results) {
         match result {
             Ok(summary) if summary.saturated_share > 0.0 => saturated.push(slot.slot),
             Ok(_) => {}
+            Err(CommandError::Interrupted) => stopped = true,
             Err(error) => failed.push(super::exit::with_reasons(&error)),
         }
     }
+    let flown = settle(context, folder, plan, ready, failed, watch)?;
+    if stopped {
+        return Err(CommandError::Interrupted);
+    }
+    Ok(Flown { saturated, ..flown })
+}
+
+/// Takes down what was flown, and says so.
+pub(super) fn settle(
+    context: &Context,
+    folder: &FlightFolder,
+    plan: &Plan,
+    ready: Ready<'_>,
+    failed: Vec<String>,
+    watch: Stopwatch,
+) -> Result<Flown, CommandError> {
+    let Ready { mut record, wanted, open, .. } = ready;
+    record.logs = taken_down(folder, plan, &record, &open)?;
+    write_record(folder, &record)?;
+    context.check_stop()?;
+    let kept = wanted.len() - open.len();
     let bytes = record.logs.iter().map(|log| log.bytes).sum();
     for error in &failed {
         context.warn(error);
@@ -351,7 +394,7 @@ pub(super) fn simulate(
         kept,
         bytes,
         failed,
-        saturated,
+        saturated: Vec::new(),
     })
 }
 

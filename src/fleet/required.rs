@@ -378,8 +378,10 @@ impl Changes {
     /// When it cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), CampaignError> {
         let path = folder.join(CHANGES_FILE);
-        let json = to_json(self)
-            .map_err(|error| CampaignError::Json { path: path.clone(), reason: error.to_string() })?;
+        let json = to_json(self).map_err(|error| CampaignError::Json {
+            path: path.clone(),
+            reason: error.to_string(),
+        })?;
         Ok(write_whole(&path, &json)?)
     }
 

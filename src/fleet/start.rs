@@ -19,6 +19,8 @@ use crate::protocol::show::{CLEAR_TIME, LEAVE_TIME, StartConfig, flag};
 pub struct StartOptions {
     /// From the decision to the start, s of the vehicles' time.
     pub lead_s: f64,
+    /// The start itself, instead of the lead; whole seconds.
+    pub at: Option<GpsTime>,
     /// Clocks may differ by so much, s.
     pub clock_spread_s: f64,
     /// Authorization after this is refused, s before the start: the firmware sets its home 10 s
@@ -28,7 +30,7 @@ pub struct StartOptions {
 
 impl Default for StartOptions {
     fn default() -> Self {
-        Self { lead_s: 30.0, clock_spread_s: 1.0, authorize_before_s: 12.0 }
+        Self { lead_s: 30.0, at: None, clock_spread_s: 1.0, authorize_before_s: 12.0 }
     }
 }
 
@@ -216,13 +218,19 @@ impl Start {
         if drones.is_empty() {
             return Err(StartRefusal::NoDrones);
         }
-        if !(LEAST_LEAD_S..=MOST_LEAD_S).contains(&options.lead_s) {
-            return Err(StartRefusal::Lead { lead_s: options.lead_s });
-        }
         match clocks(telemetry, &drones, options.clock_spread_s, now) {
             ClockSpread::Apart { text, .. } => Err(StartRefusal::Clocks { text }),
             ClockSpread::Agree { gps_ms, .. } => {
-                let second = ((gps_ms / 1000.0) + options.lead_s).ceil() as i64;
+                let lead_s = options
+                    .at
+                    .map_or(options.lead_s, |at| (at.total_ms() as f64 - gps_ms) / 1000.0);
+                if !(LEAST_LEAD_S..=MOST_LEAD_S).contains(&lead_s) {
+                    return Err(StartRefusal::Lead { lead_s });
+                }
+                let second = options.at.map_or_else(
+                    || ((gps_ms / 1000.0) + lead_s).ceil() as i64,
+                    |at| at.total_ms().div_euclid(1000),
+                );
                 let at_gps_ms = second * 1000;
                 Ok(Self { drones, at_gps_ms, options, phase: Phase::Announced, next: 0 })
             }

@@ -38,9 +38,12 @@ const DATAGRAM: usize = 65_536;
 pub enum Pace {
     /// So many times as fast as the clock on the wall.
     Speed(f64),
-    /// As the clock on the wall, and as fast as the computer allows while a vehicle flies or its
-    /// log is being written.
-    Fast,
+    /// As fast as the computer allows while a vehicle counts down, flies, or its log is being
+    /// written; so many times as fast as the clock on the wall else.
+    Fast {
+        /// On the ground.
+        ground: f64,
+    },
 }
 
 /// How a fleet is served.
@@ -117,9 +120,8 @@ pub fn serve<'w, T>(
     clock: &dyn Clock,
     body: impl FnOnce(&Running) -> T,
 ) -> Result<(T, Vec<VirtualVehicle<'w>>), ServerError> {
-    if let Pace::Speed(speed) = options.pace
-        && !(speed > 0.0 && speed <= 1000.0)
-    {
+    let (Pace::Speed(speed) | Pace::Fast { ground: speed }) = options.pace;
+    if !(speed > 0.0 && speed <= 1000.0) {
         return Err(ServerError::Pace(speed));
     }
     let mut posts = Vec::with_capacity(vehicles.len());
@@ -239,15 +241,15 @@ fn run<'w>(
         let passed = begun.saturating_sub(last);
         let whole_rounds = match options.pace {
             Pace::Speed(speed) => speed > SMOOTH_SPEED,
-            Pace::Fast => is_busy,
+            Pace::Fast { .. } => is_busy,
         };
         let goes_on = !whole_rounds || passed >= ROUND;
         if goes_on {
             last = begun;
             now += match options.pace {
                 Pace::Speed(speed) => ((passed as f64 * speed) as Micros).min(LONGEST_STEP),
-                Pace::Fast if is_busy => step.max(passed),
-                Pace::Fast => passed.min(S),
+                Pace::Fast { .. } if is_busy => step.max(passed),
+                Pace::Fast { ground } => ((passed.min(S) as f64) * ground) as Micros,
             };
         }
         hear(&mut posts, begun, &mut up, &mut buffer);

@@ -128,8 +128,11 @@ pub(in crate::cli) fn bring(
         bytes_per_s: wish.rate,
         made_by: made_by(),
     };
-    let target =
-        if context.interactive { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let target = if context.interactive {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
     let bar = ProgressBar::with_draw_target(None, target);
     if let Ok(style) = ProgressStyle::with_template(
         "logs [{bar:40.cyan/blue}] {bytes}/{total_bytes} {bytes_per_sec} (eta {eta})",

@@ -62,7 +62,8 @@ impl ConnectArgs {
             }
             if let Some(server) = only.strip_prefix("skybrush://") {
                 let server = server.trim_end_matches('/');
-                let has_port = server.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
+                let has_port =
+                    server.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
                 let address = if has_port { server.to_owned() } else { format!("{server}:5001") };
                 return Ok(Target::Server(address));
             }
@@ -80,9 +81,10 @@ impl ConnectArgs {
     /// Opens the links.
     pub(in crate::cli) fn open(&self, links: Vec<Address>) -> Result<Station, CommandError> {
         let key = match &self.key {
-            Some(path) => Some(Key::from_file(path).map_err(|error| {
-                CommandError::Usage(crate::cli::exit::with_reasons(&error))
-            })?),
+            Some(path) => Some(
+                Key::from_file(path)
+                    .map_err(|error| CommandError::Usage(crate::cli::exit::with_reasons(&error)))?,
+            ),
             None => None,
         };
         station(links, key, SystemClock::start())
@@ -101,11 +103,11 @@ pub(in crate::cli) fn station(
 
 /// A link that virtual drones on this computer find, on a free port, and the port's address.
 pub(in crate::cli) fn own_link() -> Result<(Address, SocketAddr), CommandError> {
-    let free = || -> std::io::Result<SocketAddr> {
-        UdpSocket::bind(("127.0.0.1", 0))?.local_addr()
-    };
-    let address = free()
-        .map_err(|error| CommandError::Failed(format!("no free UDP port on this computer: {error}")))?;
+    let free =
+        || -> std::io::Result<SocketAddr> { UdpSocket::bind(("127.0.0.1", 0))?.local_addr() };
+    let address = free().map_err(|error| {
+        CommandError::Failed(format!("no free UDP port on this computer: {error}"))
+    })?;
     Ok((Address { network: 0, way: Way::UdpIn(address.to_string()) }, address))
 }
 

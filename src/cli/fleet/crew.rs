@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use serde::Serialize;
 
 use super::connect::run_number;
+use crate::base::crc::ap_crc32;
 use crate::base::file::read_whole;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
@@ -14,8 +15,12 @@ use crate::cli::exit::CommandError;
 use crate::cli::words;
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
 use crate::fleet::fence::Fence;
+use crate::fleet::ftp::Caller;
+use crate::fleet::ftp::sum::Sum;
 use crate::fleet::greet::Greet;
 use crate::fleet::journal::{Entry, Journal};
+use crate::fleet::log_protocol::LogProtocolError;
+use crate::fleet::log_protocol::list::{Entry as LogOnDrone, LogList};
 use crate::fleet::preflight::{Known, Limits, Preflight, preflight};
 use crate::fleet::required::{Changes, CheckParams, requirements};
 use crate::fleet::slots::{FleetTable, SlotProblem, check_stands, picture, propose};
@@ -29,6 +34,7 @@ use crate::link::error::NetError;
 use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
 use crate::mission::Plan;
+use crate::protocol::show::SHOW_FILE;
 use crate::show::Show;
 
 /// Conversations at once per network: short ones do not disturb each other.
@@ -128,7 +134,9 @@ impl<'a> Crew<'a> {
             self.context.check_stop()?;
             let now = self.net.now();
             let ready = self.telemetry.drones.values().filter(|drone| {
-                let here = |place: crate::base::frame::Geodetic| place.lat_deg != 0.0 || place.lon_deg != 0.0;
+                let here = |place: crate::base::frame::Geodetic| {
+                    place.lat_deg != 0.0 || place.lon_deg != 0.0
+                };
                 drone.position.is_some_and(|(_, position)| here(position.place))
                     && drone.mode.is_some()
             });
@@ -156,11 +164,8 @@ impl<'a> Crew<'a> {
         machines: BTreeMap<DroneId, M>,
         at_once: usize,
     ) -> Result<BTreeMap<DroneId, M::Done>, CommandError> {
-        let mut ears = Ears {
-            telemetry: &mut self.telemetry,
-            context: self.context,
-            done: BTreeSet::new(),
-        };
+        let mut ears =
+            Ears { telemetry: &mut self.telemetry, context: self.context, done: BTreeSet::new() };
         let done = drive(self.net, machines, at_once, &mut ears)?;
         self.context.check_stop()?;
         Ok(done)
@@ -323,10 +328,14 @@ impl<'a> Crew<'a> {
     }
 
     /// Sets a start and waits until every drone has taken it.
-    pub(in crate::cli) fn announce(&mut self, options: StartOptions) -> Result<Start, CommandError> {
-        let refused = |error: crate::fleet::start::StartRefusal| CommandError::Failed(error.to_string());
-        let mut start =
-            Start::announce(self.drones(), &self.telemetry, options, self.net.now()).map_err(refused)?;
+    pub(in crate::cli) fn announce(
+        &mut self,
+        options: StartOptions,
+    ) -> Result<Start, CommandError> {
+        let refused =
+            |error: crate::fleet::start::StartRefusal| CommandError::Failed(error.to_string());
+        let mut start = Start::announce(self.drones(), &self.telemetry, options, self.net.now())
+            .map_err(refused)?;
         self.until_taken(&mut start)?;
         Ok(start)
     }
@@ -430,6 +439,79 @@ impl<'a> Crew<'a> {
         };
         self.telemetry = monitor.telemetry;
         outcome.map(|()| alarms)
+    }
+
+    /// For steps that follow an earlier upload: whether each drone's show file is the planned one.
+    pub(in crate::cli) fn look_at_files(&mut self) -> Result<(), CommandError> {
+        let (count, number) = (self.plan.slots.len(), run_number());
+        let mut wanted = BTreeMap::new();
+        let mut machines = BTreeMap::new();
+        for line in &self.table.drones {
+            let file = read_whole(&self.folder.skyb(line.slot, count), MOST_SKYB)?;
+            wanted.insert(line.drone, ap_crc32(&file));
+            let caller = Caller::new(line.drone, number);
+            let sum = Sum::new(caller, SHOW_FILE, file.len() as u64, 10 * S);
+            machines.insert(line.drone, sum);
+        }
+        let found = self.all(machines, AT_ONCE)?;
+        let same = found.into_iter().filter(|(drone, sum)| sum.as_ref().ok() == wanted.get(drone));
+        let same: Vec<DroneId> = same.map(|(drone, _)| drone).collect();
+        self.known.loaded.extend(same.iter().copied());
+        self.known.fenced.extend(same);
+        Ok(())
+    }
+
+    /// The logs on every drone of the table; in words why not.
+    pub(in crate::cli) fn list_logs(
+        &mut self,
+    ) -> Result<BTreeMap<DroneId, Result<Vec<LogOnDrone>, String>>, CommandError> {
+        let machines =
+            self.drones().into_iter().map(|drone| (drone, LogList::new(drone, 20 * S))).collect();
+        let listed = self.all(machines, AT_ONCE)?;
+        let words = |error: LogProtocolError| crate::cli::exit::with_reasons(&error);
+        Ok(listed.into_iter().map(|(drone, list)| (drone, list.map_err(words))).collect())
+    }
+
+    /// Drones of the table that are down and disarmed.
+    pub(in crate::cli) fn landed(&self) -> usize {
+        let down = |drone: &DroneId| {
+            self.telemetry.get(*drone).is_some_and(|of| of.is_armed() == Some(false))
+        };
+        self.drones().iter().filter(|drone| down(drone)).count()
+    }
+
+    /// Listens until these drones (or anyone, and a moment more) are heard.
+    pub(in crate::cli) fn hear_anyone(
+        &mut self,
+        wait_s: f64,
+        only: Option<&BTreeSet<DroneId>>,
+    ) -> Result<(), CommandError> {
+        let begun = self.net.now();
+        let until = begun + (wait_s * 1e6) as Micros;
+        loop {
+            self.context.check_stop()?;
+            let now = self.net.now();
+            let heard: BTreeSet<DroneId> = self.net.heard().into_iter().collect();
+            let enough = match only {
+                Some(only) => only.is_subset(&heard),
+                None => !heard.is_empty() && now >= begun + 1500 * MS,
+            };
+            if enough {
+                return Ok(());
+            }
+            if now >= until {
+                return if heard.is_empty() {
+                    Err(CommandError::Nothing(
+                        "no drone was heard: use their remote controls".to_owned(),
+                    ))
+                } else {
+                    Ok(())
+                };
+            }
+            if let Some(received) = self.net.recv(now + 50 * MS)? {
+                self.telemetry.on_message(self.net.now(), &received);
+            }
+        }
     }
 
     /// Ends the flight of these drones (all: of everyone who is heard).

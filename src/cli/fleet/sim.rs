@@ -62,13 +62,8 @@ impl Hangar<'_> {
                 self.slots.len()
             )));
         }
-        let mut world = World::new(
-            self.vehicle,
-            self.air,
-            self.plan.site.frame(),
-            self.seed,
-            self.switched_on,
-        );
+        let mut world =
+            World::new(self.vehicle, self.air, self.plan.site.frame(), self.seed, self.switched_on);
         world.full_logs = self.full_logs;
         let vehicles = self
             .slots
@@ -81,12 +76,8 @@ impl Hangar<'_> {
                 VirtualVehicle::new(&world, setup, Box::new(MemoryStorage::default()), 0)
             })
             .collect();
-        let options = ServerOptions {
-            station,
-            pace: self.pace,
-            faults: self.faults,
-            seed: self.seed,
-        };
+        let options =
+            ServerOptions { station, pace: self.pace, faults: self.faults, seed: self.seed };
         let served = serve(vehicles, &options, &clock, body);
         let (given, _) = served.map_err(|error| CommandError::Failed(with_reasons(&error)))?;
         Ok(given)

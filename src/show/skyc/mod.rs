@@ -12,7 +12,7 @@ mod write;
 use thiserror::Error;
 
 pub use read::{read, read_with};
-pub use write::write;
+pub use write::{drone_documents, write};
 
 /// Most drones the official loader takes.
 pub use crate::mission::formation::MAX_DRONES;

@@ -79,6 +79,18 @@ fn pack(name: &str, text: &str) -> Result<PreparedZipFile, String> {
     packed().map_err(|error| format!("{name}: {error}"))
 }
 
+/// A drone's trajectory and lights as the objects of a `.skyc` file: what Skybrush Server takes.
+///
+/// # Errors
+/// When the trajectory cannot be written.
+pub fn drone_documents(drone: &ShowDrone) -> Result<(Value, Option<Value>), String> {
+    let text = trajectory::to_json(&drone.trajectory)?;
+    let value = serde_json::from_str(&text).map_err(|error| error.to_string())?;
+    let data = || STANDARD.encode(lights::with_final_set(&drone.lights));
+    let lights = (!drone.lights.is_empty()).then(|| json!({ "version": 1, "data": data() }));
+    Ok((value, lights))
+}
+
 fn drone_files(folder: &str, drone: &ShowDrone) -> Result<Vec<PreparedZipFile>, String> {
     let text = trajectory::to_json(&drone.trajectory)?;
     let mut files = vec![pack(&format!("{folder}/trajectory.json"), &text)?];

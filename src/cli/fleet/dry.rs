@@ -1,0 +1,154 @@
+//! `--dry-run`: the messages, and nobody hears them.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::crew::Crew;
+use super::{StepArgs, one_flight};
+use crate::base::frame::Geodetic;
+use crate::cli::context::Context;
+use crate::cli::exit::{CommandError, Exit};
+use crate::fleet::abort::{Abort, Action};
+use crate::fleet::dry_run::{Obliging, dry_run};
+use crate::fleet::messages::{start_packet, text};
+use crate::fleet::required::{CheckParams, requirements};
+use crate::fleet::slots::FleetTable;
+use crate::link::clock::Micros;
+use crate::link::drive::Machine;
+use crate::link::error::NetError;
+use crate::link::frame::MavMessage;
+use crate::link::id::DroneId;
+use crate::link::net::{Net, Received};
+use crate::mission::Plan;
+use crate::mission::plan::Slot;
+use crate::protocol::show::{LEAVE_TIME, StartConfig};
+
+/// Most messages shown of a conversation.
+const MOST: usize = 20_000;
+
+/// No links at all.
+struct Nobody;
+
+impl Net for Nobody {
+    fn now(&self) -> Micros {
+        0
+    }
+
+    fn recv(&mut self, _: Micros) -> Result<Option<Received>, NetError> {
+        Ok(None)
+    }
+
+    fn send(&mut self, _: DroneId, _: &MavMessage) -> Result<(), NetError> {
+        Ok(())
+    }
+
+    fn broadcast(&mut self, _: &MavMessage) -> Result<(), NetError> {
+        Ok(())
+    }
+
+    fn heard(&self) -> Vec<DroneId> {
+        Vec::new()
+    }
+}
+
+#[derive(Serialize)]
+struct DryOutput {
+    schema: &'static str,
+    drones: BTreeMap<String, Vec<String>>,
+}
+
+fn print(context: &Context, lines: BTreeMap<DroneId, Vec<String>>) -> Result<Exit, CommandError> {
+    if context.json {
+        let drones = lines.into_iter().map(|(drone, lines)| (drone.to_string(), lines)).collect();
+        context.print_json(&DryOutput { schema: "updraft.dry-run/1", drones })?;
+        return Ok(Exit::Done);
+    }
+    for (drone, lines) in lines {
+        context.emit(&format!("to drone {drone}, if all goes well:\n"))?;
+        for line in lines {
+            context.emit(&format!("  {line}\n"))?;
+        }
+    }
+    context.say("Nothing was sent");
+    Ok(Exit::Done)
+}
+
+/// The table of the campaign, or drones by the number of their slots.
+fn table(folder: &std::path::Path, plan: &Plan) -> Result<FleetTable, CommandError> {
+    if FleetTable::path(folder).exists() {
+        return Ok(FleetTable::read(folder)?);
+    }
+    Ok(FleetTable::new(plan.slots.iter().map(|slot| {
+        let number = usize::from(slot.slot) - 1;
+        let id = DroneId { network: (number / 253) as u16, system: (number % 253 + 1) as u8 };
+        (id, slot.slot)
+    })))
+}
+
+fn place(plan: &Plan, slot: Option<&Slot>) -> Geodetic {
+    let home = slot.map_or([0.0; 3], |slot| slot.home_m);
+    plan.site.frame().to_geodetic(home.into())
+}
+
+fn shown<M: Machine>(plan: &Plan, table: &FleetTable, drone: DroneId, machine: M) -> Vec<String> {
+    let slot = table.slot_of(drone).and_then(|slot| plan.slot(slot));
+    let mut vehicle = Obliging::new(drone, true, place(plan, slot));
+    dry_run(machine, &mut vehicle, MOST).0
+}
+
+/// What an upload would send.
+pub(in crate::cli) fn upload(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let mut nobody = Nobody;
+    let mut crew = Crew::new(context, &mut nobody, &folder, &plan);
+    crew.table = table(&folder.0, &plan)?;
+    let mut lines = BTreeMap::new();
+    for (drone, upload) in crew.uploads()? {
+        let check = CheckParams::new(drone, requirements(&plan, true), false);
+        let mut all = shown(&plan, &crew.table, drone, check);
+        all.extend(shown(&plan, &crew.table, drone, upload));
+        lines.insert(drone, all);
+    }
+    print(context, lines)
+}
+
+/// What a start would send.
+pub(in crate::cli) fn start(
+    context: &Context,
+    args: &StepArgs,
+    lead_s: f64,
+) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let packet = |authorization| {
+        text(&start_packet(&StartConfig {
+            start_tow_s: 0,
+            authorization,
+            countdown_ms: LEAVE_TIME,
+        }))
+    };
+    let lines = vec![
+        format!("once a second, with the drones' GPS time + {lead_s:.0} s: {}", packet(0)),
+        format!("once authorized, until the start: {}", packet(1)),
+    ];
+    let table = table(&folder.0, &plan)?;
+    print(context, table.drones.iter().map(|line| (line.drone, lines.clone())).collect())
+}
+
+/// What an abort would send.
+pub(in crate::cli) fn end(
+    context: &Context,
+    args: &StepArgs,
+    action: Action,
+) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let table = table(&folder.0, &plan)?;
+    let lines = table.drones.iter().map(|line| {
+        let mut vehicle = Obliging::new(line.drone, true, place(&plan, plan.slot(line.slot)));
+        vehicle.armed = true;
+        vehicle.above_home_m = 20.0;
+        let abort = Abort::new(line.drone, action, None);
+        (line.drone, dry_run(abort, &mut vehicle, MOST).0)
+    });
+    print(context, lines.collect())
+}

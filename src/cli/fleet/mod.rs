@@ -1,0 +1,328 @@
+//! `updraft fleet`: the steps of a flight one by one.
+
+pub(super) mod bring;
+pub(super) mod connect;
+pub(super) mod crew;
+pub(super) mod dry;
+pub(super) mod server;
+pub(super) mod sim;
+pub(super) mod tables;
+pub(super) mod virtual_drones;
+
+use std::collections::BTreeSet;
+use std::io::{BufRead as _, IsTerminal as _, Write as _};
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use self::connect::{ConnectArgs, Target};
+use self::crew::Crew;
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use crate::campaign::{self, FlightFolder};
+use crate::fleet::abort::{Aborted, Action};
+use crate::fleet::start::StartOptions;
+use crate::link::id::DroneId;
+use crate::mission::Plan;
+
+/// Arguments of `updraft fleet`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft fleet status my-campaign --flight calibration
+  updraft fleet upload my-campaign --flight calibration --set-params
+  updraft fleet preflight my-campaign --flight calibration
+  updraft fleet start my-campaign --flight calibration --lead 60
+  updraft fleet abort my-campaign --flight calibration        # everyone returns
+  updraft fleet land my-campaign --drones 7,1:12              # these land where they are
+  updraft fleet virtual my-campaign --station 127.0.0.1:14550 # drones to practise with
+
+Which drone flies which slot is found from where they stand, and kept in fleet.json; `upload
+--assign` finds it anew. Everything that happens is in fleet-journal.ndjson. Exit codes: 3 some drones
+refused, 4 no-go.")]
+pub(super) struct FleetArgs {
+    #[command(subcommand)]
+    command: FleetCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum FleetCommand {
+    /// Who is heard, where they stand, what they say
+    Status(StepArgs),
+    /// Load the show onto the drones: file, origin, fence, all read back
+    Upload(UploadArgs),
+    /// Everything that must be right before a start, drone by drone
+    Preflight(UploadArgs),
+    /// Set a start time and authorize it, then watch the show
+    Start(StartArgs),
+    /// Send drones home (those on the ground: take their start back)
+    Abort(EndArgs),
+    /// Land drones where they are (those on the ground: take their start back)
+    Land(EndArgs),
+    /// Put back the parameters that were changed
+    Restore(StepArgs),
+    /// Virtual drones at the plan's slots, to practise with
+    Virtual(virtual_drones::VirtualArgs),
+}
+
+/// What every step needs.
+#[derive(Clone, Debug, Args)]
+pub(super) struct StepArgs {
+    /// Campaign folder
+    pub(super) campaign: PathBuf,
+    /// Which flight, if the campaign has several
+    #[arg(long, value_name = "NAME")]
+    pub(super) flight: Option<String>,
+    #[command(flatten)]
+    pub(super) connect: ConnectArgs,
+    /// Print the messages that would be sent, and send nothing
+    #[arg(long)]
+    pub(super) dry_run: bool,
+}
+
+/// Arguments of `fleet upload` and `fleet preflight`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct UploadArgs {
+    #[command(flatten)]
+    step: StepArgs,
+    /// Set parameters that must be others (old values are kept for `fleet restore`)
+    #[arg(long)]
+    set_params: bool,
+    /// Find anew which drone flies which slot, from where they stand
+    #[arg(long)]
+    assign: bool,
+}
+
+/// How a start is given.
+#[derive(Clone, Debug, Args)]
+pub(super) struct LeadArgs {
+    /// From now to the start, s of the drones' time
+    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = connect::seconds)]
+    pub(super) lead: f64,
+    /// Authorize the start without asking
+    #[arg(short, long)]
+    pub(super) yes: bool,
+}
+
+/// Arguments of `fleet start`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct StartArgs {
+    #[command(flatten)]
+    upload: UploadArgs,
+    #[command(flatten)]
+    lead: LeadArgs,
+}
+
+/// Arguments of `fleet abort` and `fleet land`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct EndArgs {
+    #[command(flatten)]
+    step: StepArgs,
+    /// Only these drones: system ids, or network:system, with commas [default: all that are heard]
+    #[arg(long, value_name = "IDS", value_delimiter = ',')]
+    drones: Option<Vec<DroneId>>,
+}
+
+/// The one flight of a campaign that is meant.
+pub(super) fn one_flight(
+    campaign: &std::path::Path,
+    name: Option<&str>,
+) -> Result<(FlightFolder, Plan), CommandError> {
+    let mut names = Vec::new();
+    let mut found = Vec::new();
+    for folder in campaign::flights(campaign)? {
+        let plan = folder.read_plan()?;
+        names.push(plan.name.clone());
+        if name.is_none_or(|name| name == plan.name) {
+            found.push((folder, plan));
+        }
+    }
+    let listed = names.join(", ");
+    match (found.len(), name) {
+        (1, _) => Ok(found.remove(0)),
+        (0, Some(name)) => {
+            Err(CommandError::Usage(format!("the campaign has no flight \"{name}\", but {listed}")))
+        }
+        _ => Err(CommandError::Usage(format!("which flight? give --flight ({listed})"))),
+    }
+}
+
+pub(super) fn run(context: &Context, args: &FleetArgs) -> Result<Exit, CommandError> {
+    match &args.command {
+        FleetCommand::Status(args) => {
+            with_crew(context, args, |crew| tables::status(context, crew))
+        }
+        FleetCommand::Upload(args) => upload(context, args),
+        FleetCommand::Preflight(args) => with_crew(context, &args.step, |crew| {
+            prepare(context, crew, args)?;
+            crew.look_at_files()?;
+            let table = crew.preflight(args.step.connect.wait)?;
+            tables::preflight(context, &table)
+        }),
+        FleetCommand::Start(args) => start(context, args),
+        FleetCommand::Abort(args) => end(context, args, Action::Return),
+        FleetCommand::Land(args) => end(context, args, Action::Land),
+        FleetCommand::Restore(args) => restore(context, args),
+        FleetCommand::Virtual(args) => virtual_drones::run(context, args),
+    }
+}
+
+/// Opens the links and runs a step.
+fn with_crew(
+    context: &Context,
+    args: &StepArgs,
+    body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
+) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    match args.connect.target()? {
+        Target::Links(links) => {
+            let mut station = args.connect.open(links)?;
+            let mut crew = Crew::new(context, &mut station, &folder, &plan);
+            crew.listen(args.connect.wait)?;
+            body(&mut crew)
+        }
+        Target::Sim => Err(CommandError::Usage(
+            "virtual drones live as long as their program: use `updraft fly --connect sim`, or \
+             `updraft fleet virtual` in another terminal"
+                .to_owned(),
+        )),
+        Target::Server(_) => Err(CommandError::Usage(
+            "through Skybrush Server the whole flight is one command: `updraft fly`; its single \
+             steps are in Skybrush Live"
+                .to_owned(),
+        )),
+    }
+}
+
+/// Clocks, slots and parameters; refuses to go on when a drone stands wrong.
+fn prepare(context: &Context, crew: &mut Crew<'_>, args: &UploadArgs) -> Result<(), CommandError> {
+    crew.greet()?;
+    if !crew.assign(args.assign)? {
+        return Err(CommandError::Usage(
+            "nothing was sent: the drones do not stand as planned".to_owned(),
+        ));
+    }
+    let right = crew.params(args.set_params)?;
+    if !right && !args.set_params {
+        context.say("The table tells which parameters");
+    }
+    Ok(())
+}
+
+fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
+    if args.step.dry_run {
+        return dry::upload(context, &args.step);
+    }
+    let _lock = context.lock(&args.step.campaign)?;
+    with_crew(context, &args.step, |crew| {
+        prepare(context, crew, args)?;
+        let refused = crew.upload()?;
+        if context.json {
+            context.print_json(&tables::UploadOutput::new(&crew.table, &refused))?;
+        }
+        Ok(if refused.is_empty() { Exit::Done } else { Exit::Losses })
+    })
+}
+
+fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
+    if args.upload.step.dry_run {
+        return dry::start(context, &args.upload.step, args.lead.lead);
+    }
+    let _lock = context.lock(&args.upload.step.campaign)?;
+    with_crew(context, &args.upload.step, |crew| {
+        prepare(context, crew, &args.upload)?;
+        crew.look_at_files()?;
+        let table = crew.preflight(args.upload.step.connect.wait)?;
+        if !table.go() {
+            return tables::preflight(context, &table);
+        }
+        fly_now(context, crew, &args.lead)
+    })
+}
+
+/// The two steps of a start, and the show.
+pub(super) fn fly_now(
+    context: &Context,
+    crew: &mut Crew<'_>,
+    lead: &LeadArgs,
+) -> Result<Exit, CommandError> {
+    if !lead.yes && !std::io::stdin().is_terminal() {
+        return Err(CommandError::Usage(
+            "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
+        ));
+    }
+    let options = StartOptions { lead_s: lead.lead, ..StartOptions::default() };
+    let mut start = crew.announce(options)?;
+    let time = start.time().map_or_else(String::new, |time| tables::time_of_day(time));
+    context.say(&format!(
+        "Every drone has the start time: {time} ({} s of the GPS week), in {:.0} s",
+        start.second_of_week(),
+        start.left_s(&crew.telemetry, crew.net.now()).unwrap_or(0.0)
+    ));
+    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
+        crew.cancel(&mut start)?;
+        return Err(CommandError::Usage("not authorized: the start was taken back".to_owned()));
+    }
+    crew.authorize(&mut start)?;
+    context.say("Authorized. Ctrl-C stops watching; `updraft fleet abort` sends everyone home");
+    let alarms = crew.watch(&mut start)?;
+    let landed = crew.landed();
+    context.say(&format!("{landed} of {} drones have landed", crew.table.drones.len()));
+    let all = landed == crew.table.drones.len() && alarms.is_empty();
+    Ok(if all { Exit::Done } else { Exit::Losses })
+}
+
+/// Asks a person.
+fn asked(question: &str) -> Result<bool, CommandError> {
+    let failed = |error: std::io::Error| CommandError::Failed(format!("failed to ask: {error}"));
+    let mut err = std::io::stderr().lock();
+    err.write_all(question.as_bytes()).and_then(|()| err.flush()).map_err(failed)?;
+    let mut answer = String::new();
+    std::io::stdin().lock().read_line(&mut answer).map_err(failed)?;
+    Ok(answer.trim().eq_ignore_ascii_case("yes"))
+}
+
+fn end(context: &Context, args: &EndArgs, action: Action) -> Result<Exit, CommandError> {
+    if args.step.dry_run {
+        return dry::end(context, &args.step, action);
+    }
+    let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())
+        // Nobody looks for a flight's name while drones fall: any plan will do.
+        .or_else(|error| any_flight(&args.step.campaign).ok_or(error))?;
+    let Target::Links(links) = args.step.connect.target()? else {
+        return Err(CommandError::Usage("give the drones' own links with --connect".to_owned()));
+    };
+    let mut station = args.step.connect.open(links)?;
+    let mut crew = Crew::new(context, &mut station, &folder, &plan);
+    let only: Option<BTreeSet<DroneId>> =
+        args.drones.as_ref().map(|drones| drones.iter().copied().collect());
+    crew.hear_anyone(args.step.connect.wait, only.as_ref())?;
+    let done = crew.abort(only.as_ref(), action)?;
+    let unsure = done.values().filter(|done| matches!(done, Aborted::Unconfirmed { .. })).count();
+    if context.json {
+        context.print_json(&tables::EndOutput::new(&done))?;
+    } else {
+        for (drone, done) in &done {
+            context.print(&format!("drone {drone}: {done}\n"))?;
+        }
+    }
+    Ok(if unsure == 0 { Exit::Done } else { Exit::Losses })
+}
+
+fn any_flight(campaign: &std::path::Path) -> Option<(FlightFolder, Plan)> {
+    let folder = campaign::flights(campaign).ok()?.into_iter().next()?;
+    let plan = folder.read_plan().ok()?;
+    Some((folder, plan))
+}
+
+fn restore(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    let _lock = context.lock(&args.campaign)?;
+    with_crew(context, args, |crew| {
+        let left = crew.restore()?;
+        context.say(
+            "Parameters are as they were, but for the drones named above".trim_end_matches(
+                if left.is_empty() { ", but for the drones named above" } else { "" },
+            ),
+        );
+        Ok(if left.is_empty() { Exit::Done } else { Exit::Losses })
+    })
+}

@@ -1,0 +1,203 @@
+//! What the steps print.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::crew::Crew;
+use crate::base::time::GpsTime;
+use crate::cli::context::Context;
+use crate::cli::exit::{CommandError, Exit};
+use crate::fleet::abort::Aborted;
+use crate::fleet::messages::mode_name;
+use crate::fleet::preflight::{COLUMNS, Preflight};
+use crate::fleet::slots::{FleetTable, picture, stands};
+use crate::link::id::DroneId;
+
+/// UTC of a GPS time: `12:34:56 UTC`.
+pub(in crate::cli) fn time_of_day(time: GpsTime) -> String {
+    let seconds = time.to_unix_ms().div_euclid(1000).rem_euclid(86_400);
+    format!("{:02}:{:02}:{:02} UTC", seconds / 3600, seconds / 60 % 60, seconds % 60)
+}
+
+#[derive(Serialize)]
+struct StatusRow {
+    drone: DroneId,
+    nearest_slot: Option<u16>,
+    distance_m: Option<f64>,
+    mode: Option<String>,
+    armed: Option<bool>,
+    stage: Option<String>,
+    satellites: Option<u8>,
+    battery_percent: Option<u8>,
+    battery_v: Option<f64>,
+    link_quality: Option<f64>,
+    obstacle: Option<&'static str>,
+    firmware: Option<String>,
+}
+
+#[derive(Serialize)]
+struct StatusOutput {
+    schema: &'static str,
+    drones: Vec<StatusRow>,
+}
+
+/// Who is heard.
+pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<Exit, CommandError> {
+    crew.greet()?;
+    let now = crew.net.now();
+    let stands = stands(crew.plan, &crew.telemetry, now);
+    let rows: Vec<StatusRow> = crew
+        .telemetry
+        .drones
+        .iter()
+        .map(|(drone, of)| {
+            let stand = stands.get(drone);
+            let status = of.status.map(|(_, status)| status);
+            let health = of.health.map(|(_, health)| health);
+            StatusRow {
+                drone: *drone,
+                nearest_slot: stand.map(|stand| stand.nearest),
+                distance_m: stand.map(|stand| stand.distance_m),
+                mode: of.mode.map(|(_, mode)| mode_name(mode)),
+                armed: of.is_armed(),
+                stage: status.map(|status| status.stage.to_string()),
+                satellites: of.gps.map(|(_, gps)| gps.satellites),
+                battery_percent: health.and_then(|health| health.battery_percent),
+                battery_v: health.and_then(|health| health.battery_v),
+                link_quality: of.link_quality(),
+                obstacle: status.and_then(|status| status.obstacle()),
+                firmware: of.version.map(|version| version.to_string()),
+            }
+        })
+        .collect();
+    if context.json {
+        context.print_json(&StatusOutput { schema: "updraft.fleet-status/1", drones: rows })?;
+        return Ok(Exit::Done);
+    }
+    let mut text = String::from(
+        "drone  slot  away m  mode        stage              sats  battery      link  firmware\n",
+    );
+    let dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    for row in &rows {
+        let battery = match (row.battery_percent, row.battery_v) {
+            (Some(percent), Some(volts)) => format!("{percent} % {volts:.1} V"),
+            (Some(percent), None) => format!("{percent} %"),
+            (None, Some(volts)) => format!("{volts:.1} V"),
+            (None, None) => "-".to_owned(),
+        };
+        text.push_str(&format!(
+            "{:>5}  {:>4}  {:>6}  {:<10}  {:<17}  {:>4}  {:<11}  {:>4}  {}\n",
+            row.drone,
+            dash(row.nearest_slot.map(|slot| slot.to_string())),
+            dash(row.distance_m.map(|m| if m < 1000.0 { format!("{m:.1}") } else { "far".into() })),
+            dash(row.mode.clone()),
+            dash(row.stage.clone()),
+            dash(row.satellites.map(|count| count.to_string())),
+            battery,
+            dash(row.link_quality.map(|share| format!("{:.0}%", share * 100.0))),
+            dash(row.firmware.clone()),
+        ));
+    }
+    text.push('\n');
+    text.push_str(&picture(crew.plan, &crew.telemetry, now));
+    context.print(&text)?;
+    Ok(Exit::Done)
+}
+
+#[derive(Serialize)]
+struct PreflightOutput {
+    schema: &'static str,
+    go: bool,
+    columns: [&'static str; 11],
+    drones: Vec<PreflightRow>,
+    fleet: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct PreflightRow {
+    slot: u16,
+    drone: DroneId,
+    go: bool,
+    cells: Vec<String>,
+    no_go: Vec<String>,
+}
+
+/// The table before a start.
+pub(in crate::cli) fn preflight(
+    context: &Context,
+    table: &Preflight,
+) -> Result<Exit, CommandError> {
+    if context.json {
+        let drones = table.rows.iter().map(|row| PreflightRow {
+            slot: row.slot,
+            drone: row.drone,
+            go: row.go(),
+            cells: row.cells.iter().map(|cell| cell.text.clone()).collect(),
+            no_go: row.cells.iter().filter_map(|cell| cell.no_go.clone()).collect(),
+        });
+        context.print_json(&PreflightOutput {
+            schema: "updraft.preflight/1",
+            go: table.go(),
+            columns: COLUMNS,
+            drones: drones.collect(),
+            fleet: table.fleet.clone(),
+        })?;
+    } else {
+        context.emit(&table.to_string())?;
+    }
+    Ok(if table.go() { Exit::Done } else { Exit::Unsafe })
+}
+
+/// What an upload prints under `--json`.
+#[derive(Serialize)]
+pub(super) struct UploadOutput {
+    schema: &'static str,
+    drones: Vec<UploadRow>,
+}
+
+#[derive(Serialize)]
+struct UploadRow {
+    slot: u16,
+    drone: DroneId,
+    loaded: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+}
+
+impl UploadOutput {
+    pub(super) fn new(table: &FleetTable, refused: &BTreeMap<DroneId, String>) -> Self {
+        let drones = table.drones.iter().map(|line| UploadRow {
+            slot: line.slot,
+            drone: line.drone,
+            loaded: !refused.contains_key(&line.drone),
+            reason: refused.get(&line.drone).cloned(),
+        });
+        Self { schema: "updraft.upload/1", drones: drones.collect() }
+    }
+}
+
+/// What an abort prints under `--json`.
+#[derive(Serialize)]
+pub(super) struct EndOutput {
+    schema: &'static str,
+    drones: Vec<EndRow>,
+}
+
+#[derive(Serialize)]
+struct EndRow {
+    drone: DroneId,
+    confirmed: bool,
+    text: String,
+}
+
+impl EndOutput {
+    pub(super) fn new(done: &BTreeMap<DroneId, Aborted>) -> Self {
+        let drones = done.iter().map(|(drone, done)| EndRow {
+            drone: *drone,
+            confirmed: !matches!(done, Aborted::Unconfirmed { .. }),
+            text: done.to_string(),
+        });
+        Self { schema: "updraft.abort/1", drones: drones.collect() }
+    }
+}

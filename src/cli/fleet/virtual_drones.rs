@@ -1,0 +1,115 @@
+//! `updraft fleet virtual`: drones to practise with, for this or any other ground station.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::one_flight;
+use super::sim::Hangar;
+use crate::base::time::GpsTime;
+use crate::cli::clock::SystemClock;
+use crate::cli::context::Context;
+use crate::cli::exit::{CommandError, Exit};
+use crate::cli::simulate::{AirArgs, updraft};
+use crate::cli::words;
+use crate::effects;
+use crate::link::clock::{Clock as _, MS};
+use crate::sim::air::spec;
+use crate::vehicle::library;
+use crate::virtual_fleet::lossy::Faults;
+use crate::virtual_fleet::server::Pace;
+use crate::virtual_fleet::vehicle::BootTimes;
+
+/// Arguments of `updraft fleet virtual`.
+#[derive(Clone, Debug, Args)]
+pub(in crate::cli) struct VirtualArgs {
+    /// Campaign folder
+    campaign: PathBuf,
+    /// Which flight, if the campaign has several
+    #[arg(long, value_name = "NAME")]
+    flight: Option<String>,
+    /// Where the ground station listens
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:14550")]
+    station: SocketAddr,
+    /// Time goes so many times as fast as the clock on the wall
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
+    speed: f64,
+    /// Share of frames that are lost, each way, 0 to 0.95
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    loss: f64,
+    /// Delay each way, ms
+    #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=10_000))]
+    delay: u64,
+    /// Largest addition to the delay, ms: frames overtake each other
+    #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=10_000))]
+    jitter: u64,
+    /// Share of frames that arrive twice, 0 to 0.95
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    repeat: f64,
+    /// What all drones together can send, bytes per second; 0: no limit
+    #[arg(long, value_name = "BYTES", default_value_t = 0)]
+    rate: u32,
+    /// Boot as slowly as real drones do (45 s to a position)
+    #[arg(long)]
+    slow_boot: bool,
+    /// Vertical air speed, m/s, up positive
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
+    updraft: f64,
+    #[command(flatten)]
+    air: AirArgs,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=0.95).contains(&value) => Ok(value),
+        _ => Err("a share between 0 and 0.95".to_owned()),
+    }
+}
+
+pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let mut vehicle = library::load(&folder.vehicle().display().to_string())?;
+    for choice in &args.air.effects {
+        effects::select::choose(&mut vehicle, choice)?;
+    }
+    effects::select::resolved(&vehicle)?;
+    let frame = plan.site.frame();
+    let air = spec::build(&args.air.air(args.updraft), &frame, args.air.seed, &plan.name);
+    let clock = SystemClock::start();
+    let switched_on = GpsTime::from_unix_ms((clock.unix_us() / 1000) as i64).ok_or_else(|| {
+        CommandError::Failed("this computer's clock is not set to any GPS time".to_owned())
+    })?;
+    let hangar = Hangar {
+        plan: &plan,
+        slots: plan.slots.iter().collect(),
+        vehicle: &vehicle,
+        air: &air,
+        seed: args.air.seed,
+        full_logs: args.air.full_logs,
+        switched_on,
+        pace: Pace::Speed(args.speed),
+        faults: Faults {
+            loss: args.loss,
+            repeat: args.repeat,
+            delay: args.delay * MS,
+            jitter: args.jitter * MS,
+            bytes_per_s: f64::from(args.rate),
+            ..Faults::default()
+        },
+        boot: if args.slow_boot { BootTimes::default() } else { BootTimes::short() },
+    };
+    context.say(&format!(
+        "{} are switched on and speak to {}; Ctrl-C switches them off",
+        words::count(plan.slots.len(), "virtual drone"),
+        args.station
+    ));
+    hangar.serve(args.station, clock, |_| {
+        while !context.stop_flag().load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    })?;
+    Ok(Exit::Done)
+}

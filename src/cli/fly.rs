@@ -1,0 +1,220 @@
+//! `updraft fly`: upload, preflight, start, watch, and bring the logs home.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::clock::Stopwatch;
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use super::fleet::bring::{Brought, Wish, bring};
+use super::fleet::connect::{ConnectArgs, Target};
+use super::fleet::crew::Crew;
+use super::fleet::sim::{Hangar, TO_START};
+use super::fleet::{LeadArgs, fly_now, one_flight, server, tables};
+use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
+use crate::base::time::GpsTime;
+use crate::campaign::{self, FlightFolder};
+use crate::fleet::start::StartOptions;
+use crate::mission::Plan;
+use crate::virtual_fleet::lossy::Faults;
+use crate::virtual_fleet::server::Pace;
+use crate::virtual_fleet::vehicle::BootTimes;
+
+/// Virtual drones on the ground live so many times as fast as the clock on the wall.
+const GROUND_PACE: f64 = 5.0;
+
+/// Arguments of `updraft fly`.
+#[derive(Debug, Args)]
+#[command(after_long_help = format!("Examples:
+  updraft fly my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --set-params
+  updraft fly my-campaign --flight hover --connect tcp:10.0.0.7:5760 --key swarm.key --lead 60
+  updraft fly my-campaign --flight hover --connect skybrush://localhost:5001
+  updraft fly my-campaign --connect sim             # every flight, by virtual drones
+
+The steps of a flight: find who flies which slot (from where they stand), check parameters, load show,
+origin and fence, the preflight table, the start time, its authorization (asked for, or --yes), the
+show, the logs. Each is a command of its own, too: see `updraft fleet` and `updraft logs`. Exit codes:
+3 done with losses, 4 no-go: nothing was started.
+
+{}", air_help()))]
+pub(super) struct FlyArgs {
+    /// Campaign folder
+    campaign: PathBuf,
+    /// Which flight, if the campaign has several
+    #[arg(long, value_name = "NAME")]
+    flight: Option<String>,
+    #[command(flatten)]
+    connect: ConnectArgs,
+    #[command(flatten)]
+    lead: LeadArgs,
+    /// Set parameters that must be others (old values are kept for `fleet restore`)
+    #[arg(long)]
+    set_params: bool,
+    /// Find anew which drone flies which slot, from where they stand
+    #[arg(long)]
+    assign: bool,
+    /// Leave the logs on the drones; `updraft logs pull` brings them
+    #[arg(long)]
+    no_logs: bool,
+    /// Print the messages of the upload and the start, and send nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Vertical air speed for virtual drones, m/s, up positive
+    #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
+    updraft: f64,
+    /// Replace logs of virtual drones that were flown with other settings
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    air: AirArgs,
+}
+
+pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandError> {
+    if args.dry_run {
+        let step = super::fleet::StepArgs {
+            campaign: args.campaign.clone(),
+            flight: args.flight.clone(),
+            connect: args.connect.clone(),
+            dry_run: true,
+        };
+        super::fleet::dry::upload(context, &step)?;
+        return super::fleet::dry::start(context, &step, args.lead.lead);
+    }
+    let _lock = context.lock(&args.campaign)?;
+    match args.connect.target()? {
+        Target::Links(links) => {
+            let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+            let mut station = args.connect.open(links)?;
+            let mut crew = Crew::new(context, &mut station, &folder, &plan);
+            crew.listen(args.connect.wait)?;
+            fly(context, &mut crew, args)
+        }
+        Target::Sim => {
+            let simulation = Simulation {
+                air: args.air.air(args.updraft),
+                truth: args.air.truth,
+                seed: args.air.seed,
+                full_logs: args.air.full_logs,
+                effects: args.air.effects.clone(),
+                vehicle: None,
+                only: None,
+                force: args.force,
+            };
+            let mut lost = false;
+            let mut any = false;
+            for folder in campaign::flights(&args.campaign)? {
+                let plan = folder.read_plan()?;
+                if args.flight.as_ref().is_some_and(|name| *name != plan.name) {
+                    continue;
+                }
+                any = true;
+                lost |= !fly_virtual(context, &folder, &plan, &simulation)?.failed.is_empty();
+            }
+            if !any {
+                one_flight(&args.campaign, args.flight.as_deref())?;
+            }
+            Ok(if lost { Exit::Losses } else { Exit::Done })
+        }
+        Target::Server(address) => {
+            let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+            server::fly(context, &address, &folder, &plan, &args.lead, !args.no_logs)
+        }
+    }
+}
+
+/// The whole flight of real drones.
+fn fly(context: &Context, crew: &mut Crew<'_>, args: &FlyArgs) -> Result<Exit, CommandError> {
+    crew.greet()?;
+    if !crew.assign(args.assign)? {
+        context.insist("NO-GO: nothing was sent, as the drones do not stand as planned");
+        return Ok(Exit::Unsafe);
+    }
+    crew.params(args.set_params)?;
+    let refused = crew.upload()?;
+    let table = crew.preflight(args.connect.wait)?;
+    if !refused.is_empty() || !table.go() {
+        tables::preflight(context, &table)?;
+        return Ok(Exit::Unsafe);
+    }
+    context.print(&table.to_string())?;
+    let flown = fly_now(context, crew, &args.lead)?;
+    if args.no_logs {
+        return Ok(flown);
+    }
+    let brought = bring(context, crew.net, crew.folder, crew.plan, &crew.table, &Wish::default())?;
+    let lost = brought.iter().any(|one| one.state == "missing");
+    Ok(if lost { Exit::Losses } else { flown })
+}
+
+/// A flight by virtual drones: over MAVLink, like real ones, with logs that come home.
+pub(super) fn fly_virtual(
+    context: &Context,
+    folder: &FlightFolder,
+    plan: &Plan,
+    simulation: &Simulation,
+) -> Result<Flown, CommandError> {
+    let watch = Stopwatch::start();
+    let ready = make_ready(context, folder, plan, simulation)?;
+    let mut failed = Vec::new();
+    if !ready.open.is_empty() {
+        let brought = launch(context, folder, plan, simulation, &ready)?;
+        let missing = brought.iter().filter(|one| one.state == "missing");
+        failed.extend(missing.map(|one| {
+            let reason = one.reason.as_deref().unwrap_or("unknown");
+            format!("no log of drone {} (slot {}): {reason}", one.drone, one.slot)
+        }));
+    }
+    settle(context, folder, plan, ready, failed, watch)
+}
+
+fn launch(
+    context: &Context,
+    folder: &FlightFolder,
+    plan: &Plan,
+    simulation: &Simulation,
+    ready: &Ready<'_>,
+) -> Result<Vec<Brought>, CommandError> {
+    let start = ready.record.start;
+    let switched_on = GpsTime::from_total_ms(start.total_ms() - (TO_START / 1000) as i64)
+        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
+    let hangar = Hangar {
+        plan,
+        slots: ready.open.clone(),
+        vehicle: &ready.vehicle,
+        air: &ready.air,
+        seed: simulation.seed,
+        full_logs: simulation.full_logs,
+        switched_on,
+        pace: Pace::Fast { ground: GROUND_PACE },
+        faults: Faults::default(),
+        boot: BootTimes::short(),
+    };
+    // A part of the fleet is a fleet of its own.
+    let mut part = plan.clone();
+    part.slots.retain(|slot| ready.open.iter().any(|open| open.slot == slot.slot));
+    hangar.open(|station| {
+        let mut crew = Crew::new(context, station, folder, &part);
+        crew.hurry = true;
+        crew.listen(60.0)?;
+        crew.greet()?;
+        let no_go =
+            |what: &str| CommandError::Failed(format!("the virtual drones do not start: {what}"));
+        if !crew.assign(true)? {
+            return Err(no_go("they do not stand as planned"));
+        }
+        crew.params(true)?;
+        let refused = crew.upload()?;
+        // The second look is after the upload has switched the fences on.
+        crew.params(true)?;
+        let table = crew.preflight(20.0)?;
+        if !refused.is_empty() || !table.go() {
+            return Err(no_go(&format!("\n{table}")));
+        }
+        let options = StartOptions { at: Some(start), ..StartOptions::default() };
+        let mut start = crew.announce(options)?;
+        crew.authorize(&mut start)?;
+        crew.watch(&mut start)?;
+        bring(context, crew.net, folder, plan, &crew.table, &Wish::default())
+    })
+}

@@ -1,0 +1,419 @@
+//! `updraft logs`: what is on the drones, bringing it home, checking it, and cards.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use serde::Serialize;
+
+use super::clock::SystemClock;
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use super::fleet::bring::{Brought, Wish, bring};
+use super::fleet::connect::{ConnectArgs, Target};
+use super::fleet::crew::Crew;
+use super::fleet::{one_flight, server};
+use super::simulate::made_by;
+use super::words;
+use crate::base::file::create_folder;
+use crate::campaign::{self, FlightFolder};
+use crate::fleet::logs::import::{ImportOptions, import};
+use crate::fleet::logs::one::Which;
+use crate::fleet::logs::verify::verify;
+use crate::fleet::slots::FleetTable;
+use crate::link::clock::Clock as _;
+use crate::link::id::DroneId;
+use crate::mission::Plan;
+
+/// Arguments of `updraft logs`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft logs list my-campaign --flight hover
+  updraft logs pull my-campaign --flight hover              # go on after Ctrl-C: the same command
+  updraft logs pull my-campaign --flight hover --log all --rate 400000
+  updraft logs verify my-campaign
+  updraft logs import my-campaign --flight hover /media/card1 /media/card2
+
+Logs come over MAVFTP, or over the log messages where that fails. What has come is kept at every
+interruption; a log is given its name when its checksum (or size, and pieces read again) agrees with
+the drone's, and logs/manifest.json says how. Exit code 3: some logs are missing; each is named with
+the reason and what to do.")]
+pub(super) struct LogsArgs {
+    #[command(subcommand)]
+    command: LogsCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum LogsCommand {
+    /// What logs the drones have
+    List(ListArgs),
+    /// Bring logs home
+    Pull(PullArgs),
+    /// Check logs against their manifest: size, SHA-256, and whether they are logs
+    Verify(VerifyArgs),
+    /// Take logs from SD cards; whose they are, they say themselves
+    Import(ImportArgs),
+}
+
+#[derive(Debug, Args)]
+struct ListArgs {
+    /// Campaign folder
+    campaign: PathBuf,
+    /// Which flight, if the campaign has several
+    #[arg(long, value_name = "NAME")]
+    flight: Option<String>,
+    #[command(flatten)]
+    connect: ConnectArgs,
+}
+
+#[derive(Debug, Args)]
+struct PullArgs {
+    /// Campaign folder
+    campaign: PathBuf,
+    /// Which flight, if the campaign has several
+    #[arg(long, value_name = "NAME")]
+    flight: Option<String>,
+    #[command(flatten)]
+    connect: ConnectArgs,
+    /// Which log of each drone: newest, all, or its number
+    #[arg(long, value_name = "WHICH", default_value = "newest", value_parser = which)]
+    log: Which,
+    /// Bring logs again that have come before
+    #[arg(long)]
+    again: bool,
+    /// Only these slots, with commas
+    #[arg(long, value_name = "SLOTS", value_delimiter = ',')]
+    slots: Option<Vec<u16>>,
+    /// What is asked of each network, bytes per second [default: what it carries]
+    #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(1..))]
+    rate: Option<u32>,
+    /// Drones of a network at once, at most
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    at_once: u16,
+    /// Refuse larger logs, MB
+    #[arg(long, value_name = "MB", default_value_t = 2048, value_parser = clap::value_parser!(u32).range(1..))]
+    max_size: u32,
+    /// Give a drone up after so long without an answer, s
+    #[arg(long, value_name = "S", default_value_t = 60.0, value_parser = super::fleet::connect::seconds)]
+    patience: f64,
+}
+
+#[derive(Debug, Args)]
+struct VerifyArgs {
+    /// Campaign folder
+    campaign: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct ImportArgs {
+    /// Campaign folder
+    campaign: PathBuf,
+    /// Folders of cards, or files
+    #[arg(required = true)]
+    cards: Vec<PathBuf>,
+    /// Which flight, if the campaign has several
+    #[arg(long, value_name = "NAME")]
+    flight: Option<String>,
+    /// When the show started, Unix time in seconds: of several logs the one that covers it
+    #[arg(long, value_name = "UNIX_S")]
+    start: Option<i64>,
+    /// Replace logs that are there
+    #[arg(long)]
+    again: bool,
+}
+
+fn which(text: &str) -> Result<Which, String> {
+    match text {
+        "newest" => Ok(Which::Newest),
+        "all" => Ok(Which::All),
+        number => number.parse().map(Which::Number).map_err(|_| "newest, all, or a number".into()),
+    }
+}
+
+pub(super) fn run(context: &Context, args: &LogsArgs) -> Result<Exit, CommandError> {
+    match &args.command {
+        LogsCommand::List(args) => list(context, args),
+        LogsCommand::Pull(args) => pull(context, args),
+        LogsCommand::Verify(args) => check(context, args),
+        LogsCommand::Import(args) => cards(context, args),
+    }
+}
+
+/// The table of the campaign; without one it is found from where the drones stand.
+fn with_table(crew: &mut Crew<'_>, wait_s: f64) -> Result<(), CommandError> {
+    if FleetTable::path(&crew.folder.0).exists() {
+        crew.table = FleetTable::read(&crew.folder.0)?;
+        let wanted = crew.table.drones.iter().map(|line| line.drone).collect();
+        // Drones that are off are told of one by one.
+        crew.hear_anyone(wait_s, Some(&wanted))
+    } else {
+        crew.listen(wait_s)?;
+        if crew.assign(false)? {
+            Ok(())
+        } else {
+            Err(CommandError::Usage("whose log is whose is not clear: see above".to_owned()))
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct ListOutput {
+    schema: &'static str,
+    drones: Vec<ListRow>,
+}
+
+#[derive(Serialize)]
+struct ListRow {
+    drone: DroneId,
+    slot: u16,
+    logs: Vec<ListedLog>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+}
+
+#[derive(Serialize)]
+struct ListedLog {
+    number: u16,
+    bytes: u64,
+    unix_s: u32,
+}
+
+fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let links = match args.connect.target()? {
+        Target::Links(links) => links,
+        Target::Server(address) => return server::list(context, &address),
+        Target::Sim => return Err(gone()),
+    };
+    let mut station = args.connect.open(links)?;
+    let mut crew = Crew::new(context, &mut station, &folder, &plan);
+    with_table(&mut crew, args.connect.wait)?;
+    let listed = crew.list_logs()?;
+    let rows: Vec<ListRow> = crew
+        .table
+        .drones
+        .iter()
+        .map(|line| match listed.get(&line.drone) {
+            Some(Ok(logs)) => ListRow {
+                drone: line.drone,
+                slot: line.slot,
+                logs: logs
+                    .iter()
+                    .map(|log| ListedLog {
+                        number: log.id,
+                        bytes: log.size,
+                        unix_s: log.time_utc_s,
+                    })
+                    .collect(),
+                reason: None,
+            },
+            Some(Err(error)) => ListRow {
+                drone: line.drone,
+                slot: line.slot,
+                logs: Vec::new(),
+                reason: Some(error.clone()),
+            },
+            None => ListRow {
+                drone: line.drone,
+                slot: line.slot,
+                logs: Vec::new(),
+                reason: Some("it was not asked".to_owned()),
+            },
+        })
+        .collect();
+    let lost = rows.iter().any(|row| row.reason.is_some());
+    if context.json {
+        context.print_json(&ListOutput { schema: "updraft.log-list/1", drones: rows })?;
+    } else {
+        for row in &rows {
+            let logs: Vec<String> = row
+                .logs
+                .iter()
+                .map(|log| format!("{} ({:.1} MB)", log.number, log.bytes as f64 / 1e6))
+                .collect();
+            let what = row.reason.clone().unwrap_or_else(|| match logs.len() {
+                0 => "no logs".to_owned(),
+                _ => logs.join(", "),
+            });
+            context.emit(&format!("drone {:>4}  slot {:>4}  {what}\n", row.drone, row.slot))?;
+        }
+    }
+    Ok(if lost { Exit::Losses } else { Exit::Done })
+}
+
+fn gone() -> CommandError {
+    CommandError::Usage(
+        "virtual drones are gone with their program: `updraft fly --connect sim` brings their logs \
+         itself"
+            .to_owned(),
+    )
+}
+
+#[derive(Serialize)]
+struct PullOutput {
+    schema: &'static str,
+    logs: Vec<Brought>,
+}
+
+fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let _lock = context.lock(&args.campaign)?;
+    let links = match args.connect.target()? {
+        Target::Links(links) => links,
+        Target::Server(address) => return server::pull(context, &address, &folder, &plan),
+        Target::Sim => return Err(gone()),
+    };
+    let mut station = args.connect.open(links)?;
+    let mut crew = Crew::new(context, &mut station, &folder, &plan);
+    with_table(&mut crew, args.connect.wait)?;
+    let mut table = crew.table.clone();
+    if let Some(slots) = &args.slots {
+        table.drones.retain(|line| slots.contains(&line.slot));
+    }
+    let wish = Wish {
+        which: args.log,
+        again: args.again,
+        most_bytes: u64::from(args.max_size) * 1_000_000,
+        rate: args.rate.map(f64::from),
+        at_once: args.at_once.into(),
+        patience_s: args.patience,
+    };
+    let brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
+    let lost = brought.iter().any(|one| one.state == "missing");
+    if lost {
+        context.insist(&format!(
+            "To try again: updraft logs pull {} --flight {}",
+            args.campaign.display(),
+            plan.name
+        ));
+    }
+    if context.json {
+        context.print_json(&PullOutput { schema: "updraft.pull/1", logs: brought })?;
+    }
+    Ok(if lost { Exit::Losses } else { Exit::Done })
+}
+
+#[derive(Serialize)]
+struct VerifyOutput {
+    schema: &'static str,
+    logs: Vec<VerifyRow>,
+}
+
+#[derive(Serialize)]
+struct VerifyRow {
+    flight: String,
+    file: String,
+    faults: Vec<String>,
+}
+
+fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
+    let mut rows = Vec::new();
+    for folder in campaign::flights(&args.campaign)? {
+        let plan = folder.read_plan()?;
+        for checked in verify(&folder.logs())? {
+            rows.push(VerifyRow {
+                flight: plan.name.clone(),
+                file: checked.entry.file.clone(),
+                faults: checked.faults.iter().map(ToString::to_string).collect(),
+            });
+        }
+    }
+    if rows.is_empty() {
+        return Err(CommandError::Nothing(
+            "no log has come with a manifest yet: `updraft logs pull` or `import`".to_owned(),
+        ));
+    }
+    let bad = rows.iter().filter(|row| !row.faults.is_empty()).count();
+    for row in rows.iter().filter(|row| !row.faults.is_empty()) {
+        context.warn(&format!("{}/logs/{} {}", row.flight, row.file, row.faults.join("; ")));
+    }
+    context.say(&format!(
+        "{} of {} are as they came",
+        rows.len() - bad,
+        words::count(rows.len(), "log")
+    ));
+    if context.json {
+        context.print_json(&VerifyOutput { schema: "updraft.verify/1", logs: rows })?;
+    }
+    Ok(if bad == 0 { Exit::Done } else { Exit::Losses })
+}
+
+#[derive(Serialize)]
+struct ImportOutput {
+    schema: &'static str,
+    taken: Vec<String>,
+    there: Vec<String>,
+    left: Vec<String>,
+    missing_slots: Vec<u16>,
+}
+
+fn cards(context: &Context, args: &ImportArgs) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let _lock = context.lock(&args.campaign)?;
+    create_folder(&folder.logs())?;
+    let options = ImportOptions {
+        slots: system_ids(&folder)?,
+        files: log_names(&folder, &plan),
+        start: args
+            .start
+            .map(|unix_s| {
+                crate::base::time::GpsTime::from_unix_ms(unix_s.saturating_mul(1000)).ok_or_else(
+                    || CommandError::Usage(format!("--start {unix_s} is not a GPS time")),
+                )
+            })
+            .transpose()?,
+        again: args.again,
+        made_by: made_by(),
+        unix_s: SystemClock::start().unix_us() / 1_000_000,
+    };
+    let report = import(&args.cards, &plan, &folder.logs(), &options)?;
+    for (path, reason) in &report.left {
+        context.warn(&format!("{} was left: {reason}", path.display()));
+    }
+    if !report.missing.is_empty() {
+        let slots: Vec<String> = report.missing.iter().map(ToString::to_string).collect();
+        context.warn(&format!("no log of slots {}", slots.join(", ")));
+    }
+    context.say(&format!(
+        "Took {} from cards{}",
+        words::count(report.taken.len(), "log"),
+        match report.there.len() {
+            0 => String::new(),
+            there => format!(" ({there} had come before)"),
+        }
+    ));
+    let lost = !report.missing.is_empty();
+    if context.json {
+        context.print_json(&ImportOutput {
+            schema: "updraft.import/1",
+            taken: report.taken.iter().map(|entry| entry.file.clone()).collect(),
+            there: report.there,
+            left: report
+                .left
+                .iter()
+                .map(|(path, why)| format!("{}: {why}", path.display()))
+                .collect(),
+            missing_slots: report.missing,
+        })?;
+    }
+    Ok(if lost { Exit::Losses } else { Exit::Done })
+}
+
+/// Slots by system id, from the campaign's table.
+fn system_ids(folder: &FlightFolder) -> Result<BTreeMap<u8, u16>, CommandError> {
+    if !FleetTable::path(&folder.0).exists() {
+        return Ok(BTreeMap::new());
+    }
+    let table = FleetTable::read(&folder.0)?;
+    Ok(table.drones.iter().map(|line| (line.drone.system, line.slot)).collect())
+}
+
+fn log_names(folder: &FlightFolder, plan: &Plan) -> BTreeMap<u16, String> {
+    plan.slots
+        .iter()
+        .filter_map(|slot| {
+            let path = folder.log(slot.slot, plan.slots.len());
+            Some((slot.slot, path.file_name()?.to_string_lossy().into_owned()))
+        })
+        .collect()
+}
