@@ -85,4 +85,4 @@ impl Hangar<'_> {
 }
 
 /// From switching on to a start that is the same every time, vehicle time.
-pub(in crate::cli) const TO_START: Micros = 40 * S;
+pub(in crate::cli) const TO_START: Micros = 240 * S;
