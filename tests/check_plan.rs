@@ -9,7 +9,7 @@ use check_support::*;
 use updraft::check::{CheckInput, CheckReport, Severity, check};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, ResolvedFlight, resolve};
-use updraft::show::Show;
+use updraft::show::{FenceZone, Show};
 use updraft::vehicle::library;
 
 fn planned(template: &str, overrides: &[&str]) -> ResolvedFlight {
@@ -41,7 +41,8 @@ fn a_show_without_a_fence_gets_none() {
     assert!(report.to_string().contains("note: no fence in this show"), "{report}");
     assert!(report.margin("fence").is_none() && report.margin("fence-altitude").is_none());
 
-    show.fence_polygon_m = vec![[-12.0, -12.0], [20.0, -12.0], [20.0, 12.0], [-12.0, 12.0]];
+    let corners_m = vec![[-12.0, -12.0], [20.0, -12.0], [20.0, 12.0], [-12.0, 12.0]];
+    show.fence = vec![FenceZone::inclusion(corners_m)];
     let plan = Plan::of_show(&show, &vehicle);
     let report = check(&CheckInput::new(&show, &plan.limits).with_polygon(Some(&plan.fence)));
     assert!((report.margin("fence").unwrap().value - 12.0).abs() < 1e-9, "{report}");

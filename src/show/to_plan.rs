@@ -294,11 +294,13 @@ fn limits(show: &Show, mut limits: Limits) -> Limits {
     limits
 }
 
-/// The polygon that the show brings, if it does: none is made up. A show file knows no top of the
-/// fence; the altitude limit stands in its place.
+/// The first inclusion polygon that the show brings, if it does: none is made up (the check looks at
+/// the show's other polygons by itself). A show file knows no top of the fence; the altitude limit
+/// stands in its place.
 fn fence(show: &Show, limits: &Limits) -> Fence {
+    let inclusion = show.fence.iter().find(|zone| zone.is_inclusion);
     Fence {
-        polygon_m: show.fence_polygon_m.clone(),
+        polygon_m: inclusion.map(|zone| zone.corners_m.clone()).unwrap_or_default(),
         max_altitude_m: limits.max_altitude_m,
         margin_m: 0.0,
     }
