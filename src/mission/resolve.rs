@@ -165,7 +165,7 @@ pub fn resolve_text(
         Template::Flight(_) => {
             let refused = |key: &Override| MissionError::Override {
                 key: key.key.clone(),
-                reason: format!("{path} has no such key"),
+                reason: format!("{path} has no such key; {}", keys_of(&key.key, &[text])),
             };
             let (flight, used) = resolve_flight(path, text, overrides)?;
             if let Some(unused) = used.iter().zip(overrides).find(|(used, _)| !**used) {
@@ -244,9 +244,14 @@ pub fn resolve_text(
                 return Err(TemplateError::new(path, text, span, "a campaign needs flights").into());
             }
             if let Some(unused) = used_any.iter().zip(overrides).find(|(used, _)| !**used) {
+                let texts: Vec<_> =
+                    flights.iter().map(|flight| flight.template_text.as_str()).collect();
                 return Err(MissionError::Override {
                     key: unused.1.key.clone(),
-                    reason: "none of the campaign's flights has such a key".to_owned(),
+                    reason: format!(
+                        "none of the campaign's flights has such a key; {}",
+                        keys_of(&unused.1.key, &texts)
+                    ),
                 });
             }
             Ok(Mission {
@@ -274,6 +279,81 @@ fn table_overrides(table: &Table) -> Vec<Override> {
     table.iter().map(|(key, value)| Override::new(key, value.clone())).collect()
 }
 
+/// The keys that a template takes at its top, besides its parameters.
+const TOP_LEVEL: [&str; 15] = [
+    "name", "title", "purpose", "vehicle", "site", "grid", "takeoff", "landing", "motion", "fence",
+    "window", "limits", "groups", "steps", "briefing",
+];
+/// Slips of the finger by which a mistyped key may differ from the one that was meant.
+const MAX_SLIPS: usize = 3;
+
+/// What can be set in these templates, and the nearest name to one that cannot.
+fn keys_of(asked: &str, texts: &[&str]) -> String {
+    let mut parameters: Vec<String> = Vec::new();
+    for table in texts.iter().filter_map(|text| text.parse::<Table>().ok()) {
+        let Some(Toml::Table(own)) = table.get("parameters") else { continue };
+        parameters.extend(own.keys().cloned());
+    }
+    parameters.sort();
+    parameters.dedup();
+    let first = asked.split('.').next().unwrap_or(asked);
+    let known = parameters.iter().map(String::as_str).chain(TOP_LEVEL);
+    let nearest = known
+        .map(|key| (slips(first, key), key))
+        .filter(|(slips, key)| *slips <= MAX_SLIPS.min(key.len() / 2))
+        .min();
+    let hint = nearest.map_or(String::new(), |(_, key)| format!("did you mean {key}? "));
+    let parameters = if parameters.is_empty() {
+        String::new()
+    } else {
+        format!("the parameters {}, and ", parameters.join(", "))
+    };
+    format!("{hint}There are {parameters}what is under {}", TOP_LEVEL.join(", "))
+}
+
+/// Letters to insert, remove or replace to make one word of the other.
+fn slips(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, letter) in a.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, other) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(letter != *other);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+/// Digits from which a number is written with an exponent.
+const LONG_NUMBER: usize = 25;
+
+/// The same TOML with numbers of hundreds of digits (1e300) written with an exponent.
+fn short_numbers(text: &str) -> String {
+    let short = |number: &str| match number.parse::<f64>() {
+        Ok(value) if number.len() > LONG_NUMBER => format!("{value:e}"),
+        _ => number.to_owned(),
+    };
+    let mut shortened = String::with_capacity(text.len());
+    for line in text.split_inclusive('\n') {
+        let Some((key, value)) = line.split_once(" = ") else {
+            shortened.push_str(line);
+            continue;
+        };
+        let (value, end) = value.strip_suffix('\n').map_or((value, ""), |value| (value, "\n"));
+        let list = value.strip_prefix('[').and_then(|list| list.strip_suffix(']'));
+        let value = match list {
+            Some(list) if !list.contains('"') => {
+                format!("[{}]", list.split(", ").map(short).collect::<Vec<_>>().join(", "))
+            }
+            _ => short(value),
+        };
+        shortened.extend([key, " = ", &value, end]);
+    }
+    shortened
+}
+
 /// Applies overrides, reads the result and builds the plan. Also says which overrides had a place.
 fn resolve_flight(
     path: &str,
@@ -294,9 +374,11 @@ fn resolve_flight(
             key: path.to_owned(),
             reason: error.to_string(),
         })?;
-        (format!("{path} with overrides"), resolved)
+        (format!("{path} with overrides"), short_numbers(&resolved))
     };
-    let template = match Template::parse(&shown_path, &resolved_text)? {
+    let parsed = Template::parse(&shown_path, &resolved_text)
+        .map_err(|error| with_range(error, path, text, overrides));
+    let template = match parsed? {
         Template::Flight(template) => template,
         Template::Campaign(_) => {
             return Err(MissionError::Override {
@@ -308,6 +390,27 @@ fn resolve_flight(
     let vehicle = vehicle_of(&shown_path, &resolved_text, &template)?;
     let plan = build_plan(&shown_path, &resolved_text, &template, &vehicle)?;
     Ok((ResolvedFlight { template_text: resolved_text, vehicle, plan }, used))
+}
+
+/// Adds the allowed range to the error of an override whose value is text where a number belongs: what
+/// the template says of a number out of every range.
+fn with_range(
+    error: TemplateError,
+    path: &str,
+    text: &str,
+    overrides: &[Override],
+) -> TemplateError {
+    let is_text = |item: &&Override| matches!(item.value, Some(Toml::String(_)));
+    for item in overrides.iter().filter(is_text) {
+        let number = Override::new(&item.key, f64::NAN);
+        if let Err(MissionError::Template(TemplateError { help: Some(help), .. })) =
+            resolve_flight(path, text, &[number])
+            && help.starts_with("allowed: ")
+        {
+            return error.with_help(format!("{} is a number; {help}", item.key));
+        }
+    }
+    error
 }
 
 fn vehicle_of(path: &str, text: &str, template: &FlightTemplate) -> Result<Vehicle, MissionError> {
@@ -334,11 +437,7 @@ fn apply(table: &mut Table, item: &Override) -> Result<bool, MissionError> {
     let keys: Vec<&str> = item.key.split('.').collect();
     let Some((last, parents)) = keys.split_last() else { return Ok(false) };
     // Only known top-level keys: anything else is a mistyped parameter.
-    let known = [
-        "name", "title", "purpose", "vehicle", "site", "grid", "takeoff", "landing", "motion",
-        "fence", "window", "limits", "groups", "steps", "briefing",
-    ];
-    if !known.contains(&keys[0]) {
+    if !TOP_LEVEL.contains(&keys[0]) {
         return Ok(false);
     }
     if parents.is_empty() {
