@@ -214,6 +214,37 @@ fn a_log_of_another_plan_is_refused_by_name() {
 }
 
 #[test]
+fn a_flight_that_runs_early_is_told_by_how_much() {
+    for (shift_ms, said) in [(4_000, "4.0 s earlier than the plan"), (0, "")] {
+        let mut segments = ladder(1.0);
+        for segment in segments.iter_mut().skip(1) {
+            segment.start_ms += shift_ms;
+            segment.end_ms += shift_ms;
+            if let Some(window) = &mut segment.window {
+                window.start_ms += shift_ms;
+                window.end_ms += shift_ms;
+            }
+        }
+        let late = plan(Purpose::Calibration, segments, 1);
+        let logs = logs(&[fixture("ladder-still.trimmed.BIN")]);
+        let flight = analyze_flight(
+            &input("calibration", Some(&late), &logs),
+            &AnalysisOptions::default(),
+            None,
+            &|_, _| {},
+        );
+        match flight {
+            Ok(_) => assert_eq!(shift_ms, 0),
+            Err(error) => {
+                let text = error.to_string();
+                assert!(!said.is_empty() && text.contains(said), "{text}");
+                assert!(text.contains("--set takeoff.speed_mps=2"), "{text}");
+            }
+        }
+    }
+}
+
+#[test]
 fn impossible_inputs_say_what_to_do() {
     let options = AnalysisOptions::default();
     let none = analyze_flight(&input("hover", None, &[]), &options, None, &|_, _| {});

@@ -3,12 +3,12 @@
 
 use nalgebra::Vector3;
 
-use super::{CheckInput, TOLERANCE_M};
 use super::bernstein::Poly;
 use super::curve::{Bounds, Curve};
 use super::report::Severity;
 use super::track::{Track, curve_of};
 use super::watch::{Object, Quantity, Stretch, Watch};
+use super::{CheckInput, TOLERANCE_M};
 use crate::mission::plan::Fence;
 use crate::show::FenceZone;
 
@@ -68,9 +68,8 @@ pub(super) fn usable_polygon(corners_m: &[[f64; 2]]) -> bool {
 pub(super) fn zones<'a>(input: &CheckInput<'a>) -> Vec<(Polygon<'a>, Quantity)> {
     let fence = input.fence.filter(|fence| usable(fence));
     let margin_m = fence.map_or(0.0, |fence| fence.margin_m);
-    let planned = fence.map(|fence| {
-        (Polygon::new(&fence.polygon_m, true, margin_m), clearance(margin_m))
-    });
+    let planned =
+        fence.map(|fence| (Polygon::new(&fence.polygon_m, true, margin_m), clearance(margin_m)));
     let is_planned = |zone: &FenceZone| {
         zone.is_inclusion && fence.is_some_and(|fence| fence.polygon_m == zone.corners_m)
     };

@@ -142,9 +142,7 @@ fn same_fence(here: &[FenceZone], there: &[FenceZone]) -> bool {
     };
     let same = |(here, there): (&FenceZone, &FenceZone)| {
         let (a, b) = (&here.corners_m, &there.corners_m);
-        here.is_inclusion == there.is_inclusion
-            && a.len() == b.len()
-            && a.iter().zip(b).all(near)
+        here.is_inclusion == there.is_inclusion && a.len() == b.len() && a.iter().zip(b).all(near)
     };
     here.len() == there.len() && here.iter().zip(there).all(same)
 }

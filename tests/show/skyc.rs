@@ -9,7 +9,9 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::show::skyc::{self, Limits};
-use updraft::show::{Cue, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl};
+use updraft::show::{
+    Cue, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl,
+};
 
 fn full_show() -> Show {
     let mut second = worked_example();

@@ -174,9 +174,7 @@ fn settings(show: &Show) -> Result<Value, String> {
         for corner in show.fence.iter().flat_map(|zone| &zone.corners_m) {
             finite("a corner of the geofence", corner)?;
         }
-        let polygon = |zone: &FenceZone| {
-            json!({ "isInclusion": zone.is_inclusion, "points": zone.corners_m })
-        };
+        let polygon = |zone: &FenceZone| json!({ "isInclusion": zone.is_inclusion, "points": zone.corners_m });
         let polygons: Vec<_> = show.fence.iter().map(polygon).collect();
         settings.insert("geofence".into(), json!({ "version": 1, "polygons": polygons }));
     }
