@@ -233,7 +233,7 @@ fn hovers_that_ramps_eat_are_counted() {
     assert_eq!(
         named(&of_plan(&flight), "ladder-window"),
         [
-            "2 of 5 hovers (group all) are too short for an analysis window after the ramps they begin with, first \"hover at 65.5 m\": 3.0 s are left after a ramp of 7.0 s"
+            "2 of 5 hovers (group all) are too short for an analysis window after the ramps they begin with, first \"hover at 90 m\": 3.0 s are left after a ramp of 7.0 s"
         ]
     );
     assert_eq!(named(&of_plan(&ramped("motion.ramp_mps2=5")), "ladder-window"), [""; 0]);
