@@ -54,7 +54,9 @@ pub(super) fn watch(track: &Track<'_>, what: Quantity, airborne_above_m: f64) ->
             // What lies between is flown above: all before was no landing.
             if (from - at) * duration_s > JOINT_S {
                 taken_off = true;
-                low.drain(..).for_each(|part| watch.feed_stretch(part.stretch));
+                for part in low.drain(..) {
+                    watch.feed_stretch(part.stretch);
+                }
             }
             at = to;
             if to > from && taken_off {
@@ -72,6 +74,8 @@ pub(super) fn watch(track: &Track<'_>, what: Quantity, airborne_above_m: f64) ->
         }
     }
     low.retain(|part| !part.sinks && part.stretch.worst > airborne_above_m);
-    low.into_iter().for_each(|part| watch.feed_stretch(part.stretch));
+    for part in low {
+        watch.feed_stretch(part.stretch);
+    }
     watch
 }
