@@ -12,8 +12,8 @@ use super::calibrate::{self, FitOptions, PaperTable};
 use super::caution::{fit_cautions, wind_caution};
 use super::density::Density;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
-use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::ladder::mark_partial;
+use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::prefer::{better_law, describes};
 use super::refer::refer_calibration;
 use super::result::{
@@ -297,7 +297,9 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
             (Purpose::Calibration, Ok(laws), _) => drone.laws = Some(laws),
             (Purpose::Calibration, Err(error), _) => unmeasured.push(nothing(error.to_string())),
             (Purpose::Measurement, _, Some(Ok((series, mapping)))) => {
-                drone.warnings.extend(partial_law(shared, slot, &name).filter(|_| mapping == FLOCK));
+                drone
+                    .warnings
+                    .extend(partial_law(shared, slot, &name).filter(|_| mapping == FLOCK));
                 updrafts.push((slot, name.clone(), drone.home_m, series, mapping));
             }
             (Purpose::Measurement, _, Some(Err(reason))) => unmeasured.push(nothing(reason)),

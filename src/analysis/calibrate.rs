@@ -360,8 +360,7 @@ pub fn table(
     ];
     let mut rows = Vec::new();
     for (name, fit_of) in laws {
-        let fits: Vec<&Fit> =
-            whole().filter_map(|drone| fit_of(drone.laws.as_ref()?)).collect();
+        let fits: Vec<&Fit> = whole().filter_map(|drone| fit_of(drone.laws.as_ref()?)).collect();
         let Some(first) = fits.first() else { continue };
         for (index, parameter) in first.parameters.iter().enumerate() {
             if parameter.held {
@@ -381,8 +380,7 @@ pub fn table(
             rows.push(TableRow { paper: row.paper.filter(|_| same), ..row });
         }
     }
-    let added: Vec<f64> =
-        whole().filter_map(|drone| drone.laws.as_ref()?.sigma_added_us).collect();
+    let added: Vec<f64> = whole().filter_map(|drone| drone.laws.as_ref()?.sigma_added_us).collect();
     if !added.is_empty() {
         rows.push(row(BOTH_LAWS, ADDED_SCATTER, "us", &added, &[], paper));
     }

@@ -242,10 +242,7 @@ impl Work<'_> {
     fn claim(&mut self, index: usize, slot: u16) {
         if let Some(first) = self.taken.get(&slot) {
             let first = &self.logs[*first].name;
-            self.refuse(
-                index,
-                format!("slot {slot} has a log already ({first})"),
-            );
+            self.refuse(index, format!("slot {slot} has a log already ({first})"));
         } else {
             self.taken.insert(slot, index);
             self.result[index] = Some(Ok(slot));

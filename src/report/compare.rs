@@ -1,7 +1,7 @@
 //! Fleet tables beside the paper's values, and the words that a page and a terminal share.
 
-use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow, UpdraftMap};
 use crate::analysis::law::SIGNED_QUADRATIC;
+use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow, UpdraftMap};
 use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 use crate::flight::Alignment;

@@ -6,8 +6,8 @@ use minijinja::{Environment, UndefinedBehavior, context};
 use crate::analysis::result::{Analysis, FlightAnalysis};
 
 use super::compare::{
-    clock, compared, comparison, drone_laws, drones_of, fit_line, flags, flock_lines, nothing, scatter_line,
-    table_heading, windows_used,
+    clock, compared, comparison, drone_laws, drones_of, fit_line, flags, flock_lines, nothing,
+    scatter_line, table_heading, windows_used,
 };
 use super::figure_air::{self, mean_truth};
 use super::figure_drone::{self, Axes, drawable};
