@@ -318,7 +318,9 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         }
         paper = paper_table(shared, &drones);
         table = calibrate::table(&drones, paper, options.fit.weights);
-        flock.iter().for_each(|laws| compare_what_fits(&mut table, laws));
+        if let Some(laws) = &flock {
+            compare_what_fits(&mut table, laws);
+        }
         warnings.extend(fit_cautions(flock.as_ref(), &drones, input.leaning));
     } else if shared.reference.is_none() {
         warnings.push(
