@@ -181,6 +181,7 @@ fn flight_section(
         logs => logs_used(flight),
         without_result_open => without_result.len() <= 2 * OPEN_LIMIT,
         without_result,
+        without_result_count => flight.missing.len() + flight.unmeasured.len(),
         unused => unused_lines(flight),
         partly_used => partly_used_lines(flight),
         compared => compared(flight),

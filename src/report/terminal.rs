@@ -93,11 +93,16 @@ impl Output {
 
     /// A list in full: warnings are never cut.
     fn list(&mut self, heading: &str, items: &[String]) {
+        self.list_of(heading, items.len(), items);
+    }
+
+    /// A list of `n` things, of which one line may tell of several.
+    fn list_of(&mut self, heading: &str, n: usize, items: &[String]) {
         if items.is_empty() {
             return;
         }
         self.line("", "");
-        self.line(YELLOW, &format!("{heading} ({})", items.len()));
+        self.line(YELLOW, &format!("{heading} ({n})"));
         for item in items {
             self.wrapped("", "  ", &format!("- {item}"));
         }
@@ -113,7 +118,7 @@ impl Output {
         let truth = flight.true_updraft_mps.map_or_else(String::new, |w| {
             format!(", simulated in a true updraft of {} m/s", signed(w, 2))
         });
-        self.line(DIM, &format!("  {}, {source}{truth}", logs_used(flight)));
+        self.wrapped(DIM, "  ", &format!("{}, {source}{truth}", logs_used(flight)));
         if let Some(words) = nothing(flight) {
             self.wrapped(YELLOW, "  ", &words);
         }
@@ -127,7 +132,8 @@ impl Output {
         }
         self.drones(flight);
         self.list("  Notes on drones", &note_lines(flight));
-        self.list("  Drones without a result", &without_result_lines(flight));
+        let without = flight.missing.len() + flight.unmeasured.len();
+        self.list_of("  Drones without a result", without, &without_result_lines(flight));
         self.list("  Logs not used", &unused_lines(flight));
         self.list("  Logs partly used", &partly_used_lines(flight));
         let warnings: Vec<String> = flight.warnings.iter().map(|w| clean(w)).collect();
