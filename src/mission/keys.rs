@@ -32,7 +32,7 @@ pub(super) fn keys_of(asked: &str, texts: &[&str]) -> String {
     } else {
         format!("the parameters {}, and ", parameters.join(", "))
     };
-    format!("{hint}There are {parameters}what is under {}", TOP_LEVEL.join(", "))
+    format!("{hint}there are {parameters}what is under {}", TOP_LEVEL.join(", "))
 }
 
 /// Letters to insert, remove or replace to make one word of the other.

@@ -150,7 +150,7 @@ fn a_campaign_passes_overrides_to_the_flights_that_have_them() {
     assert_eq!(longest(&calibration.plan, Kind::LegUp), 15_000);
     assert_eq!(longest(&hover.plan, Kind::Hover), 60_000);
     let error = resolve("campaign", &[set("leg=15")]).unwrap_err().to_string();
-    assert!(error.starts_with("cannot set leg: none of the campaign's flights has such a key; did you mean leg_s? There are the parameters "), "{error}");
+    assert!(error.starts_with("cannot set leg: none of the campaign's flights has such a key; did you mean leg_s? there are the parameters "), "{error}");
 }
 
 #[test]
