@@ -9,10 +9,12 @@ use std::f64::consts::TAU;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use analysis_support::{Synthetic, Timetable, fixture, ladder, plan};
+use analysis_support::{
+    Synthetic, Timetable, fixture, ladder, ladder_up, ladder_up_segments, plan,
+};
 use updraft::analysis::calibrate::{FitOptions, Location, Weights};
 use updraft::analysis::result::{
-    Analysis, Fit, FlightAnalysis, LostLog, Rejection, WindowStats, Yield,
+    Analysis, Fit, FlightAnalysis, Rejection, UnusedLog, WindowStats, Yield,
 };
 use updraft::analysis::{
     AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, analyze, analyze_flight,
@@ -214,6 +216,41 @@ fn a_log_of_another_plan_is_refused_by_name() {
 }
 
 #[test]
+fn a_flight_that_runs_early_is_told_by_how_much() {
+    for (shift_ms, said) in [(4_000, " s earlier than the plan"), (0, "")] {
+        let mut segments = ladder(1.0);
+        for segment in segments.iter_mut().skip(1) {
+            segment.start_ms += shift_ms;
+            segment.end_ms += shift_ms;
+            if let Some(window) = &mut segment.window {
+                window.start_ms += shift_ms;
+                window.end_ms += shift_ms;
+            }
+        }
+        let late = plan(Purpose::Calibration, segments, 1);
+        let logs = logs(&[fixture("ladder-still.trimmed.BIN")]);
+        let flight = analyze_flight(
+            &input("calibration", Some(&late), &logs),
+            &AnalysisOptions::default(),
+            None,
+            &|_, _| {},
+        );
+        match flight {
+            Ok(_) => assert_eq!(shift_ms, 0),
+            Err(error) => {
+                let text = error.to_string();
+                assert!(!said.is_empty() && text.contains(said), "{text}");
+                // The log has a command every 0.1 s.
+                let told = text.split("seems to run ").nth(1).and_then(|rest| rest.get(..3));
+                let told: f64 = told.unwrap().parse().unwrap();
+                assert!((told - 4.0).abs() < 0.15, "{text}");
+                assert!(text.contains("--set takeoff.speed_mps=2"), "{text}");
+            }
+        }
+    }
+}
+
+#[test]
 fn impossible_inputs_say_what_to_do() {
     let options = AnalysisOptions::default();
     let none = analyze_flight(&input("hover", None, &[]), &options, None, &|_, _| {});
@@ -231,14 +268,6 @@ fn drone(system_id: u8, duration_s: f64, up: fn(f64) -> f64, air: fn(f64) -> f64
     let u0 = 1546.5 + f64::from(system_id);
     let pulse_us = Box::new(move |time: f64| u0 + 26.4 * (up(time) - air(time)));
     Synthetic { system_id, duration_s, velocity_up_mps: up, pulse_us }.write()
-}
-
-const LEGS: [f64; 8] = [1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 0.5, -0.5];
-
-fn ladder_up(time: f64) -> f64 {
-    let index = (time - 20.0) / 30.0;
-    let rung = LEGS.get(index.max(0.0) as usize).copied().unwrap_or(0.0);
-    if index >= 0.0 && (time - 20.0) % 30.0 < 20.0 { rung } else { 0.0 }
 }
 
 fn wave(time: f64) -> f64 {
@@ -261,18 +290,8 @@ fn synthetic_campaign(folder: &Path) -> [Vec<LogInput>; 2] {
 }
 
 fn synthetic_plans() -> [Plan; 2] {
-    let mut table = Timetable::default().add(Kind::Hover, "hover", 0.0, 20.0);
-    for rung in LEGS {
-        let kind = if rung > 0.0 { Kind::LegUp } else { Kind::LegDown };
-        table = table.add(kind, &format!("leg {rung}"), rung, 20.0).add(
-            Kind::Hover,
-            "hover",
-            0.0,
-            10.0,
-        );
-    }
     let hover = Timetable::default().add(Kind::Hover, "hover", 0.0, 264.0).segments;
-    [plan(Purpose::Calibration, table.segments, 3), plan(Purpose::Measurement, hover, 3)]
+    [plan(Purpose::Calibration, ladder_up_segments(), 3), plan(Purpose::Measurement, hover, 3)]
 }
 
 #[test]
@@ -355,7 +374,8 @@ fn flights_that_cannot_calibrate_are_told_apart() {
         input.purpose = Some(Purpose::Calibration);
         let flight = analyze_flight(&input, &AnalysisOptions::default(), None, &|_, _| {}).unwrap();
         assert!(flight.drones[0].laws.is_none());
-        flight.drones[0].warnings.join("; ")
+        assert_eq!(flight.unmeasured.len(), 1, "listed once");
+        flight.unmeasured[0].reason.clone()
     };
     let none = warning("hover.BIN", |_| 0.0, Box::new(|_| 1550.0));
     assert!(none.contains("no ladder"), "{none}");
@@ -439,8 +459,10 @@ fn damaged_logs_never_stop_the_others() {
         let flight = run(plan, &paths, &AnalysisOptions::default());
         let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
         assert!((values(fit)[0] - 4.963).abs() < 0.01, "the whole log is unharmed");
-        let unused = flight.lost.iter().filter(|log| !log.used).count();
-        assert_eq!(flight.drones.len() + flight.missing.len() + unused, 13);
+        assert_eq!(flight.drones.len() + flight.unused.len(), flight.logs);
+        if flight.planned {
+            assert_eq!(flight.drones.len() + flight.missing.len(), 13);
+        }
         let json = serde_json::to_string(&flight).unwrap();
         let back: FlightAnalysis = serde_json::from_str(&json).unwrap();
         assert_eq!(back, flight, "every number is finite, so JSON holds all of it");
@@ -504,8 +526,7 @@ fn a_second_log_of_a_slot_is_left_out_and_named() {
     let flight =
         analyze_flight(&input("twice", Some(&plan), &twice), &paper(), None, &|_, _| {}).unwrap();
     assert_eq!((flight.drones.len(), flight.missing.len()), (1, 0));
-    let unused: Vec<String> =
-        flight.lost.iter().filter(|log| !log.used).map(LostLog::sentence).collect();
+    let unused: Vec<String> = flight.unused.iter().map(UnusedLog::sentence).collect();
     assert_eq!(unused.len(), 1, "{unused:?}");
     assert!(unused[0].contains("slot 1 has a log already"), "{unused:?}");
 }
@@ -527,7 +548,14 @@ fn chi_squared_is_told_from_before_scatter_was_added() {
     };
     assert_eq!(row(&flight, "sigma_added").unwrap().mean, added);
     assert_eq!(row(&flight, "chi2_nu").unwrap().paper, None, "not the paper's statistic");
-    let as_published = run(None, &paths, &paper());
+    // Two logs are a fleet, which the paper's Table II is of.
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
+    let fleet = ["1.BIN", "2.BIN"].map(|name| folder.path().join(name));
+    for (cut, path) in fleet.iter().enumerate() {
+        fs::write(path, &bytes[..bytes.len() - cut]).unwrap();
+    }
+    let as_published = run(None, &fleet, &paper());
     assert_eq!(row(&as_published, "chi2_nu").unwrap().paper.unwrap().value, 2.19);
     assert_eq!(row(&as_published, "sigma_added"), None);
 }

@@ -178,6 +178,36 @@ fn sideways_motion_near_the_ground() {
 }
 
 #[test]
+fn flight_below_the_take_off_altitude() {
+    let at = |height: f64| {
+        one(
+            vec![line(8_000, 0.0, 0.0, height), hold(5_000), line(8_000, 0.0, 0.0, 10.0)],
+            (0.0, 0.0),
+        )
+    };
+    clean(&at(2.5));
+    let report = at(2.0);
+    let finding = only(&report, "low-flight");
+    assert_eq!(finding.severity, Severity::Warning);
+    // From 10 m at 1 m/s: below 2.49 m after 7.51 s, and the same on the way up.
+    assert!((finding.time_s.unwrap() - 17.51).abs() < 1e-6, "{finding}");
+    assert!((finding.end_s.unwrap() - 23.49).abs() < 1e-6, "{finding}");
+    assert!(finding.message.contains("at a height of 2.000 m at "), "{finding}");
+    assert!(report.passed());
+    // A landing is no low flight, a hover within it is.
+    let landing = |last: Vec<Segment>| {
+        let mut segments = vec![line(10_000, 0.0, 0.0, 10.0), line(10_000, 0.0, 0.0, 1.5)];
+        segments.extend(last);
+        run(vec![drone(1, 0.0, 0.0, segments)])
+    };
+    let low = |report: &CheckReport| {
+        report.findings.iter().find(|found| found.check == "low-flight").map(|f| f.time_s.unwrap())
+    };
+    assert_eq!(low(&landing(vec![line(2_000, 0.0, 0.0, 0.0), hold(3_000)])), None);
+    assert_eq!(low(&landing(vec![hold(4_000), line(2_000, 0.0, 0.0, 0.0)])), Some(20.0));
+}
+
+#[test]
 fn the_fence_with_its_margin() {
     let out_and_back =
         |x: f64| vec![line(20_000, x, 0.0, 10.0), hold(1000), line(20_000, 0.0, 0.0, 10.0)];

@@ -9,7 +9,7 @@ use check_support::*;
 use updraft::check::{CheckInput, CheckReport, Severity, check};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, ResolvedFlight, resolve};
-use updraft::show::Show;
+use updraft::show::{FenceZone, Show, Validation};
 use updraft::vehicle::library;
 
 fn planned(template: &str, overrides: &[&str]) -> ResolvedFlight {
@@ -41,7 +41,8 @@ fn a_show_without_a_fence_gets_none() {
     assert!(report.to_string().contains("note: no fence in this show"), "{report}");
     assert!(report.margin("fence").is_none() && report.margin("fence-altitude").is_none());
 
-    show.fence_polygon_m = vec![[-12.0, -12.0], [20.0, -12.0], [20.0, 12.0], [-12.0, 12.0]];
+    let corners_m = vec![[-12.0, -12.0], [20.0, -12.0], [20.0, 12.0], [-12.0, 12.0]];
+    show.fence = vec![FenceZone::inclusion(corners_m)];
     let plan = Plan::of_show(&show, &vehicle);
     let report = check(&CheckInput::new(&show, &plan.limits).with_polygon(Some(&plan.fence)));
     assert!((report.margin("fence").unwrap().value - 12.0).abs() < 1e-9, "{report}");
@@ -178,4 +179,62 @@ fn numbers_without_sense_stay_short() {
     let report = check(&CheckInput::new(&show, &limits).with_stock(&limits)).to_string();
     assert!(report.lines().all(|line| line.chars().count() < 200), "{report}");
     assert!(report.contains(" 1e300 m "), "{report}");
+}
+
+/// A show cannot give itself more distance, altitude or speed than the vehicle has.
+#[test]
+fn of_the_shows_and_the_vehicles_limits_the_stricter_counts() {
+    let vehicle = library::builtin("airsim-generic-quad").unwrap();
+    let mut show = show(vec![calm(1, 0.0, 0.0), calm(2, 1.0, 0.0)]);
+    show.validation = Some(Validation {
+        min_distance_m: Some(0.1),
+        max_altitude_m: Some(10_000.0),
+        max_velocity_xy_mps: Some(2.0),
+        max_velocity_z_mps: Some(100.0),
+        max_velocity_step_mps: Some(6.5),
+        ..Validation::default()
+    });
+    let limits = Plan::of_show(&show, &vehicle).limits;
+    let own = vehicle.limits;
+    assert_eq!(limits.min_distance_m, own.min_distance_m);
+    assert_eq!(limits.max_altitude_m, own.max_altitude_m);
+    assert_eq!(limits.max_speed_xy_mps, 2.0, "the show is stricter here");
+    assert_eq!((limits.max_speed_up_mps, limits.max_speed_down_mps), (5.0, 5.0));
+    assert_eq!(limits.max_velocity_step_mps, 6.5, "only shows of this program state it");
+    let report = check(&CheckInput::new(&show, &limits).with_stock(&own));
+    assert!(!report.passed() && report.counts.contains_key("distance"), "{report}");
+    let mut messages = named(&report, "limits");
+    messages.sort_unstable();
+    assert_eq!(
+        messages,
+        [
+            "max_velocity_step_mps is loosened to 6.5 m/s; the vehicle's own is 4 m/s",
+            "the show states max_altitude_m = 10000 m; the vehicle's own 150 m are stricter and count",
+            "the show states max_speed_down_mps = 100 m/s; the vehicle's own 5 m/s are stricter and count",
+            "the show states max_speed_up_mps = 100 m/s; the vehicle's own 5 m/s are stricter and count",
+            "the show states min_distance_m = 0.1 m; the vehicle's own 3 m are stricter and count",
+        ]
+    );
+}
+
+#[test]
+fn hovers_that_ramps_eat_are_counted() {
+    let ramped = |ramp: &str| {
+        let grid = ["grid.rows=1", "grid.columns=1", "speeds_mps=[3.5, 0.5]", ramp];
+        planned("calibration", &grid)
+    };
+    let flight = ramped("motion.ramp_mps2=0.5");
+    let hovers: Vec<_> =
+        flight.plan.groups[0].segments.iter().filter(|s| s.label.starts_with("hover")).collect();
+    for hover in &hovers {
+        let height = (hover.to_m[2] * 10.0).round() / 10.0;
+        assert_eq!(hover.label, format!("hover at {height} m"));
+    }
+    assert_eq!(
+        named(&of_plan(&flight), "ladder-window"),
+        [
+            "2 of 5 hovers (group all) are too short for an analysis window after the ramps they begin with, first \"hover at 90 m\": 3.0 s are left after a ramp of 7.0 s"
+        ]
+    );
+    assert_eq!(named(&of_plan(&ramped("motion.ramp_mps2=5")), "ladder-window"), [""; 0]);
 }

@@ -71,6 +71,15 @@ fn warnings_are_printed_in_full() {
 }
 
 #[test]
+fn drones_without_a_result_are_counted_and_equal_reasons_told_once() {
+    let text = terminal_summary(&campaign(), 120, false);
+    // Six without a log, of which four for the same reason, and one whose hover was rejected.
+    assert!(text.contains("Drones without a result (7)\n  - slots 3, 7, 18, 33: no log"), "{text}");
+    let page = render(&campaign(), &provenance()).unwrap().html;
+    assert!(page.contains("Drones without a result (7)"));
+}
+
+#[test]
 fn nothing_found_is_said_plainly() {
     let said = |change: fn(&mut FlightAnalysis), flight: usize| {
         let mut analysis = campaign();

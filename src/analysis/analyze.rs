@@ -7,16 +7,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use thiserror::Error;
 
+use super::account::{self, Account};
 use super::calibrate::{self, FitOptions, PaperTable};
 use super::caution::{fit_cautions, wind_caution};
 use super::density::Density;
-use super::drone::{One, Shared, one};
+use super::drone::{FLOCK, One, Shared, one, same_drone};
+use super::ladder::mark_partial;
 use super::law::{LINEAR, SIGNED_QUADRATIC};
-use super::prefer::better_law;
+use super::prefer::{better_law, describes};
 use super::refer::refer_calibration;
 use super::result::{
-    ANALYSIS_SCHEMA, Analysis, DroneUpdraft, FlightAnalysis, LostLog, Missing, Unmeasured,
-    UpdraftMap,
+    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, FlightAnalysis, Laws, TableRow,
+    Unmeasured, UnusedLog, UpdraftMap,
 };
 use super::slots::{SlotMatch, match_slots};
 use super::updraft::{self, DroneSeries};
@@ -101,7 +103,7 @@ pub struct AnalysisOptions {
     /// has the lower reduced chi².
     pub map_law: Option<MapLaw>,
     /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
-    /// updraft (simulations), Table II for others.
+    /// updraft (simulations), Table II for other fleets (of two drones or more).
     pub paper: Option<PaperTable>,
     /// Most points of a trace for figures.
     pub trace_points: usize,
@@ -219,8 +221,8 @@ fn listed(reasons: &[String]) -> String {
     text
 }
 
-/// Analyses one flight of a fleet. A log that cannot be used is listed as missing (or as lost, when
-/// it has no slot) and does not stop the others.
+/// Analyses one flight of a fleet. A log that cannot be used is listed with its reason
+/// ([`FlightAnalysis::unused`]) and does not stop the others.
 ///
 /// `reference` is a calibration whose laws measure the air and hold A and u0 (unless
 /// [`FitOptions::hold`] gives them): each drone's own laws, else its flock mapping.
@@ -248,7 +250,7 @@ pub fn analyze_flight(
         .par_iter()
         .map(|(log, slot)| {
             let outcome = match slot {
-                SlotMatch::Refused(reason) => Err(reason.clone()),
+                SlotMatch::Refused { reason, .. } => Err(reason.clone()),
                 SlotMatch::Slot(number) => one(&shared, log, Some(*number)),
                 SlotMatch::Unplanned => one(&shared, log, None),
             };
@@ -257,54 +259,28 @@ pub fn analyze_flight(
         })
         .collect();
 
-    let mut ones: Vec<One> = Vec::new();
-    let mut reasons: BTreeMap<u16, String> = BTreeMap::new();
-    let mut failures = Vec::new();
-    let mut lost = Vec::new();
-    for ((log, slot), outcome) in work.iter().zip(outcomes) {
-        let source = input.shown(&log.path);
-        match (outcome, slot) {
-            (Ok(one), _) => {
-                let cut_off = one.cut_off.clone();
-                lost.extend(cut_off.map(|reason| LostLog { source, reason, used: true }));
-                ones.push(one);
-            }
-            (Err(reason), slot) => {
-                // Errors name the file as it was opened; results name it as their reader finds it.
-                let reason = reason.replace(&log.path.display().to_string(), &source);
-                let failure = LostLog { source, reason, used: false };
-                failures.push(failure.sentence());
-                match slot {
-                    SlotMatch::Slot(slot) => _ = reasons.entry(*slot).or_insert(failure.sentence()),
-                    _ => lost.push(failure),
-                }
-            }
-        }
-    }
-    if ones.is_empty() {
+    let outcomes = work.iter().zip(outcomes).map(|((log, slot), outcome)| (*log, *slot, outcome));
+    let mut account = Account::of(input, outcomes);
+    if account.ones.is_empty() {
         return Err(AnalysisError::NothingUsable {
             name: input.name.to_owned(),
             count: input.logs.len(),
-            reasons: failures,
+            reasons: account.unused.iter().map(UnusedLog::sentence).collect(),
         });
     }
     if input.plan.is_some() {
-        ones.sort_by_key(|one| one.drone.slot);
+        account.ones.sort_by_key(|one| one.drone.slot);
     }
-    Ok(FlightAnalysis { lost, ..finish(&shared, ones, &reasons, warnings) })
+    Ok(finish(&shared, account, warnings))
 }
 
 /// Unusable logs named in an error.
 const LISTED: usize = 20;
 
 /// Joins the drones' results: purpose, laws, flock, tables, map, missing.
-fn finish(
-    shared: &Shared<'_>,
-    ones: Vec<One>,
-    reasons: &BTreeMap<u16, String>,
-    mut warnings: Vec<String>,
-) -> FlightAnalysis {
+fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> FlightAnalysis {
     let Shared { input, options, .. } = shared;
+    let Account { ones, unused, partly_used } = account;
     let any_laws = ones.iter().any(|one| one.calibration.is_ok());
     let purpose = shared.planned_purpose.unwrap_or(if any_laws {
         Purpose::Calibration
@@ -315,40 +291,36 @@ fn finish(
     let mut updrafts = Vec::new();
     let mut unmeasured = Vec::new();
     for One { mut drone, calibration, updraft, .. } in ones {
-        if purpose == Purpose::Calibration {
-            match calibration {
-                Ok(laws) => drone.laws = Some(laws),
-                Err(error) => drone.warnings.push(error.to_string()),
+        let (slot, name) = (drone.slot, drone.name.clone());
+        let nothing = |reason| Unmeasured { slot, name: name.clone(), reason };
+        match (purpose, calibration, updraft) {
+            (Purpose::Calibration, Ok(laws), _) => drone.laws = Some(laws),
+            (Purpose::Calibration, Err(error), _) => unmeasured.push(nothing(error.to_string())),
+            (Purpose::Measurement, _, Some(Ok((series, mapping)))) => {
+                drone
+                    .warnings
+                    .extend(partial_law(shared, slot, &name).filter(|_| mapping == FLOCK));
+                updrafts.push((slot, name.clone(), drone.home_m, series, mapping));
             }
-        } else {
-            match updraft {
-                Some(Ok((series, mapping))) => {
-                    updrafts.push((drone.slot, drone.name.clone(), drone.home_m, series, mapping));
-                }
-                Some(Err(reason)) => unmeasured.push(Unmeasured {
-                    slot: drone.slot,
-                    name: drone.name.clone(),
-                    reason,
-                }),
-                None => {}
-            }
+            (Purpose::Measurement, _, Some(Err(reason))) => unmeasured.push(nothing(reason)),
+            (Purpose::Measurement, _, None) => {}
         }
         drones.push(drone);
     }
     let mut flock = None;
     let mut table = Vec::new();
-    let mut paper_table = None;
+    let mut paper = None;
     if purpose == Purpose::Calibration {
+        warnings.extend(mark_partial(&mut drones, &options.fit));
         match calibrate::flock(&drones, &options.fit) {
             Ok(laws) => flock = Some(laws),
             Err(error) => warnings.push(format!("flock mapping: {error}")),
         }
-        let paper = options.paper.unwrap_or(match input.true_updraft_mps {
-            Some(_) => PaperTable::Simulation,
-            None => PaperTable::Field,
-        });
+        paper = paper_table(shared, &drones);
         table = calibrate::table(&drones, paper, options.fit.weights);
-        paper_table = Some(paper.number().to_owned());
+        if let Some(laws) = &flock {
+            compare_what_fits(&mut table, laws);
+        }
         warnings.extend(fit_cautions(flock.as_ref(), &drones, input.leaning));
     } else if shared.reference.is_none() {
         warnings.push(
@@ -357,21 +329,6 @@ fn finish(
                 .to_owned(),
         );
     }
-    let missing = input.plan.map_or_else(Vec::new, |plan| {
-        let flown: Vec<u16> = drones.iter().filter_map(|drone| drone.slot).collect();
-        plan.slots
-            .iter()
-            .filter(|slot| !flown.contains(&slot.slot))
-            .map(|slot| Missing {
-                slot: slot.slot,
-                home_m: Some([slot.home_m[0], slot.home_m[1]]),
-                reason: reasons
-                    .get(&slot.slot)
-                    .cloned()
-                    .unwrap_or_else(|| format!("no log of {}", slot.name)),
-            })
-            .collect()
-    });
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
     warnings.extend(map.as_ref().and_then(wind_caution));
     FlightAnalysis {
@@ -379,16 +336,51 @@ fn finish(
         purpose,
         planned: input.plan.is_some(),
         true_updraft_mps: input.true_updraft_mps,
+        logs: input.logs.len(),
+        missing: account::missing(input, &drones, &unused),
         drones,
-        missing,
         flock,
         table,
         map,
         unmeasured,
-        paper_table,
+        paper_table: paper.map(|paper| paper.number().to_owned()),
         warnings,
-        lost: Vec::new(),
+        unused,
+        partly_used,
     }
+}
+
+/// The table of the paper to compare a calibration with. Table II is one of a fleet in the field: a
+/// single log is none.
+fn paper_table(shared: &Shared<'_>, drones: &[DroneAnalysis]) -> Option<PaperTable> {
+    let counted = |drone: &&DroneAnalysis| drone.laws.is_some() && drone.partial_ladder.is_none();
+    let is_fleet = drones.iter().filter(counted).count() > 1;
+    let paper = shared.options.paper.unwrap_or(match shared.input.true_updraft_mps {
+        Some(_) => PaperTable::Simulation,
+        None => PaperTable::Field,
+    });
+    (is_fleet || paper == PaperTable::Simulation).then_some(paper)
+}
+
+/// Takes the paper's values from the rows of a law that does not describe the flight: its parameters
+/// mean nothing there.
+fn compare_what_fits(table: &mut [TableRow], flock: &Laws) {
+    for row in table {
+        let law = if row.law == LINEAR { MapLaw::Linear } else { MapLaw::SignedQuadratic };
+        if !describes(flock, law) {
+            row.paper = None;
+        }
+    }
+}
+
+/// That the law of a measured drone is the flock's because its own is of a part of the ladder.
+fn partial_law(shared: &Shared<'_>, slot: Option<u16>, name: &str) -> Option<String> {
+    let drone = same_drone(shared.map_reference?, slot, name)?;
+    let partial = drone.partial_ladder.filter(|_| drone.laws.is_some())?;
+    Some(format!(
+        "the map uses the flock's law: its own is of a partial ladder ({})",
+        partial.short()
+    ))
 }
 
 type NamedUpdraft = (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str);

@@ -255,11 +255,13 @@ fn added_sigma_us(points: &[Point]) -> Option<f64> {
 ///
 /// Windows are the same when kind, label, command and their order among equals agree, so that groups
 /// flying at different times are averaged too. The averages' statistical errors shrink with the
-/// number of drones; the air they share does not, which the added variance accounts for.
+/// number of drones; the air they share does not, which the added variance accounts for. Drones with
+/// a part of the ladder ([`DroneAnalysis::partial_ladder`]) do not count: the average would change its
+/// drones from rung to rung.
 pub fn flock(drones: &[DroneAnalysis], options: &FitOptions) -> Result<Laws, CalibrationError> {
     let mut groups: std::collections::BTreeMap<(String, i64, usize), Vec<Point>> =
         std::collections::BTreeMap::new();
-    for drone in drones {
+    for drone in drones.iter().filter(|drone| drone.partial_ladder.is_none()) {
         let mut seen = std::collections::BTreeMap::<(String, i64), usize>::new();
         for window in &drone.windows {
             let command = (window.commanded_mps * 1000.0).round() as i64;
@@ -339,11 +341,18 @@ pub const BOTH_LAWS: &str = "both laws";
 /// Name of the added scatter in tables.
 pub const ADDED_SCATTER: &str = "sigma_added";
 
-/// Statistics over drones of the fitted parameters, in the rows of Tables I and II.
+/// Statistics over drones of the fitted parameters, in the rows of Tables I and II. Drones with a
+/// part of the ladder ([`DroneAnalysis::partial_ladder`]) do not count. Without `paper`, nothing is
+/// compared.
 ///
 /// The paper's chi² counts the samples' standard deviation as the error of a window: it stands beside
 /// ours only when the weights are the same ([`Weights::WindowSd`]).
-pub fn table(drones: &[DroneAnalysis], paper: PaperTable, weights: Weights) -> Vec<TableRow> {
+pub fn table(
+    drones: &[DroneAnalysis],
+    paper: Option<PaperTable>,
+    weights: Weights,
+) -> Vec<TableRow> {
+    let whole = || drones.iter().filter(|drone| drone.partial_ladder.is_none());
     let laws: [(&str, FitOf); 3] = [
         (law::SIGNED_QUADRATIC, |laws| laws.signed_quadratic.as_ref()),
         (SIGNED_QUADRATIC_HELD, |laws| laws.signed_quadratic_held.as_ref()),
@@ -351,8 +360,7 @@ pub fn table(drones: &[DroneAnalysis], paper: PaperTable, weights: Weights) -> V
     ];
     let mut rows = Vec::new();
     for (name, fit_of) in laws {
-        let fits: Vec<&Fit> =
-            drones.iter().filter_map(|drone| fit_of(drone.laws.as_ref()?)).collect();
+        let fits: Vec<&Fit> = whole().filter_map(|drone| fit_of(drone.laws.as_ref()?)).collect();
         let Some(first) = fits.first() else { continue };
         for (index, parameter) in first.parameters.iter().enumerate() {
             if parameter.held {
@@ -372,8 +380,7 @@ pub fn table(drones: &[DroneAnalysis], paper: PaperTable, weights: Weights) -> V
             rows.push(TableRow { paper: row.paper.filter(|_| same), ..row });
         }
     }
-    let added: Vec<f64> =
-        drones.iter().filter_map(|drone| drone.laws.as_ref()?.sigma_added_us).collect();
+    let added: Vec<f64> = whole().filter_map(|drone| drone.laws.as_ref()?.sigma_added_us).collect();
     if !added.is_empty() {
         rows.push(row(BOTH_LAWS, ADDED_SCATTER, "us", &added, &[], paper));
     }
@@ -386,7 +393,7 @@ fn row(
     unit: &str,
     values: &[f64],
     errors: &[f64],
-    paper: PaperTable,
+    paper: Option<PaperTable>,
 ) -> TableRow {
     let (mean, sd) = mean_sd(values);
     TableRow {
@@ -397,6 +404,6 @@ fn row(
         sd,
         mean_se: mean_sd(errors).0,
         n: values.len(),
-        paper: paper.value(law, parameter),
+        paper: paper.and_then(|paper| paper.value(law, parameter)),
     }
 }

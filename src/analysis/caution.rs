@@ -19,7 +19,7 @@ pub(super) fn fit_cautions(
 ) -> Vec<String> {
     if drones.iter().all(|drone| drone.laws.is_none()) {
         return vec![
-            "no law was fitted: no drone has a usable speed ladder (the reasons are with the drones)"
+            "no law was fitted: no drone has a usable speed ladder (the reasons are listed)"
                 .to_owned(),
         ];
     }

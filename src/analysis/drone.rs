@@ -24,8 +24,10 @@ pub(super) struct Shared<'a> {
 /// What one log gave.
 pub(super) struct One {
     pub(super) drone: DroneAnalysis,
-    /// Why the log lacks the flight's end.
-    pub(super) cut_off: Option<String>,
+    /// What the log lacks: one phrase for each, in the words of the drone's warnings.
+    pub(super) losses: Vec<String>,
+    /// Bytes of the log that its reader skipped.
+    pub(super) skipped_bytes: u64,
     pub(super) calibration: Result<Laws, CalibrationError>,
     /// The air, with the mapping used; or why there is none. `None` without reference laws.
     pub(super) updraft: Option<Result<(DroneSeries, &'static str), String>>,
@@ -61,11 +63,6 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let updraft =
         shared.map_reference.map(|reference| measure(shared, &seen, reference, number, &name));
     let source = input.shown(&log.path);
-    let cut_off = flight.cut_off_at_m.map(|height| {
-        format!(
-            "the log ends in the air, {height:.1} m above the ground; what it holds is analysed"
-        )
-    });
     let drone = DroneAnalysis {
         slot: number,
         name,
@@ -74,10 +71,12 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         clock: flight.clock.clone(),
         windows: stats,
         laws: None,
+        partial_ladder: None,
         trace: trace(&flight, &corrected, options.trace_points),
         warnings,
     };
-    Ok(One { drone, cut_off, calibration, updraft })
+    let (losses, skipped_bytes) = (flight.losses(), flight.scan.bad_bytes);
+    Ok(One { drone, losses, skipped_bytes, calibration, updraft })
 }
 
 /// What one log showed.
@@ -161,23 +160,36 @@ fn find_targets(
     windows::contradiction(flight, &targets).map_or(Ok(targets), Err)
 }
 
+/// Mapping of a drone that has none of its own: `DroneUpdraft::mapping`.
+pub(super) const FLOCK: &str = "flock";
+
+/// A drone in a reference calibration: of the same slot, else of the same name.
+pub(super) fn same_drone<'a>(
+    reference: &'a FlightAnalysis,
+    slot: Option<u16>,
+    name: &str,
+) -> Option<&'a DroneAnalysis> {
+    let same = |drone: &&DroneAnalysis| match (slot, drone.slot) {
+        (Some(slot), Some(other)) => slot == other,
+        _ => drone.name == name,
+    };
+    reference.drones.iter().find(same)
+}
+
 /// The laws of a drone in a reference calibration, and its windows there: its own, else the flock's
-/// with those of the first drone.
+/// with those of the first drone. A law of a part of the ladder stands only where there is no flock's.
 fn laws_for<'a>(
     reference: &'a FlightAnalysis,
     slot: Option<u16>,
     name: &str,
 ) -> Option<(&'a Laws, &'static str, &'a [WindowStats])> {
-    let same = |drone: &&DroneAnalysis| match (slot, drone.slot) {
-        (Some(slot), Some(other)) => slot == other,
-        _ => drone.name == name,
-    };
-    let own = reference.drones.iter().find(same);
+    let whole = |drone: &DroneAnalysis| drone.partial_ladder.is_none() || reference.flock.is_none();
+    let own = same_drone(reference, slot, name).filter(|drone| whole(drone));
     if let Some((drone, laws)) = own.and_then(|drone| Some((drone, drone.laws.as_ref()?))) {
         return Some((laws, "own", &drone.windows));
     }
-    let first = reference.drones.iter().find(|drone| drone.laws.is_some());
-    Some((reference.flock.as_ref()?, "flock", first.map_or(&[][..], |drone| &drone.windows)))
+    let first = reference.drones.iter().find(|drone| drone.laws.is_some() && whole(drone));
+    Some((reference.flock.as_ref()?, FLOCK, first.map_or(&[][..], |drone| &drone.windows)))
 }
 
 pub(super) fn law_fit(laws: &Laws, law: MapLaw) -> Option<&Fit> {

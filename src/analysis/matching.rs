@@ -192,7 +192,7 @@ fn away(slot: u16, distance_m: f64, limit_m: f64) -> String {
 
 /// Why a copy of a log is not used.
 pub(super) fn copy_of(name: &str) -> String {
-    format!("the same bytes as {name}: a copy, which is not used")
+    format!("a copy of {name} (the same bytes)")
 }
 
 fn nowhere() -> String {
@@ -242,10 +242,7 @@ impl Work<'_> {
     fn claim(&mut self, index: usize, slot: u16) {
         if let Some(first) = self.taken.get(&slot) {
             let first = &self.logs[*first].name;
-            self.refuse(
-                index,
-                format!("slot {slot} has a log already ({first}); this one is not used"),
-            );
+            self.refuse(index, format!("slot {slot} has a log already ({first})"));
         } else {
             self.taken.insert(slot, index);
             self.result[index] = Some(Ok(slot));
@@ -282,36 +279,43 @@ impl Work<'_> {
     }
 }
 
-/// Logs of which weaker evidence says something else than what decided.
+/// Logs of which other evidence says something else than what decided: each log once.
 fn contradictions(plan: &Plan, work: &Work<'_>, places: &[Place]) -> Vec<String> {
     const WORDS: [&str; 4] = ["home position", "flight record", "file name", "system id"];
-    let mut found: BTreeMap<(usize, usize), Vec<String>> = BTreeMap::new();
+    let mut found: BTreeMap<(usize, Vec<usize>), Vec<String>> = BTreeMap::new();
     for ((log, place), result) in work.logs.iter().zip(places).zip(&work.result) {
         let Some(Ok(slot)) = result else { continue };
         let placed = matches!(place, Place::On(_) | Place::Between(_));
         let says =
             [placed.then_some(*slot), log.given, log.file_number, log.system_id.map(u16::from)];
         let Some(decided) = says.iter().position(|said| *said == Some(*slot)) else { continue };
-        for (weaker, said) in says.iter().enumerate() {
-            if let Some(said) = said.filter(|said| said != slot && plan.slot(*said).is_some()) {
-                let line = format!("{} is slot {slot}, not {said}", log.name);
-                found.entry((decided, weaker)).or_default().push(line);
-            }
+        let others: Vec<(usize, u16)> = (says.iter().enumerate())
+            .filter_map(|(word, said)| Some((word, (*said)?)))
+            .filter(|(_, said)| said != slot && plan.slot(*said).is_some())
+            .collect();
+        let meant: BTreeSet<u16> = others.iter().map(|(_, said)| *said).collect();
+        if meant.is_empty() {
+            continue;
         }
+        let meant: Vec<String> = meant.iter().map(u16::to_string).collect();
+        let line = format!("{} is slot {slot}, not {}", log.name, meant.join(" or "));
+        let words = others.into_iter().map(|(word, _)| word).collect();
+        found.entry((decided, words)).or_default().push(line);
     }
     found
         .into_iter()
-        .map(|((decided, weaker), lines)| {
-            let (strong, weak) = (WORDS[decided.min(weaker)], WORDS[decided.max(weaker)]);
+        .map(|((decided, others), lines)| {
+            let others: Vec<&str> = others.into_iter().map(|word| WORDS[word]).collect();
             let more = match lines.len().saturating_sub(NAMED) {
                 0 => String::new(),
                 more => format!(" and {more} more"),
             };
             let named: Vec<&str> = lines.iter().take(NAMED).map(String::as_str).collect();
             format!(
-                "{strong} and {weak} disagree; {} counts: {}{more}",
-                WORDS[decided],
-                named.join(", ")
+                "{decided} contradicts {}; {decided} counts: {}{more}",
+                others.join(" and "),
+                named.join(", "),
+                decided = WORDS[decided],
             )
         })
         .collect()

@@ -3,12 +3,14 @@
 //! [`analyze_flight`] does one flight of a fleet: logs to windows, windows to laws (a calibration) or
 //! to the map of the air (a measurement, with the laws of a calibration). [`analyze`] does a campaign.
 
+mod account;
 mod analyze;
 pub mod calibrate;
 mod caution;
 pub mod density;
 mod drone;
 pub mod fit;
+mod ladder;
 pub mod law;
 mod matching;
 pub mod prefer;

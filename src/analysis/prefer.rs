@@ -27,6 +27,7 @@ pub fn better_law(reference: &FlightAnalysis) -> MapLaw {
         let values: Vec<f64> = reference
             .drones
             .iter()
+            .filter(|drone| drone.partial_ladder.is_none())
             .filter_map(|drone| law_fit(drone.laws.as_ref()?, law)?.chi2_reduced)
             .collect();
         (!values.is_empty()).then(|| mean_sd(&values).0)
@@ -52,12 +53,25 @@ pub fn better_of(laws: &Laws) -> Option<MapLaw> {
     }
 }
 
+/// Whether a law describes a set of windows: unless the other law is clearly better.
+pub(super) fn describes(laws: &Laws, law: MapLaw) -> bool {
+    let other = match law {
+        MapLaw::Linear => MapLaw::SignedQuadratic,
+        MapLaw::SignedQuadratic => MapLaw::Linear,
+    };
+    let reduced = |law| law_fit(laws, law).and_then(|fit| fit.chi2_reduced);
+    match (reduced(law), reduced(other)) {
+        (Some(this), Some(other)) => this <= CLEARLY * other,
+        _ => true,
+    }
+}
+
 /// In plain words, that the signed quadratic is not the shape of these windows; `None` where it is,
 /// or where the windows do not tell.
 pub fn misfit(laws: &Laws) -> Option<String> {
     let (quadratic, linear) = (laws.signed_quadratic.as_ref()?, laws.linear.as_ref()?);
     let (worse, than) = (quadratic.chi2_reduced?, linear.chi2_reduced?);
-    if worse <= CLEARLY * than {
+    if describes(laws, MapLaw::SignedQuadratic) {
         return None;
     }
     let w = w_mps(quadratic)?;

@@ -40,7 +40,12 @@ pub struct FlightAnalysis {
     pub true_updraft_mps: Option<f64>,
     /// Analysed drones, in slot order.
     pub drones: Vec<DroneAnalysis>,
-    /// Slots of the plan without a usable log: (slot, reason).
+    /// Logs given. Each is the `source` of one of [`FlightAnalysis::drones`] or stands in
+    /// [`FlightAnalysis::unused`].
+    #[serde(default)]
+    pub logs: usize,
+    /// Slots of the plan that no analysed log belongs to, with the reason: there is no log, or what
+    /// became of it. With [`FlightAnalysis::unmeasured`] these are the drones without a result.
     pub missing: Vec<Missing>,
     /// Fits to the windows of all drones averaged (the paper's flock mapping), for calibrations.
     pub flock: Option<Laws>,
@@ -48,34 +53,40 @@ pub struct FlightAnalysis {
     pub table: Vec<TableRow>,
     /// The map of the air, for measurements.
     pub map: Option<UpdraftMap>,
-    /// Drones of a measurement whose log was read but gave no value for the map.
+    /// Drones whose log was read but gave no law (calibrations) or no value of the map
+    /// (measurements).
     #[serde(default)]
     pub unmeasured: Vec<Unmeasured>,
-    /// The paper's table beside [`FlightAnalysis::table`]: `I` (simulation) or `II` (field).
+    /// The paper's table that [`FlightAnalysis::table`] is compared with: `I` (simulation) or `II`
+    /// (field, for two drones or more); absent: with none.
     #[serde(default)]
     pub paper_table: Option<String>,
     /// What is doubtful about the flight as a whole (logs that contradict each other), one sentence
     /// each.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// Logs that could not be used, or not to the flight's end. Those of slots are in
-    /// [`FlightAnalysis::missing`].
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub lost: Vec<LostLog>,
+    /// Logs that nothing was taken from, those of missing slots among them.
+    #[serde(default)]
+    pub unused: Vec<UnusedLog>,
+    /// Logs that were analysed, but not in full: they end in the air, or are damaged.
+    #[serde(default)]
+    pub partly_used: Vec<PartlyUsedLog>,
 }
 
-/// A log that could not be used, or not to the flight's end.
+/// A log that nothing was taken from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct LostLog {
+pub struct UnusedLog {
     /// The file, relative to the campaign folder where possible.
     pub source: String,
-    /// Why.
+    /// The slot that it was matched to, else the one that flight record or file name mean; absent:
+    /// none of the plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slot: Option<u16>,
+    /// Why it is not used.
     pub reason: String,
-    /// Whether what it holds was analysed nevertheless.
-    pub used: bool,
 }
 
-impl LostLog {
+impl UnusedLog {
     /// One sentence that names the file.
     pub fn sentence(&self) -> String {
         if self.reason.contains(&self.source) {
@@ -84,6 +95,21 @@ impl LostLog {
             format!("{}: {}", self.source, self.reason)
         }
     }
+}
+
+/// A log that was analysed as far as it goes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PartlyUsedLog {
+    /// The file, relative to the campaign folder where possible.
+    pub source: String,
+    /// Slot number, if the log was matched to a plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slot: Option<u16>,
+    /// What is lost of it.
+    pub reason: String,
+    /// Bytes that the reader skipped because no message could be read there.
+    #[serde(default)]
+    pub skipped_bytes: u64,
 }
 
 /// A drone that the plan has and the analysis has not.
@@ -98,7 +124,7 @@ pub struct Missing {
     pub reason: String,
 }
 
-/// A drone of a measurement without a value in the map.
+/// A drone whose log gave no law, or no value of the map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unmeasured {
     /// Slot number, if planned.
@@ -112,9 +138,9 @@ pub struct Unmeasured {
 /// How much of what was asked for an analysis gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Yield {
-    /// Every drone has its laws or its value of the map.
+    /// Every drone has its laws, from the fleet's whole ladder, or its value of the map.
     Whole,
-    /// Some drones, or some flights, have none.
+    /// Some drones, or some flights, have none, or a law of a part of the ladder.
     Partial,
     /// There is no law and no value of the map at all.
     Nothing,
@@ -134,7 +160,9 @@ impl Analysis {
     /// How much of what was asked for there is.
     pub fn what_was_found(&self) -> Yield {
         let whole = |flight: &FlightAnalysis| {
-            flight.missing.is_empty() && flight.results() == flight.drones.len()
+            flight.missing.is_empty()
+                && flight.results() == flight.drones.len()
+                && flight.drones.iter().all(|drone| drone.partial_ladder.is_none())
         };
         if self.flights.iter().all(|flight| flight.results() == 0) {
             Yield::Nothing
@@ -163,10 +191,43 @@ pub struct DroneAnalysis {
     pub windows: Vec<WindowStats>,
     /// Fitted laws, for calibrations.
     pub laws: Option<Laws>,
+    /// Set if the laws rest on clearly less of the ladder than those of the fleet: then they do not
+    /// count in [`FlightAnalysis::table`] and [`FlightAnalysis::flock`], and no map uses them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partial_ladder: Option<PartialLadder>,
     /// Thinned traces for figures.
     pub trace: Trace,
     /// What is doubtful about this drone.
     pub warnings: Vec<String>,
+}
+
+/// That a drone's usable legs are fewer than two thirds of the fleet's, or span less than two thirds
+/// of its speeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PartialLadder {
+    /// Usable legs of the drone.
+    pub usable: Ladder,
+    /// Usable legs of the fleet's middle drone.
+    pub fleet: Ladder,
+}
+
+impl PartialLadder {
+    /// `6 of 14 legs, -1.5 to +1.5 m/s`.
+    pub fn short(&self) -> String {
+        let Ladder { legs, lowest_mps, highest_mps } = self.usable;
+        format!("{legs} of {} legs, {lowest_mps:+} to {highest_mps:+} m/s", self.fleet.legs)
+    }
+}
+
+/// Legs of vertical motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Ladder {
+    /// How many.
+    pub legs: usize,
+    /// Lowest commanded vertical velocity, m/s, up positive.
+    pub lowest_mps: f64,
+    /// Highest commanded vertical velocity, m/s, up positive.
+    pub highest_mps: f64,
 }
 
 /// Statistics of one window.

@@ -14,8 +14,13 @@ pub(super) enum SlotMatch {
     Slot(u16),
     /// There is no plan.
     Unplanned,
-    /// Nobody's, and why.
-    Refused(String),
+    /// It is not used.
+    Refused {
+        /// Why.
+        reason: String,
+        /// The slot of the plan that the flight record or the file name mean.
+        meant_for: Option<u16>,
+    },
 }
 
 /// Finds the slot of each log, refuses copies, other places and a slot's second log; and says what
@@ -32,7 +37,8 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
     let Some(plan) = input.plan else {
         let refused = |first: usize| {
             let first = input.logs.get(first).map(|log| input.shown(&log.path));
-            SlotMatch::Refused(matching::copy_of(&first.unwrap_or_default()))
+            let reason = matching::copy_of(&first.unwrap_or_default());
+            SlotMatch::Refused { reason, meant_for: None }
         };
         let slots = copies.into_iter().map(|copy| copy.map_or(SlotMatch::Unplanned, refused));
         return (slots.collect(), Vec::new());
@@ -55,6 +61,13 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
         })
         .collect();
     let Matched { slots, warnings } = matching::slots(plan, &candidates);
-    let slots = slots.into_iter().map(|slot| slot.map_or_else(SlotMatch::Refused, SlotMatch::Slot));
+    let in_plan = |slot: &u16| plan.slot(*slot).is_some();
+    let slots = slots.into_iter().zip(&candidates).map(|(slot, log)| match slot {
+        Ok(slot) => SlotMatch::Slot(slot),
+        Err(reason) => {
+            let meant_for = log.given.filter(in_plan).or(log.file_number.filter(in_plan));
+            SlotMatch::Refused { reason, meant_for }
+        }
+    });
     (slots.collect(), warnings)
 }

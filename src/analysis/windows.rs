@@ -79,6 +79,14 @@ const RUN_GAP_S: f64 = 1.5;
 const FEWEST_SAMPLES: usize = 5;
 /// A commanded velocity further than this from the plan's is another plan's, m/s.
 const WRONG_MPS: f64 = 0.3;
+/// Fewest legs from which a constant time offset is told.
+const OFFSET_LEGS: usize = 3;
+/// Legs of two ladders whose speeds differ by less are the same, m/s.
+const SAME_LEG_MPS: f64 = 0.1;
+/// How far the time offsets of a ladder's legs may lie apart and still be one, s.
+const OFFSET_SPREAD_S: f64 = 1.0;
+/// Smallest time offset that is told, s.
+const OFFSET_MIN_S: f64 = 0.5;
 /// Pulse quantum, us: a motor within it of its limit is at the limit.
 const QUANTUM_US: f64 = 1.0;
 
@@ -361,13 +369,41 @@ pub fn contradiction(flight: &Flight, targets: &[Target]) -> Option<String> {
     let (target, flown) = wrong.first().filter(|_| 2 * wrong.len() > compared.len())?;
     Some(format!(
         "this log does not belong to the plan: {} of {} {} were flown at another vertical speed \
-         (first: `{}` at {:.0} s, planned {} m/s, flown {flown:.2} m/s); check that the logs are \
-         in the folder of their own flight",
+         (first: `{}` at {:.0} s, planned {} m/s, flown {flown:.2} m/s); {}",
         wrong.len(),
         compared.len(),
         if has_legs { "legs" } else { "windows" },
         target.label,
         target.start_s,
         target.commanded_mps,
+        match time_offset_s(flight, targets) {
+            Some(offset_s) => format!(
+                "the legs are the plan's, but the flight seems to run {:.1} s {} than the plan: \
+                 plan it with the take-off and the waits that were flown (for example \
+                 --set takeoff.speed_mps=2)",
+                offset_s.abs(),
+                if offset_s < 0.0 { "earlier" } else { "later" },
+            ),
+            None => "check that the logs are in the folder of their own flight".to_owned(),
+        },
     ))
+}
+
+/// How much later than planned the legs were flown, s, if they were the plan's legs in the plan's
+/// order, all off by the same time.
+fn time_offset_s(flight: &Flight, targets: &[Target]) -> Option<f64> {
+    let legs = |targets: &[Target]| -> Vec<(f64, f64)> {
+        let legs = targets.iter().filter(|target| target.kind.is_leg());
+        legs.map(|leg| (leg.commanded_mps, leg.end_s)).collect()
+    };
+    let (planned, flown) = (legs(targets), legs(&inferred(flight)));
+    let same = planned.iter().zip(&flown).all(|(a, b)| (a.0 - b.0).abs() < SAME_LEG_MPS);
+    if planned.len() < OFFSET_LEGS || planned.len() != flown.len() || !same {
+        return None;
+    }
+    let mut offsets: Vec<f64> = planned.iter().zip(&flown).map(|(a, b)| b.1 - a.1).collect();
+    offsets.sort_by(f64::total_cmp);
+    let (least, most) = (offsets.first()?, offsets.last()?);
+    let median = *offsets.get(offsets.len() / 2)?;
+    (most - least <= OFFSET_SPREAD_S && median.abs() >= OFFSET_MIN_S).then_some(median)
 }

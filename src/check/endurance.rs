@@ -11,6 +11,7 @@ pub(super) fn quantity(input: &CheckInput<'_>) -> Quantity {
     Quantity {
         check: "endurance",
         label: "longest flight, landing included",
+        object: None,
         verb: "flies, landing included, for",
         unit: "s",
         severity: Severity::Error,

@@ -1,51 +1,112 @@
-//! Containment in the fence with its margin: the polygon, also a concave one, and the altitude.
+//! Containment in the fence with its margin: inside its inclusion polygons, also concave ones, outside
+//! its exclusion zones, and below its top.
 
-use super::TOLERANCE_M;
+use nalgebra::Vector3;
+
 use super::bernstein::Poly;
 use super::curve::{Bounds, Curve};
 use super::report::Severity;
 use super::track::{Track, curve_of};
-use super::watch::{Quantity, Stretch, Watch};
+use super::watch::{Object, Quantity, Stretch, Watch};
+use super::{CheckInput, TOLERANCE_M};
 use crate::mission::plan::Fence;
+use crate::show::FenceZone;
 
 /// Precision of distances to the fence, m.
 const PRECISION_M: f64 = 1e-6;
-/// How exactly the distance outside the fence is bounded, m, and how long that is pursued.
+/// How exactly the distance on the wrong side of a polygon is bounded, m, and how long that is pursued.
 const OUTSIDE_PRECISION_M: f64 = 0.01;
 const OUTSIDE_STEPS: usize = 4096;
 
-/// Clearance from the polygon and altitude, in the order of [`watch`].
-pub(super) fn quantities(fence: &Fence) -> [Quantity; 2] {
-    let polygon = Quantity {
+/// Clearance from the plan's polygon.
+fn clearance(margin_m: f64) -> Quantity {
+    Quantity {
         check: "fence",
         label: "closest to the fence (negative: outside)",
+        object: None,
         verb: "has a clearance (negative: outside) from the fence of",
         unit: "m",
         severity: Severity::Error,
         remedy: "move or shrink the show, or draw the fence wider",
-        limit: fence.margin_m,
+        limit: margin_m,
         tolerance: TOLERANCE_M,
         squared: false,
         least: true,
-    };
-    let altitude = Quantity {
+    }
+}
+
+/// Altitude below the top of the fence.
+pub(super) fn altitude(fence: &Fence) -> Quantity {
+    Quantity {
         check: "fence-altitude",
         label: "highest below the fence's top less its margin",
         verb: "is at an altitude of",
         remedy: "lower the show, or raise the top of the fence",
         limit: fence.max_altitude_m - fence.margin_m,
         least: false,
-        ..polygon
-    };
-    [polygon, altitude]
+        ..clearance(0.0)
+    }
 }
 
 /// Whether a fence can be checked against: three corners or more, all finite.
 pub(super) fn usable(fence: &Fence) -> bool {
-    fence.polygon_m.len() >= 3
-        && fence.polygon_m.iter().flatten().all(|value| value.is_finite())
+    usable_polygon(&fence.polygon_m)
         && fence.margin_m.is_finite()
         && fence.max_altitude_m.is_finite()
+}
+
+/// The same for one polygon.
+pub(super) fn usable_polygon(corners_m: &[[f64; 2]]) -> bool {
+    corners_m.len() >= 3 && corners_m.iter().flatten().all(|value| value.is_finite())
+}
+
+/// Every polygon that counts, with what is watched: that of the fence, and the show's own, each with
+/// the fence's margin.
+///
+/// A drone must be inside all inclusion polygons. That is what the autopilot asks for unless its
+/// parameter `FENCE_OPTIONS` has the bit for their union, and the stricter of the two.
+pub(super) fn zones<'a>(input: &CheckInput<'a>) -> Vec<(Polygon<'a>, Quantity)> {
+    let fence = input.fence.filter(|fence| usable(fence));
+    let margin_m = fence.map_or(0.0, |fence| fence.margin_m);
+    let planned =
+        fence.map(|fence| (Polygon::new(&fence.polygon_m, true, margin_m), clearance(margin_m)));
+    let is_planned = |zone: &FenceZone| {
+        zone.is_inclusion && fence.is_some_and(|fence| fence.polygon_m == zone.corners_m)
+    };
+    let own = input
+        .show
+        .fence
+        .iter()
+        .enumerate()
+        .filter(|(_, zone)| usable_polygon(&zone.corners_m) && !is_planned(zone))
+        .map(|(index, zone)| {
+            let polygon = Polygon::new(&zone.corners_m, zone.is_inclusion, margin_m);
+            (polygon, zone_clearance(zone, index + 1, margin_m))
+        });
+    planned.into_iter().chain(own).collect()
+}
+
+fn zone_clearance(zone: &FenceZone, number: usize, margin_m: f64) -> Quantity {
+    let fence = clearance(margin_m);
+    if zone.is_inclusion {
+        let object = Some(Object { kind: "inclusion zone", number });
+        Quantity {
+            label: "closest to a further inclusion zone (negative: outside)",
+            object,
+            verb: "has a clearance (negative: outside) of",
+            ..fence
+        }
+    } else {
+        let object = Some(Object { kind: "exclusion zone", number });
+        Quantity {
+            check: "fence-exclusion",
+            label: "closest to an exclusion zone (negative: inside)",
+            object,
+            verb: "has a clearance (negative: inside) of",
+            remedy: "lead the show around the zone, or remove the zone from the fence",
+            ..fence
+        }
+    }
 }
 
 /// One side of the polygon: from a corner, `length_m` along the unit vector.
@@ -58,13 +119,13 @@ struct Side {
 /// The polygon prepared for distances.
 pub(super) struct Polygon<'a> {
     corners: &'a [[f64; 2]],
+    is_inclusion: bool,
     sides: Vec<Side>,
     margin_m: f64,
 }
 
 impl<'a> Polygon<'a> {
-    pub(super) fn new(fence: &'a Fence) -> Self {
-        let corners = fence.polygon_m.as_slice();
+    fn new(corners: &'a [[f64; 2]], is_inclusion: bool, margin_m: f64) -> Self {
         let next = corners.iter().cycle().skip(1);
         let sides = corners
             .iter()
@@ -76,7 +137,12 @@ impl<'a> Polygon<'a> {
                 Side { from: *from, along, length_m }
             })
             .collect();
-        Self { corners, sides, margin_m: fence.margin_m }
+        Self { corners, is_inclusion, sides, margin_m }
+    }
+
+    /// Whether a drone may be there, margin apart.
+    fn allows(&self, x: f64, y: f64) -> bool {
+        self.contains(x, y) == self.is_inclusion
     }
 
     /// Even-odd rule.
@@ -145,27 +211,37 @@ impl Side {
     }
 }
 
-/// Watches one drone.
-pub(super) fn watch(track: &Track<'_>, polygon: &Polygon<'_>, what: [Quantity; 2]) -> [Watch; 2] {
-    let [mut clearance, mut altitude] = what.map(Watch::new);
-    let start = track.start_m;
-    let signed = |x, y| {
-        let distance_m = polygon.distance_m(x, y);
-        if polygon.contains(x, y) { distance_m } else { -distance_m }
+/// Watches the altitude of one drone.
+pub(super) fn watch_altitude(track: &Track<'_>, what: Quantity) -> Watch {
+    let mut altitude = Watch::new(what);
+    altitude.feed_instant(track.start_m.z, 0.0);
+    for piece in &track.pieces {
+        let curve = curve_of(piece);
+        if !altitude.is_dull(curve.bounds().high.z) {
+            altitude.feed(&curve.axis(2), piece.start_ms as f64 / 1000.0, piece.duration_s());
+        }
+    }
+    altitude
+}
+
+/// Watches one drone against one polygon: from its home over the trajectory to its landing place.
+pub(super) fn watch(track: &Track<'_>, polygon: &Polygon<'_>, what: Quantity) -> Watch {
+    let mut clearance = Watch::new(what);
+    let signed = |point: Vector3<f64>| {
+        let distance_m = polygon.distance_m(point.x, point.y);
+        if polygon.allows(point.x, point.y) { distance_m } else { -distance_m }
     };
-    clearance.feed_instant(signed(start.x, start.y), 0.0);
-    altitude.feed_instant(start.z, 0.0);
+    for place in track.drone.home_m.into_iter().chain([track.start_m]) {
+        clearance.feed_instant(signed(place), 0.0);
+    }
     for piece in &track.pieces {
         let (start_s, duration_s) = (piece.start_ms as f64 / 1000.0, piece.duration_s());
         let curve = curve_of(piece);
         let bounds = curve.bounds();
-        if !altitude.is_dull(bounds.high.z) {
-            altitude.feed(&curve.axis(2), start_s, duration_s);
-        }
         let first = curve.first();
         let known_m = clearance.worst().unwrap_or(f64::INFINITY).max(polygon.margin_m);
         let far = polygon.sides.iter().all(|side| side.bound_m(&bounds) > known_m);
-        if far && polygon.contains(first.x, first.y) {
+        if far && polygon.allows(first.x, first.y) {
             continue;
         }
         for (from, to, worst_m, at) in stretches(&curve, polygon) {
@@ -177,10 +253,13 @@ pub(super) fn watch(track: &Track<'_>, polygon: &Polygon<'_>, what: [Quantity; 2
             });
         }
     }
-    [clearance, altitude]
+    if let Some(place) = track.drone.land_at_m {
+        clearance.feed_instant(signed(place), track.end_ms as f64 / 1000.0);
+    }
+    clearance
 }
 
-/// Parts of a curve with their least clearance (negative outside) and where it is: the parts that
+/// Parts of a curve with their least clearance (negative on the wrong side) and where it is: the parts that
 /// break the margin, or the nearest point if none does.
 fn stretches(curve: &Curve, polygon: &Polygon<'_>) -> Vec<(f64, f64, f64, f64)> {
     // The boundary is crossed only where the line of a side is.
@@ -197,7 +276,7 @@ fn stretches(curve: &Curve, polygon: &Polygon<'_>) -> Vec<(f64, f64, f64, f64)> 
         let at = |u: f64| low + u * (high - low);
         let part = curve.restrict(low, high);
         let middle = part.value(0.5);
-        if !polygon.contains(middle.x, middle.y) {
+        if !polygon.allows(middle.x, middle.y) {
             let (worst_m, u) = farthest(&part, polygon);
             found.push((low, high, -worst_m, at(u)));
             continue;
@@ -227,7 +306,7 @@ fn stretches(curve: &Curve, polygon: &Polygon<'_>) -> Vec<(f64, f64, f64, f64)> 
     found
 }
 
-/// Largest distance from the polygon of a curve outside it: proven to within a centimetre unless
+/// Largest distance from the sides of a curve on the wrong side of them: proven to within a centimetre unless
 /// the search is cut short, since the distance cannot change faster than the curve moves.
 fn farthest(curve: &Curve, polygon: &Polygon<'_>) -> (f64, f64) {
     let distance = |u: f64| {

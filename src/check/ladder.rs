@@ -14,6 +14,9 @@ const SAME_SPEED_MPS: f64 = 0.01;
 pub(super) fn check(plan: &Plan, collector: &mut Collector) {
     for group in &plan.groups {
         windows(plan, group, collector);
+        if !counts(plan.purpose, Kind::Hover) {
+            eaten_hovers(group, collector);
+        }
     }
     if plan.purpose == Purpose::Calibration {
         speeds(plan, collector);
@@ -49,6 +52,45 @@ fn windows(plan: &Plan, group: &Group, collector: &mut Collector) {
             value: Some(lasts_s),
             unit: "s",
             ..warning("ladder-window", message, "fly them longer, or settle and trim less")
+        },
+    );
+}
+
+/// One warning for all hovers of a group that have no window because of the ramp they begin with.
+fn eaten_hovers(group: &Group, collector: &mut Collector) {
+    let of_transfer = |kind| matches!(kind, Kind::Takeoff | Kind::Climb | Kind::Descend);
+    let mut eaten = Vec::new();
+    let mut before: [Option<&Segment>; 2] = [None, None];
+    for segment in &group.segments {
+        // The ramp at the end of a transfer is the transfer's own time.
+        if let [Some(flown), Some(ramp)] = before
+            && segment.kind == Kind::Hover
+            && segment.window.is_none()
+            && ramp.kind == Kind::Ramp
+            && !of_transfer(flown.kind)
+        {
+            eaten.push((ramp, segment));
+        }
+        before = [before[1], Some(segment)];
+    }
+    let Some((ramp, first)) = eaten.first() else { return };
+    let hovers = group.segments.iter().filter(|segment| segment.kind == Kind::Hover).count();
+    let lasts_s = |segment: &Segment| (segment.end_ms - segment.start_ms) as f64 / 1000.0;
+    let message = format!(
+        "{} of {hovers} hovers (group {}) are too short for an analysis window after the ramps they begin with, first \"{}\": {:.1} s are left after a ramp of {:.1} s",
+        eaten.len(),
+        group.name,
+        first.label,
+        lasts_s(first),
+        lasts_s(ramp),
+    );
+    collector.add(
+        0,
+        Finding {
+            time_s: Some(first.start_ms as f64 / 1000.0),
+            value: Some(lasts_s(first)),
+            unit: "s",
+            ..warning("ladder-window", message, "hover longer, or take a larger ramp acceleration")
         },
     );
 }

@@ -18,6 +18,7 @@ pub(super) fn quantity(input: &CheckInput<'_>) -> Quantity {
     Quantity {
         check: "low-lateral",
         label: "largest sideways motion below the take-off altitude",
+        object: None,
         verb: "moves sideways below the take-off altitude, by",
         unit: "m",
         severity: Severity::Error,

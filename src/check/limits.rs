@@ -1,4 +1,4 @@
-//! Limits that were loosened beyond the vehicle's own: whoever flies must know.
+//! Limits that were loosened beyond the vehicle's own, or would be: whoever flies must know.
 
 use super::CheckInput;
 use super::report::{Collector, Finding, Severity};
@@ -31,6 +31,12 @@ pub(super) fn check(input: &CheckInput<'_>, collector: &mut Collector) {
         let (own, value) = (get(stock), get(input.limits));
         let beyond = if larger_is_looser { value - own } else { own - value };
         if beyond <= SAME * own.abs() {
+            if let Some(value) = stated(input, key) {
+                let beyond = if larger_is_looser { value - own } else { own - value };
+                if beyond > SAME * own.abs() {
+                    collector.add(0, unheard(key, unit, value, own));
+                }
+            }
             continue;
         }
         let gap = if unit.is_empty() { "" } else { " " };
@@ -54,5 +60,40 @@ pub(super) fn check(input: &CheckInput<'_>, collector: &mut Collector) {
                 remedy: "fly like this only if somebody has tried it with this vehicle",
             },
         );
+    }
+}
+
+/// What the show itself states of the limits that it cannot loosen (see
+/// [`Plan::of_show`](crate::mission::Plan::of_show)).
+fn stated(input: &CheckInput<'_>, key: &str) -> Option<f64> {
+    let stated = input.show.validation?;
+    match key {
+        "max_speed_xy_mps" => stated.max_velocity_xy_mps,
+        "max_speed_up_mps" => stated.max_velocity_z_up_mps.or(stated.max_velocity_z_mps),
+        "max_speed_down_mps" => stated.max_velocity_z_mps,
+        "max_altitude_m" => stated.max_altitude_m,
+        "min_distance_m" => stated.min_distance_m,
+        _ => None,
+    }
+    .filter(|value| value.is_finite() && *value > 0.0)
+}
+
+/// The warning of a limit that the show states and that does not count.
+fn unheard(key: &str, unit: &'static str, value: f64, own: f64) -> Finding {
+    Finding {
+        severity: Severity::Warning,
+        check: "limits",
+        drones: vec![],
+        time_s: None,
+        end_s: None,
+        value: Some(value),
+        limit: Some(own),
+        unit,
+        message: format!(
+            "the show states {key} = {} {unit}; the vehicle's own {} {unit} are stricter and count",
+            plain(value),
+            plain(own),
+        ),
+        remedy: "name the vehicle that flies it, or allow the check by its name",
     }
 }

@@ -27,6 +27,7 @@ mod ground;
 mod ladder;
 mod lateral;
 mod limits;
+mod low_flight;
 mod motion;
 mod pair;
 mod report;
@@ -95,7 +96,7 @@ pub struct CheckInput<'a> {
     pub show: &'a Show,
     /// What the vehicle may be asked to do.
     pub limits: &'a Limits,
-    /// The fence, if there is one.
+    /// The fence, if there is one; the show's own zones ([`Show::fence`]) are checked besides it.
     pub fence: Option<&'a Fence>,
     /// Whether the fence has a top; a polygon that a show file brings has none.
     pub fence_has_top: bool,
@@ -118,6 +119,7 @@ pub const NAMES: &[&str] = &[
     "endurance",
     "fence",
     "fence-altitude",
+    "fence-exclusion",
     "firmware-away",
     "firmware-climb",
     "firmware-early-landing",
@@ -130,6 +132,7 @@ pub const NAMES: &[&str] = &[
     "ladder-speeds",
     "ladder-window",
     "limits",
+    "low-flight",
     "low-lateral",
     "mixed-starts",
     "same-home",
@@ -233,8 +236,12 @@ pub fn check(input: &CheckInput<'_>) -> CheckReport {
     watch_drones(input, &tracks, &mut collector);
     format::check(&tracks, &mut collector);
     firmware::check(input, &tracks, &mut collector);
-    if input.fence.is_none() {
-        collector.note("no fence in this show: nothing says how far a drone may stray");
+    if input.fence.is_none() && !show.fence.iter().any(|zone| zone.is_inclusion) {
+        collector.note(if show.fence.is_empty() {
+            "no fence in this show: nothing says how far a drone may stray"
+        } else {
+            "the fence of this show only excludes: nothing says how far a drone may stray"
+        });
     }
     collector.finish(show.drones.len(), duration_ms as f64 / 1000.0)
 }
@@ -242,24 +249,23 @@ pub fn check(input: &CheckInput<'_>) -> CheckReport {
 /// The checks that look at one drone at a time.
 fn watch_drones(input: &CheckInput<'_>, tracks: &[Track<'_>], collector: &mut Collector) {
     let firmware = &input.firmware;
-    let fence = input.fence.filter(|fence| fence::usable(fence));
-    let fence = fence.map(|fence| (fence::Polygon::new(fence), fence::quantities(fence)));
+    let zones = fence::zones(input);
+    let top = input.fence.filter(|fence| input.fence_has_top && fence::usable(fence));
+    let top = top.map(fence::altitude);
     let motion = motion::quantities(input);
     let lateral = lateral::quantity(input);
+    let low_flight = low_flight::quantity(input);
     let endurance = endurance::quantity(input);
     let watched: Vec<Vec<Watch>> = tracks
         .par_iter()
         .map(|track| {
             let mut watches = motion::watch(track, &motion).to_vec();
             watches.push(lateral::watch(track, lateral, firmware.takeoff_alt_m));
+            watches.push(low_flight::watch(track, low_flight, AIRBORNE_ABOVE_M));
             watches.push(endurance::watch(track, endurance, firmware.land_speed_mps));
-            if let Some((polygon, quantities)) = &fence {
-                let [clearance, altitude] = fence::watch(track, polygon, *quantities);
-                watches.push(clearance);
-                if input.fence_has_top {
-                    watches.push(altitude);
-                }
-            }
+            let clearances = zones.iter().map(|(zone, what)| fence::watch(track, zone, *what));
+            watches.extend(clearances);
+            watches.extend(top.map(|what| fence::watch_altitude(track, what)));
             watches
         })
         .collect();

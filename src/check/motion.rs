@@ -14,6 +14,7 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
     let base = Quantity {
         check: "",
         label: "",
+        object: None,
         verb: "",
         unit: "m/s",
         severity: Severity::Error,

@@ -1,6 +1,6 @@
 //! Whether the numbers of a show make sense at all; the other checks rely on it.
 
-use super::fence::usable;
+use super::fence::{usable, usable_polygon};
 use super::report::{Collector, Finding, Severity};
 use super::track::name_of;
 use super::{CheckInput, MAX_DRONES};
@@ -77,6 +77,15 @@ fn check_limits(input: &CheckInput<'_>, collector: &mut Collector) {
     if input.fence.is_some_and(|fence| !usable(fence)) {
         let message = "the fence needs three corners or more, and finite numbers".to_owned();
         collector.add(0, error(vec![], None, message, "correct the fence"));
+    }
+    for (index, zone) in input.show.fence.iter().enumerate() {
+        if !usable_polygon(&zone.corners_m) {
+            let message = format!(
+                "zone {} of the fence needs three corners or more, and finite numbers",
+                index + 1
+            );
+            collector.add(0, error(vec![], None, message, "correct the fence"));
+        }
     }
 }
 

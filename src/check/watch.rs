@@ -17,6 +17,8 @@ pub(super) struct Quantity {
     pub(super) check: &'static str,
     /// The quantity for margins: `fastest climb`.
     pub(super) label: &'static str,
+    /// What the value refers to, when there are several: a zone of the fence.
+    pub(super) object: Option<Object>,
     /// The quantity in a sentence: `climbs at`.
     pub(super) verb: &'static str,
     pub(super) unit: &'static str,
@@ -30,6 +32,14 @@ pub(super) struct Quantity {
     pub(super) squared: bool,
     /// Whether the limit is a least value; polynomials and values come as they are.
     pub(super) least: bool,
+}
+
+/// One of several things of a kind: `exclusion zone 2`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Object {
+    pub(super) kind: &'static str,
+    /// From 1, as `inspect` counts them.
+    pub(super) number: usize,
 }
 
 /// A time in which the limit was broken.
@@ -150,8 +160,11 @@ pub(super) fn report<'t>(
         }
         for stretch in &watch.stretches {
             let value = sign * stretch.worst;
+            let object = what
+                .object
+                .map_or(String::new(), |object| format!(" from {} {}", object.kind, object.number));
             let message = format!(
-                "{} {} {unit} at {:.3} s, limit {} {unit}",
+                "{} {} {unit}{object} at {:.3} s, limit {} {unit}",
                 what.verb,
                 fixed(value, 3),
                 stretch.worst_s,

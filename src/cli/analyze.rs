@@ -42,8 +42,8 @@ const WIDTH: usize = 100;
 A campaign's results go into its folder, others into --output. Without a plan, windows are found in
 the log's own desired velocity. Whose a log is, it says itself: by its home position, else by its
 file name (07.BIN), else by its system id. Exit code 3: done, but logs are missing, unusable,
-copies, from another place or end in the air, or drones gave no law or no value of the map; each is
-named with its reason. Exit code 5: no law and no map at all.")]
+copies, damaged, from another place or end in the air, or drones gave no law, one of a part of the
+ladder, or no value of the map; each is named with its reason. Exit code 5: no law and no map at all.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
     #[arg(required = true)]
@@ -223,6 +223,7 @@ fn finish(
     if !context.json {
         context.print(&terminal_summary(&analysis, WIDTH, context.color))?;
     }
+    let nothing = analysis.what_was_found() == Yield::Nothing;
     let mut page = None;
     if let Some(folder) = output {
         let json = to_json(&analysis)
@@ -232,7 +233,8 @@ fn finish(
         let report_folder = folder.join("report");
         report::write(&made, &report_folder)?;
         write_whole(&folder.join("analysis.json"), &json)?;
-        page = Some(report_folder.join(report::PAGE_FILE));
+        // A page that says that nothing was found is written, but there is nothing to point at.
+        page = (!nothing).then(|| report_folder.join(report::PAGE_FILE));
     }
     if context.json {
         context.print_json(&AnalyzeOutput {
@@ -244,11 +246,17 @@ fn finish(
     if let Some(page) = &page {
         context.result(page)?;
     }
-    let place = page.map_or(String::new(), |page| format!(" -> {}", page.display()));
+    let place = match page {
+        _ if nothing => ": nothing found".to_owned(),
+        Some(page) => format!(" -> {}", page.display()),
+        None => String::new(),
+    };
     let used: usize = analysis.flights.iter().map(|flight| flight.drones.len()).sum();
     let share = if used < total { format!("{used} of ") } else { String::new() };
     context.say(&format!("Analysed {share}{} in {watch}{place}", words::count(total, "log")));
-    let lossy = |flight: &FlightAnalysis| !flight.missing.is_empty() || !flight.lost.is_empty();
+    let lossy = |flight: &FlightAnalysis| {
+        !(flight.missing.is_empty() && flight.unused.is_empty() && flight.partly_used.is_empty())
+    };
     let lost = used < total
         || analysis.flights.iter().any(lossy)
         || analysis.flights.len() < work.flights.len();

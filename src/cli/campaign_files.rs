@@ -13,7 +13,7 @@ use crate::base::file::read_whole;
 use crate::campaign::FlightFolder;
 use crate::mission::Plan;
 use crate::show::csv::CsvOptions;
-use crate::show::{Show, ShowDrone, skyb, verify_archive};
+use crate::show::{FenceZone, Show, ShowDrone, skyb, verify_archive};
 use crate::vehicle::{Vehicle, library};
 
 /// Largest show file that is read, bytes.
@@ -63,7 +63,7 @@ pub(super) fn open(folder: &FlightFolder) -> FlightFiles {
     let compiled = archived(&folder.skyc(), &mut problems);
     if let Some(show) = &compiled {
         compare(&folder.skyc(), show, &planned, SKYC_M, true, &mut problems);
-        if !same_polygon(&show.fence_polygon_m, &planned.fence_polygon_m) {
+        if !same_fence(&show.fence, &planned.fence) {
             problems.push(format!("{}: its fence is not the plan's", folder.skyc().display()));
         }
     }
@@ -136,11 +136,15 @@ fn name_some(found: Vec<String>, before: &str, after: &str, problems: &mut Vec<S
     }
 }
 
-fn same_polygon(here: &[[f64; 2]], there: &[[f64; 2]]) -> bool {
+fn same_fence(here: &[FenceZone], there: &[FenceZone]) -> bool {
     let near = |(a, b): (&[f64; 2], &[f64; 2])| {
         (a[0] - b[0]).abs() <= SKYC_M && (a[1] - b[1]).abs() <= SKYC_M
     };
-    here.len() == there.len() && here.iter().zip(there).all(near)
+    let same = |(here, there): (&FenceZone, &FenceZone)| {
+        let (a, b) = (&here.corners_m, &there.corners_m);
+        here.is_inclusion == there.is_inclusion && a.len() == b.len() && a.iter().zip(b).all(near)
+    };
+    here.len() == there.len() && here.iter().zip(there).all(same)
 }
 
 /// The binary shows: one for each slot, and no other.

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::words;
+use crate::show::FenceZone;
 use crate::show::summary::{DroneSummary, ShowSummary, SkybSummary};
 
 /// Drones listed one by one.
 const MAX_ROWS: usize = 60;
+/// Zones of a fence described one by one.
+const MAX_ZONES: usize = 20;
 
 /// A show: head, bounds, one line per drone with as many columns as fit.
 pub(super) fn describe_show(show: &ShowSummary, width: Option<usize>) -> String {
@@ -37,9 +40,7 @@ pub(super) fn describe_show(show: &ShowSummary, width: Option<usize>) -> String 
         speeds.up_mps, speeds.down_mps, speeds.horizontal_mps
     );
     let cues = (!show.cues.is_empty()).then(|| words::count(show.cues.len(), "cue"));
-    let corners = show.fence_polygon_m.len();
-    let fence = (corners > 0).then(|| format!("fence of {}", words::count(corners, "corner")));
-    let extras: Vec<_> = cues.into_iter().chain(fence).collect();
+    let extras: Vec<_> = cues.into_iter().chain(fence(&show.fence)).collect();
     if !extras.is_empty() {
         let _ = writeln!(text, "{}", extras.join(", "));
     }
@@ -57,6 +58,25 @@ pub(super) fn describe_show(show: &ShowSummary, width: Option<usize>) -> String 
     }
     describe_remarks(&mut text, show);
     text
+}
+
+/// `fence of 4 corners`, `fence of 2 zones (1: inside 4 corners, 2: outside 3 corners)`.
+fn fence(zones: &[FenceZone]) -> Option<String> {
+    let corners = |zone: &FenceZone| words::count(zone.corners_m.len(), "corner");
+    match zones {
+        [] => None,
+        [zone] if zone.is_inclusion => Some(format!("fence of {}", corners(zone))),
+        zones => {
+            let one = |(index, zone): (usize, &FenceZone)| {
+                let side = if zone.is_inclusion { "inside" } else { "outside" };
+                format!("{}: {side} {}", index + 1, corners(zone))
+            };
+            let each: Vec<_> = zones.iter().take(MAX_ZONES).enumerate().map(one).collect();
+            let more = if zones.len() > MAX_ZONES { ", ..." } else { "" };
+            let count = words::count(zones.len(), "zone");
+            Some(format!("fence of {count} ({}{more})", each.join(", ")))
+        }
+    }
 }
 
 /// What is remarkable about drones, each thing once.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::words::{count, shorten};
 use crate::mission::plan::{Group, Kind, Plan, Segment};
 
-/// Most rows of a timetable before the middle is left out.
+/// Most rows of a timetable before the middle is left out, ramps apart.
 const MAX_ROWS: usize = 60;
 
 /// Columns of a row without its label and window.
@@ -89,12 +89,13 @@ fn describe_group(text: &mut String, plan: &Plan, group: &Group, room: Room) {
         if room.windows { "  window s" } else { "" },
         label = room.label,
     );
-    let shown: Vec<_> =
-        group.segments.iter().filter(|segment| segment.kind != Kind::Ramp).collect();
+    let shown = &group.segments;
+    let ramps = shown.iter().any(|segment| segment.kind == Kind::Ramp);
+    let most = if ramps { 2 * MAX_ROWS } else { MAX_ROWS };
     for (index, segment) in shown.iter().enumerate() {
-        if shown.len() > MAX_ROWS && (MAX_ROWS / 2..shown.len() - MAX_ROWS / 2).contains(&index) {
-            if index == MAX_ROWS / 2 {
-                let _ = writeln!(text, "{:>8}  {} more", "...", shown.len() - MAX_ROWS);
+        if shown.len() > most && (most / 2..shown.len() - most / 2).contains(&index) {
+            if index == most / 2 {
+                let _ = writeln!(text, "{:>8}  {} more", "...", shown.len() - most);
             }
             continue;
         }
@@ -111,6 +112,11 @@ fn describe_segment(text: &mut String, segment: &Segment, room: Room) {
         if vz == 0.0 { String::new() } else { format!("{vz:+.2}") }
     } else {
         format!("{:.2}", (vx * vx + vy * vy + vz * vz).sqrt())
+    };
+    let speed = match segment.kind {
+        Kind::Ramp if speed.is_empty() => "to 0".to_owned(),
+        Kind::Ramp => format!("to {speed}"),
+        _ => speed,
     };
     let height = if segment.from_m[2] == segment.to_m[2] {
         format!("{:.1}", segment.to_m[2])

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::align::{Evidence, align};
 use super::channels::Messages;
 use super::{Flight, FlightError, FlightOptions, Series, pick};
-use crate::log::Log;
+use crate::log::{Log, ScanStats};
 
 /// Kept before arming and after disarming, s.
 const MARGIN_S: f64 = 2.0;
@@ -104,11 +104,7 @@ pub(super) fn load(
     let running = pulse.value.last().is_some_and(|last| *last > pulse_limits_us.0 + IDLE_US);
     let cut_off_at_m = running.then(|| end_height_m(&pulse, &ekf.height, flight.1, ground_m));
     let cut_off_at_m = cut_off_at_m.flatten().filter(|height| *height > CUT_OFF_M);
-    if let Some(height) = cut_off_at_m {
-        warnings.push(format!(
-            "the log ends in the air, {height:.1} m above the ground; what it holds is analysed"
-        ));
-    }
+    warnings.extend(cut_off_at_m.map(cut_off));
     let mut height_m = cut(ekf.height);
     for height in &mut height_m.value {
         *height -= ground_m;
@@ -163,12 +159,29 @@ fn end_height_m(pulse: &Series, height: &Series, disarmed_s: f64, ground_m: f64)
     height.value.last().filter(|_| armed).map(|height| height - ground_m)
 }
 
+/// That a log ends before its flight does.
+pub(super) fn cut_off(height_m: f64) -> String {
+    format!("the log ends in the air, {height_m:.1} m above the ground; what it holds is analysed")
+}
+
+/// What the reader skipped inside of a log. That it ends within a message is how logs end whose
+/// drone was switched off.
+pub(super) fn damage(scan: &ScanStats) -> Option<String> {
+    let counted = [
+        (scan.unknown, "message heads of unknown types"),
+        (scan.time_jumps, "jumps of the board time"),
+    ];
+    let seen: Vec<String> = (counted.iter().filter(|(count, _)| *count > 0))
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    let seen = if seen.is_empty() { String::new() } else { format!(" ({})", seen.join(", ")) };
+    (scan.bad_bytes > 0)
+        .then(|| format!("{} bytes of the log are damaged and were skipped{seen}", scan.bad_bytes))
+}
+
 fn scan_warnings(messages: &Messages) -> Vec<String> {
     let scan = &messages.scan;
-    let mut warnings = Vec::new();
-    if scan.bad_bytes > 0 {
-        warnings.push(format!("{} bytes of the log are damaged and were skipped", scan.bad_bytes));
-    }
+    let mut warnings: Vec<String> = damage(scan).into_iter().collect();
     if scan.rejected_formats > 0 {
         let count = scan.rejected_formats;
         warnings.push(format!("{count} message definitions in the log contradict themselves"));

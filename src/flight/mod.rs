@@ -180,6 +180,13 @@ pub fn identify(log: &Log) -> Identity {
 }
 
 impl Flight {
+    /// What of the flight or of its log is lost, one phrase each, as in [`Flight::warnings`]: the
+    /// log ends in the air, or its reader skipped damage. Empty: nothing.
+    pub fn losses(&self) -> Vec<String> {
+        let cut_off = self.cut_off_at_m.map(load::cut_off);
+        cut_off.into_iter().chain(load::damage(&self.scan)).collect()
+    }
+
     /// Reads one flight of a log.
     ///
     /// With several flights in the log, the last one that performed a show is read (else the last

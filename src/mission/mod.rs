@@ -7,6 +7,7 @@
 pub mod build;
 pub mod error;
 pub mod formation;
+mod keys;
 pub mod plan;
 pub mod resolve;
 mod source;

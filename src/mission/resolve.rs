@@ -8,6 +8,7 @@ use toml::Value as Toml;
 
 use super::build::build_plan;
 use super::error::TemplateError;
+use super::keys::{TOP_LEVEL, keys_of, short_numbers};
 use super::plan::Plan;
 use super::template::{FlightTemplate, Template, span_of};
 use crate::base::file::{FileError, read_whole};
@@ -165,7 +166,7 @@ pub fn resolve_text(
         Template::Flight(_) => {
             let refused = |key: &Override| MissionError::Override {
                 key: key.key.clone(),
-                reason: format!("{path} has no such key"),
+                reason: format!("{path} has no such key; {}", keys_of(&key.key, &[text])),
             };
             let (flight, used) = resolve_flight(path, text, overrides)?;
             if let Some(unused) = used.iter().zip(overrides).find(|(used, _)| !**used) {
@@ -244,9 +245,14 @@ pub fn resolve_text(
                 return Err(TemplateError::new(path, text, span, "a campaign needs flights").into());
             }
             if let Some(unused) = used_any.iter().zip(overrides).find(|(used, _)| !**used) {
+                let texts: Vec<_> =
+                    flights.iter().map(|flight| flight.template_text.as_str()).collect();
                 return Err(MissionError::Override {
                     key: unused.1.key.clone(),
-                    reason: "none of the campaign's flights has such a key".to_owned(),
+                    reason: format!(
+                        "none of the campaign's flights has such a key; {}",
+                        keys_of(&unused.1.key, &texts)
+                    ),
                 });
             }
             Ok(Mission {
@@ -294,9 +300,11 @@ fn resolve_flight(
             key: path.to_owned(),
             reason: error.to_string(),
         })?;
-        (format!("{path} with overrides"), resolved)
+        (format!("{path} with overrides"), short_numbers(&resolved))
     };
-    let template = match Template::parse(&shown_path, &resolved_text)? {
+    let parsed = Template::parse(&shown_path, &resolved_text)
+        .map_err(|error| with_range(error, path, text, overrides));
+    let template = match parsed? {
         Template::Flight(template) => template,
         Template::Campaign(_) => {
             return Err(MissionError::Override {
@@ -308,6 +316,27 @@ fn resolve_flight(
     let vehicle = vehicle_of(&shown_path, &resolved_text, &template)?;
     let plan = build_plan(&shown_path, &resolved_text, &template, &vehicle)?;
     Ok((ResolvedFlight { template_text: resolved_text, vehicle, plan }, used))
+}
+
+/// Adds the allowed range to the error of an override whose value is text where a number belongs: what
+/// the template says of a number out of every range.
+fn with_range(
+    error: TemplateError,
+    path: &str,
+    text: &str,
+    overrides: &[Override],
+) -> TemplateError {
+    let is_text = |item: &&Override| matches!(item.value, Some(Toml::String(_)));
+    for item in overrides.iter().filter(is_text) {
+        let number = Override::new(&item.key, f64::NAN);
+        if let Err(MissionError::Template(TemplateError { help: Some(help), .. })) =
+            resolve_flight(path, text, &[number])
+            && help.starts_with("allowed: ")
+        {
+            return error.with_help(format!("{} is a number; {help}", item.key));
+        }
+    }
+    error
 }
 
 fn vehicle_of(path: &str, text: &str, template: &FlightTemplate) -> Result<Vehicle, MissionError> {
@@ -334,11 +363,7 @@ fn apply(table: &mut Table, item: &Override) -> Result<bool, MissionError> {
     let keys: Vec<&str> = item.key.split('.').collect();
     let Some((last, parents)) = keys.split_last() else { return Ok(false) };
     // Only known top-level keys: anything else is a mistyped parameter.
-    let known = [
-        "name", "title", "purpose", "vehicle", "site", "grid", "takeoff", "landing", "motion",
-        "fence", "window", "limits", "groups", "steps", "briefing",
-    ];
-    if !known.contains(&keys[0]) {
+    if !TOP_LEVEL.contains(&keys[0]) {
         return Ok(false);
     }
     if parents.is_empty() {

@@ -163,7 +163,7 @@ impl<'a> Timeline<'a> {
             }
             StepKind::Hover => {
                 let duration_ms = self.duration(step)?;
-                let label = format!("hover at {} m", (self.position_m.z * 10.0).round() / 10.0);
+                let label = format!("hover at {} m", self.rest_height_m());
                 self.timed(Kind::Hover, &label, Vector3::zeros(), duration_ms, span)
             }
             StepKind::Horizontal => {
@@ -189,7 +189,7 @@ impl<'a> Timeline<'a> {
         if duration_ms == 0 {
             return Ok(());
         }
-        let label = format!("wait at {} m", (self.position_m.z * 10.0).round() / 10.0);
+        let label = format!("wait at {} m", self.rest_height_m());
         self.timed(Kind::Hover, &label, Vector3::zeros(), duration_ms, None)
     }
 
@@ -293,6 +293,12 @@ impl<'a> Timeline<'a> {
         } else {
             0
         }
+    }
+
+    /// Where a hover that begins now stands, after the ramp that leads to it, m, to a decimetre.
+    fn rest_height_m(&self) -> f64 {
+        let ramp_s = to_s(self.ramp_ms(Vector3::zeros()));
+        ((self.position_m.z + self.velocity_mps.z * ramp_s / 2.0) * 10.0).round() / 10.0
     }
 
     fn ramp(&mut self, velocity_mps: Vector3<f64>) -> Result<(), TemplateError> {

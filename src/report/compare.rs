@@ -1,5 +1,6 @@
 //! Fleet tables beside the paper's values, and the words that a page and a terminal share.
 
+use crate::analysis::law::SIGNED_QUADRATIC;
 use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow, UpdraftMap};
 use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
@@ -12,6 +13,9 @@ use super::text::{
     NONE, clean, count, estimate, fixed, parameter, reduced, rejection, signed, symbol, unit,
     usable,
 };
+
+/// A reduced chi² up to this needs no explanation.
+const GOOD_CHI2: f64 = 1.5;
 
 /// A row of Table I or II in words.
 pub(super) struct Comparison {
@@ -121,11 +125,23 @@ pub(super) fn scatter_line(laws: &Laws) -> Option<String> {
 
 /// The paper's table that a flight's parameters stand beside, in words.
 pub(super) fn table_heading(flight: &FlightAnalysis) -> String {
-    match flight.paper_table.as_deref() {
-        Some("I") => "Fitted parameters, as the paper's Table I (simulation)".to_owned(),
-        Some("II") => "Fitted parameters, as the paper's Table II (field)".to_owned(),
-        _ => "Fitted parameters beside the paper's".to_owned(),
-    }
+    let table = match flight.paper_table.as_deref() {
+        Some("I") => " beside the paper's Table I (simulation)",
+        Some("II") => " beside the paper's Table II (its drones in the field)",
+        _ => "",
+    };
+    let told = |law: &str| flight.table.iter().any(|row| row.law == law && row.paper.is_some());
+    let not = if table.is_empty() || told(SIGNED_QUADRATIC) {
+        ""
+    } else {
+        "; the signed quadratic is not compared, as it does not describe this flight"
+    };
+    format!("Fitted parameters{}{not}", if compared(flight) { table } else { "" })
+}
+
+/// Whether a value of the paper stands beside any of the flight's.
+pub(super) fn compared(flight: &FlightAnalysis) -> bool {
+    flight.table.iter().any(|row| row.paper.is_some())
 }
 
 /// Why a flight gave nothing at all, in plain words; `None` where it gave something.
@@ -148,7 +164,7 @@ pub(super) fn nothing(flight: &FlightAnalysis) -> Option<String> {
             }
             (true, true, _) => {
                 "No calibration: the ladder was found, but no law could be fitted to it \
-                            (the reasons are with the drones)."
+                            (the reasons follow)."
             }
             (false, false, false) => {
                 "No ladder and no hover found: nothing in this flight is steady for \
@@ -177,7 +193,19 @@ pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
         MapLaw::SignedQuadratic => ("signed-quadratic", chi2(quadratic), chi2(linear)),
     };
     let (this, other) = this.zip(other)?;
-    Some(format!("the {name} law fits better (χ²/ν {} against {})", reduced(this), reduced(other)))
+    let against = format!("χ²/ν {} against {}", reduced(this), reduced(other));
+    if this <= GOOD_CHI2 {
+        return Some(format!("the {name} law fits better ({against})"));
+    }
+    let (of, errors) = if flight.flock.is_some() && flight.drones.len() > 1 {
+        (" of the drones' average", "the errors of an average of drones are so small that")
+    } else {
+        ("", "the windows' own errors are so small that")
+    };
+    Some(format!(
+        "the {name} law fits better ({against}{of}, before scatter is added: {errors} neither law is \
+         exact to within them)"
+    ))
 }
 
 /// One drone's fitted parameters in words; a dash where there is none.
@@ -237,6 +265,9 @@ pub(super) fn flags(drone: &DroneAnalysis) -> Vec<String> {
     }
     flags.extend(reasons.iter().map(|(words, n)| format!("{} {words}", count(*n, "window"))));
     flags.extend(drone.warnings.iter().map(|warning| clean(warning)));
+    flags.extend(drone.partial_ladder.map(|partial| {
+        format!("partial ladder ({}): not in the fleet's numbers", partial.short())
+    }));
     if let Some(laws) = &drone.laws {
         let fits = [&laws.signed_quadratic, &laws.signed_quadratic_held, &laws.linear];
         for fit in fits.into_iter().flatten() {
@@ -253,10 +284,11 @@ pub(super) fn flags(drone: &DroneAnalysis) -> Vec<String> {
     flags
 }
 
-/// Accepted windows over all: `28/30`.
+/// Accepted windows over all: `28/30`; `11/30, partial` where they are a part of the fleet's ladder.
 pub(super) fn windows_used(drone: &DroneAnalysis) -> String {
     let used = drone.windows.iter().filter(|window| window.rejected.is_empty()).count();
-    format!("{used}/{}", drone.windows.len())
+    let partial = if drone.partial_ladder.is_some() { ", partial" } else { "" };
+    format!("{used}/{}{partial}", drone.windows.len())
 }
 
 /// How the drone's clock was aligned, in words.

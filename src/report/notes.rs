@@ -1,20 +1,45 @@
 //! What is doubtful about drones, with equal remarks told once.
 
-use crate::analysis::result::FlightAnalysis;
+use crate::analysis::result::{FlightAnalysis, PartlyUsedLog};
 
 use super::compare::flags;
-use super::text::clean;
+use super::text::{clean, count};
 
-/// Drones without a value of the map, and why.
-pub(super) fn unmeasured_lines(flight: &FlightAnalysis) -> Vec<String> {
-    grouped(flight.unmeasured.iter().map(|one| (who(one.slot, &one.name), clean(&one.reason))))
+/// Drones without a law or a value of the map, and why: without a usable log, or with one that gave
+/// none.
+pub(super) fn without_result_lines(flight: &FlightAnalysis) -> Vec<String> {
+    let missing = flight.missing.iter().map(|one| (Some(one.slot), "", &one.reason));
+    let unmeasured = flight.unmeasured.iter().map(|one| (one.slot, &*one.name, &one.reason));
+    let mut all: Vec<(Option<u16>, &str, &String)> = missing.chain(unmeasured).collect();
+    all.sort_by_key(|(slot, ..)| slot.unwrap_or(u16::MAX));
+    grouped(all.into_iter().map(|(slot, name, reason)| (who(slot, name), clean(reason))))
 }
 
-/// Everything doubtful about the drones.
+/// Logs that are not used, and why.
+pub(super) fn unused_lines(flight: &FlightAnalysis) -> Vec<String> {
+    flight.unused.iter().map(|log| clean(&log.sentence())).collect()
+}
+
+/// Logs that are used in part, and what is lost of them.
+pub(super) fn partly_used_lines(flight: &FlightAnalysis) -> Vec<String> {
+    let line = |log: &PartlyUsedLog| clean(&format!("{}: {}", log.source, log.reason));
+    flight.partly_used.iter().map(line).collect()
+}
+
+/// `43 of 48 logs used`.
+pub(super) fn logs_used(flight: &FlightAnalysis) -> String {
+    let used = flight.logs.saturating_sub(flight.unused.len());
+    format!("{used} of {} used", count(flight.logs, "log"))
+}
+
+/// Everything doubtful about the drones that is not told with their logs.
 pub(super) fn note_lines(flight: &FlightAnalysis) -> Vec<String> {
     grouped(flight.drones.iter().flat_map(|drone| {
         let of = who(drone.slot, &drone.name);
-        flags(drone).into_iter().map(move |flag| (of.clone(), flag))
+        let log = flight.partly_used.iter().find(|log| log.source == drone.source);
+        let told = log.map(|log| clean(&log.reason)).unwrap_or_default();
+        let new = flags(drone).into_iter().filter(move |flag| !told.contains(flag.as_str()));
+        new.map(move |flag| (of.clone(), flag))
     }))
 }
 

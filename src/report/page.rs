@@ -6,12 +6,12 @@ use minijinja::{Environment, UndefinedBehavior, context};
 use crate::analysis::result::{Analysis, FlightAnalysis};
 
 use super::compare::{
-    clock, comparison, drone_laws, drones_of, fit_line, flags, flock_lines, nothing, scatter_line,
-    table_heading, windows_used,
+    clock, compared, comparison, drone_laws, drones_of, fit_line, flags, flock_lines, nothing,
+    scatter_line, table_heading, windows_used,
 };
 use super::figure_air::{self, mean_truth};
 use super::figure_drone::{self, Axes, drawable};
-use super::notes::unmeasured_lines;
+use super::notes::{logs_used, partly_used_lines, unused_lines, without_result_lines};
 use super::text::{NONE, clean, estimate, fixed, kind, purpose, shortened, signed, slug, usable};
 use super::{Figure, Provenance, Report, ReportError, figure_laws, figure_map, glance, law};
 
@@ -141,11 +141,7 @@ fn flight_section(
             }
         })
         .collect();
-    let missing: Vec<Value> = flight
-        .missing
-        .iter()
-        .map(|missing| context! { slot => missing.slot, reason => clean(&missing.reason) })
-        .collect();
+    let without_result = without_result_lines(flight);
     let flock: Vec<Value> =
         flock_lines(flight).into_iter().map(|(law, line)| context! { law, line }).collect();
     let own = match flight.drones.as_slice() {
@@ -180,13 +176,15 @@ fn flight_section(
         nothing => nothing(flight),
         table_heading => table_heading(flight),
         scatter => law::flight_laws(flight).and_then(scatter_line),
-        unmeasured => unmeasured_lines(flight),
         cautions => flight.warnings.iter().map(|w| clean(w)).collect::<Vec<_>>(),
         leaning => flight.map.as_ref().is_some_and(|map| map.leaning.is_some()),
-        missing_open => missing.len() <= 2 * OPEN_LIMIT,
-        missing,
-        lost => flight.lost.iter().map(|log| clean(&log.sentence())).collect::<Vec<_>>(),
-        doubts => flight.warnings.iter().map(|doubt| clean(doubt)).collect::<Vec<_>>(),
+        logs => logs_used(flight),
+        without_result_open => without_result.len() <= 2 * OPEN_LIMIT,
+        without_result,
+        without_result_count => flight.missing.len() + flight.unmeasured.len(),
+        unused => unused_lines(flight),
+        partly_used => partly_used_lines(flight),
+        compared => compared(flight),
     }
 }
 

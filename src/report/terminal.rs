@@ -6,11 +6,11 @@ use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
 use crate::mission::plan::Purpose;
 
 use super::compare::{
-    better_words, clock, comparison, drone_laws, drones_of, fleet_air, flock_lines, nothing,
-    scatter_line, table_heading, windows_used,
+    better_words, clock, compared, comparison, drone_laws, drones_of, fleet_air, flock_lines,
+    nothing, scatter_line, table_heading, windows_used,
 };
 use super::figure_air::mean_truth;
-use super::notes::{note_lines, unmeasured_lines};
+use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
 use super::page::capitalised;
 use super::table::{Align, Column, lines};
 use super::text::{NONE, clean, count, fixed, purpose, shortened, signed, usable};
@@ -93,11 +93,16 @@ impl Output {
 
     /// A list in full: warnings are never cut.
     fn list(&mut self, heading: &str, items: &[String]) {
+        self.list_of(heading, items.len(), items);
+    }
+
+    /// A list of `n` things, of which one line may tell of several.
+    fn list_of(&mut self, heading: &str, n: usize, items: &[String]) {
         if items.is_empty() {
             return;
         }
         self.line("", "");
-        self.line(YELLOW, &format!("{heading} ({})", items.len()));
+        self.line(YELLOW, &format!("{heading} ({n})"));
         for item in items {
             self.wrapped("", "  ", &format!("- {item}"));
         }
@@ -113,7 +118,7 @@ impl Output {
         let truth = flight.true_updraft_mps.map_or_else(String::new, |w| {
             format!(", simulated in a true updraft of {} m/s", signed(w, 2))
         });
-        self.line(DIM, &format!("  {source}{truth}"));
+        self.wrapped(DIM, "  ", &format!("{}, {source}{truth}", logs_used(flight)));
         if let Some(words) = nothing(flight) {
             self.wrapped(YELLOW, "  ", &words);
         }
@@ -127,10 +132,10 @@ impl Output {
         }
         self.drones(flight);
         self.list("  Notes on drones", &note_lines(flight));
-        self.list("  Drones without a value in the map", &unmeasured_lines(flight));
-        self.list("  Missing drones", &missing_lines(flight));
-        let lost: Vec<String> = flight.lost.iter().map(|log| clean(&log.sentence())).collect();
-        self.list("  Lost logs", &lost);
+        let without = flight.missing.len() + flight.unmeasured.len();
+        self.list_of("  Drones without a result", without, &without_result_lines(flight));
+        self.list("  Logs not used", &unused_lines(flight));
+        self.list("  Logs partly used", &partly_used_lines(flight));
         let warnings: Vec<String> = flight.warnings.iter().map(|w| clean(w)).collect();
         self.list("  Cautions", &warnings);
     }
@@ -139,7 +144,7 @@ impl Output {
         if flight.table.is_empty() {
             return;
         }
-        let columns = [
+        let mut columns = vec![
             column("law", Align::Left, 0),
             column("par.", Align::Left, 0),
             column("fleet mean ± s.d.", Align::Right, 0),
@@ -150,6 +155,8 @@ impl Output {
             column("difference", Align::Right, 2),
             column("/ paper's ±", Align::Right, 3),
         ];
+        let ours = if compared(flight) { columns.len() } else { columns.len() - 3 };
+        columns.truncate(ours);
         let rows: Vec<Vec<String>> = flight
             .table
             .iter()
@@ -166,6 +173,10 @@ impl Output {
                     row.difference,
                     row.in_errors,
                 ]
+            })
+            .map(|mut row| {
+                row.truncate(ours);
+                row
             })
             .collect();
         self.line("", "");
@@ -332,11 +343,6 @@ impl Output {
             let _ = writeln!(self.text, "{}", line.trim_end());
         }
     }
-}
-
-fn missing_lines(flight: &FlightAnalysis) -> Vec<String> {
-    let line = |slot: u16, reason: &str| format!("slot {slot}: {}", clean(reason));
-    flight.missing.iter().map(|missing| line(missing.slot, &missing.reason)).collect()
 }
 
 fn column(head: &'static str, align: Align, drop: u8) -> Column {

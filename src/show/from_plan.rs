@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::lights::{self, LightStep, Rgb};
-use super::{Cue, Path, Segment, Show, ShowDrone, Trajectory, Validation};
+use super::{Cue, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation};
 use crate::mission::plan::{self, Kind, Plan, Slot};
 
 impl Trajectory {
@@ -134,10 +134,16 @@ impl Show {
                 endurance_s: Some(limits.endurance_s),
                 endurance_reserve: Some(limits.endurance_reserve),
             }),
-            fence_polygon_m: plan.fence.polygon_m.clone(),
+            fence: fence(plan),
             phases_s: takeoff_end
                 .zip(landing_start)
                 .map(|(takeoff, landing)| [at_s(takeoff), at_s(landing), at_s(plan.duration_ms)]),
         }
     }
+}
+
+/// A plan without a polygon has no fence.
+fn fence(plan: &Plan) -> Vec<FenceZone> {
+    let polygon_m = &plan.fence.polygon_m;
+    if polygon_m.is_empty() { vec![] } else { vec![FenceZone::inclusion(polygon_m.clone())] }
 }

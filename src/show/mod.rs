@@ -41,10 +41,32 @@ pub struct Show {
     pub cues: Vec<Cue>,
     /// Limits that Skybrush's own tools check and draw (`settings.validation`).
     pub validation: Option<Validation>,
-    /// Proposed geofence: one inclusion polygon, show x and y in metres.
-    pub fence_polygon_m: Vec<[f64; 2]>,
+    /// Proposed geofence: its polygons in the order of the file; empty: no fence.
+    pub fence: Vec<FenceZone>,
     /// End of take-off, start of landing and end of the show, s (`meta.segments`).
     pub phases_s: Option<[f64; 3]>,
+}
+
+/// One polygon of a geofence. Drones must stay inside every inclusion zone and outside every exclusion
+/// zone.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct FenceZone {
+    /// Whether drones must stay inside it (else: outside).
+    pub is_inclusion: bool,
+    /// Its corners, show x and y, m.
+    pub corners_m: Vec<[f64; 2]>,
+}
+
+impl FenceZone {
+    /// A zone that drones must stay in.
+    pub fn inclusion(corners_m: Vec<[f64; 2]>) -> Self {
+        Self { is_inclusion: true, corners_m }
+    }
+
+    /// A zone that drones must stay out of.
+    pub fn exclusion(corners_m: Vec<[f64; 2]>) -> Self {
+        Self { is_inclusion: false, corners_m }
+    }
 }
 
 /// One drone of a show.

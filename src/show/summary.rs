@@ -9,7 +9,7 @@ use super::lights::{self, Explanation};
 use super::quantise::{self, DroneQuantisation};
 use super::skyb::{BlockInfo, Event, SkybContents, SkybError, SkybOptions};
 use super::trajectory::{Path, Trajectory};
-use super::{Show, ShowDrone};
+use super::{FenceZone, Show, ShowDrone};
 
 /// Lines of a light program that a summary shows.
 const LIGHT_LINES: usize = 20;
@@ -34,8 +34,8 @@ pub struct ShowSummary {
     pub origin: Option<(f64, f64, Option<f64>)>,
     /// Degrees clockwise from north to the show's x axis.
     pub orientation_deg: Option<f64>,
-    /// Corners of the proposed fence, m.
-    pub fence_polygon_m: Vec<[f64; 2]>,
+    /// Polygons of the proposed fence.
+    pub fence: Vec<FenceZone>,
     /// The drones.
     pub drones: Vec<DroneSummary>,
 }
@@ -130,7 +130,7 @@ pub fn summarise(show: &Show, params: &DeriveParams) -> ShowSummary {
             (place.lat_deg, place.lon_deg, show.has_amsl.then_some(place.amsl_m))
         }),
         orientation_deg: show.frame.map(|frame| frame.orientation_deg),
-        fence_polygon_m: show.fence_polygon_m.clone(),
+        fence: show.fence.clone(),
         drones,
     }
 }

@@ -270,20 +270,36 @@ fn site(show: &Show) -> Site {
     }
 }
 
+/// The show's limits, and the vehicle's where it states none.
+///
+/// Of distance, altitude and speeds the stricter one counts: a show cannot give itself more than the
+/// vehicle has. The rest (acceleration, velocity step, endurance) is as stated: only shows of this
+/// program state it.
 fn limits(show: &Show, mut limits: Limits) -> Limits {
     let stated = show.validation.unwrap_or_default();
-    let fields = [
+    let usable = |value: &f64| value.is_finite() && *value > 0.0;
+    let up_mps = stated.max_velocity_z_up_mps.or(stated.max_velocity_z_mps);
+    let strict = [
         (stated.max_altitude_m, &mut limits.max_altitude_m),
         (stated.max_velocity_xy_mps, &mut limits.max_speed_xy_mps),
         (stated.max_velocity_z_mps, &mut limits.max_speed_down_mps),
-        (stated.max_velocity_z_up_mps.or(stated.max_velocity_z_mps), &mut limits.max_speed_up_mps),
-        (stated.min_distance_m, &mut limits.min_distance_m),
+        (up_mps, &mut limits.max_speed_up_mps),
+    ];
+    for (value, limit) in strict {
+        if let Some(value) = value.filter(usable) {
+            *limit = limit.min(value);
+        }
+    }
+    if let Some(value) = stated.min_distance_m.filter(usable) {
+        limits.min_distance_m = limits.min_distance_m.max(value);
+    }
+    let free = [
         (stated.max_acceleration_mps2, &mut limits.max_acceleration_mps2),
         (stated.max_velocity_step_mps, &mut limits.max_velocity_step_mps),
         (stated.endurance_s, &mut limits.endurance_s),
     ];
-    for (value, limit) in fields {
-        if let Some(value) = value.filter(|value| value.is_finite() && *value > 0.0) {
+    for (value, limit) in free {
+        if let Some(value) = value.filter(usable) {
             *limit = value;
         }
     }
@@ -294,11 +310,13 @@ fn limits(show: &Show, mut limits: Limits) -> Limits {
     limits
 }
 
-/// The polygon that the show brings, if it does: none is made up. A show file knows no top of the
-/// fence; the altitude limit stands in its place.
+/// The first inclusion polygon that the show brings, if it does: none is made up (the check looks at
+/// the show's other polygons by itself). A show file knows no top of the fence; the altitude limit
+/// stands in its place.
 fn fence(show: &Show, limits: &Limits) -> Fence {
+    let inclusion = show.fence.iter().find(|zone| zone.is_inclusion);
     Fence {
-        polygon_m: show.fence_polygon_m.clone(),
+        polygon_m: inclusion.map(|zone| zone.corners_m.clone()).unwrap_or_default(),
         max_altitude_m: limits.max_altitude_m,
         margin_m: 0.0,
     }

@@ -135,6 +135,31 @@ pub(crate) fn renamed(bytes: &[u8], from: [u8; 4], to: [u8; 4]) -> Vec<u8> {
     bytes
 }
 
+/// The rungs of [`ladder_up`], in their order, m/s.
+pub(crate) const LEGS: [f64; 8] = [1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 0.5, -0.5];
+
+/// A ladder for synthetic logs: legs of 20 s, a hover of 20 s before them and of 10 s after each.
+pub(crate) fn ladder_up(time: f64) -> f64 {
+    let index = (time - 20.0) / 30.0;
+    let rung = LEGS.get(index.max(0.0) as usize).copied().unwrap_or(0.0);
+    if index >= 0.0 && (time - 20.0) % 30.0 < 20.0 { rung } else { 0.0 }
+}
+
+/// The segments of [`ladder_up`].
+pub(crate) fn ladder_up_segments() -> Vec<Segment> {
+    let mut table = Timetable::default().add(Kind::Hover, "hover", 0.0, 20.0);
+    for rung in LEGS {
+        let kind = if rung > 0.0 { Kind::LegUp } else { Kind::LegDown };
+        table = table.add(kind, &format!("leg {rung}"), rung, 20.0).add(
+            Kind::Hover,
+            "hover",
+            0.0,
+            10.0,
+        );
+    }
+    table.segments
+}
+
 /// A synthetic log at 10 Hz: what the drone does and how its rotors answer, over show time.
 pub(crate) struct Synthetic {
     pub(crate) system_id: u8,

@@ -90,6 +90,12 @@ fn nothing_found_is_no_success() {
     bench.expect(0, &["simulate", "campaign"]);
     let analysed = bench.expect(5, &["analyze", "campaign"]);
     assert!(analysed.out.contains("No calibration"), "{analysed}");
+    // The page says so too, but it is not offered as something to read.
+    assert!(!analysed.err.contains("index.html"), "{analysed}");
+    assert!(analysed.err.ends_with(": nothing found\n"), "{analysed}");
+    assert_eq!(bench.expect(5, &["analyze", "campaign", "--quiet"]).out, "");
+    let json = bench.expect(5, &["analyze", "campaign", "--json"]).json("updraft.analyze/1");
+    assert!(json["report"].is_null());
     let page = fs::read_to_string(bench.path("campaign/report/index.html")).unwrap();
     assert!(page.contains("No calibration") && !page.contains("<svg"), "no empty figures");
 }

@@ -8,7 +8,13 @@ use crate::support::{Bench, Ended, SHORT};
 
 /// What is said about logs: the lists below the tables, and standard error without times.
 fn said(ended: &Ended) -> String {
-    let lists = ["  Missing drones", "  Lost logs", "  Cautions"];
+    let lists = [
+        "  Notes on drones",
+        "  Drones without a result",
+        "  Logs not used",
+        "  Logs partly used",
+        "  Cautions",
+    ];
     let from = lists.iter().filter_map(|list| ended.out.find(list)).min();
     let out = from.and_then(|from| ended.out.get(from..)).unwrap_or_default();
     let mut err = String::new();
@@ -85,8 +91,48 @@ fn the_same_bytes_twice_are_one_log() {
     assert_eq!(bench.matched(3), [("logs/02.BIN".to_owned(), 2)]);
     // Without a plan these legs are too short for a law.
     let unplanned = bench.expect(5, &["analyze", "campaign/logs", "--no-report"]);
-    assert!(unplanned.out.contains("the same bytes as 01.BIN"), "{unplanned}");
+    assert!(unplanned.out.contains("a copy of 01.BIN (the same bytes)"), "{unplanned}");
     assert!(unplanned.err.starts_with("Analysed 1 of 2 logs in "), "{unplanned}");
+}
+
+#[test]
+fn every_log_and_every_drone_is_accounted_for_once() {
+    let bench = Bench::new();
+    let six = ["plan", "calibration", "--grid", "2x3", "-o", "campaign"];
+    bench.expect(0, &[&six[..], SHORT].concat());
+    bench.expect(0, &["simulate", "campaign"]);
+    // 2 is a copy, 3 is unusable, 4 is cut, 5 is not there, 6 is overwritten in the middle.
+    bench.put("02.BIN", &bench.log("01.BIN"));
+    bench.put("03.BIN", b"");
+    let four = bench.log("04.BIN");
+    bench.put("04.BIN", &four[..four.len() * 2 / 3]);
+    fs::remove_file(bench.path("campaign/logs/05.BIN")).unwrap();
+    let mut six = bench.log("06.BIN");
+    let middle = six.len() / 2;
+    six[middle..middle + 5000].fill(0xA5);
+    bench.put("06.BIN", &six);
+    let analysed = bench.analyze(3);
+    assert!(analysed.out.contains("  3 of 5 logs used, windows from the plan"), "{analysed}");
+    assert_snapshot!(said(&analysed));
+
+    let args = ["analyze", "campaign", "--json", "--quiet"];
+    let value = bench.expect(3, &args).json("updraft.analyze/1");
+    let flight = &value["analysis"]["flights"][0];
+    let numbers = |list: &str, key: &str| -> Vec<u64> {
+        flight[list].as_array().unwrap().iter().map(|one| one[key].as_u64().unwrap()).collect()
+    };
+    assert_eq!(flight["logs"], 5);
+    assert_eq!(numbers("drones", "slot"), [1, 4, 6]);
+    assert_eq!(numbers("missing", "slot"), [2, 3, 5]);
+    assert_eq!(numbers("unused", "slot"), [2, 3]);
+    assert_eq!(numbers("partly_used", "slot"), [4, 6]);
+    let skipped = numbers("partly_used", "skipped_bytes");
+    assert!(skipped[0] == 0 && (4900..5200).contains(&skipped[1]), "{skipped:?}");
+    let page = fs::read_to_string(bench.path("campaign/report/index.html")).unwrap();
+    for part in ["3 of 5 logs used", "Drones without a result (3)", "Logs not used (2)"] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(page.contains("Logs partly used (2)") && !page.contains("Lost logs"));
 }
 
 #[test]
@@ -147,12 +193,13 @@ fn without_a_plan_every_unusable_log_is_named() {
     let value = bench
         .expect(5, &["analyze", "field", "--no-report", "--json", "--quiet"])
         .json("updraft.analyze/1");
-    let lost = value["analysis"]["flights"][0]["lost"].as_array().unwrap();
-    let used = lost.iter().filter(|log| log["used"] == true).count();
-    assert_eq!((lost.len(), used), (5, 1));
+    let flight = &value["analysis"]["flights"][0];
+    let count = |list: &str| flight[list].as_array().unwrap().len();
+    assert_eq!((count("drones"), count("unused"), count("partly_used")), (2, 4, 1));
     bench.expect(5, &["analyze", "field", "-o", "out"]);
     let page = fs::read_to_string(bench.path("out/report/index.html")).unwrap();
-    assert!(page.contains("Lost logs (5)") && page.contains("it is empty"));
+    assert!(page.contains("Logs not used (4)") && page.contains("it is empty"));
+    assert!(page.contains("Logs partly used (1)"));
 }
 
 #[test]

@@ -158,3 +158,25 @@ fn json_and_quiet() {
     assert_eq!(value["safe"], true);
     assert!(bench.expect(0, &["check", "campaign", "-q"]).err.is_empty());
 }
+
+#[test]
+fn the_timetable_has_no_gaps_where_ramps_are() {
+    let bench = Bench::new();
+    let args = ["plan", "calibration", "--speeds", "3.5,0.5", "--ramp", "0.5", "--dry-run"];
+    let planned = bench.expect(0, &[&args[..], &["--grid", "2x2"]].concat());
+    let rows = planned.out.lines().skip_while(|line| !line.contains("segment")).skip(1);
+    // Time and duration of every row: each begins where the one before ended.
+    let mut end_s: f64 = 0.0;
+    let mut ramps = 0;
+    for row in rows.take_while(|row| !row.ends_with("  end")) {
+        let (minutes, seconds) = row.split_whitespace().next().unwrap().split_once(':').unwrap();
+        let start_s = 60.0 * minutes.parse::<f64>().unwrap() + seconds.parse::<f64>().unwrap();
+        assert!((start_s - end_s).abs() < 0.3, "{row}\n{planned}");
+        let lasts_s: f64 = row[40..].split_whitespace().next().unwrap().parse().unwrap();
+        end_s = start_s + lasts_s;
+        ramps += usize::from(row.contains("  ramp "));
+    }
+    assert!(ramps > 8, "{planned}");
+    assert!(planned.out.contains("to +3.50"), "{planned}");
+    assert!(planned.err.contains("hovers (group all) are too short"), "{planned}");
+}

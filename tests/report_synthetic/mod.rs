@@ -126,8 +126,10 @@ pub(crate) fn calibration(
         purpose: Purpose::Calibration,
         planned: true,
         warnings: Vec::new(),
-        lost: Vec::new(),
+        unused: Vec::new(),
+        partly_used: Vec::new(),
         true_updraft_mps: Some(truth),
+        logs: analysed.len(),
         drones: analysed,
         missing: missing
             .iter()
@@ -246,6 +248,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
             sigma_added_us: Some(0.0),
             linear: Some(straight(slope, u0)),
         }),
+        partial_ladder: None,
         trace,
         warnings,
     }
@@ -393,6 +396,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             clock: Clock { method: Alignment::ShowRows, ..Clock::default() },
             windows: Vec::new(),
             laws: None,
+            partial_ladder: None,
             trace: Trace::default(),
             warnings: if slot == 20 {
                 vec!["gap of 290 s in the log".to_owned()]
@@ -406,8 +410,10 @@ pub(crate) fn hover() -> FlightAnalysis {
         purpose: Purpose::Measurement,
         planned: true,
         warnings: Vec::new(),
-        lost: Vec::new(),
+        unused: Vec::new(),
+        partly_used: Vec::new(),
         true_updraft_mps: None,
+        logs: drones.len(),
         drones,
         missing: missing
             .iter()

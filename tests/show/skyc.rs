@@ -9,7 +9,9 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::show::skyc::{self, Limits};
-use updraft::show::{Cue, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl};
+use updraft::show::{
+    Cue, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl,
+};
 
 fn full_show() -> Show {
     let mut second = worked_example();
@@ -52,7 +54,10 @@ fn full_show() -> Show {
             endurance_s: Some(600.0),
             endurance_reserve: Some(0.0),
         }),
-        fence_polygon_m: vec![[-10.0, -10.0], [40.0, -10.0], [40.0, 20.5]],
+        fence: vec![
+            FenceZone::exclusion(vec![[30.0, 0.0], [31.0, 0.0], [31.0, 1.5], [30.0, 1.5]]),
+            FenceZone::inclusion(vec![[-10.0, -10.0], [40.0, -10.0], [40.0, 20.5]]),
+        ],
         phases_s: Some([10.0, 65.0, 73.0]),
     }
 }

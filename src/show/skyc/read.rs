@@ -15,7 +15,7 @@ use super::trajectory::{self, Problem, short};
 use super::{Limits, MAX_DRONES, SkycError};
 use crate::base::frame::{Geodetic, ShowFrame};
 use crate::show::archive::Archive;
-use crate::show::{Cue, Show, ShowDrone, Validation, YawControl};
+use crate::show::{Cue, FenceZone, Show, ShowDrone, Validation, YawControl};
 
 /// Reads a `.skyc` file with the default [`Limits`].
 ///
@@ -218,8 +218,8 @@ impl Reader<'_> {
             });
         }
         if let Some(fence) = self.documents.child(node, "geofence")? {
-            show.fence_polygon_m =
-                polygon(&fence.value).map_err(|problem| wrong(&fence, "geofence", problem))?;
+            show.fence =
+                zones(&fence.value).map_err(|problem| wrong(&fence, "geofence", problem))?;
         }
         Ok(())
     }
@@ -353,21 +353,30 @@ fn frame(location: &Value) -> Result<(ShowFrame, bool), String> {
     Ok((ShowFrame { origin, orientation_deg }, !amsl.is_empty()))
 }
 
-/// The first inclusion polygon.
-fn polygon(fence: &Value) -> Result<Vec<[f64; 2]>, String> {
-    let polygons = fence.get("polygons").and_then(Value::as_array);
-    let inclusion = |polygon: &&Value| polygon.get("isInclusion") == Some(&Value::Bool(true));
-    let Some(polygon) = polygons.into_iter().flatten().find(inclusion) else {
-        return Ok(Vec::new());
+/// All polygons of a fence; one without corners is none.
+fn zones(fence: &Value) -> Result<Vec<FenceZone>, String> {
+    let polygons = match fence.get("polygons") {
+        None | Some(Value::Null) => return Ok(Vec::new()),
+        Some(polygons) => polygons.as_array().ok_or("its polygons must be an array")?,
     };
+    let numbered = polygons.iter().enumerate();
+    let read = |(index, polygon)| {
+        zone(polygon).map_err(|problem| format!("polygon {}: {problem}", index + 1))
+    };
+    let zones = numbered.map(read).collect::<Result<Vec<_>, String>>()?;
+    Ok(zones.into_iter().filter(|zone| !zone.corners_m.is_empty()).collect())
+}
+
+fn zone(polygon: &Value) -> Result<FenceZone, String> {
+    let is_inclusion = polygon.get("isInclusion").and_then(Value::as_bool);
+    let is_inclusion = is_inclusion.ok_or("isInclusion must be true or false")?;
     let points = polygon.get("points").and_then(Value::as_array).ok_or("it has no points")?;
-    points
-        .iter()
-        .map(|point| match numbers(Some(point)).as_deref() {
-            Some([x, y, ..]) => Ok([*x, *y]),
-            _ => Err(format!("{} is not [x, y]", short(point))),
-        })
-        .collect()
+    let corner = |point| match numbers(Some(point)).as_deref() {
+        Some([x, y, ..]) => Ok([*x, *y]),
+        _ => Err(format!("{} is not [x, y]", short(point))),
+    };
+    let corners_m = points.iter().map(corner).collect::<Result<_, String>>()?;
+    Ok(FenceZone { is_inclusion, corners_m })
 }
 
 fn yaw(value: &Value) -> Result<YawControl, Problem> {

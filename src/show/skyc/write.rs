@@ -10,7 +10,7 @@ use zip::write::{PreparedZipFile, SimpleFileOptions, ZipFileBuilder};
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::{MAX_COORDINATE_M, MAX_DRONES, SkycError, trajectory};
-use crate::show::{Show, ShowDrone, YawControl, lights};
+use crate::show::{FenceZone, Show, ShowDrone, YawControl, lights};
 
 /// Writes a show. The same show gives the same bytes, on any number of threads.
 ///
@@ -182,12 +182,13 @@ fn settings(show: &Show) -> Result<Value, String> {
         }
         settings.insert("validation".into(), validation.into());
     }
-    if !show.fence_polygon_m.is_empty() {
-        for corner in &show.fence_polygon_m {
+    if !show.fence.is_empty() {
+        for corner in show.fence.iter().flat_map(|zone| &zone.corners_m) {
             finite("a corner of the geofence", corner)?;
         }
-        let polygon = json!({ "isInclusion": true, "points": show.fence_polygon_m });
-        settings.insert("geofence".into(), json!({ "version": 1, "polygons": [polygon] }));
+        let polygon = |zone: &FenceZone| json!({ "isInclusion": zone.is_inclusion, "points": zone.corners_m });
+        let polygons: Vec<_> = show.fence.iter().map(polygon).collect();
+        settings.insert("geofence".into(), json!({ "version": 1, "polygons": polygons }));
     }
     Ok(settings.into())
 }

@@ -1,0 +1,96 @@
+//! What became of every log, and of every drone of the plan: one account of both.
+
+use std::collections::BTreeMap;
+
+use super::analyze::{FlightInput, LogInput};
+use super::drone::One;
+use super::result::{DroneAnalysis, Missing, PartlyUsedLog, UnusedLog};
+use super::slots::SlotMatch;
+
+/// The logs of a flight, sorted by their use.
+#[derive(Default)]
+pub(super) struct Account {
+    pub(super) ones: Vec<One>,
+    pub(super) unused: Vec<UnusedLog>,
+    pub(super) partly_used: Vec<PartlyUsedLog>,
+}
+
+impl Account {
+    /// Sorts what the logs gave.
+    pub(super) fn of<'a>(
+        input: &FlightInput<'_>,
+        outcomes: impl Iterator<Item = (&'a LogInput, &'a SlotMatch, Result<One, String>)>,
+    ) -> Self {
+        let mut account = Self::default();
+        for (log, found, outcome) in outcomes {
+            let source = input.shown(&log.path);
+            match outcome {
+                Ok(one) => {
+                    account.partly_used.extend(partly_used(&one, source));
+                    account.ones.push(one);
+                }
+                Err(reason) => {
+                    // Errors name the file as it was opened; results name it as their reader finds it.
+                    let reason = reason.replace(&log.path.display().to_string(), &source);
+                    let reason = match reason.strip_prefix(&format!("{source}: ")) {
+                        Some(rest) => rest.to_owned(),
+                        None => reason,
+                    };
+                    let slot = match found {
+                        SlotMatch::Slot(slot) => Some(*slot),
+                        SlotMatch::Unplanned => None,
+                        SlotMatch::Refused { meant_for, .. } => *meant_for,
+                    };
+                    account.unused.push(UnusedLog { source, slot, reason });
+                }
+            }
+        }
+        account
+    }
+}
+
+fn partly_used(one: &One, source: String) -> Option<PartlyUsedLog> {
+    let reasons: Vec<&str> = one.losses.iter().map(String::as_str).collect();
+    (!reasons.is_empty()).then(|| PartlyUsedLog {
+        source,
+        slot: one.drone.slot,
+        reason: reasons.join("; "),
+        skipped_bytes: one.skipped_bytes,
+    })
+}
+
+/// Slots of the plan without an analysed log: what became of the log that is theirs by match, record
+/// or file name, or that there is none.
+pub(super) fn missing(
+    input: &FlightInput<'_>,
+    drones: &[DroneAnalysis],
+    unused: &[UnusedLog],
+) -> Vec<Missing> {
+    let Some(plan) = input.plan else { return Vec::new() };
+    let flown: Vec<u16> = drones.iter().filter_map(|drone| drone.slot).collect();
+    let mut logs: BTreeMap<u16, Vec<&UnusedLog>> = BTreeMap::new();
+    for log in unused {
+        if let Some(slot) = log.slot {
+            logs.entry(slot).or_default().push(log);
+        }
+    }
+    let reason = |slot: u16, name: &str| {
+        let of_slot = logs.get(&slot).map(Vec::as_slice).unwrap_or_default();
+        match of_slot {
+            [] => format!("no log of {name}"),
+            [only] => format!("its log is not used: {}", only.sentence()),
+            several => {
+                let named: Vec<String> = several.iter().map(|log| log.sentence()).collect();
+                format!("its {} logs are not used: {}", several.len(), named.join("; "))
+            }
+        }
+    };
+    (plan.slots.iter())
+        .filter(|slot| !flown.contains(&slot.slot))
+        .map(|slot| Missing {
+            slot: slot.slot,
+            home_m: Some([slot.home_m[0], slot.home_m[1]]),
+            reason: reason(slot.slot, &slot.name),
+        })
+        .collect()
+}
