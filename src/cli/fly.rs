@@ -195,7 +195,7 @@ fn launch(
     part.slots.retain(|slot| ready.open.iter().any(|open| open.slot == slot.slot));
     hangar.open(|station| {
         let mut crew = Crew::new(context, station, folder, &part);
-        crew.hurry = true;
+        crew.is_virtual = true;
         crew.listen(60.0)?;
         crew.greet()?;
         let no_go =
@@ -215,6 +215,7 @@ fn launch(
         let mut start = crew.announce(options)?;
         crew.authorize(&mut start)?;
         crew.watch(&mut start)?;
-        bring(context, crew.net, folder, plan, &crew.table, &Wish::default())
+        let wish = Wish { quiet: true, ..Wish::default() };
+        bring(context, crew.net, folder, plan, &crew.table, &wish)
     })
 }

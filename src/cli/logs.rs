@@ -277,6 +277,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
         rate: args.rate.map(f64::from),
         at_once: args.at_once.into(),
         patience_s: args.patience,
+        quiet: false,
     };
     let brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
     let lost = brought.iter().any(|one| one.state == "missing");

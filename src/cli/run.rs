@@ -9,6 +9,8 @@ use super::check::{Origin, checked, few, is_safe, say_findings};
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::fleet::sim::MOST_DRONES;
+use super::fly::fly_virtual;
 use super::mission_args::MissionArgs;
 use super::plan::{what_for_whom, write};
 use super::simulate::{
@@ -45,6 +47,10 @@ pub(super) struct RunArgs {
     /// Vertical air speed in measurement flights, m/s, up positive [default: 1, or 0 with --air]
     #[arg(long, value_name = "MPS", value_parser = updraft, allow_hyphen_values = true)]
     updraft: Option<f64>,
+    /// Fly in the simulator without MAVLink in between: the same logs, sooner (fleets of more than
+    /// 253 drones always)
+    #[arg(long)]
+    direct: bool,
     /// Vertical air speed in calibration flights, m/s, up positive
     #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
     calibration_updraft: f64,
@@ -104,7 +110,13 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
             only: None,
             force: args.force,
         };
-        lost |= !simulate(context, folder, &flight.plan, &simulation)?.failed.is_empty();
+        let crowd = flight.plan.slots.len() > MOST_DRONES;
+        let flown = if args.direct || crowd {
+            simulate(context, folder, &flight.plan, &simulation)?
+        } else {
+            fly_virtual(context, folder, &flight.plan, &simulation)?
+        };
+        lost |= !flown.failed.is_empty();
     }
     let exit = analyze_campaign(context, &args.output, &AnalyzeOptions::default())?;
     context.say(&format!("Done in {watch}"));

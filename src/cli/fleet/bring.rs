@@ -32,6 +32,8 @@ pub(in crate::cli) struct Wish {
     pub(in crate::cli) rate: Option<f64>,
     pub(in crate::cli) at_once: usize,
     pub(in crate::cli) patience_s: f64,
+    /// Only what is missing is told.
+    pub(in crate::cli) quiet: bool,
 }
 
 impl Default for Wish {
@@ -43,6 +45,7 @@ impl Default for Wish {
             rate: None,
             at_once: 12,
             patience_s: 60.0,
+            quiet: false,
         }
     }
 }
@@ -103,6 +106,7 @@ pub(in crate::cli) fn bring(
     table: &FleetTable,
     wish: &Wish,
 ) -> Result<Vec<Brought>, CommandError> {
+    let quiet = wish.quiet;
     create_folder(&folder.logs())?;
     let count = plan.slots.len();
     let file = |slot: u16| {
@@ -186,7 +190,12 @@ pub(in crate::cli) fn bring(
     }
     let bytes: u64 = brought.iter().map(|one| one.bytes).sum();
     let state = |state: &str| brought.iter().filter(|one| one.state == state).count();
-    context.say(&format!(
+    let say = |text: &str| {
+        if !quiet {
+            context.say(text)
+        }
+    };
+    say(&format!(
         "Brought {} of {} logs home, {:.1} MB in {}{}",
         state("pulled") + state("there"),
         brought.len(),

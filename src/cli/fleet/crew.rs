@@ -68,8 +68,9 @@ pub(in crate::cli) struct Crew<'a> {
     pub(in crate::cli) table: FleetTable,
     known: Known,
     clock: SystemClock,
-    /// Vehicles run faster than the clock on the wall: no waiting for people.
-    pub(in crate::cli) hurry: bool,
+    /// Virtual drones that are gone after this flight: nobody waits for people, and nothing is kept
+    /// of them but their logs.
+    pub(in crate::cli) is_virtual: bool,
 }
 
 /// Listens to all, and looks for Ctrl-C.
@@ -120,7 +121,7 @@ impl<'a> Crew<'a> {
             table: FleetTable::new([]),
             known: Known::default(),
             clock: SystemClock::start(),
-            hurry: false,
+            is_virtual: false,
         }
     }
 
@@ -128,7 +129,7 @@ impl<'a> Crew<'a> {
     pub(in crate::cli) fn listen(&mut self, wait_s: f64) -> Result<(), CommandError> {
         let slots = self.plan.slots.len();
         let until = self.net.now() + (wait_s * 1e6) as Micros;
-        let settle = if self.hurry { 500 * MS } else { SETTLE };
+        let settle = if self.is_virtual { 500 * MS } else { SETTLE };
         let mut complete = None;
         loop {
             self.context.check_stop()?;
@@ -194,7 +195,9 @@ impl<'a> Crew<'a> {
         } else {
             match propose(self.plan, &self.telemetry, now) {
                 Ok(table) => {
-                    table.write(&self.folder.0)?;
+                    if !self.is_virtual {
+                        table.write(&self.folder.0)?;
+                    }
                     self.table = table;
                     Vec::new()
                 }
@@ -223,14 +226,15 @@ impl<'a> Crew<'a> {
             })
             .collect();
         let standings = self.all(machines, AT_ONCE)?;
-        let mut changes = Changes::read(&self.folder.0)?;
+        let mut changes =
+            if self.is_virtual { Changes::default() } else { Changes::read(&self.folder.0)? };
         let (mut changed, mut wrong) = (0, 0);
         for (drone, standing) in &standings {
             changes.add(*drone, &standing.changed);
             changed += standing.changed.len();
             wrong += usize::from(!standing.is_right());
         }
-        if changed > 0 {
+        if changed > 0 && !self.is_virtual {
             changes.write(&self.folder.0)?;
             self.context.say(&format!(
                 "Changed {} on {}; `updraft fleet restore` puts them back",
@@ -295,10 +299,12 @@ impl<'a> Crew<'a> {
                 }
             }
         }
-        self.context.say(&format!(
-            "Loaded {} of {count} drones ({written} written, the others had the file)",
-            count - refused.len()
-        ));
+        if !self.is_virtual {
+            self.context.say(&format!(
+                "Loaded {} of {count} drones ({written} written, the others had the file)",
+                count - refused.len()
+            ));
+        }
         self.note("upload", Some(format!("{} refused", refused.len())))?;
         Ok(refused)
     }
@@ -400,7 +406,7 @@ impl<'a> Crew<'a> {
         let limits = watch::Limits::of(self.plan);
         let mut monitor = Monitor::new(self.plan, &self.table, telemetry, limits);
         monitor.set_start(start.time().map(crate::base::time::GpsTime::total_ms));
-        let mut journal = Journal::open(&self.folder.0)?;
+        let mut journal = if self.is_virtual { None } else { Some(Journal::open(&self.folder.0)?) };
         let mut alarms: BTreeMap<DroneId, Vec<String>> = BTreeMap::new();
         let outcome = loop {
             let now = self.net.now();
@@ -413,16 +419,18 @@ impl<'a> Crew<'a> {
             }
             monitor.stop(self.net.now());
             for told in monitor.take_events() {
-                journal.write(&Entry {
-                    unix_us: self.clock.unix_us(),
-                    drone: Some(told.drone),
-                    event: &told.event,
-                })?;
+                if let Some(journal) = &mut journal {
+                    journal.write(&Entry {
+                        unix_us: self.clock.unix_us(),
+                        drone: Some(told.drone),
+                        event: &told.event,
+                    })?;
+                }
                 let alarm = told.event.is_alarm();
                 if alarm {
                     alarms.entry(told.drone).or_default().push(told.event.to_string());
                     self.context.warn(&format!("drone {}: {}", told.drone, told.event));
-                } else if !self.hurry {
+                } else if !self.is_virtual {
                     self.context.say(&format!("drone {}: {}", told.drone, told.event));
                 }
             }
@@ -554,6 +562,9 @@ impl<'a> Crew<'a> {
     }
 
     fn note(&mut self, step: &str, text: Option<String>) -> Result<(), CommandError> {
+        if self.is_virtual {
+            return Ok(());
+        }
         let event = Note { step, text };
         let entry = Entry { unix_us: self.clock.unix_us(), drone: None, event: &event };
         Ok(Journal::open(&self.folder.0)?.write(&entry)?)
