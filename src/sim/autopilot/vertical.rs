@@ -4,7 +4,7 @@ use nalgebra::Vector1;
 
 use super::filter::LowPass;
 use super::params as p;
-use super::shaping::{Approach, Kinematics, RootLaw};
+use super::shaping::{Approach, Kinematics, RootLaw, Swing};
 use crate::sim::sensors::Estimate;
 use crate::vehicle;
 
@@ -13,10 +13,6 @@ const MAX_ACCELERATION: f64 = 7.5;
 /// What a target beyond its nominal speed gets more of acceleration and jerk
 /// (POSCONTROL_OVERSPEED_GAIN_Z).
 const OVERSPEED_GAIN: f64 = 2.0;
-/// Share of the nominal speed over which that sets in. The firmware switches it on at once: a target
-/// that lags (SHOW_VEL_FF_GAIN below 1) then catches up faster the moment it is beyond the nominal
-/// speed, falls back below it, lags again, and so swings at every leg near that speed.
-const OVERSPEED_RAMP: f64 = 0.5;
 /// ArduPilot states the gains of acceleration for cm/s² and thousandths of throttle.
 const THROTTLE_PER_MPS2: f64 = 0.1;
 
@@ -182,7 +178,12 @@ impl Vertical {
         let (target, none) = (&mut self.target, Vector1::zeros());
         let rising = target.velocity.x > 0.0;
         let speed = if rising { self.gains.wpnav_speed_up_mps } else { p::WPNAV_SPEED_DN };
-        let over = overspeed(target.velocity.x.abs(), speed);
+        // Beyond its nominal speed the firmware allows more.
+        let over = if target.velocity.x.abs() > speed {
+            OVERSPEED_GAIN * target.velocity.x.abs() / speed
+        } else {
+            1.0
+        };
         match goal {
             Goal::Follow(wanted) => {
                 let ahead = wanted.position.x > target.position.x;
@@ -190,29 +191,22 @@ impl Vertical {
                     if ahead { self.gains.wpnav_speed_up_mps } else { p::WPNAV_SPEED_DN };
                 if over > 1.0 {
                     let limit = p::WPNAV_ACCEL_Z * over;
-                    let (speed, jerk) = (self.limits.speed, p::PSC_JERK * over);
-                    let up = Approach::new(speed, limit, jerk, self.dt_s);
-                    let down = Approach::new(speed, limit.min(MAX_ACCELERATION), jerk, self.dt_s);
-                    target.approach_between(wanted, &up, &down, self.dt_s);
+                    let jerk = p::PSC_JERK * over;
+                    let up = Swing::new(limit, jerk, self.dt_s);
+                    let down = Swing::new(limit.min(MAX_ACCELERATION), jerk, self.dt_s);
+                    target.approach_between(wanted, &self.limits, &up, &down, self.dt_s);
                 } else {
                     target.approach(wanted, &self.limits, self.dt_s);
                 }
             }
             Goal::Land(speed) => {
-                target.approach_velocity(&Vector1::new(-speed), &none, &self.limits, self.dt_s);
+                target.approach_velocity(
+                    &Vector1::new(-speed),
+                    &none,
+                    &self.limits.swing,
+                    self.dt_s,
+                );
             }
         }
     }
-}
-
-/// What a target at a speed gets of acceleration and jerk: 1 up to the nominal speed, continuous, and
-/// as the firmware has it from [`OVERSPEED_RAMP`] beyond.
-#[inline]
-fn overspeed(speed_mps: f64, nominal_mps: f64) -> f64 {
-    if speed_mps <= nominal_mps {
-        return 1.0;
-    }
-    let beyond = speed_mps / nominal_mps;
-    let share = ((beyond - 1.0) / OVERSPEED_RAMP).min(1.0);
-    1.0 + share * (OVERSPEED_GAIN * beyond - 1.0)
 }
