@@ -13,13 +13,14 @@ fn no_climb_near_the_nominal_speed_swings() {
             flown.autopilot.show_vel_ff_gain = gain;
             for limit_mps in [1.5, 2.5] {
                 flown.autopilot.wpnav_speed_up_mps = limit_mps;
-                // Up to 1.2: what the feed-forward leaves is made up for at the nominal speed at most.
                 for share in [0.96, 1.0, 1.04, 1.2, 1.3] {
                     let speed_mps = limit_mps * share;
                     let leg = steady(&flown, &Flight::moving(speed_mps));
                     let case = format!("{name}, gain {gain}, {speed_mps} of {limit_mps} m/s");
                     let sd_us = leg.pulse_sd_us;
-                    assert!(sd_us < 3.0, "{case}: the pulse swings by {sd_us:.1} us");
+                    // Targets in whole centimetres make up to 3.2 us, evenly more with speed and lag; a swing
+                    // makes 17 to 28 us.
+                    assert!(sd_us < 4.0, "{case}: the pulse swings by {sd_us:.1} us");
                     assert!((leg.climb_mps - speed_mps).abs() < 0.02, "{case}: {}", leg.climb_mps);
                 }
             }

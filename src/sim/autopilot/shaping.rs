@@ -121,11 +121,14 @@ impl<const N: usize> Kinematics<N> {
 
 impl Kinematics<1> {
     /// As [`Kinematics::approach`], with limits of their own for accelerating up and down.
-    ///
-    /// The position error is made up as `limits` say. The firmware makes that stiffer too while it
-    /// is beyond its nominal speed; a target that lags steadily (SHOW_VEL_FF_GAIN below 1) then has
-    /// two lags for one speed, and swings between them at every leg near the nominal speed.
-    pub fn approach_between(
+    pub fn approach_between(&mut self, goal: &Self, up: &Approach, down: &Approach, dt_s: f64) {
+        // What brakes before a goal above is the downward acceleration.
+        let brake = if goal.position.x > self.position.x { down } else { up };
+        self.approach_with(goal, brake, &up.swing, &down.swing, dt_s);
+    }
+
+    /// As [`Kinematics::approach_between`], but position errors are made up as `limits` say.
+    pub fn approach_with(
         &mut self,
         goal: &Self,
         limits: &Approach,

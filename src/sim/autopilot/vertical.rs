@@ -4,7 +4,7 @@ use nalgebra::Vector1;
 
 use super::filter::LowPass;
 use super::params as p;
-use super::shaping::{Approach, Kinematics, RootLaw, Swing};
+use super::shaping::{Approach, Kinematics, RootLaw};
 use crate::sim::sensors::Estimate;
 use crate::vehicle;
 
@@ -191,10 +191,18 @@ impl Vertical {
                     if ahead { self.gains.wpnav_speed_up_mps } else { p::WPNAV_SPEED_DN };
                 if over > 1.0 {
                     let limit = p::WPNAV_ACCEL_Z * over;
-                    let jerk = p::PSC_JERK * over;
-                    let up = Swing::new(limit, jerk, self.dt_s);
-                    let down = Swing::new(limit.min(MAX_ACCELERATION), jerk, self.dt_s);
-                    target.approach_between(wanted, &self.limits, &up, &down, self.dt_s);
+                    let (speed, jerk) = (self.limits.speed, p::PSC_JERK * over);
+                    let up = Approach::new(speed, limit, jerk, self.dt_s);
+                    let down = Approach::new(speed, limit.min(MAX_ACCELERATION), jerk, self.dt_s);
+                    if self.gains.show_vel_ff_gain < 1.0 {
+                        // Not as the firmware has it, which makes up for position errors faster
+                        // too: a target that lags steadily would have two lags at its nominal
+                        // speed, and swing between them for the whole leg.
+                        let (up, down) = (&up.swing, &down.swing);
+                        target.approach_with(wanted, &self.limits, up, down, self.dt_s);
+                    } else {
+                        target.approach_between(wanted, &up, &down, self.dt_s);
+                    }
                 } else {
                     target.approach(wanted, &self.limits, self.dt_s);
                 }
