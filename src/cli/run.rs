@@ -104,7 +104,14 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
             only: None,
             force: args.force,
         };
-        lost |= !simulate(context, folder, &flight.plan, &simulation)?.failed.is_empty();
+        let flown = simulate(context, folder, &flight.plan, &simulation)?;
+        if flown.logs == 0 {
+            return Err(CommandError::Failed(format!(
+                "{}: no drone could be flown, so there is nothing to analyse; the reasons are above",
+                flown.flight
+            )));
+        }
+        lost |= !flown.failed.is_empty();
     }
     let exit = analyze_campaign(context, &args.output, &AnalyzeOptions::default())?;
     context.say(&format!("Done in {watch}"));

@@ -15,6 +15,7 @@ use super::error::SimError;
 use super::plant::Plant;
 use super::recorder::{LogRecorder, Moment, NoLog, Recorder};
 use super::sensors::Sensors;
+use super::strain::Strain;
 use crate::base::file::write_with;
 use crate::base::frame::ShowFrame;
 use crate::base::time::GpsTime;
@@ -92,6 +93,9 @@ pub struct FlightSummary {
     pub max_height_m: f64,
     /// Share of the steps of stage 4 in which a rotor was at an end of its range.
     pub saturated_share: f64,
+    /// When the battery had given all its charge, to the second; absent when it lasted, or there is
+    /// none.
+    pub flat_s: Option<f64>,
     /// Steps simulated, of 2.5 ms each.
     pub steps: u64,
     /// Rows written to the log, definitions excluded.
@@ -183,6 +187,7 @@ pub fn fly_with<R: Recorder>(
     let mut air = setup.atmosphere.sampler(drone);
     let mut density = DensityNearby::about(home_amsl_m);
     let mut stop_at_s = f64::INFINITY;
+    let mut strain = Strain::default();
     let mut step: u64 = 0;
     loop {
         let time_us = start_us + step as i64 * STEP_US;
@@ -202,9 +207,13 @@ pub fn fly_with<R: Recorder>(
             if let Some(battery) = plant.battery().filter(|battery| battery.compensated) {
                 pilot.motors.set_voltage(battery.resting_v);
             }
+            if plant.battery().is_some_and(|battery| battery.charge < 0.0) {
+                tally.summary.flat_s.get_or_insert(time_s);
+            }
+            strain.note(&pilot, &plant, &around);
             look(setup, &plant, time_s, takeoff_s, end_s)?;
             if time_s > give_up_s {
-                return Err(SimError::NotLanded { drone, time_s });
+                return Err(SimError::NotLanded { drone, time_s, strain });
             }
         }
         let mut estimate = sensors.sense(plant.motion());
@@ -229,6 +238,9 @@ pub fn fly_with<R: Recorder>(
         if time_s >= stop_at_s {
             break;
         }
+    }
+    if tally.summary.performing_s.is_none() {
+        return Err(SimError::NeverBegun { drone, strain });
     }
     tally.summary.steps = step;
     tally.summary.takeoff_s = takeoff_s;

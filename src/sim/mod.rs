@@ -13,6 +13,7 @@ pub mod json;
 pub mod plant;
 pub mod recorder;
 pub mod sensors;
+pub mod strain;
 
 pub use air::{Atmosphere, Uniform};
 pub use error::SimError;
