@@ -344,4 +344,9 @@ fn air_that_no_drone_can_fly_in_ends_the_flight() {
     let storm = Uniform(Vector3::new(0.0, 0.0, 15.0));
     let error = fly_without_log(&setup(&vehicle, &trajectory, &storm, 1)).unwrap_err();
     assert!(matches!(error, SimError::NotLanded { .. }), "{error}");
+    let text = error.to_string();
+    assert!(text.contains("more than the vehicle can hold") && text.contains("15.0 m/s"), "{text}");
+    let sink = Uniform(Vector3::new(0.0, 0.0, -20.0));
+    let error = fly_without_log(&setup(&vehicle, &trajectory, &sink, 1)).unwrap_err();
+    assert!(error.to_string().contains("updraft -20.0 m/s"), "{error}");
 }

@@ -74,10 +74,11 @@ pub(super) fn wind_caution(map: &UpdraftMap) -> Option<String> {
         )
     } else {
         format!(
-            "wind: the drones leaned {tilt:.1} degrees in the hover, and a lean in hover or \
-             calibration reads as sinking air. Without the drag of these drones nothing is \
-             corrected: the map may be off by up to {error:.2} m/s, in the same direction \
-             for all drones (stated as the systematic error). Fly in still air where that matters"
+            "wind: the drones leaned {tilt:.1} degrees in the hover. Wind along the rotor axis of a \
+             leaning drone reads as sinking air, and the lift that rotors gain in wind as rising \
+             air. Without the drag and the rotors of these drones known nothing is corrected: the \
+             map may be off by up to {error:.2} m/s by the first alone, in the same direction for \
+             all drones (stated as the systematic error). Fly in still air where that matters"
         )
     })
 }

@@ -116,6 +116,12 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
         } else {
             fly_virtual(context, folder, &flight.plan, &simulation)?
         };
+        if flown.logs == 0 {
+            return Err(CommandError::Failed(format!(
+                "{}: no drone could be flown, so there is nothing to analyse; the reasons are above",
+                flown.flight
+            )));
+        }
         lost |= !flown.failed.is_empty();
     }
     let exit = analyze_campaign(context, &args.output, &AnalyzeOptions::default())?;

@@ -25,6 +25,9 @@ use crate::sim::air::truth;
 use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, fly_to_file};
 use crate::vehicle::{Vehicle, library};
 
+/// Drones that are named in one warning.
+const MOST_NAMED: usize = 10;
+
 /// Motion of the air and seed of a simulated flight, shared by `simulate` and `run`.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Simulation")]
@@ -191,6 +194,7 @@ pub(super) struct Flown {
     pub(super) bytes: u64,
     pub(super) failed: Vec<String>,
     pub(super) saturated: Vec<u16>,
+    pub(super) flat: Vec<u16>,
 }
 
 #[derive(Serialize)]
@@ -343,7 +347,11 @@ pub(super) fn simulate(
     let mut saturated = Vec::new();
     let mut failed = Vec::new();
     let mut stopped = false;
+    let mut flat = Vec::new();
     for (slot, result) in open.iter().zip(results) {
+        if matches!(&result, Ok(summary) if summary.flat_s.is_some()) {
+            flat.push(slot.slot);
+        }
         match result {
             Ok(summary) if summary.saturated_share > 0.0 => saturated.push(slot.slot),
             Ok(_) => {}
@@ -351,11 +359,22 @@ pub(super) fn simulate(
             Err(error) => failed.push(super::exit::with_reasons(&error)),
         }
     }
+    if !flat.is_empty() {
+        let named: Vec<_> = flat.iter().take(MOST_NAMED).map(u16::to_string).collect();
+        let more = if flat.len() > MOST_NAMED { ", ..." } else { "" };
+        context.warn(&format!(
+            "{}: the battery of {} ran flat in flight (slots {}{more}); the simulation flies on at its empty \
+             voltage, a real drone would not",
+            plan.name,
+            words::count(flat.len(), "drone"),
+            named.join(", ")
+        ));
+    }
     let flown = settle(context, folder, plan, ready, failed, watch)?;
     if stopped {
         return Err(CommandError::Interrupted);
     }
-    Ok(Flown { saturated, ..flown })
+    Ok(Flown { saturated, flat, ..flown })
 }
 
 /// Takes down what was flown, and says so.
@@ -395,6 +414,7 @@ pub(super) fn settle(
         bytes,
         failed,
         saturated: Vec::new(),
+        flat: Vec::new(),
     })
 }
 

@@ -101,6 +101,8 @@ pub struct Reading {
     pub amps: f64,
     /// Charge used, Ah.
     pub used_ah: f64,
+    /// What is left, share of full; below 0 when it gave more than it had.
+    pub charge: f64,
     /// Charge of a full battery, Ah.
     pub capacity_ah: f64,
     /// Internal resistance, ohm.

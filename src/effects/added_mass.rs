@@ -35,7 +35,7 @@ impl Effect for AddedMass {
             signals: &[Signal::Acceleration],
             parameters: &[Parameter {
                 name: "coefficient",
-                unit: "1",
+                unit: "",
                 what: "apparent mass over that of an impermeable disc",
                 low: 0.0,
                 high: 10.0,

@@ -61,7 +61,34 @@ fn capacity_ah(vehicle: &Vehicle) -> f64 {
     (amps * vehicle.limits.endurance_s / 3600.0).clamp(0.1, 1000.0)
 }
 
+/// Take-off, and a landing at once, s: a battery that does not last so long is a mistake.
+const SHORTEST_S: f64 = 30.0;
+
 impl Effect for Battery {
+    fn refusal(&self, values: &Values, vehicle: &Vehicle) -> Option<(usize, String)> {
+        if values[CELLS].fract() != 0.0 {
+            return Some((CELLS, "it must be a whole number".to_owned()));
+        }
+        if values[COMPENSATED] != 0.0 && values[COMPENSATED] != 1.0 {
+            return Some((COMPENSATED, "it must be 0 or 1".to_owned()));
+        }
+        let power_w = Reference::of(vehicle).hover_w() + values[AVIONICS];
+        let charge_ah = values[INITIAL] * values[CAPACITY];
+        let lasts_s = charge_ah * resting_v(values, 0.0) / power_w * 3600.0;
+        // NaN is refused too.
+        if lasts_s >= SHORTEST_S {
+            return None;
+        }
+        let culprit = if values[INITIAL] < 0.05 { INITIAL } else { CAPACITY };
+        Some((
+            culprit,
+            format!(
+                "such a battery lasts {lasts_s:.0} s of hover, and a take-off with a landing needs \
+                 {SHORTEST_S:.0} s"
+            ),
+        ))
+    }
+
     fn definition(&self) -> &'static Definition {
         &Definition {
             name: "battery",
@@ -71,7 +98,9 @@ impl Effect for Battery {
                 of 1 % needs 1 % more of the pulse above 1000 us. The slow part (charge) looks like \
                 a growing downdraft; the fast part (current times resistance) steepens every \
                 response. ArduPilot's compensation raises the pulse before it is logged, so it \
-                hides nothing. Terminal voltage must not be used as a regressor: the pulse drives \
+                hides nothing. An empty battery does not switch off here: it stays at the voltage of \
+                no charge (3.27 V a cell), and the drone flies on with what that gives; the \
+                simulator names such drones. Terminal voltage must not be used as a regressor: the pulse drives \
                 the current and with it the voltage.",
             formula: "V_b = n V_cell(q) - R I;  du = (u - 1000) ((V_ref/V_b)^gamma - 1)",
             source: "ArduPilot MOT_BAT_VOLT and MOTB; typical discharge curve of lithium polymer",
@@ -80,7 +109,7 @@ impl Effect for Battery {
             parameters: &[
                 Parameter {
                     name: "cells",
-                    unit: "1",
+                    unit: "",
                     what: "cells in series",
                     low: 1.0,
                     high: 24.0,
@@ -128,7 +157,7 @@ impl Effect for Battery {
                 },
                 Parameter {
                     name: "exponent",
-                    unit: "1",
+                    unit: "",
                     what: "how much of a fall of voltage reaches the motor (gamma)",
                     low: 0.0,
                     high: 2.0,
@@ -185,6 +214,7 @@ impl Effect for Battery {
             resting_v: own.state[RESTING],
             amps: own.state[AMPS],
             used_ah: own.state[USED],
+            charge: own.values[INITIAL] - own.state[USED] / own.values[CAPACITY],
             capacity_ah: own.values[CAPACITY],
             resistance_ohm: own.values[RESISTANCE],
             compensated: own.values[COMPENSATED] >= 0.5,

@@ -42,7 +42,7 @@ pub struct Definition {
 pub struct Parameter {
     /// Key in vehicle files.
     pub name: &'static str,
-    /// Unit; "1" for a pure number.
+    /// Unit; empty for a pure number.
     pub unit: &'static str,
     /// What it is.
     pub what: &'static str,

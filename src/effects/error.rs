@@ -25,7 +25,10 @@ pub enum EffectError {
         known: String,
     },
     /// A parameter outside of what makes sense.
-    #[error("effects.{effect}.{name} = {value} is not allowed; it must be {low} to {high} {unit}")]
+    #[error(
+        "effects.{effect}.{name} = {value} is not allowed; it must be {low} to {high}{}",
+        spaced(unit)
+    )]
     Bounds {
         /// The effect.
         effect: &'static str,
@@ -40,7 +43,24 @@ pub enum EffectError {
         /// Unit.
         unit: &'static str,
     },
+    /// A parameter that is within its bounds, but with which nothing can be flown.
+    #[error("effects.{effect}.{name} = {value} is not allowed; {why}")]
+    Nonsense {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        name: &'static str,
+        /// What was asked for.
+        value: f64,
+        /// What it must be, or what comes of it.
+        why: String,
+    },
     /// Not `NAME`, `NAME=on`, `NAME=off` or `NAME.PARAMETER=NUMBER`.
     #[error("\"{0}\" is not NAME, NAME=on, NAME=off or NAME.PARAMETER=NUMBER")]
     Syntax(String),
+}
+
+/// A unit behind its number; nothing for a pure number.
+fn spaced(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }

@@ -70,7 +70,7 @@ impl Effect for GroundEffect {
                 },
                 Parameter {
                     name: "body_lift",
-                    unit: "1",
+                    unit: "",
                     what: "strength of the fountain between the rotors (K_b)",
                     low: 0.0,
                     high: 5.0,

@@ -26,7 +26,7 @@ impl Effect for MassSpread {
             signals: &[Signal::Drone],
             parameters: &[Parameter {
                 name: "sd",
-                unit: "1",
+                unit: "",
                 what: "standard deviation of mass between drones, relative",
                 low: 0.0,
                 high: 0.1,

@@ -40,7 +40,7 @@ pub use model::Model;
 pub use reference::Reference;
 pub use signals::Signals;
 
-use crate::vehicle::Airframe;
+use crate::vehicle::{Airframe, Vehicle};
 
 /// All effects, in the order in which they act: what makes drones differ comes first, as the others
 /// are set up for the drone that results.
@@ -83,6 +83,12 @@ pub trait Effect: Sync {
     /// `at` is the vehicle without the effect, `values` are the effect's parameters in the order
     /// of its definition.
     fn pulse_us(&self, at: &Reference, values: &Values, signals: &Signals) -> f64;
+
+    /// A parameter with which no flight makes sense though it is within its bounds: its place in the
+    /// definition, and what it must be or what would come of it.
+    fn refusal(&self, _values: &Values, _vehicle: &Vehicle) -> Option<(usize, String)> {
+        None
+    }
 
     /// Once, before the flight: prepares what it remembers, changes the drone ([`Hook::Drone`]).
     /// Called for every effect that is on.

@@ -65,7 +65,7 @@ impl Effect for NeighbourDownwash {
                 },
                 Parameter {
                     name: "strength",
-                    unit: "1",
+                    unit: "",
                     what: "share of the momentum disc's sink that reaches the drones",
                     low: 0.0,
                     high: 4.0,

@@ -84,7 +84,7 @@ impl Effect for RotorInflow {
             parameters: &[
                 Parameter {
                     name: "inflow_share",
-                    unit: "1",
+                    unit: "",
                     what: "share of the geometric thrust lost to the inflow in hover (k2 v_h/(k w))",
                     low: LEAST_SHARE,
                     high: MOST_SHARE,
@@ -92,7 +92,7 @@ impl Effect for RotorInflow {
                 },
                 Parameter {
                     name: "spread",
-                    unit: "1",
+                    unit: "",
                     what: "standard deviation of the share between drones, relative",
                     low: 0.0,
                     high: 0.2,

@@ -58,6 +58,11 @@ pub fn values_of(effect: &dyn Effect, vehicle: &Vehicle) -> Result<Values, Effec
             });
         }
     }
+    if let Some((index, why)) = effect.refusal(&values, vehicle) {
+        let name = definition.parameters.get(index).map_or("", |parameter| parameter.name);
+        let value = values.get(index).copied().unwrap_or_default();
+        return Err(EffectError::Nonsense { effect: definition.name, name, value, why });
+    }
     Ok(values)
 }
 
@@ -156,6 +161,10 @@ mod tests {
             ("battery.volts=3", "initial_charge"),
             ("battery.initial_charge=1.5", "0 to 1"),
             ("battery.initial_charge=full", "NAME.PARAMETER=NUMBER"),
+            ("battery.initial_charge=0", "lasts 0 s of hover"),
+            ("battery.capacity_ah=0.01", "lasts"),
+            ("battery.cells=1.5", "whole number"),
+            ("battery.compensated=0.3", "0 or 1"),
             ("battery=maybe", "NAME=off"),
             ("battery.initial_charge", "NAME.PARAMETER=NUMBER"),
             ("battery.initial_charge=nan", "0 to 1"),
@@ -163,6 +172,8 @@ mod tests {
             let error = choose(&mut vehicle.clone(), choice).unwrap_err().to_string();
             assert!(error.contains(part), "{choice}: {error}");
         }
+        let error = choose(&mut vehicle.clone(), "vortex-ring.onset=9").unwrap_err().to_string();
+        assert!(error.ends_with("0.25 to 1.5"), "no unit of a pure number: {error}");
         vehicle.effects.insert("x".to_owned(), crate::vehicle::EffectTable::default());
         assert!(resolved(&vehicle).is_err());
     }

@@ -43,7 +43,7 @@ impl Effect for ThrustCurve {
             signals: &[Signal::ModelIncrement],
             parameters: &[Parameter {
                 name: "expo",
-                unit: "1",
+                unit: "",
                 what: "curvature: 0 is the model's own response, 1 is quadratic",
                 low: -0.5,
                 high: 1.0,

@@ -24,7 +24,7 @@ impl Effect for ThrustSpread {
             signals: &[Signal::Drone],
             parameters: &[Parameter {
                 name: "sd",
-                unit: "1",
+                unit: "",
                 what: "standard deviation of the thrust coefficient between drones, relative",
                 low: 0.0,
                 high: 0.1,

@@ -29,7 +29,7 @@ impl Effect for TranslationalLift {
             signals: &[Signal::Horizontal, Signal::Climb, Signal::Tilt],
             parameters: &[Parameter {
                 name: "inflow_share",
-                unit: "1",
+                unit: "",
                 what: "share of the geometric thrust lost to the inflow in hover",
                 low: LEAST_SHARE,
                 high: MOST_SHARE,

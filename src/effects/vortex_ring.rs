@@ -64,7 +64,7 @@ impl Effect for VortexRing {
             parameters: &[
                 Parameter {
                     name: "inflow_share",
-                    unit: "1",
+                    unit: "",
                     what: "share of the geometric thrust lost to the inflow in hover",
                     low: LEAST_SHARE,
                     high: MOST_SHARE,
@@ -72,7 +72,7 @@ impl Effect for VortexRing {
                 },
                 Parameter {
                     name: "onset",
-                    unit: "1",
+                    unit: "",
                     what: "descent over induced velocity at which the state has half set in",
                     low: 0.25,
                     high: 1.5,
@@ -80,7 +80,7 @@ impl Effect for VortexRing {
                 },
                 Parameter {
                     name: "jitter",
-                    unit: "1",
+                    unit: "",
                     what: "standard deviation of the thrust in the full state, relative",
                     low: 0.0,
                     high: 0.3,

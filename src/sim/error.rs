@@ -4,6 +4,7 @@ use std::io;
 
 use thiserror::Error;
 
+use super::strain::Strain;
 use crate::base::file::FileError;
 
 /// A flight could not be simulated to its end; its log must not be kept.
@@ -62,12 +63,28 @@ pub enum SimError {
         time_s: f64,
     },
     /// The drone was still in the air long after its trajectory's end.
-    #[error("drone {drone} had not landed by show time {time_s:.0} s; check the updraft")]
+    #[error(
+        "drone {drone} had not landed by show time {time_s:.0} s: the air is more than the vehicle can \
+         hold; {strain}"
+    )]
     NotLanded {
         /// The drone's slot.
         drone: u16,
         /// Show time.
         time_s: f64,
+        /// What the air was, and what the vehicle did.
+        strain: Strain,
+    },
+    /// The drone never got off the ground as far as the show needs.
+    #[error(
+        "drone {drone} never reached the height where the show begins: the air is more than the \
+         vehicle can hold; {strain}"
+    )]
+    NeverBegun {
+        /// The drone's slot.
+        drone: u16,
+        /// What the air was, and what the vehicle did.
+        strain: Strain,
     },
     /// The user asked to stop.
     #[error("drone {drone}: stopped at show time {time_s:.0} s")]

@@ -80,6 +80,9 @@ pub struct FlightSummary {
     pub max_height_m: f64,
     /// Share of the steps of stage 4 in which a rotor was at an end of its range.
     pub saturated_share: f64,
+    /// When the battery had given all its charge, to the second; absent when it lasted, or there is
+    /// none.
+    pub flat_s: Option<f64>,
     /// Steps simulated, of 2.5 ms each.
     pub steps: u64,
     /// Rows written to the log, definitions excluded.
@@ -148,7 +151,7 @@ pub fn fly_with<R: Recorder>(
 ) -> Result<FlightSummary, SimError> {
     let mut flight = Flight::new(setup)?;
     flight.step_until(f64::INFINITY, recorder)?;
-    Ok(flight.summary())
+    flight.finish()
 }
 
 /// AirSim's motor interface: the command is linear in the pulse, 1000..2000 us, whatever the

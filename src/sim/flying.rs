@@ -15,6 +15,7 @@ use super::flight::{FlightSetup, FlightSummary, STEP_S, STEP_US, armed_at_us, co
 use super::plant::{Motion, Plant};
 use super::recorder::{Moment, Recorder};
 use super::sensors::Sensors;
+use super::strain::Strain;
 use crate::effects::{Active, Reading};
 
 /// Air motion and density are looked up every so many steps (100 Hz).
@@ -36,6 +37,7 @@ pub struct Flight<'a> {
     around: Surroundings,
     density: DensityNearby,
     tally: Tally,
+    strain: Strain,
     start_us: i64,
     end_s: f64,
     give_up_s: f64,
@@ -89,6 +91,7 @@ impl<'a> Flight<'a> {
             around: Surroundings { air_velocity_mps: Vector3::zeros(), density_ratio: 1.0 },
             density: DensityNearby::about(home_amsl_m),
             tally: Tally::default(),
+            strain: Strain::default(),
             start_us: armed_at_us(takeoff_s).max(late_us),
             end_s,
             give_up_s,
@@ -163,6 +166,10 @@ impl<'a> Flight<'a> {
         if let Some(battery) = self.plant.battery().filter(|battery| battery.compensated) {
             self.pilot.motors.set_voltage(battery.resting_v);
         }
+        if self.plant.battery().is_some_and(|battery| battery.charge < 0.0) {
+            self.tally.summary.flat_s.get_or_insert(time_s);
+        }
+        self.strain.note(&self.pilot, &self.plant, &self.around);
         let drone = self.setup.drone;
         if self.setup.hooks.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
             return Err(SimError::Stopped { drone, time_s });
@@ -176,7 +183,7 @@ impl<'a> Flight<'a> {
             progress(((time_s - begin_s) / (self.end_s - begin_s).max(1.0)).clamp(0.0, 1.0));
         }
         if time_s > self.give_up_s {
-            return Err(SimError::NotLanded { drone, time_s });
+            return Err(SimError::NotLanded { drone, time_s, strain: self.strain });
         }
         Ok(())
     }
@@ -238,6 +245,18 @@ impl<'a> Flight<'a> {
     pub fn miss_m(&self) -> Option<f64> {
         (self.stage() == Stage::Performing)
             .then(|| (self.plant.motion().position_m - self.pilot.director.target.position).norm())
+    }
+
+    /// What became of it, now that it is over.
+    ///
+    /// # Errors
+    /// [`SimError::NeverBegun`] when it never reached the show proper.
+    pub(super) fn finish(&self) -> Result<FlightSummary, SimError> {
+        let summary = self.summary();
+        if summary.performing_s.is_none() {
+            return Err(SimError::NeverBegun { drone: self.setup.drone, strain: self.strain });
+        }
+        Ok(summary)
     }
 
     /// What became of it so far.

@@ -15,6 +15,7 @@ pub mod plant;
 mod recorded;
 pub mod recorder;
 pub mod sensors;
+pub mod strain;
 
 pub use crate::effects::Reading as BatteryReading;
 pub use air::{Atmosphere, Uniform};

@@ -74,7 +74,7 @@ impl Horizontal {
         let none = Vector2::zeros();
         match goal {
             Some(goal) => self.target.approach(goal, &self.limits, self.dt_s),
-            None => self.target.approach_velocity(&none, &none, &self.limits, self.dt_s),
+            None => self.target.approach_velocity(&none, &none, &self.limits.swing, self.dt_s),
         }
 
         self.position_error = self.target.position - estimate.position_m.xy();

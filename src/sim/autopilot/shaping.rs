@@ -19,12 +19,27 @@ pub struct Kinematics<const N: usize> {
 pub struct Approach {
     /// Largest speed for making up a position error, m/s.
     pub speed: f64,
-    /// Largest acceleration for making up a velocity error, m/s².
+    /// How a velocity error is made up.
+    pub swing: Swing,
+    to_position: RootLaw,
+}
+
+/// How a velocity error is made up.
+#[derive(Clone, Copy, Debug)]
+pub struct Swing {
+    /// Largest acceleration for it, m/s².
     pub acceleration: f64,
     /// Largest jerk, m/s³.
     pub jerk: f64,
-    to_position: RootLaw,
     to_velocity: RootLaw,
+}
+
+impl Swing {
+    /// Limits on acceleration (m/s²) and jerk (m/s³), for steps of `dt_s`.
+    pub fn new(acceleration: f64, jerk: f64, dt_s: f64) -> Self {
+        let to_velocity = RootLaw::new(jerk / acceleration, jerk, dt_s);
+        Self { acceleration, jerk, to_velocity }
+    }
 }
 
 impl Approach {
@@ -32,11 +47,9 @@ impl Approach {
     pub fn new(speed: f64, acceleration: f64, jerk: f64, dt_s: f64) -> Self {
         Self {
             speed,
-            acceleration,
-            jerk,
+            swing: Swing::new(acceleration, jerk, dt_s),
             // Half the acceleration and jerk are kept for the velocity loop inside.
             to_position: RootLaw::new(0.5 * jerk / acceleration, 0.5 * acceleration, dt_s),
-            to_velocity: RootLaw::new(jerk / acceleration, jerk, dt_s),
         }
     }
 }
@@ -83,7 +96,12 @@ impl<const N: usize> Kinematics<N> {
     #[inline]
     pub fn approach(&mut self, goal: &Self, limits: &Approach, dt_s: f64) {
         let catch_up = limits.to_position.rate(goal.position - self.position, limits.speed);
-        self.approach_velocity(&(catch_up + goal.velocity), &goal.acceleration, limits, dt_s);
+        self.approach_velocity(
+            &(catch_up + goal.velocity),
+            &goal.acceleration,
+            &limits.swing,
+            dt_s,
+        );
     }
 
     /// Turns the acceleration towards a velocity.
@@ -92,7 +110,7 @@ impl<const N: usize> Kinematics<N> {
         &mut self,
         velocity: &SVector<f64, N>,
         feed_forward: &SVector<f64, N>,
-        limits: &Approach,
+        limits: &Swing,
         dt_s: f64,
     ) {
         let error = velocity - self.velocity;
@@ -104,13 +122,24 @@ impl<const N: usize> Kinematics<N> {
 impl Kinematics<1> {
     /// As [`Kinematics::approach`], with limits of their own for accelerating up and down.
     pub fn approach_between(&mut self, goal: &Self, up: &Approach, down: &Approach, dt_s: f64) {
-        let error = goal.position - self.position;
         // What brakes before a goal above is the downward acceleration.
-        let brake = if error.x > 0.0 { down } else { up };
-        let catch_up = brake.to_position.rate(error, brake.speed);
+        let brake = if goal.position.x > self.position.x { down } else { up };
+        self.approach_with(goal, brake, &up.swing, &down.swing, dt_s);
+    }
+
+    /// As [`Kinematics::approach_between`], but position errors are made up as `limits` say.
+    pub fn approach_with(
+        &mut self,
+        goal: &Self,
+        limits: &Approach,
+        up: &Swing,
+        down: &Swing,
+        dt_s: f64,
+    ) {
+        let catch_up = limits.to_position.rate(goal.position - self.position, limits.speed);
         let velocity = catch_up + goal.velocity;
-        let limits = if velocity.x > self.velocity.x { up } else { down };
-        self.approach_velocity(&velocity, &goal.acceleration, limits, dt_s);
+        let swing = if velocity.x > self.velocity.x { up } else { down };
+        self.approach_velocity(&velocity, &goal.acceleration, swing, dt_s);
     }
 }
 
@@ -216,8 +245,8 @@ mod tests {
             for _ in 0..8_000 {
                 let before = target.acceleration;
                 target.approach(&goal, &limits, DT_S);
-                prop_assert!(target.acceleration.norm() <= limits.acceleration * 1.5);
-                prop_assert!((target.acceleration - before).norm() <= limits.jerk * DT_S + 1e-12);
+                prop_assert!(target.acceleration.norm() <= limits.swing.acceleration * 1.5);
+                prop_assert!((target.acceleration - before).norm() <= limits.swing.jerk * DT_S + 1e-12);
                 target.advance(DT_S);
                 goal.advance(DT_S);
             }

@@ -194,13 +194,26 @@ impl Vertical {
                     let (speed, jerk) = (self.limits.speed, p::PSC_JERK * over);
                     let up = Approach::new(speed, limit, jerk, self.dt_s);
                     let down = Approach::new(speed, limit.min(MAX_ACCELERATION), jerk, self.dt_s);
-                    target.approach_between(wanted, &up, &down, self.dt_s);
+                    if self.gains.show_vel_ff_gain < 1.0 {
+                        // Not as the firmware has it, which makes up for position errors faster
+                        // too: a target that lags steadily would have two lags at its nominal
+                        // speed, and swing between them for the whole leg.
+                        let (up, down) = (&up.swing, &down.swing);
+                        target.approach_with(wanted, &self.limits, up, down, self.dt_s);
+                    } else {
+                        target.approach_between(wanted, &up, &down, self.dt_s);
+                    }
                 } else {
                     target.approach(wanted, &self.limits, self.dt_s);
                 }
             }
             Goal::Land(speed) => {
-                target.approach_velocity(&Vector1::new(-speed), &none, &self.limits, self.dt_s);
+                target.approach_velocity(
+                    &Vector1::new(-speed),
+                    &none,
+                    &self.limits.swing,
+                    self.dt_s,
+                );
             }
         }
     }

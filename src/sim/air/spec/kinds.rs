@@ -140,7 +140,13 @@ pub const KINDS: &[Kind] = &[
 
 const GUST_KEYS: &[Key] = &[
     key("sd", "m/s", Value(0.5), (0.0, 10.0), "standard deviation of each axis"),
-    key("length", "m", Value(50.0), LENGTH, "integral length (low: height above ground)"),
+    key(
+        "length",
+        "m",
+        Value(50.0),
+        LENGTH,
+        "integral length; near the ground about the height above it",
+    ),
     WIND,
     FROM,
     MODES,
