@@ -26,6 +26,7 @@ const GROUND_PACE: f64 = 5.0;
 
 /// Arguments of `updraft fly`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option of the command line")]
 #[command(after_long_help = format!("Examples:
   updraft fly my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --set-params
   updraft fly my-campaign --flight hover --connect tcp:10.0.0.7:5760 --key swarm.key --lead 60

@@ -83,7 +83,7 @@ impl Client {
                 return Err(ServerError::Silent { what, seconds: ANSWER / S });
             };
             if incoming.refers_to.as_deref() != Some(&id) {
-                self.note(incoming);
+                self.note(&incoming);
                 continue;
             }
             if incoming.kind == "ACK-NAK" {
@@ -127,7 +127,7 @@ impl Client {
         while !running.receipts.is_empty() {
             let now = self.clock.now();
             if let Some(incoming) = self.receive("the end of its work", now + 200_000)? {
-                self.note(incoming);
+                self.note(&incoming);
             }
             let mut over = Vec::new();
             for (drone, receipt) in &running.receipts {
@@ -197,7 +197,7 @@ impl Client {
     }
 
     /// Keeps a notification until it is asked for.
-    fn note(&mut self, incoming: Incoming) {
+    fn note(&mut self, incoming: &Incoming) {
         let body = &incoming.body;
         match incoming.kind.as_str() {
             "ASYNC-RESP" => {

@@ -64,7 +64,7 @@ pub(in crate::cli) struct Brought {
 
 struct Bar<'a> {
     context: &'a Context,
-    bar: ProgressBar,
+    line: ProgressBar,
     watch: Stopwatch,
     shares: BTreeMap<DroneId, Share>,
     over: BTreeSet<DroneId>,
@@ -78,8 +78,8 @@ impl Watch for Bar<'_> {
             self.over.insert(drone);
         }
         let done = self.shares.values().map(|share| share.done).sum();
-        self.bar.set_length(self.shares.values().map(|share| share.total).sum());
-        self.bar.set_position(done);
+        self.line.set_length(self.shares.values().map(|share| share.total).sum());
+        self.line.set_position(done);
         let tens = self.watch.elapsed().as_secs() / 10;
         if !self.context.interactive && tens > self.said {
             self.said = tens;
@@ -145,7 +145,7 @@ pub(in crate::cli) fn bring(
     }
     let mut watch = Bar {
         context,
-        bar,
+        line: bar,
         watch: Stopwatch::start(),
         shares: BTreeMap::new(),
         over: BTreeSet::new(),
@@ -153,7 +153,7 @@ pub(in crate::cli) fn bring(
     };
     let outcomes = pull(net, &folder.logs(), &wanted, &options, &mut watch)
         .map_err(|error| CommandError::Failed(with_reasons(&error)))?;
-    watch.bar.finish_and_clear();
+    watch.line.finish_and_clear();
     let brought: Vec<Brought> = wanted
         .iter()
         .map(|wanted| {
@@ -192,7 +192,7 @@ pub(in crate::cli) fn bring(
     let state = |state: &str| brought.iter().filter(|one| one.state == state).count();
     let say = |text: &str| {
         if !quiet {
-            context.say(text)
+            context.say(text);
         }
     };
     say(&format!(

@@ -25,7 +25,7 @@ use crate::fleet::preflight::{Known, Limits, Preflight, preflight};
 use crate::fleet::required::{Changes, CheckParams, requirements};
 use crate::fleet::slots::{FleetTable, SlotProblem, check_stands, picture, propose};
 use crate::fleet::start::{Start, StartOptions};
-use crate::fleet::telemetry::Telemetry;
+use crate::fleet::telemetry::{Drone, Telemetry};
 use crate::fleet::upload::{Load, Upload};
 use crate::fleet::watch::{self, Monitor};
 use crate::link::clock::{Clock as _, MS, Micros, S};
@@ -220,7 +220,7 @@ impl<'a> Crew<'a> {
             .drones()
             .into_iter()
             .map(|drone| {
-                let show = self.telemetry.get(drone).and_then(|of| of.has_show_firmware());
+                let show = self.telemetry.get(drone).and_then(Drone::has_show_firmware);
                 let required = requirements(self.plan, show.unwrap_or(true));
                 (drone, CheckParams::new(drone, required, may_change))
             })
@@ -549,7 +549,7 @@ impl<'a> Crew<'a> {
         let mut left = Vec::new();
         for drone in wanted {
             match done.get(&drone) {
-                Some(Ok(_)) => changes.forget(drone),
+                Some(Ok(())) => changes.forget(drone),
                 Some(Err(error)) => {
                     self.context.warn(&format!("drone {drone}: {error}"));
                     left.push(drone);

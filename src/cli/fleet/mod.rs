@@ -252,7 +252,7 @@ pub(super) fn fly_now(
     }
     let options = StartOptions { lead_s: lead.lead, ..StartOptions::default() };
     let mut start = crew.announce(options)?;
-    let time = start.time().map_or_else(String::new, |time| tables::time_of_day(time));
+    let time = start.time().map_or_else(String::new, tables::time_of_day);
     context.say(&format!(
         "Every drone has the start time: {time} ({} s of the GPS week), in {:.0} s",
         start.second_of_week(),

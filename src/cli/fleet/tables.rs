@@ -1,6 +1,7 @@
 //! What the steps print.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 
 use serde::Serialize;
 
@@ -86,8 +87,9 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
             (None, Some(volts)) => format!("{volts:.1} V"),
             (None, None) => "-".to_owned(),
         };
-        text.push_str(&format!(
-            "{:>5}  {:>4}  {:>6}  {:<10}  {:<17}  {:>4}  {:<11}  {:>4}  {}\n",
+        let _ = writeln!(
+            text,
+            "{:>5}  {:>4}  {:>6}  {:<10}  {:<17}  {:>4}  {:<11}  {:>4}  {}",
             row.drone,
             dash(row.nearest_slot.map(|slot| slot.to_string())),
             dash(row.distance_m.map(|m| if m < 1000.0 { format!("{m:.1}") } else { "far".into() })),
@@ -97,7 +99,7 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
             battery,
             dash(row.link_quality.map(|share| format!("{:.0}%", share * 100.0))),
             dash(row.firmware.clone()),
-        ));
+        );
     }
     text.push('\n');
     text.push_str(&picture(crew.plan, &crew.telemetry, now));
