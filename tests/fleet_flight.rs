@@ -106,7 +106,7 @@ fn started(net: &mut Net<'_>, plan: &Plan) -> (Monitor, Start) {
     let checks =
         all.iter().map(|id| (*id, CheckParams::new(*id, requirements(plan, true), true))).collect();
     let params = drive(net, checks, 9, &mut telemetry).unwrap();
-    assert!(params.values().all(|standing| standing.is_right()), "{params:?}");
+    assert!(params.values().all(updraft::fleet::required::Standing::is_right), "{params:?}");
     let upload = |line: &slots::Assignment| {
         let of = &show.drones[usize::from(line.slot) - 1];
         let skyb = skyb::write(of, &skyb::SkybOptions::default()).unwrap().bytes;
