@@ -150,7 +150,7 @@ fn fly_fleet(count: u8, show: impl Fn([f64; 2]) -> ShowDrone, pace: Pace, faults
 
 #[test]
 fn a_fleet_flies_as_fast_as_it_can_and_logs_the_same() {
-    fly_fleet(5, |place| show_of(place, 12.0), Pace::Fast, Faults::default());
+    fly_fleet(5, |place| show_of(place, 12.0), Pace::Fast { ground: 1.0 }, Faults::default());
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn a_fleet_flies_at_a_chosen_speed_over_a_bad_link() {
 #[test]
 #[ignore = "slow without optimisation"]
 fn forty_nine_fly_a_ladder() {
-    fly_fleet(49, ladder, Pace::Fast, Faults::default());
+    fly_fleet(49, ladder, Pace::Fast { ground: 1.0 }, Faults::default());
 }
 
 #[test]
