@@ -25,7 +25,7 @@ fn every_command_has_its_help() {
 fn wrong_arguments_end_with_2_and_say_what_is_right() {
     let updraft = || Command::new(env!("CARGO_BIN_EXE_updraft"));
     updraft().assert().code(2).stdout_eq("");
-    updraft().arg("fly").assert().code(2).stderr_eq("error: unrecognized subcommand 'fly'\n...");
+    updraft().arg("hop").assert().code(2).stderr_eq("error: unrecognized subcommand 'hop'\n...");
     updraft()
         .args(["plan", "calibration", "--grid", "7"])
         .assert()

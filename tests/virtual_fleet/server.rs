@@ -133,7 +133,10 @@ fn fly_fleet(count: u8, show: impl Fn([f64; 2]) -> ShowDrone, pace: Pace, faults
         lead(&mut station, running, &field, count)
     })
     .unwrap();
-    println!("{count} drones: {:.1} s", (clock.now() - begun) as f64 * 1e-6);
+    #[expect(clippy::print_stdout, reason = "the measurement of an ignored test")]
+    {
+        println!("{count} drones: {:.1} s", (clock.now() - begun) as f64 * 1e-6);
+    }
     for (system, vehicle) in (1..).zip(&vehicles) {
         assert_eq!(vehicle.flown.len(), 1, "drone {system}");
         if system == 1 || faults.loss == 0.0 && count < 10 {

@@ -268,6 +268,7 @@ impl<'w> Crew<'w> {
         self.heard.iter().filter(|(_, message)| starts(message)).count()
     }
 
+    #[expect(clippy::needless_pass_by_value, reason = "messages are made where they are sent")]
     pub(crate) fn send(&mut self, system: u8, message: MavMessage) {
         self.net.send(id(system), &message).unwrap();
         self.run_for(0.02);
@@ -371,6 +372,7 @@ impl<'w> Crew<'w> {
         self.net.broadcast(&MavMessage::DATA16(packet)).unwrap();
     }
 
+    #[expect(clippy::unused_self, reason = "reads as the crew's other words")]
     pub(crate) fn start_time(&self, start: f64) -> GpsTime {
         gps_at(start as i64)
     }
