@@ -13,6 +13,10 @@
 //! * [`effects`]: physics beyond the base model, each piece stated once, for simulator and analysis.
 //! * [`fleet`]: real vehicles over MAVLink: uploads, preflight, start, watch, abort.
 //! * [`sim`]: the embedded simulator flies a show and writes the same `.BIN` logs as a drone.
+//! * [`link`], [`protocol`]: MAVLink 2, and what the show protocol's bytes mean.
+//! * [`fleet`]: real vehicles: upload, preflight, start, watch, abort, logs.
+//! * [`virtual_fleet`]: vehicles that speak as the show firmware does, flown by the simulator.
+//! * [`skybrush_server`]: a client of a running Skybrush Server.
 //! * [`log`]: the ArduPilot DataFlash format, reader and writer.
 //! * [`flight`]: one drone's log as time series in show time.
 //! * [`analysis`]: windows, calibration laws, updraft estimates.
