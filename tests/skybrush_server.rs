@@ -20,7 +20,7 @@ use updraft::skybrush_server::Client;
 /// Its only flight takes half a minute, and two drones.
 fn planned() -> Bench {
     let bench = Bench::new();
-    let args = ["plan", "hover", "--grid", "1x2", "--duration", "10", "-o", "campaign"];
+    let args = ["plan", "hover", "--grid", "1x2", "--set", "duration_s=10", "-o", "campaign"];
     bench.expect(0, &args);
     bench
 }
@@ -67,7 +67,8 @@ fn a_flight_is_uploaded_started_watched_and_brings_its_logs_home() {
     for (index, upload) in uploads.iter().enumerate() {
         assert_eq!(upload["command"], "__show_upload");
         // The drones stand the other way round.
-        assert_eq!(upload["ids"], json!([["02", "01"][index]]));
+        let id = ["02", "01"][index];
+        assert_eq!(upload["ids"], json!([id]));
         let show = &upload["kwds"]["show"];
         assert_eq!(show["trajectory"]["version"], 1);
         assert_eq!(show["mission"]["index"], index);

@@ -190,10 +190,9 @@ impl Client {
             }
             match self.stream.read(&mut buffer) {
                 Ok(0) => return Err(broken(io::ErrorKind::UnexpectedEof.into())),
-                Ok(size) => self
-                    .lines
-                    .push(&buffer[..size])
-                    .map_err(|_| ServerError::TooLong { most })?,
+                Ok(size) => {
+                    self.lines.push(&buffer[..size]).map_err(|_| ServerError::TooLong { most })?
+                }
                 Err(error) => match error.kind() {
                     io::ErrorKind::WouldBlock
                     | io::ErrorKind::TimedOut

@@ -249,8 +249,7 @@ impl Watched {
         // Not every driver of the server says that a drone has landed: those of ArduPilot are on
         // the ground again.
         self.flown |= started && !is_on_ground(status);
-        self.landed =
-            started && (now.contains(&LANDED) || self.flown && now.contains(&ON_GROUND));
+        self.landed = started && (now.contains(&LANDED) || self.flown && now.contains(&ON_GROUND));
     }
 }
 
@@ -269,9 +268,7 @@ mod tests {
     #[test]
     fn a_flight_is_told_and_its_end_is_seen() {
         let mut monitor = Monitor::new(["01".to_owned()], 25.0, 0);
-        let status = |mode: &str, codes: &[u64], percent: f64, time: u64| {
-            json!({ "mode": mode, "errors": codes, "battery": [123, percent], "timestamp": time })
-        };
+        let status = |mode: &str, codes: &[u64], percent: f64, time: u64| json!({ "mode": mode, "errors": codes, "battery": [123, percent], "timestamp": time });
         let nothing: [&str; 0] = [];
         // Landed from the flight before.
         assert_eq!(look(&mut monitor, 0, false, status("stab", &[7], 90.0, 0)), nothing);

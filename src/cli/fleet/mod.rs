@@ -291,7 +291,9 @@ fn end(context: &Context, args: &EndArgs, action: Action) -> Result<Exit, Comman
         Target::Links(links) => links,
         Target::Server(address) => return server::end(context, &address, only.as_ref(), action),
         Target::Sim => {
-            return Err(CommandError::Usage("give the drones' own links with --connect".to_owned()));
+            return Err(CommandError::Usage(
+                "give the drones' own links with --connect".to_owned(),
+            ));
         }
     };
     let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())

@@ -158,7 +158,9 @@ fn whole(listed: &LogEntry, bytes: Vec<u8>) -> Result<Vec<u8>, String> {
         ));
     }
     match Log::from_bytes(bytes.clone()).why_not_a_log() {
-        Some(reason) => Err(format!("what came as log {} is no DataFlash log: {reason}", listed.id)),
+        Some(reason) => {
+            Err(format!("what came as log {} is no DataFlash log: {reason}", listed.id))
+        }
         None => Ok(bytes),
     }
 }

@@ -190,11 +190,8 @@ pub(in crate::cli) fn fly(
     }
     let landed = drones.len() - watched.in_the_air.len();
     context.say(&format!("{landed} of {} drones have landed", drones.len()));
-    let flown = if watched.in_the_air.is_empty() && !watched.alarms {
-        Exit::Done
-    } else {
-        Exit::Losses
-    };
+    let flown =
+        if watched.in_the_air.is_empty() && !watched.alarms { Exit::Done } else { Exit::Losses };
     if !with_logs {
         return Ok(flown);
     }
