@@ -177,7 +177,7 @@ pub(in crate::cli) fn fly(
         context.insist("NO-GO: nothing was started; Skybrush Live tells more of these drones");
         return Ok(Exit::Unsafe);
     }
-    let Some(unix_s) = start(context, &mut client, &flight, lead)? else {
+    let Some(unix_s) = start(&mut client, &flight, lead)? else {
         return Err(CommandError::Usage("not authorized: the start was taken back".to_owned()));
     };
     context.say(&format!(
@@ -232,7 +232,6 @@ fn send_shows(
 /// The two steps of a start: its time, and its authorization; the Unix time, s, if a person or
 /// `--yes` authorized it.
 fn start(
-    context: &Context,
     client: &mut Client,
     flight: &Flight<'_>,
     lead: &LeadArgs,
