@@ -11,14 +11,21 @@ use updraft::base::crc::ap_crc32;
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::campaign::{parse_plan, to_json};
 use updraft::check::{CheckInput, check};
+use updraft::fleet::slots::{FleetTable, check_table};
+use updraft::link::frame::{FrameReader, MAX_FRAME, encode};
 use updraft::log::{Log, Select};
 use updraft::mission::Plan;
-use updraft::mission::resolve::resolve_text;
+use updraft::mission::resolve::{resolve, resolve_text};
+use updraft::protocol::ftp::{MOST_DATA, PAYLOAD, Packet};
+use updraft::protocol::show::{Stage, StartConfig, Status};
 use updraft::show::derive::DeriveParams;
 use updraft::show::summary::{summarise, summarise_skyb};
 use updraft::show::{Show, csv, skyb, skyc};
 use updraft::sim::Uniform;
 use updraft::sim::json::{Instance, InstanceSetup, ServoPacket};
+use updraft::skybrush_server::lines::Lines;
+use updraft::skybrush_server::watch::Monitor;
+use updraft::skybrush_server::{log_bytes, log_entries, message};
 use updraft::vehicle::library;
 
 /// Shows of more drones or segments are read, but not checked: that takes too long for a fuzzer.
@@ -31,9 +38,14 @@ pub(crate) type Target = (&'static str, fn(&[u8]));
 /// All of them.
 pub(crate) const TARGETS: &[Target] = &[
     ("csv", csv),
+    ("fleet_table", fleet_table),
+    ("frame", frame),
+    ("ftp_packet", ftp_packet),
     ("json_packet", json_packet),
     ("log", log),
     ("plan", plan),
+    ("server_line", server_line),
+    ("show_status", show_status),
     ("skyb", skyb),
     ("skyc", skyc),
     ("template", template),
@@ -75,6 +87,104 @@ fn json_packet(bytes: &[u8]) {
             assert!(status.height_m >= 0.0, "{status:?}");
         } else {
             assert_eq!(status.frames, frames);
+        }
+    }
+}
+
+/// `fleet.json`: what can be read is held against a plan, and is written as it was read.
+fn fleet_table(bytes: &[u8]) {
+    let Ok(table) = FleetTable::parse(bytes) else { return };
+    let json = to_json(&table).expect("a table is JSON");
+    assert_eq!(FleetTable::parse(&json).as_ref(), Ok(&table));
+    let mission = resolve("hover", &[]).expect("it is built in");
+    for problem in check_table(&mission.flights[0].plan, &table) {
+        assert!(!problem.to_string().is_empty());
+    }
+    for line in &table.drones {
+        assert!(table.slot_of(line.drone).is_some());
+    }
+}
+
+/// MAVLink from a stream and from a datagram: no byte is counted twice, and a message that came is
+/// one that can be sent.
+fn frame(bytes: &[u8]) {
+    let mut whole = FrameReader::default();
+    let mut pieces = FrameReader::default();
+    whole.push(bytes);
+    let mut found = Vec::new();
+    while let Some(frame) = whole.next(None) {
+        found.push(frame);
+    }
+    let mut again = Vec::new();
+    for piece in bytes.chunks(7) {
+        pieces.push(piece);
+        while let Some(frame) = pieces.next(None) {
+            again.push(frame);
+        }
+    }
+    // Text, as numbers that are none are not equal to themselves.
+    assert_eq!(format!("{found:?}"), format!("{again:?}"));
+    assert_eq!(whole.loss, pieces.loss);
+    whole.end_of_datagram();
+    assert!(whole.loss.noise_bytes <= bytes.len() as u64);
+    for frame in &found {
+        let sent = encode(frame.sender, frame.sequence, &frame.message, None);
+        assert!(sent.len() <= MAX_FRAME);
+        let mut reader = FrameReader::default();
+        reader.push(&sent);
+        let back = reader.next(None).expect("what is written can be read");
+        assert_eq!(format!("{:?}", back.message), format!("{:?}", frame.message));
+    }
+}
+
+/// The payload of FILE_TRANSFER_PROTOCOL; shorter ones are filled with zeros, as MAVLink does.
+fn ftp_packet(bytes: &[u8]) {
+    let mut payload = [0; PAYLOAD];
+    let length = bytes.len().min(PAYLOAD);
+    payload[..length].copy_from_slice(&bytes[..length]);
+    let Some(packet) = Packet::from_payload(&payload) else { return };
+    assert!(packet.data.len() <= MOST_DATA && packet.data.len() == usize::from(packet.size));
+    assert_eq!(Packet::from_payload(&packet.to_payload()).as_ref(), Some(&packet));
+    if let Some(refusal) = packet.refusal() {
+        assert!(!refusal.to_string().is_empty());
+    }
+}
+
+/// DATA16 of the show protocol, of any length, in both directions.
+fn show_status(bytes: &[u8]) {
+    let status = Status::from_data(bytes);
+    assert_eq!(Status::from_data(&status.to_data()).stage, status.stage);
+    assert_eq!(Stage::from_number(status.stage.number()), status.stage);
+    let _ = (status.obstacle(), status.stage.to_string(), status.stage.is_flying());
+    for length in [0, 5, 6, 9, 10, 12, 16, 255] {
+        if let Some(start) = StartConfig::from_data(bytes, length) {
+            let (data, length) = start.to_data();
+            assert_eq!(StartConfig::from_data(&data, length), Some(start));
+        }
+    }
+}
+
+/// What Skybrush Server says, line by line, through everything that reads it.
+fn server_line(bytes: &[u8]) {
+    let mut lines = Lines::new(1 << 16);
+    let mut monitor = Monitor::new(["01".to_owned()], 25.0, 0);
+    for (second, piece) in bytes.chunks(61).enumerate() {
+        if lines.push(piece).is_err() {
+            return;
+        }
+        while let Some(line) = lines.next_line() {
+            assert!(!line.contains(&b'\n'));
+            let Some(incoming) = message::parse(&line) else { continue };
+            let result = incoming.body.get("result").unwrap_or(&incoming.body);
+            if let Ok(log) = log_bytes(result) {
+                assert!(log.len() <= line.len());
+            }
+            let _ = log_entries(result);
+            let status = incoming.body.pointer("/status").and_then(|status| status.as_object());
+            let status = status.cloned().unwrap_or_default().into_iter().collect();
+            for (_, event) in monitor.look(second as u64 * 1_000_000, second > 3, &status) {
+                assert!(!event.to_string().is_empty());
+            }
         }
     }
 }

@@ -30,6 +30,10 @@ fn json_schemas_are_current() {
         (Format::Study, "study"),
         (Format::Cell, "cell"),
         (Format::Vehicle, "vehicle"),
+        (Format::Logs, "logs"),
+        (Format::Fleet, "fleet"),
+        (Format::Changes, "changes"),
+        (Format::Preflight, "preflight"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();

@@ -6,8 +6,12 @@ use schemars::schema_for;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use super::fleet::tables::PreflightOutput;
 use crate::analysis::result::Analysis;
 use crate::campaign::{CampaignIndex, FlightRecord};
+use crate::fleet::logs::manifest::Manifest;
+use crate::fleet::required::Changes;
+use crate::fleet::slots::FleetTable;
 use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
@@ -45,6 +49,14 @@ pub enum Format {
     Cell,
     /// vehicle files
     Vehicle,
+    /// logs/manifest.json
+    Logs,
+    /// fleet.json
+    Fleet,
+    /// fleet-changes.json
+    Changes,
+    /// what `updraft fleet preflight --json` prints
+    Preflight,
 }
 
 impl Format {
@@ -58,6 +70,10 @@ impl Format {
             Self::Study => schema_for!(StudyResult),
             Self::Cell => schema_for!(CellRecord),
             Self::Vehicle => schema_for!(Vehicle),
+            Self::Logs => schema_for!(Manifest),
+            Self::Fleet => schema_for!(FleetTable),
+            Self::Changes => schema_for!(Changes),
+            Self::Preflight => schema_for!(PreflightOutput),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;
         text.push('\n');

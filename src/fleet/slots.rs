@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::telemetry::Telemetry;
-use crate::base::file::write_whole;
-use crate::campaign::{CampaignError, read_json, to_json};
+use crate::base::file::{read_whole, write_whole};
+use crate::campaign::{CampaignError, to_json};
 use crate::link::clock::{Micros, S};
 use crate::link::id::DroneId;
 use crate::mission::Plan;
@@ -18,6 +18,8 @@ use crate::mission::Plan;
 pub const FLEET_SCHEMA: &str = "updraft.fleet/1";
 /// Its name in a flight's folder.
 pub const FLEET_FILE: &str = "fleet.json";
+/// A table is never longer, bytes.
+const MOST_BYTES: u64 = 16 << 20;
 /// A position older than this does not say where a drone stands.
 const FRESH: Micros = 5 * S;
 
@@ -58,12 +60,17 @@ impl FleetTable {
     /// Reads it.
     pub fn read(folder: &Path) -> Result<Self, CampaignError> {
         let path = Self::path(folder);
-        let table: Self = read_json(&path)?;
+        let bytes = read_whole(&path, MOST_BYTES)?;
+        Self::parse(&bytes).map_err(|reason| CampaignError::Json { path, reason })
+    }
+
+    /// A table from its JSON; else why not.
+    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let table: Self = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
         if table.schema == FLEET_SCHEMA {
             Ok(table)
         } else {
-            let reason = format!("this program reads \"{FLEET_SCHEMA}\", not \"{}\"", table.schema);
-            Err(CampaignError::Json { path, reason })
+            Err(format!("this program reads \"{FLEET_SCHEMA}\", not \"{}\"", table.schema))
         }
     }
 

@@ -173,7 +173,8 @@ impl Log {
         }
     }
 
-    fn why_not_a_log(&self) -> Option<String> {
+    /// What is there instead of a log; `None`: it begins as one.
+    pub fn why_not_a_log(&self) -> Option<String> {
         let bytes = self.bytes();
         let start = &bytes[..bytes.len().min(SEARCHED_BYTES)];
         let header = [MAGIC[0], MAGIC[1], FMT_ID];

@@ -29,6 +29,7 @@ const KEPT: usize = 10_000;
 pub struct Client {
     stream: TcpStream,
     lines: Lines,
+    most_line: usize,
     clock: Arc<dyn Clock>,
     next_id: u64,
     /// Ends of work by receipt, and progress.
@@ -61,6 +62,7 @@ impl Client {
                     return Ok(Self {
                         stream,
                         lines: Lines::new(MOST_LINE),
+                        most_line: MOST_LINE,
                         clock,
                         next_id: 0,
                         ended: BTreeMap::new(),
@@ -71,6 +73,14 @@ impl Client {
             }
         }
         Err(fail(last))
+    }
+
+    /// The same with another limit for the server's lines, bytes.
+    #[must_use]
+    pub fn with_longest_line(mut self, bytes: usize) -> Self {
+        self.lines = Lines::new(bytes);
+        self.most_line = bytes;
+        self
     }
 
     /// Asks, and waits for the answer's body.
@@ -170,19 +180,19 @@ impl Client {
     /// The next message until a time.
     fn receive(&mut self, what: &str, until: Micros) -> Result<Option<Incoming>, ServerError> {
         let broken = |source| ServerError::Broken { what: what.to_owned(), source };
+        let most = self.most_line;
         let mut buffer = vec![0; 1 << 16];
         loop {
-            while let Some(line) = self.lines.next() {
+            while let Some(line) = self.lines.next_line() {
                 if let Some(incoming) = message::parse(&line) {
                     return Ok(Some(incoming));
                 }
             }
             match self.stream.read(&mut buffer) {
                 Ok(0) => return Err(broken(io::ErrorKind::UnexpectedEof.into())),
-                Ok(size) => self
-                    .lines
-                    .push(&buffer[..size])
-                    .map_err(|_| ServerError::TooLong { most: MOST_LINE })?,
+                Ok(size) => {
+                    self.lines.push(&buffer[..size]).map_err(|_| ServerError::TooLong { most })?
+                }
                 Err(error) => match error.kind() {
                     io::ErrorKind::WouldBlock
                     | io::ErrorKind::TimedOut

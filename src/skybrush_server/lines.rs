@@ -2,38 +2,58 @@
 
 /// Takes bytes, gives lines; a line is bounded.
 #[derive(Debug)]
-pub(super) struct Lines {
+pub struct Lines {
     bytes: Vec<u8>,
     /// How much of `bytes` is known to hold no line's end.
     searched: usize,
+    /// Where the last line, which has no end yet, begins.
+    begun: usize,
     most: usize,
 }
 
 /// The line is longer than allowed.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) struct TooLong;
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooLong;
 
 impl Lines {
-    pub(super) fn new(most: usize) -> Self {
-        Self { bytes: Vec::new(), searched: 0, most }
+    /// Lines of at most `most` bytes.
+    pub fn new(most: usize) -> Self {
+        Self { bytes: Vec::new(), searched: 0, begun: 0, most }
     }
 
-    pub(super) fn push(&mut self, bytes: &[u8]) -> Result<(), TooLong> {
+    /// Takes what has arrived. It is looked at once, however long its line is.
+    ///
+    /// # Errors
+    /// When a line is too long; it is of no use to go on then.
+    pub fn push(&mut self, bytes: &[u8]) -> Result<(), TooLong> {
+        let mut begun = self.begun;
+        for (at, _) in bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n') {
+            let end = self.bytes.len() + at;
+            if end - begun > self.most {
+                return Err(TooLong);
+            }
+            begun = end + 1;
+        }
+        if self.bytes.len() + bytes.len() - begun > self.most {
+            return Err(TooLong);
+        }
+        self.begun = begun;
         self.bytes.extend_from_slice(bytes);
-        let begun = self.bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-        if self.bytes.len() - begun > self.most { Err(TooLong) } else { Ok(()) }
+        Ok(())
     }
 
     /// The next whole line, without its end.
-    pub(super) fn next(&mut self) -> Option<Vec<u8>> {
+    pub fn next_line(&mut self) -> Option<Vec<u8>> {
         let found = self.bytes[self.searched..].iter().position(|byte| *byte == b'\n');
         let Some(found) = found else {
             self.searched = self.bytes.len();
             return None;
         };
-        let rest = self.bytes.split_off(self.searched + found + 1);
+        let end = self.searched + found + 1;
+        let rest = self.bytes.split_off(end);
         let mut line = std::mem::replace(&mut self.bytes, rest);
         self.searched = 0;
+        self.begun -= end;
         line.pop();
         Some(line)
     }
@@ -50,10 +70,13 @@ mod tests {
             lines.push(piece).unwrap();
         }
         let mut found = Vec::new();
-        while let Some(line) = lines.next() {
+        while let Some(line) = lines.next_line() {
             found.push(String::from_utf8(line).unwrap());
         }
         assert_eq!(found, ["one", "two", ""]);
         assert_eq!(lines.push(b"012345678"), Err(TooLong));
+        lines.push(b"ree\n0123456789").unwrap();
+        assert_eq!(lines.next_line().unwrap(), b"three");
+        assert_eq!(lines.push(b"\n01234567890\n"), Err(TooLong), "though its end is there");
     }
 }

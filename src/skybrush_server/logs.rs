@@ -30,7 +30,7 @@ impl Client {
         let ended = self.finish(running, |_, _| true)?;
         Ok(ended
             .into_iter()
-            .map(|(drone, outcome)| (drone, outcome.and_then(|value| entries(&value))))
+            .map(|(drone, outcome)| (drone, outcome.and_then(|value| log_entries(&value))))
             .collect())
     }
 
@@ -40,7 +40,11 @@ impl Client {
     }
 }
 
-fn entries(value: &Value) -> Result<Vec<LogEntry>, String> {
+/// The logs in the end of a LOG-INF request.
+///
+/// # Errors
+/// When it is no list.
+pub fn log_entries(value: &Value) -> Result<Vec<LogEntry>, String> {
     let list = value.as_array().ok_or("the server's list of logs is no list")?;
     Ok(list
         .iter()

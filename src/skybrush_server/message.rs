@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 const VERSION: &str = "1.0";
 
 /// A message from the server.
-#[derive(Clone, Debug)]
-pub(super) struct Incoming {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Incoming {
     /// The request that it answers.
     pub refers_to: Option<String>,
     /// Kind of the body.
@@ -24,7 +24,7 @@ pub(super) fn request(id: &str, body: &Value) -> String {
 }
 
 /// A line from the server; `None`: it is none of its messages.
-pub(super) fn parse(line: &[u8]) -> Option<Incoming> {
+pub fn parse(line: &[u8]) -> Option<Incoming> {
     let mut value: Value = serde_json::from_slice(line).ok()?;
     let refers_to = value.get("refs").and_then(Value::as_str).map(str::to_owned);
     let body = value.get_mut("body")?.take();

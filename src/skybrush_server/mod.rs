@@ -6,14 +6,15 @@
 
 mod client;
 mod error;
-mod lines;
+pub mod lines;
 mod logs;
-mod message;
+pub mod message;
 mod show;
 mod upload;
+pub mod watch;
 
 pub use client::{Client, Outcome, Running};
 pub use error::ServerError;
-pub use logs::{LogEntry, log_bytes};
+pub use logs::{LogEntry, log_bytes, log_entries};
 pub use show::StartConfig;
 pub use upload::{Fence, ShowUpload};

@@ -18,6 +18,13 @@ pub struct StartConfig {
     pub duration_s: f64,
 }
 
+impl StartConfig {
+    /// No start.
+    pub fn none() -> Self {
+        Self { unix_s: None, authorized: false, drones: Vec::new(), duration_s: 0.0 }
+    }
+}
+
 impl Client {
     /// Tells the server when to start; it tells the drones once a second.
     pub fn set_start(&mut self, start: &StartConfig) -> Result<(), ServerError> {

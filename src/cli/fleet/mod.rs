@@ -186,8 +186,8 @@ fn with_crew(
                 .to_owned(),
         )),
         Target::Server(_) => Err(CommandError::Usage(
-            "through Skybrush Server the whole flight is one command: `updraft fly`; its single \
-             steps are in Skybrush Live"
+            "through Skybrush Server the whole flight is one command: `updraft fly`; of its \
+             single steps there are `fleet abort` and `fleet land`, the others are in Skybrush Live"
                 .to_owned(),
         )),
     }
@@ -285,16 +285,22 @@ fn end(context: &Context, args: &EndArgs, action: Action) -> Result<Exit, Comman
     if args.step.dry_run {
         return dry::end(context, &args.step, action);
     }
+    let only: Option<BTreeSet<DroneId>> =
+        args.drones.as_ref().map(|drones| drones.iter().copied().collect());
+    let links = match args.step.connect.target()? {
+        Target::Links(links) => links,
+        Target::Server(address) => return server::end(context, &address, only.as_ref(), action),
+        Target::Sim => {
+            return Err(CommandError::Usage(
+                "give the drones' own links with --connect".to_owned(),
+            ));
+        }
+    };
     let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())
         // Nobody looks for a flight's name while drones fall: any plan will do.
         .or_else(|error| any_flight(&args.step.campaign).ok_or(error))?;
-    let Target::Links(links) = args.step.connect.target()? else {
-        return Err(CommandError::Usage("give the drones' own links with --connect".to_owned()));
-    };
     let mut station = args.step.connect.open(links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    let only: Option<BTreeSet<DroneId>> =
-        args.drones.as_ref().map(|drones| drones.iter().copied().collect());
     crew.hear_anyone(args.step.connect.wait, only.as_ref())?;
     let done = crew.abort(only.as_ref(), action)?;
     let unsure = done.values().filter(|done| matches!(done, Aborted::Unconfirmed { .. })).count();

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::crew::Crew;
@@ -107,21 +108,33 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
     Ok(Exit::Done)
 }
 
-#[derive(Serialize)]
-struct PreflightOutput {
+/// What `fleet preflight --json` prints.
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct PreflightOutput {
+    /// Format name and version: `updraft.preflight/1`.
     schema: &'static str,
+    /// Whether everything is right for a start.
     go: bool,
+    /// Headings of every drone's cells.
     columns: [&'static str; 11],
+    /// The drones, in slot order.
     drones: Vec<PreflightRow>,
+    /// What is wrong with the fleet as a whole.
     fleet: Vec<String>,
 }
 
-#[derive(Serialize)]
+/// One drone before a start.
+#[derive(Serialize, JsonSchema)]
 struct PreflightRow {
+    /// Number of the slot.
     slot: u16,
+    /// The drone that flies it.
     drone: DroneId,
+    /// Whether everything is right with it.
     go: bool,
+    /// What was found, a text per column.
     cells: Vec<String>,
+    /// Why it must not start.
     no_go: Vec<String>,
 }
 

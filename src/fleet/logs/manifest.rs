@@ -33,13 +33,14 @@ pub struct ManifestEntry {
     pub file: String,
     /// Slot of the plan.
     pub slot: u16,
-    /// The drone, if it came over the air.
+    /// The drone, if it came over MAVLink; Skybrush Server's name for it is in `source`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drone: Option<DroneId>,
     /// Number of the log on the drone; each boot has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub boot: Option<u32>,
-    /// Its path on the drone, `log N` by the log messages, or the imported file's path.
+    /// Its path on the drone, `log N` by the log messages, the server with drone and log, or the
+    /// imported file's path.
     pub source: String,
     /// Size, bytes.
     pub size_bytes: u64,
@@ -66,6 +67,8 @@ pub enum Method {
     Mavftp,
     /// LOG_REQUEST_DATA.
     LogMessages,
+    /// Through Skybrush Server.
+    SkybrushServer,
     /// Copied from a card.
     Import,
 }
@@ -78,6 +81,8 @@ pub enum Verified {
     Checksum,
     /// Its size, and some pieces that were read again.
     Sample,
+    /// Its size, and that it can be read as a log.
+    Size,
     /// Read again from the card.
     Copy,
 }

@@ -238,6 +238,12 @@ fn read_journal(bytes: &[u8], identity: &str) -> (u64, Option<Intervals>) {
     (valid, have)
 }
 
+/// Of bytes in memory.
+pub fn sums_of(bytes: &[u8]) -> Sums {
+    let sha256 = format!("{:x}", Sha256::digest(bytes));
+    Sums { size: bytes.len() as u64, crc32: ap_crc32(bytes), sha256 }
+}
+
 /// Reads a file through.
 pub fn sums(path: &Path) -> Result<Sums, FileError> {
     let fail = |source| FileError::new("read", path, source);

@@ -1,0 +1,335 @@
+//! Flights through a running Skybrush Server.
+
+mod logs;
+mod watch;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::IsTerminal as _;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use serde_json::Value;
+
+use super::{LeadArgs, asked};
+use crate::campaign::FlightFolder;
+use crate::cli::clock::SystemClock;
+use crate::cli::context::Context;
+use crate::cli::exit::{CommandError, Exit, with_reasons};
+use crate::fleet::abort::Action;
+use crate::fleet::fence::Fence as Checked;
+use crate::link::clock::Clock as _;
+use crate::link::id::DroneId;
+use crate::mission::Plan;
+use crate::show::Show;
+use crate::show::skyc::drone_documents;
+use crate::skybrush_server::watch::{code_name, is_on_ground, warnings};
+use crate::skybrush_server::{Client, Fence, ServerError, ShowUpload, StartConfig};
+
+pub(in crate::cli) use logs::{list, pull};
+
+/// Distance of the fence's circle beyond the farthest corner, m.
+const BEYOND_M: f64 = 10.0;
+/// Shortest lead, s, as over MAVLink.
+const LEAST_LEAD_S: f64 = 20.0;
+/// Authorization after this is too late, s before the start.
+const AUTHORIZE_BEFORE_S: f64 = 12.0;
+
+/// A flight through a server.
+struct Flight<'a> {
+    /// The server.
+    address: &'a str,
+    folder: &'a FlightFolder,
+    plan: &'a Plan,
+    /// The server's names of the drones by slot.
+    drones: &'a BTreeMap<u16, String>,
+}
+
+impl Flight<'_> {
+    /// What a person types to end it.
+    fn abort(&self) -> String {
+        let Self { address, folder, .. } = self;
+        format!("updraft fleet abort {} --connect skybrush://{address}", folder.0.display())
+    }
+}
+
+impl From<ServerError> for CommandError {
+    fn from(error: ServerError) -> Self {
+        Self::Failed(with_reasons(&error))
+    }
+}
+
+fn connect(context: &Context, address: &str) -> Result<Client, CommandError> {
+    let mut client = Client::connect(address, Arc::new(SystemClock::start()))?;
+    context.say(&format!("{} at {address}", client.version()?));
+    Ok(client)
+}
+
+/// Slots and the server's names of their drones: by what is nearest to each home.
+fn assign(
+    context: &Context,
+    client: &mut Client,
+    plan: &Plan,
+) -> Result<BTreeMap<u16, String>, CommandError> {
+    let ids = client.drones()?;
+    let status = client.status(&ids)?;
+    let frame = plan.site.frame();
+    let allowed_m = crate::fleet::slots::allowed_m(plan);
+    let mut found: BTreeMap<u16, String> = BTreeMap::new();
+    let mut problems = Vec::new();
+    for (id, status) in &status {
+        // 1e-7 degrees, as the server has them.
+        let part = |index: usize| {
+            let value = status.pointer(&format!("/position/{index}")).and_then(Value::as_f64);
+            value.map(|value| value * 1e-7)
+        };
+        let (Some(lat_deg), Some(lon_deg)) = (part(0), part(1)) else {
+            problems.push(format!("drone {id} does not say where it stands"));
+            continue;
+        };
+        let place = crate::base::frame::Geodetic { lat_deg, lon_deg, amsl_m: 0.0 };
+        let at = frame.from_geodetic(place);
+        let near = plan.slots.iter().min_by(|a, b| {
+            let away = |slot: &crate::mission::plan::Slot| {
+                (at.x - slot.home_m[0]).hypot(at.y - slot.home_m[1])
+            };
+            away(a).total_cmp(&away(b))
+        });
+        let Some(near) = near else { continue };
+        let away_m = (at.x - near.home_m[0]).hypot(at.y - near.home_m[1]);
+        if away_m > allowed_m {
+            problems.push(format!("drone {id} stands {away_m:.1} m from slot {}", near.slot));
+        } else if let Some(other) = found.insert(near.slot, id.clone()) {
+            problems.push(format!("drones {other} and {id} both stand on slot {}", near.slot));
+        }
+    }
+    for slot in &plan.slots {
+        if !found.contains_key(&slot.slot) {
+            problems.push(format!("slot {} has no drone", slot.slot));
+        }
+    }
+    if problems.is_empty() {
+        return Ok(found);
+    }
+    for problem in &problems {
+        context.warn(problem);
+    }
+    Err(CommandError::Usage("the drones do not stand as planned; nothing was sent".to_owned()))
+}
+
+/// The whole flight.
+pub(in crate::cli) fn fly(
+    context: &Context,
+    address: &str,
+    folder: &FlightFolder,
+    plan: &Plan,
+    lead: &LeadArgs,
+    with_logs: bool,
+) -> Result<Exit, CommandError> {
+    if !lead.yes && !std::io::stdin().is_terminal() {
+        return Err(CommandError::Usage(
+            "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
+        ));
+    }
+    if lead.lead < LEAST_LEAD_S {
+        return Err(CommandError::Usage(format!(
+            "a lead of {} s is not possible: give at least {LEAST_LEAD_S} s; the drones set their \
+             home and arm in the last 10 s",
+            lead.lead
+        )));
+    }
+    let show = Show::of_plan(plan);
+    // The same fence and the same refusal as over MAVLink.
+    let checked =
+        Checked::of(plan, &show).map_err(|error| CommandError::Usage(error.to_string()))?;
+    let corners = &plan.fence.polygon_m;
+    let homes = plan.slots.iter().map(|slot| slot.home_m);
+    let reach_m = homes
+        .flat_map(|home| {
+            corners.iter().map(move |corner| (corner[0] - home[0]).hypot(corner[1] - home[1]))
+        })
+        .fold(0.0, f64::max);
+    let upload = ShowUpload {
+        id: plan.name.clone(),
+        title: plan.title.clone(),
+        drones: plan.slots.len(),
+        frame: plan.site.frame(),
+        fence: Fence {
+            polygon_m: corners.clone(),
+            max_altitude_m: checked.top_m,
+            max_distance_m: reach_m + BEYOND_M,
+        },
+    };
+    let mut client = connect(context, address)?;
+    let drones = assign(context, &mut client, plan)?;
+    let flight = Flight { address, folder, plan, drones: &drones };
+    let refused = send_shows(context, &mut client, &flight, &show, &upload)?;
+    if refused > 0 {
+        context
+            .insist(&format!("NO-GO: {refused} drones do not have the show; nothing was started"));
+        return Ok(Exit::Unsafe);
+    }
+    let ids: Vec<String> = drones.values().cloned().collect();
+    let troubled = troubled(&client.status(&ids)?);
+    for problem in &troubled {
+        context.warn(problem);
+    }
+    if !troubled.is_empty() {
+        context.insist("NO-GO: nothing was started; Skybrush Live tells more of these drones");
+        return Ok(Exit::Unsafe);
+    }
+    let Some(unix_s) = start(&mut client, &flight, lead)? else {
+        return Err(CommandError::Usage("not authorized: the start was taken back".to_owned()));
+    };
+    context.say(&format!(
+        "Authorized. Ctrl-C stops watching; `{}` sends everyone home",
+        flight.abort()
+    ));
+    let watched = watch::watch(context, &mut client, &flight, unix_s)?;
+    for id in &watched.in_the_air {
+        context.warn(&format!("drone {id} has not been seen to land"));
+    }
+    let landed = drones.len() - watched.in_the_air.len();
+    context.say(&format!("{landed} of {} drones have landed", drones.len()));
+    let flown =
+        if watched.in_the_air.is_empty() && !watched.alarms { Exit::Done } else { Exit::Losses };
+    if !with_logs {
+        return Ok(flown);
+    }
+    let brought = logs::bring(context, &mut client, address, folder, plan, &drones)?;
+    Ok(if brought == Exit::Done { flown } else { brought })
+}
+
+/// Sends every drone its show; how many do not have it.
+fn send_shows(
+    context: &Context,
+    client: &mut Client,
+    flight: &Flight<'_>,
+    show: &Show,
+    upload: &ShowUpload,
+) -> Result<usize, CommandError> {
+    let mut refused = 0;
+    for (index, (slot, drone)) in flight.plan.slots.iter().zip(&show.drones).enumerate() {
+        context.check_stop()?;
+        let Some(id) = flight.drones.get(&slot.slot) else { continue };
+        let (trajectory, lights) = drone_documents(drone)
+            .map_err(|problem| CommandError::Failed(format!("slot {}: {problem}", slot.slot)))?;
+        let payload = upload.payload(index, &trajectory, lights.as_ref())?;
+        let running = client.upload(id, &payload)?;
+        let ended = client.finish(running, |_, _| !stopped(context))?;
+        context.check_stop()?;
+        let reason = match ended.get(id) {
+            Some(Ok(_)) => continue,
+            Some(Err(reason)) => reason.as_str(),
+            None => "the server says nothing of it",
+        };
+        refused += 1;
+        context.warn(&format!("drone {id} (slot {}): {reason}", slot.slot));
+    }
+    context.check_stop()?;
+    Ok(refused)
+}
+
+/// The two steps of a start: its time, and its authorization; the Unix time, s, if a person or
+/// `--yes` authorized it.
+fn start(
+    client: &mut Client,
+    flight: &Flight<'_>,
+    lead: &LeadArgs,
+) -> Result<Option<i64>, CommandError> {
+    let now_us = SystemClock::start().unix_us();
+    let unix_s = (now_us / 1_000_000) as i64 + lead.lead.ceil() as i64;
+    let mut start = StartConfig {
+        unix_s: Some(unix_s),
+        authorized: false,
+        drones: flight.drones.values().cloned().collect(),
+        duration_s: flight.plan.duration_ms as f64 / 1000.0,
+    };
+    client.set_start(&start)?;
+    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
+        client.set_start(&StartConfig::none())?;
+        return Ok(None);
+    }
+    // A person may take their time.
+    let left_s = unix_s as f64 - SystemClock::start().unix_us() as f64 * 1e-6;
+    if left_s < AUTHORIZE_BEFORE_S {
+        client.set_start(&StartConfig::none())?;
+        return Err(CommandError::Usage(format!(
+            "{left_s:.0} s before the start it is too late to authorize it: the drones set their \
+             home and arm in the last 10 s; it was taken back, give a longer --lead"
+        )));
+    }
+    start.authorized = true;
+    if let Err(error) = client.set_start(&start) {
+        let back = match client.set_start(&StartConfig::none()) {
+            Ok(()) => "it was taken back".to_owned(),
+            Err(_) => format!(
+                "IT MAY BE AUTHORIZED all the same, and it could not be taken back: use Skybrush \
+                 Live, or `{}`",
+                flight.abort()
+            ),
+        };
+        return Err(CommandError::Failed(format!(
+            "the start was not authorized: {}\n  {back}",
+            with_reasons(&error)
+        )));
+    }
+    Ok(Some(unix_s))
+}
+
+fn stopped(context: &Context) -> bool {
+    context.stop_flag().load(Ordering::SeqCst)
+}
+
+/// Drones that must not start, with why.
+fn troubled(status: &BTreeMap<String, Value>) -> Vec<String> {
+    let one = |(id, status): (&String, &Value)| {
+        let codes = warnings(status);
+        let text = |code: &u64| format!("{} (code {code})", code_name(*code));
+        let texts: Vec<String> = codes.iter().map(text).collect();
+        (!texts.is_empty()).then(|| format!("drone {id}: {}", texts.join(", ")))
+    };
+    status.iter().filter_map(one).collect()
+}
+
+/// Ends flights: those in the air return or land, the start is taken back when all are meant.
+pub(in crate::cli) fn end(
+    context: &Context,
+    address: &str,
+    only: Option<&BTreeSet<DroneId>>,
+    action: Action,
+) -> Result<Exit, CommandError> {
+    let mut client = connect(context, address)?;
+    let is_meant = |id: &String| {
+        only.is_none_or(|only| id.parse().is_ok_and(|drone: DroneId| only.contains(&drone)))
+    };
+    let ids: Vec<String> = client.drones()?.into_iter().filter(is_meant).collect();
+    // Who is not known to be on the ground is told to come down.
+    let status = client.status(&ids)?;
+    let (down, up): (Vec<String>, Vec<String>) =
+        ids.into_iter().partition(|id| status.get(id).is_some_and(is_on_ground));
+    let mut unsure = 0;
+    if !up.is_empty() {
+        let running = client.end_flight(&up, action == Action::Return)?;
+        let done = client.finish(running, |_, _| !stopped(context))?;
+        for id in &up {
+            let text = match done.get(id) {
+                Some(Ok(_)) if action == Action::Return => "returns".to_owned(),
+                Some(Ok(_)) => "lands where it is".to_owned(),
+                Some(Err(reason)) => format!("NOT CONFIRMED: {reason}"),
+                None => "NOT CONFIRMED: the server says nothing of it".to_owned(),
+            };
+            unsure += usize::from(!matches!(done.get(id), Some(Ok(_))));
+            context.emit(&format!("drone {id}: {text}\n"))?;
+        }
+    }
+    for id in &down {
+        context.emit(&format!("drone {id}: on the ground\n"))?;
+    }
+    if only.is_none() {
+        client.set_start(&StartConfig::none())?;
+        context.emit("the start is taken back\n")?;
+    } else if !down.is_empty() {
+        context.warn("the start stays for drones on the ground: without --drones it is taken back");
+    }
+    Ok(if unsure == 0 { Exit::Done } else { Exit::Losses })
+}

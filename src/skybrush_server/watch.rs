@@ -1,0 +1,305 @@
+//! What a show looks like from the server: states, errors and batteries of its drones (UAV-INF).
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::link::clock::{Micros, S};
+
+/// Codes below are states of a healthy drone.
+const FIRST_WARNING: u64 = 64;
+const ON_GROUND: u64 = 1;
+const LANDED: u64 = 7;
+/// The server forgets drones that are silent for so long.
+const SILENT: Micros = 5 * S;
+
+/// What the server's number for a state or an error means.
+pub fn code_name(code: u64) -> &'static str {
+    match code {
+        1 => "on the ground",
+        2 => "its logging is off",
+        3 => "pre-arm check running",
+        4 => "initializing",
+        5 => "take-off",
+        6 => "landing",
+        7 => "landed",
+        8 => "motors running on the ground",
+        9 => "sleeping",
+        63 => "returning home",
+        64 => "its disk is nearly full",
+        65 => "no remote control",
+        66 => "battery low",
+        67 => "its clock is not synchronised",
+        68 => "far from its take-off position",
+        69 => "its mission is not set up",
+        71 => "near its fence",
+        73 => "its motors are disarmed for good (safety switch)",
+        74 => "it must be rebooted",
+        75 => "far from where it should be",
+        128 => "no communication with the autopilot",
+        131 => "pre-arm check failed",
+        133 => "GPS error",
+        134 => "battery error",
+        137 => "configuration error",
+        142 => "motor controller error",
+        193 => "magnetometer broken",
+        194 => "gyroscope broken",
+        195 => "accelerometer broken",
+        196 => "barometer broken",
+        197 => "GPS broken",
+        198 => "motor broken",
+        199 => "battery critical",
+        201 => "has left its fence",
+        205 => "its autopilot did not start",
+        207 => "crashed",
+        192..=254 => "critical error",
+        128..=191 => "error",
+        64..=127 => "warning",
+        _ => "unknown state",
+    }
+}
+
+/// Codes of a drone's status.
+pub fn codes(status: &Value) -> BTreeSet<u64> {
+    let list = status.get("errors").and_then(Value::as_array);
+    list.into_iter().flatten().filter_map(Value::as_u64).collect()
+}
+
+/// Codes of a drone's status that keep it from flying.
+pub fn warnings(status: &Value) -> BTreeSet<u64> {
+    codes(status).into_iter().filter(|code| *code >= FIRST_WARNING).collect()
+}
+
+/// Whether a drone is on the ground for certain.
+pub fn is_on_ground(status: &Value) -> bool {
+    let codes = codes(status);
+    codes.contains(&ON_GROUND) || codes.contains(&LANDED)
+}
+
+/// What happened to a drone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Event {
+    /// It is in another flight mode.
+    Mode {
+        /// Its name, as the server has it.
+        mode: String,
+    },
+    /// It has come into a state, or has an error.
+    Code {
+        /// The server's number.
+        code: u64,
+    },
+    /// An error is gone.
+    CodeGone {
+        /// The server's number.
+        code: u64,
+    },
+    /// Its battery is low.
+    BatteryLow {
+        /// What is left, %.
+        percent: f64,
+    },
+    /// The server has heard nothing of it for too long.
+    Silent {
+        /// How long, s.
+        seconds: u64,
+    },
+    /// It is heard again.
+    HeardAgain,
+}
+
+impl Event {
+    /// Whether a person must look at it at once.
+    pub fn is_alarm(&self) -> bool {
+        match self {
+            Self::Code { code } => *code >= FIRST_WARNING,
+            Self::BatteryLow { .. } | Self::Silent { .. } => true,
+            _ => false,
+        }
+    }
+}
+
+impl std::fmt::Display for Event {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Mode { mode } => write!(f, "flight mode {mode}"),
+            Self::Code { code } if *code < FIRST_WARNING => f.write_str(code_name(*code)),
+            Self::Code { code } => write!(f, "{} (code {code})", code_name(*code)),
+            Self::CodeGone { code } => write!(f, "no longer: {} (code {code})", code_name(*code)),
+            Self::BatteryLow { percent } => write!(f, "battery low: {percent:.0} %"),
+            Self::Silent { seconds } => write!(f, "not heard by the server for {seconds} s"),
+            Self::HeardAgain => f.write_str("heard again"),
+        }
+    }
+}
+
+#[derive(Debug, Default)]
+struct Watched {
+    mode: Option<String>,
+    codes: Option<BTreeSet<u64>>,
+    low: bool,
+    silent: bool,
+    timestamp: Option<Value>,
+    heard: Micros,
+    /// Off the ground, or about to be, since the start.
+    flown: bool,
+    landed: bool,
+}
+
+/// Watches a show: statuses in, events out. It does nothing on its own.
+#[derive(Debug)]
+pub struct Monitor {
+    battery_percent: f64,
+    drones: BTreeMap<String, Watched>,
+}
+
+impl Monitor {
+    /// Watches these drones. `battery_percent`: told once below.
+    pub fn new(
+        drones: impl IntoIterator<Item = String>,
+        battery_percent: f64,
+        now: Micros,
+    ) -> Self {
+        let watched = |id| (id, Watched { heard: now, ..Watched::default() });
+        Self { battery_percent, drones: drones.into_iter().map(watched).collect() }
+    }
+
+    /// Takes what the server says of its drones. `started`: the start is over, so that who has
+    /// landed has flown.
+    pub fn look(
+        &mut self,
+        now: Micros,
+        started: bool,
+        status: &BTreeMap<String, Value>,
+    ) -> Vec<(String, Event)> {
+        let mut told = Vec::new();
+        for (id, watched) in &mut self.drones {
+            let mut tell = |event| told.push((id.clone(), event));
+            watched.hearing(now, status.get(id), &mut tell);
+            if let Some(status) = status.get(id) {
+                watched.states(status, self.battery_percent, started, &mut tell);
+            }
+        }
+        told
+    }
+
+    /// Whether everyone has landed after the start.
+    pub fn is_over(&self) -> bool {
+        self.drones.values().all(|watched| watched.landed)
+    }
+
+    /// Who has not landed.
+    pub fn in_the_air(&self) -> Vec<&str> {
+        let open = self.drones.iter().filter(|(_, watched)| !watched.landed);
+        open.map(|(id, _)| id.as_str()).collect()
+    }
+}
+
+impl Watched {
+    /// A drone that is gone has no status, or one that does not get newer.
+    fn hearing(&mut self, now: Micros, status: Option<&Value>, tell: &mut dyn FnMut(Event)) {
+        if let Some(status) = status {
+            let timestamp = status.get("timestamp");
+            if timestamp.is_none() || timestamp != self.timestamp.as_ref() {
+                self.timestamp = timestamp.cloned();
+                self.heard = now;
+            }
+        }
+        let silence = now.saturating_sub(self.heard);
+        let silent = silence > SILENT;
+        if silent != self.silent {
+            self.silent = silent;
+            let seconds = silence / S;
+            tell(if silent { Event::Silent { seconds } } else { Event::HeardAgain });
+        }
+    }
+
+    fn states(
+        &mut self,
+        status: &Value,
+        battery_percent: f64,
+        started: bool,
+        tell: &mut dyn FnMut(Event),
+    ) {
+        if let Some(mode) = status.get("mode").and_then(Value::as_str) {
+            if self.mode.as_deref().is_some_and(|old| old != mode) {
+                tell(Event::Mode { mode: mode.to_owned() });
+            }
+            self.mode = Some(mode.to_owned());
+        }
+        let now = codes(status);
+        // The states of the first look are where it stands; its errors were looked at before.
+        let before = self.codes.replace(now.clone()).unwrap_or_else(|| now.clone());
+        for code in now.difference(&before) {
+            tell(Event::Code { code: *code });
+        }
+        for code in before.difference(&now).filter(|code| **code >= FIRST_WARNING) {
+            tell(Event::CodeGone { code: *code });
+        }
+        let percent = status.pointer("/battery/1").and_then(Value::as_f64);
+        if let Some(percent) = percent.filter(|percent| *percent < battery_percent)
+            && !self.low
+        {
+            self.low = true;
+            tell(Event::BatteryLow { percent });
+        }
+        // Not every driver of the server says that a drone has landed: those of ArduPilot are on
+        // the ground again.
+        self.flown |= started && !is_on_ground(status);
+        self.landed = started && (now.contains(&LANDED) || self.flown && now.contains(&ON_GROUND));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn look(monitor: &mut Monitor, second: u64, started: bool, status: Value) -> Vec<String> {
+        let status = BTreeMap::from([("01".to_owned(), status)]);
+        let told = monitor.look(second * S, started, &status);
+        told.iter().map(|(id, event)| format!("{id} {event} {}", event.is_alarm())).collect()
+    }
+
+    #[test]
+    fn a_flight_is_told_and_its_end_is_seen() {
+        let mut monitor = Monitor::new(["01".to_owned()], 25.0, 0);
+        let status = |mode: &str, codes: &[u64], percent: f64, time: u64| json!({ "mode": mode, "errors": codes, "battery": [123, percent], "timestamp": time });
+        let nothing: [&str; 0] = [];
+        // Landed from the flight before.
+        assert_eq!(look(&mut monitor, 0, false, status("stab", &[7], 90.0, 0)), nothing);
+        assert!(!monitor.is_over());
+        let told = look(&mut monitor, 1, false, status("show", &[1], 90.0, 1));
+        assert_eq!(told, ["01 flight mode show false", "01 on the ground false"]);
+        let told = look(&mut monitor, 2, true, status("show", &[5, 75], 24.0, 2));
+        assert_eq!(
+            told,
+            [
+                "01 take-off false",
+                "01 far from where it should be (code 75) true",
+                "01 battery low: 24 % true"
+            ]
+        );
+        let told = look(&mut monitor, 3, true, status("show", &[], 23.0, 3));
+        assert_eq!(told, ["01 no longer: far from where it should be (code 75) false"]);
+        let told = look(&mut monitor, 9, true, status("show", &[], 23.0, 3));
+        assert_eq!(told, ["01 not heard by the server for 6 s true"]);
+        assert_eq!(monitor.in_the_air(), ["01"]);
+        let told = look(&mut monitor, 10, true, status("land", &[7], 23.0, 4));
+        assert_eq!(told, ["01 heard again false", "01 flight mode land false", "01 landed false"]);
+        assert!(monitor.is_over());
+        // One whose driver does not tell its landing; on the ground it waits for the start.
+        let mut other = Monitor::new(["01".to_owned()], 25.0, 0);
+        for (second, code, over) in [(0, 1, false), (1, 8, false), (2, 5, false), (3, 1, true)] {
+            look(&mut other, second, true, status("show", &[code], 90.0, second));
+            assert_eq!(other.is_over(), over, "{second}");
+        }
+        // One that the server does not know any more.
+        let told = monitor.look(16 * S, true, &BTreeMap::new());
+        assert_eq!(told, [("01".to_owned(), Event::Silent { seconds: 6 })]);
+    }
+}

@@ -1,0 +1,246 @@
+//! The whole program against a Skybrush Server that is none.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+#[path = "cli/support.rs"]
+mod cli_support;
+mod skybrush_server_support;
+
+use std::fs;
+use std::process::Stdio;
+use std::sync::Arc;
+use std::time::Instant;
+
+use cli_support::{Bench, Ended};
+use serde_json::{Value, json};
+use skybrush_server_support::{Fake, Fault};
+use updraft::link::clock::{Clock, Micros};
+use updraft::skybrush_server::Client;
+
+/// Its only flight takes half a minute, and two drones.
+fn planned() -> Bench {
+    let bench = Bench::new();
+    let args = ["plan", "hover", "--grid", "1x2", "--set", "duration_s=10", "-o", "campaign"];
+    bench.expect(0, &args);
+    bench
+}
+
+fn plan(bench: &Bench) -> Value {
+    serde_json::from_slice(&fs::read(bench.path("campaign/plan.json")).unwrap()).unwrap()
+}
+
+fn run(bench: &Bench, server: &Fake, args: &[&str]) -> Ended {
+    let mut command = bench.command(args);
+    command.args(["--connect", &format!("skybrush://{}", server.address)]);
+    let ended = Ended::of(&command.stdin(Stdio::null()).output().unwrap());
+    let port = server.address.port().to_string();
+    Ended { err: ended.err.replace(&port, "PORT"), out: ended.out.replace(&port, "PORT"), ..ended }
+}
+
+fn fly(bench: &Bench, fault: Fault) -> (Ended, Fake) {
+    let server = Fake::start(&plan(bench), fault);
+    let ended = run(bench, &server, &["fly", "campaign", "--yes", "--lead", "20"]);
+    (ended, server)
+}
+
+fn refused(fault: Fault) -> String {
+    let (ended, server) = fly(&planned(), fault);
+    assert!(!server.is_authorized(), "{ended}");
+    ended.to_string()
+}
+
+#[test]
+fn a_flight_is_uploaded_started_watched_and_brings_its_logs_home() {
+    let bench = planned();
+    let begun = Stopwatch::start();
+    let (ended, server) = fly(&bench, Fault::None);
+    assert_eq!(ended.code, Some(0), "{ended}");
+    // It does not wait for the time at which the show ends, and some.
+    assert!(begun.now() < 60_000_000, "{ended}");
+    insta::assert_snapshot!(ended.err);
+
+    // What the server was told.
+    let plan = plan(&bench);
+    let asked = server.asked();
+    let uploads: Vec<&Value> = asked.iter().filter(|body| body["type"] == "OBJ-CMD").collect();
+    assert_eq!(uploads.len(), 2);
+    for (index, upload) in uploads.iter().enumerate() {
+        assert_eq!(upload["command"], "__show_upload");
+        // The drones stand the other way round.
+        let id = ["02", "01"][index];
+        assert_eq!(upload["ids"], json!([id]));
+        let show = &upload["kwds"]["show"];
+        assert_eq!(show["trajectory"]["version"], 1);
+        assert_eq!(show["mission"]["index"], index);
+        assert_eq!(show["coordinateSystem"]["type"], "nwu");
+        assert_eq!(show["coordinateSystem"]["origin"], json!([19.0621, 47.4733]));
+        assert_eq!(show["geofence"]["enabled"], true);
+        assert_eq!(show["geofence"]["polygons"][0]["points"], plan["fence"]["polygon_m"]);
+        assert_eq!(show["geofence"]["maxAltitude"], plan["fence"]["max_altitude_m"]);
+    }
+    let starts: Vec<&Value> = asked.iter().filter(|body| body["type"] == "SHOW-SETCFG").collect();
+    let start = |index: usize| &starts[index]["configuration"]["start"];
+    assert_eq!(starts.len(), 2);
+    assert_eq!((&start(0)["authorized"], &start(1)["authorized"]), (&json!(false), &json!(true)));
+    assert_eq!(start(0)["time"], start(1)["time"]);
+    assert_eq!(start(1)["uavIds"], json!(["02", "01"]));
+
+    // What came home.
+    let manifest = fs::read(bench.path("campaign/logs/manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_slice(&manifest).unwrap();
+    for (index, id) in ["02", "01"].into_iter().enumerate() {
+        let entry = &manifest["logs"][index];
+        assert_eq!(entry["slot"], index + 1);
+        assert_eq!(entry["method"], "skybrush_server");
+        assert_eq!(entry["verified"], "size");
+        assert_eq!(entry["boot"], 2);
+        assert!(entry["source"].as_str().unwrap().ends_with(&format!("drone {id} log 2")));
+        let file = entry["file"].as_str().unwrap();
+        let came = fs::read(bench.path("campaign/logs").join(file)).unwrap();
+        assert!(came == skybrush_server_support::log(id), "{file}");
+    }
+    bench.expect(0, &["logs", "verify", "campaign"]);
+    let journal = fs::read_to_string(bench.path("campaign/fleet-journal.ndjson")).unwrap();
+    assert!(journal.contains(r#""server_drone":"01","event":"code","code":7"#), "{journal}");
+}
+
+#[test]
+fn errors_and_a_server_that_goes_away_are_told_while_it_flies() {
+    let (ended, _) = fly(&planned(), Fault::TroubleInFlight);
+    assert_eq!(ended.code, Some(3), "{ended}");
+    insta::assert_snapshot!(ended.err);
+}
+
+#[test]
+fn shows_that_cannot_be_flown_are_refused_before_anything_is_sent() {
+    let mut said = String::new();
+    let mut change = |change: &dyn Fn(&mut Value)| {
+        let bench = planned();
+        let mut plan = plan(&bench);
+        change(&mut plan);
+        fs::write(bench.path("campaign/plan.json"), plan.to_string()).unwrap();
+        let (ended, server) = fly(&bench, Fault::None);
+        assert!(server.asked().is_empty(), "{ended}");
+        said += &format!("{ended}\n");
+    };
+    change(&|plan| plan["fence"]["polygon_m"] = json!([]));
+    change(&|plan| plan["fence"]["polygon_m"] = json!([[-1, -1], [1, -1], [1, 1], [-1, 1]]));
+    change(&|plan| plan["fence"]["max_altitude_m"] = json!(12.0));
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn nobody_starts_without_a_person() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::None);
+    let ended = run(&bench, &server, &["fly", "campaign"]);
+    assert!(server.asked().is_empty(), "{ended}");
+    let short = run(&bench, &server, &["fly", "campaign", "--yes", "--lead", "10"]);
+    assert!(server.asked().is_empty(), "{short}");
+    insta::assert_snapshot!(format!("{ended}\n{short}"));
+}
+
+#[test]
+fn every_refusal_says_why() {
+    let faults = [
+        Fault::StandsWrong,
+        Fault::Upload("file transfer failed"),
+        Fault::UploadTimeout,
+        Fault::Nak("OBJ-CMD"),
+        Fault::Nak("SHOW-SETCFG"),
+        Fault::Gone("OBJ-CMD"),
+        Fault::Trouble,
+    ];
+    let said: Vec<String> =
+        faults.iter().map(|fault| format!("{fault:?}\n{}", refused(*fault))).collect();
+    insta::assert_snapshot!(said.join("\n"));
+}
+
+#[test]
+fn an_authorization_that_fails_is_taken_back() {
+    let (ended, server) = fly(&planned(), Fault::NakAuthorization);
+    assert_eq!(ended.code, Some(1), "{ended}");
+    assert!(!server.is_authorized());
+    let last = server.asked().pop().unwrap();
+    assert_eq!(last["configuration"]["start"]["time"], Value::Null, "{last}");
+    insta::assert_snapshot!(ended.err);
+}
+
+#[test]
+fn logs_are_listed_and_pulled_and_losses_are_named() {
+    let bench = planned();
+    let pull = |fault| {
+        let server = Fake::start(&plan(&bench), fault);
+        run(&bench, &server, &["logs", "pull", "campaign"]).to_string()
+    };
+    let server = Fake::start(&plan(&bench), Fault::None);
+    let mut said = run(&bench, &server, &["logs", "list", "campaign"]).to_string();
+    for fault in [
+        Fault::LogSize,
+        Fault::LogCut,
+        Fault::LogGarbled,
+        Fault::LogIsNone,
+        Fault::Nak("LOG-DATA"),
+        Fault::Gone("LOG-DATA"),
+    ] {
+        said += &format!("\n{fault:?}\n{}", pull(fault));
+        assert!(!bench.path("campaign/logs/1.BIN").exists());
+    }
+    said += &format!("\nwhole\n{}", pull(Fault::None));
+    // What is there is not asked for again.
+    said += &format!("\nagain\n{}", pull(Fault::Nak("LOG-DATA")));
+    insta::assert_snapshot!(said);
+    bench.expect(0, &["logs", "verify", "campaign"]);
+}
+
+#[test]
+fn abort_brings_down_who_flies_and_takes_the_start_back() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::OneFlies);
+    let all = run(&bench, &server, &["fleet", "abort", "campaign"]);
+    let asked = server.asked();
+    let rth = asked.iter().find(|body| body["type"] == "UAV-RTH").unwrap();
+    assert_eq!(rth["ids"], json!(["01"]));
+    assert_eq!(asked.last().unwrap()["configuration"]["start"]["authorized"], false);
+    let one = run(&bench, &server, &["fleet", "land", "campaign", "--drones", "2"]);
+    assert!(!server.asked().iter().any(|body| body["type"] == "UAV-LAND"));
+    insta::assert_snapshot!(format!("{all}\n{one}"));
+}
+
+#[test]
+fn nobody_at_the_address_is_said() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::None);
+    server.stop();
+    let ended = run(&bench, &server, &["logs", "list", "campaign"]);
+    insta::assert_snapshot!(ended.to_string());
+}
+
+struct Stopwatch(Instant);
+
+impl Stopwatch {
+    #[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+}
+
+impl Clock for Stopwatch {
+    fn now(&self) -> Micros {
+        self.0.elapsed().as_micros() as Micros
+    }
+
+    fn unix_us(&self) -> u64 {
+        0
+    }
+}
+
+#[test]
+fn a_line_without_an_end_is_refused_at_its_limit() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::Endless);
+    let clock = Arc::new(Stopwatch::start());
+    let client = Client::connect(&server.address.to_string(), clock).unwrap();
+    let error = client.with_longest_line(1 << 20).version().unwrap_err();
+    insta::assert_snapshot!(error.to_string());
+}
