@@ -9,6 +9,8 @@ mod support;
 mod analyze;
 #[path = "cli/check.rs"]
 mod check;
+#[path = "cli/fleet.rs"]
+mod fleet;
 #[path = "cli/help.rs"]
 mod help;
 #[path = "cli/inspect.rs"]

@@ -10,7 +10,7 @@ use super::exit::{CommandError, Exit};
 use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
-use super::fleet::sim::{Hangar, TO_START};
+use super::fleet::sim::{Hangar, Mishaps, TO_START};
 use super::fleet::{LeadArgs, fly_now, one_flight, server, tables};
 use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
 use crate::base::time::GpsTime;
@@ -190,6 +190,7 @@ fn launch(
         pace: Pace::Fast { ground: GROUND_PACE },
         faults: Faults::default(),
         boot: BootTimes::short(),
+        mishaps: Mishaps::default(),
     };
     // A part of the fleet is a fleet of its own.
     let mut part = plan.clone();

@@ -255,6 +255,41 @@ struct PullOutput {
     logs: Vec<Brought>,
 }
 
+/// A word of a shell's command line.
+fn word(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:@,+=".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}
+
+/// The command that brings these slots' logs, over the same links and with the same options.
+fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
+    let campaign = args.campaign.display().to_string();
+    let mut words = vec!["updraft logs pull".to_owned(), word(&campaign)];
+    let mut add = |option: &str, value: &str| words.push(format!("{option} {}", word(value)));
+    add("--flight", flight);
+    for link in &args.connect.connect {
+        add("--connect", link);
+    }
+    if let Some(key) = &args.connect.key {
+        add("--key", &key.display().to_string());
+    }
+    match args.log {
+        Which::Newest => {}
+        Which::All => add("--log", "all"),
+        Which::Number(number) => add("--log", &number.to_string()),
+    }
+    if let Some(rate) = args.rate {
+        add("--rate", &rate.to_string());
+    }
+    let slots: Vec<String> = slots.iter().map(u16::to_string).collect();
+    add("--slots", &slots.join(","));
+    words.join(" ")
+}
+
 fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     let _lock = context.lock(&args.campaign)?;
@@ -282,11 +317,9 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
     let lost = brought.iter().any(|one| one.state == "missing");
     if lost {
-        context.insist(&format!(
-            "To try again: updraft logs pull {} --flight {}",
-            args.campaign.display(),
-            plan.name
-        ));
+        let lost: Vec<u16> =
+            brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
+        context.insist(&format!("To try again: {}", once_more(args, &plan.name, &lost)));
     }
     if context.json {
         context.print_json(&PullOutput { schema: "updraft.pull/1", logs: brought })?;

@@ -1,5 +1,6 @@
 //! Virtual drones: the fleet of `--connect sim`, of `run`, and of `fleet virtual`.
 
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 
 use super::connect::{own_link, station};
@@ -35,6 +36,20 @@ pub(in crate::cli) struct Hangar<'a> {
     pub(in crate::cli) pace: Pace,
     pub(in crate::cli) faults: Faults,
     pub(in crate::cli) boot: BootTimes,
+    pub(in crate::cli) mishaps: Mishaps,
+}
+
+/// What befalls virtual drones, besides a bad link, and what they bring along.
+#[derive(Clone, Debug, Default)]
+pub(in crate::cli) struct Mishaps {
+    /// Slots whose drones are switched off for good.
+    pub(in crate::cli) gone: Vec<u16>,
+    /// Slots whose drones reboot once.
+    pub(in crate::cli) reboot: Vec<u16>,
+    /// When, their time from being switched on.
+    pub(in crate::cli) at: Micros,
+    /// Logs that are on their cards, by slot.
+    pub(in crate::cli) cards: BTreeMap<u16, Vec<u8>>,
 }
 
 impl Hangar<'_> {
@@ -73,9 +88,19 @@ impl Hangar<'_> {
                 let system = index as u8 + 1;
                 let mut setup = VehicleSetup::new(slot.slot, system, slot.home_m.into());
                 setup.boot = self.boot;
-                VirtualVehicle::new(&world, setup, Box::new(MemoryStorage::default()), 0)
+                let mishaps = &self.mishaps;
+                setup.gone_at = mishaps.gone.contains(&slot.slot).then_some(mishaps.at);
+                setup.reboot_at = mishaps.reboot.contains(&slot.slot).then_some(mishaps.at);
+                let mut storage = MemoryStorage::default();
+                if let Some(log) = mishaps.cards.get(&slot.slot) {
+                    let name = format!("{}/00000001.BIN", setup.log_folder);
+                    storage.put(&name, log.clone()).map_err(|_| {
+                        CommandError::Failed(format!("slot {} has no place for a log", slot.slot))
+                    })?;
+                }
+                Ok(VirtualVehicle::new(&world, setup, Box::new(storage), 0))
             })
-            .collect();
+            .collect::<Result<Vec<_>, CommandError>>()?;
         let options =
             ServerOptions { station, pace: self.pace, faults: self.faults, seed: self.seed };
         let served = serve(vehicles, &options, &clock, body);

@@ -1,5 +1,6 @@
 //! `updraft fleet virtual`: drones to practise with, for this or any other ground station.
 
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -8,15 +9,18 @@ use std::time::Duration;
 use clap::Args;
 
 use super::one_flight;
-use super::sim::Hangar;
+use super::sim::{Hangar, Mishaps};
+use crate::base::file::read_whole;
 use crate::base::time::GpsTime;
+use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::cli::simulate::{AirArgs, updraft};
 use crate::cli::words;
 use crate::effects;
-use crate::link::clock::{Clock as _, MS};
+use crate::link::clock::{Clock as _, MS, Micros, S};
+use crate::mission::Plan;
 use crate::sim::air::spec;
 use crate::vehicle::library;
 use crate::virtual_fleet::lossy::Faults;
@@ -55,6 +59,18 @@ pub(in crate::cli) struct VirtualArgs {
     /// Boot as slowly as real drones do (45 s to a position)
     #[arg(long)]
     slow_boot: bool,
+    /// Their cards hold the logs that are in the campaign, to practise bringing logs home
+    #[arg(long)]
+    flown: bool,
+    /// These slots' drones are switched off for good, with commas
+    #[arg(long, value_name = "SLOTS", value_delimiter = ',')]
+    gone: Vec<u16>,
+    /// These slots' drones reboot once, with commas
+    #[arg(long, value_name = "SLOTS", value_delimiter = ',')]
+    reboot: Vec<u16>,
+    /// When --gone and --reboot happen, s of the drones' time after they are switched on
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = super::connect::seconds)]
+    after: f64,
     /// Vertical air speed, m/s, up positive
     #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = updraft, allow_hyphen_values = true)]
     updraft: f64,
@@ -67,6 +83,41 @@ fn share(text: &str) -> Result<f64, String> {
         Ok(value) if (0.0..=0.95).contains(&value) => Ok(value),
         _ => Err("a share between 0 and 0.95".to_owned()),
     }
+}
+
+/// Largest log that virtual drones have on their cards, bytes.
+const MOST_LOG: u64 = 1 << 28;
+
+fn mishaps(
+    args: &VirtualArgs,
+    folder: &FlightFolder,
+    plan: &Plan,
+) -> Result<Mishaps, CommandError> {
+    if let Some(slot) =
+        args.gone.iter().chain(&args.reboot).find(|slot| plan.slot(**slot).is_none())
+    {
+        return Err(CommandError::Usage(format!(
+            "the plan has no slot {slot}: it has {}",
+            plan.slots.len()
+        )));
+    }
+    let mut cards = BTreeMap::new();
+    if args.flown {
+        for slot in &plan.slots {
+            let path = folder.log(slot.slot, plan.slots.len());
+            if path.exists() {
+                cards.insert(slot.slot, read_whole(&path, MOST_LOG)?);
+            }
+        }
+        if cards.is_empty() {
+            return Err(CommandError::Nothing(format!(
+                "{} has no logs for the drones' cards: `updraft simulate` makes them",
+                folder.logs().display()
+            )));
+        }
+    }
+    let at = (args.after * S as f64) as Micros;
+    Ok(Mishaps { gone: args.gone.clone(), reboot: args.reboot.clone(), at, cards })
 }
 
 pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit, CommandError> {
@@ -82,6 +133,7 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
     let switched_on = GpsTime::from_unix_ms((clock.unix_us() / 1000) as i64).ok_or_else(|| {
         CommandError::Failed("this computer's clock is not set to any GPS time".to_owned())
     })?;
+    let mishaps = mishaps(args, &folder, &plan)?;
     let hangar = Hangar {
         plan: &plan,
         slots: plan.slots.iter().collect(),
@@ -100,6 +152,7 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
             ..Faults::default()
         },
         boot: if args.slow_boot { BootTimes::default() } else { BootTimes::short() },
+        mishaps,
     };
     context.say(&format!(
         "{} are switched on and speak to {}; Ctrl-C switches them off",

@@ -87,6 +87,10 @@ pub struct VehicleSetup {
     pub log_folder: String,
     /// Packets per second of its file and log transfers; 0: no limit.
     pub packets_per_s: f64,
+    /// When it is switched off for good.
+    pub gone_at: Option<Micros>,
+    /// When it reboots by itself, once.
+    pub reboot_at: Option<Micros>,
 }
 
 impl VehicleSetup {
@@ -100,6 +104,8 @@ impl VehicleSetup {
             stock: false,
             log_folder: "logs".to_owned(),
             packets_per_s: 0.0,
+            gone_at: None,
+            reboot_at: None,
         }
     }
 }
@@ -228,6 +234,11 @@ impl<'w> VirtualVehicle<'w> {
         self.logbook.flush(self.storage.as_mut());
         self.logbook = Logbook::new(&self.setup.log_folder);
         self.streams = Streams::new(now + self.setup.boot.heartbeat, self.setup.stock);
+    }
+
+    /// Whether it has been switched off for good.
+    fn is_gone(&self, now: Micros) -> bool {
+        self.setup.gone_at.is_some_and(|at| now >= at)
     }
 
     fn age(&self, now: Micros) -> Micros {
@@ -458,7 +469,7 @@ impl<'w> VirtualVehicle<'w> {
 
 impl Endpoint for VirtualVehicle<'_> {
     fn on_message(&mut self, now: Micros, message: &MavMessage, out: &mut Vec<MavMessage>) {
-        if self.age(now) < self.setup.boot.heartbeat {
+        if self.is_gone(now) || self.age(now) < self.setup.boot.heartbeat {
             return;
         }
         if target(message).is_some_and(|system| system != 0 && system != self.setup.system) {
@@ -487,6 +498,13 @@ impl Endpoint for VirtualVehicle<'_> {
     }
 
     fn poll(&mut self, now: Micros, out: &mut Vec<MavMessage>) -> Micros {
+        if self.is_gone(now) {
+            return Micros::MAX;
+        }
+        if self.setup.reboot_at.is_some_and(|at| now >= at) && !self.is_armed() {
+            self.setup.reboot_at = None;
+            self.reboot(now);
+        }
         while self.next_tick <= now {
             let tick = self.next_tick;
             self.next_tick += TICK;
