@@ -348,9 +348,9 @@ impl Watched {
         tell: &mut dyn FnMut(Event),
     ) {
         let performing = match self.stage {
-            Some(stage) => stage == Stage::Performing,
-            // Without show mode: while it is guided.
-            None => self.armed == Some(true) && self.mode == Some(super::messages::GUIDED),
+            Some(stage) if stage != Stage::Off => stage == Stage::Performing,
+            // Without show mode, or not in it: while it is guided.
+            _ => self.armed == Some(true) && self.mode == Some(super::messages::GUIDED),
         };
         self.flying.distance_m = None;
         let (Some((at, position)), Some(start)) = (of.position, start_gps_ms) else { return };
