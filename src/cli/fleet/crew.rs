@@ -448,10 +448,7 @@ impl<'a> Crew<'a> {
     }
 
     /// What was seen: the drones whose flight gave an alarm.
-    fn close(
-        &mut self,
-        eyes: Eyes<'_>,
-    ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
+    fn close(&mut self, eyes: Eyes<'_>) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
         let (telemetry, alarms) = eyes.close();
         self.telemetry = telemetry;
         Ok(alarms?)

@@ -70,9 +70,7 @@ impl<'a> Eyes<'a> {
     }
 
     /// What is known, and the drones that gave an alarm.
-    pub(super) fn close(
-        self,
-    ) -> (Telemetry, Result<BTreeMap<DroneId, Vec<String>>, FileError>) {
+    pub(super) fn close(self) -> (Telemetry, Result<BTreeMap<DroneId, Vec<String>>, FileError>) {
         (self.monitor.telemetry, self.failed.map_or(Ok(self.alarms), Err))
     }
 }

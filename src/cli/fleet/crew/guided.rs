@@ -80,11 +80,7 @@ impl Crew<'_> {
     pub(in crate::cli) fn authorize_guided(&mut self, start: &Start) -> Result<(), CommandError> {
         // A person has taken their time to answer.
         while let Some(received) = self.net.recv(0)? {
-            crate::link::drive::Watch::on_message(
-                &mut self.telemetry,
-                self.net.now(),
-                &received,
-            );
+            crate::link::drive::Watch::on_message(&mut self.telemetry, self.net.now(), &received);
         }
         start.check_time(&self.telemetry, self.net.now()).map_err(refused)?;
         self.note("authorized", Some(format!("start at {}", start.second_of_week())))
