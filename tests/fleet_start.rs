@@ -16,7 +16,7 @@ use updraft::fleet::dry_run::{Obliging, dry_run};
 use updraft::fleet::greet::Greet;
 use updraft::fleet::guided::{Flight, Guided};
 use updraft::fleet::journal::{Entry, JOURNAL_FILE, Journal};
-use updraft::fleet::messages::{self, LAND, RTL};
+use updraft::fleet::messages::{self, GUIDED, LAND, RTL};
 use updraft::fleet::params::{ListParams, ReadParams, SetParams};
 use updraft::fleet::preflight::{Known, Limits, Preflight, preflight};
 use updraft::fleet::required::{Changes, CheckParams, Standing, requirements};
@@ -26,7 +26,7 @@ use updraft::fleet::telemetry::Telemetry;
 use updraft::fleet::vehicle_clock::VehicleClock;
 use updraft::fleet::watch::{self, Monitor};
 use updraft::link::clock::{MS, S};
-use updraft::link::drive::{Machine, NoWatch, drive};
+use updraft::link::drive::{Machine, NoWatch, Step, drive};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavResult};
 use updraft::link::id::DroneId;
@@ -291,7 +291,7 @@ fn a_return_that_is_refused_becomes_a_landing_and_silence_is_said() {
             // The vehicle's acknowledgement, turned into a refusal while a return is asked for.
             self.0.on_message(now, message);
         }
-        fn poll(&mut self, now: u64) -> updraft::link::drive::Step<Aborted> {
+        fn poll(&mut self, now: u64) -> Step<Aborted> {
             self.0.poll(now)
         }
     }
@@ -314,6 +314,32 @@ fn a_return_that_is_refused_becomes_a_landing_and_silence_is_said() {
     let done = drive(&mut net, machines, ALL_AT_ONCE, &mut NoWatch).unwrap();
     assert_eq!(done[&drone(1)], Aborted::Confirmed(Action::Land));
     assert_snapshot!(done[&drone(2)], @"NOT CONFIRMED after 600 tries: use its remote control");
+}
+
+#[test]
+fn a_drone_that_waits_in_guided_is_taken_from_its_station() {
+    let plan = plan();
+    let mut net = fleet(&plan, false, Faults::default(), 1);
+    net.vehicles.get_mut(&drone(1)).unwrap().inner.mode = GUIDED;
+    let aborted = run(&mut net, Abort::new(drone(1), Action::Return, None));
+    assert_eq!(aborted, Aborted::Grounded);
+    assert_eq!(net.vehicles[&drone(1)].inner.mode, LAND);
+    // The station that was about to fly it sends nothing more.
+    let trajectory = Trajectory::of_slot(&plan, &plan.slots[0]);
+    let mut clock = VehicleClock::default();
+    clock.read(0, 1_795_143_537_000_000);
+    let start_gps_ms = clock.gps_ms(0).unwrap() as i64 + 60_000;
+    let frame = plan.site.frame();
+    let flight = Flight { trajectory, frame, start_gps_ms, yaw_rad: None, clock };
+    let mut machine = Guided::new(drone(1), flight);
+    let beat = |custom_mode| {
+        MavMessage::HEARTBEAT(dialect::HEARTBEAT_DATA { custom_mode, ..Default::default() })
+    };
+    machine.on_message(S, &beat(GUIDED));
+    assert!(matches!(machine.poll(S), Step::Wait(_)));
+    machine.on_message(2 * S, &beat(LAND));
+    let Step::Done(Err(error)) = machine.poll(2 * S) else { panic!("it goes on") };
+    assert_snapshot!(error, @"the drone left GUIDED (LAND) at -58 s: nothing more was sent to it");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::sim::{Hangar, Mishaps, TO_START};
-use super::fleet::{LeadArgs, fly_now, one_flight, server, tables};
+use super::fleet::{LeadArgs, fly_now, guide_now, one_flight, server, tables};
 use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FlightFolder};
@@ -31,6 +31,7 @@ const GROUND_PACE: f64 = 5.0;
   updraft fly my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --set-params
   updraft fly my-campaign --flight hover --connect tcp:10.0.0.7:5760 --key swarm.key --lead 60
   updraft fly my-campaign --flight hover --connect skybrush://localhost:5001
+  updraft fly my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --guided  # stock firmware
   updraft fly my-campaign --connect sim             # every flight, by virtual drones
 
 The steps of a flight: find who flies which slot (from where they stand), check parameters, load show,
@@ -55,6 +56,10 @@ pub(super) struct FlyArgs {
     /// Find anew which drone flies which slot, from where they stand
     #[arg(long)]
     assign: bool,
+    /// Fly the drones by streaming targets in GUIDED: needs no show firmware, but a link without
+    /// gaps until everyone has landed
+    #[arg(long, conflicts_with = "dry_run")]
+    guided: bool,
     /// Leave the logs on the drones; `updraft logs pull` brings them
     #[arg(long)]
     no_logs: bool,
@@ -82,12 +87,20 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
         super::fleet::dry::upload(context, &step)?;
         return super::fleet::dry::start(context, &step, args.lead.lead);
     }
+    let target = args.connect.target()?;
+    if args.guided && !matches!(target, Target::Links(_)) {
+        return Err(CommandError::Usage(
+            "--guided streams to the drones themselves: give their own links with --connect"
+                .to_owned(),
+        ));
+    }
     let _lock = context.lock(&args.campaign)?;
-    match args.connect.target()? {
+    match target {
         Target::Links(links) => {
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             let mut station = args.connect.open(links)?;
             let mut crew = Crew::new(context, &mut station, &folder, &plan);
+            crew.is_guided = args.guided;
             crew.listen(args.connect.wait)?;
             fly(context, &mut crew, args)
         }
@@ -131,15 +144,36 @@ fn fly(context: &Context, crew: &mut Crew<'_>, args: &FlyArgs) -> Result<Exit, C
         context.insist("NO-GO: nothing was sent, as the drones do not stand as planned");
         return Ok(Exit::Unsafe);
     }
-    crew.params(args.set_params)?;
-    let refused = crew.upload()?;
+    let refused = if args.guided {
+        // The fence's own switch is one of the parameters.
+        let refused = crew.make_guided()?;
+        crew.params(args.set_params)?;
+        refused
+    } else {
+        let stock = crew.stock();
+        if !stock.is_empty() {
+            let names: Vec<String> = stock.iter().map(ToString::to_string).collect();
+            context.insist(&format!(
+                "NO-GO: without show firmware: drones {}; nothing was sent. Fly all drones by \
+                 streaming with --guided, or leave these out",
+                names.join(", ")
+            ));
+            return Ok(Exit::Unsafe);
+        }
+        crew.params(args.set_params)?;
+        crew.upload()?
+    };
     let table = crew.preflight(args.connect.wait)?;
     if !refused.is_empty() || !table.go() {
         tables::preflight(context, &table)?;
         return Ok(Exit::Unsafe);
     }
     context.print(&table.to_string())?;
-    let flown = fly_now(context, crew, &args.lead)?;
+    let flown = if args.guided {
+        guide_now(context, crew, &args.lead)?
+    } else {
+        fly_now(context, crew, &args.lead)?
+    };
     if args.no_logs {
         return Ok(flown);
     }

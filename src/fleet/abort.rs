@@ -5,7 +5,7 @@
 //! heartbeat confirms it. A drone that is not flying has its start taken back instead. Nothing
 //! else is sent meanwhile.
 
-use super::messages::{LAND, RTL, set_mode, start_packet};
+use super::messages::{GUIDED, LAND, RTL, set_mode, start_packet};
 use super::telemetry::Drone;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Step};
@@ -125,6 +125,9 @@ impl Abort {
     /// Armed, but not in the air: there it lands at once, where a return might not disarm. Kept,
     /// as leaving the show ends its stages.
     fn decide(&mut self) {
+        if self.armed == Some(false) && self.mode == Some(GUIDED) {
+            self.action = Action::Land;
+        }
         let on_ground = |status: Status| {
             matches!(status.stage, Stage::Init | Stage::WaitForStart | Stage::Landed)
         };
@@ -138,7 +141,7 @@ impl Abort {
             (Some(true), Some(mode)) if mode == self.action.mode() => {
                 Some(Aborted::Confirmed(self.action))
             }
-            (Some(false), _) if self.grounded => {
+            (Some(false), mode) if self.grounded && mode != Some(GUIDED) => {
                 // Without show mode there is no status to wait for.
                 let stock = self.status.is_none() && now >= begun + STATUS_WITHIN;
                 (stock || self.quiet == Some(true)).then_some(Aborted::Grounded)
@@ -203,8 +206,9 @@ impl Machine for Abort {
         self.next = now + EVERY;
         self.told += 1;
         self.cancel_next = true;
-        // A drone on the ground stays in its mode; before it is known, both are said.
-        if self.armed == Some(false) {
+        // A drone on the ground stays in its mode; before it is known, both are said. But one that
+        // waits in GUIDED is taken from the station that is about to fly it.
+        if self.armed == Some(false) && self.mode != Some(GUIDED) {
             return self.poll(now);
         }
         let confirmation = self.told.min(255) as u8 - 1;

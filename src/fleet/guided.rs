@@ -12,6 +12,7 @@ use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
+use crate::link::station::heartbeat;
 use crate::show::Trajectory;
 use crate::show::derive::{DeriveParams, Firmware, derive};
 use dialect::{MavCmd, MavModeFlag, MavResult};
@@ -65,7 +66,7 @@ pub enum GuidedError {
         /// What it said last.
         said: String,
     },
-    /// It left GUIDED in the air: its pilot, its fence or a failsafe has taken over.
+    /// It left GUIDED: its pilot, an abort, its fence or a failsafe has taken over.
     #[error("the drone left GUIDED ({mode}) at {show_s} s: nothing more was sent to it")]
     TakenOver {
         /// The mode it went to.
@@ -113,6 +114,10 @@ pub struct Guided {
     targets: u64,
     armed: bool,
     mode: Option<u32>,
+    /// It was in GUIDED: if it leaves that, somebody else has decided so.
+    was_guided: bool,
+    /// The next heartbeat for a simulator that runs faster than real time.
+    next_beat: Micros,
     heard: Option<Micros>,
     above_home_m: f64,
     heading_deg: Option<f64>,
@@ -140,6 +145,8 @@ impl Guided {
             targets: 0,
             armed: false,
             mode: None,
+            was_guided: false,
+            next_beat: 0,
             heard: None,
             above_home_m: 0.0,
             heading_deg: None,
@@ -207,6 +214,13 @@ impl Guided {
     }
 
     fn fly(&mut self, now: Micros, show_s: f64, takeoff_s: f64) -> Step<Result<(), GuidedError>> {
+        // It may still be on the ground: `fleet abort` of another station takes it out of GUIDED.
+        if self.phase != Phase::Land
+            && self.was_guided
+            && let Some(error) = self.taken_over(show_s)
+        {
+            return Step::Done(Err(error));
+        }
         match self.phase {
             Phase::Wait => {
                 let arm_s = takeoff_s - ARM_BEFORE_S;
@@ -262,9 +276,6 @@ impl Guided {
                 Step::send(self.command(MavCmd::MAV_CMD_NAV_TAKEOFF, 0.0, altitude))
             }
             Phase::Stream => {
-                if let Some(error) = self.taken_over(show_s) {
-                    return Step::Done(Err(error));
-                }
                 if show_s >= self.end_s() {
                     self.go(Phase::Land, now);
                     return Step::Wait(now);
@@ -301,6 +312,7 @@ impl Machine for Guided {
                     self.next = self.next.min(now);
                 }
                 self.mode = Some(beat.custom_mode);
+                self.was_guided |= beat.custom_mode == GUIDED;
                 self.armed = armed;
             }
             MavMessage::GLOBAL_POSITION_INT(at) => {
@@ -341,6 +353,12 @@ impl Machine for Guided {
         };
         if now >= heard + LOST {
             return Step::Done(Err(GuidedError::Lost { show_s: show_s as i64 }));
+        }
+        let rate = self.flight.clock.rate();
+        if rate > 1.0 && now >= self.next_beat {
+            // Its failsafe counts seconds of its own, the link's heartbeats are too far apart.
+            self.next_beat = now + (S as f64 / rate) as Micros;
+            return Step::send(heartbeat());
         }
         if now < self.next {
             return Step::Wait(self.next);

@@ -25,13 +25,13 @@ pub struct Limits {
     pub link_quality: f64,
     /// Clocks may differ by so much, s.
     pub clock_spread_s: f64,
-    /// Whether vehicles without show mode may fly (guided by the station).
-    pub stock: bool,
+    /// The station flies them all by streaming: nobody needs the show mode.
+    pub guided: bool,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { satellites: 8, h_acc_m: 2.5, link_quality: 0.6, clock_spread_s: 1.0, stock: false }
+        Self { satellites: 8, h_acc_m: 2.5, link_quality: 0.6, clock_spread_s: 1.0, guided: false }
     }
 }
 
@@ -184,8 +184,9 @@ impl Look<'_> {
         ]
     }
 
-    fn is_stock(&self) -> bool {
-        self.of.has_show_firmware() == Some(false)
+    /// Nothing of the show mode is asked of it.
+    fn is_guided(&self) -> bool {
+        self.limits.guided || self.of.has_show_firmware() == Some(false)
     }
 
     /// A value that is fresh enough to be believed.
@@ -220,15 +221,15 @@ impl Look<'_> {
         );
         match self.of.has_show_firmware() {
             None => bad(text, "does not say which firmware it has"),
-            Some(false) if !self.limits.stock => {
-                bad(text, "has no show firmware: fly it in guided mode, or leave it out")
+            Some(false) if !self.limits.guided => {
+                bad(text, "has no show firmware: fly all with --guided, or leave it out")
             }
             Some(_) => good(text),
         }
     }
 
     fn show(&self) -> Cell {
-        if self.is_stock() {
+        if self.is_guided() {
             return good("guided");
         }
         let Some(status) = self.fresh(self.of.status) else {
@@ -244,7 +245,7 @@ impl Look<'_> {
     }
 
     fn origin(&self) -> Cell {
-        if self.is_stock() {
+        if self.is_guided() {
             return good("-");
         }
         match self.fresh(self.of.status) {
@@ -275,7 +276,7 @@ impl Look<'_> {
             return bad(text, problem.to_string());
         }
         let away = preflight::NOT_AT_TAKEOFF;
-        match self.fresh(self.of.status) {
+        match self.fresh(self.of.status).filter(|_| !self.is_guided()) {
             Some(status) if status.preflight & away != 0 => {
                 bad(text, "is not at its take-off position, it says: is the origin right?")
             }
@@ -343,18 +344,17 @@ impl Look<'_> {
                 bad("off", "geofence not set: upload the show")
             }
             Some(_) => good("on"),
-            None if self.is_stock() && self.known.fenced.contains(&self.drone) => good("on"),
+            None if self.is_guided() && self.known.fenced.contains(&self.drone) => good("on"),
             None => bad("?", "does not report its fence: put it there again"),
         }
     }
 
     fn start(&self) -> Cell {
-        if self.is_stock() {
+        let status = self.fresh(self.of.status);
+        if self.is_guided() && status.is_none() {
             return good("-");
         }
-        let Some(status) = self.fresh(self.of.status) else {
-            return bad("?", "sends no show status");
-        };
+        let Some(status) = status else { return bad("?", "sends no show status") };
         if status.has(flag::AUTHORIZED) {
             return bad("authorized", "is authorized to start already: cancel the start first");
         }
@@ -365,6 +365,7 @@ impl Look<'_> {
             );
         }
         match status.stage {
+            _ if self.is_guided() => good("-"),
             Stage::WaitForStart => good("waiting"),
             Stage::Landed => bad("landed", "has flown: restart it, or leave and enter show mode"),
             Stage::Off => bad("off", "is not in show mode: upload the show"),

@@ -303,14 +303,21 @@ impl Start {
         all.filter(|(_, readback)| !taken(*readback)).collect()
     }
 
-    /// Authorizes the start: the second step, on a person's word. Every drone must have the start
-    /// time by then, and there must be time left.
-    pub fn authorize(&mut self, telemetry: &Telemetry, now: Micros) -> Result<(), StartRefusal> {
+    /// Whether there is time left to authorize it. For drones that the station itself flies, which
+    /// hear nothing of the start, that is all there is to it.
+    pub fn check_time(&self, telemetry: &Telemetry, now: Micros) -> Result<(), StartRefusal> {
         let needed_s = self.options.authorize_before_s;
         let left_s = self.left_s(telemetry, now).unwrap_or(0.0);
         if left_s < needed_s || self.phase == Phase::Cancelled {
             return Err(StartRefusal::TooLate { left_s, needed_s });
         }
+        Ok(())
+    }
+
+    /// Authorizes the start: the second step, on a person's word. Every drone must have the start
+    /// time by then, and there must be time left.
+    pub fn authorize(&mut self, telemetry: &Telemetry, now: Micros) -> Result<(), StartRefusal> {
+        self.check_time(telemetry, now)?;
         let late = self.late(telemetry, now);
         if !late.is_empty() {
             return Err(StartRefusal::Late { late });

@@ -171,6 +171,9 @@ const MOST_EVENTS: usize = 10_000;
 const LOOK: Micros = 100 * MS;
 /// Nobody takes off later than this after the time at which it should; see the firmware's window.
 const TOO_LATE_S: f64 = 30.0;
+/// A drone that is guided from the ground has joined its trajectory so long after the take-off:
+/// its motors take a while to spin up, s.
+const CLIMB_S: f64 = 8.0;
 
 /// Watches a show.
 pub struct Monitor {
@@ -348,16 +351,18 @@ impl Watched {
         tell: &mut dyn FnMut(Event),
     ) {
         let performing = match self.stage {
-            Some(stage) => stage == Stage::Performing,
-            // Without show mode: while it is guided.
-            None => self.armed == Some(true) && self.mode == Some(super::messages::GUIDED),
+            Some(stage) if stage != Stage::Off => stage == Stage::Performing,
+            // Without show mode, or not in it: while it is guided.
+            _ => self.armed == Some(true) && self.mode == Some(super::messages::GUIDED),
         };
         self.flying.distance_m = None;
         let (Some((at, position)), Some(start)) = (of.position, start_gps_ms) else { return };
         let Some(gps_ms) = of.clock.gps_ms(at).filter(|_| performing) else { return };
         let show_s = (gps_ms - start as f64) / 1000.0;
         let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
-        if show_s < 0.0 || show_s > end_s {
+        // The show firmware tells when it has joined its trajectory; without it, time does.
+        let joined = self.stage == Some(Stage::Performing) || show_s > self.wait_s() + CLIMB_S;
+        if show_s < 0.0 || show_s > end_s || !joined {
             return;
         }
         let mut place = frame.from_geodetic(position.place);

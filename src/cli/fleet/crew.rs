@@ -1,13 +1,18 @@
 //! What a station does with a fleet, step by step: the steps of `fly` and of `fleet`.
 
+mod eyes;
+mod guided;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
 
 use serde::Serialize;
 
+use self::eyes::Eyes;
 use super::connect::run_number;
 use crate::base::crc::ap_crc32;
 use crate::base::file::read_whole;
+use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
@@ -71,6 +76,8 @@ pub(in crate::cli) struct Crew<'a> {
     /// Virtual drones that are gone after this flight: nobody waits for people, and nothing is kept
     /// of them but their logs.
     pub(in crate::cli) is_virtual: bool,
+    /// The station flies the drones by streaming targets; nobody needs the show mode.
+    pub(in crate::cli) is_guided: bool,
 }
 
 /// Listens to all, and looks for Ctrl-C.
@@ -122,6 +129,7 @@ impl<'a> Crew<'a> {
             known: Known::default(),
             clock: SystemClock::start(),
             is_virtual: false,
+            is_guided: false,
         }
     }
 
@@ -221,7 +229,8 @@ impl<'a> Crew<'a> {
             .into_iter()
             .map(|drone| {
                 let show = self.telemetry.get(drone).and_then(Drone::has_show_firmware);
-                let required = requirements(self.plan, show.unwrap_or(true));
+                let by_show = show.unwrap_or(true) && !self.is_guided;
+                let required = requirements(self.plan, by_show);
                 (drone, CheckParams::new(drone, required, may_change))
             })
             .collect();
@@ -320,7 +329,7 @@ impl<'a> Crew<'a> {
                 &self.table,
                 &self.telemetry,
                 &self.known,
-                &Limits::default(),
+                &Limits { guided: self.is_guided, ..Limits::default() },
                 now,
             );
             if found.go() || now >= until {
@@ -402,39 +411,18 @@ impl<'a> Crew<'a> {
         &mut self,
         start: &mut Start,
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
-        let telemetry = std::mem::take(&mut self.telemetry);
-        let limits = watch::Limits::of(self.plan);
-        let mut monitor = Monitor::new(self.plan, &self.table, telemetry, limits);
-        monitor.set_start(start.time().map(crate::base::time::GpsTime::total_ms));
-        let mut journal = if self.is_virtual { None } else { Some(Journal::open(&self.folder.0)?) };
-        let mut alarms: BTreeMap<DroneId, Vec<String>> = BTreeMap::new();
+        let mut eyes = self.eyes(start.time().map(GpsTime::total_ms))?;
         let outcome = loop {
             let now = self.net.now();
-            if let Some(packet) = start.due(&monitor.telemetry, now) {
+            if let Some(packet) = start.due(eyes.telemetry(), now) {
                 self.net.broadcast(&packet)?;
             }
             let next = start.next().clamp(now + MS, now + 100 * MS);
             if let Some(received) = self.net.recv(next)? {
-                monitor.on_message(self.net.now(), &received);
+                eyes.on_message(self.net.now(), &received);
             }
-            monitor.stop(self.net.now());
-            for told in monitor.take_events() {
-                if let Some(journal) = &mut journal {
-                    journal.write(&Entry {
-                        unix_us: self.clock.unix_us(),
-                        drone: Some(told.drone),
-                        event: &told.event,
-                    })?;
-                }
-                let alarm = told.event.is_alarm();
-                if alarm {
-                    alarms.entry(told.drone).or_default().push(told.event.to_string());
-                    self.context.warn(&format!("drone {}: {}", told.drone, told.event));
-                } else if !self.is_virtual {
-                    self.context.say(&format!("drone {}: {}", told.drone, told.event));
-                }
-            }
-            if monitor.is_over() {
+            eyes.stop(self.net.now());
+            if eyes.is_over() {
                 break Ok(());
             }
             if self.context.stop_flag().load(Ordering::SeqCst) {
@@ -445,8 +433,25 @@ impl<'a> Crew<'a> {
                 break Err(CommandError::Interrupted);
             }
         };
-        self.telemetry = monitor.telemetry;
-        outcome.map(|()| alarms)
+        let alarms = self.close(eyes);
+        outcome.and(alarms)
+    }
+
+    /// Watches a flight from here on.
+    fn eyes(&mut self, start_gps_ms: Option<i64>) -> Result<Eyes<'a>, CommandError> {
+        let telemetry = std::mem::take(&mut self.telemetry);
+        let mut monitor =
+            Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
+        monitor.set_start(start_gps_ms);
+        let journal = if self.is_virtual { None } else { Some(Journal::open(&self.folder.0)?) };
+        Ok(Eyes::new(self.context, monitor, journal, self.clock.clone()))
+    }
+
+    /// What was seen: the drones whose flight gave an alarm.
+    fn close(&mut self, eyes: Eyes<'_>) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
+        let (telemetry, alarms) = eyes.close();
+        self.telemetry = telemetry;
+        Ok(alarms?)
     }
 
     /// For steps that follow an earlier upload: whether each drone's show file is the planned one.

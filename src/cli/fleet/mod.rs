@@ -21,7 +21,7 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::abort::{Aborted, Action};
-use crate::fleet::start::StartOptions;
+use crate::fleet::start::{Start, StartOptions};
 use crate::link::id::DroneId;
 use crate::mission::Plan;
 
@@ -101,6 +101,12 @@ pub(super) struct LeadArgs {
     /// Authorize the start without asking
     #[arg(short, long)]
     pub(super) yes: bool,
+}
+
+impl LeadArgs {
+    fn options(&self) -> StartOptions {
+        StartOptions { lead_s: self.lead, ..StartOptions::default() }
+    }
 }
 
 /// Arguments of `fleet start`.
@@ -245,19 +251,9 @@ pub(super) fn fly_now(
     crew: &mut Crew<'_>,
     lead: &LeadArgs,
 ) -> Result<Exit, CommandError> {
-    if !lead.yes && !std::io::stdin().is_terminal() {
-        return Err(CommandError::Usage(
-            "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
-        ));
-    }
-    let options = StartOptions { lead_s: lead.lead, ..StartOptions::default() };
-    let mut start = crew.announce(options)?;
-    let time = start.time().map_or_else(String::new, tables::time_of_day);
-    context.say(&format!(
-        "Every drone has the start time: {time} ({} s of the GPS week), in {:.0} s",
-        start.second_of_week(),
-        start.left_s(&crew.telemetry, crew.net.now()).unwrap_or(0.0)
-    ));
+    needs_person(lead)?;
+    let mut start = crew.announce(lead.options())?;
+    say_start(context, crew, &start, "Every drone has the start time");
     if !lead.yes && !asked("Authorize the start? Type yes: ")? {
         crew.cancel(&mut start)?;
         return Err(CommandError::Usage("not authorized: the start was taken back".to_owned()));
@@ -265,10 +261,52 @@ pub(super) fn fly_now(
     crew.authorize(&mut start)?;
     context.say("Authorized. Ctrl-C stops watching; `updraft fleet abort` sends everyone home");
     let alarms = crew.watch(&mut start)?;
+    Ok(landed(context, crew, alarms.is_empty()))
+}
+
+/// The same for drones that the station flies itself.
+pub(super) fn guide_now(
+    context: &Context,
+    crew: &mut Crew<'_>,
+    lead: &LeadArgs,
+) -> Result<Exit, CommandError> {
+    needs_person(lead)?;
+    let start = crew.set_guided_start(lead.options())?;
+    say_start(context, crew, &start, "The start time, by the drones' clocks");
+    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
+        return Err(CommandError::Usage("not authorized: nobody takes off".to_owned()));
+    }
+    crew.authorize_guided(&start)?;
+    context.say(
+        "Authorized. This program flies the drones: Ctrl-C sends everyone home, as does `updraft \
+         fleet abort`",
+    );
+    let alarms = crew.fly_guided(&start)?;
+    Ok(landed(context, crew, alarms.is_empty()))
+}
+
+fn needs_person(lead: &LeadArgs) -> Result<(), CommandError> {
+    if !lead.yes && !std::io::stdin().is_terminal() {
+        return Err(CommandError::Usage(
+            "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
+        ));
+    }
+    Ok(())
+}
+
+fn say_start(context: &Context, crew: &mut Crew<'_>, start: &Start, what: &str) {
+    let time = start.time().map_or_else(String::new, tables::time_of_day);
+    context.say(&format!(
+        "{what}: {time} ({} s of the GPS week), in {:.0} s",
+        start.second_of_week(),
+        start.left_s(&crew.telemetry, crew.net.now()).unwrap_or(0.0)
+    ));
+}
+
+fn landed(context: &Context, crew: &Crew<'_>, quiet: bool) -> Exit {
     let landed = crew.landed();
     context.say(&format!("{landed} of {} drones have landed", crew.table.drones.len()));
-    let all = landed == crew.table.drones.len() && alarms.is_empty();
-    Ok(if all { Exit::Done } else { Exit::Losses })
+    if landed == crew.table.drones.len() && quiet { Exit::Done } else { Exit::Losses }
 }
 
 /// Asks a person.

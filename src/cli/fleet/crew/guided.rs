@@ -1,0 +1,148 @@
+//! A flight that the station itself flies: every drone's trajectory, streamed in GUIDED.
+
+use std::collections::BTreeMap;
+
+use super::{AT_ONCE, Crew};
+use crate::base::time::GpsTime;
+use crate::cli::exit::CommandError;
+use crate::fleet::abort::{ALL_AT_ONCE, Abort, Action};
+use crate::fleet::command::Command;
+use crate::fleet::fence::PutFence;
+use crate::fleet::guided::{Flight, Guided};
+use crate::fleet::messages::{GUIDED, set_mode};
+use crate::fleet::start::{Start, StartOptions, StartRefusal};
+use crate::fleet::telemetry::Drone;
+use crate::link::clock::MS;
+use crate::link::drive::{Watch as _, drive};
+use crate::link::id::DroneId;
+use crate::show::Trajectory;
+
+fn refused(error: StartRefusal) -> CommandError {
+    CommandError::Failed(error.to_string())
+}
+
+impl Crew<'_> {
+    /// Drones of the table without show mode.
+    pub(in crate::cli) fn stock(&self) -> Vec<DroneId> {
+        let firmware = |drone: &DroneId| {
+            self.telemetry.get(*drone).and_then(Drone::has_show_firmware) == Some(false)
+        };
+        self.drones().into_iter().filter(firmware).collect()
+    }
+
+    /// Puts the fence on every drone, and every drone into GUIDED, where it waits on the ground.
+    /// The drones that refused, with their reasons.
+    pub(in crate::cli) fn make_guided(
+        &mut self,
+    ) -> Result<BTreeMap<DroneId, String>, CommandError> {
+        let fence = self.fence()?;
+        let drones = self.drones();
+        let put = |drone: &DroneId| (*drone, PutFence::new(*drone, fence.clone()));
+        let fenced = self.all(drones.iter().map(put).collect(), AT_ONCE)?;
+        let mode = |drone: &DroneId| {
+            (*drone, Command::new("go into guided mode", set_mode(*drone, GUIDED, 0)))
+        };
+        let in_mode = self.all(drones.iter().map(mode).collect(), AT_ONCE)?;
+        let mut bad = BTreeMap::new();
+        for (drone, outcome) in fenced {
+            match outcome {
+                Ok(()) => {
+                    self.known.fenced.insert(drone);
+                }
+                Err(error) => {
+                    bad.insert(drone, crate::cli::exit::with_reasons(&error));
+                }
+            }
+        }
+        for (drone, outcome) in in_mode {
+            if let Err(error) = outcome {
+                bad.insert(drone, error.to_string());
+            }
+        }
+        for (drone, reason) in &bad {
+            let slot = self.table.slot_of(*drone).unwrap_or(0);
+            self.context.warn(&format!("drone {drone} (slot {slot}): {reason}"));
+        }
+        self.note("guided", Some(format!("{} refused", bad.len())))?;
+        Ok(bad)
+    }
+
+    /// Sets a start by the drones' clocks. Nothing is sent: it is the station that keeps it.
+    pub(in crate::cli) fn set_guided_start(
+        &mut self,
+        options: StartOptions,
+    ) -> Result<Start, CommandError> {
+        let now = self.net.now();
+        Start::announce(self.drones(), &self.telemetry, options, now).map_err(refused)
+    }
+
+    /// Authorizes a start that the station keeps.
+    pub(in crate::cli) fn authorize_guided(&mut self, start: &Start) -> Result<(), CommandError> {
+        // A person has taken their time to answer.
+        while let Some(received) = self.net.recv(0)? {
+            crate::link::drive::Watch::on_message(&mut self.telemetry, self.net.now(), &received);
+        }
+        start.check_time(&self.telemetry, self.net.now()).map_err(refused)?;
+        self.note("authorized", Some(format!("start at {}", start.second_of_week())))
+    }
+
+    /// Flies everyone, watching, until all have landed. Drones that gave an alarm or were not
+    /// flown to the end. Ctrl-C sends all home: without the station nobody else flies them.
+    pub(in crate::cli) fn fly_guided(
+        &mut self,
+        start: &Start,
+    ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
+        let start_gps_ms = start.time().map_or(0, GpsTime::total_ms);
+        let frame = self.plan.site.frame();
+        let mut machines = BTreeMap::new();
+        for line in &self.table.drones {
+            let (Some(slot), Some(known)) =
+                (self.plan.slot(line.slot), self.telemetry.get(line.drone))
+            else {
+                continue;
+            };
+            let flight = Flight {
+                trajectory: Trajectory::of_slot(self.plan, slot),
+                frame,
+                start_gps_ms,
+                yaw_rad: None,
+                clock: known.clock.clone(),
+            };
+            machines.insert(line.drone, Guided::new(line.drone, flight));
+        }
+        let mut eyes = self.eyes(Some(start_gps_ms))?;
+        let done = drive(self.net, machines, ALL_AT_ONCE, &mut eyes)?;
+        let stopped = self.context.check_stop();
+        for (drone, outcome) in done {
+            if let Err(error) = outcome {
+                eyes.alarm(drone, error.to_string());
+            }
+        }
+        if stopped.is_err() {
+            self.context.insist("Stopped: this program flies the drones, so they are sent home");
+            eyes.finishes = true;
+            let drones = self.drones();
+            let end = |drone: &DroneId| {
+                (*drone, Abort::new(*drone, Action::Return, eyes.telemetry().get(*drone)))
+            };
+            let machines: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
+            for (drone, end) in drive(self.net, machines, ALL_AT_ONCE, &mut eyes)? {
+                self.context.insist(&format!("drone {drone}: {end}"));
+            }
+        }
+        // Those that were taken over are still on their way.
+        while stopped.is_ok() && !eyes.is_over() {
+            let now = self.net.now();
+            if let Some(received) = self.net.recv(now + 100 * MS)? {
+                eyes.on_message(self.net.now(), &received);
+            }
+            if eyes.stop(self.net.now()) {
+                break;
+            }
+        }
+        let alarms = self.close(eyes);
+        stopped?;
+        self.context.check_stop()?;
+        alarms
+    }
+}
