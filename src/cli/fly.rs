@@ -22,7 +22,7 @@ use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
 
 /// Virtual drones on the ground live so many times as fast as the clock on the wall.
-const GROUND_PACE: f64 = 5.0;
+const GROUND_PACE: f64 = 20.0;
 
 /// Arguments of `updraft fly`.
 #[derive(Debug, Args)]
@@ -190,33 +190,40 @@ fn launch(
         pace: Pace::Fast { ground: GROUND_PACE },
         faults: Faults::default(),
         boot: BootTimes::short(),
+        key: None,
     };
     // A part of the fleet is a fleet of its own.
     let mut part = plan.clone();
     part.slots.retain(|slot| ready.open.iter().any(|open| open.slot == slot.slot));
+    let tw = Stopwatch::start();
     hangar.open(|station| {
         let mut crew = Crew::new(context, station, folder, &part);
         crew.is_virtual = true;
         crew.listen(60.0)?;
-        crew.greet()?;
+        eprintln!("T listen {:.2}", tw.elapsed().as_secs_f64());crew.greet()?;eprintln!("T greet {:.2}", tw.elapsed().as_secs_f64());
         let no_go =
             |what: &str| CommandError::Failed(format!("the virtual drones do not start: {what}"));
         if !crew.assign(true)? {
             return Err(no_go("they do not stand as planned"));
         }
-        crew.params(true)?;
+eprintln!("T assign {:.2}", tw.elapsed().as_secs_f64());crew.params(true)?;eprintln!("T params {:.2}", tw.elapsed().as_secs_f64());
         let refused = crew.upload()?;
+eprintln!("T upload {:.2}", tw.elapsed().as_secs_f64());
         // The second look is after the upload has switched the fences on.
         crew.params(true)?;
+eprintln!("T params2 {:.2}", tw.elapsed().as_secs_f64());
         let table = crew.preflight(20.0)?;
         if !refused.is_empty() || !table.go() {
             return Err(no_go(&format!("\n{table}")));
         }
+eprintln!("T preflight {:.2}", tw.elapsed().as_secs_f64());
         let options = StartOptions { at: Some(start), ..StartOptions::default() };
         let mut start = crew.announce(options)?;
-        crew.authorize(&mut start)?;
-        crew.watch(&mut start)?;
-        let wish = Wish { quiet: true, ..Wish::default() };
-        bring(context, crew.net, folder, plan, &crew.table, &wish)
+eprintln!("T announce {:.2}", tw.elapsed().as_secs_f64());
+        crew.authorize(&mut start)?;eprintln!("T authorize {:.2}", tw.elapsed().as_secs_f64());
+        crew.watch(&mut start)?;eprintln!("T watch {:.2}", tw.elapsed().as_secs_f64());
+        // Virtual drones fly again at any time.
+        let wish = Wish { quiet: true, is_durable: false, ..Wish::default() };
+        let r = bring(context, crew.net, folder, plan, &crew.table, &wish);eprintln!("T bring {:.2}", tw.elapsed().as_secs_f64());r
     })
 }

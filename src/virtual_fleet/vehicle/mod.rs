@@ -77,6 +77,8 @@ pub struct VehicleSetup {
     pub drone: u16,
     /// MAVLink system id.
     pub system: u8,
+    /// Network, from 0: system ids are unique in it.
+    pub network: u16,
     /// Where it stands, show frame, m.
     pub stands_m: Vector3<f64>,
     /// How long it takes to boot.
@@ -95,6 +97,7 @@ impl VehicleSetup {
         Self {
             drone,
             system,
+            network: 0,
             stands_m,
             boot: BootTimes::default(),
             stock: false,
