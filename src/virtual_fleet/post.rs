@@ -6,7 +6,7 @@ use std::net::{SocketAddr, UdpSocket};
 use super::endpoint::Endpoint as _;
 use super::vehicle::VirtualVehicle;
 use crate::link::clock::Micros;
-use crate::link::frame::{FrameReader, MavMessage, Sender, encode};
+use crate::link::frame::{Frame, FrameReader, Sender, encode};
 use crate::link::signing::{Key, Signer, Verifier};
 use crate::link::station::AUTOPILOT;
 
@@ -24,7 +24,7 @@ pub(super) struct Post<'w> {
     station: SocketAddr,
     signing: Option<(Signer, Verifier)>,
     sequence: u8,
-    inbox: Vec<MavMessage>,
+    inbox: Vec<Frame>,
     wake: Micros,
     /// Whether a transfer had more to send.
     pub(super) is_sending: bool,
@@ -80,7 +80,7 @@ impl<'w> Post<'w> {
             verifier.advance(time);
         }
         while let Some(frame) = reader.next(verifier.as_deref_mut()) {
-            self.inbox.push(frame.message);
+            self.inbox.push(frame);
         }
         reader.loss.unsigned + reader.loss.forged
     }
@@ -89,8 +89,8 @@ impl<'w> Post<'w> {
     pub(super) fn round(&mut self, now: Micros, time: u64) -> Vec<Vec<u8>> {
         let mut out = Vec::new();
         let heard = !self.inbox.is_empty();
-        for message in self.inbox.drain(..) {
-            self.vehicle.on_message(now, &message, &mut out);
+        for frame in self.inbox.drain(..) {
+            self.vehicle.on_frame(now, frame.sender, &frame.message, &mut out);
         }
         self.is_sending = false;
         if heard || self.wake <= now {

@@ -22,11 +22,11 @@ use updraft::virtual_fleet::world::World;
 
 use super::support::{Field, file, gps_at, ladder, read, show_of, tow_at};
 
-struct Wall(Instant);
+pub(crate) struct Wall(Instant);
 
 #[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
 impl Wall {
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self(Instant::now())
     }
 }
@@ -47,7 +47,7 @@ fn slot_m(system: u8) -> [f64; 2] {
     [f64::from(index % 7) * 5.0, f64::from(index / 7) * 5.0]
 }
 
-fn drone<'w>(world: &'w World<'w>, system: u8, show: &ShowDrone) -> VirtualVehicle<'w> {
+pub(crate) fn drone<'w>(world: &'w World<'w>, system: u8, show: &ShowDrone) -> VirtualVehicle<'w> {
     let [x, y] = slot_m(system);
     let mut setup = VehicleSetup::new(system.into(), system, Vector3::new(x, y, 0.0));
     setup.boot =
@@ -57,7 +57,7 @@ fn drone<'w>(world: &'w World<'w>, system: u8, show: &ShowDrone) -> VirtualVehic
     VirtualVehicle::new(world, setup, Box::new(storage), 0)
 }
 
-fn free_port() -> SocketAddr {
+pub(crate) fn free_port() -> SocketAddr {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap()
 }
 
