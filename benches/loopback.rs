@@ -75,8 +75,7 @@ fn measure(count: usize, bytes: usize) {
     let frame = ShowFrame { origin, orientation_deg: 0.0 };
     let world = World::new(&vehicle, &air, frame, 1, GpsTime { week: 2445, tow_ms: 100_000_000 });
     let clock = Arc::new(Wall(Instant::now()));
-    let stations: Vec<SocketAddr> =
-        (0..count.div_ceil(PER_NETWORK)).map(|_| free_port()).collect();
+    let stations: Vec<SocketAddr> = (0..count.div_ceil(PER_NETWORK)).map(|_| free_port()).collect();
     let links = stations.iter().enumerate();
     let links = links
         .map(|(network, at)| format!("{network}@udpin:{at}").parse().expect("an address"))

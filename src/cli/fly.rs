@@ -195,35 +195,36 @@ fn launch(
     // A part of the fleet is a fleet of its own.
     let mut part = plan.clone();
     part.slots.retain(|slot| ready.open.iter().any(|open| open.slot == slot.slot));
-    let tw = Stopwatch::start();
     hangar.open(|station| {
         let mut crew = Crew::new(context, station, folder, &part);
         crew.is_virtual = true;
         crew.listen(60.0)?;
-        eprintln!("T listen {:.2}", tw.elapsed().as_secs_f64());crew.greet()?;eprintln!("T greet {:.2}", tw.elapsed().as_secs_f64());
+        crew.greet()?;
+        eprintln!("T greet {:.2}", tw.elapsed().as_secs_f64());
         let no_go =
             |what: &str| CommandError::Failed(format!("the virtual drones do not start: {what}"));
         if !crew.assign(true)? {
             return Err(no_go("they do not stand as planned"));
         }
-eprintln!("T assign {:.2}", tw.elapsed().as_secs_f64());crew.params(true)?;eprintln!("T params {:.2}", tw.elapsed().as_secs_f64());
+        crew.params(true)?;
+        eprintln!("T params {:.2}", tw.elapsed().as_secs_f64());
         let refused = crew.upload()?;
-eprintln!("T upload {:.2}", tw.elapsed().as_secs_f64());
+
         // The second look is after the upload has switched the fences on.
         crew.params(true)?;
-eprintln!("T params2 {:.2}", tw.elapsed().as_secs_f64());
+
         let table = crew.preflight(20.0)?;
         if !refused.is_empty() || !table.go() {
             return Err(no_go(&format!("\n{table}")));
         }
-eprintln!("T preflight {:.2}", tw.elapsed().as_secs_f64());
+
         let options = StartOptions { at: Some(start), ..StartOptions::default() };
         let mut start = crew.announce(options)?;
-eprintln!("T announce {:.2}", tw.elapsed().as_secs_f64());
-        crew.authorize(&mut start)?;eprintln!("T authorize {:.2}", tw.elapsed().as_secs_f64());
-        crew.watch(&mut start)?;eprintln!("T watch {:.2}", tw.elapsed().as_secs_f64());
+
+        crew.authorize(&mut start)?;
+        crew.watch(&mut start)?;
         // Virtual drones fly again at any time.
         let wish = Wish { quiet: true, is_durable: false, ..Wish::default() };
-        let r = bring(context, crew.net, folder, plan, &crew.table, &wish);eprintln!("T bring {:.2}", tw.elapsed().as_secs_f64());r
+        bring(context, crew.net, folder, plan, &crew.table, &wish)
     })
 }

@@ -39,9 +39,8 @@ impl<'w> Post<'w> {
         key: Option<&Key>,
         time: u64,
     ) -> io::Result<Self> {
-        let signing = key.map(|key| {
-            (Signer::new(key.clone(), LINK, time), Verifier::new(key.clone(), time))
-        });
+        let signing =
+            key.map(|key| (Signer::new(key.clone(), LINK, time), Verifier::new(key.clone(), time)));
         Ok(Self {
             vehicle,
             socket: open(station)?,

@@ -120,19 +120,15 @@ fn the_same_id_in_two_networks_is_two_drones() {
         vehicle.setup.network = network;
         vehicle
     };
-    let (heard, _) = serve(
-        vec![make(0), make(1)],
-        &options(ports.clone(), None),
-        clock.as_ref(),
-        |_| {
+    let (heard, _) =
+        serve(vec![make(0), make(1)], &options(ports.clone(), None), clock.as_ref(), |_| {
             let until = station.now() + 5 * S;
             while station.heard().len() < 2 && station.now() < until {
                 let _ = station.recv(until.min(station.now() + 50 * MS)).unwrap();
             }
             station.heard()
-        },
-    )
-    .unwrap();
+        })
+        .unwrap();
     let id = |network| DroneId { network, system: 1 };
     assert_eq!(heard, [id(0), id(1)]);
 
