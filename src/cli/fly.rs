@@ -200,27 +200,21 @@ fn launch(
         crew.is_virtual = true;
         crew.listen(60.0)?;
         crew.greet()?;
-        eprintln!("T greet {:.2}", tw.elapsed().as_secs_f64());
         let no_go =
             |what: &str| CommandError::Failed(format!("the virtual drones do not start: {what}"));
         if !crew.assign(true)? {
             return Err(no_go("they do not stand as planned"));
         }
         crew.params(true)?;
-        eprintln!("T params {:.2}", tw.elapsed().as_secs_f64());
         let refused = crew.upload()?;
-
         // The second look is after the upload has switched the fences on.
         crew.params(true)?;
-
         let table = crew.preflight(20.0)?;
         if !refused.is_empty() || !table.go() {
             return Err(no_go(&format!("\n{table}")));
         }
-
         let options = StartOptions { at: Some(start), ..StartOptions::default() };
         let mut start = crew.announce(options)?;
-
         crew.authorize(&mut start)?;
         crew.watch(&mut start)?;
         // Virtual drones fly again at any time.
