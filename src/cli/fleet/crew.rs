@@ -282,7 +282,9 @@ impl<'a> Crew<'a> {
     pub(in crate::cli) fn upload(&mut self) -> Result<BTreeMap<DroneId, String>, CommandError> {
         let uploads = self.uploads()?;
         let count = uploads.len();
-        let done = self.all(uploads, UPLOADS_AT_ONCE)?;
+        // Virtual drones share no radio; each upload waits a second for the drone to settle.
+        let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
+        let done = self.all(uploads, at_once)?;
         let mut refused = BTreeMap::new();
         let mut written = 0;
         for (drone, outcome) in done {
