@@ -2,10 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+#[expect(dead_code, reason = "it is shared")]
 #[path = "cli/support.rs"]
 mod cli_support;
 mod skybrush_server_support;
 
+use std::fmt::Write as _;
 use std::fs;
 use std::process::Stdio;
 use std::sync::Arc;
@@ -121,7 +123,7 @@ fn shows_that_cannot_be_flown_are_refused_before_anything_is_sent() {
         fs::write(bench.path("campaign/plan.json"), plan.to_string()).unwrap();
         let (ended, server) = fly(&bench, Fault::None);
         assert!(server.asked().is_empty(), "{ended}");
-        said += &format!("{ended}\n");
+        let _ = write!(said, "{ended}\n");
     };
     change(&|plan| plan["fence"]["polygon_m"] = json!([]));
     change(&|plan| plan["fence"]["polygon_m"] = json!([[-1, -1], [1, -1], [1, 1], [-1, 1]]));
@@ -183,12 +185,12 @@ fn logs_are_listed_and_pulled_and_losses_are_named() {
         Fault::Nak("LOG-DATA"),
         Fault::Gone("LOG-DATA"),
     ] {
-        said += &format!("\n{fault:?}\n{}", pull(fault));
+        let _ = write!(said, "\n{fault:?}\n{}", pull(fault));
         assert!(!bench.path("campaign/logs/1.BIN").exists());
     }
-    said += &format!("\nwhole\n{}", pull(Fault::None));
+    let _ = write!(said, "\nwhole\n{}", pull(Fault::None));
     // What is there is not asked for again.
-    said += &format!("\nagain\n{}", pull(Fault::Nak("LOG-DATA")));
+    let _ = write!(said, "\nagain\n{}", pull(Fault::Nak("LOG-DATA")));
     insta::assert_snapshot!(said);
     bench.expect(0, &["logs", "verify", "campaign"]);
 }

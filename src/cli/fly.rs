@@ -22,7 +22,7 @@ use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
 
 /// Virtual drones on the ground live so many times as fast as the clock on the wall.
-const GROUND_PACE: f64 = 5.0;
+const GROUND_PACE: f64 = 20.0;
 
 /// Arguments of `updraft fly`.
 #[derive(Debug, Args)]
@@ -225,6 +225,7 @@ fn launch(
         faults: Faults::default(),
         boot: BootTimes::short(),
         mishaps: Mishaps::default(),
+        key: None,
     };
     // A part of the fleet is a fleet of its own.
     let mut part = plan.clone();
@@ -251,7 +252,8 @@ fn launch(
         let mut start = crew.announce(options)?;
         crew.authorize(&mut start)?;
         crew.watch(&mut start)?;
-        let wish = Wish { quiet: true, ..Wish::default() };
+        // Virtual drones fly again at any time.
+        let wish = Wish { quiet: true, is_durable: false, ..Wish::default() };
         bring(context, crew.net, folder, plan, &crew.table, &wish)
     })
 }

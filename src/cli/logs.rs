@@ -313,6 +313,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
         at_once: args.at_once.into(),
         patience_s: args.patience,
         quiet: false,
+        is_durable: true,
     };
     let brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
     let lost = brought.iter().any(|one| one.state == "missing");

@@ -48,7 +48,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "MPS", value_parser = updraft, allow_hyphen_values = true)]
     updraft: Option<f64>,
     /// Fly in the simulator without MAVLink in between: the same logs, sooner (fleets of more than
-    /// 253 drones always)
+    /// 800 drones always)
     #[arg(long)]
     direct: bool,
     /// Vertical air speed in calibration flights, m/s, up positive

@@ -115,7 +115,7 @@ pub struct Guided {
     armed: bool,
     mode: Option<u32>,
     /// It was in GUIDED: if it leaves that, somebody else has decided so.
-    was_guided: bool,
+    obeyed: bool,
     /// The next heartbeat for a simulator that runs faster than real time.
     next_beat: Micros,
     heard: Option<Micros>,
@@ -145,7 +145,7 @@ impl Guided {
             targets: 0,
             armed: false,
             mode: None,
-            was_guided: false,
+            obeyed: false,
             next_beat: 0,
             heard: None,
             above_home_m: 0.0,
@@ -216,7 +216,7 @@ impl Guided {
     fn fly(&mut self, now: Micros, show_s: f64, takeoff_s: f64) -> Step<Result<(), GuidedError>> {
         // It may still be on the ground: `fleet abort` of another station takes it out of GUIDED.
         if self.phase != Phase::Land
-            && self.was_guided
+            && self.obeyed
             && let Some(error) = self.taken_over(show_s)
         {
             return Step::Done(Err(error));
@@ -312,7 +312,7 @@ impl Machine for Guided {
                     self.next = self.next.min(now);
                 }
                 self.mode = Some(beat.custom_mode);
-                self.was_guided |= beat.custom_mode == GUIDED;
+                self.obeyed |= beat.custom_mode == GUIDED;
                 self.armed = armed;
             }
             MavMessage::GLOBAL_POSITION_INT(at) => {

@@ -191,7 +191,7 @@ impl Client {
             match self.stream.read(&mut buffer) {
                 Ok(0) => return Err(broken(io::ErrorKind::UnexpectedEof.into())),
                 Ok(size) => {
-                    self.lines.push(&buffer[..size]).map_err(|_| ServerError::TooLong { most })?
+                    self.lines.push(&buffer[..size]).map_err(|_| ServerError::TooLong { most })?;
                 }
                 Err(error) => match error.kind() {
                     io::ErrorKind::WouldBlock

@@ -53,10 +53,17 @@ pub fn code_name(code: u64) -> &'static str {
         201 => "has left its fence",
         205 => "its autopilot did not start",
         207 => "crashed",
-        192..=254 => "critical error",
-        128..=191 => "error",
-        64..=127 => "warning",
-        _ => "unknown state",
+        other => of_group(other),
+    }
+}
+
+/// Codes without words of their own, by how bad they are.
+fn of_group(code: u64) -> &'static str {
+    match code {
+        0..64 => "unknown state",
+        64..128 => "warning",
+        128..192 => "error",
+        192.. => "critical error",
     }
 }
 
@@ -137,6 +144,7 @@ impl std::fmt::Display for Event {
 }
 
 #[derive(Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is told of by itself")]
 struct Watched {
     mode: Option<String>,
     codes: Option<BTreeSet<u64>>,

@@ -1,12 +1,24 @@
 //! One end of a link, without the link.
 
 use crate::link::clock::Micros;
-use crate::link::frame::MavMessage;
+use crate::link::frame::{MavMessage, Sender};
 
 /// A vehicle, or a part of one, as it is met on the air.
 pub trait Endpoint {
     /// A message from a ground station has come; answers go to `out`.
     fn on_message(&mut self, now: Micros, message: &MavMessage, out: &mut Vec<MavMessage>);
+
+    /// The same, with who sent it: some answers go to the sender alone.
+    fn on_frame(
+        &mut self,
+        now: Micros,
+        sender: Sender,
+        message: &MavMessage,
+        out: &mut Vec<MavMessage>,
+    ) {
+        let _ = sender;
+        self.on_message(now, message, out);
+    }
 
     /// What it says on its own; returns when it wants to be asked again.
     fn poll(&mut self, now: Micros, out: &mut Vec<MavMessage>) -> Micros;

@@ -57,7 +57,7 @@ impl<S: Storage> Endpoint for FileVehicle<S> {
             return;
         }
         if let Some(ftp) = &mut self.ftp {
-            ftp.on_message(STATION.system, message);
+            ftp.on_message(STATION, message);
         }
         self.logs.on_message(message, self.is_armed, &self.storage, out);
     }

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use super::storage::{Storage, StorageError};
 use crate::base::crc::ApCrc32;
 use crate::link::clock::{Micros, S};
-use crate::link::frame::{MavMessage, dialect};
+use crate::link::frame::{MavMessage, Sender, dialect};
 use crate::protocol::ftp::{MOST_DATA, Op, Packet};
 
 /// Packets in one burst.
@@ -27,7 +27,7 @@ const AT_ONCE: usize = 32;
 pub struct FtpServer {
     /// Packets per second at most; 0: as many as are taken.
     pub packets_per_s: f64,
-    waiting: VecDeque<(u8, Packet)>,
+    waiting: VecDeque<(Sender, Packet)>,
     open: Option<Open>,
     burst: Option<Burst>,
     last: Option<Packet>,
@@ -44,7 +44,7 @@ struct Open {
 
 #[derive(Debug)]
 struct Burst {
-    station: u8,
+    station: Sender,
     answer: Packet,
     size: u8,
     sent: u32,
@@ -56,8 +56,8 @@ impl FtpServer {
         Self { packets_per_s, ..Self::default() }
     }
 
-    /// Takes a message from the station `station`; others than MAVFTP's are not for it.
-    pub fn on_message(&mut self, station: u8, message: &MavMessage) {
+    /// Takes a message from `station`, which gets the answers; others than MAVFTP's are not for it.
+    pub fn on_message(&mut self, station: Sender, message: &MavMessage) {
         let MavMessage::FILE_TRANSFER_PROTOCOL(message) = message else { return };
         let Some(request) = Packet::from_payload(&message.payload) else { return };
         if self.waiting.len() < WAITING {
@@ -88,15 +88,15 @@ impl FtpServer {
             }
             out.push(MavMessage::FILE_TRANSFER_PROTOCOL(dialect::FILE_TRANSFER_PROTOCOL_DATA {
                 target_network: 0,
-                target_system: station,
-                target_component: 0,
+                target_system: station.system,
+                target_component: station.component,
                 payload: answer.to_payload(),
             }));
         }
         now
     }
 
-    fn next_answer(&mut self, now: Micros, storage: &mut dyn Storage) -> Option<(u8, Packet)> {
+    fn next_answer(&mut self, now: Micros, storage: &mut dyn Storage) -> Option<(Sender, Packet)> {
         if self.burst.is_some() {
             return self.go_on_bursting(storage);
         }
@@ -129,7 +129,7 @@ impl FtpServer {
         Some((station, answer))
     }
 
-    fn go_on_bursting(&mut self, storage: &dyn Storage) -> Option<(u8, Packet)> {
+    fn go_on_bursting(&mut self, storage: &dyn Storage) -> Option<(Sender, Packet)> {
         let burst = self.burst.as_mut()?;
         let station = burst.station;
         let mut bytes = vec![0; usize::from(burst.size).min(MOST_DATA)];

@@ -40,6 +40,14 @@ impl Default for Faults {
     }
 }
 
+impl Faults {
+    /// Whether the link is perfect.
+    pub fn is_none(&self) -> bool {
+        let Self { loss, repeat, delay, jitter, bytes_per_s, queue: _ } = *self;
+        loss <= 0.0 && repeat <= 0.0 && delay == 0 && jitter == 0 && bytes_per_s <= 0.0
+    }
+}
+
 /// What went through, bytes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Carried {

@@ -10,6 +10,7 @@ pub mod files;
 pub mod ftp_server;
 pub mod log_server;
 pub mod lossy;
+mod post;
 pub mod server;
 pub mod storage;
 pub mod vehicle;

@@ -5,20 +5,19 @@
 //! the computer allows while somebody flies; messages never come in shorter rounds than 20 ms.
 
 use std::io;
-use std::net::{SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::endpoint::Endpoint as _;
 use super::faulty::FaultyLink;
 use super::lossy::Faults;
+use super::post::Post;
 use super::vehicle::VirtualVehicle;
 use crate::link::clock::{Clock, MS, Micros, S};
-use crate::link::frame::{FrameReader, MavMessage, Sender, encode};
-use crate::link::station::AUTOPILOT;
+use crate::link::signing::{Key, signing_time};
 
 /// Length of a round, wall time.
 const ROUND: Micros = 20 * MS;
@@ -28,8 +27,6 @@ const TRANSFER_ROUND: Micros = 2 * MS;
 const LONGEST_STEP: Micros = 10 * S;
 /// Up to this speed messages are never too close together; above it time goes on in whole rounds.
 const SMOOTH_SPEED: f64 = 20.0;
-/// Packets that a vehicle may send in one round, in batches of its servers.
-const MOST_BATCHES: usize = 16;
 /// Largest datagram.
 const DATAGRAM: usize = 65_536;
 
@@ -47,13 +44,16 @@ pub enum Pace {
 }
 
 /// How a fleet is served.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct ServerOptions {
-    /// Where the station listens; every vehicle sends there from a socket of its own.
-    pub station: SocketAddr,
+    /// Where the station listens, network by network; every vehicle sends to the port of its
+    /// network, from a socket of its own.
+    pub stations: Vec<SocketAddr>,
+    /// With a key vehicles sign what they say, and refuse what is not signed with it.
+    pub key: Option<Key>,
     /// How fast time goes.
     pub pace: Pace,
-    /// How bad the link is, each way, in wall time.
+    /// How bad each network's link is, each way, in wall time.
     pub faults: Faults,
     /// Seed of the link's faults.
     pub seed: u64,
@@ -74,6 +74,19 @@ pub enum ServerError {
         #[source]
         source: io::Error,
     },
+    /// A vehicle is in a network that the station has no port for.
+    #[error(
+        "virtual vehicle {system} is in network {network}, but the station has {stations} ports: \
+         give one for each network"
+    )]
+    Network {
+        /// Its system id.
+        system: u8,
+        /// Its network.
+        network: u16,
+        /// Networks that there are.
+        stations: usize,
+    },
     /// The thread could not be started.
     #[error("no thread for the virtual fleet")]
     Thread(#[source] io::Error),
@@ -91,6 +104,7 @@ pub struct Running {
     end: AtomicBool,
     now: AtomicU64,
     busy: AtomicU64,
+    refused: AtomicU64,
 }
 
 impl Running {
@@ -102,6 +116,11 @@ impl Running {
     /// Vehicles that fly, or whose log is still being written.
     pub fn busy(&self) -> u64 {
         self.busy.load(Ordering::Relaxed)
+    }
+
+    /// Frames that vehicles refused, because they were not signed, or wrongly, or heard before.
+    pub fn refused(&self) -> u64 {
+        self.refused.load(Ordering::Relaxed)
     }
 
     /// Ends the service; it is over when [`serve`] returns.
@@ -124,25 +143,24 @@ pub fn serve<'w, T>(
     if !(speed > 0.0 && speed <= 1000.0) {
         return Err(ServerError::Pace(speed));
     }
+    let time = signing_time(clock.unix_us());
     let mut posts = Vec::with_capacity(vehicles.len());
     for vehicle in vehicles {
-        let system = vehicle.setup.system;
-        let socket = open(options.station).map_err(|source| ServerError::Socket {
-            system,
-            station: options.station,
-            source,
-        })?;
-        posts.push(Post {
-            vehicle,
-            socket,
-            sequence: 0,
-            inbox: Vec::new(),
-            wake: 0,
-            is_sending: false,
-        });
+        let (system, network) = (vehicle.setup.system, vehicle.setup.network);
+        let stations = options.stations.len();
+        let Some(&station) = options.stations.get(usize::from(network)) else {
+            return Err(ServerError::Network { system, network, stations });
+        };
+        let post = Post::open(vehicle, station, options.key.as_ref(), time)
+            .map_err(|source| ServerError::Socket { system, station, source })?;
+        posts.push(post);
     }
-    let running =
-        Running { end: AtomicBool::new(false), now: AtomicU64::new(0), busy: AtomicU64::new(0) };
+    let running = Running {
+        end: AtomicBool::new(false),
+        now: AtomicU64::new(0),
+        busy: AtomicU64::new(0),
+        refused: AtomicU64::new(0),
+    };
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("virtual fleet".to_owned())
@@ -165,61 +183,6 @@ impl Drop for StopAtEnd<'_> {
     }
 }
 
-fn open(station: SocketAddr) -> io::Result<UdpSocket> {
-    let any: SocketAddr = match (station.is_ipv6(), station.ip().is_loopback()) {
-        (false, true) => ([127, 0, 0, 1], 0).into(),
-        (false, false) => ([0, 0, 0, 0], 0).into(),
-        (true, _) => (std::net::Ipv6Addr::UNSPECIFIED, 0).into(),
-    };
-    let socket = UdpSocket::bind(any)?;
-    socket.set_nonblocking(true)?;
-    Ok(socket)
-}
-
-/// A vehicle and its socket.
-struct Post<'w> {
-    vehicle: VirtualVehicle<'w>,
-    socket: UdpSocket,
-    sequence: u8,
-    inbox: Vec<MavMessage>,
-    wake: Micros,
-    /// Whether a transfer had more to send.
-    is_sending: bool,
-}
-
-impl Post<'_> {
-    fn is_busy(&self) -> bool {
-        self.vehicle.is_busy() || self.vehicle.is_writing()
-    }
-
-    /// Takes what has come, and goes on to this time; returns the frames to send.
-    fn round(&mut self, now: Micros) -> Vec<Vec<u8>> {
-        let mut out = Vec::new();
-        let heard = !self.inbox.is_empty();
-        for message in self.inbox.drain(..) {
-            self.vehicle.on_message(now, &message, &mut out);
-        }
-        self.is_sending = false;
-        if heard || self.wake <= now {
-            for batch in 1..=MOST_BATCHES {
-                self.wake = self.vehicle.poll(now, &mut out);
-                if self.wake > now {
-                    break;
-                }
-                self.is_sending = batch == MOST_BATCHES;
-            }
-        }
-        let sender = Sender { system: self.vehicle.setup.system, component: AUTOPILOT };
-        out.iter()
-            .map(|message| {
-                let frame = encode(sender, self.sequence, message, None);
-                self.sequence = self.sequence.wrapping_add(1);
-                frame
-            })
-            .collect()
-    }
-}
-
 /// Frames on their way: whose, and what.
 type Frame = (usize, Vec<u8>);
 
@@ -229,8 +192,14 @@ fn run<'w>(
     clock: &dyn Clock,
     running: &Running,
 ) -> Vec<VirtualVehicle<'w>> {
-    let mut up: FaultyLink<Frame> = FaultyLink::new(options.faults, options.seed, 0);
-    let mut down: FaultyLink<Frame> = FaultyLink::new(options.faults, options.seed, 1);
+    let links = |direction: u64| -> Vec<FaultyLink<Frame>> {
+        let networks = 0..options.stations.len() as u64;
+        networks
+            .map(|network| FaultyLink::new(options.faults, options.seed, 2 * network + direction))
+            .collect()
+    };
+    let (mut up, mut down) = (links(0), links(1));
+    let is_perfect = options.faults.is_none();
     let mut buffer = vec![0; DATAGRAM];
     let mut now: Micros = 0;
     let mut last = clock.now();
@@ -252,8 +221,23 @@ fn run<'w>(
                 Pace::Fast { ground } => ((passed.min(S) as f64) * ground) as Micros,
             };
         }
-        hear(&mut posts, begun, &mut up, &mut buffer);
-        let frames: Vec<Vec<Vec<u8>>> = posts.par_iter_mut().map(|post| post.round(now)).collect();
+        let time = signing_time(clock.unix_us());
+        let refused = hear(&mut posts, begun, time, &mut up, &mut buffer);
+        running.refused.fetch_add(refused, Ordering::Relaxed);
+        let frames: Vec<Vec<Vec<u8>>> = posts
+            .par_iter_mut()
+            .map(|post| {
+                let frames = post.round(now, time);
+                if !is_perfect {
+                    return frames;
+                }
+                for frame in &frames {
+                    post.send(frame);
+                }
+                post.flush();
+                Vec::new()
+            })
+            .collect();
         let took = clock.now().saturating_sub(begun);
         if is_busy && goes_on {
             // So long a step that a round takes about as long as it should.
@@ -267,12 +251,15 @@ fn run<'w>(
             .enumerate()
             .flat_map(|(index, all)| all.into_iter().map(move |frame| (index, frame)))
         {
-            down.send(begun, frame.len(), &(index, frame));
+            let network = usize::from(posts[index].vehicle.setup.network);
+            down[network].send(begun, frame.len(), &(index, frame));
         }
-        while let Some((index, frame)) = down.arrived(clock.now()) {
-            // A full buffer loses it, as a radio does.
-            let _ = posts[index].socket.send_to(&frame, options.station);
+        for link in &mut down {
+            while let Some((index, frame)) = link.arrived(clock.now()) {
+                posts[index].send(&frame);
+            }
         }
+        posts.iter_mut().for_each(Post::flush);
         running.now.store(now, Ordering::Relaxed);
         let busy = posts.iter().filter(|post| post.is_busy()).count();
         running.busy.store(busy as u64, Ordering::Relaxed);
@@ -287,28 +274,33 @@ fn run<'w>(
 /// Sleeps, but not for longer than nothing comes.
 fn wait(posts: &[Post<'_>], clock: &dyn Clock, left: Micros) {
     let until = clock.now() + left;
-    let mut peeked = [0; 1];
     while clock.now() < until {
         std::thread::sleep(Duration::from_micros(MS.min(left)));
-        if posts.iter().any(|post| post.socket.peek_from(&mut peeked).is_ok()) {
+        if posts.iter().any(Post::has_mail) {
             return;
         }
     }
 }
 
-/// Takes everything that waits at the sockets.
-fn hear(posts: &mut [Post<'_>], now: Micros, up: &mut FaultyLink<Frame>, buffer: &mut [u8]) {
+/// Takes everything that waits at the sockets; returns how many frames were refused.
+fn hear(
+    posts: &mut [Post<'_>],
+    now: Micros,
+    time: u64,
+    up: &mut [FaultyLink<Frame>],
+    buffer: &mut [u8],
+) -> u64 {
     for (index, post) in posts.iter().enumerate() {
-        // Errors tell of earlier sends: the station is not there (yet).
-        while let Ok((size, _)) = post.socket.recv_from(buffer) {
-            up.send(now, size, &(index, buffer[..size].to_vec()));
+        let link = &mut up[usize::from(post.vehicle.setup.network)];
+        while let Some(bytes) = post.receive(buffer) {
+            link.send(now, bytes.len(), &(index, bytes.to_vec()));
         }
     }
-    while let Some((index, bytes)) = up.arrived(now) {
-        let mut reader = FrameReader::default();
-        reader.push(&bytes);
-        while let Some(frame) = reader.next(None) {
-            posts[index].inbox.push(frame.message);
+    let mut refused = 0;
+    for link in up {
+        while let Some((index, bytes)) = link.arrived(now) {
+            refused += posts[index].hear(&bytes, time);
         }
     }
+    refused
 }

@@ -22,11 +22,11 @@ use updraft::virtual_fleet::world::World;
 
 use super::support::{Field, file, gps_at, ladder, read, show_of, tow_at};
 
-struct Wall(Instant);
+pub(crate) struct Wall(Instant);
 
 #[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
 impl Wall {
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self(Instant::now())
     }
 }
@@ -47,7 +47,7 @@ fn slot_m(system: u8) -> [f64; 2] {
     [f64::from(index % 7) * 5.0, f64::from(index / 7) * 5.0]
 }
 
-fn drone<'w>(world: &'w World<'w>, system: u8, show: &ShowDrone) -> VirtualVehicle<'w> {
+pub(crate) fn drone<'w>(world: &'w World<'w>, system: u8, show: &ShowDrone) -> VirtualVehicle<'w> {
     let [x, y] = slot_m(system);
     let mut setup = VehicleSetup::new(system.into(), system, Vector3::new(x, y, 0.0));
     setup.boot =
@@ -57,7 +57,7 @@ fn drone<'w>(world: &'w World<'w>, system: u8, show: &ShowDrone) -> VirtualVehic
     VirtualVehicle::new(world, setup, Box::new(storage), 0)
 }
 
-fn free_port() -> SocketAddr {
+pub(crate) fn free_port() -> SocketAddr {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap()
 }
 
@@ -127,7 +127,7 @@ fn fly_fleet(count: u8, show: impl Fn([f64; 2]) -> ShowDrone, pace: Pace, faults
     let wall: Arc<dyn Clock> = clock.clone();
     let mut station = Station::open(Setup { links, key: None, clock: wall }).unwrap();
     let vehicles = (1..=count).map(|system| drone(&world, system, &show(slot_m(system)))).collect();
-    let options = ServerOptions { station: at, pace, faults, seed: 1 };
+    let options = ServerOptions { stations: vec![at], key: None, pace, faults, seed: 1 };
     let begun = clock.now();
     let (start_s, vehicles) = serve(vehicles, &options, clock.as_ref(), |running| {
         lead(&mut station, running, &field, count)
@@ -153,7 +153,7 @@ fn fly_fleet(count: u8, show: impl Fn([f64; 2]) -> ShowDrone, pace: Pace, faults
 
 #[test]
 fn a_fleet_flies_as_fast_as_it_can_and_logs_the_same() {
-    fly_fleet(5, |place| show_of(place, 12.0), Pace::Fast { ground: 1.0 }, Faults::default());
+    fly_fleet(5, |place| show_of(place, 12.0), Pace::Fast { ground: 5.0 }, Faults::default());
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn a_fleet_flies_at_a_chosen_speed_over_a_bad_link() {
 #[test]
 #[ignore = "slow without optimisation"]
 fn forty_nine_fly_a_ladder() {
-    fly_fleet(49, ladder, Pace::Fast { ground: 1.0 }, Faults::default());
+    fly_fleet(49, ladder, Pace::Fast { ground: 5.0 }, Faults::default());
 }
 
 #[test]
@@ -175,7 +175,8 @@ fn a_speed_of_nothing_is_refused() {
     let clock = Wall::start();
     for speed in [0.0, -1.0, f64::NAN, 1e9] {
         let options = ServerOptions {
-            station: free_port(),
+            stations: vec![free_port()],
+            key: None,
             pace: Pace::Speed(speed),
             faults: Faults::default(),
             seed: 1,

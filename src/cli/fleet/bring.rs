@@ -32,6 +32,8 @@ pub(in crate::cli) struct Wish {
     pub(in crate::cli) rate: Option<f64>,
     pub(in crate::cli) at_once: usize,
     pub(in crate::cli) patience_s: f64,
+    /// Waits for the disk.
+    pub(in crate::cli) is_durable: bool,
     /// Only what is missing is told.
     pub(in crate::cli) quiet: bool,
 }
@@ -45,6 +47,7 @@ impl Default for Wish {
             rate: None,
             at_once: 12,
             patience_s: 60.0,
+            is_durable: true,
             quiet: false,
         }
     }
@@ -124,6 +127,7 @@ pub(in crate::cli) fn bring(
             patience: (wish.patience_s * S as f64) as Micros,
             most_size: wish.most_bytes,
             again: wish.again,
+            is_durable: wish.is_durable,
             start_number: run_number(),
             unix_s: SystemClock::start().unix_us() / 1_000_000,
             ..OneOptions::default()

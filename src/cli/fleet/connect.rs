@@ -1,7 +1,7 @@
 //! `--connect`: from words to links.
 
 use std::net::{SocketAddr, UdpSocket};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
@@ -80,15 +80,15 @@ impl ConnectArgs {
 
     /// Opens the links.
     pub(in crate::cli) fn open(&self, links: Vec<Address>) -> Result<Station, CommandError> {
-        let key = match &self.key {
-            Some(path) => Some(
-                Key::from_file(path)
-                    .map_err(|error| CommandError::Usage(crate::cli::exit::with_reasons(&error)))?,
-            ),
-            None => None,
-        };
+        let key = read_key(self.key.as_deref())?;
         station(links, key, SystemClock::start())
     }
+}
+
+/// The signing key in a file, if one is given.
+pub(in crate::cli) fn read_key(path: Option<&Path>) -> Result<Option<Key>, CommandError> {
+    let key = path.map(Key::from_file).transpose();
+    key.map_err(|error| CommandError::Usage(crate::cli::exit::with_reasons(&error)))
 }
 
 /// Opens links with a clock.
@@ -101,14 +101,14 @@ pub(in crate::cli) fn station(
         .map_err(|error| CommandError::Failed(crate::cli::exit::with_reasons(&error)))
 }
 
-/// A link that virtual drones on this computer find, on a free port, and the port's address.
-pub(in crate::cli) fn own_link() -> Result<(Address, SocketAddr), CommandError> {
+/// A link to a network of virtual drones on this computer, on a free port, and the port's address.
+pub(in crate::cli) fn own_link(network: u16) -> Result<(Address, SocketAddr), CommandError> {
     let free =
         || -> std::io::Result<SocketAddr> { UdpSocket::bind(("127.0.0.1", 0))?.local_addr() };
     let address = free().map_err(|error| {
         CommandError::Failed(format!("no free UDP port on this computer: {error}"))
     })?;
-    Ok((Address { network: 0, way: Way::UdpIn(address.to_string()) }, address))
+    Ok((Address { network, way: Way::UdpIn(address.to_string()) }, address))
 }
 
 /// Differs from run to run, for sequence numbers that answers of an earlier run must not match.

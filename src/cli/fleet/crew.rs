@@ -291,7 +291,9 @@ impl<'a> Crew<'a> {
     pub(in crate::cli) fn upload(&mut self) -> Result<BTreeMap<DroneId, String>, CommandError> {
         let uploads = self.uploads()?;
         let count = uploads.len();
-        let done = self.all(uploads, UPLOADS_AT_ONCE)?;
+        // Virtual drones share no radio; each upload waits a second for the drone to settle.
+        let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
+        let done = self.all(uploads, at_once)?;
         let mut refused = BTreeMap::new();
         let mut written = 0;
         for (drone, outcome) in done {
@@ -444,7 +446,7 @@ impl<'a> Crew<'a> {
             Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
         monitor.set_start(start_gps_ms);
         let journal = if self.is_virtual { None } else { Some(Journal::open(&self.folder.0)?) };
-        Ok(Eyes::new(self.context, monitor, journal, self.clock.clone()))
+        Ok(Eyes::new(self.context, monitor, journal, self.clock))
     }
 
     /// What was seen: the drones whose flight gave an alarm.

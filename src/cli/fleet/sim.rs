@@ -7,7 +7,9 @@ use super::connect::{own_link, station};
 use crate::base::time::GpsTime;
 use crate::cli::clock::SystemClock;
 use crate::cli::exit::{CommandError, with_reasons};
+use crate::cli::words;
 use crate::link::clock::{Micros, S};
+use crate::link::signing::Key;
 use crate::link::station::Station;
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
@@ -19,8 +21,10 @@ use crate::virtual_fleet::storage::MemoryStorage;
 use crate::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use crate::virtual_fleet::world::World;
 
-/// Most virtual drones: system ids of one network, without those of ground stations.
-pub(in crate::cli) const MOST_DRONES: usize = 253;
+/// Virtual drones in one network: its system ids, without those of ground stations.
+pub(in crate::cli) const MOST_PER_NETWORK: usize = 253;
+/// Most virtual drones of one process: each has a socket, and systems allow about 1,000 files.
+pub(in crate::cli) const MOST_DRONES: usize = 800;
 
 /// What virtual drones fly in, and how well they are heard.
 pub(in crate::cli) struct Hangar<'a> {
@@ -36,6 +40,8 @@ pub(in crate::cli) struct Hangar<'a> {
     pub(in crate::cli) pace: Pace,
     pub(in crate::cli) faults: Faults,
     pub(in crate::cli) boot: BootTimes,
+    /// What they sign with.
+    pub(in crate::cli) key: Option<Key>,
     pub(in crate::cli) mishaps: Mishaps,
 }
 
@@ -58,25 +64,34 @@ impl Hangar<'_> {
         &self,
         body: impl FnOnce(&mut Station) -> Result<T, CommandError>,
     ) -> Result<T, CommandError> {
-        let (link, address) = own_link()?;
+        let networks = self.slots.len().div_ceil(MOST_PER_NETWORK).max(1);
+        let opened: Result<Vec<_>, CommandError> =
+            (0..networks).map(|network| own_link(network as u16)).collect();
+        let (links, stations) = opened?.into_iter().unzip();
         let clock = SystemClock::start();
-        let mut station = station(vec![link], None, clock)?;
-        self.serve(address, clock, |_| body(&mut station))?
+        let mut station = station(links, self.key.clone(), clock)?;
+        self.serve(stations, clock, |_| body(&mut station))?
     }
 
-    /// Switches the drones on; they look for a station at this address.
+    /// Switches the drones on; they look for a station at these addresses, one for each
+    /// network, among which they are divided evenly.
     pub(in crate::cli) fn serve<T>(
         &self,
-        station: SocketAddr,
+        stations: Vec<SocketAddr>,
         clock: SystemClock,
         body: impl FnOnce(&Running) -> T,
     ) -> Result<T, CommandError> {
-        if self.slots.len() > MOST_DRONES {
+        let most = MOST_PER_NETWORK * stations.len();
+        if self.slots.len() > most {
             return Err(CommandError::Usage(format!(
-                "{} virtual drones do not fit into one network, which has {MOST_DRONES} system ids",
-                self.slots.len()
+                "{} virtual drones do not fit into {} with {MOST_PER_NETWORK} system ids each: give \
+                 --station {} times, once for each network",
+                self.slots.len(),
+                words::count(stations.len(), "network"),
+                self.slots.len().div_ceil(MOST_PER_NETWORK)
             )));
         }
+        let per_network = self.slots.len().div_ceil(stations.len().max(1)).max(1);
         let mut world =
             World::new(self.vehicle, self.air, self.plan.site.frame(), self.seed, self.switched_on);
         world.full_logs = self.full_logs;
@@ -85,8 +100,9 @@ impl Hangar<'_> {
             .iter()
             .enumerate()
             .map(|(index, slot)| {
-                let system = index as u8 + 1;
+                let system = (index % per_network) as u8 + 1;
                 let mut setup = VehicleSetup::new(slot.slot, system, slot.home_m.into());
+                setup.network = (index / per_network) as u16;
                 setup.boot = self.boot;
                 let mishaps = &self.mishaps;
                 setup.gone_at = mishaps.gone.contains(&slot.slot).then_some(mishaps.at);
@@ -101,8 +117,13 @@ impl Hangar<'_> {
                 Ok(VirtualVehicle::new(&world, setup, Box::new(storage), 0))
             })
             .collect::<Result<Vec<_>, CommandError>>()?;
-        let options =
-            ServerOptions { station, pace: self.pace, faults: self.faults, seed: self.seed };
+        let options = ServerOptions {
+            stations,
+            key: self.key.clone(),
+            pace: self.pace,
+            faults: self.faults,
+            seed: self.seed,
+        };
         let served = serve(vehicles, &options, &clock, body);
         let (given, _) = served.map_err(|error| CommandError::Failed(with_reasons(&error)))?;
         Ok(given)

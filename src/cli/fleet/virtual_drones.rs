@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use clap::Args;
 
+use super::connect::read_key;
 use super::one_flight;
 use super::sim::{Hangar, Mishaps};
 use crate::base::file::read_whole;
@@ -35,9 +36,13 @@ pub(in crate::cli) struct VirtualArgs {
     /// Which flight, if the campaign has several
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
-    /// Where the ground station listens
+    /// Where the ground station listens; several: one for each network, among which the drones
+    /// are divided evenly (a network has 253 system ids)
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:14550")]
-    station: SocketAddr,
+    station: Vec<SocketAddr>,
+    /// File with the signing key: the drones sign everything, and refuse what is not signed with it
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     /// Time goes so many times as fast as the clock on the wall
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     speed: f64,
@@ -153,13 +158,15 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
         },
         boot: if args.slow_boot { BootTimes::default() } else { BootTimes::short() },
         mishaps,
+        key: read_key(args.key.as_deref())?,
     };
+    let stations: Vec<String> = args.station.iter().map(ToString::to_string).collect();
     context.say(&format!(
         "{} are switched on and speak to {}; Ctrl-C switches them off",
         words::count(plan.slots.len(), "virtual drone"),
-        args.station
+        stations.join(", ")
     ));
-    hangar.serve(args.station, clock, |_| {
+    hangar.serve(args.station.clone(), clock, |_| {
         while !context.stop_flag().load(Ordering::SeqCst) {
             std::thread::sleep(Duration::from_millis(100));
         }

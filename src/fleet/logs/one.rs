@@ -58,6 +58,9 @@ pub struct OneOptions {
     pub folders: Vec<String>,
     /// Brings a log again that is there.
     pub again: bool,
+    /// Waits for the disk, so that a power loss loses little; needless for logs that can be had
+    /// again at any time.
+    pub is_durable: bool,
     /// Differs from run to run.
     pub start_number: u32,
     /// For the manifest, Unix seconds.
@@ -72,6 +75,7 @@ impl Default for OneOptions {
             most_size: 2 << 30,
             folders: vec!["/APM/LOGS".to_owned(), "logs".to_owned()],
             again: false,
+            is_durable: true,
             start_number: 0,
             unix_s: 0,
         }
@@ -405,7 +409,8 @@ impl PullOne {
         let opened = path
             .parent()
             .map_or(Ok(()), create_folder)
-            .and_then(|()| PartFile::open(&path, &identity));
+            .and_then(|()| PartFile::open(&path, &identity))
+            .map(|part| if self.options.is_durable { part } else { part.without_waiting() });
         match opened {
             Ok(part) => self.begin(part, true),
             Err(error) => {

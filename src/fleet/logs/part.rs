@@ -37,6 +37,8 @@ pub struct PartFile {
     fresh: Intervals,
     position: u64,
     synced: Option<Micros>,
+    /// Whether it survives a power loss.
+    is_durable: bool,
 }
 
 /// Checksums of a file.
@@ -95,6 +97,7 @@ impl PartFile {
             fresh: Intervals::default(),
             position: u64::MAX,
             synced: None,
+            is_durable: true,
         };
         match have {
             Some(have) if have.end() <= length => {
@@ -106,6 +109,14 @@ impl PartFile {
             _ => part.clear()?,
         }
         Ok(part)
+    }
+
+    /// Waits for the disk no more: for logs that can be had again at any time. A kill is still
+    /// survived, a power loss is not.
+    #[must_use]
+    pub fn without_waiting(mut self) -> Self {
+        self.is_durable = false;
+        self
     }
 
     /// Begins anew.
@@ -120,7 +131,7 @@ impl PartFile {
             .and_then(|()| self.journal.seek(SeekFrom::Start(0)))
             .and_then(|_| self.file.set_len(0))
             .and_then(|()| self.journal.write_all(line.as_bytes()))
-            .and_then(|()| self.journal.sync_data());
+            .and_then(|()| if self.is_durable { self.journal.sync_data() } else { Ok(()) });
         result.map_err(|source| FileError::new("write", &journal_path(&self.path), source))
     }
 
@@ -135,14 +146,16 @@ impl PartFile {
         if self.fresh.count() == 0 {
             return Ok(());
         }
-        self.file.sync_data().map_err(fail)?;
+        if self.is_durable {
+            self.file.sync_data().map_err(fail)?;
+        }
         let ranges: Vec<String> =
             self.fresh.iter().map(|(start, end)| format!("{start}-{end}")).collect();
         let text: String =
             ranges.chunks(RANGES_PER_LINE).map(|some| line(&some.join(" "))).collect();
         self.journal
             .write_all(text.as_bytes())
-            .and_then(|()| self.journal.sync_data())
+            .and_then(|()| if self.is_durable { self.journal.sync_data() } else { Ok(()) })
             .map_err(|source| FileError::new("write", &journal_path(&self.path), source))?;
         self.fresh = Intervals::default();
         Ok(())
@@ -161,11 +174,15 @@ impl PartFile {
         self.sync()?;
         let part = part_path(&self.path);
         let fail = |source| FileError::new("rename", &part, source);
-        self.file.sync_all().map_err(fail)?;
+        if self.is_durable {
+            self.file.sync_all().map_err(fail)?;
+        }
         fs::rename(&part, &self.path).map_err(fail)?;
         // A journal without its part is begun anew by the next download; no harm.
         let _ = fs::remove_file(journal_path(&self.path));
-        if let Some(folder) = self.path.parent().and_then(|folder| File::open(folder).ok()) {
+        if let Some(folder) = self.path.parent().filter(|_| self.is_durable)
+            && let Ok(folder) = File::open(folder)
+        {
             let _ = folder.sync_all();
         }
         Ok(())

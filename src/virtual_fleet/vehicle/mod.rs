@@ -28,7 +28,7 @@ use super::storage::Storage;
 use super::world::World;
 use crate::base::time::GpsTime;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::frame::{MavMessage, dialect};
+use crate::link::frame::{MavMessage, Sender, dialect};
 use crate::link::station::STATION;
 use crate::protocol::show::{self, SHOW_MODE, Stage, StartConfig, Status, flag};
 use crate::show::lights;
@@ -77,6 +77,8 @@ pub struct VehicleSetup {
     pub drone: u16,
     /// MAVLink system id.
     pub system: u8,
+    /// Network, from 0: system ids are unique in it.
+    pub network: u16,
     /// Where it stands, show frame, m.
     pub stands_m: Vector3<f64>,
     /// How long it takes to boot.
@@ -99,6 +101,7 @@ impl VehicleSetup {
         Self {
             drone,
             system,
+            network: 0,
             stands_m,
             boot: BootTimes::default(),
             stock: false,
@@ -469,6 +472,16 @@ impl<'w> VirtualVehicle<'w> {
 
 impl Endpoint for VirtualVehicle<'_> {
     fn on_message(&mut self, now: Micros, message: &MavMessage, out: &mut Vec<MavMessage>) {
+        self.on_frame(now, STATION, message, out);
+    }
+
+    fn on_frame(
+        &mut self,
+        now: Micros,
+        sender: Sender,
+        message: &MavMessage,
+        out: &mut Vec<MavMessage>,
+    ) {
         if self.is_gone(now) || self.age(now) < self.setup.boot.heartbeat {
             return;
         }
@@ -479,7 +492,7 @@ impl Endpoint for VirtualVehicle<'_> {
             MavMessage::COMMAND_LONG(command) => self.on_command(now, &command.into(), out),
             MavMessage::COMMAND_INT(command) => self.on_command(now, &command.into(), out),
             MavMessage::DATA16(packet) => self.take_start_packet(now, packet),
-            MavMessage::FILE_TRANSFER_PROTOCOL(_) => self.ftp.on_message(STATION.system, message),
+            MavMessage::FILE_TRANSFER_PROTOCOL(_) => self.ftp.on_message(sender, message),
             _ => {
                 if let MavMessage::LOG_REQUEST_DATA(_) = message
                     && self.airborne.is_none()

@@ -17,6 +17,7 @@ use crate::link::drive::{Watch as _, drive};
 use crate::link::id::DroneId;
 use crate::show::Trajectory;
 
+#[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
 fn refused(error: StartRefusal) -> CommandError {
     CommandError::Failed(error.to_string())
 }

@@ -1,0 +1,164 @@
+//! Whole fleets over UDP on this computer: `cargo bench --bench loopback [DRONES BYTES]...`.
+//!
+//! Time and processor time (of both ends together) to put a show file onto every drone and to
+//! bring a log home from each: 1 drone with 20 MB, 49 with 6.5 MB, 500 in two networks with 1 MB.
+
+#![expect(clippy::expect_used, reason = "a measurement that cannot go on fails")]
+#![expect(clippy::print_stdout, reason = "a table for people")]
+
+use std::collections::BTreeMap;
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::time::{Instant, SystemTime};
+
+use nalgebra::Vector3;
+use updraft::base::frame::{Geodetic, ShowFrame};
+use updraft::base::time::GpsTime;
+use updraft::fleet::ftp::Caller;
+use updraft::fleet::ftp::put::Put;
+use updraft::fleet::logs::one::OneOptions;
+use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
+use updraft::link::clock::{Clock, MS, Micros, S};
+use updraft::link::drive::{NoWatch, drive};
+use updraft::link::id::DroneId;
+use updraft::link::net::Net as _;
+use updraft::link::station::{Setup, Station};
+use updraft::sim::Uniform;
+use updraft::vehicle::library::builtin;
+use updraft::virtual_fleet::lossy::Faults;
+use updraft::virtual_fleet::server::{Pace, ServerOptions, serve};
+use updraft::virtual_fleet::storage::MemoryStorage;
+use updraft::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
+use updraft::virtual_fleet::world::World;
+
+const PER_NETWORK: usize = 250;
+const SHOW_BYTES: usize = 8_000;
+
+struct Wall(Instant);
+
+impl Clock for Wall {
+    fn now(&self) -> Micros {
+        self.0.elapsed().as_micros() as Micros
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
+    fn unix_us(&self) -> u64 {
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        since.map_or(0, |since| since.as_micros() as u64)
+    }
+}
+
+/// Processor time of this process so far, s; Linux only.
+fn cpu_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace();
+    // User and system time, in ticks of 10 ms.
+    fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
+
+fn main() {
+    let numbers: Vec<usize> = std::env::args().filter_map(|text| text.parse().ok()).collect();
+    let pairs: Vec<(usize, usize)> = match numbers.as_chunks::<2>().0 {
+        [] => vec![(1, 20_000_000), (49, 6_500_000), (500, 1_000_000)],
+        pairs => pairs.iter().map(|&[count, bytes]| (count, bytes)).collect(),
+    };
+    println!("drones      task       MB   time s    CPU s   MB/s  CPU s/GB");
+    for (count, bytes) in pairs {
+        measure(count, bytes);
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
+fn measure(count: usize, bytes: usize) {
+    let vehicle = builtin("airsim-generic-quad").expect("a built-in vehicle");
+    let air = Uniform(Vector3::zeros());
+    let origin = Geodetic { lat_deg: 47.0, lon_deg: 19.0, amsl_m: 150.0 };
+    let frame = ShowFrame { origin, orientation_deg: 0.0 };
+    let world = World::new(&vehicle, &air, frame, 1, GpsTime { week: 2445, tow_ms: 100_000_000 });
+    let clock = Arc::new(Wall(Instant::now()));
+    let stations: Vec<SocketAddr> = (0..count.div_ceil(PER_NETWORK)).map(|_| free_port()).collect();
+    let links = stations.iter().enumerate();
+    let links = links
+        .map(|(network, at)| format!("{network}@udpin:{at}").parse().expect("an address"))
+        .collect();
+    let wall: Arc<dyn Clock> = clock.clone();
+    let mut station = Station::open(Setup { links, key: None, clock: wall }).expect("a port");
+    let ids: Vec<DroneId> = (0..count)
+        .map(|index| DroneId {
+            network: (index / PER_NETWORK) as u16,
+            system: (index % PER_NETWORK) as u8 + 1,
+        })
+        .collect();
+    let vehicles = ids
+        .iter()
+        .enumerate()
+        .map(|(index, id)| {
+            let mut setup = VehicleSetup::new(index as u16 + 1, id.system, Vector3::zeros());
+            setup.network = id.network;
+            setup.boot = BootTimes::short();
+            let mut storage = MemoryStorage::default();
+            let log = (0..bytes).map(|at| (at * 7 + at / 253) as u8).collect();
+            storage.put("logs/00000001.BIN", log).expect("a plain name");
+            VirtualVehicle::new(&world, setup, Box::new(storage), 0)
+        })
+        .collect();
+    let options = ServerOptions {
+        stations,
+        key: None,
+        pace: Pace::Speed(1.0),
+        faults: Faults::default(),
+        seed: 1,
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    serve(vehicles, &options, clock.as_ref(), |_| {
+        let until = station.now() + 10 * S;
+        let awake = station.now() + 2 * S;
+        while station.now() < awake || (station.heard().len() < count && station.now() < until) {
+            let next = station.now() + 50 * MS;
+            let _ = station.recv(next).expect("a link");
+        }
+        let (begun, cpu) = (clock.now(), cpu_s());
+        let puts: BTreeMap<DroneId, Put> = ids
+            .iter()
+            .map(|id| {
+                let caller = Caller::new(*id, 1);
+                (*id, Put::new(caller, "/collmot/show.skyb", vec![7; SHOW_BYTES], 60 * S))
+            })
+            .collect();
+        let done = drive(&mut station, puts, 16, &mut NoWatch).expect("a link");
+        let good = done.values().filter(|done| done.is_ok()).count();
+        tell(count, "put", good, good * SHOW_BYTES, clock.now() - begun, cpu_s() - cpu);
+
+        let (begun, cpu) = (clock.now(), cpu_s());
+        let wanted: Vec<Wanted> = (1..)
+            .zip(&ids)
+            .map(|(slot, id)| Wanted { drone: *id, slot, file: format!("{slot:03}.BIN") })
+            .collect();
+        let options = PullOptions {
+            each: OneOptions::default(),
+            at_once: 12,
+            bytes_per_s: None,
+            made_by: "bench".to_owned(),
+        };
+        let pulled = pull(&mut station, folder.path(), &wanted, &options, &mut NoWatch);
+        let pulled = pulled.expect("a link");
+        let is_whole = |of: &&Outcome| matches!(of, Outcome::Done(done) if done.failure.is_none());
+        let good = pulled.values().filter(is_whole).count();
+        tell(count, "pull", good, good * bytes, clock.now() - begun, cpu_s() - cpu);
+    })
+    .expect("a fleet");
+}
+
+fn tell(count: usize, task: &str, good: usize, bytes: usize, took: Micros, cpu: f64) {
+    let (mb, time_s) = (bytes as f64 * 1e-6, took as f64 * 1e-6);
+    println!(
+        "{good:>3}/{count:<3} {task:>8} {mb:>8.1} {time_s:>8.2} {cpu:>8.2} {:>6.1} {:>9.1}",
+        mb / time_s,
+        cpu / mb * 1e3
+    );
+}
+
+fn free_port() -> SocketAddr {
+    let socket = UdpSocket::bind("127.0.0.1:0").expect("a port");
+    socket.local_addr().expect("an address")
+}
