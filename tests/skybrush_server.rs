@@ -123,7 +123,7 @@ fn shows_that_cannot_be_flown_are_refused_before_anything_is_sent() {
         fs::write(bench.path("campaign/plan.json"), plan.to_string()).unwrap();
         let (ended, server) = fly(&bench, Fault::None);
         assert!(server.asked().is_empty(), "{ended}");
-        let _ = write!(said, "{ended}\n");
+        let _ = writeln!(said, "{ended}");
     };
     change(&|plan| plan["fence"]["polygon_m"] = json!([]));
     change(&|plan| plan["fence"]["polygon_m"] = json!([[-1, -1], [1, -1], [1, 1], [-1, 1]]));
