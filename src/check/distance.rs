@@ -354,18 +354,8 @@ fn report(
 }
 
 fn unfinished() -> Finding {
-    Finding {
-        severity: Severity::Error,
-        check: NAMES[AIR],
-        drones: Vec::new(),
-        time_s: None,
-        end_s: None,
-        value: None,
-        limit: None,
-        unit: "m",
-        message:
-            "too many drones are too close together to list all; there may be more, and nearer"
-                .into(),
-        remedy: "separate the drones that are listed, then check again",
-    }
+    let message =
+        "too many drones are too close together to list all; there may be more, and nearer";
+    let remedy = "separate the drones that are listed, then check again";
+    Finding { unit: "m", ..Finding::new(Severity::Error, NAMES[AIR], message.into(), remedy) }
 }

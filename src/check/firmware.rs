@@ -115,16 +115,12 @@ fn finding(
     remedy: &'static str,
 ) -> Finding {
     Finding {
-        severity,
-        check,
         drones: vec![track.name()],
         time_s: Some(time_s),
-        end_s: None,
         value: Some(value),
         limit: Some(limit),
         unit,
-        message,
-        remedy,
+        ..Finding::new(severity, check, message, remedy)
     }
 }
 

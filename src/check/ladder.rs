@@ -126,16 +126,5 @@ fn speeds(plan: &Plan, collector: &mut Collector) {
 }
 
 fn warning(check: &'static str, message: String, remedy: &'static str) -> Finding {
-    Finding {
-        severity: Severity::Warning,
-        check,
-        drones: vec![],
-        time_s: None,
-        end_s: None,
-        value: None,
-        limit: None,
-        unit: "",
-        message,
-        remedy,
-    }
+    Finding::new(Severity::Warning, check, message, remedy)
 }

@@ -47,18 +47,11 @@ pub(super) fn check(input: &CheckInput<'_>, collector: &mut Collector) {
         );
         collector.add(
             0,
-            Finding {
-                severity: Severity::Warning,
-                check: "limits",
-                drones: vec![],
-                time_s: None,
-                end_s: None,
-                value: Some(value),
-                limit: Some(own),
-                unit,
+            warning(
+                (value, own, unit),
                 message,
-                remedy: "fly like this only if somebody has tried it with this vehicle",
-            },
+                "fly like this only if somebody has tried it with this vehicle",
+            ),
         );
     }
 }
@@ -80,20 +73,24 @@ fn stated(input: &CheckInput<'_>, key: &str) -> Option<f64> {
 
 /// The warning of a limit that the show states and that does not count.
 fn unheard(key: &str, unit: &'static str, value: f64, own: f64) -> Finding {
+    let message = format!(
+        "the show states {key} = {} {unit}; the vehicle's own {} {unit} are stricter and count",
+        plain(value),
+        plain(own),
+    );
+    let remedy = "name the vehicle that flies it, or allow the check by its name";
+    warning((value, own, unit), message, remedy)
+}
+
+fn warning(
+    (value, limit, unit): (f64, f64, &'static str),
+    message: String,
+    remedy: &'static str,
+) -> Finding {
     Finding {
-        severity: Severity::Warning,
-        check: "limits",
-        drones: vec![],
-        time_s: None,
-        end_s: None,
         value: Some(value),
-        limit: Some(own),
+        limit: Some(limit),
         unit,
-        message: format!(
-            "the show states {key} = {} {unit}; the vehicle's own {} {unit} are stricter and count",
-            plain(value),
-            plain(own),
-        ),
-        remedy: "name the vehicle that flies it, or allow the check by its name",
+        ..Finding::new(Severity::Warning, "limits", message, remedy)
     }
 }

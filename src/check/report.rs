@@ -43,6 +43,29 @@ pub struct Finding {
     pub remedy: &'static str,
 }
 
+impl Finding {
+    /// A finding about the show as a whole, without a number: what else is known is filled in.
+    pub(super) fn new(
+        severity: Severity,
+        check: &'static str,
+        message: String,
+        remedy: &'static str,
+    ) -> Self {
+        Self {
+            severity,
+            check,
+            drones: vec![],
+            time_s: None,
+            end_s: None,
+            value: None,
+            limit: None,
+            unit: "",
+            message,
+            remedy,
+        }
+    }
+}
+
 /// The worst value that a check met, whether or not it breaks the limit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Margin {

@@ -18,18 +18,7 @@ fn error(
     message: String,
     remedy: &'static str,
 ) -> Finding {
-    Finding {
-        severity: Severity::Error,
-        check: CHECK,
-        drones,
-        time_s,
-        end_s: None,
-        value: None,
-        limit: None,
-        unit: "",
-        message,
-        remedy,
-    }
+    Finding { drones, time_s, ..Finding::new(Severity::Error, CHECK, message, remedy) }
 }
 
 /// Reports what is broken; returns for each drone whether the other checks can look at it.

@@ -84,8 +84,7 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
             connect: args.connect.clone(),
             dry_run: true,
         };
-        super::fleet::dry::upload(context, &step)?;
-        return super::fleet::dry::start(context, &step, args.lead.lead);
+        return super::fleet::dry::fly(context, &step, args.lead.lead);
     }
     let target = args.connect.target()?;
     if args.guided && !matches!(target, Target::Links(_)) {
@@ -105,16 +104,7 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
             fly(context, &mut crew, args)
         }
         Target::Sim => {
-            let simulation = Simulation {
-                air: args.air.air(args.updraft),
-                truth: args.air.truth,
-                seed: args.air.seed,
-                full_logs: args.air.full_logs,
-                effects: args.air.effects.clone(),
-                vehicle: None,
-                only: None,
-                force: args.force,
-            };
+            let simulation = args.air.simulation(args.updraft, args.force);
             let mut lost = false;
             let mut any = false;
             for folder in campaign::flights(&args.campaign)? {
@@ -145,10 +135,7 @@ fn fly(context: &Context, crew: &mut Crew<'_>, args: &FlyArgs) -> Result<Exit, C
         return Ok(Exit::Unsafe);
     }
     let refused = if args.guided {
-        // The fence's own switch is one of the parameters.
-        let refused = crew.make_guided()?;
-        crew.params(args.set_params)?;
-        refused
+        crew.make_guided()?
     } else {
         let stock = crew.stock();
         if !stock.is_empty() {
@@ -160,9 +147,10 @@ fn fly(context: &Context, crew: &mut Crew<'_>, args: &FlyArgs) -> Result<Exit, C
             ));
             return Ok(Exit::Unsafe);
         }
-        crew.params(args.set_params)?;
         crew.upload()?
     };
+    // The fence's own switch is one of the parameters.
+    crew.params(args.set_params)?;
     let table = crew.preflight(args.connect.wait)?;
     if !refused.is_empty() || !table.go() {
         tables::preflight(context, &table)?;
@@ -194,11 +182,7 @@ pub(super) fn fly_virtual(
     let mut failed = Vec::new();
     if !ready.open.is_empty() {
         let brought = launch(context, folder, plan, simulation, &ready)?;
-        let missing = brought.iter().filter(|one| one.state == "missing");
-        failed.extend(missing.map(|one| {
-            let reason = one.reason.as_deref().unwrap_or("unknown");
-            format!("no log of drone {} (slot {}): {reason}", one.drone, one.slot)
-        }));
+        failed.extend(brought.iter().filter_map(Brought::loss));
     }
     settle(context, folder, plan, ready, failed, watch)
 }
@@ -240,9 +224,7 @@ fn launch(
         if !crew.assign(true)? {
             return Err(no_go("they do not stand as planned"));
         }
-        crew.params(true)?;
         let refused = crew.upload()?;
-        // The second look is after the upload has switched the fences on.
         crew.params(true)?;
         let table = crew.preflight(20.0)?;
         if !refused.is_empty() || !table.go() {

@@ -13,7 +13,7 @@ use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::{one_flight, server};
-use super::simulate::made_by;
+use super::simulate::{SlotSet, made_by, parse_slots};
 use super::words;
 use crate::base::file::create_folder;
 use crate::campaign::{self, FlightFolder};
@@ -81,9 +81,9 @@ struct PullArgs {
     /// Bring logs again that have come before
     #[arg(long)]
     again: bool,
-    /// Only these slots, with commas
-    #[arg(long, value_name = "SLOTS", value_delimiter = ',')]
-    slots: Option<Vec<u16>>,
+    /// Only these slots: 1-10,12
+    #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
+    slots: Option<SlotSet>,
     /// What is asked of each network, bytes per second [default: what it carries]
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(1..))]
     rate: Option<u32>,
@@ -292,6 +292,12 @@ fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
 
 fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    if let Some(stray) = args.slots.as_ref().and_then(|slots| slots.stray(&plan)) {
+        return Err(CommandError::Usage(format!(
+            "the plan has no slot {stray}: it has {}",
+            plan.slots.len()
+        )));
+    }
     let _lock = context.lock(&args.campaign)?;
     let links = match args.connect.target()? {
         Target::Links(links) => links,
@@ -303,7 +309,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     with_table(&mut crew, args.connect.wait)?;
     let mut table = crew.table.clone();
     if let Some(slots) = &args.slots {
-        table.drones.retain(|line| slots.contains(&line.slot));
+        table.drones.retain(|line| slots.contains(line.slot));
     }
     let wish = Wish {
         which: args.log,

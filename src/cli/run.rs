@@ -13,9 +13,7 @@ use super::fleet::sim::MOST_DRONES;
 use super::fly::fly_virtual;
 use super::mission_args::MissionArgs;
 use super::plan::{what_for_whom, write};
-use super::simulate::{
-    AirArgs, AirSpecs, Simulation, air_help, air_specs, simulate, speed, updraft,
-};
+use super::simulate::{AirArgs, AirSpecs, air_help, air_specs, simulate, speed, updraft};
 use crate::campaign;
 use crate::mission::plan::Purpose;
 use crate::show::Show;
@@ -100,16 +98,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
             Purpose::Measurement if air.specs.is_empty() => args.updraft.unwrap_or(1.0),
             Purpose::Measurement => args.updraft.unwrap_or(0.0),
         };
-        let simulation = Simulation {
-            air: air.air(updraft_mps),
-            truth: air.truth,
-            seed: air.seed,
-            full_logs: air.full_logs,
-            effects: air.effects,
-            vehicle: None,
-            only: None,
-            force: args.force,
-        };
+        let simulation = air.simulation(updraft_mps, args.force);
         let crowd = flight.plan.slots.len() > MOST_DRONES;
         let flown = if args.direct || crowd {
             simulate(context, folder, &flight.plan, &simulation)?

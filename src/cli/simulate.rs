@@ -109,6 +109,20 @@ impl AirArgs {
         let specs: Vec<_> = self.specs.iter().flat_map(|specs| specs.0.iter().cloned()).collect();
         Air::new(uniform_mps, &specs)
     }
+
+    /// A flight of all drones in that air, in the vehicle that was planned for.
+    pub(super) fn simulation(&self, updraft_mps: f64, force: bool) -> Simulation {
+        Simulation {
+            air: self.air(updraft_mps),
+            truth: self.truth,
+            seed: self.seed,
+            full_logs: self.full_logs,
+            effects: self.effects.clone(),
+            vehicle: None,
+            only: None,
+            force,
+        }
+    }
 }
 
 /// Arguments of `updraft simulate`.
@@ -149,7 +163,8 @@ pub(super) struct SimulateArgs {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct SlotSet(BTreeSet<u16>);
 
-fn parse_slots(text: &str) -> Result<SlotSet, String> {
+/// Parser of sets of slots: `1-10,12`.
+pub(super) fn parse_slots(text: &str) -> Result<SlotSet, String> {
     let bad = || "write slots as 1-10,12,20-29".to_owned();
     let mut slots = BTreeSet::new();
     for part in text.split(',') {
@@ -166,8 +181,13 @@ fn parse_slots(text: &str) -> Result<SlotSet, String> {
 
 impl SlotSet {
     /// The first of them that a plan does not have.
-    fn stray(&self, plan: &Plan) -> Option<u16> {
+    pub(super) fn stray(&self, plan: &Plan) -> Option<u16> {
         self.0.iter().copied().find(|slot| plan.slot(*slot).is_none())
+    }
+
+    /// Whether a slot is one of them.
+    pub(super) fn contains(&self, slot: u16) -> bool {
+        self.0.contains(&slot)
     }
 }
 
@@ -207,14 +227,9 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
     let folders = campaign::flights(&args.campaign)?;
     let vehicle = args.vehicle.as_deref().map(library::load).transpose()?;
     let simulation = Simulation {
-        air: args.air.air(args.updraft),
-        truth: args.air.truth,
-        seed: args.air.seed,
-        full_logs: args.air.full_logs,
-        effects: args.air.effects.clone(),
         vehicle,
         only: args.drones.clone(),
-        force: args.force,
+        ..args.air.simulation(args.updraft, args.force)
     };
     let _lock = context.lock(&args.campaign)?;
     let mut flights = Vec::new();
@@ -236,6 +251,23 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
     Ok(if failed { Exit::Losses } else { Exit::Done })
 }
 
+/// The vehicle of a flight (another, if given), with the effects that were chosen.
+pub(super) fn resolved_vehicle(
+    folder: &FlightFolder,
+    other: Option<&Vehicle>,
+    choices: &[String],
+) -> Result<Vehicle, CommandError> {
+    let mut vehicle = match other {
+        Some(vehicle) => vehicle.clone(),
+        None => library::load(&folder.vehicle().display().to_string())?,
+    };
+    for choice in choices {
+        effects::select::choose(&mut vehicle, choice)?;
+    }
+    effects::select::resolved(&vehicle)?;
+    Ok(vehicle)
+}
+
 /// A flight that is about to be flown.
 pub(super) struct Ready<'a> {
     pub(super) vehicle: Vehicle,
@@ -255,14 +287,7 @@ pub(super) fn make_ready<'a>(
     plan: &'a Plan,
     simulation: &Simulation,
 ) -> Result<Ready<'a>, CommandError> {
-    let mut vehicle = match &simulation.vehicle {
-        Some(vehicle) => vehicle.clone(),
-        None => library::load(&folder.vehicle().display().to_string())?,
-    };
-    for choice in &simulation.effects {
-        effects::select::choose(&mut vehicle, choice)?;
-    }
-    effects::select::resolved(&vehicle)?;
+    let vehicle = resolved_vehicle(folder, simulation.vehicle.as_ref(), &simulation.effects)?;
     if let Some(stray) = simulation.only.as_ref().and_then(|set| set.stray(plan)) {
         return Err(CommandError::Usage(format!(
             "{} has no slot {stray}; slots are 1 to {}",
@@ -275,7 +300,7 @@ pub(super) fn make_ready<'a>(
     let wanted: Vec<_> = plan
         .slots
         .iter()
-        .filter(|slot| simulation.only.as_ref().is_none_or(|set| set.0.contains(&slot.slot)))
+        .filter(|slot| simulation.only.as_ref().is_none_or(|set| set.contains(slot.slot)))
         .collect();
     let changed = changed_logs(folder, &record, &wanted, count)?;
     for (slot, how) in &changed {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::telemetry::Telemetry;
 use crate::base::file::{read_whole, write_whole};
+use crate::base::frame::Geodetic;
 use crate::campaign::{CampaignError, to_json};
 use crate::link::clock::{Micros, S};
 use crate::link::id::DroneId;
@@ -208,7 +209,6 @@ pub struct Stand {
 
 /// Where all vehicles with a fresh position stand.
 pub fn stands(plan: &Plan, telemetry: &Telemetry, now: Micros) -> BTreeMap<DroneId, Stand> {
-    let frame = plan.site.frame();
     let stand = |(drone, known): (&DroneId, &super::telemetry::Drone)| {
         let (at, position) = known.position?;
         // Without a fix the firmware sends a place of zeros.
@@ -216,13 +216,20 @@ pub fn stands(plan: &Plan, telemetry: &Telemetry, now: Micros) -> BTreeMap<Drone
         if nowhere || now.saturating_sub(at) > FRESH {
             return None;
         }
-        let place = frame.from_geodetic(position.place);
+        Some((*drone, Stand::of(plan, position.place)?))
+    };
+    telemetry.drones.iter().filter_map(stand).collect()
+}
+
+impl Stand {
+    /// Of a drone at this place; `None`: the plan has no slots.
+    pub fn of(plan: &Plan, place: Geodetic) -> Option<Self> {
+        let place = plan.site.frame().from_geodetic(place);
         let at_m = [place.x, place.y];
         let distance = |slot: &crate::mission::plan::Slot| distance_m(at_m, slot.home_m);
         let nearest = plan.slots.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        Some((*drone, Stand { nearest: nearest.slot, distance_m: distance(nearest), at_m }))
-    };
-    telemetry.drones.iter().filter_map(stand).collect()
+        Some(Self { nearest: nearest.slot, distance_m: distance(nearest), at_m })
+    }
 }
 
 fn distance_m(at_m: [f64; 2], home_m: [f64; 3]) -> f64 {

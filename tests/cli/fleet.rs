@@ -157,3 +157,30 @@ fn what_cannot_be_is_refused() {
     refused(5, &["fleet", "virtual", "campaign", "--flown"]);
     insta::assert_snapshot!(all);
 }
+
+#[test]
+fn a_dry_run_sends_nothing_and_needs_nobody() {
+    let bench = Bench::new();
+    bench.planned("1x2", "campaign");
+    let link = format!("udpin:{}", free_port());
+    let steps: [&[&str]; 7] = [
+        &["fleet", "status"],
+        &["fleet", "upload", "--set-params"],
+        &["fleet", "preflight", "--set-params"],
+        &["fleet", "start", "--yes"],
+        &["fleet", "abort"],
+        &["fleet", "land"],
+        &["fly", "--yes", "--set-params"],
+    ];
+    for step in steps {
+        let args = [step, &["campaign", "--dry-run", "--connect", &link, "--wait", "0"]].concat();
+        let ended = bench.expect(0, &args);
+        assert!(ended.out.contains("to drone 2, if all goes well:"), "{ended}");
+        assert!(ended.err.contains("Nothing was sent"), "{ended}");
+        let json = bench.expect(0, &[&args[..], &["--json"]].concat()).json("updraft.dry-run/1");
+        assert_eq!(json["drones"].as_object().unwrap().len(), 2, "{step:?}");
+    }
+    let args = ["fleet", "restore", "campaign", "--dry-run", "--connect", &link, "--wait", "0"];
+    assert!(bench.expect(0, &args).out.is_empty(), "nothing was changed before");
+    assert!(!bench.path("campaign/fleet.json").exists(), "nothing is written");
+}

@@ -34,7 +34,7 @@ pub(in crate::cli) struct Wish {
     pub(in crate::cli) patience_s: f64,
     /// Waits for the disk.
     pub(in crate::cli) is_durable: bool,
-    /// Only what is missing is told.
+    /// Says nothing: the caller tells what is missing.
     pub(in crate::cli) quiet: bool,
 }
 
@@ -63,6 +63,15 @@ pub(in crate::cli) struct Brought {
     pub(in crate::cli) bytes: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(in crate::cli) reason: Option<String>,
+}
+
+impl Brought {
+    /// In a sentence why there is no log; `None`: there is one.
+    pub(in crate::cli) fn loss(&self) -> Option<String> {
+        let reason = self.reason.as_deref().unwrap_or("unknown");
+        (self.state == "missing")
+            .then(|| format!("no log of drone {} (slot {}): {reason}", self.drone, self.slot))
+    }
 }
 
 struct Bar<'a> {
@@ -184,13 +193,8 @@ pub(in crate::cli) fn bring(
             Brought { slot: wanted.slot, drone: wanted.drone, state, bytes, reason }
         })
         .collect();
-    for one in brought.iter().filter(|one| one.state == "missing") {
-        context.warn(&format!(
-            "no log of drone {} (slot {}): {}",
-            one.drone,
-            one.slot,
-            one.reason.as_deref().unwrap_or("unknown")
-        ));
+    for loss in brought.iter().filter_map(Brought::loss).filter(|_| !quiet) {
+        context.warn(&loss);
     }
     let bytes: u64 = brought.iter().map(|one| one.bytes).sum();
     let state = |state: &str| brought.iter().filter(|one| one.state == state).count();

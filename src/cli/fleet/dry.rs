@@ -7,12 +7,14 @@ use serde::Serialize;
 use super::crew::Crew;
 use super::{StepArgs, one_flight};
 use crate::base::frame::Geodetic;
+use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::{Abort, Action};
 use crate::fleet::dry_run::{Obliging, dry_run};
+use crate::fleet::greet::Greet;
 use crate::fleet::messages::{start_packet, text};
-use crate::fleet::required::{CheckParams, requirements};
+use crate::fleet::required::{Changes, CheckParams, requirements};
 use crate::fleet::slots::FleetTable;
 use crate::link::clock::Micros;
 use crate::link::drive::Machine;
@@ -97,20 +99,67 @@ fn shown<M: Machine>(plan: &Plan, table: &FleetTable, drone: DroneId, machine: M
     dry_run(machine, &mut vehicle, MOST).0
 }
 
+/// A campaign's flight, and the drones that it would be flown by.
+struct Dry {
+    folder: FlightFolder,
+    plan: Plan,
+    table: FleetTable,
+}
+
+impl Dry {
+    fn of(args: &StepArgs) -> Result<Self, CommandError> {
+        let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        let table = table(&folder.0, &plan)?;
+        Ok(Self { folder, plan, table })
+    }
+
+    /// What each drone would be sent.
+    fn each(&self, lines: impl Fn(DroneId) -> Vec<String>) -> BTreeMap<DroneId, Vec<String>> {
+        self.table.drones.iter().map(|line| (line.drone, lines(line.drone))).collect()
+    }
+
+    fn shown<M: Machine>(&self, drone: DroneId, machine: M) -> Vec<String> {
+        shown(&self.plan, &self.table, drone, machine)
+    }
+
+    fn params(&self, drone: DroneId) -> Vec<String> {
+        self.shown(drone, CheckParams::new(drone, requirements(&self.plan, true), false))
+    }
+
+    fn upload(&self, context: &Context) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
+        let mut nobody = Nobody;
+        let mut crew = Crew::new(context, &mut nobody, &self.folder, &self.plan);
+        crew.table = self.table.clone();
+        let mut lines = BTreeMap::new();
+        for (drone, upload) in crew.uploads()? {
+            let mut all = self.shown(drone, upload);
+            all.extend(self.params(drone));
+            lines.insert(drone, all);
+        }
+        Ok(lines)
+    }
+}
+
+/// What a look at the fleet would send.
+pub(in crate::cli) fn status(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    let dry = Dry::of(args)?;
+    print(context, dry.each(|drone| dry.shown(drone, Greet::new(drone))))
+}
+
+/// What the preflight table would send.
+pub(in crate::cli) fn preflight(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    let dry = Dry::of(args)?;
+    let lines = |drone| {
+        let mut lines = dry.shown(drone, Greet::new(drone));
+        lines.extend(dry.params(drone));
+        lines
+    };
+    print(context, dry.each(lines))
+}
+
 /// What an upload would send.
 pub(in crate::cli) fn upload(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
-    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-    let mut nobody = Nobody;
-    let mut crew = Crew::new(context, &mut nobody, &folder, &plan);
-    crew.table = table(&folder.0, &plan)?;
-    let mut lines = BTreeMap::new();
-    for (drone, upload) in crew.uploads()? {
-        let check = CheckParams::new(drone, requirements(&plan, true), false);
-        let mut all = shown(&plan, &crew.table, drone, check);
-        all.extend(shown(&plan, &crew.table, drone, upload));
-        lines.insert(drone, all);
-    }
-    print(context, lines)
+    print(context, Dry::of(args)?.upload(context)?)
 }
 
 /// What a start would send.
@@ -119,7 +168,30 @@ pub(in crate::cli) fn start(
     args: &StepArgs,
     lead_s: f64,
 ) -> Result<Exit, CommandError> {
-    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    print(context, Dry::of(args)?.each(|_| start_lines(lead_s)))
+}
+
+/// What a whole flight would send.
+pub(in crate::cli) fn fly(
+    context: &Context,
+    args: &StepArgs,
+    lead_s: f64,
+) -> Result<Exit, CommandError> {
+    let mut lines = Dry::of(args)?.upload(context)?;
+    for all in lines.values_mut() {
+        all.extend(start_lines(lead_s));
+    }
+    print(context, lines)
+}
+
+/// What putting parameters back would send.
+pub(in crate::cli) fn restore(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    let dry = Dry::of(args)?;
+    let machines = Changes::read(&dry.folder.0)?.restore().into_iter();
+    print(context, machines.map(|(drone, set)| (drone, dry.shown(drone, set))).collect())
+}
+
+fn start_lines(lead_s: f64) -> Vec<String> {
     let packet = |authorization| {
         text(&start_packet(&StartConfig {
             start_tow_s: 0,
@@ -127,12 +199,10 @@ pub(in crate::cli) fn start(
             countdown_ms: LEAVE_TIME,
         }))
     };
-    let lines = vec![
+    vec![
         format!("once a second, with the drones' GPS time + {lead_s:.0} s: {}", packet(0)),
         format!("once authorized, until the start: {}", packet(1)),
-    ];
-    let table = table(&folder.0, &plan)?;
-    print(context, table.drones.iter().map(|line| (line.drone, lines.clone())).collect())
+    ]
 }
 
 /// What an abort would send.
@@ -141,14 +211,13 @@ pub(in crate::cli) fn end(
     args: &StepArgs,
     action: Action,
 ) -> Result<Exit, CommandError> {
-    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-    let table = table(&folder.0, &plan)?;
-    let lines = table.drones.iter().map(|line| {
-        let mut vehicle = Obliging::new(line.drone, true, place(&plan, plan.slot(line.slot)));
+    let dry = Dry::of(args)?;
+    let lines = |drone| {
+        let slot = dry.table.slot_of(drone).and_then(|slot| dry.plan.slot(slot));
+        let mut vehicle = Obliging::new(drone, true, place(&dry.plan, slot));
         vehicle.armed = true;
         vehicle.above_home_m = 20.0;
-        let abort = Abort::new(line.drone, action, None);
-        (line.drone, dry_run(abort, &mut vehicle, MOST).0)
-    });
-    print(context, lines.collect())
+        dry_run(Abort::new(drone, action, None), &mut vehicle, MOST).0
+    };
+    print(context, dry.each(lines))
 }

@@ -21,6 +21,7 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::abort::{Aborted, Action};
+use crate::fleet::preflight::Preflight;
 use crate::fleet::start::{Start, StartOptions};
 use crate::link::id::DroneId;
 use crate::mission::Plan;
@@ -154,16 +155,9 @@ pub(super) fn one_flight(
 
 pub(super) fn run(context: &Context, args: &FleetArgs) -> Result<Exit, CommandError> {
     match &args.command {
-        FleetCommand::Status(args) => {
-            with_crew(context, args, |crew| tables::status(context, crew))
-        }
+        FleetCommand::Status(args) => status(context, args),
         FleetCommand::Upload(args) => upload(context, args),
-        FleetCommand::Preflight(args) => with_crew(context, &args.step, |crew| {
-            prepare(context, crew, args)?;
-            crew.look_at_files()?;
-            let table = crew.preflight(args.step.connect.wait)?;
-            tables::preflight(context, &table)
-        }),
+        FleetCommand::Preflight(args) => preflight(context, args),
         FleetCommand::Start(args) => start(context, args),
         FleetCommand::Abort(args) => end(context, args, Action::Return),
         FleetCommand::Land(args) => end(context, args, Action::Land),
@@ -199,19 +193,36 @@ fn with_crew(
     }
 }
 
-/// Clocks, slots and parameters; refuses to go on when a drone stands wrong.
-fn prepare(context: &Context, crew: &mut Crew<'_>, args: &UploadArgs) -> Result<(), CommandError> {
+/// Clocks and slots; refuses to go on when a drone stands wrong.
+fn prepare(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<(), CommandError> {
     crew.greet()?;
-    if !crew.assign(args.assign)? {
-        return Err(CommandError::Usage(
-            "nothing was sent: the drones do not stand as planned".to_owned(),
-        ));
+    if crew.assign(args.assign)? {
+        return Ok(());
     }
-    let right = crew.params(args.set_params)?;
-    if !right && !args.set_params {
-        context.say("The table tells which parameters");
+    Err(CommandError::Usage("nothing was sent: the drones do not stand as planned".to_owned()))
+}
+
+/// The table of drones that were loaded by an earlier command.
+fn look(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<Preflight, CommandError> {
+    prepare(crew, args)?;
+    crew.params(args.set_params)?;
+    crew.look_at_files()?;
+    crew.preflight(args.step.connect.wait)
+}
+
+fn preflight(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
+    if args.step.dry_run {
+        return dry::preflight(context, &args.step);
     }
-    Ok(())
+    let _lock = context.lock(&args.step.campaign)?;
+    with_crew(context, &args.step, |crew| tables::preflight(context, &look(crew, args)?))
+}
+
+fn status(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    if args.dry_run {
+        return dry::status(context, args);
+    }
+    with_crew(context, args, |crew| tables::status(context, crew))
 }
 
 fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
@@ -220,8 +231,10 @@ fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
     }
     let _lock = context.lock(&args.step.campaign)?;
     with_crew(context, &args.step, |crew| {
-        prepare(context, crew, args)?;
+        prepare(crew, args)?;
         let refused = crew.upload()?;
+        // The fence's own switch is one of the parameters.
+        crew.params(args.set_params)?;
         if context.json {
             context.print_json(&tables::UploadOutput::new(&crew.table, &refused))?;
         }
@@ -235,9 +248,7 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
     }
     let _lock = context.lock(&args.upload.step.campaign)?;
     with_crew(context, &args.upload.step, |crew| {
-        prepare(context, crew, &args.upload)?;
-        crew.look_at_files()?;
-        let table = crew.preflight(args.upload.step.connect.wait)?;
+        let table = look(crew, &args.upload)?;
         if !table.go() {
             return tables::preflight(context, &table);
         }
@@ -359,14 +370,14 @@ fn any_flight(campaign: &std::path::Path) -> Option<(FlightFolder, Plan)> {
 }
 
 fn restore(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    if args.dry_run {
+        return dry::restore(context, args);
+    }
     let _lock = context.lock(&args.campaign)?;
     with_crew(context, args, |crew| {
         let left = crew.restore()?;
-        context.say(
-            "Parameters are as they were, but for the drones named above".trim_end_matches(
-                if left.is_empty() { ", but for the drones named above" } else { "" },
-            ),
-        );
+        let but = if left.is_empty() { "" } else { ", but for the drones named above" };
+        context.say(&format!("Parameters are as they were{but}"));
         Ok(if left.is_empty() { Exit::Done } else { Exit::Losses })
     })
 }

@@ -7,6 +7,7 @@ use super::connect::{own_link, station};
 use crate::base::time::GpsTime;
 use crate::cli::clock::SystemClock;
 use crate::cli::exit::{CommandError, with_reasons};
+use crate::cli::simulate::SlotSet;
 use crate::cli::words;
 use crate::link::clock::{Micros, S};
 use crate::link::signing::Key;
@@ -49,9 +50,9 @@ pub(in crate::cli) struct Hangar<'a> {
 #[derive(Clone, Debug, Default)]
 pub(in crate::cli) struct Mishaps {
     /// Slots whose drones are switched off for good.
-    pub(in crate::cli) gone: Vec<u16>,
+    pub(in crate::cli) gone: Option<SlotSet>,
     /// Slots whose drones reboot once.
-    pub(in crate::cli) reboot: Vec<u16>,
+    pub(in crate::cli) reboot: Option<SlotSet>,
     /// When, their time from being switched on.
     pub(in crate::cli) at: Micros,
     /// Logs that are on their cards, by slot.
@@ -105,8 +106,12 @@ impl Hangar<'_> {
                 setup.network = (index / per_network) as u16;
                 setup.boot = self.boot;
                 let mishaps = &self.mishaps;
-                setup.gone_at = mishaps.gone.contains(&slot.slot).then_some(mishaps.at);
-                setup.reboot_at = mishaps.reboot.contains(&slot.slot).then_some(mishaps.at);
+                let befalls = |slots: &Option<SlotSet>| {
+                    let named = slots.as_ref().is_some_and(|slots| slots.contains(slot.slot));
+                    named.then_some(mishaps.at)
+                };
+                setup.gone_at = befalls(&mishaps.gone);
+                setup.reboot_at = befalls(&mishaps.reboot);
                 let mut storage = MemoryStorage::default();
                 if let Some(log) = mishaps.cards.get(&slot.slot) {
                     let name = format!("{}/00000001.BIN", setup.log_folder);

@@ -17,13 +17,11 @@ use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::cli::simulate::{AirArgs, updraft};
+use crate::cli::simulate::{AirArgs, SlotSet, parse_slots, resolved_vehicle, updraft};
 use crate::cli::words;
-use crate::effects;
 use crate::link::clock::{Clock as _, MS, Micros, S};
 use crate::mission::Plan;
 use crate::sim::air::spec;
-use crate::vehicle::library;
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
@@ -67,12 +65,12 @@ pub(in crate::cli) struct VirtualArgs {
     /// Their cards hold the logs that are in the campaign, to practise bringing logs home
     #[arg(long)]
     flown: bool,
-    /// These slots' drones are switched off for good, with commas
-    #[arg(long, value_name = "SLOTS", value_delimiter = ',')]
-    gone: Vec<u16>,
-    /// These slots' drones reboot once, with commas
-    #[arg(long, value_name = "SLOTS", value_delimiter = ',')]
-    reboot: Vec<u16>,
+    /// These slots' drones are switched off for good: 1-10,12
+    #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
+    gone: Option<SlotSet>,
+    /// These slots' drones reboot once: 1-10,12
+    #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
+    reboot: Option<SlotSet>,
     /// When --gone and --reboot happen, s of the drones' time after they are switched on
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = super::connect::seconds)]
     after: f64,
@@ -98,9 +96,8 @@ fn mishaps(
     folder: &FlightFolder,
     plan: &Plan,
 ) -> Result<Mishaps, CommandError> {
-    if let Some(slot) =
-        args.gone.iter().chain(&args.reboot).find(|slot| plan.slot(**slot).is_none())
-    {
+    let named = args.gone.iter().chain(&args.reboot);
+    if let Some(slot) = named.into_iter().find_map(|slots| slots.stray(plan)) {
         return Err(CommandError::Usage(format!(
             "the plan has no slot {slot}: it has {}",
             plan.slots.len()
@@ -127,11 +124,7 @@ fn mishaps(
 
 pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-    let mut vehicle = library::load(&folder.vehicle().display().to_string())?;
-    for choice in &args.air.effects {
-        effects::select::choose(&mut vehicle, choice)?;
-    }
-    effects::select::resolved(&vehicle)?;
+    let vehicle = resolved_vehicle(&folder, None, &args.air.effects)?;
     let frame = plan.site.frame();
     let air = spec::build(&args.air.air(args.updraft), &frame, args.air.seed, &plan.name);
     let clock = SystemClock::start();

@@ -4,19 +4,20 @@ mod logs;
 mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::IsTerminal as _;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use serde_json::Value;
 
-use super::{LeadArgs, asked};
+use super::{LeadArgs, asked, needs_person};
+use crate::base::frame::Geodetic;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit, with_reasons};
 use crate::fleet::abort::Action;
 use crate::fleet::fence::Fence as Checked;
+use crate::fleet::slots::{Stand, allowed_m};
 use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
@@ -72,8 +73,7 @@ fn assign(
 ) -> Result<BTreeMap<u16, String>, CommandError> {
     let ids = client.drones()?;
     let status = client.status(&ids)?;
-    let frame = plan.site.frame();
-    let allowed_m = crate::fleet::slots::allowed_m(plan);
+    let allowed_m = allowed_m(plan);
     let mut found: BTreeMap<u16, String> = BTreeMap::new();
     let mut problems = Vec::new();
     for (id, status) in &status {
@@ -86,20 +86,14 @@ fn assign(
             problems.push(format!("drone {id} does not say where it stands"));
             continue;
         };
-        let place = crate::base::frame::Geodetic { lat_deg, lon_deg, amsl_m: 0.0 };
-        let at = frame.from_geodetic(place);
-        let near = plan.slots.iter().min_by(|a, b| {
-            let away = |slot: &crate::mission::plan::Slot| {
-                (at.x - slot.home_m[0]).hypot(at.y - slot.home_m[1])
-            };
-            away(a).total_cmp(&away(b))
-        });
-        let Some(near) = near else { continue };
-        let away_m = (at.x - near.home_m[0]).hypot(at.y - near.home_m[1]);
+        let Some(stand) = Stand::of(plan, Geodetic { lat_deg, lon_deg, amsl_m: 0.0 }) else {
+            continue;
+        };
+        let (slot, away_m) = (stand.nearest, stand.distance_m);
         if away_m > allowed_m {
-            problems.push(format!("drone {id} stands {away_m:.1} m from slot {}", near.slot));
-        } else if let Some(other) = found.insert(near.slot, id.clone()) {
-            problems.push(format!("drones {other} and {id} both stand on slot {}", near.slot));
+            problems.push(format!("drone {id} stands {away_m:.1} m from slot {slot}"));
+        } else if let Some(other) = found.insert(slot, id.clone()) {
+            problems.push(format!("drones {other} and {id} both stand on slot {slot}"));
         }
     }
     for slot in &plan.slots {
@@ -125,11 +119,7 @@ pub(in crate::cli) fn fly(
     lead: &LeadArgs,
     with_logs: bool,
 ) -> Result<Exit, CommandError> {
-    if !lead.yes && !std::io::stdin().is_terminal() {
-        return Err(CommandError::Usage(
-            "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
-        ));
-    }
+    needs_person(lead)?;
     if lead.lead < LEAST_LEAD_S {
         return Err(CommandError::Usage(format!(
             "a lead of {} s is not possible: give at least {LEAST_LEAD_S} s; the drones set their \
