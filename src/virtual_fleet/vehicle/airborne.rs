@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{VirtualVehicle, error, text};
+use super::VirtualVehicle;
+use super::words::{error, text};
 use crate::base::time::GpsTime;
 use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, dialect};

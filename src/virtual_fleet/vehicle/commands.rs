@@ -1,8 +1,9 @@
 //! Commands and their acknowledgements.
 
+use super::VirtualVehicle;
 use super::show_mode::Reload;
 use super::telemetry::AUTOPILOT_VERSION;
-use super::{VirtualVehicle, error};
+use super::words::error;
 use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::station::STATION;
