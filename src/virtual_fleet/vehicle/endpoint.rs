@@ -80,6 +80,11 @@ impl Endpoint for VirtualVehicle<'_> {
             MavMessage::COMMAND_INT(command) => self.on_command(now, &command.into(), out),
             MavMessage::DATA16(packet) => self.take_start_packet(now, packet),
             MavMessage::FILE_TRANSFER_PROTOCOL(_) => self.ftp.on_message(sender, message),
+            MavMessage::HEARTBEAT(_)
+            | MavMessage::SET_POSITION_TARGET_GLOBAL_INT(_)
+            | MavMessage::SET_POSITION_TARGET_LOCAL_NED(_) => {
+                self.on_stream(now, sender, message, out);
+            }
             _ => {
                 if let MavMessage::LOG_REQUEST_DATA(_) = message
                     && self.airborne.is_none()
@@ -145,6 +150,8 @@ fn target(message: &MavMessage) -> Option<u8> {
         MavMessage::LOG_REQUEST_LIST(it) => it.target_system,
         MavMessage::LOG_REQUEST_DATA(it) => it.target_system,
         MavMessage::LOG_REQUEST_END(it) => it.target_system,
+        MavMessage::SET_POSITION_TARGET_GLOBAL_INT(it) => it.target_system,
+        MavMessage::SET_POSITION_TARGET_LOCAL_NED(it) => it.target_system,
         _ => return None,
     })
 }

@@ -1,5 +1,5 @@
 //! One virtual vehicle: the embedded simulator behind real MAVLink, behaving as ArduCopter 4.4
-//! with the show mode does on the wire.
+//! with the show mode does on the wire, or without it.
 //!
 //! Everything happens on a fixed grid of ticks in the vehicle's own time, so that a flight and its
 //! log do not depend on how often the vehicle is polled. The simulator gets the show's place and
@@ -9,6 +9,7 @@ mod airborne;
 mod commands;
 mod endpoint;
 mod fence;
+mod guided;
 mod logbook;
 pub mod params;
 mod setup;
@@ -72,6 +73,8 @@ pub struct VirtualVehicle<'w> {
     next_tick: Micros,
     next_text: Micros,
     used_share: f64,
+    /// When the station that SYSID_MYGCS names was heard last.
+    station_heard: Option<Micros>,
 }
 
 impl<'w> VirtualVehicle<'w> {
@@ -104,6 +107,7 @@ impl<'w> VirtualVehicle<'w> {
             next_tick: now,
             next_text: 0,
             used_share: 0.0,
+            station_heard: None,
         }
     }
 
@@ -164,6 +168,7 @@ impl<'w> VirtualVehicle<'w> {
         self.show.amsl_mm = before.amsl_mm;
         self.show.orientation_deg = before.orientation_deg;
         self.breached = false;
+        self.station_heard = None;
         self.ftp = FtpServer::new(self.setup.packets_per_s);
         self.logs = LogServer::new(&self.setup.log_folder, self.setup.packets_per_s);
         self.logbook.flush(self.storage.as_mut());
@@ -240,6 +245,7 @@ impl<'w> VirtualVehicle<'w> {
             out.extend(self.obstacle(now).map(warning));
         }
         self.fly(now, out);
+        self.watch_station(now, out);
         let rotate = self.params.whole("LOG_FILE_DSRMROT") != 0;
         if self.airborne.is_none() {
             self.logbook.poll(now, rotate, self.storage.as_mut());
