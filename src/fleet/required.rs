@@ -18,6 +18,7 @@ use crate::link::clock::Micros;
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
+use crate::link::station::STATION;
 use crate::mission::Plan;
 
 /// What a parameter must be.
@@ -142,6 +143,11 @@ pub fn requirements(plan: &Plan, show_firmware: bool) -> Vec<Requirement> {
                 "FS_GCS_ENABLE",
                 Wanted::AtLeast(1.0),
                 "a drone that is flown by the station must return when it loses it",
+            ),
+            require(
+                "SYSID_MYGCS",
+                Wanted::Is(STATION.system as f32),
+                "a drone misses only the station that this names, and this program is 254",
             ),
         ]);
     }

@@ -8,7 +8,7 @@ use updraft::link::frame::dialect::{self, MavCmd, MavResult, PositionTargetTypem
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
 use updraft::link::station::heartbeat;
-use updraft::log::Log;
+use updraft::log::{Log, Select};
 
 use super::support::{Crew, Field};
 
@@ -95,7 +95,6 @@ fn it_follows_targets_stops_without_and_lands() {
     let world = field.world();
     let mut crew = stock(&world);
     in_the_air(&mut crew);
-    let armed = crew.now();
     let takeoff = MavCmd::MAV_CMD_NAV_TAKEOFF;
     assert_eq!(order(&mut crew, takeoff, 0.0, 5.0), MavResult::MAV_RESULT_FAILED, "in the air");
     let begun = crew.now();
@@ -137,8 +136,16 @@ fn it_follows_targets_stops_without_and_lands() {
     let path = folder.path().join("1.BIN");
     std::fs::write(&path, crew.log(1, &names[0])).unwrap();
     let log = Log::open(&path).unwrap();
-    let flight = Flight::from_log(&log, FlightOptions::default()).unwrap();
-    let _ = (armed, flight);
+    let wanted = Select { message: "GUIP", fields: &["Type", "vZ"] };
+    let (tables, _) = log.select(&[wanted, Select { message: "SHOW", fields: &["Stage"] }]);
+    let targets = tables.iter().find(|table| table.name == "GUIP").unwrap();
+    // A hundred with velocity 1 m/s up, and one to stay.
+    let up = targets.number("vZ").unwrap();
+    assert_eq!((up.len(), up.iter().filter(|cm_s| **cm_s == 100.0).count()), (101, 100));
+    assert!(targets.number("Type").unwrap().iter().all(|kind| *kind == 3.0));
+    assert!(!tables.iter().any(|table| table.name == "SHOW" && table.number("Stage").is_some_and(|rows| !rows.is_empty())));
+    let flight = Flight::open(&path, FlightOptions::default()).unwrap();
+    assert!(flight.losses().is_empty(), "{:?}", flight.losses());
 }
 
 #[test]

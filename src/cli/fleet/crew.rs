@@ -5,6 +5,7 @@ mod eyes;
 mod guided;
 mod load;
 mod start;
+mod stubborn;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;

@@ -62,6 +62,9 @@ pub(in crate::cli) struct VirtualArgs {
     /// Boot as slowly as real drones do (45 s to a position)
     #[arg(long)]
     slow_boot: bool,
+    /// These slots' drones have stock firmware, without show mode: 1-10,12 [without SLOTS: all]
+    #[arg(long, value_name = "SLOTS", num_args = 0..=1, value_parser = parse_slots)]
+    stock: Option<Option<SlotSet>>,
     /// Their cards hold the logs that are in the campaign, to practise bringing logs home
     #[arg(long)]
     flown: bool,
@@ -96,7 +99,7 @@ fn mishaps(
     folder: &FlightFolder,
     plan: &Plan,
 ) -> Result<Mishaps, CommandError> {
-    let named = args.gone.iter().chain(&args.reboot);
+    let named = args.gone.iter().chain(&args.reboot).chain(args.stock.iter().flatten());
     if let Some(slot) = named.into_iter().find_map(|slots| slots.stray(plan)) {
         return Err(CommandError::Usage(format!(
             "the plan has no slot {slot}: it has {}",
@@ -119,7 +122,8 @@ fn mishaps(
         }
     }
     let at = (args.after * S as f64) as Micros;
-    Ok(Mishaps { gone: args.gone.clone(), reboot: args.reboot.clone(), at, cards })
+    let (gone, reboot, stock) = (args.gone.clone(), args.reboot.clone(), args.stock.clone());
+    Ok(Mishaps { gone, reboot, stock, at, cards })
 }
 
 pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit, CommandError> {
