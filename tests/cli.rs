@@ -11,6 +11,8 @@ mod analyze;
 mod check;
 #[path = "cli/fleet.rs"]
 mod fleet;
+#[path = "cli/guided.rs"]
+mod guided;
 #[path = "cli/help.rs"]
 mod help;
 #[path = "cli/inspect.rs"]
