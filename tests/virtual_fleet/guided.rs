@@ -6,7 +6,6 @@ use updraft::flight::{Flight, FlightOptions};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavResult, PositionTargetTypemask};
 use updraft::link::id::DroneId;
-use updraft::link::station::heartbeat;
 use updraft::log::{Log, Select};
 
 use super::support::{Crew, Field};
@@ -156,10 +155,11 @@ fn it_returns_when_its_station_falls_silent() {
         crew.set(1, "SYSID_MYGCS", own);
         crew.set(1, "FS_GCS_ENABLE", enabled);
         in_the_air(&mut crew);
-        crew.send(1, heartbeat());
-        crew.run_for(4.5);
+        // The station's last heartbeat was up to a second before.
+        crew.net.faults.loss = 1.0;
+        crew.run_for(3.5);
         assert_eq!(crew.vehicle(1).mode(), 4);
-        crew.run_for(1.0);
+        crew.run_for(2.5);
         let mode = crew.vehicle(1).mode();
         assert_eq!(mode == 6, returns, "SYSID_MYGCS {own}, FS_GCS_ENABLE {enabled}: mode {mode}");
     }
