@@ -141,7 +141,7 @@ impl Dry {
         let flight = Flight {
             trajectory: Trajectory::of_slot(&self.plan, slot),
             frame: self.plan.site.frame(),
-            start_gps_ms: GpsTime::from_unix_ms(authorized_ms).map_or(0, |time| time.total_ms()),
+            start_gps_ms: GpsTime::from_unix_ms(authorized_ms).map_or(0, GpsTime::total_ms),
             yaw_rad: None,
             clock: VehicleClock::default(),
         };

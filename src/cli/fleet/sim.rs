@@ -54,6 +54,7 @@ pub(in crate::cli) struct Mishaps {
     /// Slots whose drones reboot once.
     pub(in crate::cli) reboot: Option<SlotSet>,
     /// Slots whose drones have stock firmware; `Some(None)`: all.
+    #[expect(clippy::option_option, reason = "none, all, or these")]
     pub(in crate::cli) stock: Option<Option<SlotSet>>,
     /// When, their time from being switched on.
     pub(in crate::cli) at: Micros,

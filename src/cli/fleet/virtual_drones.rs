@@ -64,6 +64,7 @@ pub(in crate::cli) struct VirtualArgs {
     slow_boot: bool,
     /// These slots' drones have stock firmware, without show mode: 1-10,12 [without SLOTS: all]
     #[arg(long, value_name = "SLOTS", num_args = 0..=1, value_parser = parse_slots)]
+    #[expect(clippy::option_option, reason = "an option whose value may be left out")]
     stock: Option<Option<SlotSet>>,
     /// Their cards hold the logs that are in the campaign, to practise bringing logs home
     #[arg(long)]
