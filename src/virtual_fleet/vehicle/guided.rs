@@ -62,10 +62,8 @@ impl VirtualVehicle<'_> {
         }
         self.fly(now, out);
         let airborne = self.airborne.as_mut().filter(|it| it.is_guided() && it.is_armed());
-        match airborne.is_some_and(|it| it.flight().take_off(above_home_m.into())) {
-            true => ACCEPTED,
-            false => FAILED,
-        }
+        let obeys = airborne.is_some_and(|it| it.flight().take_off(above_home_m.into()));
+        if obeys { ACCEPTED } else { FAILED }
     }
 
     /// Takes what a station streams: targets, and its heartbeats.
