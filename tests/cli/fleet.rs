@@ -19,13 +19,13 @@ impl Drop for Fleet {
     }
 }
 
-fn free_port() -> String {
+pub(crate) fn free_port() -> String {
     let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     format!("127.0.0.1:{}", socket.local_addr().unwrap().port())
 }
 
 impl Bench {
-    fn planned(&self, grid: &str, folder: &str) {
+    pub(crate) fn planned(&self, grid: &str, folder: &str) {
         let plan = ["plan", "calibration", "--grid", grid, "-o", folder];
         self.expect(0, &[&plan[..], SHORT].concat());
     }

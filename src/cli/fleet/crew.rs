@@ -2,6 +2,8 @@
 
 mod eyes;
 mod guided;
+mod keep;
+mod troubles;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
@@ -19,6 +21,7 @@ use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::words;
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
+use crate::fleet::changes::Changes;
 use crate::fleet::fence::Fence;
 use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::sum::Sum;
@@ -27,7 +30,7 @@ use crate::fleet::journal::{Entry, Journal};
 use crate::fleet::log_protocol::LogProtocolError;
 use crate::fleet::log_protocol::list::{Entry as LogOnDrone, LogList};
 use crate::fleet::preflight::{Known, Limits, Preflight, preflight};
-use crate::fleet::required::{Changes, CheckParams, requirements};
+use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::slots::{FleetTable, SlotProblem, check_stands, picture, propose};
 use crate::fleet::start::{Start, StartOptions};
 use crate::fleet::telemetry::{Drone, Telemetry};
@@ -73,6 +76,8 @@ pub(in crate::cli) struct Crew<'a> {
     pub(in crate::cli) table: FleetTable,
     known: Known,
     clock: SystemClock,
+    /// Troubles of the links that were told.
+    told: BTreeSet<String>,
     /// Virtual drones that are gone after this flight: nobody waits for people, and nothing is kept
     /// of them but their logs.
     pub(in crate::cli) is_virtual: bool,
@@ -128,6 +133,7 @@ impl<'a> Crew<'a> {
             table: FleetTable::new([]),
             known: Known::default(),
             clock: SystemClock::start(),
+            told: BTreeSet::new(),
             is_virtual: false,
             is_guided: false,
         }
@@ -159,6 +165,7 @@ impl<'a> Crew<'a> {
                 self.telemetry.on_message(self.net.now(), &received);
             }
         }
+        self.tell_troubles()?;
         if self.telemetry.drones.is_empty() {
             return Err(CommandError::Nothing(format!(
                 "no drone was heard within {wait_s:.0} s: are they on, and is --connect right?"
@@ -289,12 +296,13 @@ impl<'a> Crew<'a> {
 
     /// Loads the show onto every drone. The drones that refused, with their reasons.
     pub(in crate::cli) fn upload(&mut self) -> Result<BTreeMap<DroneId, String>, CommandError> {
-        let uploads = self.uploads()?;
+        let mut refused = self.remember_fence()?;
+        let mut uploads = self.uploads()?;
         let count = uploads.len();
+        uploads.retain(|drone, _| !refused.contains_key(drone));
         // Virtual drones share no radio; each upload waits a second for the drone to settle.
         let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
         let done = self.all(uploads, at_once)?;
-        let mut refused = BTreeMap::new();
         let mut written = 0;
         for (drone, outcome) in done {
             match outcome {
@@ -453,6 +461,7 @@ impl<'a> Crew<'a> {
     fn close(&mut self, eyes: Eyes<'_>) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
         let (telemetry, alarms) = eyes.close();
         self.telemetry = telemetry;
+        self.tell_troubles()?;
         Ok(alarms?)
     }
 
@@ -545,27 +554,6 @@ impl<'a> Crew<'a> {
         let done = self.all(machines, ALL_AT_ONCE)?;
         self.note("abort", Some(format!("{} drones", done.len())))?;
         Ok(done)
-    }
-
-    /// Puts back the parameters that were changed. Drones that did not take them.
-    pub(in crate::cli) fn restore(&mut self) -> Result<Vec<DroneId>, CommandError> {
-        let mut changes = Changes::read(&self.folder.0)?;
-        let machines = changes.restore();
-        let wanted: Vec<DroneId> = machines.keys().copied().collect();
-        let done = self.all(machines, AT_ONCE)?;
-        let mut left = Vec::new();
-        for drone in wanted {
-            match done.get(&drone) {
-                Some(Ok(())) => changes.forget(drone),
-                Some(Err(error)) => {
-                    self.context.warn(&format!("drone {drone}: {error}"));
-                    left.push(drone);
-                }
-                None => left.push(drone),
-            }
-        }
-        changes.write(&self.folder.0)?;
-        Ok(left)
     }
 
     fn note(&mut self, step: &str, text: Option<String>) -> Result<(), CommandError> {

@@ -139,6 +139,7 @@ struct Burst {
 impl<S: Sink> Get<S> {
     /// Brings the file `path`, or what the sink lacks of it.
     pub fn new(caller: Caller, path: &str, sink: S, options: GetOptions) -> Self {
+        let reads = Reads::new(PIECE, MOST_READS, options.patience);
         Self {
             caller,
             path: path.to_owned(),
@@ -149,7 +150,7 @@ impl<S: Sink> Get<S> {
             bursts: VecDeque::new(),
             burst_packets: None,
             no_bursts: false,
-            reads: Reads::new(PIECE, MOST_READS),
+            reads,
             numbers: VecDeque::new(),
             heard: None,
             lies: 0,
