@@ -43,6 +43,8 @@ pub(crate) struct Drones {
     pub(crate) setups: Vec<VehicleSetup>,
     pub(crate) key: Option<Key>,
     pub(crate) faults: Faults,
+    /// Parameters that are not as the firmware has them at first.
+    pub(crate) params: Vec<(&'static str, f32)>,
 }
 
 impl Bench {
@@ -56,7 +58,7 @@ impl Bench {
             setup
         };
         let setups = plan.slots.iter().map(setup).collect();
-        Drones { folder, plan, setups, key: None, faults: Faults::default() }
+        Drones { folder, plan, setups, key: None, faults: Faults::default(), params: Vec::new() }
     }
 }
 
@@ -84,7 +86,10 @@ impl Drones {
             .setups
             .iter()
             .map(|setup| {
-                VirtualVehicle::new(&world, setup.clone(), Box::new(MemoryStorage::default()), 0)
+                let storage = Box::new(MemoryStorage::default());
+                let mut vehicle = VirtualVehicle::new(&world, setup.clone(), storage, 0);
+                self.params.iter().for_each(|(name, value)| vehicle.params.put(name, *value));
+                vehicle
             })
             .collect();
         let options = ServerOptions {

@@ -177,7 +177,7 @@ fn two_drones_with_one_system_id_are_reported() {
 fn the_fence_stays_on_unless_somebody_says_otherwise() {
     let bench = Bench::new();
     bench.planned("1x2", "campaign");
-    let drones = bench.drones();
+    let mut drones = bench.drones();
     let station = free_port();
     let link = format!("udpin:{station}");
     let step = ["campaign", "--connect", &link, "--wait", "20"];
@@ -203,7 +203,8 @@ fn the_fence_stays_on_unless_somebody_says_otherwise() {
         },
     );
     insta::assert_snapshot!(seen);
-    // Drones that are switched on anew: what is left is put back when it is said.
+    // Another day, with the fence as it was left: it is put back when it is said.
+    drones.params.push(("FENCE_ENABLE", 1.0));
     drones.fly(
         station.parse().unwrap(),
         || {

@@ -146,3 +146,23 @@ impl Reads {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_silent_vehicle_is_asked_often_enough_before_it_is_given_up() {
+        for patience in [10 * S, 60 * S] {
+            let (mut reads, have) = (Reads::new(239, 48, patience), Intervals::default());
+            let mut now = 0;
+            while now < patience {
+                let next = reads.expire(now, 600_000, true);
+                if reads.next(now, &have, 100_000, true).is_none() {
+                    now = next;
+                }
+            }
+            assert!((12..40).contains(&reads.asked), "{} in {patience} us", reads.asked);
+        }
+    }
+}
