@@ -44,7 +44,7 @@ fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
     let all = drones.fly(
         station.parse().unwrap(),
         || {
-            let upload = bench.expect(2, &[&["fleet"], &step("upload")[..]].concat());
+            let upload = bench.expect(2, &[&["fleet"][..], &step("upload")[..]].concat());
             let fly = bench.expect(4, &[&step("fly")[..], &["--yes"]].concat());
             // With a table that does not fit how they stand.
             let line = |slot: u16, system: u8| {
@@ -53,7 +53,7 @@ fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
             let lines = [line(1, 1), line(2, 2), line(3, 3), line(4, 4)];
             let table = serde_json::json!({ "schema": "updraft.fleet/1", "drones": lines });
             fs::write(bench.path("campaign/fleet.json"), table.to_string()).unwrap();
-            let table = bench.expect(2, &[&["fleet"], &step("upload")[..]].concat());
+            let table = bench.expect(2, &[&["fleet"][..], &step("upload")[..]].concat());
             [upload, fly, table].map(|ended| said(&ended, &station)).join("\n----\n")
         },
         assert_untouched,
@@ -72,14 +72,14 @@ fn a_fleet_that_is_not_loaded_is_no_go() {
         station.parse().unwrap(),
         || {
             let step = ["campaign", "--connect", &link, "--wait", "5"];
-            let table = bench.expect(4, &[&["fleet", "preflight"], &step[..]].concat());
-            let start = bench.expect(4, &[&["fleet", "start", "--yes"], &step[..]].concat());
+            let table = bench.expect(4, &[&["fleet", "preflight"][..], &step[..]].concat());
+            let start = bench.expect(4, &[&["fleet", "start", "--yes"][..], &step[..]].concat());
             let lines = |ended: &Ended| -> Vec<String> {
                 let lines = ended.out.lines().filter(|line| line.starts_with("NO-GO"));
                 lines.map(str::to_owned).collect()
             };
             assert_eq!(lines(&table), lines(&start));
-            let json = [&["fleet", "preflight", "--json"], &step[..]].concat();
+            let json = [&["fleet", "preflight", "--json"][..], &step[..]].concat();
             let json = bench.expect(4, &json).json("updraft.preflight/1");
             assert_eq!(json["go"], false);
             format!("{}\n{}", lines(&table).join("\n"), table.err)
@@ -100,9 +100,9 @@ fn nobody_starts_a_fleet_without_a_person_or_yes() {
         station.parse().unwrap(),
         || {
             let step = ["campaign", "--connect", &link, "--wait", "20", "--set-params"];
-            bench.expect(0, &[&["fleet", "upload"], &step[..]].concat());
+            bench.expect(0, &[&["fleet", "upload"][..], &step[..]].concat());
             // Standard input is no terminal.
-            bench.expect(2, &[&["fleet", "start"], &step[..]].concat()).err
+            bench.expect(2, &[&["fleet", "start"][..], &step[..]].concat()).err
         },
         |vehicles| {
             for (slot, vehicle) in (1..).zip(vehicles) {
@@ -129,7 +129,7 @@ fn a_station_with_a_key_refuses_what_is_not_signed_and_says_so() {
             station.parse().unwrap(),
             || {
                 let step = ["campaign", "--connect", &link, "--key", "our.key", "--wait", "3"];
-                bench.expect(5, &[&["fleet", "upload"], &step[..]].concat())
+                bench.expect(5, &[&["fleet", "upload"][..], &step[..]].concat())
             },
             assert_untouched,
         );
@@ -159,13 +159,13 @@ fn two_drones_with_one_system_id_are_reported() {
         station.parse().unwrap(),
         || {
             let step = ["campaign", "--connect", &link, "--wait", "4"];
-            let status = bench.expect(0, &[&["fleet", "status", "--json"], &step[..]].concat());
+            let status = bench.expect(0, &[&["fleet", "status", "--json"][..], &step[..]].concat());
             let json = status.json("updraft.fleet-status/1");
             assert_eq!(json["drones"].as_array().unwrap().len(), 1);
             assert_eq!(json["drones"][0]["doubled"], true);
             assert!(json["networks"][0]["frames_in"].as_u64().unwrap() > 10);
             // The other one's slot is empty: nothing is sent.
-            let upload = bench.expect(2, &[&["fleet", "upload"], &step[..]].concat());
+            let upload = bench.expect(2, &[&["fleet", "upload"][..], &step[..]].concat());
             format!("{}\n----\n{}", status.err, upload.err)
         },
         assert_untouched,
@@ -183,14 +183,14 @@ fn the_fence_stays_on_unless_somebody_says_otherwise() {
     let step = ["campaign", "--connect", &link, "--wait", "20"];
     let changes = || fs::read_to_string(bench.path("campaign/fleet-changes.json")).unwrap();
     let restored = |more: &[&'static str]| {
-        bench.expect(0, &[&["fleet", "restore"], &step[..], more].concat()).err
+        bench.expect(0, &[&["fleet", "restore"][..], &step[..], more].concat()).err
     };
     let seen = drones.fly(
         station.parse().unwrap(),
         || {
-            bench.expect(0, &[&["fleet", "upload"], &step[..]].concat());
+            bench.expect(0, &[&["fleet", "upload"][..], &step[..]].concat());
             let uploaded = changes();
-            let again = bench.expect(0, &[&["fleet", "upload"], &step[..]].concat());
+            let again = bench.expect(0, &[&["fleet", "upload"][..], &step[..]].concat());
             assert_eq!(changes(), uploaded, "the first old values count\n{again}");
             let kept = restored(&[]);
             format!("{uploaded}\n----\n{kept}\n{}", changes())

@@ -23,7 +23,8 @@ fn a_killed_upload_is_run_again_and_every_drone_is_loaded_whole() {
     let last = drones.fly(
         station.parse().unwrap(),
         || {
-            for _ in 0..2 {
+            // In the midst of the first upload, and of the second.
+            for after_s in [3, 8] {
                 let mut killed = bench.command(&upload);
                 let mut killed =
                     killed.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
@@ -34,7 +35,7 @@ fn a_killed_upload_is_run_again_and_every_drone_is_loaded_whole() {
                     std::thread::sleep(Duration::from_millis(50));
                     waited_ms += 50;
                 }
-                std::thread::sleep(Duration::from_secs(3));
+                std::thread::sleep(Duration::from_secs(after_s));
                 assert!(killed.try_wait().unwrap().is_none(), "it ended before it was killed");
                 killed.kill().unwrap();
                 assert_eq!(killed.wait().unwrap().code(), None, "killed, not ended");
