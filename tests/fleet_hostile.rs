@@ -137,7 +137,7 @@ fn reads_that_are_always_wrong_are_given_up_for_the_log_messages() {
     assert_eq!(done.failure, None);
     assert!(bytes.unwrap() == content(1, 200_000));
     let [entry] = &done.pulled[..] else { panic!("{:?}", done.pulled) };
-    assert_eq!(entry.method, Method::LogMessages);
+    assert_eq!(entry.method, Method::LogMessages, "{entry:?}");
     let reason = entry.method_reason.as_deref();
     assert_eq!(reason, Some("MAVFTP: the checksum differs, 4 times"));
     assert_eq!(entry.attempts, 5);

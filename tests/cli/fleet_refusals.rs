@@ -35,7 +35,7 @@ fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
     let bench = Bench::new();
     bench.planned("2x2", "campaign");
     let mut drones = bench.drones();
-    // Drone 2 stands beside drone 1; drone 4 has been carried away.
+    // Drone 2 stands beside drone 1; drone 4 is off its place, but near enough.
     drones.setups[1].stands_m = drones.setups[0].stands_m + Vector3::new(0.6, 0.3, 0.0);
     drones.setups[3].stands_m += Vector3::new(2.0, 1.0, 0.0);
     let station = free_port();
