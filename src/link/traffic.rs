@@ -99,23 +99,3 @@ pub fn troubles(traffic: &BTreeMap<u16, Traffic>, doubled: &BTreeSet<DroneId>) -
 fn frames(count: u64) -> String {
     if count == 1 { "1 frame".to_owned() } else { format!("{count} frames") }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_people_must_know_is_said_and_what_is_usual_is_not() {
-        let said = |loss: FrameLoss, doubled: &[u8]| {
-            let traffic = Traffic { bytes_in: 20_000, loss, ..Traffic::default() };
-            let doubled = doubled.iter().map(|system| DroneId { network: 1, system: *system });
-            let all = troubles(&BTreeMap::from([(1, traffic)]), &doubled.collect());
-            all.into_iter().map(|trouble| trouble.text).collect::<Vec<_>>().join("\n")
-        };
-        let usual = FrameLoss { noise_bytes: 1_900, unknown: 40, ..FrameLoss::default() };
-        assert_eq!(said(usual, &[]), "");
-        let all =
-            FrameLoss { noise_bytes: 2_100, version_1: 1, unknown: 0, unsigned: 3, forged: 2 };
-        insta::assert_snapshot!(said(all, &[4]));
-    }
-}
