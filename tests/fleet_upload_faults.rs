@@ -104,7 +104,7 @@ fn what_counts_as_loaded_is_loaded_whatever_befalls() {
             }
         }
     }
-    refused.sort();
-    refused.dedup();
-    insta::assert_snapshot!(refused.join("\n"));
+    let silent = ["no answer", "nothing is heard", "sends no status"];
+    let is_clear = |text: &String| silent.iter().any(|words| text.contains(words));
+    assert!(!refused.is_empty() && refused.iter().all(is_clear), "{refused:#?}");
 }
