@@ -3,9 +3,11 @@
 mod end;
 mod eyes;
 mod guided;
+mod keep;
 mod load;
 mod start;
 mod stubborn;
+mod troubles;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
@@ -58,6 +60,8 @@ pub(in crate::cli) struct Crew<'a> {
     pub(in crate::cli) table: FleetTable,
     known: Known,
     clock: SystemClock,
+    /// Troubles of the links that were told.
+    told: BTreeSet<String>,
     /// Virtual drones that are gone after this flight: nobody waits for people, and nothing is kept
     /// of them but their logs.
     pub(in crate::cli) is_virtual: bool,
@@ -113,6 +117,7 @@ impl<'a> Crew<'a> {
             table: FleetTable::new([]),
             known: Known::default(),
             clock: SystemClock::start(),
+            told: BTreeSet::new(),
             is_virtual: false,
             is_guided: false,
         }
@@ -144,6 +149,7 @@ impl<'a> Crew<'a> {
                 self.telemetry.on_message(self.net.now(), &received);
             }
         }
+        self.tell_troubles()?;
         if self.telemetry.drones.is_empty() {
             return Err(CommandError::Nothing(format!(
                 "no drone was heard within {wait_s:.0} s: are they on, and is --connect right?"

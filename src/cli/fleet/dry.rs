@@ -12,13 +12,15 @@ use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::{Abort, Action};
+use crate::fleet::changes::Changes;
 use crate::fleet::command::Command;
 use crate::fleet::dry_run::{Obliging, dry_run};
 use crate::fleet::fence::PutFence;
 use crate::fleet::greet::Greet;
 use crate::fleet::guided::{Flight, Guided};
 use crate::fleet::messages::{GUIDED, set_mode, start_packet, text};
-use crate::fleet::required::{Changes, CheckParams, requirements};
+use crate::fleet::params::ReadParams;
+use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::slots::FleetTable;
 use crate::fleet::vehicle_clock::VehicleClock;
 use crate::link::clock::Micros;
@@ -157,9 +159,12 @@ impl Dry {
         let mut nobody = Nobody;
         let mut crew = Crew::new(context, &mut nobody, &self.folder, &self.plan);
         crew.table = self.table.clone();
+        let fence = crew.fence()?;
         let mut lines = BTreeMap::new();
         for (drone, upload) in crew.uploads()? {
-            let mut all = self.shown(drone, upload);
+            let names = fence.params().into_iter().map(|(name, _)| name);
+            let mut all = self.shown(drone, ReadParams::new(drone, names));
+            all.extend(self.shown(drone, upload));
             all.extend(self.params(drone));
             lines.insert(drone, all);
         }
@@ -263,9 +268,13 @@ fn told_once(lines: Vec<String>) -> Vec<String> {
 }
 
 /// What putting parameters back would send.
-pub(in crate::cli) fn restore(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+pub(in crate::cli) fn restore(
+    context: &Context,
+    args: &StepArgs,
+    fence_off: bool,
+) -> Result<Exit, CommandError> {
     let dry = Dry::of(args)?;
-    let machines = Changes::read(&dry.folder.0)?.restore().into_iter();
+    let machines = Changes::read(&dry.folder.0)?.restore(fence_off).into_iter();
     print(context, machines.map(|(drone, set)| (drone, dry.shown(drone, set))).collect())
 }
 

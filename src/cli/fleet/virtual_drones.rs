@@ -164,9 +164,17 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
         words::count(plan.slots.len(), "virtual drone"),
         stations.join(", ")
     ));
-    hangar.serve(args.station.clone(), clock, |_| {
+    hangar.serve(args.station.clone(), clock, |running| {
+        let mut told = false;
         while !context.stop_flag().load(Ordering::SeqCst) {
             std::thread::sleep(Duration::from_millis(100));
+            if running.refused() > 0 && !told {
+                told = true;
+                context.warn(
+                    "the drones refuse what is not signed with their key: give the station the \
+                     same --key",
+                );
+            }
         }
     })?;
     Ok(Exit::Done)

@@ -45,6 +45,11 @@ impl Fence {
         self.items.len()
     }
 
+    /// Where the items are: latitude and longitude, 1e-7 degrees.
+    pub(super) fn corners_1e7(&self) -> Vec<(i32, i32)> {
+        self.items.iter().map(|item| (item.x, item.y)).collect()
+    }
+
     /// Takes the messages of the mission protocol.
     pub(super) fn on_message(
         &mut self,

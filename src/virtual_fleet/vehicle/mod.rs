@@ -30,7 +30,7 @@ use self::words::{error, warning};
 use super::ftp_server::FtpServer;
 use super::log_server::LogServer;
 use super::storage::Storage;
-use super::world::World;
+use super::world::{LoadedShow, World};
 use crate::base::time::GpsTime;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::frame::MavMessage;
@@ -147,6 +147,16 @@ impl<'w> VirtualVehicle<'w> {
     /// Custom mode.
     pub fn mode(&self) -> u32 {
         self.mode
+    }
+
+    /// The show that it would fly, as it was when the file was read last.
+    pub fn loaded(&self) -> Option<&LoadedShow> {
+        self.show.loaded
+    }
+
+    /// Corners of the fence that it has: latitude and longitude, 1e-7 degrees.
+    pub fn fence_1e7(&self) -> Vec<(i32, i32)> {
+        self.fence.corners_1e7()
     }
 
     /// Takes the battery's charge into its own hands: share that is used, 0..1.

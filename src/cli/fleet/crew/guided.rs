@@ -62,7 +62,9 @@ impl<'a> Crew<'a> {
         &mut self,
     ) -> Result<BTreeMap<DroneId, String>, CommandError> {
         let fence = self.fence()?;
-        let drones = self.drones();
+        let silent = self.remember_fence()?;
+        let mut drones = self.drones();
+        drones.retain(|drone| !silent.contains_key(drone));
         let put = |drone: &DroneId| (*drone, PutFence::new(*drone, fence.clone()));
         let fenced = self.all(drones.iter().map(put).collect(), AT_ONCE)?;
         let mode = |drone: &DroneId| {
@@ -89,6 +91,7 @@ impl<'a> Crew<'a> {
             let slot = self.table.slot_of(*drone).unwrap_or(0);
             self.context.warn(&format!("drone {drone} (slot {slot}): {reason}"));
         }
+        bad.extend(silent);
         self.note("guided", Some(format!("{} refused", bad.len())))?;
         Ok(bad)
     }

@@ -8,10 +8,11 @@ use crate::base::file::read_whole;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::connect::run_number;
 use crate::cli::words;
+use crate::fleet::changes::Changes;
 use crate::fleet::fence::Fence;
 use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::sum::Sum;
-use crate::fleet::required::{Changes, CheckParams, requirements};
+use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::upload::{Load, Upload};
 use crate::link::clock::S;
@@ -91,12 +92,13 @@ impl Crew<'_> {
 
     /// Loads the show onto every drone. The drones that refused, with their reasons.
     pub(in crate::cli) fn upload(&mut self) -> Result<BTreeMap<DroneId, String>, CommandError> {
-        let uploads = self.uploads()?;
+        let mut refused = self.remember_fence()?;
+        let mut uploads = self.uploads()?;
         let count = uploads.len();
+        uploads.retain(|drone, _| !refused.contains_key(drone));
         // Virtual drones share no radio; each upload waits a second for the drone to settle.
         let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
         let done = self.all(uploads, at_once)?;
-        let mut refused = BTreeMap::new();
         let mut written = 0;
         for (drone, outcome) in done {
             match outcome {
@@ -140,26 +142,5 @@ impl Crew<'_> {
         self.known.loaded.extend(same.iter().copied());
         self.known.fenced.extend(same);
         Ok(())
-    }
-
-    /// Puts back the parameters that were changed. Drones that did not take them.
-    pub(in crate::cli) fn restore(&mut self) -> Result<Vec<DroneId>, CommandError> {
-        let mut changes = Changes::read(&self.folder.0)?;
-        let machines = changes.restore();
-        let wanted: Vec<DroneId> = machines.keys().copied().collect();
-        let done = self.all(machines, AT_ONCE)?;
-        let mut left = Vec::new();
-        for drone in wanted {
-            match done.get(&drone) {
-                Some(Ok(())) => changes.forget(drone),
-                Some(Err(error)) => {
-                    self.context.warn(&format!("drone {drone}: {error}"));
-                    left.push(drone);
-                }
-                None => left.push(drone),
-            }
-        }
-        changes.write(&self.folder.0)?;
-        Ok(left)
     }
 }

@@ -127,6 +127,7 @@ impl<'a> Crew<'a> {
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
         let (telemetry, alarms) = eyes.close();
         self.telemetry = telemetry;
+        self.tell_troubles()?;
         Ok(alarms?)
     }
 }
