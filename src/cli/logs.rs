@@ -9,10 +9,10 @@ use serde::Serialize;
 use super::clock::SystemClock;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::fleet::bring::{Brought, Wish, bring};
+use super::fleet::bring::{Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
-use super::fleet::{one_flight, server};
+use super::fleet::{dry, one_flight, server};
 use super::simulate::{SlotSet, made_by, parse_slots};
 use super::words;
 use crate::base::file::create_folder;
@@ -22,7 +22,6 @@ use crate::fleet::logs::one::Which;
 use crate::fleet::logs::verify::verify;
 use crate::fleet::slots::FleetTable;
 use crate::link::clock::Clock as _;
-use crate::link::id::DroneId;
 use crate::mission::Plan;
 
 /// Arguments of `updraft logs`.
@@ -64,6 +63,9 @@ struct ListArgs {
     flight: Option<String>,
     #[command(flatten)]
     connect: ConnectArgs,
+    /// Only these slots: 1-10,12
+    #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
+    slots: Option<SlotSet>,
 }
 
 #[derive(Debug, Args)]
@@ -96,6 +98,9 @@ struct PullArgs {
     /// Give a drone up after so long without an answer, s
     #[arg(long, value_name = "S", default_value_t = 60.0, value_parser = super::fleet::connect::seconds)]
     patience: f64,
+    /// Tell what would be asked for, and ask nobody
+    #[arg(long)]
+    dry_run: bool,
 }
 
 #[derive(Debug, Args)]
@@ -162,65 +167,72 @@ struct ListOutput {
     drones: Vec<ListRow>,
 }
 
+/// A drone's logs, or why they are not known.
 #[derive(Serialize)]
-struct ListRow {
-    drone: DroneId,
-    slot: u16,
-    logs: Vec<ListedLog>,
+pub(super) struct ListRow {
+    pub(super) drone: String,
+    /// None: no slot is near.
     #[serde(skip_serializing_if = "Option::is_none")]
-    reason: Option<String>,
+    pub(super) slot: Option<u16>,
+    pub(super) logs: Vec<ListedLog>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reason: Option<String>,
 }
 
+/// A log on a drone.
 #[derive(Serialize)]
-struct ListedLog {
-    number: u16,
-    bytes: u64,
-    unix_s: u32,
+pub(super) struct ListedLog {
+    pub(super) number: u16,
+    pub(super) bytes: u64,
+    /// 0: the autopilot had no clock.
+    pub(super) unix_s: u32,
 }
 
 fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    has_slots(&plan, args.slots.as_ref())?;
     let links = match args.connect.target()? {
         Target::Links(links) => links,
-        Target::Server(address) => return server::list(context, &address),
+        Target::Server(address) => {
+            let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
+            return show_list(context, server::list(context, &address, &plan, slots, wait_s)?);
+        }
         Target::Sim => return Err(gone()),
     };
     let mut station = args.connect.open(links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
     with_table(&mut crew, args.connect.wait)?;
+    if let Some(slots) = &args.slots {
+        crew.table.drones.retain(|line| slots.contains(line.slot));
+    }
     let listed = crew.list_logs()?;
     let rows: Vec<ListRow> = crew
         .table
         .drones
         .iter()
-        .map(|line| match listed.get(&line.drone) {
-            Some(Ok(logs)) => ListRow {
-                drone: line.drone,
-                slot: line.slot,
-                logs: logs
-                    .iter()
-                    .map(|log| ListedLog {
-                        number: log.id,
-                        bytes: log.size,
-                        unix_s: log.time_utc_s,
-                    })
-                    .collect(),
-                reason: None,
-            },
-            Some(Err(error)) => ListRow {
-                drone: line.drone,
-                slot: line.slot,
-                logs: Vec::new(),
-                reason: Some(error.clone()),
-            },
-            None => ListRow {
-                drone: line.drone,
-                slot: line.slot,
-                logs: Vec::new(),
-                reason: Some("it was not asked".to_owned()),
-            },
+        .map(|line| {
+            let (logs, reason) = match listed.get(&line.drone) {
+                Some(Ok(logs)) => (logs.as_slice(), None),
+                Some(Err(error)) => (&[][..], Some(error.clone())),
+                None => (&[][..], Some("it was not asked".to_owned())),
+            };
+            let logs = logs.iter().map(|log| ListedLog {
+                number: log.id,
+                bytes: log.size,
+                unix_s: log.time_utc_s,
+            });
+            ListRow {
+                drone: line.drone.to_string(),
+                slot: Some(line.slot),
+                logs: logs.collect(),
+                reason,
+            }
         })
         .collect();
+    show_list(context, rows)
+}
+
+fn show_list(context: &Context, rows: Vec<ListRow>) -> Result<Exit, CommandError> {
     let lost = rows.iter().any(|row| row.reason.is_some());
     if context.json {
         context.print_json(&ListOutput { schema: "updraft.log-list/1", drones: rows })?;
@@ -235,10 +247,22 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
                 0 => "no logs".to_owned(),
                 _ => logs.join(", "),
             });
-            context.emit(&format!("drone {:>4}  slot {:>4}  {what}\n", row.drone, row.slot))?;
+            let slot = row.slot.map_or_else(|| "-".to_owned(), |slot| slot.to_string());
+            context.emit(&format!("drone {:>4}  slot {slot:>4}  {what}\n", row.drone))?;
         }
     }
     Ok(if lost { Exit::Losses } else { Exit::Done })
+}
+
+/// The plan has these slots.
+fn has_slots(plan: &Plan, slots: Option<&SlotSet>) -> Result<(), CommandError> {
+    match slots.and_then(|slots| slots.stray(plan)) {
+        None => Ok(()),
+        Some(stray) => Err(CommandError::Usage(format!(
+            "the plan has no slot {stray}: it has {}",
+            plan.slots.len()
+        ))),
+    }
 }
 
 fn gone() -> CommandError {
@@ -250,9 +274,9 @@ fn gone() -> CommandError {
 }
 
 #[derive(Serialize)]
-struct PullOutput {
+struct PullOutput<T> {
     schema: &'static str,
-    logs: Vec<Brought>,
+    logs: Vec<T>,
 }
 
 /// A word of a shell's command line.
@@ -292,25 +316,12 @@ fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
 
 fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-    if let Some(stray) = args.slots.as_ref().and_then(|slots| slots.stray(&plan)) {
-        return Err(CommandError::Usage(format!(
-            "the plan has no slot {stray}: it has {}",
-            plan.slots.len()
-        )));
+    has_slots(&plan, args.slots.as_ref())?;
+    let target = args.connect.target()?;
+    if args.dry_run {
+        return dry_pull(context, &folder, &plan, args);
     }
     let _lock = context.lock(&args.campaign)?;
-    let links = match args.connect.target()? {
-        Target::Links(links) => links,
-        Target::Server(address) => return server::pull(context, &address, &folder, &plan),
-        Target::Sim => return Err(gone()),
-    };
-    let mut station = args.connect.open(links)?;
-    let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    with_table(&mut crew, args.connect.wait)?;
-    let mut table = crew.table.clone();
-    if let Some(slots) = &args.slots {
-        table.drones.retain(|line| slots.contains(line.slot));
-    }
     let wish = Wish {
         which: args.log,
         again: args.again,
@@ -321,17 +332,78 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
         quiet: false,
         is_durable: true,
     };
+    let links = match target {
+        Target::Links(links) => links,
+        Target::Server(address) => {
+            if args.rate.is_some() {
+                return Err(CommandError::Usage(
+                    "--rate is for the drones' own links: Skybrush Server asks them at its own \
+                     pace; --at-once bounds how many drones at a time"
+                        .to_owned(),
+                ));
+            }
+            let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
+            let rows = server::pull(context, &address, &folder, &plan, slots, &wish, wait_s)?;
+            let lost = rows.iter().filter(|row| row.state == "missing").map(|row| row.slot);
+            let lost = lost.collect();
+            return end_pull(context, args, &plan, rows, lost);
+        }
+        Target::Sim => return Err(gone()),
+    };
+    let mut station = args.connect.open(links)?;
+    let mut crew = Crew::new(context, &mut station, &folder, &plan);
+    with_table(&mut crew, args.connect.wait)?;
+    let mut table = crew.table.clone();
+    if let Some(slots) = &args.slots {
+        table.drones.retain(|line| slots.contains(line.slot));
+    }
     let brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
-    let lost = brought.iter().any(|one| one.state == "missing");
-    if lost {
-        let lost: Vec<u16> =
-            brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
+    let lost = brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
+    end_pull(context, args, &plan, brought, lost)
+}
+
+/// What to do about lost logs, and all of it for programs.
+fn end_pull<T: Serialize>(
+    context: &Context,
+    args: &PullArgs,
+    plan: &Plan,
+    logs: Vec<T>,
+    lost: Vec<u16>,
+) -> Result<Exit, CommandError> {
+    if !lost.is_empty() {
         context.insist(&format!("To try again: {}", once_more(args, &plan.name, &lost)));
     }
     if context.json {
-        context.print_json(&PullOutput { schema: "updraft.pull/1", logs: brought })?;
+        context.print_json(&PullOutput { schema: "updraft.pull/1", logs })?;
     }
-    Ok(if lost { Exit::Losses } else { Exit::Done })
+    Ok(if lost.is_empty() { Exit::Done } else { Exit::Losses })
+}
+
+/// What a pull would ask for.
+fn dry_pull(
+    context: &Context,
+    folder: &FlightFolder,
+    plan: &Plan,
+    args: &PullArgs,
+) -> Result<Exit, CommandError> {
+    let what = match args.log {
+        Which::Newest => "its newest log".to_owned(),
+        Which::All => "all of its logs".to_owned(),
+        Which::Number(number) => format!("its log {number}"),
+    };
+    let is_meant = |slot: u16| args.slots.as_ref().is_none_or(|slots| slots.contains(slot));
+    let mut lines = BTreeMap::new();
+    for slot in plan.slots.iter().map(|slot| slot.slot).filter(|slot| is_meant(*slot)) {
+        let path = folder.log(slot, plan.slots.len());
+        let place = path.strip_prefix(&folder.0).unwrap_or(&path).display();
+        let line = if path.exists() && !args.again && args.log == Which::Newest {
+            format!("nothing: {place} is there")
+        } else {
+            format!("the list of its logs, and {what}, for {place}")
+        };
+        lines.insert(format!("on slot {slot}"), vec![line]);
+    }
+    dry::print(context, lines)
 }
 
 #[derive(Serialize)]

@@ -2,8 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::client::{Client, Running};
+use super::client::Client;
 use super::error::ServerError;
+use super::work::Running;
 
 /// When the show starts.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,24 +26,30 @@ impl StartConfig {
     }
 }
 
-impl Client {
-    /// Tells the server when to start; it tells the drones once a second.
-    pub fn set_start(&mut self, start: &StartConfig) -> Result<(), ServerError> {
-        self.ask(&json!({
+impl StartConfig {
+    /// The request that sets it.
+    pub fn body(&self) -> Value {
+        json!({
             "type": "SHOW-SETCFG",
             "configuration": {
                 "start": {
-                    "authorized": start.authorized,
+                    "authorized": self.authorized,
                     "authorizationScope": "live",
                     "clock": null,
-                    "time": start.unix_s,
+                    "time": self.unix_s,
                     "method": "auto",
-                    "uavIds": start.drones,
+                    "uavIds": self.drones,
                 },
-                "duration": start.duration_s,
+                "duration": self.duration_s,
             },
-        }))
-        .map(|_| ())
+        })
+    }
+}
+
+impl Client {
+    /// Tells the server when to start; it tells the drones once a second.
+    pub fn set_start(&mut self, start: &StartConfig) -> Result<(), ServerError> {
+        self.ask(&start.body()).map(|_| ())
     }
 
     /// What the server would start, as it tells it.
