@@ -433,7 +433,7 @@ impl Visit {
                 self.end_later(drone, vec![error("Another log download is in progress")]);
                 return Ok(());
             }
-            Fault::LogOnce if first && downloads <= 2 => {
+            Fault::LogOnce if first && downloads == 1 => {
                 self.end_later(drone, vec![error("MAVLink mission operation timed out")]);
                 return Ok(());
             }

@@ -103,6 +103,11 @@ pub(super) fn bring(
             context.warn(&format!("no log of drone {drone} (slot {}): {reason}", row.slot));
         }
     }
+    Ok(rows)
+}
+
+/// In a line what came of it.
+pub(super) fn sum_up(context: &Context, rows: &[Row]) {
     let count = |state: &str| rows.iter().filter(|row| row.state == state).count();
     let (pulled, there) = (count("pulled"), count("there"));
     context.say(&format!(
@@ -114,7 +119,6 @@ pub(super) fn bring(
             there => format!(" ({there} had come before)"),
         }
     ));
-    Ok(rows)
 }
 
 /// A log that is to come.

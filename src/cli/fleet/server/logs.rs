@@ -1,6 +1,6 @@
 //! `logs list` and `logs pull` through the server.
 
-use super::bring::{Row, bring};
+use super::bring::{Row, bring, sum_up};
 use super::standing::{Standing, standing};
 use super::{connect, stopped};
 use crate::campaign::FlightFolder;
@@ -100,5 +100,6 @@ pub(in crate::cli) fn pull(
     };
     rows.extend(lost.into_iter().map(nobody));
     rows.sort_by_key(|row| row.slot);
+    sum_up(context, &rows);
     Ok(rows)
 }

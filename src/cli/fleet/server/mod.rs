@@ -12,7 +12,7 @@ use std::sync::atomic::Ordering;
 
 use serde_json::Value;
 
-use self::bring::bring;
+use self::bring::{bring, sum_up};
 use self::standing::assign;
 use self::upload::Shows;
 use super::bring::Wish;
@@ -125,6 +125,7 @@ pub(in crate::cli) fn fly(
     }
     let wanted: Vec<(u16, String)> = drones.into_iter().collect();
     let brought = bring(context, &mut client, address, folder, plan, &wanted, &Wish::default())?;
+    sum_up(context, &brought);
     if brought.iter().all(|row| row.state != "missing") {
         return Ok(flown);
     }
