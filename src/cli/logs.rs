@@ -1,5 +1,8 @@
 //! `updraft logs`: what is on the drones, bringing it home, checking it, and cards.
 
+mod dry;
+mod listing;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -12,7 +15,7 @@ use super::exit::{CommandError, Exit};
 use super::fleet::bring::{Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
-use super::fleet::{dry, one_flight, server};
+use super::fleet::{one_flight, server};
 use super::simulate::{SlotSet, made_by, parse_slots};
 use super::words;
 use crate::base::file::create_folder;
@@ -23,6 +26,8 @@ use crate::fleet::logs::verify::verify;
 use crate::fleet::slots::FleetTable;
 use crate::link::clock::Clock as _;
 use crate::mission::Plan;
+
+pub(super) use listing::{ListRow, ListedLog};
 
 /// Arguments of `updraft logs`.
 #[derive(Debug, Args)]
@@ -161,33 +166,6 @@ fn with_table(crew: &mut Crew<'_>, wait_s: f64) -> Result<(), CommandError> {
     }
 }
 
-#[derive(Serialize)]
-struct ListOutput {
-    schema: &'static str,
-    drones: Vec<ListRow>,
-}
-
-/// A drone's logs, or why they are not known.
-#[derive(Serialize)]
-pub(super) struct ListRow {
-    pub(super) drone: String,
-    /// None: no slot is near.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) slot: Option<u16>,
-    pub(super) logs: Vec<ListedLog>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) reason: Option<String>,
-}
-
-/// A log on a drone.
-#[derive(Serialize)]
-pub(super) struct ListedLog {
-    pub(super) number: u16,
-    pub(super) bytes: u64,
-    /// 0: the autopilot had no clock.
-    pub(super) unix_s: u32,
-}
-
 fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     has_slots(&plan, args.slots.as_ref())?;
@@ -195,7 +173,7 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
         Target::Links(links) => links,
         Target::Server(address) => {
             let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
-            return show_list(context, server::list(context, &address, &plan, slots, wait_s)?);
+            return listing::show(context, server::list(context, &address, &plan, slots, wait_s)?);
         }
         Target::Sim => return Err(gone()),
     };
@@ -229,29 +207,7 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
             }
         })
         .collect();
-    show_list(context, rows)
-}
-
-fn show_list(context: &Context, rows: Vec<ListRow>) -> Result<Exit, CommandError> {
-    let lost = rows.iter().any(|row| row.reason.is_some());
-    if context.json {
-        context.print_json(&ListOutput { schema: "updraft.log-list/1", drones: rows })?;
-    } else {
-        for row in &rows {
-            let logs: Vec<String> = row
-                .logs
-                .iter()
-                .map(|log| format!("{} ({:.1} MB)", log.number, log.bytes as f64 / 1e6))
-                .collect();
-            let what = row.reason.clone().unwrap_or_else(|| match logs.len() {
-                0 => "no logs".to_owned(),
-                _ => logs.join(", "),
-            });
-            let slot = row.slot.map_or_else(|| "-".to_owned(), |slot| slot.to_string());
-            context.emit(&format!("drone {:>4}  slot {slot:>4}  {what}\n", row.drone))?;
-        }
-    }
-    Ok(if lost { Exit::Losses } else { Exit::Done })
+    listing::show(context, rows)
 }
 
 /// The plan has these slots.
@@ -319,7 +275,8 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     has_slots(&plan, args.slots.as_ref())?;
     let target = args.connect.target()?;
     if args.dry_run {
-        return dry_pull(context, &folder, &plan, args);
+        let lines = dry::lines(&folder, &plan, args);
+        return super::fleet::dry::print(context, lines);
     }
     let _lock = context.lock(&args.campaign)?;
     let wish = Wish {
@@ -377,33 +334,6 @@ fn end_pull<T: Serialize>(
         context.print_json(&PullOutput { schema: "updraft.pull/1", logs })?;
     }
     Ok(if lost.is_empty() { Exit::Done } else { Exit::Losses })
-}
-
-/// What a pull would ask for.
-fn dry_pull(
-    context: &Context,
-    folder: &FlightFolder,
-    plan: &Plan,
-    args: &PullArgs,
-) -> Result<Exit, CommandError> {
-    let what = match args.log {
-        Which::Newest => "its newest log".to_owned(),
-        Which::All => "all of its logs".to_owned(),
-        Which::Number(number) => format!("its log {number}"),
-    };
-    let is_meant = |slot: u16| args.slots.as_ref().is_none_or(|slots| slots.contains(slot));
-    let mut lines = BTreeMap::new();
-    for slot in plan.slots.iter().map(|slot| slot.slot).filter(|slot| is_meant(*slot)) {
-        let path = folder.log(slot, plan.slots.len());
-        let place = path.strip_prefix(&folder.0).unwrap_or(&path).display();
-        let line = if path.exists() && !args.again && args.log == Which::Newest {
-            format!("nothing: {place} is there")
-        } else {
-            format!("the list of its logs, and {what}, for {place}")
-        };
-        lines.insert(format!("on slot {slot}"), vec![line]);
-    }
-    dry::print(context, lines)
 }
 
 #[derive(Serialize)]

@@ -4,7 +4,6 @@ use serde_json::{Value, json};
 
 use super::client::Client;
 use super::error::ServerError;
-use super::work::Running;
 
 /// When the show starts.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,10 +56,9 @@ impl Client {
         let mut answer = self.ask(&json!({ "type": "SHOW-CFG" }))?;
         Ok(answer.get_mut("configuration").map(Value::take).unwrap_or_default())
     }
+}
 
-    /// Sends drones home, or lets them land where they are.
-    pub fn end_flight(&mut self, drones: &[String], home: bool) -> Result<Running, ServerError> {
-        let kind = if home { "UAV-RTH" } else { "UAV-LAND" };
-        self.begin(&json!({ "type": kind, "ids": drones }))
-    }
+/// The request that sends drones home, or lets them land where they are.
+pub fn end_flight(drones: &[String], home: bool) -> Value {
+    json!({ "type": if home { "UAV-RTH" } else { "UAV-LAND" }, "ids": drones })
 }

@@ -221,6 +221,10 @@ pub(in crate::cli) fn end(
     args: &StepArgs,
     action: Action,
 ) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.connect.target()? {
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::dry_end(context, &plan, action);
+    }
     let dry = Dry::of(args)?;
     let lines = |drone| {
         let slot = dry.table.slot_of(drone).and_then(|slot| dry.plan.slot(slot));

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::Serialize;
-
+use super::rows::Row;
 use super::stopped;
 use crate::base::file::{create_folder, write_whole};
 use crate::campaign::FlightFolder;
@@ -27,20 +26,6 @@ use crate::skybrush_server::{
 const TRIES: u32 = 3;
 /// A word to who waits, s.
 const SAY_EVERY_S: u64 = 10;
-
-/// What became of a slot's log, for `--json`.
-#[derive(Clone, Debug, Serialize)]
-pub(in crate::cli) struct Row {
-    pub(in crate::cli) slot: u16,
-    /// The server's name of the drone; none stands there.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::cli) drone: Option<String>,
-    /// `pulled`, `there` or `missing`.
-    pub(in crate::cli) state: &'static str,
-    pub(in crate::cli) bytes: u64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::cli) reason: Option<String>,
-}
 
 /// Brings logs of these slots and the server's names of their drones.
 pub(super) fn bring(
@@ -104,21 +89,6 @@ pub(super) fn bring(
         }
     }
     Ok(rows)
-}
-
-/// In a line what came of it.
-pub(super) fn sum_up(context: &Context, rows: &[Row]) {
-    let count = |state: &str| rows.iter().filter(|row| row.state == state).count();
-    let (pulled, there) = (count("pulled"), count("there"));
-    context.say(&format!(
-        "Brought {} of {} logs home{}",
-        pulled + there,
-        rows.len(),
-        match there {
-            0 => String::new(),
-            there => format!(" ({there} had come before)"),
-        }
-    ));
 }
 
 /// A log that is to come.

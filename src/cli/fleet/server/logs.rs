@@ -1,6 +1,7 @@
 //! `logs list` and `logs pull` through the server.
 
-use super::bring::{Row, bring, sum_up};
+use super::bring::bring;
+use super::rows::{Row, sum_up};
 use super::standing::{Standing, standing};
 use super::{connect, stopped};
 use crate::campaign::FlightFolder;

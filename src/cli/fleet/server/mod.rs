@@ -1,7 +1,9 @@
 //! Flights through a running Skybrush Server.
 
 mod bring;
+mod dry;
 mod logs;
+mod rows;
 mod standing;
 mod upload;
 mod watch;
@@ -12,7 +14,8 @@ use std::sync::atomic::Ordering;
 
 use serde_json::Value;
 
-use self::bring::{bring, sum_up};
+use self::bring::bring;
+use self::rows::sum_up;
 use self::standing::assign;
 use self::upload::Shows;
 use super::bring::Wish;
@@ -26,10 +29,10 @@ use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
 use crate::skybrush_server::watch::{code_name, is_on_ground, warnings};
-use crate::skybrush_server::{Client, ServerError, StartConfig};
+use crate::skybrush_server::{Client, ServerError, StartConfig, end_flight};
 
+pub(in crate::cli) use dry::{dry_end, dry_fly};
 pub(in crate::cli) use logs::{list, pull};
-pub(in crate::cli) use upload::dry_fly;
 
 /// Distance of the fence's circle beyond the farthest corner, m.
 const BEYOND_M: f64 = 10.0;
@@ -216,7 +219,7 @@ pub(in crate::cli) fn end(
         ids.into_iter().partition(|id| status.get(id).is_some_and(is_on_ground));
     let mut unsure = 0;
     if !up.is_empty() {
-        let running = client.end_flight(&up, action == Action::Return)?;
+        let running = client.begin(&end_flight(&up, action == Action::Return))?;
         let done = client.finish(running, || !stopped(context))?;
         for id in &up {
             let text = match done.get(id) {

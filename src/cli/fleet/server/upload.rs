@@ -1,20 +1,15 @@
-//! Shows to drones through the server, and what a dry run shows of it.
+//! Shows to drones through the server, several drones at once.
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
-
 use super::{BEYOND_M, Flight, stopped};
 use crate::cli::context::Context;
-use crate::cli::exit::{CommandError, Exit};
-use crate::cli::fleet::dry;
+use crate::cli::exit::CommandError;
 use crate::fleet::fence::Fence as Checked;
 use crate::mission::Plan;
 use crate::show::Show;
 use crate::show::skyc::drone_documents;
-use crate::skybrush_server::{
-    Client, Fence, Foreman, Job, Outcome, ShowUpload, StartConfig, upload,
-};
+use crate::skybrush_server::{Client, Fence, Foreman, Job, Outcome, ShowUpload, upload};
 
 /// Drones that are sent their show at once. The server takes any number, but tells of no progress
 /// and gives each up after 90 s: more of them would share the same radio, and all be late.
@@ -55,7 +50,7 @@ impl<'a> Shows<'a> {
     }
 
     /// Every slot's request, to the drones that `name` says.
-    fn jobs(
+    pub(super) fn jobs(
         &self,
         name: impl Fn(u16) -> Option<String>,
     ) -> Result<BTreeMap<u16, Job>, CommandError> {
@@ -110,35 +105,4 @@ impl Foreman for Uploads<'_> {
     fn stop(&mut self) -> bool {
         stopped(self.context)
     }
-}
-
-/// What a flight would ask of the server; which drone stands where, only the server knows.
-pub(in crate::cli) fn dry_fly(
-    context: &Context,
-    plan: &Plan,
-    lead_s: f64,
-) -> Result<Exit, CommandError> {
-    let name = |slot: u16| format!("(who stands on slot {slot})");
-    let jobs = Shows::of(plan)?.jobs(|slot| Some(name(slot)))?;
-    let mut lines: BTreeMap<String, Vec<String>> = jobs
-        .into_iter()
-        .map(|(slot, job)| (format!("on slot {slot}"), vec![job.body.to_string()]))
-        .collect();
-    let start = |authorized| {
-        let mut body = StartConfig {
-            unix_s: None,
-            authorized,
-            drones: plan.slots.iter().map(|slot| name(slot.slot)).collect(),
-            duration_s: plan.duration_ms as f64 / 1000.0,
-        }
-        .body();
-        if let Some(time) = body.pointer_mut("/configuration/start/time") {
-            *time = Value::from(format!("(now + {lead_s:.0} s)"));
-        }
-        body.to_string()
-    };
-    for all in lines.values_mut() {
-        all.extend([start(false), start(true)]);
-    }
-    dry::print(context, lines)
 }
