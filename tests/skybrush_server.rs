@@ -265,6 +265,12 @@ fn a_flights_dry_run_shows_the_servers_requests() {
     let kinds: Vec<&str> = bodies.iter().map(|body| body["type"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["OBJ-CMD", "SHOW-SETCFG", "SHOW-SETCFG"]);
     assert_eq!(bodies[0]["kwds"]["show"]["mission"]["index"], 1);
+    let ended = run(&bench, &server, &["fleet", "abort", "campaign", "--dry-run"]);
+    assert!(server.asked().is_empty(), "{ended}");
+    assert!(
+        ended.out.contains(r#"{"ids":["(who stands on slot 2)"],"type":"UAV-RTH"}"#),
+        "{ended}"
+    );
 }
 
 #[test]
