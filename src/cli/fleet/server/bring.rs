@@ -282,7 +282,7 @@ impl Puller<'_> {
     fn choose(&self, drone: &str, one: &mut One, mut logs: Vec<LogEntry>) -> Option<Job> {
         logs.sort_by_key(number);
         let Some(newest) = logs.last().map(number) else {
-            return one.fail("it has none");
+            return one.fail("the server lists no ArduPilot log of it");
         };
         let known: Vec<String> = logs.iter().map(|log| log.id.clone()).collect();
         let which = self.wish.which;
