@@ -302,8 +302,8 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
             let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
             let rows = server::pull(context, &address, &folder, &plan, slots, &wish, wait_s)?;
             let lost = rows.iter().filter(|row| row.state == "missing").map(|row| row.slot);
-            let lost = lost.collect();
-            return end_pull(context, args, &plan, rows, lost);
+            let lost: Vec<u16> = lost.collect();
+            return end_pull(context, args, &plan, rows, &lost);
         }
         Target::Sim => return Err(gone()),
     };
@@ -315,8 +315,9 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
         table.drones.retain(|line| slots.contains(line.slot));
     }
     let brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
-    let lost = brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
-    end_pull(context, args, &plan, brought, lost)
+    let lost: Vec<u16> =
+        brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
+    end_pull(context, args, &plan, brought, &lost)
 }
 
 /// What to do about lost logs, and all of it for programs.
@@ -325,10 +326,10 @@ fn end_pull<T: Serialize>(
     args: &PullArgs,
     plan: &Plan,
     logs: Vec<T>,
-    lost: Vec<u16>,
+    lost: &[u16],
 ) -> Result<Exit, CommandError> {
     if !lost.is_empty() {
-        context.insist(&format!("To try again: {}", once_more(args, &plan.name, &lost)));
+        context.insist(&format!("To try again: {}", once_more(args, &plan.name, lost)));
     }
     if context.json {
         context.print_json(&PullOutput { schema: "updraft.pull/1", logs })?;

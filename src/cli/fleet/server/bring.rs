@@ -248,7 +248,7 @@ impl Puller<'_> {
                     bytes
                 }
                 Err(reason) if target.tries < TRIES && !is_final(&reason) => {
-                    return fetch(drone, one, target);
+                    return Some(fetch(drone, one, target));
                 }
                 Err(reason) => return one.fail(advised(&reason)),
             },
@@ -256,7 +256,7 @@ impl Puller<'_> {
         let (size, came) = (target.log.size, bytes.len() as u64);
         if size != came {
             if target.tries < TRIES {
-                return fetch(drone, one, target);
+                return Some(fetch(drone, one, target));
             }
             return one.fail(format!(
                 "log {} was listed with {size} bytes, but {came} came: it may still be written; \
@@ -363,14 +363,14 @@ impl Puller<'_> {
 /// The next log of a drone, if there is one to come.
 fn next(drone: &str, one: &mut One) -> Option<Job> {
     let target = one.targets.pop()?;
-    fetch(drone, one, target)
+    Some(fetch(drone, one, target))
 }
 
-fn fetch(drone: &str, one: &mut One, mut target: Target) -> Option<Job> {
+fn fetch(drone: &str, one: &mut One, mut target: Target) -> Job {
     target.tries += 1;
     let job = fetch_log(drone, &target.log.id);
     one.targets.push(target);
-    Some(job)
+    job
 }
 
 fn number(log: &LogEntry) -> u32 {
