@@ -123,7 +123,8 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
         }
         Target::Server(address) => {
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-            server::fly(context, &address, &folder, &plan, &args.lead, !args.no_logs)
+            let (with_logs, wait_s) = (!args.no_logs, args.connect.wait);
+            server::fly(context, &address, &folder, &plan, &args.lead, with_logs, wait_s)
         }
     }
 }

@@ -1,11 +1,13 @@
 //! `--dry-run`: the messages, and nobody hears them.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 
 use serde::Serialize;
 
+use super::connect::Target;
 use super::crew::Crew;
-use super::{StepArgs, one_flight};
+use super::{StepArgs, one_flight, server};
 use crate::base::frame::Geodetic;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
@@ -71,7 +73,11 @@ struct DryOutput {
     drones: BTreeMap<String, Vec<String>>,
 }
 
-fn print(context: &Context, lines: BTreeMap<DroneId, Vec<String>>) -> Result<Exit, CommandError> {
+/// Prints what each drone would be sent.
+pub(in crate::cli) fn print<D: Display + Ord>(
+    context: &Context,
+    lines: BTreeMap<D, Vec<String>>,
+) -> Result<Exit, CommandError> {
     if context.json {
         let drones = lines.into_iter().map(|(drone, lines)| (drone.to_string(), lines)).collect();
         context.print_json(&DryOutput { schema: "updraft.dry-run/1", drones })?;
@@ -209,6 +215,10 @@ pub(in crate::cli) fn fly(
     args: &StepArgs,
     lead_s: f64,
 ) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.connect.target()? {
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::dry_fly(context, &plan, lead_s);
+    }
     let mut lines = Dry::of(args)?.upload(context)?;
     for all in lines.values_mut() {
         all.extend(start_lines(lead_s));
@@ -298,6 +308,10 @@ pub(in crate::cli) fn end(
     args: &StepArgs,
     action: Action,
 ) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.connect.target()? {
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::dry_end(context, &plan, action);
+    }
     let dry = Dry::of(args)?;
     let lines = |drone| {
         let slot = dry.table.slot_of(drone).and_then(|slot| dry.plan.slot(slot));

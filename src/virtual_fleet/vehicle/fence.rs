@@ -251,8 +251,10 @@ fn is_inside(corners: &[Vector3<f64>], point: &Vector3<f64>) -> bool {
     inside
 }
 
+/// The firmware asks with the older of the two messages, and some stations know no other from it.
+#[expect(deprecated, reason = "the firmware sends it")]
 fn ask(seq: u16) -> MavMessage {
-    MavMessage::MISSION_REQUEST_INT(dialect::MISSION_REQUEST_INT_DATA {
+    MavMessage::MISSION_REQUEST(dialect::MISSION_REQUEST_DATA {
         seq,
         target_system: STATION.system,
         target_component: STATION.component,
