@@ -46,6 +46,8 @@ use crate::show::Show;
 const AT_ONCE: usize = 64;
 /// Uploads at once per network.
 const UPLOADS_AT_ONCE: usize = 16;
+/// Virtual drones have set their flags by then, and no radio holds older packets back.
+const SETTLE_VIRTUAL: Micros = 100 * MS;
 /// Largest show file, bytes.
 const MOST_SKYB: u64 = 1 << 20;
 /// Drones are listened to for so long after the last of them was heard, to judge their links.
@@ -282,7 +284,9 @@ impl<'a> Crew<'a> {
             .iter()
             .map(|line| {
                 let load = self.load(line.slot, &fence)?;
-                Ok((line.drone, Upload::new(line.drone, load, number)))
+                let upload = Upload::new(line.drone, load, number);
+                let upload = if self.is_virtual { upload.settling(SETTLE_VIRTUAL) } else { upload };
+                Ok((line.drone, upload))
             })
             .collect()
     }
@@ -291,7 +295,7 @@ impl<'a> Crew<'a> {
     pub(in crate::cli) fn upload(&mut self) -> Result<BTreeMap<DroneId, String>, CommandError> {
         let uploads = self.uploads()?;
         let count = uploads.len();
-        // Virtual drones share no radio; each upload waits a second for the drone to settle.
+        // Virtual drones share no radio.
         let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
         let done = self.all(uploads, at_once)?;
         let mut refused = BTreeMap::new();
