@@ -15,10 +15,12 @@ use crate::fleet::ftp::sum::Sum;
 use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::upload::{Load, Upload};
-use crate::link::clock::S;
+use crate::link::clock::{MS, Micros, S};
 use crate::link::id::DroneId;
 use crate::protocol::show::SHOW_FILE;
 
+/// Virtual drones have set their flags by then, and no radio holds older packets back.
+const SETTLE_VIRTUAL: Micros = 100 * MS;
 /// Uploads at once per network.
 const UPLOADS_AT_ONCE: usize = 16;
 /// Largest show file, bytes.
@@ -85,7 +87,9 @@ impl Crew<'_> {
             .iter()
             .map(|line| {
                 let load = self.load(line.slot, &fence)?;
-                Ok((line.drone, Upload::new(line.drone, load, number)))
+                let upload = Upload::new(line.drone, load, number);
+                let upload = if self.is_virtual { upload.settling(SETTLE_VIRTUAL) } else { upload };
+                Ok((line.drone, upload))
             })
             .collect()
     }
@@ -96,7 +100,7 @@ impl Crew<'_> {
         let mut uploads = self.uploads()?;
         let count = uploads.len();
         uploads.retain(|drone, _| !refused.contains_key(drone));
-        // Virtual drones share no radio; each upload waits a second for the drone to settle.
+        // Virtual drones share no radio.
         let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
         let done = self.all(uploads, at_once)?;
         let mut written = 0;
