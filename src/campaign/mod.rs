@@ -13,6 +13,7 @@
 //! ```
 
 pub mod lock;
+pub mod start;
 pub mod write;
 
 use std::io;
