@@ -17,7 +17,8 @@ use updraft::analysis::result::{
     Analysis, Fit, FlightAnalysis, Rejection, UnusedLog, WindowStats, Yield,
 };
 use updraft::analysis::{
-    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, analyze, analyze_flight,
+    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, OffsetRule, analyze,
+    analyze_flight,
 };
 use updraft::mission::plan::{Kind, Plan, Purpose};
 
@@ -38,11 +39,16 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
 }
 
 fn logs(paths: &[PathBuf]) -> Vec<LogInput> {
-    paths.iter().map(|path| LogInput { slot: None, path: path.clone() }).collect()
+    paths.iter().map(|path| LogInput { slot: None, path: path.clone(), table: None }).collect()
 }
 
 fn run(plan: Option<&Plan>, paths: &[PathBuf], options: &AnalysisOptions) -> FlightAnalysis {
     analyze_flight(&input("flight", plan, &logs(paths)), options, None, &|_, _| {}).unwrap()
+}
+
+/// The firmware's simulator has still air: there is no slow air to subtract.
+fn still() -> AnalysisOptions {
+    AnalysisOptions { offset: OffsetRule::Never, ..AnalysisOptions::default() }
 }
 
 fn paper() -> AnalysisOptions {
@@ -51,7 +57,7 @@ fn paper() -> AnalysisOptions {
         weights: Weights::WindowSd,
         ..FitOptions::default()
     };
-    AnalysisOptions { fit, ..AnalysisOptions::default() }
+    AnalysisOptions { fit, ..still() }
 }
 
 fn values(fit: &Fit) -> Vec<f64> {
@@ -71,7 +77,7 @@ fn both_ways() -> [Option<Plan>; 2] {
 fn the_still_air_ladder_has_the_law_of_its_plant() {
     for plan in both_ways() {
         let paths = [fixture("ladder-still.trimmed.BIN")];
-        let flight = run(plan.as_ref(), &paths, &AnalysisOptions::default());
+        let flight = run(plan.as_ref(), &paths, &still());
         assert_eq!(flight.purpose, Purpose::Calibration);
         let windows = &flight.drones[0].windows;
         assert_eq!((windows.len(), legs(windows).len()), (29, 14), "planned: {}", flight.planned);
@@ -118,6 +124,27 @@ fn the_square_law_ladder_has_the_law_of_its_plant() {
         assert!(fit.other_minima.is_empty() && fit.warnings.is_empty(), "{fit:?}");
         assert!(fit.chi2_reduced.unwrap() < laws.linear.as_ref().unwrap().chi2_reduced.unwrap());
     }
+}
+
+#[test]
+fn the_offset_takes_out_what_height_does() {
+    let paths = [fixture("square-law-ladder.trimmed.BIN")];
+    let with = AnalysisOptions { offset: OffsetRule::Always, ..paper() };
+    let flight = run(None, &paths, &with);
+    let drone = &flight.drones[0];
+    // Thinner air above asks for more pulse, which an even term, W, imitates where it is left in.
+    let fit = drone.laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
+    let [a, _, w] = values(fit)[..] else { panic!("three parameters") };
+    assert!((a - 4.9025).abs() < 0.002 && (w + 0.012).abs() < 0.003, "{a} {w}");
+    let offset = drone.offset.as_ref().unwrap();
+    assert_eq!(offset.points.len(), 15);
+    assert!((offset.points.iter().map(|point| point.offset_us).sum::<f64>()).abs() < 1e-6);
+    let outside: Vec<&str> = legs(&drone.windows)
+        .iter()
+        .filter(|leg| leg.offset_outside)
+        .map(|leg| &*leg.label)
+        .collect();
+    assert_eq!(outside, ["up 0.5 m/s"], "only the first climb is outside the 0-windows");
 }
 
 #[test]
@@ -202,15 +229,11 @@ fn a_fleet_is_matched_and_what_is_lost_is_said() {
 fn a_log_of_another_plan_is_refused_by_name() {
     let wrong = plan(Purpose::Calibration, ladder(-1.0), 1);
     let logs = logs(&[fixture("ladder-still.trimmed.BIN")]);
-    let error = analyze_flight(
-        &input("calibration", Some(&wrong), &logs),
-        &AnalysisOptions::default(),
-        None,
-        &|_, _| {},
-    )
-    .map(|flight| flight.drones.len())
-    .unwrap_err()
-    .to_string();
+    let error =
+        analyze_flight(&input("calibration", Some(&wrong), &logs), &still(), None, &|_, _| {})
+            .map(|flight| flight.drones.len())
+            .unwrap_err()
+            .to_string();
     for part in ["does not belong to the plan", "14 of 14 legs", "`up 0.5 m/s`", "planned -0.5"] {
         assert!(error.contains(part), "{error}");
     }
@@ -230,12 +253,8 @@ fn a_flight_that_runs_early_is_told_by_how_much() {
         }
         let late = plan(Purpose::Calibration, segments, 1);
         let logs = logs(&[fixture("ladder-still.trimmed.BIN")]);
-        let flight = analyze_flight(
-            &input("calibration", Some(&late), &logs),
-            &AnalysisOptions::default(),
-            None,
-            &|_, _| {},
-        );
+        let flight =
+            analyze_flight(&input("calibration", Some(&late), &logs), &still(), None, &|_, _| {});
         match flight {
             Ok(_) => assert_eq!(shift_ms, 0),
             Err(error) => {
@@ -253,7 +272,7 @@ fn a_flight_that_runs_early_is_told_by_how_much() {
 
 #[test]
 fn impossible_inputs_say_what_to_do() {
-    let options = AnalysisOptions::default();
+    let options = still();
     let none = analyze_flight(&input("hover", None, &[]), &options, None, &|_, _| {});
     assert!(none.unwrap_err().to_string().contains("no logs to analyse"));
     let nothing = logs(&[PathBuf::from("nowhere/1.BIN")]);
@@ -280,12 +299,12 @@ fn synthetic_campaign(folder: &Path) -> [Vec<LogInput>; 2] {
     for id in 1..=2 {
         let path = folder.join(format!("cal-{id}.BIN"));
         fs::write(&path, drone(id, 265.0, ladder_up, |_| 0.0)).unwrap();
-        campaign[0].push(LogInput { slot: None, path });
+        campaign[0].push(LogInput { slot: None, path, table: None });
     }
     for id in 1..=3 {
         let path = folder.join(format!("hover-{id}.BIN"));
         fs::write(&path, drone(id, 264.0, |_| 0.0, wave)).unwrap();
-        campaign[1].push(LogInput { slot: None, path });
+        campaign[1].push(LogInput { slot: None, path, table: None });
     }
     campaign
 }
@@ -313,8 +332,7 @@ fn a_campaign_measures_the_air_it_flew_in() {
             assert_eq!(total, 5);
             done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         };
-        let analysis =
-            analyze("campaign", &inputs, &AnalysisOptions::default(), None, &count).unwrap();
+        let analysis = analyze("campaign", &inputs, &still(), None, &count).unwrap();
         assert_eq!(done.into_inner(), 5);
         let [calibration, hover] = &analysis.flights[..] else { panic!("two flights") };
         assert_eq!((calibration.name.as_str(), hover.name.as_str()), ("calibration", "hover"));
@@ -354,7 +372,7 @@ fn a_measurement_without_laws_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let [_, hover] = synthetic_campaign(folder.path());
     let [_, scan] = synthetic_plans();
-    let options = AnalysisOptions { map_law: Some(MapLaw::Linear), ..AnalysisOptions::default() };
+    let options = AnalysisOptions { map_law: Some(MapLaw::Linear), ..still() };
     let flight =
         analyze_flight(&input("hover", Some(&scan), &hover), &options, None, &|_, _| {}).unwrap();
     assert!(flight.map.is_none());
@@ -373,7 +391,7 @@ fn flights_that_cannot_calibrate_are_told_apart() {
         let logs = logs(&[path]);
         let mut input = input("calibration", None, &logs);
         input.purpose = Some(Purpose::Calibration);
-        let flight = analyze_flight(&input, &AnalysisOptions::default(), None, &|_, _| {}).unwrap();
+        let flight = analyze_flight(&input, &still(), None, &|_, _| {}).unwrap();
         assert!(flight.drones[0].laws.is_none());
         assert_eq!(flight.unmeasured.len(), 1, "listed once");
         flight.unmeasured[0].reason.clone()
@@ -408,8 +426,8 @@ fn whole_logs_agree_with_the_fixtures() {
         println!("planned {}: {found:?} rms {:.3}", flight.planned, fit.rms_us);
         assert!((found[0] - 4.963).abs() < 0.002 && (found[2] + 0.044).abs() < 0.003);
 
-        let still = run(plan.as_ref(), &log("ladder-still.BIN"), &AnalysisOptions::default());
-        let windy = run(plan.as_ref(), &log("ladder-wind5.BIN"), &AnalysisOptions::default());
+        let still = run(plan.as_ref(), &log("ladder-still.BIN"), &still());
+        let windy = run(plan.as_ref(), &log("ladder-wind5.BIN"), &still());
         let base = |flight: &FlightAnalysis| {
             let window = flight.drones[0].windows[4].clone();
             assert!(window.kind.is_hover() && window.height_m < 21.0);
@@ -457,7 +475,7 @@ fn damaged_logs_never_stop_the_others() {
         fs::write(&paths[seed - 1], damaged).unwrap();
     }
     for plan in [Some(&plan), None] {
-        let flight = run(plan, &paths, &AnalysisOptions::default());
+        let flight = run(plan, &paths, &still());
         let fit = flight.drones[0].laws.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
         assert!((values(fit)[0] - 4.963).abs() < 0.01, "the whole log is unharmed");
         assert_eq!(flight.drones.len() + flight.unused.len(), flight.logs);
@@ -489,39 +507,31 @@ fn a_log_without_id_and_number_is_matched_by_its_home() {
         slot.home_m[0] -= 7.0;
     }
     let paths = [path];
-    let flight = run(Some(&plan), &paths, &AnalysisOptions::default());
+    let flight = run(Some(&plan), &paths, &still());
     assert_eq!(flight.drones[0].slot, Some(2));
 
     // Without GPS the show's clock still aligns it, but nothing tells whose log it is.
     fs::write(&paths[0], analysis_support::renamed(&nameless, *b"GPS\0", *b"GPX\0")).unwrap();
     let logs = logs(&paths);
-    let error = analyze_flight(
-        &input("calibration", Some(&plan), &logs),
-        &AnalysisOptions::default(),
-        None,
-        &|_, _| {},
-    )
-    .map(|flight| flight.drones.len())
-    .unwrap_err()
-    .to_string();
+    let error =
+        analyze_flight(&input("calibration", Some(&plan), &logs), &still(), None, &|_, _| {})
+            .map(|flight| flight.drones.len())
+            .unwrap_err()
+            .to_string();
     assert!(error.contains("name it after its slot"), "{error}");
 
     // Given by the caller, the slot needs no proof.
-    let given = [LogInput { slot: Some(3), path: paths[0].clone() }];
-    let flight = analyze_flight(
-        &input("calibration", Some(&plan), &given),
-        &AnalysisOptions::default(),
-        None,
-        &|_, _| {},
-    )
-    .unwrap();
+    let given = [LogInput { slot: Some(3), path: paths[0].clone(), table: None }];
+    let flight =
+        analyze_flight(&input("calibration", Some(&plan), &given), &still(), None, &|_, _| {})
+            .unwrap();
     assert_eq!(flight.drones[0].slot, Some(3));
 }
 
 #[test]
 fn a_second_log_of_a_slot_is_left_out_and_named() {
     let twice: Vec<LogInput> = ["square-law-ladder.trimmed.BIN", "ladder-still.trimmed.BIN"]
-        .map(|name| LogInput { slot: Some(1), path: fixture(name) })
+        .map(|name| LogInput { slot: Some(1), path: fixture(name), table: None })
         .to_vec();
     let plan = plan(Purpose::Calibration, ladder(1.0), 1);
     let flight =
@@ -535,7 +545,7 @@ fn a_second_log_of_a_slot_is_left_out_and_named() {
 #[test]
 fn chi_squared_is_told_from_before_scatter_was_added() {
     let paths = [fixture("ladder-still.trimmed.BIN")];
-    let flight = run(None, &paths, &AnalysisOptions::default());
+    let flight = run(None, &paths, &still());
     let laws = flight.drones[0].laws.as_ref().unwrap();
     let (line, square) = (laws.linear.as_ref().unwrap(), laws.signed_quadratic.as_ref().unwrap());
     let added = laws.sigma_added_us.unwrap();
@@ -563,7 +573,7 @@ fn chi_squared_is_told_from_before_scatter_was_added() {
 
 #[test]
 fn a_signed_quadratic_that_does_not_fit_is_called_so() {
-    let flight = run(None, &[fixture("ladder-still.trimmed.BIN")], &AnalysisOptions::default());
+    let flight = run(None, &[fixture("ladder-still.trimmed.BIN")], &still());
     let words = flight.warnings.join("; ");
     assert!(words.contains("signed-quadratic law does not describe this flight"), "{words}");
     assert!(words.contains("Use A' of the line"), "{words}");
@@ -591,7 +601,7 @@ fn measured(pulse: fn(f64) -> f64, up: fn(f64) -> f64, planned_s: f64) -> Analys
     let scan = plan(Purpose::Measurement, table.segments, 2);
     let inputs =
         [input("calibration", Some(&ladder), &calibration), input("hover", Some(&scan), &hover)];
-    analyze("x", &inputs, &AnalysisOptions::default(), None, &|_, _| {}).unwrap()
+    analyze("x", &inputs, &still(), None, &|_, _| {}).unwrap()
 }
 
 #[test]
@@ -636,7 +646,7 @@ fn what_was_found_tells_nothing_from_something() {
     let [calibration, hover] = synthetic_campaign(folder.path());
     let found = |name, logs: &[LogInput]| {
         let inputs = [input(name, None, logs)];
-        analyze(name, &inputs, &AnalysisOptions::default(), None, &|_, _| {}).unwrap()
+        analyze(name, &inputs, &still(), None, &|_, _| {}).unwrap()
     };
     let nothing = found("hover", &hover);
     assert_eq!(nothing.what_was_found(), Yield::Nothing);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -26,6 +27,7 @@ use super::wind::Leaning;
 use super::windows::{Tilt, WindowOptions};
 use crate::base::time::GpsTime;
 use crate::flight::Indicator;
+use crate::flight::table::Mapping;
 use crate::mission::plan::{Plan, Purpose};
 
 /// One log of a flight.
@@ -36,6 +38,8 @@ pub struct LogInput {
     pub slot: Option<u16>,
     /// The file.
     pub path: PathBuf,
+    /// What its columns are, if it is a table and no DataFlash log.
+    pub table: Option<Arc<Mapping>>,
 }
 
 /// One flight to analyse.

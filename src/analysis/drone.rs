@@ -5,10 +5,11 @@ use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::offset::OffsetMap;
 use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats};
 use super::stats::mean_sd;
+use super::steps::steady;
 use super::updraft::{self, DroneSeries, Lean};
 use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
-use crate::flight::{Alignment, Flight, FlightOptions};
+use crate::flight::{Alignment, Flight, FlightOptions, table};
 use crate::mission::plan::{Purpose, Segment, Slot};
 
 /// What all logs of a flight share.
@@ -47,11 +48,20 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         indicator: options.indicator,
         segments: slot.map(|(_, segments)| segments),
     };
-    let flight =
-        Flight::open(&log.path, flight_options).map_err(|error| with_causes(&error, ": "))?;
+    let flight = match &log.table {
+        Some(mapping) => {
+            table::read(&log.path, mapping).map_err(|error| with_causes(&error, ": "))?
+        }
+        None => {
+            Flight::open(&log.path, flight_options).map_err(|error| with_causes(&error, ": "))?
+        }
+    };
     let mut warnings = flight.warnings.clone();
 
-    let targets = find_targets(&flight, slot.map(|(_, segments)| segments), &mut warnings)?;
+    let targets = match &log.table {
+        Some(mapping) if flight.desired_up_mps.is_none() => steady(&flight, &mapping.steps),
+        _ => find_targets(&flight, slot.map(|(_, segments)| segments), &mut warnings)?,
+    };
     let corrected = windows::correct_tilt(&flight, &options.windows);
     let mut stats = windows::measure(&flight, &corrected, &targets, &options.windows);
     let offset = options

@@ -19,6 +19,7 @@ mod refer;
 pub mod result;
 mod slots;
 mod stats;
+mod steps;
 pub mod updraft;
 pub mod wind;
 pub mod windows;

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::found::{Found, Work, find, stem};
+use super::found::{Found, Work, find, find_tables, stem};
 use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::simulate::{made_by, sha256};
@@ -46,8 +46,11 @@ copies, damaged, from another place or end in the air, or drones gave no law, on
 ladder, or no value of the map; each is named with its reason. Exit code 5: no law and no map at all.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
-    #[arg(required = true)]
+    #[arg(required_unless_present = "csv")]
     paths: Vec<PathBuf>,
+    /// Analyse tables: a mapping file says which columns are what (docs/csv.md)
+    #[arg(long, value_name = "MAPPING.toml", conflicts_with_all = ["paths", "plan", "start", "indicator"])]
+    csv: Option<PathBuf>,
     /// Plan that the logs were flown from: plan.json, a flight's folder, .skyc or .skyb
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
@@ -121,6 +124,16 @@ enum IndicatorChoice {
     Power,
 }
 
+impl From<Indicator> for IndicatorChoice {
+    fn from(indicator: Indicator) -> Self {
+        match indicator {
+            Indicator::Pulse => Self::Pulse,
+            Indicator::RotorSpeed => Self::Rpm,
+            Indicator::Power => Self::Power,
+        }
+    }
+}
+
 /// Form of the tilt correction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum TiltChoice {
@@ -185,8 +198,17 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         find(path, plan.as_ref(), &mut work)?;
     }
     name_apart(&mut work.flights, &args.paths);
-    let first = &args.paths[0];
-    if args.paths.len() == 1 {
+    let mut options = args.options.clone();
+    if let Some(mapping) = &args.csv {
+        options.indicator = find_tables(mapping, &mut work)?.into();
+    }
+    let first = match (&args.csv, args.paths.first()) {
+        (Some(first), _) | (None, Some(first)) => first,
+        (None, None) => {
+            return Err(CommandError::Usage("give a campaign, logs or --csv".to_owned()));
+        }
+    };
+    if args.paths.len() < 2 {
         work.root = if first.is_dir() {
             first.clone()
         } else {
@@ -208,7 +230,7 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         work.flights.iter_mut().for_each(|flight| flight.start = Some(start));
     }
     let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
-    finish(context, &work, &args.options, args.hold.as_deref(), output.as_deref())
+    finish(context, &work, &options, args.hold.as_deref(), output.as_deref())
 }
 
 /// Analyses a campaign into its own folder; the last step of `updraft run`.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::exit::CommandError;
 use super::leaning::leaning;
@@ -13,6 +14,8 @@ use crate::base::file::FileError;
 use crate::base::time::GpsTime;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, LogRecord};
+use crate::flight::Indicator;
+use crate::flight::table::{Mapping, TableError};
 use crate::log::Log;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
@@ -79,7 +82,7 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         name: stem(path),
         plan: plan.cloned(),
         purpose: None,
-        logs: logs.into_iter().map(|path| LogInput { slot: None, path }).collect(),
+        logs: logs.into_iter().map(|path| LogInput { slot: None, path, table: None }).collect(),
         true_updraft_mps: None,
         truth: BTreeMap::new(),
         seed: None,
@@ -98,6 +101,38 @@ fn linear_thrust(vehicle: &Vehicle) -> Option<f64> {
     (vehicle.autopilot.mot_thst_expo == 0.0).then_some(1.0)
 }
 
+/// Adds the flights of a mapping file to the work; what stands for rotor effort in them.
+pub(super) fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, CommandError> {
+    let mapping = Mapping::load(path).map_err(|error| match error {
+        TableError::File(error) => CommandError::File(error),
+        error => CommandError::Usage(error.to_string()),
+    })?;
+    work.title.clone_from(&mapping.title);
+    let shared = Arc::new(mapping);
+    work.flights.extend(shared.flights.iter().map(|flight| {
+        let log = |path: &PathBuf| LogInput {
+            slot: None,
+            path: path.clone(),
+            table: Some(Arc::clone(&shared)),
+        };
+        Found {
+            name: flight.name.clone(),
+            plan: None,
+            purpose: Some(flight.purpose),
+            logs: flight.files.iter().map(log).collect(),
+            true_updraft_mps: None,
+            truth: BTreeMap::new(),
+            seed: None,
+            start: None,
+            density: None,
+            leaning: None,
+            thrust_exponent: None,
+            notes: Vec::new(),
+        }
+    }));
+    Ok(shared.indicator)
+}
+
 fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     let plan = folder.read_plan()?;
     let files = if folder.logs().is_dir() { logs_in(&folder.logs())? } else { Vec::new() };
@@ -108,7 +143,11 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     };
     let logs = files
         .into_iter()
-        .map(|path| LogInput { slot: recorded_slot(folder, record.as_ref(), &path), path })
+        .map(|path| LogInput {
+            slot: recorded_slot(folder, record.as_ref(), &path),
+            path,
+            table: None,
+        })
         .collect();
     let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
     let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };

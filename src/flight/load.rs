@@ -161,6 +161,7 @@ pub(super) fn load(
         desired_horizontal_mps: desired_horizontal.map(cut).filter(|series| !series.is_empty()),
         voltage_v: voltage_v.map(cut),
         current_a: current_a.map(cut),
+        truth_up_mps: None,
         stages: stages.into_iter().map(|(time, stage)| (show(time), stage)).collect(),
         armed_s: armed.into_iter().map(|(start, end)| (show(start), show(end))).collect(),
         pulse_limits_us,

@@ -21,6 +21,7 @@ mod indicator;
 mod load;
 mod pick;
 mod series;
+pub mod table;
 
 use std::path::{Path, PathBuf};
 
@@ -80,6 +81,9 @@ pub struct Flight {
     pub voltage_v: Option<Series>,
     /// Battery current, A.
     pub current_a: Option<Series>,
+    /// True vertical velocity of the air, m/s, up positive, where something beside the drone measured
+    /// it.
+    pub truth_up_mps: Option<Series>,
     /// Show stage (0..9), at its changes: (show time s, stage).
     pub stages: Vec<(f64, u8)>,
     /// When motors were armed, (start, end) show time s.

@@ -1,0 +1,93 @@
+//! Windows from the measured velocity, for tables that have no commands.
+
+use super::windows::Target;
+use crate::flight::table::Steps;
+use crate::flight::{Flight, Series};
+use crate::mission::plan::Kind;
+
+/// Running mean before steps are told apart, s: rotor and position control jitter faster.
+const SMOOTH_S: f64 = 1.0;
+/// Grid on which steps are looked for, s.
+const STEP_S: f64 = 0.1;
+/// Slower is a hover, m/s.
+const HOVER_MPS: f64 = 0.3;
+/// Cut at the end of every window, s.
+const END_CUT_S: f64 = 0.5;
+/// Longest table, s.
+const LONGEST_S: f64 = 1e6;
+
+/// Stretches over which the velocity, averaged over 1 s, stays near its mean: each is a window, less
+/// the controller's transient.
+pub(super) fn steady(flight: &Flight, steps: &Steps) -> Vec<Target> {
+    let mut targets = Vec::new();
+    let mut run: Vec<(f64, f64)> = Vec::new();
+    for (time_s, velocity_mps) in smoothed(&flight.velocity_up_mps) {
+        let mean = run.iter().map(|(_, value)| value).sum::<f64>() / run.len().max(1) as f64;
+        let follows = run.last().is_some_and(|(last, _)| time_s - last < 2.0 * STEP_S);
+        if !run.is_empty() && !(follows && (velocity_mps - mean).abs() <= steps.wobble_mps) {
+            targets.extend(target(&run, steps));
+            run.clear();
+        }
+        run.push((time_s, velocity_mps));
+    }
+    targets.extend(target(&run, steps));
+    targets
+}
+
+/// Means over 1 s, each tenth of a second; none where there are no samples.
+fn smoothed(velocity: &Series) -> Vec<(f64, f64)> {
+    let Some((start, end)) = velocity.span() else { return Vec::new() };
+    let count = ((end - start).min(LONGEST_S) / STEP_S) as usize;
+    let value = |index: usize| {
+        let time_s = start + index as f64 * STEP_S;
+        let near = velocity.between(time_s - SMOOTH_S / 2.0, time_s + SMOOTH_S / 2.0);
+        let mean = near.iter().sum::<f64>() / near.len().max(1) as f64;
+        (!near.is_empty()).then_some((time_s, mean))
+    };
+    (0..=count).filter_map(value).collect()
+}
+
+fn target(run: &[(f64, f64)], steps: &Steps) -> Option<Target> {
+    let (start_s, end_s) = (run.first()?.0 + steps.settle_s, run.last()?.0 - END_CUT_S);
+    if end_s - start_s < steps.shortest_s {
+        return None;
+    }
+    let settled: Vec<f64> =
+        run.iter().filter(|(time_s, _)| *time_s >= start_s).map(|(_, value)| *value).collect();
+    let mean = settled.iter().sum::<f64>() / settled.len().max(1) as f64;
+    let (kind, label, commanded_mps) = if mean.abs() < HOVER_MPS {
+        (Kind::Hover, "hover".to_owned(), 0.0)
+    } else {
+        let rounded = (mean * 10.0).round() / 10.0;
+        let (kind, word) = if mean > 0.0 { (Kind::LegUp, "up") } else { (Kind::LegDown, "down") };
+        (kind, format!("{word} {:.1} m/s", rounded.abs()), rounded)
+    };
+    Some(Target { kind, label, start_s, end_s, commanded_mps })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn climbs_hovers_and_descents_are_told_apart() {
+        // 10 s of hover, 8 s up at 3 m/s, 4 s of hover, 8 s down, each change within 1 s.
+        let velocity = |time: f64| match time {
+            t if t < 10.0 => 0.02 * (t * 7.0).sin(),
+            t if t < 18.0 => (3.0 * (t - 10.0)).min(3.05),
+            t if t < 22.0 => 0.0,
+            t if t < 30.0 => -2.98,
+            _ => 0.0,
+        };
+        let time_s: Vec<f64> = (0..340).map(|step| f64::from(step) * 0.1).collect();
+        let value = time_s.iter().map(|time| velocity(*time)).collect();
+        let flight = Flight { velocity_up_mps: Series { time_s, value }, ..Flight::default() };
+        let steps = Steps { settle_s: 1.0, shortest_s: 2.0, ..Steps::default() };
+        let found = steady(&flight, &steps);
+        let labels: Vec<&str> = found.iter().map(|target| target.label.as_str()).collect();
+        assert_eq!(labels, ["hover", "up 3.0 m/s", "down 3.0 m/s"]);
+        let up = &found[1];
+        assert!(up.start_s > 11.5 && up.end_s < 18.0, "{up:?}");
+        assert_eq!(steady(&Flight::default(), &steps), []);
+    }
+}

@@ -1,0 +1,188 @@
+//! The mapping file: TOML.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::TableError;
+use crate::base::file::read_whole;
+use crate::flight::Indicator;
+use crate::mission::plan::Purpose;
+
+/// Name and version of the format.
+const SCHEMA: &str = "updraft.csv/1";
+/// Largest mapping file, bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Which column is what, and which files are which flight.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mapping {
+    /// `updraft.csv/1`.
+    pub schema: String,
+    /// Title for people.
+    #[serde(default)]
+    pub title: String,
+    /// Character between the cells.
+    #[serde(default = "comma")]
+    pub delimiter: char,
+    /// What stands for rotor effort: `pulse`, `rotor_speed` or `power`.
+    pub indicator: Indicator,
+    /// When.
+    pub time: TimeColumn,
+    /// Rotor effort, in the indicator's unit.
+    pub effort: Channel,
+    /// Vertical velocity, m/s, up positive (a column that points down has the scale -1).
+    pub velocity_up: Channel,
+    /// Height, m, up positive; from any level.
+    pub height: Channel,
+    /// Roll, radians.
+    pub roll: Channel,
+    /// Pitch, radians.
+    pub pitch: Channel,
+    /// Commanded vertical velocity, m/s, up positive, if there is one: windows come from it.
+    pub command_up: Option<Channel>,
+    /// True vertical velocity of the air, m/s, up positive, if something measured it.
+    pub truth: Option<Channel>,
+    /// How windows are found where there is no command.
+    #[serde(default)]
+    pub steps: Steps,
+    /// The flights.
+    pub flights: Vec<TableFlight>,
+}
+
+/// The column of times.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimeColumn {
+    /// Its name.
+    pub column: String,
+    /// What it holds.
+    #[serde(default)]
+    pub format: TimeFormat,
+}
+
+/// What a column of times holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TimeFormat {
+    /// Seconds.
+    #[default]
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// `2021-04-20 09:29:26.100`, with a blank or a T.
+    Datetime,
+}
+
+/// A quantity: the mean of some columns, times a scale, plus an offset.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Channel {
+    /// Columns whose mean is taken.
+    pub columns: Vec<String>,
+    /// Factor to our unit and sign.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// What is added then.
+    #[serde(default)]
+    pub offset: f64,
+}
+
+/// Windows from the measured velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Steps {
+    /// A step is steady where the velocity stays within this of its mean, m/s.
+    pub wobble_mps: f64,
+    /// Cut at a step's start: the controller's transient, s.
+    pub settle_s: f64,
+    /// Shortest window, s.
+    pub shortest_s: f64,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self { wobble_mps: 0.3, settle_s: 3.0, shortest_s: 6.0 }
+    }
+}
+
+/// One flight.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableFlight {
+    /// Short name.
+    pub name: String,
+    /// `calibration` or `measurement`.
+    pub purpose: Purpose,
+    /// The tables of its drones, relative to the mapping file.
+    pub files: Vec<PathBuf>,
+}
+
+fn comma() -> char {
+    ','
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Mapping {
+    /// Reads a mapping file; its flights' files become relative to where it is read from.
+    pub fn load(path: &Path) -> Result<Self, TableError> {
+        let bytes = read_whole(path, MAX_BYTES)?;
+        let wrong = |reason: String| TableError::Mapping { path: path.to_owned(), reason };
+        let text = std::str::from_utf8(&bytes).map_err(|error| wrong(error.to_string()))?;
+        let mut mapping: Self = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
+        mapping.refusal().map_or(Ok(()), |reason| Err(wrong(reason)))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for file in mapping.flights.iter_mut().flat_map(|flight| &mut flight.files) {
+            *file = folder.join(&*file);
+        }
+        Ok(mapping)
+    }
+
+    /// The channels, with their names in the file.
+    pub(super) fn channels(&self) -> Vec<(&'static str, &Channel)> {
+        let always = [
+            ("effort", &self.effort),
+            ("velocity_up", &self.velocity_up),
+            ("height", &self.height),
+            ("roll", &self.roll),
+            ("pitch", &self.pitch),
+        ];
+        let command = self.command_up.as_ref().map(|channel| ("command_up", channel));
+        let truth = self.truth.as_ref().map(|channel| ("truth", channel));
+        always.into_iter().chain(command).chain(truth).collect()
+    }
+
+    fn refusal(&self) -> Option<String> {
+        if self.schema != SCHEMA {
+            return Some(format!("schema is \"{}\", this program reads \"{SCHEMA}\"", self.schema));
+        }
+        if !self.delimiter.is_ascii() {
+            return Some(format!("delimiter {:?} must be one ASCII character", self.delimiter));
+        }
+        for (name, channel) in self.channels() {
+            if channel.columns.is_empty() {
+                return Some(format!("{name}: columns is empty; name at least one"));
+            }
+            if !(channel.scale.is_finite() && channel.offset.is_finite() && channel.scale != 0.0) {
+                return Some(format!("{name}: scale and offset must be finite, and scale not 0"));
+            }
+        }
+        let Steps { wobble_mps, settle_s, shortest_s } = self.steps;
+        if !(wobble_mps > 0.0 && settle_s >= 0.0 && shortest_s >= 1.0) {
+            return Some(
+                "steps: wobble_mps must be above 0, settle_s not below 0, shortest_s 1 or more"
+                    .to_owned(),
+            );
+        }
+        if self.flights.iter().all(|flight| flight.files.is_empty()) {
+            return Some("there are no flights with files".to_owned());
+        }
+        None
+    }
+}

@@ -1,0 +1,75 @@
+//! Flights from other people's tables (CSV): which column is what, in which unit, is told by a mapping
+//! file. This is the border where their signs and units become ours.
+
+mod mapping;
+mod read;
+mod time;
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::base::file::FileError;
+
+pub use mapping::{Channel, Mapping, Steps, TableFlight, TimeColumn, TimeFormat};
+pub use read::read;
+
+/// A table cannot be used.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// A file could not be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The mapping is not what it should be.
+    #[error("{}: {reason}", path.display())]
+    Mapping {
+        /// The mapping file.
+        path: PathBuf,
+        /// What is wrong, with the place.
+        reason: String,
+    },
+    /// A column that the mapping names is not in the table.
+    #[error(
+        "{}: there is no column \"{column}\", which the mapping names for {channel}; there are: {there}",
+        path.display()
+    )]
+    Column {
+        /// The table.
+        path: PathBuf,
+        /// The missing column.
+        column: String,
+        /// What it is wanted for.
+        channel: &'static str,
+        /// The table's columns.
+        there: String,
+    },
+    /// A cell is not what its column holds.
+    #[error("{}, line {line}, column \"{column}\": {reason}", path.display())]
+    Cell {
+        /// The table.
+        path: PathBuf,
+        /// The line, from 1.
+        line: u64,
+        /// The column.
+        column: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A line cannot be read at all.
+    #[error("{}: {reason}", path.display())]
+    Row {
+        /// The table.
+        path: PathBuf,
+        /// What is wrong, with the line.
+        reason: String,
+    },
+    /// There are too few rows for a flight.
+    #[error("{}: {rows} usable rows are no flight", path.display())]
+    Short {
+        /// The table.
+        path: PathBuf,
+        /// Rows with a time.
+        rows: usize,
+    },
+}

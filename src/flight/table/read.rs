@@ -1,0 +1,154 @@
+//! Rows of a table to a flight.
+
+use std::fs::File;
+use std::path::Path;
+
+use super::TableError;
+use super::mapping::{Channel, Mapping, TimeFormat};
+use super::time::seconds_of;
+use crate::base::file::FileError;
+use crate::flight::{Clock, Flight, Series};
+
+/// Rows that are read at most.
+const MOST_ROWS: usize = 20_000_000;
+/// Fewer rows are no flight.
+const FEWEST_ROWS: usize = 20;
+
+/// Columns of one channel in the table.
+struct Wanted<'a> {
+    channel: &'a Channel,
+    /// Number and name of each column.
+    columns: Vec<(usize, &'a str)>,
+    series: Series,
+}
+
+impl Wanted<'_> {
+    /// Takes a row. Empty cells and what is not finite are no measurement.
+    fn take(&mut self, time_s: f64, row: &csv::StringRecord) -> Result<(), (String, String)> {
+        let mut sum = 0.0;
+        for (index, name) in &self.columns {
+            let cell = row.get(*index).unwrap_or_default().trim();
+            if cell.is_empty() {
+                return Ok(());
+            }
+            let value: f64 = cell
+                .parse()
+                .map_err(|_| ((*name).to_owned(), format!("\"{}\" is no number", short(cell))))?;
+            sum += value;
+        }
+        let value =
+            sum / self.columns.len().max(1) as f64 * self.channel.scale + self.channel.offset;
+        if value.is_finite() {
+            self.series.time_s.push(time_s);
+            self.series.value.push(value);
+        }
+        Ok(())
+    }
+}
+
+/// Reads a table as a flight; show time counts from its first row.
+///
+/// # Errors
+/// [`TableError`]: a column is missing, a cell is no number or no time, or there are too few rows.
+pub fn read(path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
+    let file = File::open(path).map_err(|source| FileError::new("open", path, source))?;
+    let mut reader = csv::ReaderBuilder::new().delimiter(mapping.delimiter as u8).from_reader(file);
+    let broken =
+        |error: csv::Error| TableError::Row { path: path.to_owned(), reason: error.to_string() };
+    let heads = reader.headers().map_err(broken)?.clone();
+    let find = |column: &str, channel: &'static str| {
+        heads.iter().position(|head| head.trim() == column).ok_or_else(|| TableError::Column {
+            path: path.to_owned(),
+            column: column.to_owned(),
+            channel,
+            there: short(&heads.iter().collect::<Vec<_>>().join(", ")).to_owned(),
+        })
+    };
+    let time_index = find(&mapping.time.column, "time")?;
+    let mut wanted = Vec::new();
+    for (name, channel) in mapping.channels() {
+        let columns: Result<Vec<_>, TableError> = channel
+            .columns
+            .iter()
+            .map(|column| Ok((find(column, name)?, column.as_str())))
+            .collect();
+        wanted.push((name, Wanted { channel, columns: columns?, series: Series::default() }));
+    }
+    let mut row = csv::StringRecord::new();
+    let (mut first, mut last, mut rows, mut backward) = (None, f64::NEG_INFINITY, 0, 0);
+    while rows < MOST_ROWS && reader.read_record(&mut row).map_err(broken)? {
+        let line = row.position().map_or(0, csv::Position::line);
+        let cell = |column: &str, reason: String| TableError::Cell {
+            path: path.to_owned(),
+            line,
+            column: column.to_owned(),
+            reason,
+        };
+        let text = row.get(time_index).unwrap_or_default();
+        let time = time_of(text, mapping.time.format)
+            .ok_or_else(|| cell(&mapping.time.column, format!("\"{}\" is no time", short(text))))?;
+        let show_s = time - *first.get_or_insert(time);
+        if show_s <= last {
+            backward += 1;
+            continue;
+        }
+        last = show_s;
+        rows += 1;
+        for (_, one) in &mut wanted {
+            one.take(show_s, &row).map_err(|(column, reason)| cell(&column, reason))?;
+        }
+    }
+    if rows < FEWEST_ROWS {
+        return Err(TableError::Short { path: path.to_owned(), rows });
+    }
+    let mut warnings = Vec::new();
+    if backward > 0 {
+        warnings.push(format!("{backward} rows whose time does not go forward were left out"));
+    }
+    let mut flight = Flight {
+        source: path.to_owned(),
+        indicator: mapping.indicator,
+        pulse_limits_us: (f64::NEG_INFINITY, f64::INFINITY),
+        clock: Clock::default(),
+        warnings,
+        ..Flight::default()
+    };
+    for (name, Wanted { series, .. }) in wanted {
+        match name {
+            "effort" => flight.pulse_us = series,
+            "velocity_up" => flight.velocity_up_mps = series,
+            "height" => flight.height_m = from_start(series),
+            "roll" => flight.roll_rad = series,
+            "pitch" => flight.pitch_rad = series,
+            "command_up" => flight.desired_up_mps = Some(series),
+            _ => flight.truth_up_mps = Some(series),
+        }
+    }
+    Ok(flight)
+}
+
+fn time_of(text: &str, format: TimeFormat) -> Option<f64> {
+    let number = || text.trim().parse::<f64>().ok().filter(|time| time.is_finite());
+    match format {
+        TimeFormat::S => number(),
+        TimeFormat::Ms => Some(number()? / 1e3),
+        TimeFormat::Us => Some(number()? / 1e6),
+        TimeFormat::Datetime => seconds_of(text),
+    }
+}
+
+/// Heights above the first one.
+fn from_start(mut series: Series) -> Series {
+    let first = series.value.first().copied().unwrap_or(0.0);
+    for height in &mut series.value {
+        *height -= first;
+    }
+    series
+}
+
+/// The beginning of what may be long.
+fn short(text: &str) -> &str {
+    const MOST: usize = 200;
+    let end = (0..=MOST.min(text.len())).rev().find(|end| text.is_char_boundary(*end));
+    text.get(..end.unwrap_or(0)).unwrap_or_default()
+}
