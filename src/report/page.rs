@@ -9,15 +9,23 @@ use super::compare::{
     clock, compared, comparison, drone_laws, drones_of, fit_line, flags, flock_lines, nothing,
     scatter_line, table_heading, windows_used,
 };
-use super::figure_air::{self, mean_truth};
-use super::figure_drone::{self, Axes, drawable};
+use super::axis::decimals_of;
+use super::colour::diverging;
+use super::figures::air::mean_truth;
+use super::figures::drone::{Axes, drawable};
+use super::figures::{air as figure_air, drone as figure_drone, evolution, laws as figure_laws, map as figure_map};
+use super::film::film;
+use super::frames::Frames;
 use super::notes::{logs_used, partly_used_lines, unused_lines, without_result_lines};
 use super::text::{NONE, clean, estimate, fixed, kind, purpose, shortened, signed, slug, usable};
-use super::{Figure, Provenance, Report, ReportError, figure_laws, figure_map, glance, law};
+use super::{Figure, Provenance, Report, ReportError, glance, law};
 
 const PAGE: &str = include_str!("../../templates/report/report.html");
 const STYLE: &str = include_str!("../../templates/report/style.css");
-const SCRIPT: &str = include_str!("../../templates/report/script.js");
+const SCRIPTS: [&str; 2] = [
+    include_str!("../../templates/report/script.js"),
+    include_str!("../../templates/report/film.js"),
+];
 
 /// Bytes of drawings of single drones that the page carries; further drones are only in files.
 const DRONE_FIGURE_BYTES: usize = 2_300_000;
@@ -56,7 +64,7 @@ pub(super) fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Rep
     let html = environment.get_template("report.html")?.render(context! {
         title => if title.trim().is_empty() { "Updraft report".to_owned() } else { title },
         style => Value::from_safe_string(STYLE.to_owned()),
-        script => Value::from_safe_string(SCRIPT.to_owned()),
+        script => Value::from_safe_string(SCRIPTS.concat()),
         made_by => clean(&analysis.made_by),
         schema => clean(&analysis.schema),
         program => clean(&provenance.program),
@@ -108,16 +116,39 @@ fn air_section(
 ) -> Option<Value> {
     let map = flight.map.as_ref()?;
     let key = flight_key(analysis, index);
-    let maps: Vec<Value> = [
-        figure_map::mean_map(analysis, flight, &key, map),
+    let frames = Frames::of(map);
+    let mean = figure_map::mean_map(analysis, flight, &key, map).map(|figure| figures.show(figure));
+    let shown = frames.as_ref().and_then(|frames| film(map, frames)).map(|film| {
+        context! {
+            id => format!("film-{key}"),
+            json => Value::from_safe_string(film.json),
+            step => fixed(film.step_s, usize::from(film.step_s.fract() > 0.05)),
+            frames => film.frames,
+            truth => frames.as_ref().is_some_and(|frames| frames.truth_known),
+            bar => colour_bar(frames.as_ref().map_or(1.0, |frames| frames.limit_mps)),
+            difference_bar =>
+                colour_bar(frames.as_ref().map_or(1.0, |frames| frames.difference_limit_mps)),
+        }
+    });
+    let more: Vec<Value> = [
+        frames.as_ref().and_then(|frames| evolution::figure(flight, &key, frames, None)),
         figure_air::figure(flight, &key, map),
-        figure_map::time_maps(flight, &key, map),
     ]
     .into_iter()
     .flatten()
     .map(|figure| figures.show(figure))
     .collect();
-    Some(context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), maps })
+    Some(context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), mean, film => shown, more })
+}
+
+/// A colour bar of the page: its gradient and the numbers below it.
+fn colour_bar(limit: f64) -> Value {
+    let colours: Vec<String> =
+        (0..=20).map(|i| diverging(f64::from(i) / 10.0 - 1.0)).collect();
+    let decimals = decimals_of(limit / 2.0);
+    let ticks: Vec<String> =
+        [-1.0, -0.5, 0.0, 0.5, 1.0].iter().map(|part| signed(part * limit, decimals)).collect();
+    context! { colours => colours.join(","), ticks }
 }
 
 fn flight_section(

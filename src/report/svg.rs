@@ -95,6 +95,11 @@ impl Drawing {
         let _ = write!(self.body, ">{}</text>", escape(&clean(text)));
     }
 
+    /// An element of our own making.
+    pub(super) fn raw(&mut self, element: &str) {
+        self.body.push_str(element);
+    }
+
     /// Opens a group with a tooltip.
     pub(super) fn open(&mut self, tooltip: &str) {
         let _ = write!(self.body, "<g><title>{}</title>", escape(&clean(tooltip)));

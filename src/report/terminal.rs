@@ -9,7 +9,7 @@ use super::compare::{
     better_words, clock, compared, comparison, drone_laws, drones_of, fleet_air, flock_lines,
     nothing, scatter_line, table_heading, windows_used,
 };
-use super::figure_air::mean_truth;
+use super::figures::air::mean_truth;
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
 use super::page::capitalised;
 use super::table::{Align, Column, lines};

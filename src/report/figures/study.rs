@@ -8,13 +8,13 @@ use crate::base::estimate::Estimate;
 use crate::study::Condition;
 use crate::study::result::{ConditionResult, StudyFlight, StudyResult};
 
-use super::Figure;
-use super::axis::{Axis, nice_step};
-use super::chart::{Mark, Panel};
-use super::colour::{BLUE, FAINT, GREEN, INK, MUTED, VERMILLION, sequential};
-use super::figure_laws::{PULSE_LABEL, VELOCITY_LABEL};
-use super::sheet::Sheet;
-use super::text::{count, fixed, signed, usable};
+use crate::report::Figure;
+use crate::report::axis::{Axis, nice_step};
+use crate::report::chart::{Mark, Panel};
+use crate::report::colour::{BLUE, FAINT, GREEN, INK, MUTED, VERMILLION, sequential};
+use super::laws::{PULSE_LABEL, VELOCITY_LABEL};
+use crate::report::sheet::Sheet;
+use crate::report::text::{count, fixed, signed, usable};
 
 /// Samples of a drawn curve.
 const CURVE_POINTS: u32 = 61;
@@ -32,7 +32,7 @@ struct Coloured<'a> {
 }
 
 /// All figures that the study has data for.
-pub(super) fn figures(study: &StudyResult) -> Vec<Figure> {
+pub(in crate::report) fn figures(study: &StudyResult) -> Vec<Figure> {
     [still(study), winds(study), errors(study)].into_iter().flatten().collect()
 }
 
@@ -295,7 +295,7 @@ fn errors(study: &StudyResult) -> Option<Figure> {
 }
 
 /// Rho with as many digits as its distance from 1 asks for.
-pub(super) fn rho(rho: f64) -> String {
+pub(in crate::report) fn rho(rho: f64) -> String {
     let gap = 1.0 - rho.abs();
     if gap <= 0.0 || !gap.is_finite() {
         return fixed(rho, 6);

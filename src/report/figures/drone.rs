@@ -5,20 +5,20 @@ use kuva::plot::scatter::MarkerShape;
 
 use crate::analysis::result::{DroneAnalysis, FlightAnalysis, WindowStats};
 
-use super::Figure;
-use super::axis::Axis;
-use super::chart::{Panel, lines, thinned};
-use super::colour::{FAINT, GREEN, INK, MUTED, sequential};
-use super::figure_laws::{PULSE_LABEL, VELOCITY_LABEL};
-use super::law;
-use super::sheet::Sheet;
-use super::text::{clean, slug, usable};
+use crate::report::Figure;
+use crate::report::axis::Axis;
+use crate::report::chart::{Panel, lines, thinned};
+use crate::report::colour::{FAINT, GREEN, INK, MUTED, sequential};
+use super::laws::{PULSE_LABEL, VELOCITY_LABEL};
+use crate::report::law;
+use crate::report::sheet::Sheet;
+use crate::report::text::{clean, slug, usable};
 
 /// A trace keeps two samples of each of so many stretches.
 const TRACE_BUCKETS: usize = 260;
 
 /// Axes shared by all drones of a flight, so that they compare when one flips through them.
-pub(super) struct Axes {
+pub(in crate::report) struct Axes {
     time: Axis,
     velocity: Axis,
     pulse: Axis,
@@ -29,7 +29,7 @@ pub(super) struct Axes {
 
 impl Axes {
     /// The axes that hold every drone of the flight.
-    pub(super) fn of(flight: &FlightAnalysis) -> Self {
+    pub(in crate::report) fn of(flight: &FlightAnalysis) -> Self {
         let traces = || flight.drones.iter().map(|drone| &drone.trace);
         let windows = || flight.drones.iter().flat_map(|drone| drone.windows.iter());
         let marks = || windows().map(law::mark);
@@ -67,12 +67,12 @@ impl Axes {
 }
 
 /// Whether there is anything to draw for this drone.
-pub(super) fn drawable(drone: &DroneAnalysis) -> bool {
+pub(in crate::report) fn drawable(drone: &DroneAnalysis) -> bool {
     !drone.windows.is_empty() || drone.trace.time_s.len() > 1
 }
 
 /// The three panels of one drone; `key` names the flight in file names.
-pub(super) fn figure(
+pub(in crate::report) fn figure(
     flight: &FlightAnalysis,
     key: &str,
     index: usize,
