@@ -342,6 +342,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         flock,
         table,
         map,
+        statistics: None,
         unmeasured,
         paper_table: paper.map(|paper| paper.number().to_owned()),
         warnings,

@@ -17,6 +17,7 @@ pub mod prefer;
 mod refer;
 pub mod result;
 mod slots;
+pub mod statistics;
 mod stats;
 pub mod updraft;
 pub mod wind;

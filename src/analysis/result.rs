@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::density::Density;
+use super::statistics::result::FieldStatistics;
 use super::wind::Leaning;
 use crate::base::estimate::Estimate;
 use crate::flight::Clock;
@@ -53,6 +54,9 @@ pub struct FlightAnalysis {
     pub table: Vec<TableRow>,
     /// The map of the air, for measurements.
     pub map: Option<UpdraftMap>,
+    /// Statistics of the map: scales of the air in space and time, wind, averaging times.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub statistics: Option<FieldStatistics>,
     /// Drones whose log was read but gave no law (calibrations) or no value of the map
     /// (measurements).
     #[serde(default)]

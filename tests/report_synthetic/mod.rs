@@ -143,6 +143,7 @@ pub(crate) fn calibration(
         table: if drones > 1 { table } else { Vec::new() },
         map: None,
         unmeasured: Vec::new(),
+        statistics: None,
         paper_table: Some("I".to_owned()),
     }
 }
@@ -430,6 +431,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             name: "Drone 44".to_owned(),
             reason: "the hover from 95 to 685 s was rejected: a motor touched its limit".to_owned(),
         }],
+        statistics: None,
         paper_table: None,
         map: Some(UpdraftMap {
             law: "signed quadratic".to_owned(),
