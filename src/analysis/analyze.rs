@@ -17,8 +17,8 @@ use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::prefer::{better_law, describes};
 use super::refer::refer_calibration;
 use super::result::{
-    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, FlightAnalysis, Laws, TableRow,
-    Unmeasured, UnusedLog, UpdraftMap,
+    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
+    TableRow, Unmeasured, UnusedLog, UpdraftMap,
 };
 use super::slots::{SlotMatch, match_slots};
 use super::updraft::{self, DroneSeries};
@@ -403,9 +403,14 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             height_m: series.height_m,
             mapping: mapping.to_owned(),
             mean: series.mean,
+            mean_interval_mps: None,
+            errors: ErrorBudget::default(),
             systematic_mps: series.systematic_mps,
             tilt_deg: series.tilt_deg,
             updraft_mps: series.at(&times),
+            sd_mps: Vec::new(),
+            interval_mps: Vec::new(),
+            quality: Vec::new(),
             truth_mps: truth_of(slot),
         })
         .collect();
@@ -420,5 +425,9 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         flock: shared.map_reference.and_then(|reference| reference.flock.clone()),
         time_s: times.iter().map(|time| *time as f64).collect(),
         drones,
+        battery: None,
+        calibration_air: None,
+        common: None,
+        truth: None,
     }
 }

@@ -5,6 +5,7 @@
 
 mod account;
 mod analyze;
+pub mod budget;
 pub mod calibrate;
 mod caution;
 pub mod density;

@@ -3,6 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use super::budget::{
+    BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, TruthCheck,
+};
 use super::density::Density;
 use super::statistics::result::FieldStatistics;
 use super::wind::Leaning;
@@ -423,6 +426,19 @@ pub struct UpdraftMap {
     pub time_s: Vec<f64>,
     /// The drones' estimates.
     pub drones: Vec<DroneUpdraft>,
+    /// How pulses were referred to one battery voltage; absent: they were not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub battery: Option<BatteryCorrection>,
+    /// Slow air during the calibration, whose mean is the doubt about the zero; absent: the
+    /// calibration does not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_air: Option<CalibrationAir>,
+    /// The error that all drones share; absent: not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub common: Option<CommonError>,
+    /// Comparison with the true air, when it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<TruthCheck>,
 }
 
 /// One drone's estimate of the vertical air speed.
@@ -438,8 +454,15 @@ pub struct DroneUpdraft {
     pub height_m: f64,
     /// Mapping used: `own` or `flock`.
     pub mapping: String,
-    /// Mean over the hover with its standard error, m/s, up positive.
+    /// Mean over the hover, m/s, up positive, with its standard error: that of
+    /// [`DroneUpdraft::errors`], which holds all origins.
     pub mean: Estimate,
+    /// Interval that holds the true mean with a probability of 95 %, m/s; absent: not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_interval_mps: Option<[f64; 2]>,
+    /// Where the error of the mean comes from.
+    #[serde(default)]
+    pub errors: ErrorBudget,
     /// Systematic error of the mean from wind on the leaning drone, m/s: a bound, not a standard
     /// error, and the same in sign for drones in the same wind.
     #[serde(default)]
@@ -449,6 +472,16 @@ pub struct DroneUpdraft {
     pub tilt_deg: f64,
     /// Running 10 s estimate at each of [`UpdraftMap::time_s`], m/s; null where the log has none.
     pub updraft_mps: Vec<Option<f64>>,
+    /// Statistical error of each value (its own noise alone), m/s; empty: not known.
+    #[serde(default)]
+    pub sd_mps: Vec<Option<f64>>,
+    /// Interval that holds the true value with a probability of 95 %, all origins of error
+    /// included, m/s; empty: not known.
+    #[serde(default)]
+    pub interval_mps: Vec<Option<[f64; 2]>>,
+    /// What is doubtful, by stretches of time.
+    #[serde(default)]
+    pub quality: Vec<QualityFlag>,
     /// True value at the same times, when it is known.
     pub truth_mps: Option<Vec<f64>>,
 }

@@ -8,8 +8,9 @@ use std::f64::consts::TAU;
 
 use rand::Rng as _;
 use updraft::analysis::result::{
-    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, Fit, FlightAnalysis, Laws, Missing,
-    Parameter, Rejection, SampleStats, TableRow, Trace, Unmeasured, UpdraftMap, WindowStats,
+    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, Fit, FlightAnalysis, Laws,
+    Missing, Parameter, Rejection, SampleStats, TableRow, Trace, Unmeasured, UpdraftMap,
+    WindowStats,
 };
 use updraft::base::estimate::Estimate;
 use updraft::base::rng::{self, Purpose as Stream};
@@ -384,9 +385,14 @@ pub(crate) fn hover() -> FlightAnalysis {
             height_m: 100.0,
             mapping: if [41].contains(&slot) { "flock" } else { "own" }.to_owned(),
             mean: Estimate::new(mean, 0.028),
+            mean_interval_mps: None,
+            errors: ErrorBudget::default(),
             systematic_mps: 0.11,
             tilt_deg: 1.2,
             updraft_mps: updraft,
+            sd_mps: Vec::new(),
+            interval_mps: Vec::new(),
+            quality: Vec::new(),
             truth_mps: Some(truth),
         }));
         drones.push(DroneAnalysis {
@@ -440,6 +446,10 @@ pub(crate) fn hover() -> FlightAnalysis {
             flock: None,
             time_s,
             drones: estimates,
+            battery: None,
+            calibration_air: None,
+            common: None,
+            truth: None,
         }),
     }
 }
