@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::clock::Stopwatch;
 use super::context::Context;
+use super::fields::{read_study, write_fields};
 use super::exit::{CommandError, Exit};
 use super::found::{Found, Work, find, stem};
 use super::load::{has_extension, load_shows};
@@ -229,10 +230,15 @@ fn finish(
         let json = to_json(&analysis)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
         let provenance = provenance(work);
-        let made = report::render(&analysis, &provenance)?;
+        let study = read_study(context, &work.root);
+        let made = match &study {
+            Some(study) => report::render_with_study(&analysis, study, &provenance)?,
+            None => report::render(&analysis, &provenance)?,
+        };
         let report_folder = folder.join("report");
         report::write(&made, &report_folder)?;
         write_whole(&folder.join("analysis.json"), &json)?;
+        write_fields(&analysis, folder)?;
         // A page that says that nothing was found is written, but there is nothing to point at.
         page = (!nothing).then(|| report_folder.join(report::PAGE_FILE));
     }

@@ -8,6 +8,7 @@ mod context;
 mod effects;
 mod effects_plot;
 pub mod exit;
+mod fields;
 mod fleet;
 mod flown;
 mod fly;

@@ -14,11 +14,26 @@ use kuva::render::theme::Theme;
 
 use super::axis::Axis;
 use super::colour::{INK, RULE};
+use super::shapes::Shape;
 use super::sheet::FONT;
 use super::text::{clean, usable};
 
+/// Pixels right of a panel.
+const RIGHT_MARGIN: f64 = 16.0;
 /// Pixels right of a panel with a right axis.
 const RIGHT_AXIS_MARGIN: f64 = 62.0;
+/// Pixels left of, above and below every panel's frame.
+const LEFT_MARGIN: f64 = 66.0;
+const TOP_MARGIN: f64 = 30.0;
+const BOTTOM_MARGIN: f64 = 46.0;
+
+/// Where the frame of a panel of a size lies in it, [x, y, width, height], pixels; `room_right`: with
+/// [`Panel::leave_room_right`].
+pub(super) fn frame(width: f64, height: f64, room_right: bool) -> [f64; 4] {
+    let right = if room_right { RIGHT_AXIS_MARGIN } else { RIGHT_MARGIN };
+    let size = [width - LEFT_MARGIN - right, height - TOP_MARGIN - BOTTOM_MARGIN];
+    [LEFT_MARGIN, TOP_MARGIN, size[0], size[1]]
+}
 
 /// A point with half lengths of its error bars.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +59,9 @@ pub(super) struct Panel {
     plots: Vec<Plot>,
     right: Option<(Axis, Vec<Plot>)>,
     bars: Vec<(Vec<Mark>, String)>,
+    shapes: Vec<Shape>,
+    front_shapes: Vec<Shape>,
+    log_x: bool,
     legend: Vec<LegendEntry>,
     legend_position: LegendPosition,
     legend_box: bool,
@@ -60,10 +78,13 @@ impl Panel {
             plots: Vec::new(),
             right: None,
             bars: Vec::new(),
+            shapes: Vec::new(),
+            front_shapes: Vec::new(),
+            log_x: false,
             legend: Vec::new(),
             legend_position: LegendPosition::InsideTopLeft,
             legend_box: true,
-            right_margin: 16.0,
+            right_margin: RIGHT_MARGIN,
         }
     }
 
@@ -139,6 +160,21 @@ impl Panel {
         self.bars.push((marks, colour.to_owned()));
     }
 
+    /// An area or strokes behind everything else, in the order given.
+    pub(super) fn shape(&mut self, shape: Shape) {
+        self.shapes.push(shape);
+    }
+
+    /// An area or strokes in front of everything else.
+    pub(super) fn front_shape(&mut self, shape: Shape) {
+        self.front_shapes.push(shape);
+    }
+
+    /// A logarithmic x axis.
+    pub(super) fn logarithmic_x(&mut self) {
+        self.log_x = true;
+    }
+
     /// Draws the panel.
     pub(super) fn draw(self, width: f64, height: f64) -> Scene {
         let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
@@ -154,13 +190,16 @@ impl Panel {
             .with_y_tick_step(self.y.step)
             .with_x_tick_format(self.x.format())
             .with_y_tick_format(self.y.format())
-            .with_force_margins(66.0, self.right_margin)
-            .with_force_margins_y(30.0, 46.0)
+            .with_force_margins(LEFT_MARGIN, self.right_margin)
+            .with_force_margins_y(TOP_MARGIN, BOTTOM_MARGIN)
             .with_label_size(13)
             .with_tick_size(12)
             .with_body_size(12)
             .with_font_family(FONT)
             .with_theme(theme());
+        if self.log_x {
+            layout = layout.with_log_x();
+        }
         if !self.legend.is_empty() {
             layout = layout
                 .with_legend_entries(self.legend)
@@ -177,14 +216,18 @@ impl Panel {
                 .with_y2_tick_format(axis.format());
             let computed = ComputedLayout::from_layout(&layout);
             scene = render_twin_y(self.plots, lines, layout);
-            insert_bars(&mut scene, &computed, &self.bars);
+            insert_behind(&mut scene, &computed, &self.shapes, &self.bars);
+            let front = self.front_shapes.iter().filter_map(|shape| shape.path(&computed));
+            scene.elements.extend(front);
         } else {
             let computed = ComputedLayout::from_layout(&layout);
             scene = render_multiple(self.plots, layout);
-            insert_bars(&mut scene, &computed, &self.bars);
+            insert_behind(&mut scene, &computed, &self.shapes, &self.bars);
+            let front = self.front_shapes.iter().filter_map(|shape| shape.path(&computed));
+            scene.elements.extend(front);
         }
         scene.elements.push(Primitive::Text {
-            x: 66.0,
+            x: LEFT_MARGIN,
             y: 17.0,
             content: self.title,
             size: 14,
@@ -240,11 +283,18 @@ pub(super) fn thinned(points: &[(f64, f64)], buckets: usize) -> Vec<(f64, f64)> 
     kept
 }
 
-/// All bars of a colour in one path: three elements for each bar would make big files.
-fn insert_bars(scene: &mut Scene, computed: &ComputedLayout, bars: &[(Vec<Mark>, String)]) {
+/// Shapes, then error bars, behind the plots. All bars of a colour are one path: three elements for
+/// each bar would make big files.
+fn insert_behind(
+    scene: &mut Scene,
+    computed: &ComputedLayout,
+    shapes: &[Shape],
+    bars: &[(Vec<Mark>, String)],
+) {
     let (left, right) = (computed.map_x(computed.x_range.0), computed.map_x(computed.x_range.1));
     let (bottom, top) = (computed.map_y(computed.y_range.0), computed.map_y(computed.y_range.1));
-    let mut paths = Vec::new();
+    let mut paths: Vec<Primitive> =
+        shapes.iter().filter_map(|shape| shape.path(computed)).collect();
     for (marks, colour) in bars {
         let mut d = String::new();
         for mark in marks {

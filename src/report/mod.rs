@@ -13,14 +13,24 @@ mod axis;
 mod chart;
 mod colour;
 mod compare;
+mod drone_table;
+mod errors;
+pub mod fields;
+#[cfg(feature = "parquet")]
+pub mod fields_parquet;
 mod figures;
 mod film;
 mod frames;
 mod glance;
 mod law;
 mod notes;
+mod offset_field;
 mod page;
+mod page_air;
+mod page_flight;
 mod raster;
+mod scales;
+mod shapes;
 mod sheet;
 mod study_page;
 mod study_terminal;
@@ -36,6 +46,7 @@ use thiserror::Error;
 
 use crate::analysis::result::Analysis;
 use crate::base::file::{FileError, write_whole};
+use crate::study::result::StudyResult;
 
 pub use study_page::render_study;
 pub use study_terminal::study_summary;
@@ -102,8 +113,23 @@ struct Figure {
 }
 
 /// Makes the page and the figures.
+///
+/// # Errors
+/// [`ReportError::Page`], a bug of this program.
 pub fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Report, ReportError> {
-    page::render(analysis, provenance)
+    page::render(analysis, None, provenance)
+}
+
+/// The same with the paper's Fig. 2 and Table I, from a finished simulation study.
+///
+/// # Errors
+/// [`ReportError::Page`], a bug of this program.
+pub fn render_with_study(
+    analysis: &Analysis,
+    study: &StudyResult,
+    provenance: &Provenance,
+) -> Result<Report, ReportError> {
+    page::render(analysis, Some(study), provenance)
 }
 
 /// Writes `index.html` and `figures/*.svg` to `folder`, the page last: where it is, all is.

@@ -113,7 +113,8 @@ fn tiles(study: &StudyResult) -> Vec<Value> {
     tiles
 }
 
-fn law_table(study: &StudyResult) -> Vec<Value> {
+/// Table I beside the paper's values.
+pub(super) fn law_table(study: &StudyResult) -> Vec<Value> {
     study
         .paper_way
         .table

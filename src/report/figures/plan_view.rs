@@ -109,15 +109,20 @@ pub(super) fn limit(values: impl Iterator<Item = f64>) -> f64 {
     nice_step(largest.max(0.01))
 }
 
+/// Where each slot stands, as far as any flight of the analysis knows.
+pub(super) fn places_of_slots(analysis: &Analysis) -> BTreeMap<u16, [f64; 2]> {
+    let drones = analysis.flights.iter().flat_map(|flight| &flight.drones);
+    let missing = analysis.flights.iter().flat_map(|flight| &flight.missing);
+    missing
+        .filter_map(|missing| Some((missing.slot, missing.home_m?)))
+        .chain(drones.filter_map(|drone| Some((drone.slot?, drone.home_m?))))
+        .filter(|(_, home)| usable(home[0]) && usable(home[1]))
+        .collect()
+}
+
 /// Slots without data whose place another flight of the analysis knows.
 pub(super) fn empty_places(analysis: &Analysis, flight: &FlightAnalysis) -> Vec<(u16, [f64; 2])> {
-    let homes: BTreeMap<u16, [f64; 2]> = analysis
-        .flights
-        .iter()
-        .flat_map(|other| &other.drones)
-        .filter_map(|drone| Some((drone.slot?, drone.home_m?)))
-        .filter(|(_, home)| usable(home[0]) && usable(home[1]))
-        .collect();
+    let homes = places_of_slots(analysis);
     let missing = flight
         .missing
         .iter()
@@ -203,4 +208,24 @@ pub(super) fn colour_bar(drawing: &mut Drawing, [x, y, w, h]: [f64; 4], limit: f
     }
     let style = TextStyle { size: 13.0, bold: false, colour: INK, anchor: Anchor::Middle };
     drawing.text([x + w + 64.0, y + h / 2.0], label, style, -90.0);
+}
+
+/// A narrow colour bar beside a panel: `colour` of 0 (bottom) to 1 (top), ticks at such places.
+pub(super) fn narrow_bar(
+    drawing: &mut Drawing,
+    [x, y, w, h]: [f64; 4],
+    colour: impl Fn(f64) -> String,
+    ticks: &[(f64, String)],
+) {
+    const STEPS: u32 = 40;
+    let slice = h / f64::from(STEPS);
+    for step in 0..STEPS {
+        let place = 1.0 - (f64::from(step) + 0.5) / f64::from(STEPS);
+        drawing.rect([x, y + f64::from(step) * slice, w, slice + 0.4], &colour(place), "");
+    }
+    drawing.rect([x, y, w, h], "none", &format!("stroke=\"{FAINT}\""));
+    let style = TextStyle { size: 10.5, bold: false, colour: INK, anchor: Anchor::Start };
+    for (place, text) in ticks {
+        drawing.text([x + w + 3.0, y + h * (1.0 - place) + 3.5], text, style, 0.0);
+    }
 }

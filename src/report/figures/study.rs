@@ -16,6 +16,8 @@ use super::laws::{PULSE_LABEL, VELOCITY_LABEL};
 use crate::report::sheet::Sheet;
 use crate::report::text::{count, fixed, signed, usable};
 
+/// Name of the paper's Fig. 2.
+pub(in crate::report) const FIG2: &str = "fig2-study";
 /// Samples of a drawn curve.
 const CURVE_POINTS: u32 = 61;
 /// Panels in a row of the figure of winds.
@@ -136,7 +138,7 @@ fn still(study: &StudyResult) -> Option<Figure> {
     sheet.place(panel.draw(1040.0, 720.0), 0.0, 0.0);
     sheet.cover([70.0, 33.0, 350.0, 242.0]);
     sheet.place(inset(&coloured).draw(350.0, 250.0), 68.0, 24.0);
-    let name = "fig2-study".to_owned();
+    let name = FIG2.to_owned();
     let title = "Pulse width against vertical velocity in still air, by updraft".to_owned();
     let rho = study
         .paper_way
