@@ -11,13 +11,13 @@ mod report_synthetic;
 use std::path::{Path, PathBuf};
 
 use report_browser_support::{Browser, Key, Tab};
-use report_synthetic::{campaign, provenance};
+use report_synthetic::{provenance, whole_campaign};
 use updraft::report::{render, write};
 
 /// Writes the synthetic campaign's report; the page's address and the folder of screenshots.
 fn report(name: &str) -> (String, PathBuf) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-browser").join(name);
-    let made = render(&campaign(), &provenance()).unwrap();
+    let made = render(&whole_campaign(), &provenance()).unwrap();
     write(&made, &folder).unwrap();
     (format!("file://{}", folder.join("index.html").display()), folder)
 }
@@ -34,7 +34,9 @@ fn the_report_works_in_a_browser() {
     let mut tab = browser.open(&address, [1280, 900]);
 
     // The film: slider, keys, play and pause.
-    tab.run("document.querySelector('.film').scrollIntoView({ block: 'center', behavior: 'instant' })");
+    tab.run(
+        "document.querySelector('.film').scrollIntoView({ block: 'center', behavior: 'instant' })",
+    );
     assert_eq!(frame(&mut tab), 0);
     let early = tab.text("document.querySelector('.film canvas').toDataURL()");
     let [x, y, width, _] = tab.place(".film input[type=range]");
@@ -89,7 +91,9 @@ fn the_report_fits_a_phone_and_respects_less_motion() {
     let wide = tab.number("document.documentElement.scrollWidth");
     assert!(wide <= 391.0, "the page scrolls sideways: {wide} px");
     tab.less_motion();
-    tab.run("document.querySelector('.film').scrollIntoView({ block: 'start', behavior: 'instant' })");
+    tab.run(
+        "document.querySelector('.film').scrollIntoView({ block: 'start', behavior: 'instant' })",
+    );
     tab.click_on(".film .play");
     tab.sleep_ms(400);
     assert_eq!(frame(&mut tab), 0, "no movement within the first second");

@@ -24,7 +24,10 @@ fn every_drone_and_second_is_a_row() {
     let first: Vec<&str> = lines.next().unwrap().split(',').collect();
     let drone = &map.drones[0];
     let expected = format!("{:.4}", drone.updraft_mps[0].unwrap());
-    assert_eq!(first[..8], ["hover", "95", "1", "Drone 1", "-21.00", "-21.00", "100.00", &expected]);
+    assert_eq!(
+        first[..8],
+        ["hover", "95", "1", "Drone 1", "-21.00", "-21.00", "100.00", &expected]
+    );
     assert_eq!(first[12], format!("{:.4}", drone.truth_mps.as_ref().unwrap()[0]));
     let silent = map.drones.iter().find(|drone| drone.slot == Some(20)).unwrap();
     assert!(silent.updraft_mps[400].is_none());

@@ -21,6 +21,7 @@ mod mission_args;
 mod physics;
 mod plan;
 mod progress;
+mod provenance;
 mod run;
 mod show_text;
 mod simulate;

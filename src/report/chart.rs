@@ -7,9 +7,7 @@ use kuva::plot::scatter::{MarkerShape, ScatterPlot};
 use kuva::plot::{BandPlot, LinePlot};
 use kuva::render::layout::{ComputedLayout, Layout};
 use kuva::render::plots::Plot;
-use kuva::render::render::{
-    PathData, Primitive, Scene, TextAnchor, render_multiple, render_twin_y,
-};
+use kuva::render::render::{PathData, Primitive, Scene, TextAnchor, render_multiple};
 use kuva::render::theme::Theme;
 
 use super::axis::Axis;
@@ -20,8 +18,8 @@ use super::text::{clean, usable};
 
 /// Pixels right of a panel.
 const RIGHT_MARGIN: f64 = 16.0;
-/// Pixels right of a panel with a right axis.
-const RIGHT_AXIS_MARGIN: f64 = 62.0;
+/// Pixels right of a panel with a colour bar.
+const BAR_MARGIN: f64 = 62.0;
 /// Pixels left of, above and below every panel's frame.
 const LEFT_MARGIN: f64 = 66.0;
 const TOP_MARGIN: f64 = 30.0;
@@ -30,7 +28,7 @@ const BOTTOM_MARGIN: f64 = 46.0;
 /// Where the frame of a panel of a size lies in it, [x, y, width, height], pixels; `room_right`: with
 /// [`Panel::leave_room_right`].
 pub(super) fn frame(width: f64, height: f64, room_right: bool) -> [f64; 4] {
-    let right = if room_right { RIGHT_AXIS_MARGIN } else { RIGHT_MARGIN };
+    let right = if room_right { BAR_MARGIN } else { RIGHT_MARGIN };
     let size = [width - LEFT_MARGIN - right, height - TOP_MARGIN - BOTTOM_MARGIN];
     [LEFT_MARGIN, TOP_MARGIN, size[0], size[1]]
 }
@@ -57,7 +55,6 @@ pub(super) struct Panel {
     x: Axis,
     y: Axis,
     plots: Vec<Plot>,
-    right: Option<(Axis, Vec<Plot>)>,
     bars: Vec<(Vec<Mark>, String)>,
     shapes: Vec<Shape>,
     front_shapes: Vec<Shape>,
@@ -76,7 +73,6 @@ impl Panel {
             x,
             y,
             plots: Vec::new(),
-            right: None,
             bars: Vec::new(),
             shapes: Vec::new(),
             front_shapes: Vec::new(),
@@ -104,15 +100,9 @@ impl Panel {
         self.right_margin = width;
     }
 
-    /// Leaves room on the right, as a panel with a right axis does, so that both line up.
+    /// Leaves room on the right, for a colour bar.
     pub(super) fn leave_room_right(&mut self) {
-        self.right_margin = RIGHT_AXIS_MARGIN;
-    }
-
-    /// A second axis on the right, with its own lines.
-    pub(super) fn right_axis(&mut self, axis: Axis, lines: Vec<Plot>) {
-        self.right = Some((axis, lines));
-        self.leave_room_right();
+        self.right_margin = BAR_MARGIN;
     }
 
     /// An entry of the legend.
@@ -206,26 +196,11 @@ impl Panel {
                 .with_legend_position(self.legend_position)
                 .with_legend_box(self.legend_box);
         }
-        let mut scene;
-        if let Some((axis, lines)) = self.right {
-            layout = layout
-                .with_y2_range(axis.min, axis.max)
-                .with_y2_axis_min(axis.min)
-                .with_y2_axis_max(axis.max)
-                .with_y2_label(axis.label.clone())
-                .with_y2_tick_format(axis.format());
-            let computed = ComputedLayout::from_layout(&layout);
-            scene = render_twin_y(self.plots, lines, layout);
-            insert_behind(&mut scene, &computed, &self.shapes, &self.bars);
-            let front = self.front_shapes.iter().filter_map(|shape| shape.path(&computed));
-            scene.elements.extend(front);
-        } else {
-            let computed = ComputedLayout::from_layout(&layout);
-            scene = render_multiple(self.plots, layout);
-            insert_behind(&mut scene, &computed, &self.shapes, &self.bars);
-            let front = self.front_shapes.iter().filter_map(|shape| shape.path(&computed));
-            scene.elements.extend(front);
-        }
+        let computed = ComputedLayout::from_layout(&layout);
+        let mut scene = render_multiple(self.plots, layout);
+        insert_behind(&mut scene, &computed, &self.shapes, &self.bars);
+        let front = self.front_shapes.iter().filter_map(|shape| shape.path(&computed));
+        scene.elements.extend(front);
         scene.elements.push(Primitive::Text {
             x: LEFT_MARGIN,
             y: 17.0,
@@ -240,8 +215,8 @@ impl Panel {
     }
 }
 
-/// Lines for [`Panel::right_axis`], broken where a point cannot be drawn.
-pub(super) fn lines(points: &[(f64, f64)], colour: &str, width: f64, dash: &str) -> Vec<Plot> {
+/// Lines, broken where a point cannot be drawn.
+fn lines(points: &[(f64, f64)], colour: &str, width: f64, dash: &str) -> Vec<Plot> {
     points
         .split(|&(x, y)| !(usable(x) && usable(y)))
         .filter(|run| run.len() > 1)

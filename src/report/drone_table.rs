@@ -84,4 +84,3 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         .collect();
     (head, rows)
 }
-

@@ -15,10 +15,30 @@ type Kind = (&'static str, &'static str, fn(&ErrorBudget) -> f64, Option<fn(&Com
 
 const KINDS: [Kind; 7] = [
     ("hover", "noise of pulse and velocity in the hover", |e| e.window_mps, None),
-    ("law", "the drone's mapping: noise and local air in its calibration, slope and curvature", |e| e.law_mps, Some(|c| c.law_mps)),
-    ("zero", "slow air during the calibration that the whole fleet shared", |e| e.zero_mps, Some(|c| c.zero_mps)),
-    ("battery", "change of battery voltage beyond its correction, and other drift", |e| e.battery_mps, Some(|c| c.battery_mps)),
-    ("wind", "wind on the leaning drone beyond its correction", |e| e.wind_mps, Some(|c| c.wind_mps)),
+    (
+        "law",
+        "the drone's mapping: noise and local air in its calibration, slope and curvature",
+        |e| e.law_mps,
+        Some(|c| c.law_mps),
+    ),
+    (
+        "zero",
+        "slow air during the calibration that the whole fleet shared",
+        |e| e.zero_mps,
+        Some(|c| c.zero_mps),
+    ),
+    (
+        "battery",
+        "change of battery voltage beyond its correction, and other drift",
+        |e| e.battery_mps,
+        Some(|c| c.battery_mps),
+    ),
+    (
+        "wind",
+        "wind on the leaning drone beyond its correction",
+        |e| e.wind_mps,
+        Some(|c| c.wind_mps),
+    ),
     ("density", "air density beyond its correction", |e| e.density_mps, Some(|c| c.density_mps)),
     ("velocity", "bias of the vertical velocity", |e| e.velocity_mps, None),
 ];
@@ -44,7 +64,8 @@ pub(super) fn section(map: &UpdraftMap) -> Value {
 }
 
 fn budget(map: &UpdraftMap) -> Option<Value> {
-    let known = |drone: &&DroneUpdraft| usable(drone.errors.total_mps) && drone.errors.total_mps > 0.0;
+    let known =
+        |drone: &&DroneUpdraft| usable(drone.errors.total_mps) && drone.errors.total_mps > 0.0;
     let drones: Vec<&DroneUpdraft> = map.drones.iter().filter(known).collect();
     if drones.is_empty() {
         return None;
@@ -63,7 +84,7 @@ fn budget(map: &UpdraftMap) -> Option<Value> {
         .map(|(name, what, of, common)| {
             let common = common.zip(map.common.as_ref()).map(|(of, common)| of(common));
             let (median, largest, common) = row(of, common);
-            context! { name, what, median, largest, common, total => false }
+            context! { name => *name, what => *what, median, largest, common, total => false }
         })
         .collect();
     let (median, largest, common) = row(&|e| e.total_mps, map.common.map(|common| common.se_mps));

@@ -12,8 +12,19 @@ use super::text::clean;
 
 /// Names of the columns, in order.
 pub const COLUMNS: [&str; 13] = [
-    "flight", "time_s", "slot", "drone", "x_m", "y_m", "z_m", "w_mps", "sd_mps", "low_mps",
-    "high_mps", "flags", "truth_mps",
+    "flight",
+    "time_s",
+    "slot",
+    "drone",
+    "x_m",
+    "y_m",
+    "z_m",
+    "w_mps",
+    "sd_mps",
+    "low_mps",
+    "high_mps",
+    "flags",
+    "truth_mps",
 ];
 
 /// One drone in one second.
@@ -145,7 +156,8 @@ mod tests {
 
     #[test]
     fn flags_hold_from_their_start_to_their_end() {
-        let flag = |flag, start_s, end_s| QualityFlag { flag, start_s, end_s, reason: String::new() };
+        let flag =
+            |flag, start_s, end_s| QualityFlag { flag, start_s, end_s, reason: String::new() };
         let quality = [flag(Quality::LowBattery, 10.0, 20.0), flag(Quality::Drift, 15.0, 30.0)];
         assert_eq!(flags(&quality, 9.0), "");
         assert_eq!(flags(&quality, 15.0), "drift;low_battery");

@@ -86,9 +86,7 @@ pub(super) fn film(map: &UpdraftMap, frames: &Frames<'_>) -> Option<Film> {
             .map(|i| diverging(2.0 * f64::from(i) / f64::from(COLOURS) - 1.0))
             .collect(),
         estimate: encoded(&|drone, time| frames.estimate(drone, time)),
-        truth: frames
-            .truth_known
-            .then(|| encoded(&|drone, time| frames.truth(drone, time))),
+        truth: frames.truth_known.then(|| encoded(&|drone, time| frames.truth(drone, time))),
     };
     let span = data.times.last()? - data.times.first()?;
     let step_s = span / (chosen.len() - 1) as f64;

@@ -10,10 +10,10 @@ use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 
 use super::compare::{better_words, drones_of, flags, fleet_air, nothing};
-use super::page::capitalised;
-use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable, value_of};
 use super::figures::air;
 use super::law;
+use super::page::capitalised;
+use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable, value_of};
 
 /// More flights than this are summed up at the top of the page.
 const SUMMED_FLIGHTS: usize = 3;

@@ -68,6 +68,8 @@ pub struct Provenance {
     pub seed: Option<u64>,
     /// When it was made, as text; the library has no clock. May be empty.
     pub made_at: String,
+    /// How it was analysed: (what, how).
+    pub settings: Vec<(String, String)>,
     /// The files that the analysis read.
     pub inputs: Vec<InputFile>,
 }

@@ -65,6 +65,11 @@ pub(super) fn render(
         command => clean(&provenance.command),
         seed => provenance.seed.map(|seed| seed.to_string()),
         made_at => clean(&provenance.made_at),
+        settings => provenance
+            .settings
+            .iter()
+            .map(|(what, how)| context! { what => clean(what), how => clean(how) })
+            .collect::<Vec<_>>(),
         inputs_open => inputs.len() <= OPEN_LIMIT,
         inputs,
         verdict => glance::verdict(analysis),

@@ -54,16 +54,16 @@ pub(super) fn air_section(
             .map(|figure| figures.show(figure));
         context! { correlations, averaging, ..scales::section(found) }
     });
-    Some(context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), mean, film => shown, more, statistics, errors => errors::section(map) })
+    Some(
+        context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), mean, film => shown, more, statistics, errors => errors::section(map) },
+    )
 }
 
 /// A colour bar of the page: its gradient and the numbers below it.
 fn colour_bar(limit: f64) -> Value {
-    let colours: Vec<String> =
-        (0..=20).map(|i| diverging(f64::from(i) / 10.0 - 1.0)).collect();
+    let colours: Vec<String> = (0..=20).map(|i| diverging(f64::from(i) / 10.0 - 1.0)).collect();
     let decimals = decimals_of(limit / 2.0);
     let ticks: Vec<String> =
         [-1.0, -0.5, 0.0, 0.5, 1.0].iter().map(|part| signed(part * limit, decimals)).collect();
     context! { colours => colours.join(","), ticks }
 }
-

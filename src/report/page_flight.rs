@@ -178,4 +178,3 @@ fn window_kinds(flight: &FlightAnalysis) -> String {
         .collect::<Vec<_>>()
         .join(", ")
 }
-

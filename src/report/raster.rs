@@ -83,7 +83,14 @@ mod tests {
 
     #[test]
     fn pixels_come_back() {
-        let pixels = [Pixel::At(0.0), Pixel::At(-1.0), Pixel::At(7.0), Pixel::Empty, Pixel::Hatch, Pixel::At(f64::NAN)];
+        let pixels = [
+            Pixel::At(0.0),
+            Pixel::At(-1.0),
+            Pixel::At(7.0),
+            Pixel::Empty,
+            Pixel::Hatch,
+            Pixel::At(f64::NAN),
+        ];
         let bytes = png(&pixels, 3, 2).unwrap();
         let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
         decoder.set_transformations(png::Transformations::EXPAND);

@@ -3,7 +3,9 @@
 use minijinja::context;
 use minijinja::value::Value;
 
-use crate::analysis::statistics::result::{FieldStatistics, Interval, Reads, Scale, Treatment, Variant};
+use crate::analysis::statistics::result::{
+    FieldStatistics, Interval, Reads, Scale, Treatment, Variant,
+};
 use crate::base::estimate::Estimate;
 
 use super::text::{NONE, clean, count, estimate, fixed, usable};
@@ -32,7 +34,12 @@ pub(super) fn paper_form(scale: &Scale) -> String {
 
 /// `reads 61 (28 to 130) where 145 is true`.
 fn reads(of: Reads) -> String {
-    format!("{} ({}) where {} is true", rounded(of.median), interval(of.range_90), rounded(of.truth))
+    format!(
+        "{} ({}) where {} is true",
+        rounded(of.median),
+        interval(of.range_90),
+        rounded(of.truth)
+    )
 }
 
 /// A row of the table of scales.
@@ -74,7 +81,9 @@ pub(super) fn section(of: &FieldStatistics) -> Value {
         for (name, one) in directions {
             rows.extend(one.and_then(|one| one.lambda_m.as_ref()).map(|s| row(name, "m", s)));
         }
-        rows.extend(space.all.weighted_lambda_m.as_ref().map(|s| row("λ, medians weighted", "m", s)));
+        rows.extend(
+            space.all.weighted_lambda_m.as_ref().map(|s| row("λ, medians weighted", "m", s)),
+        );
         rows.extend(
             space.all.with_nugget.as_ref().map(|fit| row("λ, C₀ exp(−r/λ)", "m", &fit.lambda_m)),
         );

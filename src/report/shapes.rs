@@ -12,18 +12,9 @@ use super::text::usable;
 #[derive(Clone, Debug)]
 pub(super) enum Shape {
     /// A filled outline.
-    Area {
-        outline: Vec<(f64, f64)>,
-        fill: String,
-        opacity: f64,
-    },
+    Area { outline: Vec<(f64, f64)>, fill: String, opacity: f64 },
     /// Straight strokes of one kind, [from, to] each.
-    Strokes {
-        lines: Vec<[(f64, f64); 2]>,
-        colour: String,
-        width: f64,
-        dash: &'static str,
-    },
+    Strokes { lines: Vec<[(f64, f64); 2]>, colour: String, width: f64, dash: &'static str },
 }
 
 impl Shape {

@@ -145,7 +145,9 @@ mod tests {
 
     #[test]
     fn too_few_or_in_a_row_is_no_surface() {
-        for places in [vec![], vec![Some([0.0, 0.0])], (0..5).map(|i| Some([0.0, f64::from(i)])).collect()] {
+        for places in
+            [vec![], vec![Some([0.0, 0.0])], (0..5).map(|i| Some([0.0, f64::from(i)])).collect()]
+        {
             assert!(Surface::over(places).triangles().is_empty());
         }
         let nonsense = vec![Some([f64::NAN, 0.0]), Some([1e300, 0.0]), Some([0.0, f64::INFINITY])];

@@ -141,8 +141,7 @@ impl Browser {
         for domain in ["Page", "Runtime", "Log", "Network"] {
             tab.call(&format!("{domain}.enable"), &json!({}));
         }
-        let metrics =
-            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
+        let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
         tab.call("Emulation.setDeviceMetricsOverride", &metrics);
         tab.call("Page.navigate", &json!({ "url": address }));
         tab.wait_for("location.href !== 'about:blank' && document.readyState === 'complete'");
@@ -278,11 +277,14 @@ impl Tab<'_> {
 
     /// Keeps the whole page.
     pub(crate) fn whole_page(&mut self, path: &Path) {
-        self.capture(path, &json!({ "format": "png", "captureBeyondViewport": true, "clip": {
+        self.capture(
+            path,
+            &json!({ "format": "png", "captureBeyondViewport": true, "clip": {
             "x": 0, "y": 0, "scale": 1,
             "width": self.number("document.documentElement.clientWidth"),
             "height": self.number("Math.min(16000, document.documentElement.scrollHeight)"),
-        } }));
+        } }),
+        );
     }
 
     fn capture(&mut self, path: &Path, how: &Value) {

@@ -68,7 +68,11 @@ fn instants(map: &UpdraftMap) -> Vec<Instant> {
 }
 
 /// Fleet mean over time, beside estimate against truth; `None` if nothing was estimated.
-pub(in crate::report) fn figure(flight: &FlightAnalysis, key: &str, map: &UpdraftMap) -> Option<Figure> {
+pub(in crate::report) fn figure(
+    flight: &FlightAnalysis,
+    key: &str,
+    map: &UpdraftMap,
+) -> Option<Figure> {
     let instants = instants(map);
     if instants.len() < 2 {
         return None;

@@ -72,7 +72,10 @@ pub(in crate::report) fn figure(
         svg: sheet.svg(&name, &title),
         name,
         title,
-        caption: format!("Allan deviation: how much two averages of one length, one right after \
-                  the other, differ (over √2). {}", clean(&averaging.words)),
+        caption: format!(
+            "Allan deviation: how much two averages of one length, one right after \
+                  the other, differ (over √2). {}",
+            clean(&averaging.words)
+        ),
     })
 }

@@ -90,7 +90,13 @@ fn correlation_axis(statistics: &FieldStatistics) -> Axis {
         time.mean.iter().zip(&time.sd_between_drones).flat_map(|(c, sd)| [c - sd, c + sd])
     });
     let low = of_pairs.flatten().chain(of_time).filter(|c| usable(*c)).fold(0.0, f64::min);
-    let min = if low < -0.5 { -1.0 } else if low < -0.02 { -0.5 } else { 0.0 };
+    let min = if low < -0.5 {
+        -1.0
+    } else if low < -0.02 {
+        -0.5
+    } else {
+        0.0
+    };
     let step = if min < -0.5 { 0.5 } else { 0.25 };
     Axis { label: "correlation".to_owned(), min, max: 1.0, step }
 }

@@ -125,9 +125,8 @@ fn places(analysis: &Analysis, flight: &FlightAnalysis) -> Places {
         keys.into_keys().rev().enumerate().map(|(rank, key)| (key, rank)).collect()
     };
     let (forward, left) = (ranks(0), ranks(1));
-    let on_ground = drones_placed
-        && !forward.is_empty()
-        && forward.len() * left.len() <= 3 * all.len().max(3);
+    let on_ground =
+        drones_placed && !forward.is_empty() && forward.len() * left.len() <= 3 * all.len().max(3);
     let columns = if on_ground { left.len() } else { (all.len() as f64).sqrt().ceil() as usize };
     let columns = columns.max(1);
     all.sort_by_key(|one| (one.0.unwrap_or(u16::MAX), one.1));

@@ -1,11 +1,10 @@
 //! The map of the air: the grid seen from above, coloured by the estimated vertical air speed.
 
-use super::plan_view::{
-    Projection, axes, colour_bar, empty_places, holes, limit, position,
-};
+use super::air::mean_truth;
+use super::plan_view::{Projection, axes, colour_bar, empty_places, holes, limit, position};
 use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis, UpdraftMap};
 use crate::report::Figure;
-use crate::report::colour::{FAINT, MUTED, diverging, ink_on_diverging};
+use crate::report::colour::{FAINT, INK, MUTED, diverging, ink_on_diverging};
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, count, estimate, fixed, signed, usable};
 
@@ -30,11 +29,18 @@ pub(in crate::report) fn mean_map(
     let unknown = holes(&positions);
     positions.extend(&unknown);
     empty.extend(unknown.into_iter().map(|place| (None, place)));
-    let projection = Projection::new(&positions, [70.0, 16.0], [800.0, 620.0], 0.5)?;
+    let truths: Vec<Option<f64>> =
+        map.drones.iter().map(|drone| mean_truth(drone).filter(|w| usable(*w))).collect();
+    let truth_known = truths.iter().any(Option::is_some);
+    // Two maps beside each other, or one that fills the sheet.
+    let (top, room) = if truth_known { (40.0, [424.0, 424.0]) } else { (16.0, [800.0, 620.0]) };
+    let projection = Projection::new(&positions, [70.0, top], room, 0.5)?;
     let [width, height] = projection.size();
-    let limit = limit(map.drones.iter().map(|drone| drone.mean.value));
-    let sheet_width = (70.0 + width + 130.0).max(380.0);
-    let mut drawing = Drawing::new(sheet_width, height.max(220.0) + 74.0);
+    let limit = limit(
+        map.drones.iter().map(|drone| drone.mean.value).chain(truths.iter().copied().flatten()),
+    );
+    let right = if truth_known { 70.0 + 2.0 * width + 30.0 } else { 70.0 + width };
+    let mut drawing = Drawing::new((right + 130.0).max(380.0), top + height.max(220.0) + 58.0);
     let with_text = positions.len() <= TEXT_LIMIT;
     for (slot, home) in &empty {
         empty_cell(&mut drawing, *slot, projection.cell(*home), with_text);
@@ -46,12 +52,34 @@ pub(in crate::report) fn mean_map(
         }
     }
     axes(&mut drawing, &projection);
+    if truth_known {
+        let aside = Projection::new(&positions, [100.0 + width, top], room, 0.5)?;
+        for (drone, truth) in map.drones.iter().zip(&truths) {
+            if let (Some(place), Some(truth)) = (position(drone), truth) {
+                true_cell(&mut drawing, drone, *truth, aside.cell(place), limit, with_text);
+            }
+        }
+        for (projection, words) in [(&projection, "estimated W*"), (&aside, "true W")] {
+            let style = TextStyle { size: 14.0, bold: true, colour: INK, anchor: Anchor::Start };
+            drawing.text([projection.origin()[0], top - 12.0], words, style, 0.0);
+        }
+    }
     let bar_height = height.clamp(160.0, 420.0);
-    let bar = [70.0 + width + 34.0, 16.0, 18.0, bar_height];
-    colour_bar(&mut drawing, bar, limit, "mean updraft W* (m/s)");
+    let bar = [right + 34.0, top, 18.0, bar_height];
+    colour_bar(
+        &mut drawing,
+        bar,
+        limit,
+        if truth_known { "mean W* and W (m/s)" } else { "mean updraft W* (m/s)" },
+    );
     let name = format!("map-{key}");
     let title = format!("Mean vertical air speed over the grid, {}", clean(&flight.name));
     let dashed = if empty.is_empty() { "" } else { " Dashed squares are drones without data." };
+    let beside = if truth_known {
+        " Right: the mean of the true air at the same drones and times, on the same scale."
+    } else {
+        ""
+    };
     Some(Figure {
         svg: drawing.finish(&title),
         name,
@@ -59,10 +87,32 @@ pub(in crate::report) fn mean_map(
         caption: format!(
             "The grid seen from above, one square for each of {}: the mean vertical air speed \
              over the hover with its standard error below, m/s, up positive. Red is rising air, \
-             blue sinking, white none; the small number is the slot.{dashed}",
+             blue sinking, white none; the small number is the slot.{beside}{dashed}",
             count(positions.len() - empty.len(), "drone"),
         ),
     })
+}
+
+/// The true mean in a square.
+fn true_cell(
+    drawing: &mut Drawing,
+    drone: &DroneUpdraft,
+    truth: f64,
+    [x, y, w, h]: [f64; 4],
+    limit: f64,
+    with_text: bool,
+) {
+    drawing.open(&format!("{}: true mean {} m/s", clean(&drone.name), signed(truth, 3)));
+    let fill = diverging(truth / limit);
+    drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
+    if with_text {
+        let colour = ink_on_diverging(truth / limit);
+        let size = (w * 0.23).min(20.0);
+        let style = TextStyle { size, bold: true, colour, anchor: Anchor::Middle };
+        let text = signed(truth, error_decimals(drone.mean.se));
+        drawing.text([x + w / 2.0, y + h * 0.56], &text, style, 0.0);
+    }
+    drawing.close();
 }
 
 fn empty_cell(drawing: &mut Drawing, slot: Option<u16>, [x, y, w, h]: [f64; 4], with_text: bool) {

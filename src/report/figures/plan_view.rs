@@ -103,10 +103,11 @@ pub(super) fn position(drone: &DroneUpdraft) -> Option<[f64; 2]> {
     drone.position_m.filter(|p| usable(p[0]) && usable(p[1]))
 }
 
-/// The smallest of 1, 2, 2.5, 5 times a power of ten around all values: the scale is symmetric.
+/// A round number around all values: the scale is symmetric.
 pub(super) fn limit(values: impl Iterator<Item = f64>) -> f64 {
-    let largest = values.filter(|&v| usable(v)).map(f64::abs).fold(0.0, f64::max);
-    nice_step(largest.max(0.01))
+    let largest = values.filter(|&v| usable(v)).map(f64::abs).fold(0.01, f64::max);
+    let step = nice_step(largest / 5.0);
+    (largest / step).ceil() * step
 }
 
 /// Where each slot stands, as far as any flight of the analysis knows.

@@ -8,11 +8,11 @@ use crate::base::estimate::Estimate;
 use crate::study::Condition;
 use crate::study::result::{ConditionResult, StudyFlight, StudyResult};
 
+use super::laws::{PULSE_LABEL, VELOCITY_LABEL};
 use crate::report::Figure;
 use crate::report::axis::{Axis, nice_step};
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, FAINT, GREEN, INK, MUTED, VERMILLION, sequential};
-use super::laws::{PULSE_LABEL, VELOCITY_LABEL};
 use crate::report::sheet::Sheet;
 use crate::report::text::{count, fixed, signed, usable};
 
