@@ -32,6 +32,7 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
         truth: None,
         density: None,
         leaning: None,
+        thrust_exponent: None,
         folder: None,
     }
 }

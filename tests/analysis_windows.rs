@@ -33,8 +33,8 @@ fn leg(start_s: f64, end_s: f64, commanded_mps: f64) -> Target {
 }
 
 fn rejections(flight: &Flight, target: &Target) -> Vec<Rejection> {
-    let corrected = correct_tilt(flight, Tilt::Paper);
     let options = WindowOptions::default();
+    let corrected = correct_tilt(flight, &options);
     measure(flight, &corrected, std::slice::from_ref(target), &options).remove(0).rejected
 }
 
@@ -44,11 +44,18 @@ fn tilt_is_that_of_the_rotor_axis_and_both_forms_use_it() {
     tilted.roll_rad = series(100.0, |_| 10_f64.to_radians());
     tilted.pitch_rad = series(100.0, |_| -6_f64.to_radians());
     // tan² phi = tan² 10° + tan² 6° (0.031091 + 0.011047): phi = 11.6005°, cos phi = 0.979574.
-    for (form, expected) in [(Tilt::Paper, 1518.34), (Tilt::Excess, 1538.77)] {
-        let corrected = correct_tilt(&tilted, form);
+    // 550 us: linear in thrust 538.77 us; to its power 0.55, 550 cos^0.55 = 543.79 us.
+    let forms = [
+        (Tilt::Paper, None, 1518.34),
+        (Tilt::Thrust, Some(1.0), 1538.77),
+        (Tilt::Thrust, None, 1543.79),
+    ];
+    for (tilt, thrust_exponent, expected) in forms {
+        let options = WindowOptions { tilt, thrust_exponent, ..WindowOptions::default() };
+        let corrected = correct_tilt(&tilted, &options);
         assert_eq!(corrected.pulse_phi_us.len(), 1000);
         let pulse = corrected.pulse_phi_us.at(50.0, 1.0).unwrap();
-        assert!((pulse - expected).abs() < 0.01, "{form:?}: {pulse}");
+        assert!((pulse - expected).abs() < 0.01, "{tilt:?}: {pulse}");
         assert!((corrected.tilt_deg.at(50.0, 1.0).unwrap() - 11.6005).abs() < 0.001);
     }
 }
@@ -61,7 +68,7 @@ fn attitude_is_interpolated_to_the_pulses_and_not_across_gaps() {
         (0..100).map(f64::from).filter(|time| !(50.5..59.5).contains(time)).collect();
     let pitch = times.iter().map(|time| (time * 0.1).to_radians()).collect();
     sparse.pitch_rad = Series { time_s: times, value: pitch };
-    let tilt = correct_tilt(&sparse, Tilt::Paper).tilt_deg;
+    let tilt = correct_tilt(&sparse, &WindowOptions::default()).tilt_deg;
     assert!((tilt.at(20.5, 0.2).unwrap() - 2.05).abs() < 1e-9);
     assert!(tilt.between(51.2, 59.9).is_empty(), "no attitude, no corrected pulse");
 }

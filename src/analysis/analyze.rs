@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::account::{self, Account};
-use super::calibrate::{self, FitOptions, PaperTable};
-use super::caution::{fit_cautions, wind_caution};
+use super::calibrate::{self, FitOptions, Location, PaperTable, Weights};
+use super::caution::{fit_cautions, tilt_caution, wind_caution};
 use super::density::Density;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
 use super::ladder::mark_partial;
@@ -23,8 +23,9 @@ use super::result::{
 use super::slots::{SlotMatch, match_slots};
 use super::updraft::{self, DroneSeries};
 use super::wind::Leaning;
-use super::windows::WindowOptions;
+use super::windows::{Tilt, WindowOptions};
 use crate::base::time::GpsTime;
+use crate::flight::Indicator;
 use crate::mission::plan::{Plan, Purpose};
 
 /// One log of a flight.
@@ -60,11 +61,24 @@ pub struct FlightInput<'a> {
     /// How the vehicle leans in wind, where its drag is known; `None`: the map is not corrected for
     /// wind, and says how wrong it may be.
     pub leaning: Option<Leaning>,
+    /// Power of thrust that `u - 1000` goes with, where the vehicle is known: 1 where thrust is linear
+    /// in the pulse.
+    pub thrust_exponent: Option<f64>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
 }
 
 impl FlightInput<'_> {
+    /// Without the corrections that are known for pulses alone.
+    fn for_indicator(&self, indicator: Indicator) -> Self {
+        match indicator {
+            Indicator::Pulse => *self,
+            Indicator::RotorSpeed | Indicator::Power => {
+                Self { density: None, leaning: None, ..*self }
+            }
+        }
+    }
+
     /// A log's path as results give it.
     pub(super) fn shown(&self, path: &Path) -> String {
         let inside = self.folder.and_then(|folder| path.strip_prefix(folder).ok());
@@ -95,10 +109,17 @@ impl TruthSeries {
 /// Choices of an analysis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnalysisOptions {
+    /// What stands for rotor effort.
+    pub indicator: Indicator,
     /// How windows are measured.
     pub windows: WindowOptions,
+    /// Whether the slow offset of the pulse is subtracted before laws are fitted.
+    pub offset: OffsetRule,
     /// How laws are fitted.
     pub fit: FitOptions,
+    /// Windows as in the paper, whatever `fit` says of them: medians in simulations and means in the
+    /// field, weighted by the samples' standard deviation.
+    pub paper_windows: bool,
     /// Law for the map of the air (`linear`, `signed quadratic`); `None`: the one whose calibration
     /// has the lower reduced chi².
     pub map_law: Option<MapLaw>,
@@ -107,6 +128,28 @@ pub struct AnalysisOptions {
     pub paper: Option<PaperTable>,
     /// Most points of a trace for figures.
     pub trace_points: usize,
+}
+
+/// When the slow offset (eq. 5) is subtracted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OffsetRule {
+    /// As in the paper: in the field, and not in simulations of uniform air.
+    #[default]
+    Field,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+impl OffsetRule {
+    pub(super) fn is_subtracted(self, true_updraft_mps: Option<f64>) -> bool {
+        match self {
+            Self::Field => true_updraft_mps.is_none(),
+            Self::Always => true,
+            Self::Never => false,
+        }
+    }
 }
 
 /// Law for the map of the air.
@@ -121,12 +164,31 @@ pub enum MapLaw {
 impl Default for AnalysisOptions {
     fn default() -> Self {
         Self {
+            indicator: Indicator::default(),
             windows: WindowOptions::default(),
+            offset: OffsetRule::default(),
             fit: FitOptions::default(),
+            paper_windows: false,
             map_law: None,
             paper: None,
             trace_points: 1200,
         }
+    }
+}
+
+impl AnalysisOptions {
+    /// The choices for one flight, with what they leave to it decided.
+    fn of_flight(&self, input: &FlightInput<'_>) -> Self {
+        let mut options = self.clone();
+        options.fit.indicator = options.indicator;
+        options.windows.thrust_exponent = options.windows.thrust_exponent.or(input.thrust_exponent);
+        if self.paper_windows {
+            let field = self.offset.is_subtracted(input.true_updraft_mps);
+            options.fit.location = if field { Location::Mean } else { Location::Median };
+            options.fit.weights = Weights::WindowSd;
+            options.windows.tilt = Tilt::Paper;
+        }
+        options
     }
 }
 
@@ -235,6 +297,8 @@ pub fn analyze_flight(
     if input.logs.is_empty() {
         return Err(AnalysisError::NoLogs { name: input.name.to_owned() });
     }
+    let options = &options.of_flight(input);
+    let input = &input.for_indicator(options.indicator);
     let (slots, warnings) = match_slots(input);
     let planned_purpose = input.purpose.or(input.plan.map(|plan| plan.purpose));
     let referred = reference
@@ -317,11 +381,12 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
             Err(error) => warnings.push(format!("flock mapping: {error}")),
         }
         paper = paper_table(shared, &drones);
-        table = calibrate::table(&drones, paper, options.fit.weights);
+        table = calibrate::table(&drones, paper, &options.fit);
         if let Some(laws) = &flock {
             compare_what_fits(&mut table, laws);
         }
         warnings.extend(fit_cautions(flock.as_ref(), &drones, input.leaning));
+        warnings.extend(tilt_caution(&drones, options));
     } else if shared.reference.is_none() {
         warnings.push(
             "no calibration was given: the air cannot be measured without laws (analyse a \
@@ -334,6 +399,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
+        indicator: options.indicator,
         planned: input.plan.is_some(),
         true_updraft_mps: input.true_updraft_mps,
         logs: input.logs.len(),

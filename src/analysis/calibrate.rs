@@ -7,6 +7,7 @@ use super::law::{self, ErrorScale, Law, Point};
 use super::result::{DroneAnalysis, Fit, Laws, SampleStats, TableRow, WindowStats};
 use super::stats::mean_sd;
 use crate::base::estimate::Estimate;
+use crate::flight::Indicator;
 
 /// Which number stands for a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,6 +68,8 @@ impl Hold {
 /// Choices of a calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitOptions {
+    /// What stands for rotor effort.
+    pub indicator: Indicator,
     /// Which number stands for a window.
     pub location: Location,
     /// What a window's error is.
@@ -105,21 +108,20 @@ pub enum CalibrationError {
     },
     /// The pulse is the same in all windows.
     #[error(
-        "the pulse width is {pulse_us:.0} us in all windows: it does not depend on the speed (are \
-         these the motor channels? check SERVOn_FUNCTION)"
+        "the {} is {value:.0} {} in all windows: it does not depend on the speed (are these the \
+         motor channels? check SERVOn_FUNCTION)",
+        indicator.words(),
+        indicator.unit()
     )]
     ConstantPulse {
-        /// The pulse width.
-        pulse_us: f64,
+        /// The indicator.
+        indicator: Indicator,
+        /// Its value.
+        value: f64,
     },
     /// The fit failed.
     #[error("the fit failed: {0}")]
     Fit(#[from] FitError),
-}
-
-/// Logs hold whole microseconds: no window is known better than the rounding of one sample.
-fn quantum_us() -> f64 {
-    1.0 / 12.0_f64.sqrt()
 }
 
 /// The number that stands for samples.
@@ -148,7 +150,7 @@ fn point(window: &WindowStats, options: &FitOptions) -> Point {
         velocity_mps: location(&window.velocity_mps, options.location),
         pulse_us: location(&window.pulse_phi_us, options.location)
             - window.offset_us.unwrap_or(0.0),
-        sigma_us: sigma_us.max(quantum_us()),
+        sigma_us: sigma_us.max(options.indicator.quantum()),
         velocity_sigma_mps,
     }
 }
@@ -177,8 +179,9 @@ fn fit_points(
         let speed_mps = (first.velocity_mps * 10.0).round() / 10.0;
         return Err(CalibrationError::OneSpeed { speed_mps, windows: points.len() });
     }
-    if spread(|point| point.pulse_us) < quantum_us() && options.hold.is_none() {
-        return Err(CalibrationError::ConstantPulse { pulse_us: first.pulse_us });
+    if spread(|point| point.pulse_us) < options.indicator.quantum() && options.hold.is_none() {
+        let indicator = options.indicator;
+        return Err(CalibrationError::ConstantPulse { indicator, value: first.pulse_us });
     }
     let scale = options.weights.scale();
     let sigma_added_us =
@@ -206,14 +209,26 @@ fn fit_points(
     let held = held?.zip(options.hold).map(|(fit, hold)| {
         untuned(fit, law::signed_quadratic_held(measured, hold.a, hold.u0_us, scale))
     });
+    let in_units = |fit: Fit| in_units_of(options.indicator, fit);
     Ok(Laws {
         signed_quadratic: law::signed_quadratic(&points, scale)
             .ok()
-            .map(|fit| untuned(fit, law::signed_quadratic(measured, scale))),
-        signed_quadratic_held: held,
-        linear: linear.ok().map(|fit| untuned(fit, law::linear(measured, scale))),
+            .map(|fit| in_units(untuned(fit, law::signed_quadratic(measured, scale)))),
+        signed_quadratic_held: held.map(in_units),
+        linear: linear.ok().map(|fit| in_units(untuned(fit, law::linear(measured, scale)))),
         sigma_added_us,
     })
+}
+
+/// The fit's parameters in the indicator's unit instead of microseconds.
+fn in_units_of(indicator: Indicator, mut fit: Fit) -> Fit {
+    let pulse = Indicator::Pulse.unit();
+    for parameter in &mut fit.parameters {
+        if let Some(rest) = parameter.unit.strip_prefix(pulse) {
+            parameter.unit = format!("{}{rest}", indicator.unit());
+        }
+    }
+    fit
 }
 
 fn widened(points: &[Point], added_us: f64) -> Vec<Point> {
@@ -350,8 +365,9 @@ pub const ADDED_SCATTER: &str = "sigma_added";
 pub fn table(
     drones: &[DroneAnalysis],
     paper: Option<PaperTable>,
-    weights: Weights,
+    options: &FitOptions,
 ) -> Vec<TableRow> {
+    let FitOptions { weights, indicator, .. } = *options;
     let whole = || drones.iter().filter(|drone| drone.partial_ladder.is_none());
     let laws: [(&str, FitOf); 3] = [
         (law::SIGNED_QUADRATIC, |laws| laws.signed_quadratic.as_ref()),
@@ -382,7 +398,7 @@ pub fn table(
     }
     let added: Vec<f64> = whole().filter_map(|drone| drone.laws.as_ref()?.sigma_added_us).collect();
     if !added.is_empty() {
-        rows.push(row(BOTH_LAWS, ADDED_SCATTER, "us", &added, &[], paper));
+        rows.push(row(BOTH_LAWS, ADDED_SCATTER, indicator.unit(), &added, &[], paper));
     }
     rows
 }

@@ -1,9 +1,13 @@
 //! What a reader must know before using a flight's numbers, in plain words.
 
+use super::analyze::AnalysisOptions;
+use super::calibrate;
 use super::prefer::misfit;
-use super::result::{DroneAnalysis, Laws, UpdraftMap};
+use super::result::{DroneAnalysis, Fit, Laws, UpdraftMap};
 use super::stats::mean_sd;
 use super::wind::{Leaning, axial_of};
+use super::windows::Tilt;
+use crate::base::estimate::Estimate;
 
 /// A systematic error above this is worth a sentence, m/s.
 const WORTH_SAYING_MPS: f64 = 0.05;
@@ -54,6 +58,38 @@ fn lean_caution(drones: &[DroneAnalysis], leaning: Option<Leaning>) -> Option<St
          leaning drone reads as sinking air: {size} {axial:.2} m/s of the fitted W* is that, and A \
          and u0 are off with it{}",
         if leaning.is_some() { " (the map is corrected for it, this table is not)" } else { "" }
+    ))
+}
+
+/// About the two forms of the tilt correction, where they differ by more than the fleet's u0 is known.
+pub(super) fn tilt_caution(drones: &[DroneAnalysis], options: &AnalysisOptions) -> Option<String> {
+    let with_laws = || drones.iter().filter_map(|drone| Some((drone, drone.laws.as_ref()?)));
+    let changes: Vec<f64> = with_laws()
+        .flat_map(|(drone, _)| &drone.windows)
+        .filter(|window| calibrate::is_used(window, &options.fit))
+        .map(|window| window.tilt_form_us)
+        .collect();
+    let (change, _) = mean_sd(&changes);
+    let fits: Vec<&Fit> = with_laws().filter_map(|(_, laws)| laws.linear.as_ref()).collect();
+    let estimates = |index: usize| -> Vec<Estimate> {
+        fits.iter().filter_map(|fit| Some(fit.parameters.get(index)?.estimate)).collect()
+    };
+    let mean = |values: Vec<f64>| mean_sd(&values).0;
+    let slope = mean(estimates(0).iter().map(|estimate| estimate.value).collect());
+    let error = mean(estimates(1).iter().map(|estimate| estimate.se).collect());
+    if changes.is_empty() || change.abs() <= error || slope.abs() < f64::EPSILON {
+        return None;
+    }
+    let unit = options.indicator.unit();
+    let (ours, other) = match options.windows.tilt {
+        Tilt::Paper => ("the paper's u cos(phi)", "what the vertical part of the thrust takes"),
+        Tilt::Thrust => ("what the vertical part of the thrust takes", "the paper's u cos(phi)"),
+    };
+    Some(format!(
+        "tilt: pulses are corrected to {ours}. With {other} u0 would be {change:+.1} {unit}, which \
+         is more than its error of {error:.1} {unit} and reads as {:+.2} m/s of updraft where a \
+         hover leans alike",
+        -change / slope
     ))
 }
 

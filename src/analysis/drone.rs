@@ -2,6 +2,7 @@
 
 use super::analyze::{AnalysisOptions, FlightInput, LogInput, MapLaw};
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
+use super::offset::OffsetMap;
 use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats};
 use super::stats::mean_sd;
 use super::updraft::{self, DroneSeries, Lean};
@@ -41,15 +42,23 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         let slot = plan.slot(number)?;
         Some((slot, plan.segments(slot)))
     });
-    let flight_options =
-        FlightOptions { start: input.start, segments: slot.map(|(_, segments)| segments) };
+    let flight_options = FlightOptions {
+        start: input.start,
+        indicator: options.indicator,
+        segments: slot.map(|(_, segments)| segments),
+    };
     let flight =
         Flight::open(&log.path, flight_options).map_err(|error| with_causes(&error, ": "))?;
     let mut warnings = flight.warnings.clone();
 
     let targets = find_targets(&flight, slot.map(|(_, segments)| segments), &mut warnings)?;
-    let corrected = windows::correct_tilt(&flight, options.windows.tilt);
-    let stats = windows::measure(&flight, &corrected, &targets, &options.windows);
+    let corrected = windows::correct_tilt(&flight, &options.windows);
+    let mut stats = windows::measure(&flight, &corrected, &targets, &options.windows);
+    let offset = options
+        .offset
+        .is_subtracted(input.true_updraft_mps)
+        .then(|| OffsetMap::subtract(&mut stats, options.fit.location))
+        .flatten();
 
     let name = match slot {
         Some((slot, _)) => slot.name.clone(),
@@ -70,6 +79,7 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         home_m: slot.map(|(slot, _)| [slot.home_m[0], slot.home_m[1]]),
         clock: flight.clock.clone(),
         windows: stats,
+        offset,
         laws: None,
         partial_ladder: None,
         trace: trace(&flight, &corrected, options.trace_points),

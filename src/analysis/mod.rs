@@ -14,6 +14,7 @@ pub mod fit;
 mod ladder;
 pub mod law;
 mod matching;
+pub mod offset;
 pub mod prefer;
 mod refer;
 pub mod result;
@@ -25,6 +26,6 @@ pub mod wind;
 pub mod windows;
 
 pub use analyze::{
-    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, Progress, TruthSeries, analyze,
-    analyze_flight,
+    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, OffsetRule, Progress,
+    TruthSeries, analyze, analyze_flight,
 };

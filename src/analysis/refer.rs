@@ -3,6 +3,7 @@
 
 use super::calibrate::{self, FitOptions};
 use super::density::Density;
+use super::offset::OffsetMap;
 use super::result::{FlightAnalysis, SampleStats, WindowStats};
 use super::wind::Leaning;
 
@@ -40,6 +41,9 @@ pub(super) fn refer_calibration(
             if let Some(density) = density {
                 *window = refer_window(density, window);
             }
+        }
+        if drone.offset.is_some() {
+            drone.offset = OffsetMap::subtract(&mut drone.windows, options.location);
         }
         if drone.laws.is_some() {
             drone.laws = calibrate::calibrate(&drone.windows, options).ok();

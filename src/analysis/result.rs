@@ -7,10 +7,11 @@ pub use super::budget::{
     BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, TruthCheck,
 };
 use super::density::Density;
+use super::offset::OffsetMap;
 use super::statistics::result::FieldStatistics;
 use super::wind::Leaning;
 use crate::base::estimate::Estimate;
-use crate::flight::Clock;
+use crate::flight::{Clock, Indicator};
 use crate::mission::plan::{Kind, Purpose};
 
 /// Name and version of the analysis format.
@@ -38,6 +39,9 @@ pub struct FlightAnalysis {
     pub name: String,
     /// What it was for.
     pub purpose: Purpose,
+    /// What stands for rotor effort: wherever a name says pulse, and us, it is this and its unit.
+    #[serde(default)]
+    pub indicator: Indicator,
     /// Whether windows came from a plan (else from the log's desired velocity).
     pub planned: bool,
     /// The true vertical air speed in this flight, m/s, when it was simulated in uniform air.
@@ -196,6 +200,9 @@ pub struct DroneAnalysis {
     pub clock: Clock,
     /// Windows, in time order.
     pub windows: Vec<WindowStats>,
+    /// The slow offset of its pulse over time and height, for calibrations in the field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<OffsetMap>,
     /// Fitted laws, for calibrations.
     pub laws: Option<Laws>,
     /// Set if the laws rest on clearly less of the ladder than those of the fleet: then they do not
@@ -263,8 +270,14 @@ pub struct WindowStats {
     /// Angle of the mean attitude from the vertical, degrees: what wind does, without noise.
     #[serde(default)]
     pub lean_deg: f64,
-    /// Estimated slow offset subtracted before fitting (field mode), us.
+    /// What the other form of the tilt correction (the paper's, if ours was used) would change, us.
+    #[serde(default)]
+    pub tilt_form_us: f64,
+    /// Slow offset (eq. 5) at the window's time and height, subtracted before laws are fitted, us.
     pub offset_us: Option<f64>,
+    /// The window lies outside the 0-windows: its offset is the nearest one's.
+    #[serde(default)]
+    pub offset_outside: bool,
     /// Why the window is not used in fits; empty: it is used (if it is of the fitted kind).
     pub rejected: Vec<Rejection>,
 }

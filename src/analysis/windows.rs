@@ -6,19 +6,35 @@
 
 use super::result::{Rejection, SampleStats, WindowStats};
 use super::stats::sample_stats;
-use crate::flight::{Flight, Series};
+use crate::flight::{Flight, Indicator, Series};
 use crate::mission::plan::{Kind, Segment};
 
-/// How the pulse width is corrected for tilt.
+/// How rotor effort is corrected for tilt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Tilt {
-    /// The paper's `u cos(phi)`. It scales the whole pulse, also the 1000 us that make no thrust:
-    /// at 11.7 degrees of tilt that is 20 us too much.
-    #[default]
+    /// The paper's `u cos(phi)`. It scales the whole pulse, also the 1000 us that make no thrust,
+    /// and takes thrust for linear in the pulse: at 8 degrees of tilt that is 12 us too much on a
+    /// real drone, which reads as 0.46 m/s of updraft.
     Paper,
-    /// `(u - 1000) cos(phi) + 1000`: exact where thrust is linear in the pulse above 1000 us.
-    Excess,
+    /// What the vertical part of the thrust takes: `(u - 1000) cos(phi)^p + 1000` with p the power
+    /// of thrust that the excess pulse goes with ([`Indicator::thrust_exponent`]).
+    #[default]
+    Thrust,
+}
+
+impl Tilt {
+    /// An indicator's value at a tilt, corrected, in its unit.
+    pub fn correct(self, value: f64, tilt_rad: f64, indicator: Indicator, exponent: f64) -> f64 {
+        let cos = tilt_rad.cos();
+        match self {
+            Self::Paper => value * cos,
+            Self::Thrust => {
+                let zero = indicator.without_thrust();
+                (value - zero) * cos.powf(exponent) + zero
+            }
+        }
+    }
 }
 
 /// Window rules.
@@ -26,6 +42,9 @@ pub enum Tilt {
 pub struct WindowOptions {
     /// Tilt correction.
     pub tilt: Tilt,
+    /// Power of thrust that the indicator goes with, where the vehicle is known; else
+    /// [`Indicator::thrust_exponent`].
+    pub thrust_exponent: Option<f64>,
     /// Block length for standard errors, s: longer than the memory of gusts and controller.
     pub block_s: f64,
     /// A window is rejected when the mean velocity is further than this from the command, m/s.
@@ -34,7 +53,26 @@ pub struct WindowOptions {
 
 impl Default for WindowOptions {
     fn default() -> Self {
-        Self { tilt: Tilt::Paper, block_s: 1.0, follow_limit_mps: 0.3 }
+        Self { tilt: Tilt::default(), thrust_exponent: None, block_s: 1.0, follow_limit_mps: 0.3 }
+    }
+}
+
+impl WindowOptions {
+    fn exponent(&self, indicator: Indicator) -> f64 {
+        self.thrust_exponent
+            .filter(|_| indicator == Indicator::Pulse)
+            .unwrap_or_else(|| indicator.thrust_exponent())
+    }
+
+    /// What the other form of the tilt correction would change at an indicator's value and a tilt.
+    fn other_form(&self, value: f64, tilt_rad: f64, indicator: Indicator) -> f64 {
+        let exponent = self.exponent(indicator);
+        let other = match self.tilt {
+            Tilt::Paper => Tilt::Thrust,
+            Tilt::Thrust => Tilt::Paper,
+        };
+        let by = |tilt: Tilt| tilt.correct(value, tilt_rad, indicator, exponent);
+        by(other) - by(self.tilt)
     }
 }
 
@@ -246,7 +284,8 @@ pub struct Corrected {
 
 /// Corrects pulses for tilt, `phi = arctan sqrt(tan² pitch + tan² roll)`, with roll and pitch
 /// interpolated to the pulses' times. Pulses without attitude within 1 s are left out.
-pub fn correct_tilt(flight: &Flight, tilt: Tilt) -> Corrected {
+pub fn correct_tilt(flight: &Flight, options: &WindowOptions) -> Corrected {
+    let exponent = options.exponent(flight.indicator);
     let mut corrected = Corrected::default();
     for (time, pulse) in flight.pulse_us.time_s.iter().zip(&flight.pulse_us.value) {
         let (Some(roll), Some(pitch)) =
@@ -255,10 +294,7 @@ pub fn correct_tilt(flight: &Flight, tilt: Tilt) -> Corrected {
             continue;
         };
         let phi = pitch.tan().hypot(roll.tan()).atan();
-        let value = match tilt {
-            Tilt::Paper => pulse * phi.cos(),
-            Tilt::Excess => (pulse - 1000.0) * phi.cos() + 1000.0,
-        };
+        let value = options.tilt.correct(*pulse, phi, flight.indicator, exponent);
         corrected.pulse_phi_us.time_s.push(*time);
         corrected.pulse_phi_us.value.push(value);
         corrected.tilt_deg.time_s.push(*time);
@@ -342,7 +378,13 @@ fn measure_one(
             mean(flight.roll_rad.between(start, end)),
             mean(flight.pitch_rad.between(start, end)),
         ),
+        tilt_form_us: options.other_form(
+            mean(flight.pulse_us.between(start, end)),
+            mean(corrected.tilt_deg.between(start, end)).to_radians(),
+            flight.indicator,
+        ),
         offset_us: None,
+        offset_outside: false,
         rejected,
     }
 }

@@ -14,13 +14,13 @@ use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::provenance::provenance;
 use super::words;
-use crate::analysis::calibrate::{Location, Weights};
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
-use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, analyze};
+use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, OffsetRule, analyze};
 use crate::base::file::write_whole;
 use crate::base::time::GpsTime;
 use crate::campaign::{self, to_json};
+use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, terminal_summary};
@@ -72,9 +72,12 @@ pub(super) struct AnalyzeOptions {
     /// Law for the map of the air
     #[arg(long, value_enum, default_value_t = LawChoice::Auto)]
     law: LawChoice,
-    /// Which part of the pulse the tilt correction multiplies (in windows and laws; the map of
-    /// simulated flights of known drag has its own, see --no-wind)
-    #[arg(long, value_enum, default_value_t = TiltChoice::Paper)]
+    /// What stands for rotor effort
+    #[arg(long, value_enum, default_value_t = IndicatorChoice::Pulse)]
+    indicator: IndicatorChoice,
+    /// How it is corrected for tilt (in windows and laws; the map of simulated flights of known drag
+    /// has its own, see --no-wind)
+    #[arg(long, value_enum, default_value_t = TiltChoice::Thrust)]
     tilt: TiltChoice,
     /// Do not correct the map for air density at different heights
     #[arg(long)]
@@ -82,7 +85,12 @@ pub(super) struct AnalyzeOptions {
     /// Do not correct the map for wind on leaning drones (simulated flights of known drag)
     #[arg(long)]
     no_wind: bool,
-    /// Windows as in the paper: medians, weighted by the samples' standard deviation
+    /// Subtract the pulse's slow offset over time and height (the paper's eq. 5) before laws are
+    /// fitted
+    #[arg(long, value_enum, default_value_t = OffsetChoice::Field)]
+    offset: OffsetChoice,
+    /// Windows as in the paper: medians (means where the offset is subtracted), weighted by the
+    /// samples' standard deviation, tilt as --tilt paper
     #[arg(long)]
     paper: bool,
 }
@@ -99,14 +107,38 @@ enum LawChoice {
     SignedQuadratic,
 }
 
+/// What stands for rotor effort.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum IndicatorChoice {
+    /// Rotor control pulse width (RCOU)
+    #[default]
+    Pulse,
+    /// Rotor speed from the speed controllers' telemetry (ESC)
+    Rpm,
+    /// Electrical power (BAT: voltage times current)
+    Power,
+}
+
 /// Form of the tilt correction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum TiltChoice {
-    /// u cos(phi), as in the paper
+    /// What the vertical part of the thrust takes
     #[default]
+    Thrust,
+    /// u cos(phi), as in the paper
     Paper,
-    /// (u - 1000) cos(phi) + 1000: only the part that makes thrust
-    Excess,
+}
+
+/// When the slow offset is subtracted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum OffsetChoice {
+    /// As the paper: in the field, not in simulations of uniform air
+    #[default]
+    Field,
+    /// In all calibrations
+    Always,
+    /// In none
+    Never,
 }
 
 impl AnalyzeOptions {
@@ -114,17 +146,24 @@ impl AnalyzeOptions {
         let mut options = AnalysisOptions::default();
         options.windows.tilt = match self.tilt {
             TiltChoice::Paper => Tilt::Paper,
-            TiltChoice::Excess => Tilt::Excess,
+            TiltChoice::Thrust => Tilt::Thrust,
+        };
+        options.indicator = match self.indicator {
+            IndicatorChoice::Pulse => Indicator::Pulse,
+            IndicatorChoice::Rpm => Indicator::RotorSpeed,
+            IndicatorChoice::Power => Indicator::Power,
         };
         options.map_law = match self.law {
             LawChoice::Auto => None,
             LawChoice::Linear => Some(MapLaw::Linear),
             LawChoice::SignedQuadratic => Some(MapLaw::SignedQuadratic),
         };
-        if self.paper {
-            options.fit.location = Location::Median;
-            options.fit.weights = Weights::WindowSd;
-        }
+        options.offset = match self.offset {
+            OffsetChoice::Field => OffsetRule::Field,
+            OffsetChoice::Always => OffsetRule::Always,
+            OffsetChoice::Never => OffsetRule::Never,
+        };
+        options.paper_windows = self.paper;
         options
     }
 }
@@ -229,6 +268,7 @@ fn finish(
             truth: (!flight.truth.is_empty()).then_some(&flight.truth),
             density: flight.density.filter(|_| !options.no_density),
             leaning: flight.leaning.filter(|_| !options.no_wind),
+            thrust_exponent: flight.thrust_exponent,
             folder: Some(&work.root),
         })
         .collect();

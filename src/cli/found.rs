@@ -33,6 +33,8 @@ pub(super) struct Found {
     pub(super) start: Option<GpsTime>,
     pub(super) density: Option<Density>,
     pub(super) leaning: Option<Leaning>,
+    /// Power of thrust that `u - 1000` goes with.
+    pub(super) thrust_exponent: Option<f64>,
     /// What is doubtful about the files, one sentence each.
     pub(super) notes: Vec<String>,
 }
@@ -83,9 +85,16 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         start: None,
         density: plan.map(|plan| density(plan, None)),
         leaning: None,
+        thrust_exponent: None,
         notes: Vec::new(),
     });
     Ok(())
+}
+
+/// 1 for vehicles whose thrust is linear in the pulse; for others nothing is known better than what
+/// the analysis takes itself.
+fn linear_thrust(vehicle: &Vehicle) -> Option<f64> {
+    (vehicle.autopilot.mot_thst_expo == 0.0).then_some(1.0)
 }
 
 fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
@@ -106,6 +115,7 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
+        thrust_exponent: vehicle.as_ref().and_then(linear_thrust),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),
         plan: Some(plan),

@@ -16,6 +16,14 @@ const HIGHEST_VOLTAGE_V: f64 = 100.0;
 const PULSES_US: std::ops::RangeInclusive<f64> = 500.0..=2500.0;
 /// No multirotor is faster, m/s: what is was damaged in the log.
 const FASTEST_MPS: f64 = 100.0;
+/// No multirotor has more rotors.
+const MOST_ROTORS: f64 = 16.0;
+/// No rotor turns faster, rpm: what does was damaged in the log.
+const FASTEST_RPM: f64 = 100_000.0;
+/// Rows of one message that belong together are no further apart, s.
+const SAME_ROW_S: f64 = 0.05;
+/// A speed controller's last word that is older is none, s.
+const STALE_S: f64 = 0.5;
 /// Rows below which a desired-velocity message is not worth having.
 const FEWEST_DESIRED: usize = 20;
 
@@ -40,6 +48,7 @@ const WANTED: &[Select<'static>] = &[
     Select { message: "PSCE", fields: &["TimeUS", "DVE", "TVE"] },
     Select { message: "CTUN", fields: &["TimeUS", "TimeMS", "DCRt"] },
     Select { message: "BAT", fields: &["TimeUS", "Instance", "Volt", "Curr"] },
+    Select { message: "ESC", fields: &["TimeUS", "Instance", "RPM"] },
     Select { message: "CURR", fields: &["TimeUS", "TimeMS", "Volt", "Curr"] },
     Select { message: "SHOW", fields: &["TimeUS", "ClockMS", "Stage"] },
     Select { message: "GPS", fields: &["TimeUS", "I", "Status", "GMS", "GWk", "Lat", "Lng"] },
@@ -294,6 +303,54 @@ impl Messages {
         let centi = volts.get(volts.len() / 2).is_some_and(|median| *median > HIGHEST_VOLTAGE_V);
         let scale = if centi { 0.01 } else { 1.0 };
         (rows.series("Volt", |v| v * scale), rows.series("Curr", |v| v * scale))
+    }
+
+    /// Electrical power, W: voltage times current of the same rows.
+    pub(super) fn power(&self) -> Option<Series> {
+        let (Some(volts), Some(amps)) = self.battery() else { return None };
+        let mut power = Series::default();
+        for (time, volt) in volts.time_s.iter().zip(&volts.value) {
+            if let Some(amp) = amps.at(*time, SAME_ROW_S) {
+                power.time_s.push(*time);
+                power.value.push(volt * amp);
+            }
+        }
+        // Boards without a current sensor log 0.
+        power.value.iter().any(|watt| *watt > 0.0).then_some(power)
+    }
+
+    /// Rotor speed: mean over the speed controllers that report, rpm. Each has rows of its own; the
+    /// mean is taken where the first one reports, with the others' last words.
+    pub(super) fn rotor_speed(&self) -> Option<Series> {
+        let rows = self.rows("ESC")?;
+        let instances = rows.column("Instance")?;
+        let mut ids: Vec<i64> = instances
+            .iter()
+            .filter(|id| (0.0..MOST_ROTORS).contains(*id))
+            .map(|id| *id as i64)
+            .collect();
+        ids.sort_unstable();
+        ids.dedup();
+        let each: Vec<Series> = ids
+            .iter()
+            .filter_map(|id| {
+                let mut own = rows.clone();
+                own.retain(|row| instances.get(row) == Some(&(*id as f64)));
+                own.series("RPM", |rpm| within(rpm, FASTEST_RPM))
+            })
+            .collect();
+        let (first, others) = each.split_first()?;
+        let mut speed = Series::default();
+        for (time, rpm) in first.time_s.iter().zip(&first.value) {
+            let others: Option<Vec<f64>> =
+                others.iter().map(|other| other.latest(*time + SAME_ROW_S, STALE_S)).collect();
+            if let Some(others) = others {
+                let sum = rpm + others.iter().sum::<f64>();
+                speed.time_s.push(*time);
+                speed.value.push(sum / (others.len() + 1) as f64);
+            }
+        }
+        speed.value.iter().any(|rpm| *rpm > 0.0).then_some(speed)
     }
 
     /// GPS rows with a 3-D fix: (board time s, milliseconds since the GPS epoch).

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::align::{Evidence, align};
 use super::channels::Messages;
-use super::{Flight, FlightError, FlightOptions, Series, pick};
+use super::{Flight, FlightError, FlightOptions, Indicator, Series, pick};
 use crate::log::{Log, ScanStats};
 
 /// Kept before arming and after disarming, s.
@@ -55,6 +55,25 @@ pub(super) fn load(
             "ATT",
             "set LOG_BITMASK bit 1 or 0 (ATTITUDE_MED, +2, or FAST, +1) and fly again",
         ));
+    };
+
+    let effort = match options.indicator {
+        Indicator::Pulse => None,
+        Indicator::RotorSpeed => Some(messages.rotor_speed().ok_or_else(|| {
+            missing(
+                "rotor speeds",
+                "ESC",
+                "speed controllers with telemetry (bidirectional DShot) would log them; use the \
+                 pulse width instead",
+            )
+        })?),
+        Indicator::Power => Some(messages.power().ok_or_else(|| {
+            missing(
+                "electrical power",
+                "BAT with voltage and current",
+                "set BATT_MONITOR for a sensor of both, or use the pulse width instead",
+            )
+        })?),
     };
 
     let stages = pick::stages(&messages);
@@ -132,7 +151,8 @@ pub(super) fn load(
         height_m,
         north_m: cut(ekf.north),
         east_m: cut(ekf.east),
-        pulse_us: cut(pulse),
+        indicator: options.indicator,
+        pulse_us: cut(effort.unwrap_or(pulse)),
         pulse_max_us: cut(pulse_max),
         pulse_min_us: cut(pulse_min),
         roll_rad: cut(roll),

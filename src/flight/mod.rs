@@ -7,6 +7,8 @@
 //! |---|---|
 //! | velocity, height, position | XKF1, NKF1, EKF1 (core 0, or the primary core) |
 //! | pulses | RCOU, channels by SERVOn_FUNCTION 33..40, else C1..C4 |
+//! | rotor speeds | ESC |
+//! | electrical power | BAT, CURR |
 //! | roll, pitch | ATT |
 //! | desired vertical velocity | GUIP, PSCD, CTUN |
 //! | battery | BAT, CURR |
@@ -15,6 +17,7 @@
 mod align;
 mod channels;
 mod clean;
+mod indicator;
 mod load;
 mod pick;
 mod series;
@@ -28,6 +31,8 @@ use thiserror::Error;
 use crate::base::time::GpsTime;
 use crate::log::{Log, LogError, ScanStats};
 use crate::mission::plan::Segment;
+
+pub use indicator::Indicator;
 
 /// A channel: samples with their own times.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,11 +60,13 @@ pub struct Flight {
     pub north_m: Series,
     /// See [`Flight::north_m`].
     pub east_m: Series,
-    /// Rotor control pulse width: mean over the motors, us.
+    /// What [`Flight::pulse_us`] holds.
+    pub indicator: Indicator,
+    /// Rotor control pulse width: mean over the motors, us; or another [`Indicator`] in its unit.
     pub pulse_us: Series,
-    /// Largest motor output at each sample of [`Flight::pulse_us`], us (for saturation).
+    /// Largest motor output over time, us (for saturation).
     pub pulse_max_us: Series,
-    /// Smallest motor output at each sample, us.
+    /// Smallest motor output over time, us.
     pub pulse_min_us: Series,
     /// Roll, radians.
     pub roll_rad: Series,
@@ -95,6 +102,8 @@ pub struct Flight {
 pub struct FlightOptions<'a> {
     /// GPS time of show time 0, for logs without SHOW rows.
     pub start: Option<GpsTime>,
+    /// What stands for rotor effort.
+    pub indicator: Indicator,
     /// What the drone was to fly, for logs without SHOW rows and a start time.
     pub segments: Option<&'a [Segment]>,
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::cell::Cell;
 use super::template::StudyPlan;
 use crate::analysis::result::WindowStats;
-use crate::analysis::windows::{WindowOptions, correct_tilt, measure, planned};
+use crate::analysis::windows::{Tilt, WindowOptions, correct_tilt, measure, planned};
 use crate::base::time::GpsTime;
 use crate::flight::{Flight, FlightError, FlightOptions};
 use crate::log::Log;
@@ -93,11 +93,16 @@ pub(super) fn fly_cell(
     let mut bytes = Vec::new();
     let summary = fly(&setup, &mut bytes).map_err(FlyError::Sim)?;
     let log = Log::from_bytes(bytes);
-    let options = FlightOptions { start: Some(START), segments: Some(&study.segments) };
+    let options = FlightOptions {
+        start: Some(START),
+        segments: Some(&study.segments),
+        ..FlightOptions::default()
+    };
     let name = format!("{}.BIN", cell.name());
     let flight = Flight::from_log(&log, Path::new(&name), options).map_err(FlyError::Flight)?;
-    let windows = WindowOptions::default();
-    let corrected = correct_tilt(&flight, windows.tilt);
+    // The paper's numbers are compared with: its form of the tilt correction.
+    let windows = WindowOptions { tilt: Tilt::Paper, ..WindowOptions::default() };
+    let corrected = correct_tilt(&flight, &windows);
     let record = CellRecord {
         schema: CELL_SCHEMA.to_owned(),
         key: String::new(),

@@ -83,7 +83,8 @@ pub(crate) fn windows(flight: &Flight) -> Vec<WindowStats> {
         }
     };
     let targets: Vec<_> = steps().into_iter().map(target).collect();
-    measure(flight, &correct_tilt(flight, Tilt::Paper), &targets, &WindowOptions::default())
+    let options = WindowOptions { tilt: Tilt::Paper, ..WindowOptions::default() };
+    measure(flight, &correct_tilt(flight, &options), &targets, &options)
 }
 
 /// The log of a flight of ours at the firmware's place, heading north, in a uniform wind (m/s,

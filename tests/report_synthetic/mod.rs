@@ -124,6 +124,7 @@ pub(crate) fn calibration(
     let table = table(&analysed);
     FlightAnalysis {
         name: name.to_owned(),
+        indicator: updraft::flight::Indicator::Pulse,
         purpose: Purpose::Calibration,
         planned: true,
         warnings: Vec::new(),
@@ -205,7 +206,9 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
             pulse_phi_us: stats(measured, 4.0),
             tilt_deg: stats(1.2, 0.4),
             lean_deg: 1.1,
+            tilt_form_us: 0.0,
             offset_us: None,
+            offset_outside: false,
             rejected: if slot == 23 && v > 3.2 { vec![Rejection::Saturated] } else { Vec::new() },
         });
         let mut time = start;
@@ -244,6 +247,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
             ..Clock::default()
         },
         windows,
+        offset: None,
         laws: Some(Laws {
             signed_quadratic: Some(quadratic),
             signed_quadratic_held: None,
@@ -402,6 +406,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             home_m: Some(position),
             clock: Clock { method: Alignment::ShowRows, ..Clock::default() },
             windows: Vec::new(),
+            offset: None,
             laws: None,
             partial_ladder: None,
             trace: Trace::default(),
@@ -414,6 +419,7 @@ pub(crate) fn hover() -> FlightAnalysis {
     }
     FlightAnalysis {
         name: "hover".to_owned(),
+        indicator: updraft::flight::Indicator::Pulse,
         purpose: Purpose::Measurement,
         planned: true,
         warnings: Vec::new(),
