@@ -21,6 +21,7 @@ use super::result::{
     TableRow, Unmeasured, UnusedLog, UpdraftMap,
 };
 use super::slots::{SlotMatch, match_slots};
+use super::statistics::{StatisticsOptions, of_map};
 use super::updraft::{self, DroneSeries};
 use super::wind::Leaning;
 use super::windows::{Tilt, WindowOptions};
@@ -126,6 +127,8 @@ pub struct AnalysisOptions {
     /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
     /// updraft (simulations), Table II for other fleets (of two drones or more).
     pub paper: Option<PaperTable>,
+    /// How statistics of a map are made.
+    pub statistics: StatisticsOptions,
     /// Most points of a trace for figures.
     pub trace_points: usize,
 }
@@ -171,6 +174,7 @@ impl Default for AnalysisOptions {
             paper_windows: false,
             map_law: None,
             paper: None,
+            statistics: StatisticsOptions::default(),
             trace_points: 1200,
         }
     }
@@ -352,9 +356,9 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         Purpose::Measurement
     });
     let mut drones = Vec::new();
-    let mut updrafts = Vec::new();
+    let (mut updrafts, mut seen) = (Vec::new(), Vec::new());
     let mut unmeasured = Vec::new();
-    for One { mut drone, calibration, updraft, .. } in ones {
+    for One { mut drone, calibration, updraft, hover, .. } in ones {
         let (slot, name) = (drone.slot, drone.name.clone());
         let nothing = |reason| Unmeasured { slot, name: name.clone(), reason };
         match (purpose, calibration, updraft) {
@@ -364,6 +368,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
                 drone
                     .warnings
                     .extend(partial_law(shared, slot, &name).filter(|_| mapping == FLOCK));
+                seen.push(hover);
                 updrafts.push((slot, name.clone(), drone.home_m, series, mapping));
             }
             (Purpose::Measurement, _, Some(Err(reason))) => unmeasured.push(nothing(reason)),
@@ -396,6 +401,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
     }
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
     warnings.extend(map.as_ref().and_then(wind_caution));
+    let statistics = map.as_ref().map(|map| of_map(map, &seen, &options.statistics));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -408,7 +414,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         flock,
         table,
         map,
-        statistics: None,
+        statistics,
         unmeasured,
         paper_table: paper.map(|paper| paper.number().to_owned()),
         warnings,

@@ -233,6 +233,9 @@ pub struct HalfRecord {
     pub second_t0_s: Option<f64>,
     /// Mean of the halves over the whole: 1 where the length does not matter, 0.5 where it is all.
     pub ratio: f64,
+    /// The same ratio in simulated flights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulated_ratio: Option<Reads>,
     /// In a sentence.
     pub words: String,
 }

@@ -1,0 +1,133 @@
+//! The statistics of a flight's map: what its logs showed, as the input of the pure functions.
+
+use super::averaging::{Seconds, averaging};
+use super::field::FieldInput;
+use super::make::{StatisticsOptions, field_statistics};
+use super::result::FieldStatistics;
+use super::tilt_wind::{MeanLean, tilt_wind};
+use crate::analysis::result::{Laws, UpdraftMap};
+use crate::analysis::updraft::{self, RUNNING_S};
+use crate::analysis::windows::{Corrected, Target};
+use crate::flight::{Flight, Series};
+
+/// A heading is taken from at most so long before, s.
+const HEADING_AGE_S: f64 = 1.0;
+/// Fewest samples in a second.
+const FEWEST_PER_SECOND: usize = 3;
+/// No hover is longer, whatever times a damaged log claims, s.
+const LONGEST_S: usize = 200_000;
+
+/// What a log showed of its hover, besides the running means of the map.
+#[derive(Clone, Debug, Default)]
+pub(in crate::analysis) struct HoverSeen {
+    /// Means over each second of the tilt-corrected pulse, us, and of the vertical velocity, m/s.
+    seconds: Vec<Option<(f64, f64)>>,
+    /// Where the mean attitude leans to, degrees clockwise from north.
+    towards_deg: Option<f64>,
+}
+
+impl HoverSeen {
+    /// Of the longest hover.
+    pub(in crate::analysis) fn of(
+        flight: &Flight,
+        corrected: &Corrected,
+        targets: &[Target],
+    ) -> Self {
+        let Some(hover) = updraft::hover(targets) else { return Self::default() };
+        let length = (hover.end_s - hover.start_s).floor().max(0.0) as usize;
+        let seconds = (0..length.min(LONGEST_S))
+            .map(|second| {
+                let from = hover.start_s + second as f64;
+                let mean = |series: &Series| {
+                    let values = series.between(from, from + 1.0);
+                    (values.len() >= FEWEST_PER_SECOND)
+                        .then(|| values.iter().sum::<f64>() / values.len() as f64)
+                };
+                mean(&corrected.pulse_phi_us).zip(mean(&flight.velocity_up_mps))
+            })
+            .collect();
+        Self { seconds, towards_deg: towards_deg(flight, hover) }
+    }
+}
+
+/// Where the thrust points to on average, degrees clockwise from north; `None` without headings.
+fn towards_deg(flight: &Flight, hover: &Target) -> Option<f64> {
+    let range = flight.roll_rad.range(hover.start_s, hover.end_s);
+    let times = flight.roll_rad.time_s.get(range.clone())?;
+    let rolls = flight.roll_rad.value.get(range)?;
+    let (mut north, mut east, mut count) = (0.0, 0.0, 0);
+    for (time, roll) in times.iter().zip(rolls) {
+        let pitch = flight.pitch_rad.latest(*time, HEADING_AGE_S);
+        let yaw = flight.yaw_deg.latest(*time, HEADING_AGE_S);
+        if let Some((pitch, yaw)) = pitch.zip(yaw) {
+            // Body up in the frame of the heading: forward with the nose down, right with the right
+            // side down.
+            let (forward, right) = (-pitch.tan(), roll.tan() / pitch.cos());
+            let (sin, cos) = yaw.to_radians().sin_cos();
+            north += cos * forward - sin * right;
+            east += sin * forward + cos * right;
+            count += 1;
+        }
+    }
+    (count > 0).then(|| f64::atan2(east, north).to_degrees().rem_euclid(360.0))
+}
+
+/// Statistics of a map and of what its logs showed, in the order of the map's drones.
+pub(in crate::analysis) fn of_map(
+    map: &UpdraftMap,
+    seen: &[HoverSeen],
+    options: &StatisticsOptions,
+) -> FieldStatistics {
+    let input = FieldInput {
+        places_m: map.drones.iter().map(|one| one.position_m.unwrap_or([f64::NAN; 2])).collect(),
+        values_mps: map.drones.iter().map(|one| one.updraft_mps.clone()).collect(),
+        running_s: RUNNING_S as usize,
+    };
+    let mut statistics = field_statistics(&input, options);
+    let drones = || map.drones.iter().zip(seen);
+    match map.flock.as_ref().and_then(slope_us_per_mps) {
+        Some(slope) => {
+            let fleet: Vec<Seconds> = drones()
+                .map(|(drone, seen)| Seconds {
+                    slot: drone.slot,
+                    name: drone.name.clone(),
+                    values_mps: seen
+                        .seconds
+                        .iter()
+                        .map(|second| second.map(|(pulse_us, up_mps)| up_mps - pulse_us / slope))
+                        .collect(),
+                })
+                .collect();
+            match averaging(&fleet) {
+                Ok(found) => statistics.averaging = Some(found),
+                Err(reason) => statistics.absent.push(reason),
+            }
+        }
+        None => statistics.absent.push(
+            "no averaging times: there is no law of the flock to turn pulses into speeds"
+                .to_owned(),
+        ),
+    }
+    let leans: Vec<MeanLean> = drones()
+        .map(|(drone, seen)| MeanLean {
+            slot: drone.slot,
+            name: drone.name.clone(),
+            lean_deg: drone.tilt_deg,
+            towards_deg: seen.towards_deg,
+        })
+        .collect();
+    statistics.wind = tilt_wind(&leans, map.leaning.map(|leaning| leaning.drag_speed_mps));
+    statistics
+}
+
+/// Pulse per speed of the flock: of its line, else of its signed square up to 1 m/s, as the slope of
+/// the square itself is 0 in still air.
+fn slope_us_per_mps(laws: &Laws) -> Option<f64> {
+    let first = |fit: &crate::analysis::result::Fit| Some(fit.parameters.first()?.estimate.value);
+    let slope = laws
+        .linear
+        .as_ref()
+        .and_then(first)
+        .or_else(|| laws.signed_quadratic.as_ref().and_then(first))?;
+    (slope.is_finite() && slope > 0.0).then_some(slope)
+}
