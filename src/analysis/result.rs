@@ -44,6 +44,10 @@ pub struct FlightAnalysis {
     pub indicator: Indicator,
     /// Whether windows came from a plan (else from the log's desired velocity).
     pub planned: bool,
+    /// Direction of the show frame's x axis (forward), degrees clockwise from north; absent without a
+    /// plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation_deg: Option<f64>,
     /// The true vertical air speed in this flight, m/s, when it was simulated in uniform air.
     pub true_updraft_mps: Option<f64>,
     /// Analysed drones, in slot order.

@@ -184,9 +184,14 @@ impl AnalyzeOptions {
         vec![
             ("law of the map", name(self.law)),
             ("tilt correction", name(self.tilt)),
+            ("rotor effort", name(self.indicator)),
+            ("offset over time and height", name(self.offset)),
             ("windows", windows.to_owned()),
             ("air density at height, in the map", corrected(self.no_density)),
-            ("wind on leaning drones, in the map, where their drag is known", corrected(self.no_wind)),
+            (
+                "wind on leaning drones, in the map, where their drag is known",
+                corrected(self.no_wind),
+            ),
         ]
     }
 }

@@ -19,6 +19,8 @@ pub(super) struct OffsetScale {
     pub(super) height: Axis,
     /// The scale runs from minus to plus this, us.
     pub(super) limit_us: f64,
+    /// The unit of rotor effort, as the analysis names it.
+    pub(super) unit: &'static str,
 }
 
 impl OffsetScale {
@@ -38,6 +40,7 @@ impl OffsetScale {
             time: Axis::time(ends.chain(points().map(|p| p.time_s))),
             height: Axis::around("height (m)", heights, 10.0),
             limit_us: (largest / step).ceil() * step,
+            unit: flight.indicator.unit(),
         })
     }
 

@@ -11,7 +11,7 @@ use super::figures::{air, averaging, correlation, evolution, map as figure_map};
 use super::film::film;
 use super::frames::Frames;
 use super::page::{Gallery, capitalised, flight_key};
-use super::text::{clean, fixed, signed};
+use super::text::{clean, fixed, signed, usable};
 use super::{errors, scales};
 
 /// The maps of a flight, which the page shows first: they are what the fleet was flown for.
@@ -38,7 +38,7 @@ pub(super) fn air_section(
         }
     });
     let more: Vec<Value> = [
-        frames.as_ref().and_then(|frames| evolution::figure(flight, &key, frames, None)),
+        frames.as_ref().and_then(|frames| evolution::figure(flight, &key, frames, wind(flight))),
         air::figure(flight, &key, map),
     ]
     .into_iter()
@@ -57,6 +57,16 @@ pub(super) fn air_section(
     Some(
         context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), mean, film => shown, more, statistics, errors => errors::section(map) },
     )
+}
+
+/// Where the fleet's mean wind blows to, [forward, left] in m/s, where speed and direction are known.
+fn wind(flight: &FlightAnalysis) -> Option<[f64; 2]> {
+    let wind = flight.statistics.as_ref()?.wind.as_ref()?;
+    let (speed, from_deg) = (wind.speed_mps?.value, wind.from_deg?);
+    // Clockwise from forward, as seen from above.
+    let to_rad = (from_deg + 180.0 - flight.orientation_deg?).to_radians();
+    let (sin, cos) = to_rad.sin_cos();
+    (usable(speed) && usable(to_rad)).then_some([speed * cos, -speed * sin])
 }
 
 /// A colour bar of the page: its gradient and the numbers below it.

@@ -2,6 +2,7 @@
 
 use crate::analysis::result::{Fit, Parameter, Rejection};
 use crate::base::estimate::Estimate;
+use crate::flight::Indicator;
 use crate::mission::plan::{Kind, Purpose};
 
 /// Shown instead of a number that does not exist.
@@ -108,6 +109,16 @@ pub(super) fn unit(unit: &str) -> String {
         Some(rest) => format!("µs{rest}"),
         None => unit,
     }
+}
+
+/// Axis label of rotor effort: `tilt-corrected pulse width uφ (µs)`.
+pub(super) fn effort_label(indicator: Indicator) -> String {
+    let name = match indicator {
+        Indicator::Pulse => "tilt-corrected pulse width",
+        Indicator::RotorSpeed => "tilt-corrected rotor speed",
+        Indicator::Power => "tilt-corrected power",
+    };
+    format!("{name} uφ ({})", unit(indicator.unit()))
 }
 
 /// The report's symbol of a parameter.

@@ -4,6 +4,8 @@
 
 #![allow(dead_code, clippy::allow_attributes, reason = "each test binary uses a part")]
 
+mod whole;
+
 use std::f64::consts::TAU;
 
 use rand::Rng as _;
@@ -17,6 +19,9 @@ use updraft::base::rng::{self, Purpose as Stream};
 use updraft::flight::{Alignment, Clock};
 use updraft::mission::plan::{Kind, Purpose};
 use updraft::report::{InputFile, Provenance};
+
+#[allow(unused_imports, reason = "each test binary uses a part")]
+pub(crate) use whole::whole_campaign;
 
 /// The paper's simulated law.
 const A: f64 = 8.14;
@@ -86,6 +91,7 @@ pub(crate) fn provenance() -> Provenance {
         command: "updraft run --grid 7x7 --spacing 7 --seed 2024 -o my-campaign".to_owned(),
         seed: Some(2024),
         made_at: "2026-11-20 12:00 UTC".to_owned(),
+        settings: vec![("law of the map".to_owned(), "auto".to_owned())],
         inputs: (1..=3)
             .map(|i| InputFile {
                 path: format!("calibration/logs/{i:02}.BIN"),
@@ -127,6 +133,7 @@ pub(crate) fn calibration(
         indicator: updraft::flight::Indicator::Pulse,
         purpose: Purpose::Calibration,
         planned: true,
+        orientation_deg: Some(30.0),
         warnings: Vec::new(),
         unused: Vec::new(),
         partly_used: Vec::new(),
@@ -422,6 +429,7 @@ pub(crate) fn hover() -> FlightAnalysis {
         indicator: updraft::flight::Indicator::Pulse,
         purpose: Purpose::Measurement,
         planned: true,
+        orientation_deg: Some(30.0),
         warnings: Vec::new(),
         unused: Vec::new(),
         partly_used: Vec::new(),

@@ -148,6 +148,7 @@ fn statistics() -> FieldStatistics {
                 first_t0_s: Some(71.0),
                 second_t0_s: Some(80.0),
                 ratio: 0.51,
+                simulated_ratio: None,
                 words: "Half of the record gives half of t₀.".to_owned(),
             }),
             words: "t₀ is made by the length of the record.".to_owned(),

@@ -4,7 +4,7 @@
 use kuva::plot::legend::{LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 
-use super::laws::{PULSE_LABEL, VELOCITY_LABEL};
+use super::laws::VELOCITY_LABEL;
 use super::plan_view::narrow_bar;
 use crate::analysis::offset::OffsetMap;
 use crate::analysis::result::{DroneAnalysis, FlightAnalysis, WindowStats};
@@ -18,7 +18,7 @@ use crate::report::raster::image;
 use crate::report::shapes::Shape;
 use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
-use crate::report::text::{clean, fixed, signed, slug, usable};
+use crate::report::text::{clean, effort_label, fixed, signed, slug, unit, usable};
 
 /// A trace keeps two samples of each of so many stretches.
 const TRACE_BUCKETS: usize = 200;
@@ -78,7 +78,7 @@ impl Axes {
                 1.0,
             ),
             pulse: Axis::around(
-                "u* (µs)",
+                &format!("u* ({})", unit(flight.indicator.unit())),
                 traces()
                     .flat_map(|trace| trace.pulse_phi_us.iter().copied())
                     .chain(windows().map(adjusted)),
@@ -90,7 +90,11 @@ impl Axes {
                 10.0,
             ),
             law_velocity: Axis::around(VELOCITY_LABEL, marks().map(|mark| mark.x), 1.0),
-            law_pulse: Axis::around(PULSE_LABEL, marks().map(|mark| mark.y), 10.0),
+            law_pulse: Axis::around(
+                &effort_label(flight.indicator),
+                marks().map(|mark| mark.y),
+                10.0,
+            ),
             velocity_limit,
             pulse_scale: (middle, pulse_limit),
             offset: OffsetScale::of(flight),
@@ -154,8 +158,8 @@ pub(in crate::report) fn figure(
         name,
         title,
         caption: format!(
-            "The paper's Fig. 3. (a) Vertical velocity and (b) adjusted pulse width \
-             u* = u cos φ − offset (green). Bars are the windows, over the time that each takes, \
+            "The paper's Fig. 3. (a) Vertical velocity and (b) tilt-corrected \
+             rotor effort without the offset, u* (green). Bars are the windows, over the time that each takes, \
              coloured by value; windows that were rejected are grey. {offset_words} (d) The windows \
              as points, coloured by time, error bars one standard deviation of the samples, with \
              the linear law (solid) and the signed-quadratic law (dashed). Hovers are diamonds: \
@@ -175,7 +179,7 @@ fn velocity_panel(drone: &DroneAnalysis, axes: &Axes) -> Panel {
 
 fn pulse_panel(drone: &DroneAnalysis, axes: &Axes, offset: Option<&OffsetMap>) -> Panel {
     let mut panel =
-        Panel::new("(b) Adjusted pulse width u*", axes.time.clone(), axes.pulse.clone());
+        Panel::new("(b) Adjusted rotor effort u*", axes.time.clone(), axes.pulse.clone());
     panel.leave_room_right();
     let surface = offset.map(OffsetMap::surface);
     let values: Vec<f64> = drone

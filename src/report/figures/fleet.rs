@@ -10,7 +10,7 @@ use crate::report::colour::{FAINT, INK, MUTED, RULE};
 use crate::report::offset_field::OffsetScale;
 use crate::report::raster::{Pixel, image};
 use crate::report::svg::{Anchor, Drawing, TextStyle, escape};
-use crate::report::text::{clean, count, fixed, signed, usable};
+use crate::report::text::{clean, count, fixed, signed, unit, usable};
 
 use super::plan_view::{colour_bar, places_of_slots};
 
@@ -68,7 +68,12 @@ pub(in crate::report) fn figure(
         let [x, y] = corner(places.rows - 1, 0);
         axes(&mut drawing, scale, [x, y, pitch[0] - gap, pitch[1] - gap]);
         let bar = [LEFT + size[0] + 22.0, TOP + 70.0, 16.0, (size[1] - 90.0).clamp(110.0, 320.0)];
-        colour_bar(&mut drawing, bar, scale.limit_us, "offset of u cos φ (µs)");
+        colour_bar(
+            &mut drawing,
+            bar,
+            scale.limit_us,
+            &format!("offset of uφ ({})", unit(scale.unit)),
+        );
     }
     if places.on_ground {
         compass(&mut drawing, [LEFT + size[0] + 30.0, TOP + 26.0]);
@@ -76,7 +81,7 @@ pub(in crate::report) fn figure(
     let name = format!("fig4-{key}");
     let title = format!("The fleet, {}", clean(&flight.name));
     let heat = if scale.is_some() {
-        "Each cell is one drone at its place in the grid: the slow offset of its pulse over time \
+        "Each cell is one drone at its place in the grid: the slow offset of its rotor effort over time \
          (to the right) and height (up), on the axes of the lower left cell; red: the drone worked \
          harder than in its mean hover, blue: less. Hatched: not between hovers, the nearest \
          hover's offset stands in."
@@ -210,7 +215,8 @@ fn cell(
     if let Some(offset) = &drone.offset {
         let ends = offset.points.iter().map(|point| point.offset_us).filter(|us| usable(*us));
         let (low, high) = ends.fold((0.0_f64, 0.0_f64), |(l, h), us| (l.min(us), h.max(us)));
-        tooltip.push_str(&format!(": offset {} to {} µs", signed(low, 1), signed(high, 1)));
+        let unit = scale.map_or_else(String::new, |scale| unit(scale.unit));
+        tooltip.push_str(&format!(": offset {} to {} {unit}", signed(low, 1), signed(high, 1)));
     }
     if let Some(name) = &figure {
         drawing.raw(&format!(

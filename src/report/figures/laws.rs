@@ -12,10 +12,10 @@ use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, INK, MUTED, VERMILLION, sequential};
 use crate::report::law;
 use crate::report::sheet::Sheet;
-use crate::report::text::{clean, count, parameter, shortened, signed, usable};
+use crate::report::text::{clean, count, effort_label, parameter, shortened, signed, usable};
 
 /// Label of the pulse-width axis.
-pub(in crate::report) const PULSE_LABEL: &str = "tilt-corrected pulse width u cos φ (µs)";
+pub(in crate::report) const PULSE_LABEL: &str = "tilt-corrected pulse width uφ (µs)";
 /// Label of the velocity axis.
 pub(in crate::report) const VELOCITY_LABEL: &str = "vertical velocity (m/s, up positive)";
 
@@ -37,7 +37,8 @@ pub(in crate::report) fn figure(analysis: &Analysis) -> Option<Figure> {
         return None;
     }
     let v = Axis::around(VELOCITY_LABEL, windows().map(|window| law::mark(window).x), 1.0);
-    let u = Axis::around(PULSE_LABEL, windows().map(|window| law::mark(window).y), 10.0);
+    let effort = flights.first().map_or_else(String::new, |flight| effort_label(flight.indicator));
+    let u = Axis::around(&effort, windows().map(|window| law::mark(window).y), 10.0);
     let mut panel = Panel::new("(a) Windows and fitted laws", v.clone(), u);
 
     let colours = flight_colours(&flights);
