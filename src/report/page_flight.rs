@@ -2,10 +2,12 @@
 
 use minijinja::context;
 use minijinja::value::Value;
+use rayon::prelude::*;
 
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::mission::plan::Purpose;
 
+use super::Figure;
 use super::compare::{
     compared, comparison, drones_of, fit_line, flock_lines, nothing, scatter_line, table_heading,
 };
@@ -125,12 +127,12 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
     let mut shown = None;
     let undrawn = flight.drones.len() - wanted.len();
     let mut left_out = 0;
-    for index in wanted {
-        let (Some(drone), Some(figure)) =
-            (flight.drones.get(index), figure_drone::figure(flight, key, index, &axes))
-        else {
-            continue;
-        };
+    let drawn: Vec<(usize, Option<Figure>)> = wanted
+        .into_par_iter()
+        .map(|index| (index, figure_drone::figure(flight, key, index, &axes)))
+        .collect();
+    for (index, figure) in drawn {
+        let (Some(drone), Some(figure)) = (flight.drones.get(index), figure) else { continue };
         let label = match drone.slot {
             Some(slot) if clean(&drone.name).contains(&slot.to_string()) => clean(&drone.name),
             Some(slot) => format!("slot {slot}: {}", clean(&drone.name)),

@@ -39,8 +39,8 @@ fn program() -> Option<String> {
     if let Ok(named) = std::env::var("UPDRAFT_BROWSER") {
         return Some(named);
     }
-    let works = |name: &&str| {
-        let mut command = Command::new(name);
+    let works = |name: &&&str| {
+        let mut command = Command::new(**name);
         command.arg("--version").stdout(Stdio::null()).stderr(Stdio::null());
         command.status().is_ok_and(|status| status.success())
     };
@@ -277,14 +277,11 @@ impl Tab<'_> {
 
     /// Keeps the whole page.
     pub(crate) fn whole_page(&mut self, path: &Path) {
-        self.capture(
-            path,
-            &json!({ "format": "png", "captureBeyondViewport": true, "clip": {
-            "x": 0, "y": 0, "scale": 1,
-            "width": self.number("document.documentElement.clientWidth"),
-            "height": self.number("Math.min(16000, document.documentElement.scrollHeight)"),
-        } }),
-        );
+        let width = self.number("document.documentElement.clientWidth");
+        let height = self.number("Math.min(16000, document.documentElement.scrollHeight)");
+        let clip = json!({ "x": 0, "y": 0, "width": width, "height": height, "scale": 1 });
+        let how = json!({ "format": "png", "captureBeyondViewport": true, "clip": clip });
+        self.capture(path, &how);
     }
 
     fn capture(&mut self, path: &Path, how: &Value) {
