@@ -55,7 +55,7 @@ fn parquet_holds_what_the_csv_holds() {
     let analysis = campaign();
     let bytes = updraft::report::fields_parquet::parquet(&analysis).unwrap();
     let csv_bytes = csv(&analysis).len();
-    assert!(4 * bytes.len() < csv_bytes, "{} bytes, the CSV has {csv_bytes}", bytes.len());
+    assert!(2 * bytes.len() < csv_bytes, "{} bytes, the CSV has {csv_bytes}", bytes.len());
     let mut file = tempfile::tempfile().unwrap();
     std::io::Write::write_all(&mut file, &bytes).unwrap();
     let reader = SerializedFileReader::new(file).unwrap();

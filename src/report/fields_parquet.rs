@@ -1,4 +1,4 @@
-//! The measured fields as Parquet: the table of `fields.rs`, typed and a tenth of the size.
+//! The measured fields as Parquet: the table of `fields.rs`, typed and a third of the size.
 
 use std::sync::Arc;
 

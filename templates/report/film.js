@@ -38,9 +38,16 @@ for (const film of document.querySelectorAll(".film")) {
     return [all.reduce((a, b) => Math.min(a, b)), all.reduce((a, b) => Math.max(a, b))];
   };
   const [x, y] = [extent(0), extent(1)];
-  const area = Math.max(x[1] - x[0], y[1] - y[0]);
-  const cell = Math.max(1, area / Math.max(1, Math.sqrt(known.length) - 1));
-  const margin = data.triangles.length ? 0.35 * cell : 0.6 * cell;
+  // As wide as the closest two drones are apart.
+  let cell = Infinity;
+  known.forEach((a, i) => {
+    for (const b of known.slice(i + 1)) {
+      const apart = Math.hypot(a[0] - b[0], a[1] - b[1]);
+      if (apart > 0.5 && apart < cell) cell = apart;
+    }
+  });
+  if (cell === Infinity) cell = 7;
+  const margin = 0.5 * cell;
   const forward = [x[1] + margin, x[0] - margin];
   const left = [y[1] + margin, y[0] - margin];
   const wide = left[0] - left[1];

@@ -1,7 +1,7 @@
 //! Figure 4: every drone at its place in the grid, with its slow offset over time and height; each
 //! cell opens the drone's Figure 3.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::analysis::result::{Analysis, DroneAnalysis, FlightAnalysis};
 use crate::report::Figure;
@@ -26,12 +26,14 @@ const ASPECT: f64 = 0.72;
 /// Picture elements across the whole fleet.
 const ELEMENTS: usize = 520;
 
+/// Row from the top, column from the left, slot, index of the drone if there is one.
+type Cell = (usize, usize, Option<u16>, Option<usize>);
+
 /// The grid's shape and each place's row and column.
 struct Places {
     rows: usize,
     columns: usize,
-    /// (row from the top, column from the left, slot or index of the drone, drone).
-    cells: Vec<(usize, usize, Option<u16>, Option<usize>)>,
+    cells: Vec<Cell>,
     /// Whether rows and columns are those of the ground.
     on_ground: bool,
 }
@@ -135,7 +137,7 @@ fn places(analysis: &Analysis, flight: &FlightAnalysis) -> Places {
     let columns = if on_ground { left.len() } else { (all.len() as f64).sqrt().ceil() as usize };
     let columns = columns.max(1);
     all.sort_by_key(|one| (one.0.unwrap_or(u16::MAX), one.1));
-    let cells = all
+    let mut cells: Vec<Cell> = all
         .iter()
         .enumerate()
         .map(|(index, (slot, drone, place))| {
@@ -147,6 +149,13 @@ fn places(analysis: &Analysis, flight: &FlightAnalysis) -> Places {
         })
         .collect();
     let rows = if on_ground { forward.len() } else { all.len().div_ceil(columns).max(1) };
+    // Holes of the grid are drones that nobody knows the place of.
+    if on_ground && rows * columns <= 2 * all.len() {
+        let taken: BTreeSet<(usize, usize)> = cells.iter().map(|cell| (cell.0, cell.1)).collect();
+        let every = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        let holes = every.filter(|place| !taken.contains(place));
+        cells.extend(holes.map(|(row, column)| (row, column, None, None)));
+    }
     Places { rows, columns, cells, on_ground }
 }
 
@@ -197,7 +206,7 @@ fn cell(
         anchor: Anchor::Start,
     };
     let Some((index, drone)) = drone else {
-        drawing.open(&format!("{label}: no log"));
+        drawing.open(format!("{label} no log").trim_start());
         let dashed = format!("stroke=\"{FAINT}\" stroke-dasharray=\"4 3\"");
         drawing.rect([x, y, w, h], "#fafbfc", &dashed);
         if w > 60.0 {
