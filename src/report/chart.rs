@@ -176,7 +176,6 @@ impl Panel {
             .with_x_axis_max(self.x.max)
             .with_y_axis_min(self.y.min)
             .with_y_axis_max(self.y.max)
-            .with_x_tick_step(self.x.step)
             .with_y_tick_step(self.y.step)
             .with_x_tick_format(self.x.format())
             .with_y_tick_format(self.y.format())
@@ -187,9 +186,8 @@ impl Panel {
             .with_body_size(12)
             .with_font_family(FONT)
             .with_theme(theme());
-        if self.log_x {
-            layout = layout.with_log_x();
-        }
+        layout =
+            if self.log_x { layout.with_log_x() } else { layout.with_x_tick_step(self.x.step) };
         if !self.legend.is_empty() {
             layout = layout
                 .with_legend_entries(self.legend)

@@ -57,7 +57,7 @@ impl OffsetScale {
             for column in 0..columns {
                 let offset = surface.at(along(&self.time, column, columns), height_m);
                 pixels.push(match offset {
-                    Some(offset) if !offset.inside && (row + column) % 4 == 0 => Pixel::Hatch,
+                    Some(offset) if !offset.inside && (row + column) % 6 == 0 => Pixel::Hatch,
                     Some(offset) if usable(offset.us) => Pixel::At(offset.us / self.limit_us),
                     _ => Pixel::Empty,
                 });

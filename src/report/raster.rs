@@ -59,7 +59,7 @@ fn png(pixels: &[Pixel], columns: usize, rows: usize) -> Option<Vec<u8>> {
         .collect();
     let palette: Vec<u8> = (0..COLOURS)
         .flat_map(|i| diverging_rgb(2.0 * f64::from(i) / f64::from(COLOURS - 1) - 1.0))
-        .chain([0x8a, 0x94, 0x9e, 255, 255, 255])
+        .chain([0x9f, 0xa8, 0xb1, 255, 255, 255])
         .collect();
     let mut opaque = vec![255_u8; usize::from(EMPTY)];
     opaque.push(0);

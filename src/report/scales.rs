@@ -8,7 +8,7 @@ use crate::analysis::statistics::result::{
 };
 use crate::base::estimate::Estimate;
 
-use super::text::{NONE, clean, count, estimate, fixed, usable};
+use super::text::{NONE, count, estimate, fixed, sentence, usable};
 
 /// Three significant digits.
 fn rounded(value: f64) -> String {
@@ -97,9 +97,9 @@ pub(super) fn section(of: &FieldStatistics) -> Value {
         rows.push(row("σ of the air, maximum likelihood", "m/s", &model.sd_mps));
     }
     let mut words: Vec<String> = Vec::new();
-    let mut say = |sentence: &str| {
-        if !sentence.trim().is_empty() {
-            words.push(clean(sentence));
+    let mut say = |words_of: &str| {
+        if !words_of.trim().is_empty() {
+            words.push(sentence(words_of));
         }
     };
     if let Some(space) = &of.space {
@@ -125,8 +125,8 @@ pub(super) fn section(of: &FieldStatistics) -> Value {
         rows,
         words,
         variants => of.variants.iter().map(variant).collect::<Vec<_>>(),
-        absent => of.absent.iter().map(|one| clean(one)).collect::<Vec<_>>(),
-        simulated => of.simulated.as_ref().map(|simulated| clean(&simulated.words)),
+        absent => of.absent.iter().map(|one| sentence(one)).collect::<Vec<_>>(),
+        simulated => of.simulated.as_ref().map(|simulated| sentence(&simulated.words)),
         record => format!(
             "{} over {} s, {} m to {} m apart; values are running means of {} s; their standard \
              deviation over time is {} m/s, that of the fleet's mean {} m/s; {} % are missing",

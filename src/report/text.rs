@@ -173,6 +173,15 @@ pub(super) fn parameter<'fit>(fit: Option<&'fit Fit>, name: &str) -> Option<&'fi
     fit?.parameters.iter().find(|parameter| parameter.name == name)
 }
 
+/// Foreign words as a sentence: a capital first letter and a full stop.
+pub(super) fn sentence(text: &str) -> String {
+    let text = clean(text.trim());
+    let mut letters = text.chars();
+    let Some(first) = letters.next() else { return text };
+    let body: String = first.to_uppercase().chain(letters).collect();
+    if body.ends_with(['.', '!', '?']) { body } else { format!("{body}.") }
+}
+
 /// Plural by count: `1 drone`, `3 drones`.
 pub(super) fn count(n: usize, noun: &str) -> String {
     if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }

@@ -9,7 +9,7 @@ use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::{BLUE, MUTED, VERMILLION};
 use crate::report::sheet::Sheet;
-use crate::report::text::{clean, fixed, usable};
+use crate::report::text::{clean, fixed, sentence, usable};
 
 /// The fleet's median with its quartiles; `None` with fewer than three lengths of averages.
 pub(in crate::report) fn figure(
@@ -43,7 +43,7 @@ pub(in crate::report) fn figure(
     };
     let mut panel = Panel::new("How much averages of one length differ", x, y.clone());
     panel.logarithmic_x();
-    panel.legend_at(LegendPosition::InsideTopRight);
+    panel.legend_at(LegendPosition::InsideBottomRight);
     let band: Vec<(f64, f64, f64)> = averaging
         .averaging_s
         .iter()
@@ -75,7 +75,7 @@ pub(in crate::report) fn figure(
         caption: format!(
             "Allan deviation: how much two averages of one length, one right after \
                   the other, differ (over √2). {}",
-            clean(&averaging.words)
+            sentence(&averaging.words)
         ),
     })
 }

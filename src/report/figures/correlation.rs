@@ -68,7 +68,7 @@ pub(in crate::report) fn figure(
         title,
         caption: "The paper's Fig. 6. (a), (c), (d) Correlation of every pair of drones, gathered by \
                   nominal distance: the shape is their distribution, lines are the lowest, the \
-                  highest and (thick) the median, the dot is the mean; dashed red: exp(−r/λ) fitted \
+                  highest and (wide) the median, the short dark bar is the mean; dashed red: exp(−r/λ) fitted \
                   to the medians; dotted grey: the paper's. (b) Autocorrelation, mean of the drones \
                   with a band of one standard deviation between them; dashed red: A (Δt − t₀), \
                   fitted up to the first zero. The ± in the legend is the error of the curve fit, as \
@@ -105,6 +105,9 @@ fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, symbol: &str)
     let farthest = of.classes.iter().map(|class| class.distance_m);
     let mut x = Axis::around("distance between drones (m)", farthest.chain([0.0]), 1.0);
     x.min = 0.0;
+    // No empty half: the axis need not end on a tick.
+    let last = of.classes.iter().map(|class| class.distance_m).filter(|r| usable(*r));
+    x.max = x.max.min(1.06 * last.fold(1.0, f64::max));
     let mut panel = Panel::new(title, x.clone(), y.clone());
     panel.legend_at(if y.min < -0.4 {
         LegendPosition::InsideBottomLeft
@@ -167,7 +170,7 @@ fn violins(panel: &mut Panel, classes: &[DistanceClass], x: &Axis) {
     at.sort_by(f64::total_cmp);
     let gap = at.windows(2).map(|pair| pair[1] - pair[0]).fold(x.max, f64::min);
     // Half as wide as the closest distances are apart, but never a hairline.
-    let half = (0.45 * gap).clamp(0.006 * x.max, 0.03 * x.max);
+    let half = (0.45 * gap).clamp(0.011 * x.max, 0.03 * x.max);
     let (mut medians, mut ends, mut means) = (Vec::new(), Vec::new(), Vec::new());
     for class in classes {
         let r = class.distance_m;

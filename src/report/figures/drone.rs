@@ -25,12 +25,12 @@ const TRACE_BUCKETS: usize = 200;
 /// Sizes of the panels, pixels: (a) and (b), (c), (d).
 const TRACES: [f64; 2] = [620.0, 206.0];
 const OFFSET: [f64; 2] = [620.0, 216.0];
-const LAW: [f64; 2] = [412.0, 470.0];
+const LAW: [f64; 2] = [412.0, 560.0];
 /// Where (c) starts and (d) stands.
 const OFFSET_TOP: f64 = 2.0 * TRACES[1];
 const LAW_LEFT: f64 = 628.0;
 /// Picture elements of the offset.
-const ELEMENTS: (usize, usize) = (128, 44);
+const ELEMENTS: (usize, usize) = (246, 70);
 
 /// Axes and scales shared by all drones of a flight, so that they compare when one flips through
 /// them.
@@ -79,9 +79,8 @@ impl Axes {
             ),
             pulse: Axis::around(
                 &format!("u* ({})", unit(flight.indicator.unit())),
-                traces()
-                    .flat_map(|trace| trace.pulse_phi_us.iter().copied())
-                    .chain(windows().map(adjusted)),
+                // Around the windows: take-off and landing would squeeze them into a line.
+                [middle - 1.5 * pulse_limit, middle + 1.5 * pulse_limit].into_iter(),
                 20.0,
             ),
             height: Axis::around(
@@ -205,6 +204,9 @@ fn height_panel(axes: &Axes, offset: Option<&OffsetMap>) -> Panel {
         if offset.is_some() { "(c) Offset over time and height" } else { "(c) Height over time" };
     let mut panel = Panel::new(title, axes.time.clone(), axes.height.clone());
     panel.leave_room_right();
+    // A panel without a plot has no ticks.
+    let bottom = axes.height.min;
+    panel.line(&[(axes.time.min, bottom), (axes.time.max, bottom)], FAINT, 0.5, "");
     panel
 }
 
@@ -259,7 +261,7 @@ fn bars(over: &mut Drawing, axes: &Axes, with_offset: bool) {
     }
     // The colours of (d), below it.
     let [x, _, w, _] = frame(LAW[0], LAW[1], false);
-    let (left, top) = (LAW_LEFT + x, LAW[1] + 34.0);
+    let (left, top) = (LAW_LEFT + x, LAW[1] + 22.0);
     for step in 0..60 {
         let place = f64::from(step) / 60.0;
         let slice = [left + place * w, top, w / 60.0 + 0.4, 10.0];

@@ -15,7 +15,7 @@ use crate::report::text::{clean, count, fixed, signed, unit, usable};
 use super::plan_view::{colour_bar, places_of_slots};
 
 /// Room for the grid, pixels.
-const ROOM: f64 = 880.0;
+const ROOM: f64 = 840.0;
 /// Left of the grid: the axis of heights.
 const LEFT: f64 = 58.0;
 /// Above the grid.
@@ -90,15 +90,20 @@ pub(in crate::report) fn figure(
     } else {
         "Each cell is one drone at its place in the grid. No offset was subtracted in this flight."
     };
+    let missing = match flight.missing.len() {
+        0 => String::new(),
+        n => format!(
+            " Dashed cells have no log: {n} of {}.",
+            count(flight.drones.len() + n, "drone")
+        ),
+    };
     Some(Figure {
         svg: drawing.finish(&title),
         name,
         title,
         caption: format!(
-            "The paper's Fig. 4. {heat} Dashed cells have no log: {} of {}. Click a cell, or press \
-             Enter on it, to open that drone's calibration.",
-            flight.missing.len(),
-            count(flight.drones.len() + flight.missing.len(), "drone"),
+            "The paper's Fig. 4. {heat}{missing} Click a cell, or press Enter on it, to open that \
+             drone's calibration.",
         ),
     })
 }
@@ -271,5 +276,5 @@ fn compass(drawing: &mut Drawing, [x, y]: [f64; 2]) {
     drawing.line([x, y, x, y - 26.0], INK);
     drawing.line([x, y - 26.0, x - 4.0, y - 20.0], INK);
     drawing.line([x, y - 26.0, x + 4.0, y - 20.0], INK);
-    drawing.text([x + 8.0, y - 14.0], "forward (show x)", style, 0.0);
+    drawing.text([x + 8.0, y - 14.0], "forward", style, 0.0);
 }

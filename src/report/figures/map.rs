@@ -42,13 +42,16 @@ pub(in crate::report) fn mean_map(
     let right = if truth_known { 70.0 + 2.0 * width + 30.0 } else { 70.0 + width };
     let mut drawing = Drawing::new((right + 130.0).max(380.0), top + height.max(220.0) + 58.0);
     let with_text = positions.len() <= TEXT_LIMIT;
+    // As many decimals as the largest error asks for, the same in all cells.
+    let largest = map.drones.iter().map(|drone| drone.mean.se).filter(|se| usable(*se));
+    let decimals = with_text.then(|| error_decimals(largest.fold(0.0, f64::max)));
     for (slot, home) in &empty {
         empty_cell(&mut drawing, *slot, projection.cell(*home), with_text);
     }
     for drone in &map.drones {
         if let Some(place) = position(drone) {
             let cell = projection.cell(place);
-            mean_cell(&mut drawing, drone, cell, limit, with_text);
+            mean_cell(&mut drawing, drone, cell, limit, decimals);
         }
     }
     axes(&mut drawing, &projection);
@@ -56,7 +59,7 @@ pub(in crate::report) fn mean_map(
         let aside = Projection::new(&positions, [100.0 + width, top], room, 0.5)?;
         for (drone, truth) in map.drones.iter().zip(&truths) {
             if let (Some(place), Some(truth)) = (position(drone), truth) {
-                true_cell(&mut drawing, drone, *truth, aside.cell(place), limit, with_text);
+                true_cell(&mut drawing, drone, *truth, aside.cell(place), limit, decimals);
             }
         }
         for (projection, words) in [(&projection, "estimated W*"), (&aside, "true W")] {
@@ -100,16 +103,16 @@ fn true_cell(
     truth: f64,
     [x, y, w, h]: [f64; 4],
     limit: f64,
-    with_text: bool,
+    decimals: Option<usize>,
 ) {
     drawing.open(&format!("{}: true mean {} m/s", clean(&drone.name), signed(truth, 3)));
     let fill = diverging(truth / limit);
     drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
-    if with_text {
+    if let Some(decimals) = decimals {
         let colour = ink_on_diverging(truth / limit);
         let size = (w * 0.23).min(20.0);
         let style = TextStyle { size, bold: true, colour, anchor: Anchor::Middle };
-        let text = signed(truth, error_decimals(drone.mean.se));
+        let text = signed(truth, decimals);
         drawing.text([x + w / 2.0, y + h * 0.56], &text, style, 0.0);
     }
     drawing.close();
@@ -141,7 +144,7 @@ fn mean_cell(
     drone: &DroneUpdraft,
     [x, y, w, h]: [f64; 4],
     limit: f64,
-    with_text: bool,
+    decimals: Option<usize>,
 ) {
     let place = drone.mean.value / limit;
     let fill = if usable(drone.mean.value) { diverging(place) } else { "#ffffff".to_owned() };
@@ -152,10 +155,9 @@ fn mean_cell(
         clean(&drone.mapping),
     ));
     drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
-    if with_text {
+    if let Some(decimals) = decimals {
         let colour = if usable(drone.mean.value) { ink_on_diverging(place) } else { MUTED };
         let style = |size: f64, bold| TextStyle { size, bold, colour, anchor: Anchor::Middle };
-        let decimals = error_decimals(drone.mean.se);
         let text = if usable(drone.mean.value) {
             signed(drone.mean.value, decimals)
         } else {
