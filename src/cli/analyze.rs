@@ -171,7 +171,7 @@ impl AnalyzeOptions {
 impl AnalyzeOptions {
     /// How it was analysed, for the report: (what, how).
     fn words(&self) -> Vec<(&'static str, String)> {
-        fn name(value: impl ValueEnum) -> String {
+        fn name(value: &impl ValueEnum) -> String {
             let value = value.to_possible_value();
             value.map_or_else(String::new, |value| value.get_name().to_owned())
         }
@@ -182,10 +182,10 @@ impl AnalyzeOptions {
             "trimmed means, weighted by their standard errors"
         };
         vec![
-            ("law of the map", name(self.law)),
-            ("tilt correction", name(self.tilt)),
-            ("rotor effort", name(self.indicator)),
-            ("offset over time and height", name(self.offset)),
+            ("law of the map", name(&self.law)),
+            ("tilt correction", name(&self.tilt)),
+            ("rotor effort", name(&self.indicator)),
+            ("offset over time and height", name(&self.offset)),
             ("windows", windows.to_owned()),
             ("air density at height, in the map", corrected(self.no_density)),
             (

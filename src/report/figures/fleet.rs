@@ -2,6 +2,7 @@
 //! cell opens the drone's Figure 3.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 
 use crate::analysis::result::{Analysis, DroneAnalysis, FlightAnalysis};
 use crate::report::Figure;
@@ -28,6 +29,9 @@ const ELEMENTS: usize = 520;
 
 /// Row from the top, column from the left, slot, index of the drone if there is one.
 type Cell = (usize, usize, Option<u16>, Option<usize>);
+
+/// Slot, index of the drone if there is one, and place.
+type Placed = (Option<u16>, Option<usize>, Option<[f64; 2]>);
 
 /// The grid's shape and each place's row and column.
 struct Places {
@@ -114,7 +118,7 @@ fn places(analysis: &Analysis, flight: &FlightAnalysis) -> Places {
     let place = |slot: Option<u16>, home: Option<[f64; 2]>| {
         home.or_else(|| known.get(&slot?).copied()).filter(|p| usable(p[0]) && usable(p[1]))
     };
-    let mut all: Vec<(Option<u16>, Option<usize>, Option<[f64; 2]>)> = flight
+    let mut all: Vec<Placed> = flight
         .drones
         .iter()
         .enumerate()
@@ -131,10 +135,10 @@ fn places(analysis: &Analysis, flight: &FlightAnalysis) -> Places {
     // Half metres: surveyed homes are not exactly on the grid.
     let half_metres = |v: f64| (v * 2.0).round() as i64;
     let ranks = |axis: usize| -> BTreeMap<i64, usize> {
-        let keys: BTreeMap<i64, ()> =
-            all.iter().filter_map(|one| Some((half_metres(one.2?[axis]), ()))).collect();
+        let keys: BTreeSet<i64> =
+            all.iter().filter_map(|one| Some(half_metres(one.2?[axis]))).collect();
         // Forward is up and left is left: the largest comes first on both.
-        keys.into_keys().rev().enumerate().map(|(rank, key)| (key, rank)).collect()
+        keys.into_iter().rev().enumerate().map(|(rank, key)| (key, rank)).collect()
     };
     let (forward, left) = (ranks(0), ranks(1));
     let on_ground =
@@ -230,7 +234,7 @@ fn cell(
         let ends = offset.points.iter().map(|point| point.offset_us).filter(|us| usable(*us));
         let (low, high) = ends.fold((0.0_f64, 0.0_f64), |(l, h), us| (l.min(us), h.max(us)));
         let unit = scale.map_or_else(String::new, |scale| unit(scale.unit));
-        tooltip.push_str(&format!(": offset {} to {} {unit}", signed(low, 1), signed(high, 1)));
+        let _ = write!(tooltip, ": offset {} to {} {unit}", signed(low, 1), signed(high, 1));
     }
     if let Some(name) = &figure {
         drawing.raw(&format!(
