@@ -23,6 +23,7 @@ mod law;
 mod notes;
 mod page;
 mod sheet;
+mod statistics_lines;
 mod study_page;
 mod study_terminal;
 mod svg;
