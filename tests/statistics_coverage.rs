@@ -68,7 +68,7 @@ fn intervals_hold_the_truth() {
         length_m: 60.0,
         tau_s: 25.0,
         noise_mps: 0.1,
-        seeds: 120,
+        seeds: 100,
         flights: 80,
     };
     for (name, share) in NAMES.into_iter().zip(coverage(&small)) {

@@ -139,7 +139,7 @@ fn the_likelihood_finds_the_scales_of_the_simulators_air() {
             let mean = logs.iter().sum::<f64>() / n;
             let variance = logs.iter().map(|log| (log - mean).powi(2)).sum::<f64>() / (n - 1.0);
             let se = (variance / n).sqrt();
-            assert!(se < 0.06, "{name}, {scale}: ± {se} says nothing");
+            assert!(se < 0.1, "{name}, {scale}: ± {se} says nothing");
             assert!(mean.abs() < 3.0 * se + 0.03, "{name}, {scale}: {mean:.3} ± {se:.3}");
         }
     };
