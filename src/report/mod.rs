@@ -32,6 +32,7 @@ mod raster;
 mod scales;
 mod shapes;
 mod sheet;
+mod statistics_lines;
 mod study_page;
 mod study_terminal;
 mod surface;

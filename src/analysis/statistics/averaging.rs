@@ -4,6 +4,8 @@
 //! again when slow motion of the air and drift of the pulse take over: a longer baseline then is no
 //! better one.
 
+use std::fmt::Write as _;
+
 use super::result::{Averaging, DroneAveraging, Interval, Reached};
 use super::space::quantile;
 use super::words::digits;
@@ -122,11 +124,8 @@ fn sentence(found: &Averaging) -> String {
     let late: Vec<&Reached> =
         found.reached.iter().filter(|reached| reached.averaging_s > first).collect();
     if let Some(reached) = late.last() {
-        text.push_str(&format!(
-            "; {} m/s is reached with {} s",
-            digits(reached.deviation_mps),
-            digits(reached.averaging_s)
-        ));
+        let (deviation, span) = (digits(reached.deviation_mps), digits(reached.averaging_s));
+        let _ = write!(text, "; {deviation} m/s is reached with {span} s");
     }
     text
 }

@@ -138,7 +138,6 @@ pub(super) fn line(x: &[f64], y: &[f64]) -> Option<(Estimate, Estimate)> {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
 

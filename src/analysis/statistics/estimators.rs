@@ -21,7 +21,7 @@ pub(super) struct Estimators {
     pub(super) along_x: Vec<Class>,
     pub(super) along_y: Vec<Class>,
     counts: Counts,
-    half_counts: [Counts; 2],
+    half_counts: Option<[Counts; 2]>,
     pub(super) blocks: Option<Blocks>,
     likelihood: Option<Likelihood>,
 }
@@ -52,13 +52,14 @@ impl Estimators {
     pub(super) fn new(field: &Field, unknown: Unknown) -> Self {
         let blocks = Blocks::of(field);
         Self {
+            half_counts: Some(halves(&field.columns()).map(|half| Counts::of(&half))),
             likelihood: blocks.as_ref().map(|blocks| Likelihood::new(field, blocks, unknown)),
             blocks,
             ..Self::of_paper(field)
         }
     }
 
-    /// The same without the likelihood.
+    /// The same without halves of the record and without the likelihood.
     pub(super) fn of_paper(field: &Field) -> Self {
         let columns = field.columns();
         let shared = common_seconds(&columns);
@@ -69,7 +70,7 @@ impl Estimators {
             along_x: of(Pairs::AlongX),
             along_y: of(Pairs::AlongY),
             counts: Counts::of(&columns),
-            half_counts: halves(&columns).map(|half| Counts::of(&half)),
+            half_counts: None,
             likelihood: None,
             blocks: None,
             gaps: gaps.iter().any(|gap| gap.is_nan()).then_some(gaps),
@@ -95,8 +96,10 @@ impl Estimators {
         let all = medians(&self.all, &matrix);
         let nugget = exponential_with_nugget(&points(&self.all, &all, None));
         let t0 = |scored: &DMatrix<f64>, counts: &Counts| Some(zero_time(scored, counts)?.t0.value);
-        let [first, second] = halves(&columns).map(|half| scored(&half));
-        let [first_counts, second_counts] = &self.half_counts;
+        let half_t0_s = self.half_counts.as_ref().map(|[first_counts, second_counts]| {
+            let [first, second] = halves(&columns).map(|half| scored(&half));
+            [t0(&first, first_counts), t0(&second, second_counts)]
+        });
         let model = self.likelihood.as_ref().zip(self.blocks.as_ref());
         Estimates {
             lambda_m: length(&self.all, &all, None).map(|length| length.value),
@@ -104,7 +107,7 @@ impl Estimators {
             lambda_y_m: length_of(&self.along_y),
             nugget_lambda_m: nugget.map(|(_, length)| length.value),
             t0_s: t0(&scored_values, &self.counts),
-            half_t0_s: [t0(&first, first_counts), t0(&second, second_counts)],
+            half_t0_s: half_t0_s.unwrap_or_default(),
             model: model
                 .and_then(|(likelihood, blocks)| likelihood.fit(&blocks.take(&columns), guess)),
             medians: all,

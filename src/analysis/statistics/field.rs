@@ -193,7 +193,9 @@ impl Field {
         let mut centred = self.clone();
         for row in &mut centred.rows {
             let middle = mean(row.iter().copied());
-            row.iter_mut().for_each(|value| *value -= middle);
+            for value in row.iter_mut() {
+                *value -= middle;
+            }
         }
         let common = centred.common();
         for row in &mut centred.rows {

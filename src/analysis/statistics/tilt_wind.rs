@@ -62,7 +62,7 @@ pub fn tilt_wind(leans: &[MeanLean], drag_speed_mps: Option<f64>) -> Option<Tilt
     let speed_mps =
         speed_of(fleet_deg).map(|speed| Estimate::new(speed, (variance / count).sqrt()));
     let from = from_deg.map_or_else(
-        || ", from where is not known (the logs have no heading)".to_owned(),
+        || " from a direction that is not known (the logs have no heading)".to_owned(),
         |from| format!(" from {from:.0} degrees"),
     );
     let words = match (speed_mps, speed_of(TRIM_DEG)) {
