@@ -1,7 +1,9 @@
-//! Whole fleets over UDP on this computer: `cargo bench --bench loopback [DRONES BYTES]...`.
+//! Whole fleets over UDP on this computer: `cargo bench --bench loopback [-- DRONES BYTES...]`.
 //!
-//! Time and processor time (of both ends together) to put a show file onto every drone and to
-//! bring a log home from each: 1 drone with 20 MB, 49 with 6.5 MB, 500 in two networks with 1 MB.
+//! Time and processor time to put a show file onto every drone and to bring a log home from
+//! each: 1 drone with 20 MB, 49 with 6.5 MB, 500 in two networks with 1 MB; then how much of a
+//! link of 250 kB/s is used at 0, 1, 10 and 20 % loss, by one drone and by twelve, which offer
+//! more than it carries. Processor time is told twice: of both ends together, and of the station alone.
 
 #![expect(clippy::expect_used, reason = "a measurement that cannot go on fails")]
 #![expect(clippy::print_stdout, reason = "a table for people")]
@@ -33,6 +35,12 @@ use updraft::virtual_fleet::world::World;
 
 const PER_NETWORK: usize = 250;
 const SHOW_BYTES: usize = 8_000;
+/// Of the limited link.
+const LIMIT_BYTES_PER_S: f64 = 250e3;
+/// Of the limited link, shares of the frames each way.
+const LOSSES: [f64; 4] = [0.0, 0.01, 0.1, 0.2];
+/// Data of a frame of file transfer, of all its bytes: 10 header, 3 + 12 payload, 2 checksum.
+const DATA_SHARE: f64 = 239.0 / 266.0;
 
 struct Wall(Instant);
 
@@ -48,11 +56,20 @@ impl Clock for Wall {
     }
 }
 
-/// Processor time of this process so far, s; Linux only.
-fn cpu_s() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+/// Processor time so far, s: of this process, and of the station's threads in it. Linux only.
+fn cpu_s() -> (f64, f64) {
+    let all = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let main = std::process::id().to_string();
+    let of_station = tasks
+        .filter_map(|task| std::fs::read_to_string(task.path().join("stat")).ok())
+        .filter(|stat| stat.starts_with(&format!("{main} ")) || stat.contains("(link "));
+    (cpu_of(&all), of_station.map(|stat| cpu_of(&stat)).sum())
+}
+
+/// User and system time of a line of `/proc`, which has them in ticks of 10 ms.
+fn cpu_of(stat: &str) -> f64 {
     let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace();
-    // User and system time, in ticks of 10 ms.
     fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
 }
 
@@ -62,14 +79,56 @@ fn main() {
         [] => vec![(1, 20_000_000), (49, 6_500_000), (500, 1_000_000)],
         pairs => pairs.iter().map(|&[count, bytes]| (count, bytes)).collect(),
     };
-    println!("drones      task       MB   time s    CPU s   MB/s  CPU s/GB");
+    println!(" drones  task       MB   time s    CPU s  station    MB/s  station CPU s/GB");
     for (count, bytes) in pairs {
-        measure(count, bytes);
+        with_fleet(count, bytes, Faults::default(), 0.0, |station, clock, ids| {
+            put_all(station, clock, ids);
+            pull_all(station, clock, ids, bytes);
+        });
     }
+    if !numbers.is_empty() {
+        return;
+    }
+    println!("\nlimited to {:.0} kB/s: drones  loss  used of what the loss leaves", {
+        LIMIT_BYTES_PER_S / 1e3
+    });
+    std::thread::scope(|scope| {
+        for (count, loss) in [1, 12].into_iter().flat_map(|n| LOSSES.map(|loss| (n, loss))) {
+            scope.spawn(move || limited(count, loss));
+        }
+    });
 }
 
+/// Pulls logs of 8 MB in all over a link that loses such a share of the frames each way.
+fn limited(count: usize, loss: f64) {
+    let bytes = 8_000_000 / count;
+    let faults = Faults {
+        loss,
+        delay: 20 * MS,
+        jitter: 5 * MS,
+        bytes_per_s: LIMIT_BYTES_PER_S,
+        ..Faults::default()
+    };
+    // One alone offers a quarter more than the link carries, twelve offer twice as much.
+    let offered = if count == 1 { 1.25 } else { 2.0 / count as f64 };
+    let packets_per_s = offered * LIMIT_BYTES_PER_S * DATA_SHARE / 239.0;
+    with_fleet(count, bytes, faults, packets_per_s, |station, clock, ids| {
+        let (time_s, good) = pull_from(station, clock, ids);
+        let carried = LIMIT_BYTES_PER_S * DATA_SHARE * (1.0 - loss) * time_s;
+        let share = (good * bytes) as f64 / carried;
+        println!("{count:>29} {loss:>5} {:>5.1} %  {good} whole, {time_s:.1} s", 100.0 * share);
+    });
+}
+
+/// Lets a station meet a fleet whose drones have a log of so many bytes each.
 #[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
-fn measure(count: usize, bytes: usize) {
+fn with_fleet(
+    count: usize,
+    bytes: usize,
+    faults: Faults,
+    packets_per_s: f64,
+    body: impl FnOnce(&mut Station, &Wall, &[DroneId]),
+) {
     let vehicle = builtin("airsim-generic-quad").expect("a built-in vehicle");
     let air = Uniform(Vector3::zeros());
     let origin = Geodetic { lat_deg: 47.0, lon_deg: 19.0, amsl_m: 150.0 };
@@ -96,20 +155,14 @@ fn measure(count: usize, bytes: usize) {
             let mut setup = VehicleSetup::new(index as u16 + 1, id.system, Vector3::zeros());
             setup.network = id.network;
             setup.boot = BootTimes::short();
+            setup.packets_per_s = packets_per_s;
             let mut storage = MemoryStorage::default();
             let log = (0..bytes).map(|at| (at * 7 + at / 253) as u8).collect();
             storage.put("logs/00000001.BIN", log).expect("a plain name");
             VirtualVehicle::new(&world, setup, Box::new(storage), 0)
         })
         .collect();
-    let options = ServerOptions {
-        stations,
-        key: None,
-        pace: Pace::Speed(1.0),
-        faults: Faults::default(),
-        seed: 1,
-    };
-    let folder = tempfile::tempdir().expect("a folder");
+    let options = ServerOptions { stations, key: None, pace: Pace::Speed(1.0), faults, seed: 1 };
     serve(vehicles, &options, clock.as_ref(), |_| {
         let until = station.now() + 10 * S;
         let awake = station.now() + 2 * S;
@@ -117,44 +170,59 @@ fn measure(count: usize, bytes: usize) {
             let next = station.now() + 50 * MS;
             let _ = station.recv(next).expect("a link");
         }
-        let (begun, cpu) = (clock.now(), cpu_s());
-        let puts: BTreeMap<DroneId, Put> = ids
-            .iter()
-            .map(|id| {
-                let caller = Caller::new(*id, 1);
-                (*id, Put::new(caller, "/collmot/show.skyb", vec![7; SHOW_BYTES], 60 * S))
-            })
-            .collect();
-        let done = drive(&mut station, puts, 16, &mut NoWatch).expect("a link");
-        let good = done.values().filter(|done| done.is_ok()).count();
-        tell(count, "put", good, good * SHOW_BYTES, clock.now() - begun, cpu_s() - cpu);
-
-        let (begun, cpu) = (clock.now(), cpu_s());
-        let wanted: Vec<Wanted> = (1..)
-            .zip(&ids)
-            .map(|(slot, id)| Wanted { drone: *id, slot, file: format!("{slot:03}.BIN") })
-            .collect();
-        let options = PullOptions {
-            each: OneOptions::default(),
-            at_once: 12,
-            bytes_per_s: None,
-            made_by: "bench".to_owned(),
-        };
-        let pulled = pull(&mut station, folder.path(), &wanted, &options, &mut NoWatch);
-        let pulled = pulled.expect("a link");
-        let is_whole = |of: &&Outcome| matches!(of, Outcome::Done(done) if done.failure.is_none());
-        let good = pulled.values().filter(is_whole).count();
-        tell(count, "pull", good, good * bytes, clock.now() - begun, cpu_s() - cpu);
+        body(&mut station, &clock, &ids);
     })
     .expect("a fleet");
 }
 
-fn tell(count: usize, task: &str, good: usize, bytes: usize, took: Micros, cpu: f64) {
+fn put_all(station: &mut Station, clock: &Wall, ids: &[DroneId]) {
+    let (begun, cpu) = (clock.now(), cpu_s());
+    let puts: BTreeMap<DroneId, Put> = ids
+        .iter()
+        .map(|id| {
+            let caller = Caller::new(*id, 1);
+            (*id, Put::new(caller, "/collmot/show.skyb", vec![7; SHOW_BYTES], 60 * S))
+        })
+        .collect();
+    let done = drive(station, puts, 16, &mut NoWatch).expect("a link");
+    let good = done.values().filter(|done| done.is_ok()).count();
+    tell(ids.len(), "put", good, good * SHOW_BYTES, clock.now() - begun, cpu);
+}
+
+fn pull_all(station: &mut Station, clock: &Wall, ids: &[DroneId], bytes: usize) {
+    let (begun, cpu) = (clock.now(), cpu_s());
+    let (_, good) = pull_from(station, clock, ids);
+    tell(ids.len(), "pull", good, good * bytes, clock.now() - begun, cpu);
+}
+
+/// Brings every log home; returns the time it took, s, and how many came whole.
+fn pull_from(station: &mut Station, clock: &Wall, ids: &[DroneId]) -> (f64, usize) {
+    let begun = clock.now();
+    let folder = tempfile::tempdir().expect("a folder");
+    let wanted: Vec<Wanted> = (1..)
+        .zip(ids)
+        .map(|(slot, id)| Wanted { drone: *id, slot, file: format!("{slot:03}.BIN") })
+        .collect();
+    let options = PullOptions {
+        each: OneOptions::default(),
+        at_once: 12,
+        bytes_per_s: None,
+        made_by: "bench".to_owned(),
+    };
+    let pulled = pull(station, folder.path(), &wanted, &options, &mut NoWatch).expect("a link");
+    let is_whole = |of: &&Outcome| matches!(of, Outcome::Done(done) if done.failure.is_none());
+    let good = pulled.values().filter(is_whole).count();
+    ((clock.now() - begun) as f64 * 1e-6, good)
+}
+
+fn tell(count: usize, task: &str, good: usize, bytes: usize, took: Micros, before: (f64, f64)) {
     let (mb, time_s) = (bytes as f64 * 1e-6, took as f64 * 1e-6);
+    let after = cpu_s();
+    let (both, station) = (after.0 - before.0, after.1 - before.1);
     println!(
-        "{good:>3}/{count:<3} {task:>8} {mb:>8.1} {time_s:>8.2} {cpu:>8.2} {:>6.1} {:>9.1}",
+        "{good:>4}/{count:<4} {task:>4} {mb:>8.1} {time_s:>8.2} {both:>8.2} {station:>8.2} {:>7.1} {:>8.1}",
         mb / time_s,
-        cpu / mb * 1e3
+        station / mb * 1e3
     );
 }
 

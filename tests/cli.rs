@@ -5,12 +5,26 @@
 #[path = "cli/support.rs"]
 mod support;
 
+#[cfg(unix)]
+mod fleet_loaded_support;
+
 #[path = "cli/analyze.rs"]
 mod analyze;
 #[path = "cli/check.rs"]
 mod check;
+#[cfg(unix)]
+#[path = "cli/drones.rs"]
+mod drones;
 #[path = "cli/fleet.rs"]
 mod fleet;
+#[cfg(unix)]
+#[path = "cli/fleet_refusals.rs"]
+mod fleet_refusals;
+#[cfg(unix)]
+#[path = "cli/fleet_upload.rs"]
+mod fleet_upload;
+#[path = "cli/guided.rs"]
+mod guided;
 #[path = "cli/help.rs"]
 mod help;
 #[path = "cli/inspect.rs"]

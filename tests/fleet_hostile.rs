@@ -15,13 +15,14 @@ use updraft::fleet::ftp::list::List;
 use updraft::fleet::ftp::put::Put;
 use updraft::fleet::log_protocol::get::LogGet;
 use updraft::fleet::log_protocol::list::LogList;
-use updraft::fleet::logs::manifest::Method;
+use updraft::fleet::logs::manifest::{Method, Verified};
 use updraft::fleet::logs::one::{OneDone, OneOptions};
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use updraft::fleet::sink::Memory;
 use updraft::link::clock::{Micros, S};
 use updraft::link::drive::{Machine, NoWatch, Step};
-use updraft::link::frame::{MavMessage, dialect};
+use updraft::link::frame::{FrameLoss, MavMessage, dialect};
+use updraft::link::traffic::{Traffic, troubles};
 use updraft::protocol::ftp::{Op, PAYLOAD, Packet};
 use updraft::virtual_fleet::endpoint::Endpoint;
 use updraft::virtual_fleet::files::FileVehicle;
@@ -65,11 +66,16 @@ impl Endpoint for Liar {
 }
 
 fn pulled(lie: Lie) -> (OneDone, Option<Vec<u8>>) {
+    pulled_over(0.3, lie)
+}
+
+/// Over a link on which such a share of the frames arrives twice.
+fn pulled_over(repeat: f64, lie: Lie) -> (OneDone, Option<Vec<u8>>) {
     let mut storage = MemoryStorage::default();
     storage.put(LOG, content(1, 200_000)).unwrap();
     let vehicle = FileVehicle::new(storage, "/APM/LOGS", 500.0);
     let liar = Liar { vehicle, lie, answers: 0 };
-    let faults = Faults { loss: 0.05, repeat: 0.3, delay: 30_000, ..Faults::default() };
+    let faults = Faults { loss: 0.05, repeat, delay: 30_000, ..Faults::default() };
     let mut net = LossyNet::new(BTreeMap::from([(drone(1), liar)]), faults, 3);
     let folder = tempfile::tempdir().unwrap();
     let logs = folder.path().join("logs");
@@ -122,15 +128,40 @@ fn data_at_wrong_places_is_found_out_by_the_checksum() {
     });
     assert_eq!(done.failure, None);
     assert!(bytes.unwrap() == content(1, 200_000));
-    // For ever: it is brought again until it is right, or by the log messages.
-    let (done, bytes) = pulled(|packet, _| {
-        if packet.op == Op::Ack && packet.request == Op::ReadFile {
-            packet.data.iter_mut().for_each(|byte| *byte ^= 0x55);
-        }
-    });
-    assert!(done.failure.is_some() != bytes.is_some());
-    assert!(bytes.is_none_or(|bytes| bytes == content(1, 200_000)));
-    assert!(done.pulled.iter().all(|entry| entry.attempts > 1));
+}
+
+/// Every single read lies, always; bursts tell the truth.
+fn reads_lie(packet: &mut Packet, _: u64) {
+    if packet.op == Op::Ack && packet.request == Op::ReadFile {
+        packet.data.iter_mut().for_each(|byte| *byte ^= 0x55);
+    }
+}
+
+#[test]
+fn reads_that_are_always_wrong_are_given_up_for_the_log_messages() {
+    // What bursts lost is repaired by reads, so that the checksum of the whole differs each time.
+    // The log is brought anew three times; then MAVFTP is not believed any more, and the log
+    // messages bring it: the fifth attempt.
+    let (done, bytes) = pulled_over(0.0, reads_lie);
+    assert_eq!(done.failure, None);
+    assert!(bytes.unwrap() == content(1, 200_000));
+    let [entry] = &done.pulled[..] else { panic!("{:?}", done.pulled) };
+    assert_eq!(entry.method, Method::LogMessages, "{entry:?}");
+    let reason = entry.method_reason.as_deref();
+    assert_eq!(reason, Some("MAVFTP: the checksum differs, 4 times"));
+    assert_eq!(entry.attempts, 5);
+}
+
+#[test]
+fn reads_that_are_always_wrong_do_not_matter_where_none_is_needed() {
+    // A request for a burst that arrives twice is served twice: hardly a packet is lost both times.
+    // An attempt in which none is needs no read, and its checksum is right.
+    let (done, bytes) = pulled_over(0.3, reads_lie);
+    assert_eq!(done.failure, None);
+    assert!(bytes.unwrap() == content(1, 200_000));
+    let [entry] = &done.pulled[..] else { panic!("{:?}", done.pulled) };
+    assert_eq!((entry.method, entry.verified), (Method::Mavftp, Verified::Checksum), "{entry:?}");
+    assert!((2..=4).contains(&entry.attempts), "{entry:?}");
 }
 
 #[test]
@@ -144,6 +175,20 @@ fn names_that_lead_elsewhere_are_not_followed() {
     });
     assert_eq!(bytes, None);
     assert!(done.failure.is_some() && done.pulled.is_empty());
+}
+
+#[test]
+fn what_people_must_know_of_their_links_is_said_and_what_is_usual_is_not() {
+    let said = |loss: FrameLoss, doubled: &[u8]| {
+        let traffic = Traffic { bytes_in: 20_000, loss, ..Traffic::default() };
+        let doubled = doubled.iter().map(|system| drone(*system)).collect();
+        let all = troubles(&BTreeMap::from([(1, traffic)]), &doubled);
+        all.into_iter().map(|trouble| trouble.text).collect::<Vec<_>>().join("\n")
+    };
+    let usual = FrameLoss { noise_bytes: 1_900, unknown: 40, ..FrameLoss::default() };
+    assert_eq!(said(usual, &[]), "");
+    let all = FrameLoss { noise_bytes: 2_100, version_1: 1, unknown: 0, unsigned: 3, forged: 2 };
+    insta::assert_snapshot!(said(all, &[4]));
 }
 
 fn message(kind: u8, mut payload: [u8; PAYLOAD], numbers: (u32, u32, u16, u8)) -> MavMessage {

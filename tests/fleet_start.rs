@@ -11,6 +11,7 @@ use fleet_show_support::{A_WHILE, Fault, Net, Scripted, bad, drone, fleet, pass,
 use insta::assert_snapshot;
 use updraft::base::time::GpsTime;
 use updraft::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
+use updraft::fleet::changes::Changes;
 use updraft::fleet::command::{Command, CommandError};
 use updraft::fleet::dry_run::{Obliging, dry_run};
 use updraft::fleet::greet::Greet;
@@ -19,7 +20,7 @@ use updraft::fleet::journal::{Entry, JOURNAL_FILE, Journal};
 use updraft::fleet::messages::{self, GUIDED, LAND, RTL};
 use updraft::fleet::params::{ListParams, ReadParams, SetParams};
 use updraft::fleet::preflight::{Known, Limits, Preflight, preflight};
-use updraft::fleet::required::{Changes, CheckParams, Standing, requirements};
+use updraft::fleet::required::{CheckParams, Standing, requirements};
 use updraft::fleet::slots::{self, FleetTable};
 use updraft::fleet::start::{Phase, Start, StartOptions, StartRefusal};
 use updraft::fleet::telemetry::Telemetry;
@@ -414,9 +415,11 @@ fn parameters_are_checked_mended_and_put_back() {
         let again = mended
             .changed
             .iter()
-            .map(|change| updraft::fleet::required::Change { was: change.now, ..change.clone() });
+            .map(|change| updraft::fleet::changes::Change { was: change.now, ..change.clone() });
         changes.add(drone(1), &again.collect::<Vec<_>>());
-        drive(&mut net, changes.restore(), 9, &mut NoWatch).unwrap()[&drone(1)].clone().unwrap();
+        drive(&mut net, changes.restore(false), 9, &mut NoWatch).unwrap()[&drone(1)]
+            .clone()
+            .unwrap();
         assert_eq!(net.vehicles[&drone(1)].inner.params, before, "the first old value counts");
     }
 }

@@ -31,6 +31,7 @@ fn json_schemas_are_current() {
         (Format::Cell, "cell"),
         (Format::Vehicle, "vehicle"),
         (Format::Logs, "logs"),
+        (Format::Start, "start"),
         (Format::Fleet, "fleet"),
         (Format::Changes, "changes"),
         (Format::Preflight, "preflight"),

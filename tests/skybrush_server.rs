@@ -17,7 +17,7 @@ use cli_support::{Bench, Ended};
 use serde_json::{Value, json};
 use skybrush_server_support::{Fake, Fault};
 use updraft::link::clock::{Clock, Micros};
-use updraft::skybrush_server::Client;
+use updraft::skybrush_server::{Client, Foreman, Job, Outcome, fetch_log};
 
 /// Its only flight takes half a minute, and two drones.
 fn planned() -> Bench {
@@ -66,6 +66,7 @@ fn a_flight_is_uploaded_started_watched_and_brings_its_logs_home() {
     let asked = server.asked();
     let uploads: Vec<&Value> = asked.iter().filter(|body| body["type"] == "OBJ-CMD").collect();
     assert_eq!(uploads.len(), 2);
+    assert_eq!(server.most_at_once(), 2, "both at once");
     for (index, upload) in uploads.iter().enumerate() {
         assert_eq!(upload["command"], "__show_upload");
         // The drones stand the other way round.
@@ -186,13 +187,134 @@ fn logs_are_listed_and_pulled_and_losses_are_named() {
         Fault::Gone("LOG-DATA"),
     ] {
         let _ = write!(said, "\n{fault:?}\n{}", pull(fault));
-        assert!(!bench.path("campaign/logs/1.BIN").exists());
+        assert!(!bench.path("campaign/logs/01.BIN").exists());
     }
     let _ = write!(said, "\nwhole\n{}", pull(Fault::None));
     // What is there is not asked for again.
     let _ = write!(said, "\nagain\n{}", pull(Fault::Nak("LOG-DATA")));
     insta::assert_snapshot!(said);
     bench.expect(0, &["logs", "verify", "campaign"]);
+}
+
+#[test]
+fn a_log_that_grew_or_was_missed_comes_home() {
+    for (fault, attempts) in [(Fault::LogGrows, 1), (Fault::LogOnce, 2)] {
+        let bench = planned();
+        let server = Fake::start(&plan(&bench), fault);
+        let ended = run(&bench, &server, &["logs", "pull", "campaign", "--at-once", "1"]);
+        assert_eq!(ended.code, Some(0), "{fault:?} {ended}");
+        assert_eq!(server.most_at_once(), 1);
+        let manifest = fs::read(bench.path("campaign/logs/manifest.json")).unwrap();
+        let manifest: Value = serde_json::from_slice(&manifest).unwrap();
+        assert_eq!(manifest["logs"][1]["attempts"], attempts, "{fault:?} {manifest}");
+        bench.expect(0, &["logs", "verify", "campaign"]);
+    }
+}
+
+#[test]
+fn one_drone_without_its_log_keeps_nobody_else_from_theirs() {
+    let mut said = String::new();
+    for fault in [Fault::LogUnknown, Fault::LogBusy, Fault::StandsWrong] {
+        let bench = planned();
+        let server = Fake::start(&plan(&bench), fault);
+        let ended = run(&bench, &server, &["logs", "pull", "campaign", "--wait", "0"]);
+        assert_eq!(ended.code, Some(3), "{ended}");
+        assert!(bench.path("campaign/logs/01.BIN").exists(), "{ended}");
+        let _ = writeln!(said, "{fault:?}\n{ended}");
+    }
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn lists_and_pulls_have_the_options_of_the_drones_own_links() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::None);
+    let logs = |args: &[&str]| {
+        let all = [&["logs", args[0], "campaign"], &args[1..]].concat();
+        format!("{}\n{}\n", args.join(" "), run(&bench, &server, &all))
+    };
+    let mut said = logs(&["list", "--json"]);
+    said += &logs(&["list", "--slots", "2"]);
+    said += &logs(&["list", "--slots", "3"]);
+    said += &logs(&["pull", "--dry-run"]);
+    assert!(!server.asked().iter().any(|body| body["type"] == "LOG-DATA"));
+    said += &logs(&["pull", "--slots", "2", "--json"]);
+    assert!(!bench.path("campaign/logs/01.BIN").exists());
+    said += &logs(&["pull", "--dry-run", "--json"]);
+    said += &logs(&["pull", "--json"]);
+    said += &logs(&["pull", "--slots", "1", "--again"]);
+    said += &logs(&["pull", "--slots", "1", "--log", "7"]);
+    said += &logs(&["pull", "--slots", "1", "--rate", "1000"]);
+    let slot_1 = server.asked().iter().filter(|body| body["uavId"] == "02").count();
+    assert_eq!(slot_1, 2, "once, and once again");
+    fs::remove_file(bench.path("campaign/logs/manifest.json")).unwrap();
+    said += &logs(&["pull", "--slots", "1"]);
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn a_flights_dry_run_shows_the_servers_requests() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::None);
+    let ended = run(&bench, &server, &["fly", "campaign", "--dry-run", "--json"]);
+    assert!(server.asked().is_empty(), "{ended}");
+    let shown: Value = serde_json::from_str(&ended.out).unwrap();
+    let lines = shown["drones"]["on slot 2"].as_array().unwrap();
+    let bodies: Vec<Value> =
+        lines.iter().map(|line| serde_json::from_str(line.as_str().unwrap()).unwrap()).collect();
+    let kinds: Vec<&str> = bodies.iter().map(|body| body["type"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["OBJ-CMD", "SHOW-SETCFG", "SHOW-SETCFG"]);
+    assert_eq!(bodies[0]["kwds"]["show"]["mission"]["index"], 1);
+    let ended = run(&bench, &server, &["fleet", "abort", "campaign", "--dry-run"]);
+    assert!(server.asked().is_empty(), "{ended}");
+    assert!(
+        ended.out.contains(r#"{"ids":["(who stands on slot 2)"],"type":"UAV-RTH"}"#),
+        "{ended}"
+    );
+}
+
+#[test]
+fn drones_that_the_server_hears_late_are_waited_for() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::Late);
+    let ended = run(&bench, &server, &["logs", "pull", "campaign"]);
+    assert_eq!(ended.code, Some(0), "{ended}");
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::Late);
+    let short = run(&bench, &server, &["logs", "pull", "campaign", "--wait", "0"]);
+    insta::assert_snapshot!(format!("{ended}\n{short}"));
+}
+
+/// Stops as soon as something moves.
+struct Impatient {
+    moved: bool,
+}
+
+impl Foreman for Impatient {
+    fn over(&mut self, drone: &str, outcome: Outcome) -> Option<Job> {
+        panic!("{drone} is over: {outcome:?}")
+    }
+
+    fn progress(&mut self, _: &str, share: f64) {
+        self.moved |= share > 0.5;
+    }
+
+    fn stop(&mut self) -> bool {
+        self.moved
+    }
+}
+
+#[test]
+fn what_nobody_waits_for_any_more_is_cancelled() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::LogHangs);
+    let clock = Arc::new(Stopwatch::start());
+    let mut client = Client::connect(&server.address.to_string(), clock).unwrap();
+    let jobs = ["01", "02"].map(|drone| fetch_log(drone, "2"));
+    client.work(jobs, 1, &mut Impatient { moved: false }).unwrap();
+    let asked = server.asked();
+    assert_eq!(asked.len(), 2, "{asked:?}");
+    assert_eq!(asked[1], json!({ "type": "ASYNC-CANCEL", "ids": ["receipt-1"] }));
 }
 
 #[test]

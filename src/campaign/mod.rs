@@ -14,6 +14,7 @@
 //! ```
 
 pub mod lock;
+pub mod start;
 pub mod write;
 
 use std::io;

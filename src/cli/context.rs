@@ -11,6 +11,11 @@ use super::Global;
 use super::exit::CommandError;
 use crate::campaign::lock::FolderLock;
 
+/// What a second Ctrl-C says while this program flies drones.
+const LEFT_FLYING: &str = "Ended at once: drones that had not confirmed their return stop within 3 s \
+    (GUID_TIMEOUT) and return when they miss the station (FS_GCS_ENABLE). Watch them: `updraft fleet \
+    status`, `updraft fleet abort`, their remote controls";
+
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an option of the command line")]
@@ -26,6 +31,7 @@ pub(super) struct Context {
     /// Columns of the terminal that standard output is read on; none for files and pipes.
     pub(super) width: Option<usize>,
     stop: Arc<AtomicBool>,
+    flies: Arc<AtomicBool>,
 }
 
 impl Context {
@@ -33,9 +39,15 @@ impl Context {
     pub(super) fn new(global: &Global) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let raised = Arc::clone(&stop);
+        let flies = Arc::new(AtomicBool::new(false));
+        let in_the_air = Arc::clone(&flies);
         // The second Ctrl-C ends at once: unfinished files are temporary and swept later.
         let installed = ctrlc::set_handler(move || {
             if raised.swap(true, Ordering::SeqCst) {
+                if in_the_air.load(Ordering::SeqCst) {
+                    let _ = writeln!(io::stderr().lock(), "{LEFT_FLYING}");
+                    std::process::exit(super::exit::Exit::Interrupted as i32);
+                }
                 std::process::abort();
             }
         });
@@ -52,11 +64,31 @@ impl Context {
             interactive: io::stderr().is_terminal() && !global.quiet && !global.no_progress,
             width: columns(),
             stop,
+            flies,
         };
         if let Err(error) = installed {
             context.warn(&format!("Ctrl-C ends the program at once ({error})"));
         }
         context
+    }
+
+    /// For tests: says nothing but warnings, and is never stopped.
+    #[cfg(test)]
+    pub(super) fn silent() -> Self {
+        Self {
+            quiet: true,
+            json: false,
+            color: false,
+            interactive: false,
+            width: None,
+            stop: Arc::default(),
+            flies: Arc::default(),
+        }
+    }
+
+    /// Whether drones in the air need this program: a second Ctrl-C says what becomes of them.
+    pub(super) fn set_flies(&self, flies: bool) {
+        self.flies.store(flies, Ordering::SeqCst);
     }
 
     /// The flag that Ctrl-C raises.

@@ -11,7 +11,7 @@ use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::sim::{Hangar, Mishaps, TO_START};
-use super::fleet::{LeadArgs, fly_now, guide_now, one_flight, server, tables};
+use super::fleet::{LeadArgs, dry, fly_now, guide_now, one_flight, server, tables};
 use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FlightFolder};
@@ -58,7 +58,7 @@ pub(super) struct FlyArgs {
     assign: bool,
     /// Fly the drones by streaming targets in GUIDED: needs no show firmware, but a link without
     /// gaps until everyone has landed
-    #[arg(long, conflicts_with = "dry_run")]
+    #[arg(long)]
     guided: bool,
     /// Leave the logs on the drones; `updraft logs pull` brings them
     #[arg(long)]
@@ -84,7 +84,8 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
             connect: args.connect.clone(),
             dry_run: true,
         };
-        return super::fleet::dry::fly(context, &step, args.lead.lead);
+        let shown = if args.guided { dry::guided } else { dry::fly };
+        return shown(context, &step, args.lead.lead);
     }
     let target = args.connect.target()?;
     if args.guided && !matches!(target, Target::Links(_)) {
@@ -122,7 +123,8 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
         }
         Target::Server(address) => {
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-            server::fly(context, &address, &folder, &plan, &args.lead, !args.no_logs)
+            let (with_logs, wait_s) = (!args.no_logs, args.connect.wait);
+            server::fly(context, &address, &folder, &plan, &args.lead, with_logs, wait_s)
         }
     }
 }
@@ -137,14 +139,8 @@ fn fly(context: &Context, crew: &mut Crew<'_>, args: &FlyArgs) -> Result<Exit, C
     let refused = if args.guided {
         crew.make_guided()?
     } else {
-        let stock = crew.stock();
-        if !stock.is_empty() {
-            let names: Vec<String> = stock.iter().map(ToString::to_string).collect();
-            context.insist(&format!(
-                "NO-GO: without show firmware: drones {}; nothing was sent. Fly all drones by \
-                 streaming with --guided, or leave these out",
-                names.join(", ")
-            ));
+        if let Some(mixed) = crew.firmwares() {
+            context.insist(&mixed);
             return Ok(Exit::Unsafe);
         }
         crew.upload()?

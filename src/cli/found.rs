@@ -11,6 +11,7 @@ use crate::analysis::wind::Leaning;
 use crate::analysis::{LogInput, TruthSeries};
 use crate::base::file::FileError;
 use crate::base::time::GpsTime;
+use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, LogRecord};
 use crate::log::Log;
 use crate::mission::Plan;
@@ -112,6 +113,11 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
     let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
     let flown = record.as_ref().zip(vehicle.as_ref());
+    // Logs of the simulator have a record; others may have been flown by streaming.
+    let start = match &record {
+        Some(record) => Some(record.start),
+        None => StartRecord::read(folder)?.map(|record| record.start),
+    };
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
@@ -125,7 +131,7 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
             .filter(|record| record.air.is_empty())
             .map(|record| record.air_mps[2]),
         truth,
-        start: record.as_ref().map(|record| record.start),
+        start,
         seed: record.map(|record| record.seed),
         notes,
     })

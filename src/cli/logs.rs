@@ -1,5 +1,8 @@
 //! `updraft logs`: what is on the drones, bringing it home, checking it, and cards.
 
+mod dry;
+mod listing;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -9,7 +12,7 @@ use serde::Serialize;
 use super::clock::SystemClock;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::fleet::bring::{Brought, Wish, bring};
+use super::fleet::bring::{Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::{one_flight, server};
@@ -22,8 +25,9 @@ use crate::fleet::logs::one::Which;
 use crate::fleet::logs::verify::verify;
 use crate::fleet::slots::FleetTable;
 use crate::link::clock::Clock as _;
-use crate::link::id::DroneId;
 use crate::mission::Plan;
+
+pub(super) use listing::{ListRow, ListedLog};
 
 /// Arguments of `updraft logs`.
 #[derive(Debug, Args)]
@@ -64,6 +68,9 @@ struct ListArgs {
     flight: Option<String>,
     #[command(flatten)]
     connect: ConnectArgs,
+    /// Only these slots: 1-10,12
+    #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
+    slots: Option<SlotSet>,
 }
 
 #[derive(Debug, Args)]
@@ -96,6 +103,9 @@ struct PullArgs {
     /// Give a drone up after so long without an answer, s
     #[arg(long, value_name = "S", default_value_t = 60.0, value_parser = super::fleet::connect::seconds)]
     patience: f64,
+    /// Tell what would be asked for, and ask nobody
+    #[arg(long)]
+    dry_run: bool,
 }
 
 #[derive(Debug, Args)]
@@ -156,89 +166,59 @@ fn with_table(crew: &mut Crew<'_>, wait_s: f64) -> Result<(), CommandError> {
     }
 }
 
-#[derive(Serialize)]
-struct ListOutput {
-    schema: &'static str,
-    drones: Vec<ListRow>,
-}
-
-#[derive(Serialize)]
-struct ListRow {
-    drone: DroneId,
-    slot: u16,
-    logs: Vec<ListedLog>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    reason: Option<String>,
-}
-
-#[derive(Serialize)]
-struct ListedLog {
-    number: u16,
-    bytes: u64,
-    unix_s: u32,
-}
-
 fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    has_slots(&plan, args.slots.as_ref())?;
     let links = match args.connect.target()? {
         Target::Links(links) => links,
-        Target::Server(address) => return server::list(context, &address),
+        Target::Server(address) => {
+            let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
+            return listing::show(context, server::list(context, &address, &plan, slots, wait_s)?);
+        }
         Target::Sim => return Err(gone()),
     };
     let mut station = args.connect.open(links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
     with_table(&mut crew, args.connect.wait)?;
+    if let Some(slots) = &args.slots {
+        crew.table.drones.retain(|line| slots.contains(line.slot));
+    }
     let listed = crew.list_logs()?;
     let rows: Vec<ListRow> = crew
         .table
         .drones
         .iter()
-        .map(|line| match listed.get(&line.drone) {
-            Some(Ok(logs)) => ListRow {
-                drone: line.drone,
-                slot: line.slot,
-                logs: logs
-                    .iter()
-                    .map(|log| ListedLog {
-                        number: log.id,
-                        bytes: log.size,
-                        unix_s: log.time_utc_s,
-                    })
-                    .collect(),
-                reason: None,
-            },
-            Some(Err(error)) => ListRow {
-                drone: line.drone,
-                slot: line.slot,
-                logs: Vec::new(),
-                reason: Some(error.clone()),
-            },
-            None => ListRow {
-                drone: line.drone,
-                slot: line.slot,
-                logs: Vec::new(),
-                reason: Some("it was not asked".to_owned()),
-            },
+        .map(|line| {
+            let (logs, reason) = match listed.get(&line.drone) {
+                Some(Ok(logs)) => (logs.as_slice(), None),
+                Some(Err(error)) => (&[][..], Some(error.clone())),
+                None => (&[][..], Some("it was not asked".to_owned())),
+            };
+            let logs = logs.iter().map(|log| ListedLog {
+                number: log.id,
+                bytes: log.size,
+                unix_s: log.time_utc_s,
+            });
+            ListRow {
+                drone: line.drone.to_string(),
+                slot: Some(line.slot),
+                logs: logs.collect(),
+                reason,
+            }
         })
         .collect();
-    let lost = rows.iter().any(|row| row.reason.is_some());
-    if context.json {
-        context.print_json(&ListOutput { schema: "updraft.log-list/1", drones: rows })?;
-    } else {
-        for row in &rows {
-            let logs: Vec<String> = row
-                .logs
-                .iter()
-                .map(|log| format!("{} ({:.1} MB)", log.number, log.bytes as f64 / 1e6))
-                .collect();
-            let what = row.reason.clone().unwrap_or_else(|| match logs.len() {
-                0 => "no logs".to_owned(),
-                _ => logs.join(", "),
-            });
-            context.emit(&format!("drone {:>4}  slot {:>4}  {what}\n", row.drone, row.slot))?;
-        }
+    listing::show(context, rows)
+}
+
+/// The plan has these slots.
+fn has_slots(plan: &Plan, slots: Option<&SlotSet>) -> Result<(), CommandError> {
+    match slots.and_then(|slots| slots.stray(plan)) {
+        None => Ok(()),
+        Some(stray) => Err(CommandError::Usage(format!(
+            "the plan has no slot {stray}: it has {}",
+            plan.slots.len()
+        ))),
     }
-    Ok(if lost { Exit::Losses } else { Exit::Done })
 }
 
 fn gone() -> CommandError {
@@ -250,9 +230,9 @@ fn gone() -> CommandError {
 }
 
 #[derive(Serialize)]
-struct PullOutput {
+struct PullOutput<T> {
     schema: &'static str,
-    logs: Vec<Brought>,
+    logs: Vec<T>,
 }
 
 /// A word of a shell's command line.
@@ -292,25 +272,13 @@ fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
 
 fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-    if let Some(stray) = args.slots.as_ref().and_then(|slots| slots.stray(&plan)) {
-        return Err(CommandError::Usage(format!(
-            "the plan has no slot {stray}: it has {}",
-            plan.slots.len()
-        )));
+    has_slots(&plan, args.slots.as_ref())?;
+    let target = args.connect.target()?;
+    if args.dry_run {
+        let lines = dry::lines(&folder, &plan, args);
+        return super::fleet::dry::print(context, lines);
     }
     let _lock = context.lock(&args.campaign)?;
-    let links = match args.connect.target()? {
-        Target::Links(links) => links,
-        Target::Server(address) => return server::pull(context, &address, &folder, &plan),
-        Target::Sim => return Err(gone()),
-    };
-    let mut station = args.connect.open(links)?;
-    let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    with_table(&mut crew, args.connect.wait)?;
-    let mut table = crew.table.clone();
-    if let Some(slots) = &args.slots {
-        table.drones.retain(|line| slots.contains(line.slot));
-    }
     let wish = Wish {
         which: args.log,
         again: args.again,
@@ -321,17 +289,52 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
         quiet: false,
         is_durable: true,
     };
+    let links = match target {
+        Target::Links(links) => links,
+        Target::Server(address) => {
+            if args.rate.is_some() {
+                return Err(CommandError::Usage(
+                    "--rate is for the drones' own links: Skybrush Server asks them at its own \
+                     pace; --at-once bounds how many drones at a time"
+                        .to_owned(),
+                ));
+            }
+            let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
+            let rows = server::pull(context, &address, &folder, &plan, slots, &wish, wait_s)?;
+            let lost = rows.iter().filter(|row| row.state == "missing").map(|row| row.slot);
+            let lost: Vec<u16> = lost.collect();
+            return end_pull(context, args, &plan, rows, &lost);
+        }
+        Target::Sim => return Err(gone()),
+    };
+    let mut station = args.connect.open(links)?;
+    let mut crew = Crew::new(context, &mut station, &folder, &plan);
+    with_table(&mut crew, args.connect.wait)?;
+    let mut table = crew.table.clone();
+    if let Some(slots) = &args.slots {
+        table.drones.retain(|line| slots.contains(line.slot));
+    }
     let brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
-    let lost = brought.iter().any(|one| one.state == "missing");
-    if lost {
-        let lost: Vec<u16> =
-            brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
-        context.insist(&format!("To try again: {}", once_more(args, &plan.name, &lost)));
+    let lost: Vec<u16> =
+        brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
+    end_pull(context, args, &plan, brought, &lost)
+}
+
+/// What to do about lost logs, and all of it for programs.
+fn end_pull<T: Serialize>(
+    context: &Context,
+    args: &PullArgs,
+    plan: &Plan,
+    logs: Vec<T>,
+    lost: &[u16],
+) -> Result<Exit, CommandError> {
+    if !lost.is_empty() {
+        context.insist(&format!("To try again: {}", once_more(args, &plan.name, lost)));
     }
     if context.json {
-        context.print_json(&PullOutput { schema: "updraft.pull/1", logs: brought })?;
+        context.print_json(&PullOutput { schema: "updraft.pull/1", logs })?;
     }
-    Ok(if lost { Exit::Losses } else { Exit::Done })
+    Ok(if lost.is_empty() { Exit::Done } else { Exit::Losses })
 }
 
 #[derive(Serialize)]

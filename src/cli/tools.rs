@@ -8,9 +8,10 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::fleet::tables::PreflightOutput;
 use crate::analysis::result::Analysis;
+use crate::campaign::start::StartRecord;
 use crate::campaign::{CampaignIndex, FlightRecord};
+use crate::fleet::changes::Changes;
 use crate::fleet::logs::manifest::Manifest;
-use crate::fleet::required::Changes;
 use crate::fleet::slots::FleetTable;
 use crate::mission::Plan;
 use crate::study::CellRecord;
@@ -51,6 +52,8 @@ pub enum Format {
     Vehicle,
     /// logs/manifest.json
     Logs,
+    /// logs/start.json
+    Start,
     /// fleet.json
     Fleet,
     /// fleet-changes.json
@@ -66,6 +69,7 @@ impl Format {
             Self::Plan => schema_for!(Plan),
             Self::Campaign => schema_for!(CampaignIndex),
             Self::Flight => schema_for!(FlightRecord),
+            Self::Start => schema_for!(StartRecord),
             Self::Analysis => schema_for!(Analysis),
             Self::Study => schema_for!(StudyResult),
             Self::Cell => schema_for!(CellRecord),

@@ -1,11 +1,14 @@
 //! Flies a plan's trajectory with stock ArduCopter: the station streams targets in GUIDED.
 //!
+//! A drone that is not heard any more is told to return, again and again: it may hear what is not
+//! answered.
+//!
 //! The show firmware's law with the link in between: at 10 Hz, position and velocity of the
 //! trajectory at the vehicle's own time. A pause of the stream of more than 3 s (GUID_TIMEOUT)
 //! stops the vehicle where it is; if the station is lost it returns (FS_GCS_ENABLE).
 
 use super::fence::degrees_1e7;
-use super::messages::{GUIDED, LAND, Target, command_long, position_target, set_mode};
+use super::messages::{GUIDED, LAND, RTL, Target, command_long, position_target, set_mode};
 use super::vehicle_clock::VehicleClock;
 use crate::base::frame::ShowFrame;
 use crate::link::clock::{MS, Micros, S};
@@ -29,6 +32,8 @@ const REPEAT: Micros = S;
 const JOIN_AT: f64 = 0.7;
 /// Without a heartbeat for so long the flight counts as lost.
 const LOST: Micros = 30 * S;
+/// A lost drone is told to return for so long.
+const RECALL: Micros = 60 * S;
 
 /// What one drone is to fly.
 #[derive(Clone, Debug)]
@@ -74,12 +79,37 @@ pub enum GuidedError {
         /// Show time, whole s.
         show_s: i64,
     },
-    /// Nothing is heard of it.
-    #[error("the drone was lost at {show_s} s: nothing is heard of it any more")]
+    /// Nothing is heard of it, and nothing more is sent.
+    #[error("the drone was lost at {show_s} s: nothing is heard of it any more; {then}")]
     Lost {
         /// Show time, whole s.
         show_s: i64,
+        /// What came of it.
+        then: AfterLoss,
     },
+}
+
+/// What is done about a drone that is lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AfterLoss {
+    /// It stood or was landing: nothing.
+    LeftAlone,
+    /// It was told to return, was heard again, and does.
+    Returns,
+    /// It was told to return and has not answered.
+    Silent,
+}
+
+impl std::fmt::Display for AfterLoss {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::LeftAlone => "it was on the ground or landing",
+            Self::Returns => "it was told to return and has confirmed it",
+            Self::Silent => {
+                "it was told to return and has NOT CONFIRMED it: use its remote control"
+            }
+        })
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,6 +126,13 @@ enum Phase {
     Stream,
     /// Landing.
     Land,
+    /// Lost, and called home.
+    Recall {
+        /// Since when.
+        since: Micros,
+        /// Show time of the loss, whole s.
+        lost_s: i64,
+    },
 }
 
 /// Flies one drone.
@@ -214,6 +251,9 @@ impl Guided {
     }
 
     fn fly(&mut self, now: Micros, show_s: f64, takeoff_s: f64) -> Step<Result<(), GuidedError>> {
+        if let Phase::Recall { since, lost_s } = self.phase {
+            return self.recall(now, since, lost_s);
+        }
         // It may still be on the ground: `fleet abort` of another station takes it out of GUIDED.
         if self.phase != Phase::Land
             && self.obeyed
@@ -296,7 +336,33 @@ impl Guided {
                     Step::send(set_mode(self.drone, LAND, 0))
                 }
             }
+            Phase::Recall { since, lost_s } => self.recall(now, since, lost_s),
         }
+    }
+
+    /// Tells a lost drone to return.
+    fn recall(&mut self, now: Micros, since: Micros, lost_s: i64) -> Step<Result<(), GuidedError>> {
+        let lost = |then| Step::Done(Err(GuidedError::Lost { show_s: lost_s, then }));
+        let heard = self.heard.is_some_and(|at| at > since);
+        if heard && (!self.armed || self.mode.is_some_and(|mode| mode != GUIDED)) {
+            return lost(AfterLoss::Returns);
+        }
+        if now >= since + RECALL {
+            return lost(AfterLoss::Silent);
+        }
+        self.next = now + REPEAT;
+        Step::send(set_mode(self.drone, RTL, 0))
+    }
+
+    /// Nothing was heard for too long.
+    fn lose(&mut self, now: Micros, show_s: f64) -> Step<Result<(), GuidedError>> {
+        let lost_s = show_s as i64;
+        if !self.armed || self.phase == Phase::Land {
+            let then = AfterLoss::LeftAlone;
+            return Step::Done(Err(GuidedError::Lost { show_s: lost_s, then }));
+        }
+        self.go(Phase::Recall { since: now, lost_s }, now);
+        Step::Wait(now)
     }
 }
 
@@ -351,8 +417,8 @@ impl Machine for Guided {
             }
             return Step::Wait(now + S);
         };
-        if now >= heard + LOST {
-            return Step::Done(Err(GuidedError::Lost { show_s: show_s as i64 }));
+        if now >= heard + LOST && !matches!(self.phase, Phase::Recall { .. }) {
+            return self.lose(now, show_s);
         }
         let rate = self.flight.clock.rate();
         if rate > 1.0 && now >= self.next_beat {

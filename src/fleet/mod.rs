@@ -8,6 +8,7 @@
 
 pub mod abort;
 pub mod budget;
+pub mod changes;
 pub mod clear;
 pub mod command;
 pub mod dry_run;

@@ -9,7 +9,7 @@ use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 
 /// Given up after so long without an answer.
-const PATIENCE: Micros = 15 * S;
+const PATIENCE: Micros = 30 * S;
 
 #[derive(Debug)]
 enum Phase {

@@ -5,19 +5,14 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use std::path::Path;
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
+use super::changes::Change;
 use super::command::Patience;
 use super::params::{ReadParams, SetError, SetParams, same};
-use crate::base::file::write_whole;
-use crate::campaign::{CampaignError, read_json, to_json};
 use crate::link::clock::Micros;
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
+use crate::link::station::STATION;
 use crate::mission::Plan;
 
 /// What a parameter must be.
@@ -143,6 +138,11 @@ pub fn requirements(plan: &Plan, show_firmware: bool) -> Vec<Requirement> {
                 Wanted::AtLeast(1.0),
                 "a drone that is flown by the station must return when it loses it",
             ),
+            require(
+                "SYSID_MYGCS",
+                Wanted::Is(STATION.system as f32),
+                "a drone misses only the station that this names, and this program is 254",
+            ),
         ]);
     }
     all
@@ -169,18 +169,6 @@ impl std::fmt::Display for Difference {
             ),
         }
     }
-}
-
-/// A change that was made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Change {
-    /// The parameter.
-    pub name: String,
-    /// Its value before.
-    pub was: f32,
-    /// Its value since.
-    pub now: f32,
 }
 
 /// How the parameters of a vehicle stand.
@@ -318,106 +306,5 @@ impl Machine for CheckParams {
                 Progress { done: total, total }
             }
         }
-    }
-}
-
-/// Name and version of the file of changes.
-pub const CHANGES_SCHEMA: &str = "updraft.changes/1";
-/// Its name in a campaign folder.
-pub const CHANGES_FILE: &str = "fleet-changes.json";
-
-/// `fleet-changes.json`: every parameter changed on a vehicle, with the value it had at first.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Changes {
-    /// Format name and version: `updraft.changes/1`.
-    pub schema: String,
-    /// Per vehicle; the newest value counts, the first one is restored.
-    pub drones: Vec<DroneChanges>,
-}
-
-/// The changes of one vehicle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct DroneChanges {
-    /// The vehicle.
-    pub drone: DroneId,
-    /// What was changed.
-    pub changes: Vec<Change>,
-}
-
-impl Default for Changes {
-    fn default() -> Self {
-        Self { schema: CHANGES_SCHEMA.to_owned(), drones: Vec::new() }
-    }
-}
-
-impl Changes {
-    /// The file of a folder; empty if there is none.
-    ///
-    /// # Errors
-    /// When it cannot be read.
-    pub fn read(folder: &Path) -> Result<Self, CampaignError> {
-        let path = folder.join(CHANGES_FILE);
-        if !path.exists() {
-            return Ok(Self::default());
-        }
-        let changes: Self = read_json(&path)?;
-        if changes.schema == CHANGES_SCHEMA {
-            Ok(changes)
-        } else {
-            let (right, found) = (CHANGES_SCHEMA, &changes.schema);
-            let reason = format!("this program reads \"{right}\", not \"{found}\"");
-            Err(CampaignError::Json { path, reason })
-        }
-    }
-
-    /// Writes the file of a folder.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), CampaignError> {
-        let path = folder.join(CHANGES_FILE);
-        let json = to_json(self).map_err(|error| CampaignError::Json {
-            path: path.clone(),
-            reason: error.to_string(),
-        })?;
-        Ok(write_whole(&path, &json)?)
-    }
-
-    /// Adds changes of a vehicle; of a parameter that was changed before, the first old value is
-    /// kept.
-    pub fn add(&mut self, drone: DroneId, changes: &[Change]) {
-        if changes.is_empty() {
-            return;
-        }
-        let index = self.drones.iter().position(|entry| entry.drone == drone);
-        let index = index.unwrap_or_else(|| {
-            self.drones.push(DroneChanges { drone, changes: Vec::new() });
-            self.drones.len() - 1
-        });
-        let known = &mut self.drones[index].changes;
-        for change in changes {
-            match known.iter_mut().find(|old| old.name == change.name) {
-                Some(old) => old.now = change.now,
-                None => known.push(change.clone()),
-            }
-        }
-        self.drones.sort_by_key(|entry| entry.drone);
-    }
-
-    /// A machine per vehicle that puts the old values back. Once it is done, the vehicle's entry
-    /// can be taken out with [`Changes::forget`].
-    pub fn restore(&self) -> BTreeMap<DroneId, SetParams> {
-        let machine = |entry: &DroneChanges| {
-            let values = entry.changes.iter().map(|change| (change.name.clone(), change.was));
-            (entry.drone, SetParams::new(entry.drone, values.collect::<Vec<_>>()))
-        };
-        self.drones.iter().map(machine).collect()
-    }
-
-    /// Forgets a vehicle whose values are restored.
-    pub fn forget(&mut self, drone: DroneId) {
-        self.drones.retain(|entry| entry.drone != drone);
     }
 }

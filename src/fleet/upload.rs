@@ -176,6 +176,7 @@ pub struct Upload {
     status: Option<Status>,
     written: bool,
     step: u64,
+    settle: Micros,
 }
 
 /// Steps in [`Upload::progress`].
@@ -198,7 +199,16 @@ impl Upload {
             status: None,
             written: false,
             step: 0,
+            settle: SETTLE,
         }
+    }
+
+    /// Status packets are not believed until so long after the reload, us (1 s unless told): a
+    /// link that keeps the order needs no longer than the vehicle takes to set its flags.
+    #[must_use]
+    pub fn settling(mut self, settle: Micros) -> Self {
+        self.settle = settle;
+        self
     }
 
     fn origin(&self) -> Command {
@@ -320,7 +330,7 @@ impl Machine for Upload {
                 let status = Status::from_data(&data.data[..length]);
                 self.status = Some(status);
                 if let Phase::Flags { since, agreeing, last } = &mut self.phase
-                    && now >= *since + SETTLE
+                    && now >= *since + self.settle
                 {
                     *last = Some(status);
                     *agreeing = if missing(&status).is_none() { *agreeing + 1 } else { 0 };

@@ -13,4 +13,5 @@ pub mod id;
 pub mod net;
 pub mod signing;
 pub mod station;
+pub mod traffic;
 pub mod wire;

@@ -1,9 +1,12 @@
 //! What protocols talk through.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::clock::Micros;
 use super::error::NetError;
 use super::frame::MavMessage;
 use super::id::DroneId;
+use super::traffic::Traffic;
 
 /// A message from a vehicle's autopilot.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,4 +35,15 @@ pub trait Net {
 
     /// Vehicles heard so far.
     fn heard(&self) -> Vec<DroneId>;
+
+    /// What went through each network so far; nothing where that is not counted.
+    fn traffic(&self) -> BTreeMap<u16, Traffic> {
+        BTreeMap::new()
+    }
+
+    /// Vehicles whose id was heard from two places at once: two vehicles with one id, or one
+    /// vehicle over two links (then only one link is used).
+    fn doubled(&self) -> BTreeSet<DroneId> {
+        BTreeSet::new()
+    }
 }

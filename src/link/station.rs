@@ -10,10 +10,11 @@ use std::time::Duration;
 use super::address::Address;
 use super::clock::{Clock, Micros, S};
 use super::error::NetError;
-use super::frame::{Frame, FrameLoss, FrameReader, MavMessage, Sender, dialect, encode};
+use super::frame::{Frame, FrameReader, MavMessage, Sender, dialect, encode};
 use super::id::DroneId;
 use super::net::{Net, Received};
 use super::signing::{Key, Signer, Verifier, signing_time};
+use super::traffic::Traffic;
 use super::wire::{self, Peer, Receiving, Sending};
 
 /// The identity crews know from Skybrush Server: system 254, component 190 (mission planner).
@@ -38,19 +39,6 @@ pub struct Setup {
     pub key: Option<Key>,
     /// Its clock.
     pub clock: Arc<dyn Clock>,
-}
-
-/// What went through a network.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Traffic {
-    /// Bytes received, with all overhead above UDP.
-    pub bytes_in: u64,
-    /// Bytes sent.
-    pub bytes_out: u64,
-    /// Frames received that gave a message.
-    pub frames_in: u64,
-    /// Bytes that gave none.
-    pub loss: FrameLoss,
 }
 
 /// A station with open links. Its readers end when it is dropped.
@@ -132,17 +120,6 @@ impl Station {
             station.readers.push(reader);
         }
         Ok(station)
-    }
-
-    /// What went through each network.
-    pub fn traffic(&self) -> &BTreeMap<u16, Traffic> {
-        &self.traffic
-    }
-
-    /// Vehicles whose id was heard from two places at once: two vehicles with one id, or one
-    /// vehicle over two links (then only one link is used).
-    pub fn doubled(&self) -> &BTreeSet<DroneId> {
-        &self.doubled
     }
 
     fn take(&mut self, piece: Piece) -> Result<(), NetError> {
@@ -282,6 +259,14 @@ impl Net for Station {
 
     fn heard(&self) -> Vec<DroneId> {
         self.routes.keys().copied().collect()
+    }
+
+    fn traffic(&self) -> BTreeMap<u16, Traffic> {
+        self.traffic.clone()
+    }
+
+    fn doubled(&self) -> BTreeSet<DroneId> {
+        self.doubled.clone()
     }
 }
 

@@ -101,7 +101,8 @@ pub fn fly<W: Write>(setup: &FlightSetup<'_>, out: W) -> Result<FlightSummary, S
     validate(setup)?;
     let takeoff_s = takeoff_time_s(setup.trajectory, setup.vehicle.autopilot.wpnav_speed_up_mps)
         .ok_or(SimError::NoTakeoff { drone: setup.drone, height_m: p::SHOW_TAKEOFF_ALT })?;
-    let mut recorder = LogRecorder::new(out, setup, armed_at_us(takeoff_s)).map_err(log_error)?;
+    let mut recorder =
+        LogRecorder::new(out, setup, armed_at_us(takeoff_s), false).map_err(log_error)?;
     let mut summary = fly_with(setup, &mut recorder)?;
     summary.log_rows = recorder.finish().map_err(log_error)?;
     Ok(summary)

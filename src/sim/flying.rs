@@ -61,12 +61,32 @@ impl<'a> Flight<'a> {
     /// See [`SimError`].
     pub fn armed(setup: &FlightSetup<'a>, armed_s: Option<f64>) -> Result<Self, SimError> {
         validate(setup)?;
+        let FlightSetup { trajectory, home_m, vehicle, drone, .. } = setup;
+        let pilot =
+            Autopilot::new(trajectory, &vehicle.autopilot, *home_m, home_amsl_m(setup), STEP_S);
+        let none = SimError::NoTakeoff { drone: *drone, height_m: p::SHOW_TAKEOFF_ALT };
+        Self::begin(setup, armed_s, pilot.ok_or(none)?)
+    }
+
+    /// A drone that arms now, at show time 0, in GUIDED: it flies what it is told, not the
+    /// trajectory.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn guided(setup: &FlightSetup<'a>) -> Result<Self, SimError> {
+        validate(setup)?;
+        let FlightSetup { trajectory, home_m, vehicle, .. } = setup;
+        let pilot =
+            Autopilot::guided(trajectory, &vehicle.autopilot, *home_m, home_amsl_m(setup), STEP_S);
+        Self::begin(setup, Some(0.0), pilot)
+    }
+
+    fn begin(
+        setup: &FlightSetup<'a>,
+        armed_s: Option<f64>,
+        mut pilot: Autopilot<'a>,
+    ) -> Result<Self, SimError> {
         let drone = setup.drone;
-        let home_amsl_m = setup.frame.origin.amsl_m + setup.home_m.z;
-        let settings = &setup.vehicle.autopilot;
-        let mut pilot =
-            Autopilot::new(setup.trajectory, settings, setup.home_m, home_amsl_m, STEP_S)
-                .ok_or(SimError::NoTakeoff { drone, height_m: p::SHOW_TAKEOFF_ALT })?;
         if let Some(frame) = &setup.vehicle.airframe.sitl {
             pilot.motors.set_voltage(frame.battery_voltage_v);
         }
@@ -89,7 +109,7 @@ impl<'a> Flight<'a> {
             sensors,
             air: setup.atmosphere.sampler(drone),
             around: Surroundings { air_velocity_mps: Vector3::zeros(), density_ratio: 1.0 },
-            density: DensityNearby::about(home_amsl_m),
+            density: DensityNearby::about(home_amsl_m(setup)),
             tally: Tally::default(),
             strain: Strain::default(),
             start_us: armed_at_us(takeoff_s).max(late_us),
@@ -196,6 +216,21 @@ impl<'a> Flight<'a> {
         self.pilot.director.abort(how, self.plant.motion().position_m);
     }
 
+    /// Orders a guided vehicle to take off to this height above home, m; whether it does.
+    pub fn take_off(&mut self, above_home_m: f64) -> bool {
+        self.pilot.director.take_off(above_home_m)
+    }
+
+    /// Gives a guided vehicle its next target: show frame, m and m/s.
+    pub fn give_target(&mut self, position_m: Vector3<f64>, velocity_mps: Vector3<f64>) {
+        self.pilot.director.give_target(position_m, velocity_mps);
+    }
+
+    /// Whether a ground station flies it, not the show.
+    pub fn is_guided(&self) -> bool {
+        self.pilot.director.guided.is_some()
+    }
+
     /// Show time of the next step, s.
     pub fn now_s(&self) -> f64 {
         (self.start_us + self.step as i64 * STEP_US) as f64 * 1e-6
@@ -266,6 +301,11 @@ impl<'a> Flight<'a> {
         summary.takeoff_s = self.pilot.director.takeoff_s;
         summary
     }
+}
+
+/// Altitude of the ground at home above mean sea level, m.
+fn home_amsl_m(setup: &FlightSetup<'_>) -> f64 {
+    setup.frame.origin.amsl_m + setup.home_m.z
 }
 
 /// Gathers the summary.

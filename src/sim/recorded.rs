@@ -39,9 +39,20 @@ impl<'a> RecordedFlight<'a> {
     /// # Errors
     /// See [`SimError`].
     pub fn armed(setup: &FlightSetup<'a>, armed_s: Option<f64>) -> Result<Self, SimError> {
-        let flight = Flight::armed(setup, armed_s)?;
+        Self::of(setup, Flight::armed(setup, armed_s)?)
+    }
+
+    /// Arms at show time 0 in GUIDED: see [`Flight::guided`].
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn guided(setup: &FlightSetup<'a>) -> Result<Self, SimError> {
+        Self::of(setup, Flight::guided(setup)?)
+    }
+
+    fn of(setup: &FlightSetup<'a>, flight: Flight<'a>) -> Result<Self, SimError> {
         let tap = Tap::default();
-        let recorder = LogRecorder::new(tap.clone(), setup, flight.armed_us())
+        let recorder = LogRecorder::new(tap.clone(), setup, flight.armed_us(), flight.is_guided())
             .map_err(|source| SimError::Log { drone: setup.drone, source })?;
         Ok(Self { flight, recorder: Some(recorder), tap, drone: setup.drone })
     }

@@ -11,14 +11,13 @@ use serde_json::{Value, json};
 use super::error::ServerError;
 use super::lines::Lines;
 use super::message::{self, Incoming};
+use super::work::Outcome;
 use crate::link::clock::{Clock, Micros, S};
 
 /// Longest line: a log of 380 MB in base64.
 const MOST_LINE: usize = 512 << 20;
 /// An answer to a request comes at once.
 const ANSWER: Micros = 10 * S;
-/// The server gives up work without progress after 90 s, and says so.
-const PATIENCE: Micros = 120 * S;
 /// Longest wait on the socket at once.
 const LOOK: Duration = Duration::from_millis(100);
 const CONNECT: Duration = Duration::from_secs(5);
@@ -30,21 +29,11 @@ pub struct Client {
     stream: TcpStream,
     lines: Lines,
     most_line: usize,
-    clock: Arc<dyn Clock>,
+    pub(super) clock: Arc<dyn Clock>,
     next_id: u64,
     /// Ends of work by receipt, and progress.
-    ended: BTreeMap<String, Result<Value, String>>,
-    moved: BTreeMap<String, (Micros, f64)>,
-}
-
-/// How one drone's part of a request ended.
-pub type Outcome = Result<Value, String>;
-
-/// Work that goes on at the server: receipts by drone.
-#[derive(Clone, Debug, Default)]
-pub struct Running {
-    receipts: BTreeMap<String, String>,
-    over: BTreeMap<String, Outcome>,
+    pub(super) ended: BTreeMap<String, Outcome>,
+    pub(super) moved: BTreeMap<String, (Micros, f64)>,
 }
 
 impl Client {
@@ -85,12 +74,21 @@ impl Client {
 
     /// Asks, and waits for the answer's body.
     pub fn ask(&mut self, body: &Value) -> Result<Value, ServerError> {
+        self.ask_within(body, ANSWER)
+    }
+
+    /// The same with another patience.
+    pub(super) fn ask_within(
+        &mut self,
+        body: &Value,
+        patience: Micros,
+    ) -> Result<Value, ServerError> {
         let what = kind_of(body);
         let id = self.send(body)?;
-        let until = self.clock.now() + ANSWER;
+        let until = self.clock.now() + patience;
         loop {
             let Some(incoming) = self.receive(&what, until)? else {
-                return Err(ServerError::Silent { what, seconds: ANSWER / S });
+                return Err(ServerError::Silent { what, seconds: patience / S });
             };
             if incoming.refers_to.as_deref() != Some(&id) {
                 self.note(&incoming);
@@ -104,69 +102,6 @@ impl Client {
         }
     }
 
-    /// Asks for work on drones; what is over at once is over, the rest has receipts.
-    pub fn begin(&mut self, body: &Value) -> Result<Running, ServerError> {
-        let answer = self.ask(body)?;
-        let mut running = Running::default();
-        for (drone, receipt) in entries(&answer, "receipt") {
-            if let Some(receipt) = receipt.as_str() {
-                running.receipts.insert(drone, receipt.to_owned());
-            }
-        }
-        for (drone, result) in entries(&answer, "result") {
-            running.over.insert(drone, Ok(result));
-        }
-        for (drone, error) in entries(&answer, "error") {
-            running.over.insert(drone, Err(words(&error)));
-        }
-        // A single drone's receipt is not keyed by it.
-        if let (Some(receipt), Some(drone)) = (text(&answer, "receipt"), text(body, "uavId")) {
-            running.receipts.insert(drone.to_owned(), receipt.to_owned());
-        }
-        Ok(running)
-    }
-
-    /// Waits until all of it is over. `progress` is called with a drone and its share, 0..1, and
-    /// ends the waiting by returning false.
-    pub fn finish(
-        &mut self,
-        mut running: Running,
-        mut progress: impl FnMut(&str, f64) -> bool,
-    ) -> Result<BTreeMap<String, Outcome>, ServerError> {
-        let mut moved = self.clock.now();
-        while !running.receipts.is_empty() {
-            let now = self.clock.now();
-            if let Some(incoming) = self.receive("the end of its work", now + 200_000)? {
-                self.note(&incoming);
-            }
-            let mut over = Vec::new();
-            for (drone, receipt) in &running.receipts {
-                if let Some(outcome) = self.ended.remove(receipt) {
-                    running.over.insert(drone.clone(), outcome);
-                    over.push(drone.clone());
-                }
-                let (time, share) = self.moved.get(receipt).copied().unwrap_or((0, 0.0));
-                moved = moved.max(time);
-                if !progress(drone, if running.over.contains_key(drone) { 1.0 } else { share }) {
-                    return Ok(running.over);
-                }
-            }
-            for drone in over {
-                if let Some(receipt) = running.receipts.remove(&drone) {
-                    self.moved.remove(&receipt);
-                    moved = self.clock.now();
-                }
-            }
-            if self.clock.now() > moved + PATIENCE {
-                for drone in std::mem::take(&mut running.receipts).into_keys() {
-                    let silent = format!("nothing was heard of it for {} s", PATIENCE / S);
-                    running.over.insert(drone, Err(silent));
-                }
-            }
-        }
-        Ok(running.over)
-    }
-
     fn send(&mut self, body: &Value) -> Result<String, ServerError> {
         self.next_id += 1;
         let id = format!("updraft-{}", self.next_id);
@@ -178,7 +113,11 @@ impl Client {
     }
 
     /// The next message until a time.
-    fn receive(&mut self, what: &str, until: Micros) -> Result<Option<Incoming>, ServerError> {
+    pub(super) fn receive(
+        &mut self,
+        what: &str,
+        until: Micros,
+    ) -> Result<Option<Incoming>, ServerError> {
         let broken = |source| ServerError::Broken { what: what.to_owned(), source };
         let most = self.most_line;
         let mut buffer = vec![0; 1 << 16];
@@ -207,7 +146,7 @@ impl Client {
     }
 
     /// Keeps a notification until it is asked for.
-    fn note(&mut self, incoming: &Incoming) {
+    pub(super) fn note(&mut self, incoming: &Incoming) {
         let body = &incoming.body;
         match incoming.kind.as_str() {
             "ASYNC-RESP" => {
@@ -276,10 +215,10 @@ pub(super) fn text<'a>(value: &'a Value, key: &str) -> Option<&'a str> {
     value.get(key).and_then(Value::as_str)
 }
 
-fn entries(value: &Value, key: &str) -> impl Iterator<Item = (String, Value)> {
+pub(super) fn entries(value: &Value, key: &str) -> impl Iterator<Item = (String, Value)> {
     value.get(key).and_then(Value::as_object).cloned().unwrap_or_default().into_iter()
 }
 
-fn words(value: &Value) -> String {
+pub(super) fn words(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }

@@ -6,8 +6,9 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::client::{Client, Running, text};
+use super::client::{Client, text};
 use super::error::ServerError;
+use super::work::Job;
 
 /// A log on a drone.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,23 +22,37 @@ pub struct LogEntry {
 }
 
 impl Client {
-    /// The logs of drones; what went wrong with one is its value.
+    /// The logs of drones; what went wrong with one is its value. `go_on`: false ends the waiting.
+    ///
+    /// # Errors
+    /// When the server refuses, or is not there.
     pub fn logs(
         &mut self,
         drones: &[String],
+        go_on: impl FnMut() -> bool,
     ) -> Result<BTreeMap<String, Result<Vec<LogEntry>, String>>, ServerError> {
-        let running = self.begin(&json!({ "type": "LOG-INF", "ids": drones }))?;
-        let ended = self.finish(running, |_, _| true)?;
+        let running = self.begin(&list_body(drones))?;
+        let ended = self.finish(running, go_on)?;
         Ok(ended
             .into_iter()
             .map(|(drone, outcome)| (drone, outcome.and_then(|value| log_entries(&value))))
             .collect())
     }
+}
 
-    /// Begins the download of a log; [`log_bytes`] reads what it ends with.
-    pub fn fetch_log(&mut self, drone: &str, log: &str) -> Result<Running, ServerError> {
-        self.begin(&json!({ "type": "LOG-DATA", "uavId": drone, "logId": log }))
-    }
+fn list_body(drones: &[String]) -> Value {
+    json!({ "type": "LOG-INF", "ids": drones })
+}
+
+/// The request for a list of a drone's logs; [`log_entries`] reads what it ends with.
+pub fn list_logs(drone: &str) -> Job {
+    Job { drone: drone.to_owned(), body: list_body(&[drone.to_owned()]) }
+}
+
+/// The request for a log; [`log_bytes`] reads what it ends with.
+pub fn fetch_log(drone: &str, log: &str) -> Job {
+    let body = json!({ "type": "LOG-DATA", "uavId": drone, "logId": log });
+    Job { drone: drone.to_owned(), body }
 }
 
 /// The logs in the end of a LOG-INF request.

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::client::{Client, Running};
+use super::client::Client;
 use super::error::ServerError;
 
 /// When the show starts.
@@ -25,24 +25,30 @@ impl StartConfig {
     }
 }
 
-impl Client {
-    /// Tells the server when to start; it tells the drones once a second.
-    pub fn set_start(&mut self, start: &StartConfig) -> Result<(), ServerError> {
-        self.ask(&json!({
+impl StartConfig {
+    /// The request that sets it.
+    pub fn body(&self) -> Value {
+        json!({
             "type": "SHOW-SETCFG",
             "configuration": {
                 "start": {
-                    "authorized": start.authorized,
+                    "authorized": self.authorized,
                     "authorizationScope": "live",
                     "clock": null,
-                    "time": start.unix_s,
+                    "time": self.unix_s,
                     "method": "auto",
-                    "uavIds": start.drones,
+                    "uavIds": self.drones,
                 },
-                "duration": start.duration_s,
+                "duration": self.duration_s,
             },
-        }))
-        .map(|_| ())
+        })
+    }
+}
+
+impl Client {
+    /// Tells the server when to start; it tells the drones once a second.
+    pub fn set_start(&mut self, start: &StartConfig) -> Result<(), ServerError> {
+        self.ask(&start.body()).map(|_| ())
     }
 
     /// What the server would start, as it tells it.
@@ -50,10 +56,9 @@ impl Client {
         let mut answer = self.ask(&json!({ "type": "SHOW-CFG" }))?;
         Ok(answer.get_mut("configuration").map(Value::take).unwrap_or_default())
     }
+}
 
-    /// Sends drones home, or lets them land where they are.
-    pub fn end_flight(&mut self, drones: &[String], home: bool) -> Result<Running, ServerError> {
-        let kind = if home { "UAV-RTH" } else { "UAV-LAND" };
-        self.begin(&json!({ "type": kind, "ids": drones }))
-    }
+/// The request that sends drones home, or lets them land where they are.
+pub fn end_flight(drones: &[String], home: bool) -> Value {
+    json!({ "type": if home { "UAV-RTH" } else { "UAV-LAND" }, "ids": drones })
 }

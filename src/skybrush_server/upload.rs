@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::client::{Client, Running};
 use super::error::ServerError;
+use super::work::Job;
 use crate::base::frame::ShowFrame;
 
 /// The fence that goes with a show. There is no show without one: a server that is told nothing
@@ -97,14 +97,13 @@ impl ShowUpload {
     }
 }
 
-impl Client {
-    /// Begins the upload of a payload to a drone of the server.
-    pub fn upload(&mut self, drone: &str, show: &Value) -> Result<Running, ServerError> {
-        self.begin(&json!({
-            "type": "OBJ-CMD",
-            "ids": [drone],
-            "command": "__show_upload",
-            "kwds": { "show": show },
-        }))
-    }
+/// The request that uploads a payload to a drone of the server.
+pub fn upload(drone: &str, show: &Value) -> Job {
+    let body = json!({
+        "type": "OBJ-CMD",
+        "ids": [drone],
+        "command": "__show_upload",
+        "kwds": { "show": show },
+    });
+    Job { drone: drone.to_owned(), body }
 }

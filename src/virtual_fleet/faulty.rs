@@ -54,6 +54,11 @@ impl<T: Clone> FaultyLink<T> {
         share > 0.0 && self.rng.random_bool(share.min(1.0))
     }
 
+    /// When the next frame arrives.
+    pub(super) fn next(&self) -> Option<Micros> {
+        self.flying.first_key_value().map(|((arrives, _), _)| *arrives)
+    }
+
     /// The next frame that has arrived.
     pub(super) fn arrived(&mut self, now: Micros) -> Option<T> {
         let entry = self.flying.first_entry()?;

@@ -90,6 +90,8 @@ impl<'w> Post<'w> {
         let heard = !self.inbox.is_empty();
         for frame in self.inbox.drain(..) {
             self.vehicle.on_frame(now, frame.sender, &frame.message, &mut out);
+            // A vehicle serves requests as they come; only a burst makes them wait.
+            self.wake = self.vehicle.poll(now, &mut out);
         }
         self.is_sending = false;
         if heard || self.wake <= now {

@@ -264,7 +264,10 @@ fn run<'w>(
         let busy = posts.iter().filter(|post| post.is_busy()).count();
         running.busy.store(busy as u64, Ordering::Relaxed);
         let round = if posts.iter().any(|post| post.is_sending) { TRANSFER_ROUND } else { ROUND };
-        let left = round.saturating_sub(clock.now().saturating_sub(begun));
+        // Nor does what the links carry wait for a whole round.
+        let arrives = up.iter().chain(&down).filter_map(FaultyLink::next).min();
+        let until = arrives.unwrap_or(Micros::MAX).max(begun + TRANSFER_ROUND).min(begun + round);
+        let left = until.saturating_sub(clock.now());
         // The last sleep of a round looks for requests: an exchange of short packets is quick.
         wait(&posts, clock, left);
     }

@@ -58,7 +58,7 @@ impl<'w> World<'w> {
 }
 
 /// A show file as a vehicle has understood it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct LoadedShow {
     /// What to fly.
     pub trajectory: Trajectory,

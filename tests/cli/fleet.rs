@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::support::{Bench, Ended, SHORT};
 
 /// Virtual drones, switched off at the end.
-struct Fleet(Child);
+pub(crate) struct Fleet(Child);
 
 impl Drop for Fleet {
     fn drop(&mut self) {
@@ -19,18 +19,18 @@ impl Drop for Fleet {
     }
 }
 
-fn free_port() -> String {
+pub(crate) fn free_port() -> String {
     let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     format!("127.0.0.1:{}", socket.local_addr().unwrap().port())
 }
 
 impl Bench {
-    fn planned(&self, grid: &str, folder: &str) {
+    pub(crate) fn planned(&self, grid: &str, folder: &str) {
         let plan = ["plan", "calibration", "--grid", grid, "-o", folder];
         self.expect(0, &[&plan[..], SHORT].concat());
     }
 
-    fn fleet(&self, station: &str, more: &[&str]) -> Fleet {
+    pub(crate) fn fleet(&self, station: &str, more: &[&str]) -> Fleet {
         let args = ["fleet", "virtual", "drones", "--station", station];
         let mut command = self.command(&[&args[..], more].concat());
         Fleet(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())

@@ -2,11 +2,11 @@
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -45,7 +45,22 @@ pub(crate) enum Fault {
     LogIsNone,
     /// A line that does not end.
     Endless,
+    /// Drones are known one after the other, and then where they are.
+    Late,
+    /// Drone 01 is not known any more when its log is asked for.
+    LogUnknown,
+    /// Somebody else downloads a log of drone 01.
+    LogBusy,
+    /// Logs are smaller in the first list.
+    LogGrows,
+    /// Downloads begin, and go on for ever.
+    LogHangs,
+    /// Drone 01 misses the first request for a log.
+    LogOnce,
 }
+
+/// How long work takes, so that there can be more of it at once.
+const WORK: Duration = Duration::from_millis(150);
 
 #[derive(Default)]
 struct State {
@@ -55,6 +70,11 @@ struct State {
     /// How often statuses were asked for, in all and since the start.
     looks: u64,
     looks_in_flight: u64,
+    lists: u64,
+    /// Drones with an upload or a download, and the most of them there have been.
+    busy: Vec<String>,
+    most_busy: usize,
+    downloads: u64,
 }
 
 /// The server, on a port of its own.
@@ -93,8 +113,10 @@ impl Fake {
                 if ended.load(Ordering::SeqCst) {
                     return;
                 }
+                let stream = stream.unwrap();
                 let visit = Visit {
-                    stream: stream.unwrap(),
+                    reader: stream.try_clone().unwrap(),
+                    out: Out(Arc::new(Mutex::new(stream))),
                     fault,
                     places,
                     state: Arc::clone(&shared),
@@ -119,6 +141,11 @@ impl Fake {
         self.state.lock().unwrap().asked.clone()
     }
 
+    /// How many drones have had an upload or a download at the same time.
+    pub(crate) fn most_at_once(&self) -> usize {
+        self.state.lock().unwrap().most_busy
+    }
+
     pub(crate) fn is_authorized(&self) -> bool {
         self.state.lock().unwrap().start.is_some()
     }
@@ -131,8 +158,12 @@ impl Drop for Fake {
     }
 }
 
+#[derive(Clone)]
+struct Out(Arc<Mutex<TcpStream>>);
+
 struct Visit {
-    stream: TcpStream,
+    reader: TcpStream,
+    out: Out,
     fault: Fault,
     places: [[i64; 2]; 2],
     state: Arc<Mutex<State>>,
@@ -152,22 +183,8 @@ fn ids(body: &Value) -> Vec<String> {
     ids.iter().map(|id| id.as_str().unwrap().to_owned()).collect()
 }
 
-impl Visit {
-    fn serve(mut self) {
-        let reader = BufReader::new(self.stream.try_clone().unwrap());
-        for line in reader.lines() {
-            let Ok(line) = line else { return };
-            let request: Value = serde_json::from_str(&line).unwrap();
-            assert_eq!(request["$fw.version"], "1.0");
-            let id = request["id"].as_str().unwrap().to_owned();
-            assert!((1..=36).contains(&id.len()));
-            if self.answer(&id, &request["body"]).is_err() {
-                return;
-            }
-        }
-    }
-
-    fn send(&mut self, refs: Option<&str>, body: &Value) -> Result<(), Closed> {
+impl Out {
+    fn send(&self, refs: Option<&str>, body: &Value) -> Result<(), Closed> {
         let mut message = json!({ "$fw.version": "1.0", "id": "s", "body": body });
         if let Some(refs) = refs {
             message["refs"] = json!(refs);
@@ -175,7 +192,47 @@ impl Visit {
         let line = format!("{message}\n");
         // In two pieces: lines do not come in packets.
         let (one, two) = line.as_bytes().split_at(line.len() / 2);
-        self.stream.write_all(one).and_then(|()| self.stream.write_all(two)).map_err(|_| Closed)
+        let mut stream = self.0.lock().unwrap();
+        stream.write_all(one).and_then(|()| stream.write_all(two)).map_err(|_| Closed)
+    }
+}
+
+impl Visit {
+    fn serve(mut self) {
+        let reader = BufReader::new(self.reader.try_clone().unwrap());
+        for line in reader.lines() {
+            let Ok(line) = line else { return };
+            let request: Value = serde_json::from_str(&line).unwrap();
+            assert_eq!(request["$fw.version"], "1.0");
+            let id = request["id"].as_str().unwrap().to_owned();
+            assert!((1..=36).contains(&id.len()));
+            if self.answer(&id, &request["body"]).is_err() {
+                drop(self.reader.shutdown(Shutdown::Both));
+                return;
+            }
+        }
+    }
+
+    fn send(&self, refs: Option<&str>, body: &Value) -> Result<(), Closed> {
+        self.out.send(refs, body)
+    }
+
+    /// Ends work after a while.
+    fn end_later(&self, drone: &str, messages: Vec<Value>) {
+        let mut state = self.state.lock().unwrap();
+        assert!(!state.busy.iter().any(|busy| busy == drone), "one thing at a time and drone");
+        state.busy.push(drone.to_owned());
+        state.most_busy = state.most_busy.max(state.busy.len());
+        drop(state);
+        let (out, state, drone) = (self.out.clone(), Arc::clone(&self.state), drone.to_owned());
+        std::thread::spawn(move || {
+            std::thread::sleep(WORK);
+            state.lock().unwrap().busy.retain(|busy| *busy != drone);
+            // Whoever has asked may be gone.
+            for message in messages {
+                drop(out.send(None, &message));
+            }
+        });
     }
 
     fn receipt(&mut self) -> String {
@@ -196,13 +253,21 @@ impl Visit {
         }
         match kind.as_str() {
             "SYS-VER" if self.fault == Fault::Endless => {
-                self.stream.write_all(&vec![b'x'; 2 << 20]).map_err(|_| Closed)
+                self.out.0.lock().unwrap().write_all(&vec![b'x'; 2 << 20]).map_err(|_| Closed)
             }
             "SYS-VER" => {
                 let body = json!({ "type": kind, "software": "fake", "version": "1.2.3" });
                 self.send(Some(id), &body)
             }
-            "UAV-LIST" => self.send(Some(id), &json!({ "type": kind, "ids": ["01", "02"] })),
+            "UAV-LIST" => {
+                let mut state = self.state.lock().unwrap();
+                state.lists += 1;
+                let known = if self.fault == Fault::Late { state.lists - 1 } else { 2 };
+                drop(state);
+                // In no order.
+                let ids = &["02", "01"][..known.min(2) as usize];
+                self.send(Some(id), &json!({ "type": kind, "ids": ids }))
+            }
             "UAV-INF" => {
                 let status = self.status(&ids(body))?;
                 let body = json!({ "type": kind, "status": status });
@@ -214,6 +279,10 @@ impl Visit {
             "SHOW-SETCFG" => self.configure(id, &body["configuration"]["start"]),
             "LOG-INF" => self.list(id, &ids(body)),
             "LOG-DATA" => self.log(id, body["uavId"].as_str().unwrap()),
+            "ASYNC-CANCEL" => {
+                let body = json!({ "type": kind, "success": ids(body) });
+                self.send(Some(id), &body)
+            }
             "UAV-RTH" | "UAV-LAND" => {
                 let result: Map<String, Value> =
                     ids(body).into_iter().map(|id| (id, json!(true))).collect();
@@ -223,7 +292,7 @@ impl Visit {
         }
     }
 
-    fn nak(&mut self, id: &str, reason: &str) -> Result<(), Closed> {
+    fn nak(&self, id: &str, reason: &str) -> Result<(), Closed> {
         self.send(Some(id), &json!({ "type": "ACK-NAK", "reason": reason }))
     }
 
@@ -258,14 +327,30 @@ impl Visit {
                 Fault::TroubleInFlight if first && step == 2 => codes.push(75),
                 _ => {}
             }
-            let percent = if trouble && first && step >= 2 { 9 } else { 80 };
-            let [lat, lon] = self.places[usize::from(!first)];
+            // The percentage is there only if the autopilot tells it.
+            let battery = match (trouble && step >= 2, first) {
+                (true, true) => json!([123, 9]),
+                (_, true) => json!([123, 80]),
+                (_, false) => json!([126]),
+            };
+            let late = self.fault == Fault::Late && looks < 5;
+            let [lat, lon] = if late { [0, 0] } else { self.places[usize::from(!first)] };
             let status = json!({
+                "id": id,
                 "mode": mode,
                 "errors": codes,
                 "position": [lat, lon, 190_000, 0],
-                "battery": [123, percent],
-                "timestamp": looks,
+                "positionXYZ": null,
+                "velocity": [-10, 10, 0],
+                "velocityXYZ": null,
+                "attitude": null,
+                "heading": 12,
+                "gps": [6, 10, 300, 300],
+                "battery": battery,
+                "light": 65535,
+                "rssi": [],
+                "debug": "",
+                "timestamp": 1_795_170_696_891_u64 + looks,
             });
             (id.clone(), status)
         });
@@ -276,7 +361,7 @@ impl Visit {
         let receipt = self.receipt();
         let answer = json!({ "type": "OBJ-CMD", "receipt": { drone: receipt } });
         let end = json!({ "type": "ASYNC-RESP", "id": receipt, "result": null });
-        if drone != "01" {
+        if drone != "01" && self.state.lock().unwrap().busy.is_empty() {
             // The end overtakes the receipt.
             self.send(None, &end)?;
             return self.send(Some(id), &answer);
@@ -284,15 +369,13 @@ impl Visit {
         self.send(Some(id), &answer)?;
         let progress = json!({ "percentage": 50, "message": "half" });
         self.send(None, &json!({ "type": "ASYNC-ST", "id": receipt, "progress": progress }))?;
-        match self.fault {
-            Fault::Upload(why) => {
-                self.send(None, &json!({ "type": "ASYNC-RESP", "id": receipt, "error": why }))
-            }
-            Fault::UploadTimeout => {
-                self.send(None, &json!({ "type": "ASYNC-TIMEOUT", "ids": [receipt] }))
-            }
-            _ => self.send(None, &end),
-        }
+        let end = match self.fault {
+            Fault::Upload(why) => json!({ "type": "ASYNC-RESP", "id": receipt, "error": why }),
+            Fault::UploadTimeout => json!({ "type": "ASYNC-TIMEOUT", "ids": [receipt] }),
+            _ => end,
+        };
+        self.end_later(drone, vec![end]);
+        Ok(())
     }
 
     fn configure(&mut self, id: &str, start: &Value) -> Result<(), Closed> {
@@ -311,8 +394,12 @@ impl Visit {
             drones.iter().cloned().zip(receipts.iter().map(|receipt| json!(receipt))).collect();
         self.send(Some(id), &json!({ "type": "LOG-INF", "receipt": by_drone }))?;
         for (drone, receipt) in drones.iter().zip(&receipts) {
-            let more = if self.fault == Fault::LogSize { 100 } else { 0 };
-            let size = log(drone).len() + more;
+            let size = log(drone).len();
+            let size = match self.fault {
+                Fault::LogSize => size + 100,
+                Fault::LogGrows if self.state.lock().unwrap().downloads == 0 => size - 100,
+                _ => size,
+            };
             let logs = json!([
                 { "id": "1", "kind": "ardupilot", "size": 1000, "timestamp": 1_795_143_000 },
                 { "id": "2", "kind": "ardupilot", "size": size, "timestamp": 1_795_143_906 },
@@ -324,11 +411,33 @@ impl Visit {
     }
 
     fn log(&mut self, id: &str, drone: &str) -> Result<(), Closed> {
+        let first = drone == "01";
+        if first && self.fault == Fault::LogUnknown {
+            // Of a single drone, the error has no key.
+            return self.send(Some(id), &json!({ "type": "LOG-DATA", "error": "no such UAV" }));
+        }
         let receipt = self.receipt();
         self.send(Some(id), &json!({ "type": "LOG-DATA", "receipt": receipt }))?;
         for percentage in [0, 30, 99] {
-            let progress = json!({ "percentage": percentage });
+            let progress = json!({ "percentage": percentage, "message": "Downloading log..." });
             self.send(None, &json!({ "type": "ASYNC-ST", "id": receipt, "progress": progress }))?;
+        }
+        let mut state = self.state.lock().unwrap();
+        state.downloads += 1;
+        let downloads = state.downloads;
+        drop(state);
+        let error = |why: &str| json!({ "type": "ASYNC-RESP", "id": receipt, "error": why });
+        match self.fault {
+            Fault::LogHangs => return Ok(()),
+            Fault::LogBusy if first => {
+                self.end_later(drone, vec![error("Another log download is in progress")]);
+                return Ok(());
+            }
+            Fault::LogOnce if first && downloads == 1 => {
+                self.end_later(drone, vec![error("MAVLink mission operation timed out")]);
+                return Ok(());
+            }
+            _ => {}
         }
         let bytes = log(drone);
         let body = match self.fault {
@@ -338,11 +447,18 @@ impl Visit {
             _ => STANDARD.encode(&bytes),
         };
         let result = json!({ "id": "2", "kind": "ardupilot", "size": bytes.len(), "body": body });
-        self.send(None, &json!({ "type": "ASYNC-RESP", "id": receipt, "result": result }))
+        self.end_later(
+            drone,
+            vec![json!({ "type": "ASYNC-RESP", "id": receipt, "result": result })],
+        );
+        Ok(())
     }
 }
 
 /// The kinds that faults are named by.
 fn leaked(kind: &str) -> &'static str {
-    ["OBJ-CMD", "SHOW-SETCFG", "LOG-DATA"].into_iter().find(|known| *known == kind).unwrap_or("")
+    ["OBJ-CMD", "SHOW-SETCFG", "LOG-DATA", "LOG-INF"]
+        .into_iter()
+        .find(|known| *known == kind)
+        .unwrap_or("")
 }

@@ -375,6 +375,8 @@ fn a_fence_goes_up_and_comes_down_and_keeps_a_drone_on_the_ground() {
             .map(|[x, y]| Vector3::new(x + around[0], y + around[1], 0.0))
     };
     crew.upload_fence(1, &square([0.0, 0.0]), 4);
+    // As the firmware asks: Skybrush Server knows no other request.
+    assert_eq!((crew.count("MISSION_REQUEST"), crew.count("MISSION_REQUEST_INT")), (4, 0));
     assert_eq!(crew.mission_results(), [0]);
     assert_eq!(crew.download_fence(1).len(), 4);
     crew.set(1, "FENCE_TYPE", 4.0);

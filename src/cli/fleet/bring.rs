@@ -79,18 +79,23 @@ struct Bar<'a> {
     line: ProgressBar,
     watch: Stopwatch,
     shares: BTreeMap<DroneId, Share>,
+    /// Of all drones: adding them up at every message would cost more than the message.
+    sum: Share,
     over: BTreeSet<DroneId>,
     said: u64,
 }
 
 impl Watch for Bar<'_> {
     fn on_progress(&mut self, drone: DroneId, progress: Share, over: bool) {
-        self.shares.insert(drone, progress);
+        let before = self.shares.insert(drone, progress).unwrap_or_default();
+        let sum = &mut self.sum;
+        sum.done = (sum.done + progress.done).saturating_sub(before.done);
+        sum.total = (sum.total + progress.total).saturating_sub(before.total);
         if over {
             self.over.insert(drone);
         }
-        let done = self.shares.values().map(|share| share.done).sum();
-        self.line.set_length(self.shares.values().map(|share| share.total).sum());
+        let done = self.sum.done;
+        self.line.set_length(self.sum.total);
         self.line.set_position(done);
         let tens = self.watch.elapsed().as_secs() / 10;
         if !self.context.interactive && tens > self.said {
@@ -161,6 +166,7 @@ pub(in crate::cli) fn bring(
         line: bar,
         watch: Stopwatch::start(),
         shares: BTreeMap::new(),
+        sum: Share::default(),
         over: BTreeSet::new(),
         said: 0,
     };

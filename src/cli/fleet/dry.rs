@@ -1,21 +1,30 @@
 //! `--dry-run`: the messages, and nobody hears them.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 
 use serde::Serialize;
 
+use super::connect::Target;
 use super::crew::Crew;
-use super::{StepArgs, one_flight};
+use super::{StepArgs, one_flight, server};
 use crate::base::frame::Geodetic;
+use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::{Abort, Action};
+use crate::fleet::changes::Changes;
+use crate::fleet::command::Command;
 use crate::fleet::dry_run::{Obliging, dry_run};
+use crate::fleet::fence::PutFence;
 use crate::fleet::greet::Greet;
-use crate::fleet::messages::{start_packet, text};
-use crate::fleet::required::{Changes, CheckParams, requirements};
+use crate::fleet::guided::{Flight, Guided};
+use crate::fleet::messages::{GUIDED, set_mode, start_packet, text};
+use crate::fleet::params::ReadParams;
+use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::slots::FleetTable;
+use crate::fleet::vehicle_clock::VehicleClock;
 use crate::link::clock::Micros;
 use crate::link::drive::Machine;
 use crate::link::error::NetError;
@@ -25,9 +34,13 @@ use crate::link::net::{Net, Received};
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
 use crate::protocol::show::{LEAVE_TIME, StartConfig};
+use crate::show::Trajectory;
 
 /// Most messages shown of a conversation.
 const MOST: usize = 20_000;
+
+/// The same of a flight by streaming: three hours.
+const MOST_STREAMED: usize = 100_000;
 
 /// No links at all.
 struct Nobody;
@@ -60,7 +73,11 @@ struct DryOutput {
     drones: BTreeMap<String, Vec<String>>,
 }
 
-fn print(context: &Context, lines: BTreeMap<DroneId, Vec<String>>) -> Result<Exit, CommandError> {
+/// Prints what each drone would be sent.
+pub(in crate::cli) fn print<D: Display + Ord>(
+    context: &Context,
+    lines: BTreeMap<D, Vec<String>>,
+) -> Result<Exit, CommandError> {
     if context.json {
         let drones = lines.into_iter().map(|(drone, lines)| (drone.to_string(), lines)).collect();
         context.print_json(&DryOutput { schema: "updraft.dry-run/1", drones })?;
@@ -122,6 +139,24 @@ impl Dry {
         shown(&self.plan, &self.table, drone, machine)
     }
 
+    /// A flight by streaming, from its authorization on.
+    fn flown(&self, drone: DroneId, lead_s: f64) -> Vec<String> {
+        let Some(slot) = self.table.slot_of(drone).and_then(|slot| self.plan.slot(slot)) else {
+            return Vec::new();
+        };
+        let mut vehicle = Obliging::new(drone, false, place(&self.plan, Some(slot)));
+        let authorized_ms = (vehicle.unix_us / 1000) as i64 + (lead_s * 1000.0) as i64;
+        let flight = Flight {
+            trajectory: Trajectory::of_slot(&self.plan, slot),
+            frame: self.plan.site.frame(),
+            start_gps_ms: GpsTime::from_unix_ms(authorized_ms).map_or(0, GpsTime::total_ms),
+            yaw_rad: None,
+            clock: VehicleClock::default(),
+        };
+        let (lines, _) = dry_run(Guided::new(drone, flight), &mut vehicle, MOST_STREAMED);
+        told_once(lines)
+    }
+
     fn params(&self, drone: DroneId) -> Vec<String> {
         self.shown(drone, CheckParams::new(drone, requirements(&self.plan, true), false))
     }
@@ -130,9 +165,12 @@ impl Dry {
         let mut nobody = Nobody;
         let mut crew = Crew::new(context, &mut nobody, &self.folder, &self.plan);
         crew.table = self.table.clone();
+        let fence = crew.fence()?;
         let mut lines = BTreeMap::new();
         for (drone, upload) in crew.uploads()? {
-            let mut all = self.shown(drone, upload);
+            let names = fence.params().into_iter().map(|(name, _)| name);
+            let mut all = self.shown(drone, ReadParams::new(drone, names));
+            all.extend(self.shown(drone, upload));
             all.extend(self.params(drone));
             lines.insert(drone, all);
         }
@@ -177,6 +215,10 @@ pub(in crate::cli) fn fly(
     args: &StepArgs,
     lead_s: f64,
 ) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.connect.target()? {
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::dry_fly(context, &plan, lead_s);
+    }
     let mut lines = Dry::of(args)?.upload(context)?;
     for all in lines.values_mut() {
         all.extend(start_lines(lead_s));
@@ -184,10 +226,65 @@ pub(in crate::cli) fn fly(
     print(context, lines)
 }
 
-/// What putting parameters back would send.
-pub(in crate::cli) fn restore(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+/// What a whole flight by streaming would send.
+pub(in crate::cli) fn guided(
+    context: &Context,
+    args: &StepArgs,
+    lead_s: f64,
+) -> Result<Exit, CommandError> {
     let dry = Dry::of(args)?;
-    let machines = Changes::read(&dry.folder.0)?.restore().into_iter();
+    let mut nobody = Nobody;
+    let fence = Crew::new(context, &mut nobody, &dry.folder, &dry.plan).fence()?;
+    let mode = |drone| Command::new("go into guided mode", set_mode(drone, GUIDED, 0));
+    let required = requirements(&dry.plan, false);
+    print(
+        context,
+        dry.each(|drone| {
+            let mut lines = dry.shown(drone, PutFence::new(drone, fence.clone()));
+            lines.extend(dry.shown(drone, mode(drone)));
+            lines.extend(dry.shown(drone, CheckParams::new(drone, required.clone(), false)));
+            lines.extend(dry.flown(drone, lead_s));
+            lines
+        }),
+    )
+}
+
+/// Targets one after another with the same velocity are told by the first of them.
+fn told_once(lines: Vec<String>) -> Vec<String> {
+    let velocity = |line: &str| {
+        let (_, rest) = line.split_once("SET_POSITION_TARGET")?;
+        let (_, rest) = rest.split_once("velocity ")?;
+        Some(rest.to_owned())
+    };
+    let (mut told, mut last, mut more) = (Vec::new(), None, 0);
+    let rest = |told: &mut Vec<String>, more: &mut usize| {
+        if *more > 0 {
+            told.push(format!("             and {more} more with this velocity, 10 a second"));
+            *more = 0;
+        }
+    };
+    for line in lines {
+        let this = velocity(&line);
+        if this.is_some() && this == last {
+            more += 1;
+            continue;
+        }
+        rest(&mut told, &mut more);
+        last = this;
+        told.push(line);
+    }
+    rest(&mut told, &mut more);
+    told
+}
+
+/// What putting parameters back would send.
+pub(in crate::cli) fn restore(
+    context: &Context,
+    args: &StepArgs,
+    fence_off: bool,
+) -> Result<Exit, CommandError> {
+    let dry = Dry::of(args)?;
+    let machines = Changes::read(&dry.folder.0)?.restore(fence_off).into_iter();
     print(context, machines.map(|(drone, set)| (drone, dry.shown(drone, set))).collect())
 }
 
@@ -211,6 +308,10 @@ pub(in crate::cli) fn end(
     args: &StepArgs,
     action: Action,
 ) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.connect.target()? {
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::dry_end(context, &plan, action);
+    }
     let dry = Dry::of(args)?;
     let lines = |drone| {
         let slot = dry.table.slot_of(drone).and_then(|slot| dry.plan.slot(slot));

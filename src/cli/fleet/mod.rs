@@ -59,8 +59,8 @@ enum FleetCommand {
     Abort(EndArgs),
     /// Land drones where they are (those on the ground: take their start back)
     Land(EndArgs),
-    /// Put back the parameters that were changed
-    Restore(StepArgs),
+    /// Put back the parameters that were changed; the fence stays on, unless --fence-off is given
+    Restore(RestoreArgs),
     /// Virtual drones at the plan's slots, to practise with
     Virtual(virtual_drones::VirtualArgs),
 }
@@ -117,6 +117,17 @@ pub(super) struct StartArgs {
     upload: UploadArgs,
     #[command(flatten)]
     lead: LeadArgs,
+}
+
+/// Arguments of `fleet restore`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct RestoreArgs {
+    #[command(flatten)]
+    step: StepArgs,
+    /// Also put back values that leave a drone without a fence: FENCE_ENABLE, FENCE_TYPE and
+    /// FENCE_ACTION, where they were 0
+    #[arg(long)]
+    fence_off: bool,
 }
 
 /// Arguments of `fleet abort` and `fleet land`.
@@ -369,13 +380,13 @@ fn any_flight(campaign: &std::path::Path) -> Option<(FlightFolder, Plan)> {
     Some((folder, plan))
 }
 
-fn restore(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
-    if args.dry_run {
-        return dry::restore(context, args);
+fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> {
+    if args.step.dry_run {
+        return dry::restore(context, &args.step, args.fence_off);
     }
-    let _lock = context.lock(&args.campaign)?;
-    with_crew(context, args, |crew| {
-        let left = crew.restore()?;
+    let _lock = context.lock(&args.step.campaign)?;
+    with_crew(context, &args.step, |crew| {
+        let left = crew.restore(args.fence_off)?;
         let but = if left.is_empty() { "" } else { ", but for the drones named above" };
         context.say(&format!("Parameters are as they were{but}"));
         Ok(if left.is_empty() { Exit::Done } else { Exit::Losses })

@@ -53,6 +53,9 @@ pub(in crate::cli) struct Mishaps {
     pub(in crate::cli) gone: Option<SlotSet>,
     /// Slots whose drones reboot once.
     pub(in crate::cli) reboot: Option<SlotSet>,
+    /// Slots whose drones have stock firmware; `Some(None)`: all.
+    #[expect(clippy::option_option, reason = "none, all, or these")]
+    pub(in crate::cli) stock: Option<Option<SlotSet>>,
     /// When, their time from being switched on.
     pub(in crate::cli) at: Micros,
     /// Logs that are on their cards, by slot.
@@ -110,6 +113,9 @@ impl Hangar<'_> {
                     let named = slots.as_ref().is_some_and(|slots| slots.contains(slot.slot));
                     named.then_some(mishaps.at)
                 };
+                setup.stock = mishaps.stock.as_ref().is_some_and(|slots| {
+                    slots.as_ref().is_none_or(|slots| slots.contains(slot.slot))
+                });
                 setup.gone_at = befalls(&mishaps.gone);
                 setup.reboot_at = befalls(&mishaps.reboot);
                 let mut storage = MemoryStorage::default();

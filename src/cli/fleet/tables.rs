@@ -15,6 +15,7 @@ use crate::fleet::messages::mode_name;
 use crate::fleet::preflight::{COLUMNS, Preflight};
 use crate::fleet::slots::{FleetTable, picture, stands};
 use crate::link::id::DroneId;
+use crate::link::traffic::Traffic;
 
 /// UTC of a GPS time: `12:34:56 UTC`.
 pub(in crate::cli) fn time_of_day(time: GpsTime) -> String {
@@ -36,12 +37,46 @@ struct StatusRow {
     link_quality: Option<f64>,
     obstacle: Option<&'static str>,
     firmware: Option<String>,
+    /// Its system id was heard from two places at once.
+    doubled: bool,
+}
+
+/// What went through a network.
+#[derive(Serialize)]
+struct NetworkRow {
+    network: u16,
+    bytes_in: u64,
+    bytes_out: u64,
+    frames_in: u64,
+    /// Frames that were refused, as they are not signed.
+    unsigned: u64,
+    /// Frames that were refused, as their signature is wrong, or they were sent before.
+    forged: u64,
+    /// Frames of MAVLink 1, which are ignored.
+    mavlink_1: u64,
+    /// Bytes that are no frame.
+    noise_bytes: u64,
 }
 
 #[derive(Serialize)]
 struct StatusOutput {
     schema: &'static str,
     drones: Vec<StatusRow>,
+    networks: Vec<NetworkRow>,
+}
+
+fn networks(crew: &Crew<'_>) -> Vec<NetworkRow> {
+    let row = |(network, of): (u16, Traffic)| NetworkRow {
+        network,
+        bytes_in: of.bytes_in,
+        bytes_out: of.bytes_out,
+        frames_in: of.frames_in,
+        unsigned: of.loss.unsigned,
+        forged: of.loss.forged,
+        mavlink_1: of.loss.version_1,
+        noise_bytes: of.loss.noise_bytes,
+    };
+    crew.net.traffic().into_iter().map(row).collect()
 }
 
 /// Who is heard.
@@ -49,6 +84,7 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
     crew.greet()?;
     let now = crew.net.now();
     let stands = stands(crew.plan, &crew.telemetry, now);
+    let doubled = crew.net.doubled();
     let rows: Vec<StatusRow> = crew
         .telemetry
         .drones
@@ -70,11 +106,14 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
                 link_quality: of.link_quality(),
                 obstacle: status.and_then(|status| status.obstacle()),
                 firmware: of.version.map(|version| version.to_string()),
+                doubled: doubled.contains(drone),
             }
         })
         .collect();
     if context.json {
-        context.print_json(&StatusOutput { schema: "updraft.fleet-status/1", drones: rows })?;
+        let networks = networks(crew);
+        let schema = "updraft.fleet-status/1";
+        context.print_json(&StatusOutput { schema, drones: rows, networks })?;
         return Ok(Exit::Done);
     }
     let mut text = String::from(
@@ -104,6 +143,15 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
     }
     text.push('\n');
     text.push_str(&picture(crew.plan, &crew.telemetry, now));
+    text.push('\n');
+    for of in networks(crew) {
+        let _ = writeln!(
+            text,
+            "network {}: {} frames heard; {} not signed and {} forged or repeated (refused), {} of \
+             MAVLink 1 (ignored), {} bytes that are no frame",
+            of.network, of.frames_in, of.unsigned, of.forged, of.mavlink_1, of.noise_bytes
+        );
+    }
     context.print(&text)?;
     Ok(Exit::Done)
 }

@@ -62,6 +62,10 @@ pub(in crate::cli) struct VirtualArgs {
     /// Boot as slowly as real drones do (45 s to a position)
     #[arg(long)]
     slow_boot: bool,
+    /// These slots' drones have stock firmware, without show mode: 1-10,12 [without SLOTS: all]
+    #[arg(long, value_name = "SLOTS", num_args = 0..=1, value_parser = parse_slots)]
+    #[expect(clippy::option_option, reason = "an option whose value may be left out")]
+    stock: Option<Option<SlotSet>>,
     /// Their cards hold the logs that are in the campaign, to practise bringing logs home
     #[arg(long)]
     flown: bool,
@@ -96,7 +100,7 @@ fn mishaps(
     folder: &FlightFolder,
     plan: &Plan,
 ) -> Result<Mishaps, CommandError> {
-    let named = args.gone.iter().chain(&args.reboot);
+    let named = args.gone.iter().chain(&args.reboot).chain(args.stock.iter().flatten());
     if let Some(slot) = named.into_iter().find_map(|slots| slots.stray(plan)) {
         return Err(CommandError::Usage(format!(
             "the plan has no slot {slot}: it has {}",
@@ -119,7 +123,8 @@ fn mishaps(
         }
     }
     let at = (args.after * S as f64) as Micros;
-    Ok(Mishaps { gone: args.gone.clone(), reboot: args.reboot.clone(), at, cards })
+    let (gone, reboot, stock) = (args.gone.clone(), args.reboot.clone(), args.stock.clone());
+    Ok(Mishaps { gone, reboot, stock, at, cards })
 }
 
 pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit, CommandError> {
@@ -159,9 +164,17 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
         words::count(plan.slots.len(), "virtual drone"),
         stations.join(", ")
     ));
-    hangar.serve(args.station.clone(), clock, |_| {
+    hangar.serve(args.station.clone(), clock, |running| {
+        let mut told = false;
         while !context.stop_flag().load(Ordering::SeqCst) {
             std::thread::sleep(Duration::from_millis(100));
+            if running.refused() > 0 && !told {
+                told = true;
+                context.warn(
+                    "the drones refuse what is not signed with their key: give the station the \
+                     same --key",
+                );
+            }
         }
     })?;
     Ok(Exit::Done)

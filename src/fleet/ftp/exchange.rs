@@ -8,6 +8,9 @@ use crate::protocol::ftp::{Op, Packet, Refusal};
 /// Longest pause between repetitions.
 const MOST_PAUSE: Micros = 3 * S;
 
+/// A request is repeated so often within its patience, at least, unless the link itself is slower.
+const TRIES: Micros = 12;
+
 /// A vehicle gives up a session of somebody else when it has been idle for 3 s.
 const BUSY: Micros = 3_300 * MS;
 /// After one of ours was closed.
@@ -80,7 +83,8 @@ impl Exchange {
         }
         let timeout = caller.timeout();
         let pause = timeout.saturating_mul(1 << self.tries.min(6)) / 2;
-        let pause = pause.max(timeout).min(MOST_PAUSE) + self.work;
+        let most = MOST_PAUSE.min(self.patience / TRIES).max(timeout);
+        let pause = pause.max(timeout).min(most) + self.work;
         if self.tries > 0 && now < self.sent + pause {
             return Wish::Wait((self.sent + pause).min(first + self.patience));
         }

@@ -10,6 +10,9 @@
 //! A burst that falls silent may be over, lost, or still be sent into a bad link. Another burst
 //! would then come on top; a single read, asked now and then, settles it.
 
+mod ask;
+mod heard;
+
 use std::collections::VecDeque;
 
 use super::exchange::Wish;
@@ -17,7 +20,7 @@ use super::reads::Reads;
 use super::{Caller, Exchange, FtpError, answer};
 use crate::fleet::budget::Budget;
 use crate::fleet::sink::Sink;
-use crate::link::clock::{MS, Micros, S};
+use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::{MOST_DATA, Op, Packet, Refusal};
@@ -136,6 +139,7 @@ struct Burst {
 impl<S: Sink> Get<S> {
     /// Brings the file `path`, or what the sink lacks of it.
     pub fn new(caller: Caller, path: &str, sink: S, options: GetOptions) -> Self {
+        let reads = Reads::new(PIECE, MOST_READS, options.patience);
         Self {
             caller,
             path: path.to_owned(),
@@ -146,7 +150,7 @@ impl<S: Sink> Get<S> {
             bursts: VecDeque::new(),
             burst_packets: None,
             no_bursts: false,
-            reads: Reads::new(PIECE, MOST_READS),
+            reads,
             numbers: VecDeque::new(),
             heard: None,
             lies: 0,
@@ -211,275 +215,6 @@ impl<S: Sink> Get<S> {
         // A log that still grows is brought up to what it was; see the logs' room for the rest.
         self.size.get_or_insert(size.min(self.options.up_to));
         self.stage = Stage::Reading;
-    }
-
-    fn on_packet(&mut self, now: Micros, packet: &Packet) {
-        if packet.session != self.caller.session() {
-            return;
-        }
-        match (packet.op, packet.request) {
-            (Op::Ack, Op::BurstReadFile | Op::ReadFile) => self.on_data(now, packet),
-            (Op::Nak, Op::BurstReadFile) => self.on_burst_refused(now, packet),
-            (Op::Nak, Op::ReadFile) => self.on_read_refused(now, packet),
-            _ => {}
-        }
-    }
-
-    fn on_data(&mut self, now: Micros, packet: &Packet) {
-        let (Some(sink), Some(size)) = (&mut self.sink, self.size) else { return };
-        let offset = u64::from(packet.offset);
-        let length = (packet.data.len() as u64).min(size.saturating_sub(offset));
-        if packet.data.is_empty() {
-            return;
-        }
-        self.heard = Some(now);
-        match sink.put(now, offset, &packet.data[..length as usize]) {
-            Ok(new) => {
-                self.tally.new_bytes += new;
-                self.tally.again_bytes += packet.data.len() as u64 - new;
-            }
-            Err(reason) => return self.close(Err(FtpError::Sink(reason))),
-        }
-        self.failures = 0;
-        if packet.request == Op::ReadFile {
-            self.on_read_answered(now, offset);
-        } else {
-            self.on_burst_packet(now, packet, offset + packet.data.len() as u64 >= size);
-        }
-    }
-
-    /// The vehicle serves one request after another: with the answer to a read that was asked
-    /// after a burst had fallen silent, the burst is over, or never was.
-    fn on_read_answered(&mut self, now: Micros, offset: u64) {
-        let Some(took) = self.reads.answered(now, offset) else { return };
-        self.caller.add_rtt(took);
-        if let Some(Burst { heard: Some((_, number)), .. }) = self.bursts.front()
-            && self.burst_packets.is_none()
-            && (USUAL_BURST * 9 / 10..USUAL_BURST).contains(number)
-        {
-            self.burst_packets = Some(USUAL_BURST);
-        }
-        self.bursts.clear();
-    }
-
-    fn on_burst_packet(&mut self, now: Micros, packet: &Packet, at_end: bool) {
-        let number = |burst: &Burst| u64::from(packet.sequence.wrapping_sub(burst.sequence)) - 1;
-        let is_of = |burst: &Burst| {
-            let number = packet.sequence.wrapping_sub(burst.sequence);
-            number != 0 && number <= super::NUMBERS_PER_BURST
-        };
-        let Some(index) = self.bursts.iter().position(is_of) else { return };
-        // The vehicle serves one after another: those before it are over.
-        self.bursts.drain(..index);
-        let Some(burst) = self.bursts.front_mut() else { return };
-        let number = number(burst);
-        if let Some((at, highest)) = &mut burst.heard {
-            let steps = number.saturating_sub(*highest);
-            if steps > 0 {
-                let each = now.saturating_sub(*at) as f64 / steps as f64;
-                let weight = if burst.spacing == 0.0 { 1.0 } else { 0.1 };
-                burst.spacing += (each - burst.spacing) * weight;
-                (*at, *highest) = (now, number);
-            }
-        } else {
-            if number == 0 && burst.is_first {
-                self.caller.add_rtt(now.saturating_sub(burst.since));
-            }
-            burst.heard = Some((now, number));
-        }
-        if packet.burst_complete {
-            self.burst_packets = Some(number + 1);
-        }
-        if packet.burst_complete || at_end {
-            self.end_burst(now);
-        }
-    }
-
-    fn on_burst_refused(&mut self, now: Micros, packet: &Packet) {
-        let is_of = |burst: &Burst| {
-            let number = packet.sequence.wrapping_sub(burst.sequence);
-            number != 0 && number <= super::NUMBERS_PER_BURST
-        };
-        // A refusal that comes twice or late is of a burst that is over.
-        let Some(index) = self.bursts.iter().position(is_of) else { return };
-        self.heard = Some(now);
-        match packet.refusal() {
-            Some(Refusal::EndOfFile) => {
-                self.bursts.drain(..index);
-                let was_mute = self.bursts.front().is_some_and(|burst| burst.heard.is_none());
-                if was_mute {
-                    // Nothing where there should be something; single reads find out.
-                    self.no_bursts = true;
-                }
-                self.end_burst(now);
-            }
-            Some(Refusal::UnknownCommand) => {
-                self.bursts.clear();
-                self.no_bursts = true;
-            }
-            _ => self.reopen_limited(now, packet),
-        }
-    }
-
-    fn on_read_refused(&mut self, now: Micros, packet: &Packet) {
-        let number = packet.sequence.wrapping_sub(1);
-        let Some(index) = self.numbers.iter().position(|(of, _)| *of == number) else { return };
-        let Some((_, offset)) = self.numbers.remove(index) else { return };
-        self.heard = Some(now);
-        self.on_read_answered(now, offset);
-        match (packet.refusal(), self.size) {
-            (Some(Refusal::EndOfFile), Some(said)) if offset < said => {
-                self.lies += 1;
-                if self.lies >= MOST_LIES {
-                    self.close(Err(FtpError::SizeLies { said, ends: offset }));
-                } else {
-                    self.reopen(now + BUSY_PAUSE);
-                }
-            }
-            _ => self.reopen_limited(now, packet),
-        }
-    }
-
-    fn reopen_limited(&mut self, now: Micros, packet: &Packet) {
-        self.failures += 1;
-        match packet.refusal() {
-            Some(refusal) if self.failures > 10 => {
-                self.close(Err(FtpError::Refused { what: "reading", refusal }));
-            }
-            // The session is not the vehicle's: it booted.
-            Some(Refusal::FileNotFound) => self.reopen(now),
-            _ => self.reopen(now + BUSY_PAUSE),
-        }
-    }
-
-    fn end_burst(&mut self, now: Micros) {
-        self.bursts.pop_front();
-        if let Some(next) = self.bursts.front_mut() {
-            next.since = now;
-        }
-    }
-
-    /// From when on the current burst's silence is suspicious.
-    fn suspicious_at(&self) -> Option<Micros> {
-        let burst = self.bursts.front()?;
-        let timeout = self.caller.timeout();
-        Some(match burst.heard {
-            None => burst.since + 2 * timeout,
-            Some((at, _)) => at + timeout.max((burst.spacing * 24.0) as Micros).max(150 * MS),
-        })
-    }
-
-    fn burst_length(&self) -> u64 {
-        self.burst_packets.unwrap_or(USUAL_BURST) * PIECE
-    }
-
-    /// Where the next burst is worth its packets.
-    fn burst_start(&self) -> Option<u64> {
-        let (sink, size) = (self.sink.as_ref()?, self.size?);
-        if self.no_bursts || sink.have().count() > MOST_RANGES {
-            return None;
-        }
-        // Behind what is on its way.
-        let mut from = self.bursts.back().map_or(0, |burst| burst.offset + self.burst_length());
-        while let Some((start, end)) = sink.have().gap(from, size) {
-            let packets = (end - start).div_ceil(PIECE);
-            if packets >= WORTH_A_BURST || (end == size && packets >= WORTH_A_TAIL) {
-                return Some(start);
-            }
-            from = end;
-        }
-        None
-    }
-
-    fn wants_burst(&self) -> bool {
-        match (self.bursts.front(), self.bursts.len()) {
-            (None, _) => self.reads.is_empty(),
-            // One more while one comes, once its length is known: it is served right after it.
-            (Some(Burst { heard: Some((_, number)), .. }), 1) => {
-                self.burst_packets.is_some_and(|packets| number + 1 > packets / 2)
-            }
-            _ => false,
-        }
-    }
-
-    fn send_burst(&mut self, now: Micros, offset: u64) -> MavMessage {
-        let mut packet = Packet::request(Op::BurstReadFile);
-        packet.size = MOST_DATA as u8;
-        packet.offset = offset as u32;
-        let packet = self.caller.number(packet);
-        self.caller.skip();
-        self.tally.bursts += 1;
-        let spacing = self.bursts.front().map_or(0.0, |burst| burst.spacing);
-        self.bursts.push_back(Burst {
-            sequence: packet.sequence,
-            offset,
-            since: now,
-            is_first: self.bursts.is_empty(),
-            heard: None,
-            spacing,
-        });
-        self.caller.message(&packet)
-    }
-
-    fn poll_reading(&mut self, now: Micros) -> Step<Got<S>> {
-        let (Some(sink), Some(size)) = (&self.sink, self.size) else {
-            return Step::Wait(Micros::MAX);
-        };
-        if sink.have().gap(0, size).is_none() {
-            self.close(Ok(size));
-            return self.poll(now);
-        }
-        let heard = *self.heard.get_or_insert(now);
-        let gives_up = heard + self.options.patience;
-        if now >= gives_up {
-            let seconds = self.options.patience / S;
-            self.close(Err(FtpError::Silent { seconds }));
-            return self.poll(now);
-        }
-        let suspicious_at = self.suspicious_at();
-        let is_silent = suspicious_at.is_some_and(|at| now >= at);
-        let mut wake = gives_up.min(self.reads.expire(now, self.caller.timeout(), is_silent));
-        if let Some(at) = suspicious_at.filter(|_| !is_silent) {
-            wake = wake.min(at);
-        }
-        if !is_silent
-            && self.wants_burst()
-            && let Some(offset) = self.burst_start()
-        {
-            let length = self.burst_length().min(size - offset);
-            let cost = length + length.div_ceil(PIECE) * OVERHEAD;
-            match self.allowed(now, cost) {
-                Ok(()) => return Step::send(self.send_burst(now, offset)),
-                Err(later) => wake = wake.min(later),
-            }
-        } else if self.bursts.is_empty() || is_silent {
-            if let Err(later) = self.allowed(now, 0) {
-                return Step::Wait(wake.min(later));
-            }
-            let Some(sink) = &self.sink else { return Step::Wait(wake) };
-            if let Some((start, end)) = self.reads.next(now, sink.have(), size, is_silent) {
-                let _ = self.allowed(now, end - start + OVERHEAD);
-                return Step::send(self.send_read(start, end));
-            }
-        }
-        Step::Wait(wake)
-    }
-
-    fn allowed(&self, now: Micros, bytes: u64) -> Result<(), Micros> {
-        self.options.budget.as_ref().map_or(Ok(()), |budget| budget.take(now, bytes))
-    }
-
-    fn send_read(&mut self, start: u64, end: u64) -> MavMessage {
-        let mut packet = Packet::request(Op::ReadFile);
-        packet.size = (end - start) as u8;
-        packet.offset = start as u32;
-        let packet = self.caller.number(packet);
-        self.tally.reads += 1;
-        if self.numbers.len() >= 2 * MOST_READS {
-            self.numbers.pop_front();
-        }
-        self.numbers.push_back((packet.sequence, start));
-        self.caller.message(&packet)
     }
 
     fn open(&mut self, now: Micros) -> Step<Got<S>> {

@@ -80,7 +80,7 @@ impl<S: Sink> LogGet<S> {
             sink: Some(sink),
             rtt: Rtt::default(),
             request: None,
-            reads: Reads::new(PIECE, MOST_READS),
+            reads: Reads::new(PIECE, MOST_READS, patience),
             heard: None,
             lies: 0,
             over: None,

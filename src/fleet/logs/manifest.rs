@@ -1,5 +1,6 @@
 //! `logs/manifest.json`: what was brought home, from whom, and how it was verified.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -150,6 +151,18 @@ impl Shelf {
     pub fn finish(&mut self, part: PartFile, entry: ManifestEntry) -> Result<(), FileError> {
         self.add(entry)?;
         part.finish()
+    }
+
+    /// Waits until the disk has the names of all finished logs. Those of earlier logs are there
+    /// with the entry of a later one; without this a power loss leaves the last log under the name
+    /// of its part, whole.
+    pub fn settle(&self) {
+        for folder in [self.folder.clone(), self.folder.join("older")] {
+            // Not every file system allows it.
+            if let Ok(folder) = File::open(folder) {
+                let _ = folder.sync_all();
+            }
+        }
     }
 }
 

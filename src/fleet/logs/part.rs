@@ -125,13 +125,16 @@ impl PartFile {
         self.fresh = Intervals::default();
         self.position = u64::MAX;
         let line = line(&format!("{HEAD} {}", self.identity));
+        // What an older journal says must not come back with what is written now.
+        let was_empty = self.journal.metadata().is_ok_and(|data| data.len() == 0);
+        let waits = self.is_durable && !was_empty;
         let result = self
             .journal
             .set_len(0)
             .and_then(|()| self.journal.seek(SeekFrom::Start(0)))
             .and_then(|_| self.file.set_len(0))
             .and_then(|()| self.journal.write_all(line.as_bytes()))
-            .and_then(|()| if self.is_durable { self.journal.sync_data() } else { Ok(()) });
+            .and_then(|()| if waits { self.journal.sync_data() } else { Ok(()) });
         result.map_err(|source| FileError::new("write", &journal_path(&self.path), source))
     }
 
@@ -140,8 +143,18 @@ impl PartFile {
         &self.path
     }
 
-    /// Writes everything so far into the journal.
+    /// Writes everything so far into the journal, and waits for the disk.
     pub fn sync(&mut self) -> Result<(), FileError> {
+        if self.fresh.count() == 0 {
+            return Ok(());
+        }
+        self.note()?;
+        let fail = |source| FileError::new("write", &journal_path(&self.path), source);
+        if self.is_durable { self.journal.sync_data().map_err(fail) } else { Ok(()) }
+    }
+
+    /// Writes everything so far into the journal: what it names is on the disk, it itself will be.
+    fn note(&mut self) -> Result<(), FileError> {
         let fail = |source| FileError::new("write", &part_path(&self.path), source);
         if self.fresh.count() == 0 {
             return Ok(());
@@ -155,7 +168,6 @@ impl PartFile {
             ranges.chunks(RANGES_PER_LINE).map(|some| line(&some.join(" "))).collect();
         self.journal
             .write_all(text.as_bytes())
-            .and_then(|()| if self.is_durable { self.journal.sync_data() } else { Ok(()) })
             .map_err(|source| FileError::new("write", &journal_path(&self.path), source))?;
         self.fresh = Intervals::default();
         Ok(())
@@ -163,28 +175,23 @@ impl PartFile {
 
     /// Cuts or keeps the file at `size` bytes and reads it through.
     pub fn sums(&mut self, size: u64) -> Result<Sums, FileError> {
-        self.sync()?;
+        self.note()?;
         let path = part_path(&self.path);
         self.file.set_len(size).map_err(|source| FileError::new("cut", &path, source))?;
         sums(&path)
     }
 
-    /// Gives the finished file its name; its journal goes.
-    pub fn finish(mut self) -> Result<(), FileError> {
-        self.sync()?;
+    /// Gives the finished file its name; its journal goes. The content is on the disk then, the
+    /// name once its folder is: see [`super::manifest::Shelf::settle`].
+    pub fn finish(self) -> Result<(), FileError> {
         let part = part_path(&self.path);
         let fail = |source| FileError::new("rename", &part, source);
         if self.is_durable {
-            self.file.sync_all().map_err(fail)?;
+            self.file.sync_data().map_err(fail)?;
         }
         fs::rename(&part, &self.path).map_err(fail)?;
         // A journal without its part is begun anew by the next download; no harm.
         let _ = fs::remove_file(journal_path(&self.path));
-        if let Some(folder) = self.path.parent().filter(|_| self.is_durable)
-            && let Ok(folder) = File::open(folder)
-        {
-            let _ = folder.sync_all();
-        }
         Ok(())
     }
 }

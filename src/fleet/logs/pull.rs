@@ -78,12 +78,26 @@ pub fn pull(
     watch: &mut dyn Watch,
 ) -> Result<BTreeMap<DroneId, Outcome>, PullError> {
     let shelf = Rc::new(RefCell::new(Shelf::open(logs, &options.made_by)?));
+    let outcomes = pull_onto(&shelf, net, wanted, options, watch);
+    if options.each.is_durable {
+        shelf.borrow().settle();
+    }
+    Ok(outcomes?)
+}
+
+fn pull_onto(
+    shelf: &Rc<RefCell<Shelf>>,
+    net: &mut dyn Net,
+    wanted: &[Wanted],
+    options: &PullOptions,
+    watch: &mut dyn Watch,
+) -> Result<BTreeMap<DroneId, Outcome>, NetError> {
     let mut outcomes: BTreeMap<DroneId, Outcome> = BTreeMap::new();
     let mut lanes: BTreeMap<u16, Lane> = BTreeMap::new();
     for one in wanted {
         let lane = lanes.entry(one.drone.network).or_insert_with(|| Lane::new(options));
         let each = options.each.clone();
-        let shelf = Rc::clone(&shelf);
+        let shelf = Rc::clone(shelf);
         let machine =
             PullOne::new(one.drone, one.slot, &one.file, shelf, each, lane.budget.clone());
         lane.waiting.push_back((one.drone, machine));

@@ -3,6 +3,7 @@
 use nalgebra::{Vector1, Vector3};
 
 use super::filter::LowPass;
+use super::guided::Guided;
 use super::motors::{Motors, Spool};
 use super::params as p;
 use super::shaping::{Kinematics, RootLaw};
@@ -124,18 +125,20 @@ pub struct Director<'a> {
     pub end_s: f64,
     /// How the show was left, if it was.
     pub aborted: Option<Abort>,
+    /// A ground station's orders, which take the show's place; `None`: it flies the show.
+    pub guided: Option<Guided>,
     way_home: Return,
     cursor: Cursor<'a>,
-    home_m: Vector3<f64>,
+    pub(super) home_m: Vector3<f64>,
     above_floor: bool,
     at_limit_s: f64,
     landed_s: f64,
     feed_forward: f64,
-    spin_min: f64,
+    pub(super) spin_min: f64,
     land_acceleration: [LowPass; 3],
     to_land_alt: RootLaw,
     steps_per_target: u32,
-    dt_s: f64,
+    pub(super) dt_s: f64,
 }
 
 impl<'a> Director<'a> {
@@ -146,17 +149,43 @@ impl<'a> Director<'a> {
         settings: &crate::vehicle::Autopilot,
         dt_s: f64,
     ) -> Option<Self> {
+        let takeoff_s = takeoff_time_s(trajectory, settings.wpnav_speed_up_mps)?;
+        Some(Self::taking_off_at(takeoff_s, trajectory, home_m, settings, dt_s))
+    }
+
+    /// Armed and waiting at home for a ground station's orders; the trajectory is not flown.
+    pub fn guided(
+        trajectory: &'a Trajectory,
+        home_m: Vector3<f64>,
+        settings: &crate::vehicle::Autopilot,
+        dt_s: f64,
+    ) -> Self {
+        Self {
+            guided: Some(Guided::default()),
+            end_s: f64::INFINITY,
+            ..Self::taking_off_at(0.0, trajectory, home_m, settings, dt_s)
+        }
+    }
+
+    fn taking_off_at(
+        takeoff_s: f64,
+        trajectory: &'a Trajectory,
+        home_m: Vector3<f64>,
+        settings: &crate::vehicle::Autopilot,
+        dt_s: f64,
+    ) -> Self {
         let steps_per_target = (1.0 / (dt_s * f64::from(p::SHOW_CTRL_RATE))).round() as u32;
-        Some(Self {
+        Self {
             stage: Stage::Wait,
             armed: true,
             touchdown: Touchdown::None,
             target: Kinematics::at(home_m),
             sent_m: home_m,
             target_age: 0,
-            takeoff_s: takeoff_time_s(trajectory, settings.wpnav_speed_up_mps)?,
+            takeoff_s,
             end_s: trajectory.duration_ms() as f64 / 1000.0,
             aborted: None,
+            guided: None,
             way_home: Return { height_m: home_m.z + p::RTL_ALT, is_high: false, there_s: 0.0 },
             cursor: Cursor::new(trajectory),
             home_m,
@@ -169,7 +198,7 @@ impl<'a> Director<'a> {
             to_land_alt: RootLaw::new(settings.psc_posz_p, p::WPNAV_ACCEL_Z, dt_s),
             steps_per_target,
             dt_s,
-        })
+        }
     }
 
     /// One step: moves the stages on, and gives the goals.
@@ -177,6 +206,9 @@ impl<'a> Director<'a> {
     pub fn update(&mut self, time_s: f64, estimate: &Estimate, motors: &mut Motors) -> Goals {
         let mut restart = false;
         match self.stage {
+            Stage::Wait | Stage::Takeoff | Stage::Performing if self.guided.is_some() => {
+                restart = self.obey(estimate, motors);
+            }
             Stage::Wait => self.wait(time_s, motors),
             Stage::Takeoff => {
                 let height_m = estimate.position_m.z - self.home_m.z;
@@ -241,7 +273,7 @@ impl<'a> Director<'a> {
 
     /// The stage as it is told: an aborted show is off, another mode flies.
     pub fn told(&self) -> u8 {
-        if self.aborted.is_some() { 0 } else { self.stage as u8 }
+        if self.aborted.is_some() || self.guided.is_some() { 0 } else { self.stage as u8 }
     }
 
     fn wait(&mut self, time_s: f64, motors: &mut Motors) {
@@ -304,7 +336,11 @@ impl<'a> Director<'a> {
 
     #[inline]
     fn goals(&self, estimate: &Estimate, restart: bool) -> Goals {
-        let floor = Kinematics::at(Vector1::new(self.home_m.z + p::SHOW_TAKEOFF_ALT));
+        let floor_m = match &self.guided {
+            Some(guided) => guided.takeoff_z_m().unwrap_or(self.home_m.z),
+            None => self.home_m.z + p::SHOW_TAKEOFF_ALT,
+        };
+        let floor = Kinematics::at(Vector1::new(floor_m));
         match self.stage {
             Stage::Wait | Stage::Landed | Stage::Takeoff => {
                 Goals { vertical: Goal::Follow(floor), horizontal: None, restart }

@@ -7,6 +7,7 @@
 pub mod attitude;
 pub mod director;
 pub mod filter;
+pub mod guided;
 pub mod horizontal;
 pub mod motors;
 pub mod params;
@@ -58,8 +59,31 @@ impl<'a> Autopilot<'a> {
         home_amsl_m: f64,
         dt_s: f64,
     ) -> Option<Self> {
-        Some(Self {
-            director: Director::new(trajectory, home_m, settings, dt_s)?,
+        let director = Director::new(trajectory, home_m, settings, dt_s)?;
+        Some(Self::with(director, settings, home_m, home_amsl_m, dt_s))
+    }
+
+    /// Armed on the ground, for a ground station's orders; the trajectory is not flown.
+    pub fn guided(
+        trajectory: &'a Trajectory,
+        settings: &vehicle::Autopilot,
+        home_m: Vector3<f64>,
+        home_amsl_m: f64,
+        dt_s: f64,
+    ) -> Self {
+        let director = Director::guided(trajectory, home_m, settings, dt_s);
+        Self::with(director, settings, home_m, home_amsl_m, dt_s)
+    }
+
+    fn with(
+        director: Director<'a>,
+        settings: &vehicle::Autopilot,
+        home_m: Vector3<f64>,
+        home_amsl_m: f64,
+        dt_s: f64,
+    ) -> Self {
+        Self {
+            director,
             vertical: Vertical::new(settings, home_m.z, dt_s),
             horizontal: Horizontal::new(home_m.xy(), dt_s),
             attitude: Attitude::new(dt_s),
@@ -68,7 +92,7 @@ impl<'a> Autopilot<'a> {
             home_m,
             air: BaroAir { home_amsl_m, ground_c: settings.baro_ground_temperature_c },
             dt_s,
-        })
+        }
     }
 
     /// One control step; returns the pulse width of each rotor, whole us.

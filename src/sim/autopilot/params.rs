@@ -75,6 +75,10 @@ pub const LAND_ACCEL_FLT: f64 = 1.0;
 pub const LAND_ALT_LOW: f64 = 10.0;
 /// SHOW_CTRL_RATE, Hz.
 pub const SHOW_CTRL_RATE: u32 = 10;
+/// DISARM_DELAY, s: an armed vehicle that is told nothing disarms.
+pub const DISARM_DELAY_S: f64 = 10.0;
+/// GUID_TIMEOUT, s: without new targets for so long a guided vehicle stops.
+pub const GUID_TIMEOUT_S: f64 = 3.0;
 /// SHOW_TAKEOFF_ALT, m.
 pub const SHOW_TAKEOFF_ALT: f64 = 2.5;
 /// Height at which take-off gives way to the show, share of SHOW_TAKEOFF_ALT.

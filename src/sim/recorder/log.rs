@@ -25,18 +25,28 @@ pub struct LogRecorder<'a, W: Write> {
     events: Events,
     lights: Lights<'a>,
     full: Option<Full>,
+    has_show: bool,
     rows: u64,
 }
 
 impl<'a, W: Write> LogRecorder<'a, W> {
-    /// Starts the log of a flight that arms at this show time (us): definitions and first rows.
-    pub(in crate::sim) fn new(out: W, setup: &FlightSetup<'a>, armed_us: i64) -> io::Result<Self> {
+    /// Starts the log of a flight that arms at this show time (us): definitions and first rows. A
+    /// guided vehicle's log knows no show.
+    pub(in crate::sim) fn new(
+        out: W,
+        setup: &FlightSetup<'a>,
+        armed_us: i64,
+        is_guided: bool,
+    ) -> io::Result<Self> {
         let clock = Clock::new(setup.seed, setup.drone, armed_us, setup.start);
         let view = View::new(&setup.frame, setup.home_m);
         let board_us = clock.board_us(armed_us);
-        let mut log =
-            LogWriter::with_time(out, &messages(setup.full_logs), board_us.max(0) as u64)?;
-        let rows = start::write(&mut log, setup, &view, board_us)?;
+        let mut log = LogWriter::with_time(
+            out,
+            &messages(setup.full_logs, is_guided),
+            board_us.max(0) as u64,
+        )?;
+        let rows = start::write(&mut log, setup, &view, board_us, is_guided)?;
         Ok(Self {
             log,
             clock,
@@ -45,6 +55,7 @@ impl<'a, W: Write> LogRecorder<'a, W> {
             events: Events::new(),
             lights: Lights::new(setup.lights),
             full: setup.full_logs.then(|| Full::new(setup, &view)),
+            has_show: !is_guided,
             rows,
         })
     }
@@ -57,12 +68,15 @@ impl<'a, W: Write> LogRecorder<'a, W> {
 }
 
 /// The messages of the log.
-fn messages(full: bool) -> Vec<&'static MessageDef> {
-    if full {
-        return catalog::FULL_SET.to_vec();
-    }
-    let mut messages = catalog::DEFAULT_SET.to_vec();
-    messages.push(&catalog::GUIP);
+fn messages(full: bool, is_guided: bool) -> Vec<&'static MessageDef> {
+    let mut messages = if full {
+        catalog::FULL_SET.to_vec()
+    } else {
+        let mut messages = catalog::DEFAULT_SET.to_vec();
+        messages.push(&catalog::GUIP);
+        messages
+    };
+    messages.retain(|message| !(is_guided && message.name == catalog::SHOW.name));
     messages
 }
 
@@ -79,7 +93,7 @@ impl<W: Write> Recorder for LogRecorder<'_, W> {
                 self.rows += full::write_accuracy(log, board_us)?;
             }
         }
-        if moment.step.is_multiple_of(STEPS_25_HZ) {
+        if self.has_show && moment.step.is_multiple_of(STEPS_25_HZ) {
             let color = self.lights.color(moment.pilot, moment.time_us.div_euclid(1000));
             self.rows += control::write_show(log, moment, color, board_us)?;
         }

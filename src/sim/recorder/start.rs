@@ -15,8 +15,11 @@ const VERSION: &str = "ArduCopter V4.4.4 (updraft)";
 const FRAME: &str = "Frame: QUAD/X";
 /// ModeNum of the show mode, and the reason that the fork gives for entering it by itself.
 const SHOW_MODE: (i64, i64) = (127, 32);
-/// AP_Arming::Method of the show manager.
+/// The same of GUIDED, entered because a ground station asked for it.
+const GUIDED: (i64, i64) = (4, 2);
+/// AP_Arming::Method of the show manager, and of a ground station's command.
 const ARMED_BY_SHOW: i64 = 4;
+const ARMED_BY_STATION: i64 = 1;
 
 /// Writes everything that comes before the first periodic row; returns the number of rows.
 pub(super) fn write<W: Write>(
@@ -24,6 +27,7 @@ pub(super) fn write<W: Write>(
     setup: &FlightSetup<'_>,
     view: &View,
     board_us: i64,
+    is_guided: bool,
 ) -> io::Result<u64> {
     let time = I(board_us);
     let vehicle = format!("Vehicle: {}", setup.vehicle.name);
@@ -39,7 +43,8 @@ pub(super) fn write<W: Write>(
     row(&catalog::MSG, &[time, T(VERSION)])?;
     row(&catalog::MSG, &[time, T(FRAME)])?;
     row(&catalog::MSG, &[time, T(&vehicle)])?;
-    for (name, value, default) in parameters(setup) {
+    let known = |name: &str| !(is_guided && name.starts_with("SHOW_"));
+    for (name, value, default) in parameters(setup).into_iter().filter(|row| known(row.0)) {
         row(&catalog::PARM, &[time, T(name), F(value), F(default)])?;
     }
     let home = &view.home;
@@ -47,8 +52,10 @@ pub(super) fn write<W: Write>(
         let place = [F(home.lat_deg), F(home.lon_deg), F(home.amsl_m)];
         row(&catalog::ORGN, &[time, I(kind), place[0], place[1], place[2]])?;
     }
-    row(&catalog::MODE, &[time, I(SHOW_MODE.0), I(SHOW_MODE.0), I(SHOW_MODE.1)])?;
-    row(&catalog::ARM, &[time, I(1), I(1), I(0), I(ARMED_BY_SHOW)])?;
+    let (mode, by) =
+        if is_guided { (GUIDED, ARMED_BY_STATION) } else { (SHOW_MODE, ARMED_BY_SHOW) };
+    row(&catalog::MODE, &[time, I(mode.0), I(mode.0), I(mode.1)])?;
+    row(&catalog::ARM, &[time, I(1), I(1), I(0), I(by)])?;
     Ok(rows)
 }
 

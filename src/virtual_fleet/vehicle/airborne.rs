@@ -2,14 +2,16 @@
 
 use nalgebra::Vector3;
 
-use super::{VirtualVehicle, error, text};
+use super::VirtualVehicle;
+use super::words::{error, text};
 use crate::base::time::GpsTime;
 use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, dialect};
 use crate::protocol::show::Stage;
 use crate::sim::autopilot::director::{self, Abort};
 use crate::sim::autopilot::params::ARM_BEFORE_TAKEOFF_S;
-use crate::sim::{BatteryReading, FlightSetup, Hooks, RecordedFlight};
+use crate::sim::{BatteryReading, Flight, FlightSetup, Hooks, RecordedFlight};
+use crate::virtual_fleet::world::LoadedShow;
 
 /// An arming that comes by so little too late is on time: the grid of ticks is coarser.
 const ON_TIME_S: f64 = 1.0;
@@ -23,7 +25,7 @@ pub(super) struct Airborne<'w> {
     fence_has_acted: bool,
 }
 
-impl Airborne<'_> {
+impl<'w> Airborne<'w> {
     pub(super) fn is_armed(&self) -> bool {
         self.flight.flight.is_armed()
     }
@@ -44,9 +46,24 @@ impl Airborne<'_> {
         self.flight.flight.miss_m()
     }
 
+    /// A flight that arms now, at its show time 0, and waits for orders.
+    pub(super) fn guided(flight: RecordedFlight<'w>, start_us: i64) -> Self {
+        Self { flight, start_us, disarmed: false, fence_has_acted: false }
+    }
+
+    /// The flight, for orders.
+    pub(super) fn flight(&mut self) -> &mut Flight<'w> {
+        &mut self.flight.flight
+    }
+
+    /// Whether a station's targets are flown now.
+    pub(super) fn is_guided(&self) -> bool {
+        self.flight.flight.is_guided() && self.flight.flight.aborted().is_none()
+    }
+
     /// Stage of the show; off when another mode flies.
     pub(super) fn stage(&self) -> Stage {
-        if self.flight.flight.aborted().is_some() {
+        if self.flight.flight.aborted().is_some() || self.flight.flight.is_guided() {
             return Stage::Off;
         }
         match self.flight.flight.stage() {
@@ -60,26 +77,14 @@ impl Airborne<'_> {
     }
 }
 
-impl VirtualVehicle<'_> {
+impl<'w> VirtualVehicle<'w> {
     /// Arms, and opens the log.
     pub(super) fn arm(&mut self, now: Micros, out: &mut Vec<MavMessage>) {
         let (Some(show), Some(start_us)) = (self.show.loaded, self.show.start_us) else { return };
         let Some(start) = GpsTime::from_total_ms(start_us.div_euclid(1000)) else { return };
         let time_s = (self.world.gps_us(now) - start_us) as f64 * 1e-6;
         let late_s = time_s - (show.takeoff_s - ARM_BEFORE_TAKEOFF_S);
-        let setup = FlightSetup {
-            vehicle: self.world.vehicle,
-            trajectory: &show.trajectory,
-            home_m: self.stands_m,
-            frame: self.world.frame,
-            atmosphere: self.world.atmosphere,
-            seed: self.world.seed,
-            drone: self.setup.drone,
-            start,
-            lights: &show.lights,
-            full_logs: self.world.full_logs,
-            hooks: Hooks::default(),
-        };
+        let setup = self.flight_setup(show, start);
         let armed_s = (late_s >= ON_TIME_S).then_some(time_s);
         match RecordedFlight::armed(&setup, armed_s) {
             Ok(flight) => {
@@ -93,6 +98,23 @@ impl VirtualVehicle<'_> {
         }
     }
 
+    /// A flight from where it stands.
+    pub(super) fn flight_setup(&self, show: &'w LoadedShow, start: GpsTime) -> FlightSetup<'w> {
+        FlightSetup {
+            vehicle: self.world.vehicle,
+            trajectory: &show.trajectory,
+            home_m: self.stands_m,
+            frame: self.world.frame,
+            atmosphere: self.world.atmosphere,
+            seed: self.world.seed,
+            drone: self.setup.drone,
+            start,
+            lights: &show.lights,
+            full_logs: self.world.full_logs,
+            hooks: Hooks::default(),
+        }
+    }
+
     /// Flies until now.
     pub(super) fn fly(&mut self, now: Micros, out: &mut Vec<MavMessage>) {
         let Some(mut airborne) = self.airborne.take() else { return };
@@ -103,8 +125,10 @@ impl VirtualVehicle<'_> {
             airborne.disarmed = true;
             self.logbook.disarm(now);
             out.push(text(dialect::MavSeverity::MAV_SEVERITY_INFO, "Disarming motors"));
-            self.show.stage =
-                if airborne.flight.flight.aborted().is_none() { Stage::Landed } else { Stage::Off };
+            self.show.stage = match airborne.stage() {
+                Stage::Off => Stage::Off,
+                _ => Stage::Landed,
+            };
         }
         self.logbook.write(&log, self.storage.as_mut());
         let is_over = match outcome {

@@ -1,8 +1,10 @@
 //! Commands and their acknowledgements.
 
+use super::VirtualVehicle;
+use super::guided::GUIDED;
 use super::show_mode::Reload;
 use super::telemetry::AUTOPILOT_VERSION;
-use super::{VirtualVehicle, error};
+use super::words::error;
 use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::station::STATION;
@@ -14,6 +16,7 @@ use dialect::MavResult::{
 };
 
 /// Numbers of MAVLink's commands.
+const NAV_TAKEOFF: u16 = 22;
 const DO_SET_MODE: u16 = 176;
 const PREFLIGHT_REBOOT: u16 = 246;
 const ARM_DISARM: u16 = 400;
@@ -34,19 +37,22 @@ pub(super) struct Command {
     params: [f32; 4],
     /// Latitude, longitude, altitude; only COMMAND_INT has them exactly.
     place: Option<(i32, i32, f32)>,
+    /// The last parameter, m where it is an altitude.
+    altitude_m: f32,
 }
 
 impl From<&dialect::COMMAND_LONG_DATA> for Command {
     fn from(it: &dialect::COMMAND_LONG_DATA) -> Self {
         let params = [it.param1, it.param2, it.param3, it.param4];
-        Self { number: it.command, params, place: None }
+        Self { number: it.command, params, place: None, altitude_m: it.param7 }
     }
 }
 
 impl From<&dialect::COMMAND_INT_DATA> for Command {
     fn from(it: &dialect::COMMAND_INT_DATA) -> Self {
         let params = [it.param1, it.param2, it.param3, it.param4];
-        Self { number: it.command, params, place: Some((it.x, it.y, it.z)) }
+        let place = Some((it.x, it.y, it.z));
+        Self { number: it.command, params, place, altitude_m: it.z }
     }
 }
 
@@ -68,6 +74,8 @@ impl VirtualVehicle<'_> {
         match command.number as u32 as u16 {
             show::RELOAD if !self.setup.stock => self.reload_or_clear(first),
             show::SET_ORIGIN if !self.setup.stock => self.set_origin(command),
+            NAV_TAKEOFF if self.mode != GUIDED => FAILED,
+            NAV_TAKEOFF => self.take_off(now, command.altitude_m, out),
             DO_SET_MODE if first as u32 & 1 == 0 => DENIED,
             DO_SET_MODE => self.set_mode(second as u32),
             ARM_DISARM => self.arm_or_disarm(now, first, second, out),
@@ -177,8 +185,11 @@ impl VirtualVehicle<'_> {
             if self.is_armed() {
                 return ACCEPTED;
             }
-            let reason = self.obstacle(now).unwrap_or("Arm: Mode not armable");
-            out.push(error(reason));
+            let obstacle = self.obstacle(now);
+            if self.mode == GUIDED && self.airborne.is_none() && obstacle.is_none() {
+                return self.arm_guided(now, out);
+            }
+            out.push(error(obstacle.unwrap_or("Arm: Mode not armable")));
             return FAILED;
         }
         if !self.is_armed() {

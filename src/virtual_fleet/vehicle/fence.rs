@@ -45,6 +45,11 @@ impl Fence {
         self.items.len()
     }
 
+    /// Where the items are: latitude and longitude, 1e-7 degrees.
+    pub(super) fn corners_1e7(&self) -> Vec<(i32, i32)> {
+        self.items.iter().map(|item| (item.x, item.y)).collect()
+    }
+
     /// Takes the messages of the mission protocol.
     pub(super) fn on_message(
         &mut self,
@@ -246,8 +251,10 @@ fn is_inside(corners: &[Vector3<f64>], point: &Vector3<f64>) -> bool {
     inside
 }
 
+/// The firmware asks with the older of the two messages, and some stations know no other from it.
+#[expect(deprecated, reason = "the firmware sends it")]
 fn ask(seq: u16) -> MavMessage {
-    MavMessage::MISSION_REQUEST_INT(dialect::MISSION_REQUEST_INT_DATA {
+    MavMessage::MISSION_REQUEST(dialect::MISSION_REQUEST_DATA {
         seq,
         target_system: STATION.system,
         target_component: STATION.component,

@@ -2,9 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use super::eyes::Eyes;
+use super::stubborn::Stubborn;
 use super::{AT_ONCE, Crew};
 use crate::base::time::GpsTime;
+use crate::campaign::start::StartRecord;
 use crate::cli::exit::CommandError;
+use crate::cli::simulate::made_by;
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Action};
 use crate::fleet::command::Command;
 use crate::fleet::fence::PutFence;
@@ -15,6 +19,7 @@ use crate::fleet::telemetry::Drone;
 use crate::link::clock::MS;
 use crate::link::drive::{Watch as _, drive};
 use crate::link::id::DroneId;
+use crate::link::net::Net as _;
 use crate::show::Trajectory;
 
 #[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
@@ -22,13 +27,33 @@ fn refused(error: StartRefusal) -> CommandError {
     CommandError::Failed(error.to_string())
 }
 
-impl Crew<'_> {
-    /// Drones of the table without show mode.
-    pub(in crate::cli) fn stock(&self) -> Vec<DroneId> {
-        let firmware = |drone: &DroneId| {
-            self.telemetry.get(*drone).and_then(Drone::has_show_firmware) == Some(false)
+impl<'a> Crew<'a> {
+    /// Why a show cannot be flown by these drones: who has no show mode, and who has; `None`: it
+    /// can.
+    pub(in crate::cli) fn firmwares(&self) -> Option<String> {
+        let has_show =
+            |drone: &DroneId| self.telemetry.get(*drone).and_then(Drone::has_show_firmware);
+        let named = |wanted: Option<bool>| {
+            let drones = self.drones().into_iter().filter(|drone| has_show(drone) == wanted);
+            drones.map(|drone| drone.to_string()).collect::<Vec<_>>().join(", ")
         };
-        self.drones().into_iter().filter(firmware).collect()
+        let stock = named(Some(false));
+        let all: Vec<String> = [
+            ("without show firmware", stock.clone()),
+            ("with it", named(Some(true))),
+            ("not known", named(None)),
+        ]
+        .into_iter()
+        .filter(|(_, drones)| !drones.is_empty())
+        .map(|(what, drones)| format!("{what}: drones {drones}"))
+        .collect();
+        (!stock.is_empty()).then(|| {
+            format!(
+                "NO-GO: {}. Nothing was sent. --guided flies all of them by streaming, whatever \
+                 their firmware; or leave out those without it",
+                all.join("; ")
+            )
+        })
     }
 
     /// Puts the fence on every drone, and every drone into GUIDED, where it waits on the ground.
@@ -37,7 +62,9 @@ impl Crew<'_> {
         &mut self,
     ) -> Result<BTreeMap<DroneId, String>, CommandError> {
         let fence = self.fence()?;
-        let drones = self.drones();
+        let silent = self.remember_fence()?;
+        let mut drones = self.drones();
+        drones.retain(|drone| !silent.contains_key(drone));
         let put = |drone: &DroneId| (*drone, PutFence::new(*drone, fence.clone()));
         let fenced = self.all(drones.iter().map(put).collect(), AT_ONCE)?;
         let mode = |drone: &DroneId| {
@@ -64,6 +91,7 @@ impl Crew<'_> {
             let slot = self.table.slot_of(*drone).unwrap_or(0);
             self.context.warn(&format!("drone {drone} (slot {slot}): {reason}"));
         }
+        bad.extend(silent);
         self.note("guided", Some(format!("{} refused", bad.len())))?;
         Ok(bad)
     }
@@ -77,13 +105,16 @@ impl Crew<'_> {
         Start::announce(self.drones(), &self.telemetry, options, now).map_err(refused)
     }
 
-    /// Authorizes a start that the station keeps.
+    /// Authorizes a start that the station keeps, and writes it down: the logs will not say it.
     pub(in crate::cli) fn authorize_guided(&mut self, start: &Start) -> Result<(), CommandError> {
         // A person has taken their time to answer.
         while let Some(received) = self.net.recv(0)? {
             crate::link::drive::Watch::on_message(&mut self.telemetry, self.net.now(), &received);
         }
         start.check_time(&self.telemetry, self.net.now()).map_err(refused)?;
+        if let Some(time) = start.time() {
+            StartRecord::new(made_by(), time).write(self.folder)?;
+        }
         self.note("authorized", Some(format!("start at {}", start.second_of_week())))
     }
 
@@ -111,39 +142,55 @@ impl Crew<'_> {
             };
             machines.insert(line.drone, Guided::new(line.drone, flight));
         }
-        let mut eyes = self.eyes(Some(start_gps_ms))?;
-        let done = drive(self.net, machines, ALL_AT_ONCE, &mut eyes)?;
-        let stopped = self.context.check_stop();
+        let eyes = self.eyes(Some(start_gps_ms))?;
+        self.context.set_flies(true);
+        let (eyes, failed) = self.stream(machines, eyes);
+        self.context.set_flies(false);
+        let written = failed.map_or(Ok(()), |reason| self.note("link", Some(reason)));
+        let alarms = self.close(eyes);
+        self.context.check_stop()?;
+        written?;
+        alarms
+    }
+
+    /// Flies, and brings everyone down. Nothing that fails here ends it: drones are in the air.
+    fn stream(
+        &mut self,
+        machines: BTreeMap<DroneId, Guided>,
+        mut eyes: Eyes<'a>,
+    ) -> (Eyes<'a>, Option<String>) {
+        let drones = self.drones();
+        let context = self.context;
+        let mut net = Stubborn::new(&mut *self.net, context);
+        let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
         for (drone, outcome) in done {
             if let Err(error) = outcome {
                 eyes.alarm(drone, error.to_string());
             }
         }
-        if stopped.is_err() {
-            self.context.insist("Stopped: this program flies the drones, so they are sent home");
+        // Those that were taken over or called home are still on their way.
+        while context.check_stop().is_ok() && !eyes.is_over() {
+            let until = net.now() + 100 * MS;
+            if let Ok(Some(received)) = net.recv(until) {
+                eyes.on_message(net.now(), &received);
+            }
+            eyes.stop(net.now());
+        }
+        if context.check_stop().is_err() {
+            context.insist(
+                "Stopped: this program flies the drones, so they are sent home. Ctrl-C again ends it \
+                 at once",
+            );
             eyes.finishes = true;
-            let drones = self.drones();
             let end = |drone: &DroneId| {
                 (*drone, Abort::new(*drone, Action::Return, eyes.telemetry().get(*drone)))
             };
             let machines: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
-            for (drone, end) in drive(self.net, machines, ALL_AT_ONCE, &mut eyes)? {
-                self.context.insist(&format!("drone {drone}: {end}"));
+            let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
+            for (drone, end) in done {
+                context.insist(&format!("drone {drone}: {end}"));
             }
         }
-        // Those that were taken over are still on their way.
-        while stopped.is_ok() && !eyes.is_over() {
-            let now = self.net.now();
-            if let Some(received) = self.net.recv(now + 100 * MS)? {
-                eyes.on_message(self.net.now(), &received);
-            }
-            if eyes.stop(self.net.now()) {
-                break;
-            }
-        }
-        let alarms = self.close(eyes);
-        stopped?;
-        self.context.check_stop()?;
-        alarms
+        (eyes, net.failed)
     }
 }

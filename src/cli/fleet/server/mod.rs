@@ -1,6 +1,11 @@
 //! Flights through a running Skybrush Server.
 
+mod bring;
+mod dry;
 mod logs;
+mod rows;
+mod standing;
+mod upload;
 mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,23 +14,24 @@ use std::sync::atomic::Ordering;
 
 use serde_json::Value;
 
+use self::bring::bring;
+use self::rows::sum_up;
+use self::standing::assign;
+use self::upload::Shows;
+use super::bring::Wish;
 use super::{LeadArgs, asked, needs_person};
-use crate::base::frame::Geodetic;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit, with_reasons};
 use crate::fleet::abort::Action;
-use crate::fleet::fence::Fence as Checked;
-use crate::fleet::slots::{Stand, allowed_m};
 use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
-use crate::show::Show;
-use crate::show::skyc::drone_documents;
 use crate::skybrush_server::watch::{code_name, is_on_ground, warnings};
-use crate::skybrush_server::{Client, Fence, ServerError, ShowUpload, StartConfig};
+use crate::skybrush_server::{Client, ServerError, StartConfig, end_flight};
 
+pub(in crate::cli) use dry::{dry_end, dry_fly};
 pub(in crate::cli) use logs::{list, pull};
 
 /// Distance of the fence's circle beyond the farthest corner, m.
@@ -65,51 +71,6 @@ fn connect(context: &Context, address: &str) -> Result<Client, CommandError> {
     Ok(client)
 }
 
-/// Slots and the server's names of their drones: by what is nearest to each home.
-fn assign(
-    context: &Context,
-    client: &mut Client,
-    plan: &Plan,
-) -> Result<BTreeMap<u16, String>, CommandError> {
-    let ids = client.drones()?;
-    let status = client.status(&ids)?;
-    let allowed_m = allowed_m(plan);
-    let mut found: BTreeMap<u16, String> = BTreeMap::new();
-    let mut problems = Vec::new();
-    for (id, status) in &status {
-        // 1e-7 degrees, as the server has them.
-        let part = |index: usize| {
-            let value = status.pointer(&format!("/position/{index}")).and_then(Value::as_f64);
-            value.map(|value| value * 1e-7)
-        };
-        let (Some(lat_deg), Some(lon_deg)) = (part(0), part(1)) else {
-            problems.push(format!("drone {id} does not say where it stands"));
-            continue;
-        };
-        let Some(stand) = Stand::of(plan, Geodetic { lat_deg, lon_deg, amsl_m: 0.0 }) else {
-            continue;
-        };
-        let (slot, away_m) = (stand.nearest, stand.distance_m);
-        if away_m > allowed_m {
-            problems.push(format!("drone {id} stands {away_m:.1} m from slot {slot}"));
-        } else if let Some(other) = found.insert(slot, id.clone()) {
-            problems.push(format!("drones {other} and {id} both stand on slot {slot}"));
-        }
-    }
-    for slot in &plan.slots {
-        if !found.contains_key(&slot.slot) {
-            problems.push(format!("slot {} has no drone", slot.slot));
-        }
-    }
-    if problems.is_empty() {
-        return Ok(found);
-    }
-    for problem in &problems {
-        context.warn(problem);
-    }
-    Err(CommandError::Usage("the drones do not stand as planned; nothing was sent".to_owned()))
-}
-
 /// The whole flight.
 pub(in crate::cli) fn fly(
     context: &Context,
@@ -118,6 +79,7 @@ pub(in crate::cli) fn fly(
     plan: &Plan,
     lead: &LeadArgs,
     with_logs: bool,
+    wait_s: f64,
 ) -> Result<Exit, CommandError> {
     needs_person(lead)?;
     if lead.lead < LEAST_LEAD_S {
@@ -127,32 +89,11 @@ pub(in crate::cli) fn fly(
             lead.lead
         )));
     }
-    let show = Show::of_plan(plan);
-    // The same fence and the same refusal as over MAVLink.
-    let checked =
-        Checked::of(plan, &show).map_err(|error| CommandError::Usage(error.to_string()))?;
-    let corners = &plan.fence.polygon_m;
-    let homes = plan.slots.iter().map(|slot| slot.home_m);
-    let reach_m = homes
-        .flat_map(|home| {
-            corners.iter().map(move |corner| (corner[0] - home[0]).hypot(corner[1] - home[1]))
-        })
-        .fold(0.0, f64::max);
-    let upload = ShowUpload {
-        id: plan.name.clone(),
-        title: plan.title.clone(),
-        drones: plan.slots.len(),
-        frame: plan.site.frame(),
-        fence: Fence {
-            polygon_m: corners.clone(),
-            max_altitude_m: checked.top_m,
-            max_distance_m: reach_m + BEYOND_M,
-        },
-    };
+    let shows = Shows::of(plan)?;
     let mut client = connect(context, address)?;
-    let drones = assign(context, &mut client, plan)?;
+    let drones = assign(context, &mut client, plan, wait_s)?;
     let flight = Flight { address, folder, plan, drones: &drones };
-    let refused = send_shows(context, &mut client, &flight, &show, &upload)?;
+    let refused = shows.send(context, &mut client, &flight)?;
     if refused > 0 {
         context
             .insist(&format!("NO-GO: {refused} drones do not have the show; nothing was started"));
@@ -185,38 +126,17 @@ pub(in crate::cli) fn fly(
     if !with_logs {
         return Ok(flown);
     }
-    let brought = logs::bring(context, &mut client, address, folder, plan, &drones)?;
-    Ok(if brought == Exit::Done { flown } else { brought })
-}
-
-/// Sends every drone its show; how many do not have it.
-fn send_shows(
-    context: &Context,
-    client: &mut Client,
-    flight: &Flight<'_>,
-    show: &Show,
-    upload: &ShowUpload,
-) -> Result<usize, CommandError> {
-    let mut refused = 0;
-    for (index, (slot, drone)) in flight.plan.slots.iter().zip(&show.drones).enumerate() {
-        context.check_stop()?;
-        let Some(id) = flight.drones.get(&slot.slot) else { continue };
-        let (trajectory, lights) = drone_documents(drone)
-            .map_err(|problem| CommandError::Failed(format!("slot {}: {problem}", slot.slot)))?;
-        let payload = upload.payload(index, &trajectory, lights.as_ref())?;
-        let running = client.upload(id, &payload)?;
-        let ended = client.finish(running, |_, _| !stopped(context))?;
-        context.check_stop()?;
-        let reason = match ended.get(id) {
-            Some(Ok(_)) => continue,
-            Some(Err(reason)) => reason.as_str(),
-            None => "the server says nothing of it",
-        };
-        refused += 1;
-        context.warn(&format!("drone {id} (slot {}): {reason}", slot.slot));
+    let wanted: Vec<(u16, String)> = drones.into_iter().collect();
+    let brought = bring(context, &mut client, address, folder, plan, &wanted, &Wish::default())?;
+    sum_up(context, &brought);
+    if brought.iter().all(|row| row.state != "missing") {
+        return Ok(flown);
     }
-    context.check_stop()?;
-    Ok(refused)
+    let campaign = folder.0.display();
+    context.insist(&format!(
+        "To try again: updraft logs pull {campaign} --connect skybrush://{address}"
+    ));
+    Ok(Exit::Losses)
 }
 
 /// The two steps of a start: its time, and its authorization; the Unix time, s, if a person or
@@ -299,8 +219,8 @@ pub(in crate::cli) fn end(
         ids.into_iter().partition(|id| status.get(id).is_some_and(is_on_ground));
     let mut unsure = 0;
     if !up.is_empty() {
-        let running = client.end_flight(&up, action == Action::Return)?;
-        let done = client.finish(running, |_, _| !stopped(context))?;
+        let running = client.begin(&end_flight(&up, action == Action::Return))?;
+        let done = client.finish(running, || !stopped(context))?;
         for id in &up {
             let text = match done.get(id) {
                 Some(Ok(_)) if action == Action::Return => "returns".to_owned(),

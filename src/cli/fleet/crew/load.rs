@@ -1,0 +1,150 @@
+//! What is put on the drones before a flight: parameters, show, fence.
+
+use std::collections::BTreeMap;
+
+use super::{AT_ONCE, Crew};
+use crate::base::crc::ap_crc32;
+use crate::base::file::read_whole;
+use crate::cli::exit::CommandError;
+use crate::cli::fleet::connect::run_number;
+use crate::cli::words;
+use crate::fleet::changes::Changes;
+use crate::fleet::fence::Fence;
+use crate::fleet::ftp::Caller;
+use crate::fleet::ftp::sum::Sum;
+use crate::fleet::required::{CheckParams, requirements};
+use crate::fleet::telemetry::Drone;
+use crate::fleet::upload::{Load, Upload};
+use crate::link::clock::{MS, Micros, S};
+use crate::link::id::DroneId;
+use crate::protocol::show::SHOW_FILE;
+
+/// Virtual drones have set their flags by then, and no radio holds older packets back.
+const SETTLE_VIRTUAL: Micros = 100 * MS;
+/// Uploads at once per network.
+const UPLOADS_AT_ONCE: usize = 16;
+/// Largest show file, bytes.
+const MOST_SKYB: u64 = 1 << 20;
+
+impl Crew<'_> {
+    /// Reads the required parameters, and mends them if allowed. Whether they are right.
+    pub(in crate::cli) fn params(&mut self, may_change: bool) -> Result<bool, CommandError> {
+        let machines = self
+            .drones()
+            .into_iter()
+            .map(|drone| {
+                let show = self.telemetry.get(drone).and_then(Drone::has_show_firmware);
+                let by_show = show.unwrap_or(true) && !self.is_guided;
+                let required = requirements(self.plan, by_show);
+                (drone, CheckParams::new(drone, required, may_change))
+            })
+            .collect();
+        let standings = self.all(machines, AT_ONCE)?;
+        let mut changes =
+            if self.is_virtual { Changes::default() } else { Changes::read(&self.folder.0)? };
+        let (mut changed, mut wrong) = (0, 0);
+        for (drone, standing) in &standings {
+            changes.add(*drone, &standing.changed);
+            changed += standing.changed.len();
+            wrong += usize::from(!standing.is_right());
+        }
+        if changed > 0 && !self.is_virtual {
+            changes.write(&self.folder.0)?;
+            self.context.say(&format!(
+                "Changed {} on {}; `updraft fleet restore` puts them back",
+                words::count(changed, "parameter"),
+                words::count(standings.len(), "drone")
+            ));
+        }
+        self.known.params.extend(standings);
+        if wrong > 0 && !may_change {
+            self.context.warn(&format!(
+                "{} parameters that must be others; --set-params lets this program set them",
+                if wrong == 1 { "1 drone has".to_owned() } else { format!("{wrong} drones have") }
+            ));
+        }
+        Ok(wrong == 0)
+    }
+
+    /// What is put on a drone.
+    fn load(&self, slot: u16, fence: &Fence) -> Result<Load, CommandError> {
+        let path = self.folder.skyb(slot, self.plan.slots.len());
+        let skyb = read_whole(&path, MOST_SKYB)?;
+        Ok(Load { skyb, site: self.plan.site, fence: fence.clone() })
+    }
+
+    /// The plan's fence as drones get it.
+    pub(in crate::cli) fn fence(&self) -> Result<Fence, CommandError> {
+        Fence::of(self.plan, &self.show).map_err(|error| CommandError::Usage(error.to_string()))
+    }
+
+    /// The upload of each drone of the table.
+    pub(in crate::cli) fn uploads(&self) -> Result<BTreeMap<DroneId, Upload>, CommandError> {
+        let fence = self.fence()?;
+        let number = run_number();
+        self.table
+            .drones
+            .iter()
+            .map(|line| {
+                let load = self.load(line.slot, &fence)?;
+                let upload = Upload::new(line.drone, load, number);
+                let upload = if self.is_virtual { upload.settling(SETTLE_VIRTUAL) } else { upload };
+                Ok((line.drone, upload))
+            })
+            .collect()
+    }
+
+    /// Loads the show onto every drone. The drones that refused, with their reasons.
+    pub(in crate::cli) fn upload(&mut self) -> Result<BTreeMap<DroneId, String>, CommandError> {
+        let mut refused = self.remember_fence()?;
+        let mut uploads = self.uploads()?;
+        let count = uploads.len();
+        uploads.retain(|drone, _| !refused.contains_key(drone));
+        // Virtual drones share no radio.
+        let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
+        let done = self.all(uploads, at_once)?;
+        let mut written = 0;
+        for (drone, outcome) in done {
+            match outcome {
+                Ok(loaded) => {
+                    written += usize::from(loaded.written);
+                    self.known.loaded.insert(drone);
+                    self.known.fenced.insert(drone);
+                }
+                Err(error) => {
+                    let slot = self.table.slot_of(drone).unwrap_or(0);
+                    self.context.warn(&format!("drone {drone} (slot {slot}): {error}"));
+                    refused.insert(drone, error.to_string());
+                }
+            }
+        }
+        if !self.is_virtual {
+            self.context.say(&format!(
+                "Loaded {} of {count} drones ({written} written, the others had the file)",
+                count - refused.len()
+            ));
+        }
+        self.note("upload", Some(format!("{} refused", refused.len())))?;
+        Ok(refused)
+    }
+
+    /// For steps that follow an earlier upload: whether each drone's show file is the planned one.
+    pub(in crate::cli) fn look_at_files(&mut self) -> Result<(), CommandError> {
+        let (count, number) = (self.plan.slots.len(), run_number());
+        let mut wanted = BTreeMap::new();
+        let mut machines = BTreeMap::new();
+        for line in &self.table.drones {
+            let file = read_whole(&self.folder.skyb(line.slot, count), MOST_SKYB)?;
+            wanted.insert(line.drone, ap_crc32(&file));
+            let caller = Caller::new(line.drone, number);
+            let sum = Sum::new(caller, SHOW_FILE, file.len() as u64, 10 * S);
+            machines.insert(line.drone, sum);
+        }
+        let found = self.all(machines, AT_ONCE)?;
+        let same = found.into_iter().filter(|(drone, sum)| sum.as_ref().ok() == wanted.get(drone));
+        let same: Vec<DroneId> = same.map(|(drone, _)| drone).collect();
+        self.known.loaded.extend(same.iter().copied());
+        self.known.fenced.extend(same);
+        Ok(())
+    }
+}

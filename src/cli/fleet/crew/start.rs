@@ -1,0 +1,133 @@
+//! A start in two steps, and the show that comes of it.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
+
+use super::Crew;
+use super::eyes::Eyes;
+use crate::base::time::GpsTime;
+use crate::cli::exit::CommandError;
+use crate::fleet::journal::Journal;
+use crate::fleet::start::{Start, StartOptions};
+use crate::fleet::watch::{self, Monitor};
+use crate::link::clock::{MS, S};
+use crate::link::drive::Watch as _;
+use crate::link::id::DroneId;
+
+impl<'a> Crew<'a> {
+    /// Sets a start and waits until every drone has taken it.
+    pub(in crate::cli) fn announce(
+        &mut self,
+        options: StartOptions,
+    ) -> Result<Start, CommandError> {
+        let refused =
+            |error: crate::fleet::start::StartRefusal| CommandError::Failed(error.to_string());
+        let mut start = Start::announce(self.drones(), &self.telemetry, options, self.net.now())
+            .map_err(refused)?;
+        self.until_taken(&mut start)?;
+        Ok(start)
+    }
+
+    /// Authorizes a start that all have taken, and waits until all know.
+    pub(in crate::cli) fn authorize(&mut self, start: &mut Start) -> Result<(), CommandError> {
+        start
+            .authorize(&self.telemetry, self.net.now())
+            .map_err(|error| CommandError::Failed(error.to_string()))?;
+        self.note("authorized", Some(format!("start at {}", start.second_of_week())))?;
+        self.until_taken(start)
+    }
+
+    /// Broadcasts until all have taken it, or the time is up.
+    fn until_taken(&mut self, start: &mut Start) -> Result<(), CommandError> {
+        let until = self.net.now() + 10 * S;
+        loop {
+            let now = self.net.now();
+            if let Some(packet) = start.due(&self.telemetry, now) {
+                self.net.broadcast(&packet)?;
+            }
+            let late = start.late(&self.telemetry, now);
+            if late.is_empty() {
+                return Ok(());
+            }
+            if now >= until || self.context.stop_flag().load(Ordering::SeqCst) {
+                self.cancel(start)?;
+                self.context.check_stop()?;
+                let names: Vec<String> =
+                    late.iter().map(|(drone, what)| format!("drone {drone}: {what}")).collect();
+                return Err(CommandError::Failed(format!(
+                    "the start was cancelled, as not every drone has taken it ({}); try again",
+                    names.join("; ")
+                )));
+            }
+            let next = start.next().clamp(now + MS, now + 100 * MS);
+            while let Some(received) = self.net.recv(next)? {
+                self.telemetry.on_message(self.net.now(), &received);
+            }
+        }
+    }
+
+    /// Takes a start back, for as long as it takes everyone to hear it.
+    pub(in crate::cli) fn cancel(&mut self, start: &mut Start) -> Result<(), CommandError> {
+        start.cancel(self.net.now());
+        for _ in 0..5 {
+            self.net.broadcast(&start.packet())?;
+            let until = self.net.now() + 200 * MS;
+            while let Some(received) = self.net.recv(until)? {
+                self.telemetry.on_message(self.net.now(), &received);
+            }
+        }
+        self.note("cancelled", None)
+    }
+
+    /// Watches the show until everyone has landed. Drones whose flight gave an alarm.
+    pub(in crate::cli) fn watch(
+        &mut self,
+        start: &mut Start,
+    ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
+        let mut eyes = self.eyes(start.time().map(GpsTime::total_ms))?;
+        let outcome = loop {
+            let now = self.net.now();
+            if let Some(packet) = start.due(eyes.telemetry(), now) {
+                self.net.broadcast(&packet)?;
+            }
+            let next = start.next().clamp(now + MS, now + 100 * MS);
+            if let Some(received) = self.net.recv(next)? {
+                eyes.on_message(self.net.now(), &received);
+            }
+            eyes.stop(self.net.now());
+            if eyes.is_over() {
+                break Ok(());
+            }
+            if self.context.stop_flag().load(Ordering::SeqCst) {
+                self.context.insist(
+                    "Nobody watches any more; the drones fly on by themselves. `updraft fleet abort` \
+                     sends them home, `updraft fleet land` lands them where they are",
+                );
+                break Err(CommandError::Interrupted);
+            }
+        };
+        let alarms = self.close(eyes);
+        outcome.and(alarms)
+    }
+
+    /// Watches a flight from here on.
+    pub(super) fn eyes(&mut self, start_gps_ms: Option<i64>) -> Result<Eyes<'a>, CommandError> {
+        let telemetry = std::mem::take(&mut self.telemetry);
+        let mut monitor =
+            Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
+        monitor.set_start(start_gps_ms);
+        let journal = if self.is_virtual { None } else { Some(Journal::open(&self.folder.0)?) };
+        Ok(Eyes::new(self.context, monitor, journal, self.clock))
+    }
+
+    /// What was seen: the drones whose flight gave an alarm.
+    pub(super) fn close(
+        &mut self,
+        eyes: Eyes<'_>,
+    ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
+        let (telemetry, alarms) = eyes.close();
+        self.telemetry = telemetry;
+        self.tell_troubles()?;
+        Ok(alarms?)
+    }
+}

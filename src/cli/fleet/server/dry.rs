@@ -1,0 +1,58 @@
+//! `--dry-run`: the requests, and no server hears them.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::upload::Shows;
+use crate::cli::context::Context;
+use crate::cli::exit::{CommandError, Exit};
+use crate::cli::fleet::dry::print;
+use crate::fleet::abort::Action;
+use crate::mission::Plan;
+use crate::skybrush_server::{StartConfig, end_flight};
+
+/// Which drone stands where, only the server knows.
+fn name(slot: u16) -> String {
+    format!("(who stands on slot {slot})")
+}
+
+/// What a flight would ask of the server.
+pub(in crate::cli) fn dry_fly(
+    context: &Context,
+    plan: &Plan,
+    lead_s: f64,
+) -> Result<Exit, CommandError> {
+    let jobs = Shows::of(plan)?.jobs(|slot| Some(name(slot)))?;
+    let start = |authorized| {
+        let mut body = StartConfig {
+            unix_s: None,
+            authorized,
+            drones: plan.slots.iter().map(|slot| name(slot.slot)).collect(),
+            duration_s: plan.duration_ms as f64 / 1000.0,
+        }
+        .body();
+        if let Some(time) = body.pointer_mut("/configuration/start/time") {
+            *time = Value::from(format!("(now + {lead_s:.0} s)"));
+        }
+        body.to_string()
+    };
+    let lines = jobs.into_iter().map(|(slot, job)| {
+        (format!("on slot {slot}"), vec![job.body.to_string(), start(false), start(true)])
+    });
+    print(context, lines.collect::<BTreeMap<_, _>>())
+}
+
+/// What an abort would ask of the server.
+pub(in crate::cli) fn dry_end(
+    context: &Context,
+    plan: &Plan,
+    action: Action,
+) -> Result<Exit, CommandError> {
+    let lines = plan.slots.iter().map(|slot| {
+        let end = end_flight(&[name(slot.slot)], action == Action::Return).to_string();
+        let back = StartConfig::none().body().to_string();
+        (format!("on slot {}", slot.slot), vec![end, back])
+    });
+    print(context, lines.collect::<BTreeMap<_, _>>())
+}

@@ -1,0 +1,132 @@
+//! Which of the server's drones stands on which slot.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::stopped;
+use crate::base::frame::Geodetic;
+use crate::cli::clock::SystemClock;
+use crate::cli::context::Context;
+use crate::cli::exit::CommandError;
+use crate::fleet::slots::{Stand, allowed_m};
+use crate::link::clock::{Clock as _, S};
+use crate::mission::Plan;
+use crate::skybrush_server::Client;
+
+/// How often the server is asked who is there.
+const EVERY: Duration = Duration::from_millis(500);
+
+/// Who stands where.
+pub(super) struct Standing {
+    /// The server's names of all drones.
+    pub(super) ids: Vec<String>,
+    /// The server's names of the drones by slot.
+    pub(super) found: BTreeMap<u16, String>,
+    /// What is not as planned.
+    pub(super) problems: Vec<String>,
+    /// How many say where they are.
+    placed: usize,
+}
+
+impl Standing {
+    /// The slot of a drone.
+    pub(super) fn slot_of(&self, id: &str) -> Option<u16> {
+        self.found.iter().find(|(_, other)| *other == id).map(|(slot, _)| *slot)
+    }
+}
+
+/// Who stands where, once as many drones as are wanted say where they are, or after `wait_s`: a
+/// server that has only just been started hears its drones one after the other, and some of its
+/// drivers begin with the first client.
+pub(super) fn standing(
+    context: &Context,
+    client: &mut Client,
+    plan: &Plan,
+    wanted: usize,
+    wait_s: f64,
+) -> Result<Standing, CommandError> {
+    let clock = SystemClock::start();
+    let until = clock.now() + (wait_s * S as f64) as u64;
+    let mut said = false;
+    loop {
+        let now = look(client, plan)?;
+        if now.placed >= wanted || clock.now() >= until {
+            return Ok(now);
+        }
+        if !said {
+            said = true;
+            context.say(&format!(
+                "The server knows where {} of {wanted} drones are; waiting for the others",
+                now.placed
+            ));
+        }
+        if stopped(context) {
+            return Err(CommandError::Interrupted);
+        }
+        std::thread::sleep(EVERY);
+    }
+}
+
+/// Where a status says that its drone is; `None` without a position fix.
+fn place(status: &Value) -> Option<Geodetic> {
+    // 1e-7 degrees.
+    let part = |index: usize| {
+        let value = status.pointer(&format!("/position/{index}")).and_then(Value::as_f64);
+        value.map(|value| value * 1e-7)
+    };
+    let place = Geodetic { lat_deg: part(0)?, lon_deg: part(1)?, amsl_m: 0.0 };
+    (place.lat_deg != 0.0 || place.lon_deg != 0.0).then_some(place)
+}
+
+fn look(client: &mut Client, plan: &Plan) -> Result<Standing, CommandError> {
+    let mut ids = client.drones()?;
+    ids.sort();
+    let status = client.status(&ids)?;
+    let allowed_m = allowed_m(plan);
+    let mut found: BTreeMap<u16, String> = BTreeMap::new();
+    let mut doubled = Vec::new();
+    let mut problems = Vec::new();
+    let mut placed = 0;
+    for (id, status) in &status {
+        let Some(place) = place(status) else {
+            problems.push(format!("drone {id} does not say where it stands"));
+            continue;
+        };
+        placed += 1;
+        let Some(stand) = Stand::of(plan, place) else { continue };
+        let (slot, away_m) = (stand.nearest, stand.distance_m);
+        if away_m > allowed_m {
+            problems.push(format!("drone {id} stands {away_m:.1} m from slot {slot}"));
+        } else if let Some(other) = found.insert(slot, id.clone()) {
+            problems.push(format!("drones {other} and {id} both stand on slot {slot}"));
+            doubled.push(slot);
+        }
+    }
+    for slot in &plan.slots {
+        if !found.contains_key(&slot.slot) {
+            problems.push(format!("slot {} has no drone", slot.slot));
+        }
+    }
+    // Whose it is, nobody knows.
+    found.retain(|slot, _| !doubled.contains(slot));
+    Ok(Standing { ids, found, problems, placed })
+}
+
+/// Slots and the server's names of their drones; everyone must stand as planned.
+pub(super) fn assign(
+    context: &Context,
+    client: &mut Client,
+    plan: &Plan,
+    wait_s: f64,
+) -> Result<BTreeMap<u16, String>, CommandError> {
+    let standing = standing(context, client, plan, plan.slots.len(), wait_s)?;
+    if standing.problems.is_empty() {
+        return Ok(standing.found);
+    }
+    for problem in &standing.problems {
+        context.warn(problem);
+    }
+    Err(CommandError::Usage("the drones do not stand as planned; nothing was sent".to_owned()))
+}

@@ -1,0 +1,56 @@
+//! What logs the drones have, for people and for programs.
+
+use serde::Serialize;
+
+use crate::cli::context::Context;
+use crate::cli::exit::{CommandError, Exit};
+
+#[derive(Serialize)]
+struct ListOutput {
+    schema: &'static str,
+    drones: Vec<ListRow>,
+}
+
+/// A drone's logs, or why they are not known.
+#[derive(Serialize)]
+pub(in crate::cli) struct ListRow {
+    pub(in crate::cli) drone: String,
+    /// None: no slot is near.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(in crate::cli) slot: Option<u16>,
+    pub(in crate::cli) logs: Vec<ListedLog>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(in crate::cli) reason: Option<String>,
+}
+
+/// A log on a drone.
+#[derive(Serialize)]
+pub(in crate::cli) struct ListedLog {
+    pub(in crate::cli) number: u16,
+    pub(in crate::cli) bytes: u64,
+    /// 0: the autopilot had no clock.
+    pub(in crate::cli) unix_s: u32,
+}
+
+/// Prints them; exit code 3 when one is not known.
+pub(super) fn show(context: &Context, rows: Vec<ListRow>) -> Result<Exit, CommandError> {
+    let lost = rows.iter().any(|row| row.reason.is_some());
+    if context.json {
+        context.print_json(&ListOutput { schema: "updraft.log-list/1", drones: rows })?;
+    } else {
+        for row in &rows {
+            let logs: Vec<String> = row
+                .logs
+                .iter()
+                .map(|log| format!("{} ({:.1} MB)", log.number, log.bytes as f64 / 1e6))
+                .collect();
+            let what = row.reason.clone().unwrap_or_else(|| match logs.len() {
+                0 => "no logs".to_owned(),
+                _ => logs.join(", "),
+            });
+            let slot = row.slot.map_or_else(|| "-".to_owned(), |slot| slot.to_string());
+            context.emit(&format!("drone {:>4}  slot {slot:>4}  {what}\n", row.drone))?;
+        }
+    }
+    Ok(if lost { Exit::Losses } else { Exit::Done })
+}

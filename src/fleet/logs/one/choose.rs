@@ -1,0 +1,147 @@
+//! Which of a drone's logs are brought home, and into which files.
+
+use super::{FTP_PATIENCE, PullOne, Stage, Target, Which};
+use crate::base::file::create_folder;
+use crate::fleet::ftp::FtpError;
+use crate::fleet::ftp::list::Listed;
+use crate::fleet::log_protocol::LogProtocolError;
+use crate::fleet::log_protocol::list::Entry;
+use crate::fleet::logs::part::PartFile;
+use crate::link::clock::S;
+use crate::protocol::ftp::Refusal;
+
+impl PullOne {
+    pub(super) fn on_list(&mut self, outcome: Result<Vec<Listed>, FtpError>) -> Stage {
+        let names = match outcome {
+            Ok(names) => names,
+            Err(FtpError::Refused { refusal: Refusal::FileNotFound, .. }) => {
+                self.folder += 1;
+                return match self.list(FTP_PATIENCE) {
+                    Some(list) => Stage::List(list),
+                    None => self.fall_back("MAVFTP shows no folder of logs".to_owned()),
+                };
+            }
+            // A drone that is only just being switched on, or boots.
+            Err(FtpError::Silent { .. }) if !self.is_heard() => {
+                let heard = self.heartbeat.or(self.started).unwrap_or(self.now);
+                if self.now >= heard + self.options.patience {
+                    let seconds = self.now.saturating_sub(heard) / S;
+                    return self.fail_silent(FtpError::Silent { seconds }.to_string());
+                }
+                return match self.list(FTP_PATIENCE) {
+                    Some(list) => Stage::List(list),
+                    None => Stage::Over,
+                };
+            }
+            Err(error) => return self.fall_back(format!("MAVFTP: {error}")),
+        };
+        let Some(folder) = self.options.folders.get(self.folder) else { return Stage::Over };
+        let mut logs: Vec<(u32, String, u64)> = names
+            .into_iter()
+            .filter_map(|listed| {
+                let number = log_number(&listed.name)?;
+                Some((number, format!("{folder}/{}", listed.name), listed.size?))
+            })
+            .collect();
+        logs.sort();
+        self.choose(&logs)
+    }
+
+    pub(super) fn on_log_list(&mut self, outcome: Result<Vec<Entry>, LogProtocolError>) -> Stage {
+        let advice = "run again; or take its card and import";
+        match outcome {
+            Ok(entries) => {
+                let logs = entries.iter();
+                let logs: Vec<_> = logs
+                    .map(|entry| (entry.id.into(), format!("log {}", entry.id), entry.size))
+                    .collect();
+                self.choose(&logs)
+            }
+            Err(error @ LogProtocolError::Silent { .. }) => {
+                let ftp = self.reason.clone().unwrap_or_default();
+                self.fail_silent(format!("{error} ({ftp})"))
+            }
+            Err(error) => self.fail(error.to_string(), advice),
+        }
+    }
+
+    /// From logs in the order of their numbers.
+    pub(super) fn choose(&mut self, logs: &[(u32, String, u64)]) -> Stage {
+        let Some((newest, ..)) = logs.last() else {
+            return self
+                .fail("the drone has no logs".to_owned(), "check its card and LOG_BACKEND_TYPE");
+        };
+        let newest = *newest;
+        let wanted = |number: u32| match self.options.which {
+            Which::Newest => number == newest,
+            Which::Number(wanted) => number == wanted,
+            Which::All => true,
+        };
+        let target = |(number, source, size): &(u32, String, u64)| Target {
+            file: if self.options.which == Which::All && *number != newest {
+                let stem = self.file.trim_end_matches(".BIN");
+                format!("older/{stem}-{number:08}.BIN")
+            } else {
+                self.file.clone()
+            },
+            number: *number,
+            source: source.clone(),
+            size: *size,
+        };
+        let targets: Vec<Target> =
+            logs.iter().filter(|(number, ..)| wanted(*number)).map(target).collect();
+        if targets.is_empty() {
+            let last = logs.iter().map(|(number, ..)| number.to_string()).collect::<Vec<_>>();
+            let reason = format!("the drone has no such log, only {}", last.join(", "));
+            return self.fail(reason, "choose one of them (--log)");
+        }
+        self.targets = targets;
+        self.next_target()
+    }
+
+    pub(super) fn next_target(&mut self) -> Stage {
+        let Some(target) = self.targets.pop() else { return Stage::Over };
+        let (path, is_there) = {
+            let shelf = self.shelf.borrow();
+            let path = shelf.path(&target.file);
+            let is_there = shelf.entry(&target.file).is_some_and(|entry| {
+                entry.source == target.source
+                    && std::fs::metadata(&path).is_ok_and(|about| about.len() == entry.size_bytes)
+            });
+            (path, is_there)
+        };
+        if is_there && !self.options.again {
+            self.done.there.push(target.file);
+            return self.next_target();
+        }
+        if target.size > self.options.most_size {
+            let most = self.options.most_size;
+            let error = FtpError::TooLarge { size: target.size, most };
+            return self.fail(error.to_string(), "allow more (--max-size), if that is its size");
+        }
+        (self.size, self.rounds, self.restarts) = (target.size, 0, 0);
+        let identity = format!("drone={} source={}", self.drone, target.source);
+        self.target = Some(target);
+        let opened = path
+            .parent()
+            .map_or(Ok(()), create_folder)
+            .and_then(|()| PartFile::open(&path, &identity))
+            .map(|part| if self.options.is_durable { part } else { part.without_waiting() });
+        match opened {
+            Ok(part) => self.begin(part, true),
+            Err(error) => {
+                let reason = format!("{error}: {}", error.source);
+                self.fail(reason, "make the folder writable, or make room, and run again")
+            }
+        }
+    }
+}
+
+/// The number in a log's name: `00000012.BIN`.
+fn log_number(name: &str) -> Option<u32> {
+    let (stem, extension) = name.rsplit_once('.')?;
+    let is_log = extension.eq_ignore_ascii_case("bin")
+        && stem.len() <= 9
+        && stem.bytes().all(|byte| byte.is_ascii_digit());
+    if is_log { stem.parse().ok() } else { None }
+}

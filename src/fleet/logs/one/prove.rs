@@ -1,0 +1,99 @@
+//! Whether what came is what the drone has: by its checksum, or by pieces that are read again.
+//! Only then the file gets its name.
+
+use super::{MOST_ROUNDS, PullOne, SAMPLE_BYTES, SAMPLES, Stage};
+use crate::fleet::ftp::FtpError;
+use crate::fleet::ftp::get::Get;
+use crate::fleet::ftp::sum::Sum;
+use crate::fleet::logs::manifest::{ManifestEntry, Method, Verified};
+use crate::fleet::logs::part::{PartFile, Sample, Sums};
+
+impl PullOne {
+    pub(super) fn compare(&mut self, mut part: PartFile, is_settled: bool) -> Stage {
+        let sums = match part.sums(self.size) {
+            Ok(sums) => sums,
+            Err(error) => return self.fail(error.to_string(), "make room and run again"),
+        };
+        let Some(target) = &self.target else { return Stage::Over };
+        if is_settled {
+            let source = target.source.clone();
+            let sum = Sum::new(self.caller.another(), &source, self.size, self.options.patience);
+            return Stage::Sum(sum, part, sums);
+        }
+        self.sample(part, sums)
+    }
+
+    pub(super) fn sample(&mut self, part: PartFile, sums: Sums) -> Stage {
+        let Some(target) = self.target.clone() else { return Stage::Over };
+        let step = self.size / SAMPLES;
+        let ranges: Vec<_> = (0..SAMPLES)
+            .map(|index| index * step + step / 2)
+            .map(|start| (start, start + SAMPLE_BYTES))
+            .collect();
+        match Sample::new(part.path(), self.size, &ranges) {
+            Err(error) => self.fail(error.to_string(), "run again"),
+            Ok(sample) if self.reason.is_none() => {
+                let get =
+                    Get::new(self.caller.another(), &target.source, sample, self.get_sample());
+                Stage::Sample(Box::new(get), part, sums)
+            }
+            Ok(sample) => Stage::LogSample(Box::new(self.log_get(sample)), part, sums),
+        }
+    }
+
+    pub(super) fn on_summed(
+        &mut self,
+        part: PartFile,
+        sums: Sums,
+        outcome: Result<u32, FtpError>,
+    ) -> Stage {
+        match outcome {
+            Ok(sum) if sum == sums.crc32 => self.finish(part, sums, Verified::Checksum),
+            // It may have grown between the list and the checksum.
+            Ok(_) if self.rounds < MOST_ROUNDS => {
+                self.rounds += 1;
+                match self.list(self.options.patience) {
+                    Some(list) => Stage::Relist(list, part),
+                    None => self.restart(part, "the checksum differs"),
+                }
+            }
+            Ok(_) => self.restart(part, "the checksum differs"),
+            Err(error @ FtpError::Silent { .. }) => self.on_ftp_failed(part, error),
+            Err(_) => self.sample(part, sums),
+        }
+    }
+
+    pub(super) fn on_sampled(&mut self, part: PartFile, sums: Sums, differs: bool) -> Stage {
+        if differs {
+            return self.restart(part, "pieces that were read again differ");
+        }
+        self.finish(part, sums, Verified::Sample)
+    }
+
+    pub(super) fn finish(&mut self, part: PartFile, sums: Sums, verified: Verified) -> Stage {
+        let Some(target) = self.target.take() else { return Stage::Over };
+        let entry = ManifestEntry {
+            file: target.file,
+            slot: self.slot,
+            drone: Some(self.drone),
+            boot: Some(target.number),
+            source: target.source,
+            size_bytes: sums.size,
+            sha256: sums.sha256,
+            method: if self.reason.is_none() { Method::Mavftp } else { Method::LogMessages },
+            method_reason: self.reason.clone(),
+            verified,
+            attempts: self.attempts,
+            at_unix_s: self.options.unix_s,
+        };
+        self.attempts = 0;
+        self.held = 0;
+        let finished = self.shelf.borrow_mut().finish(part, entry.clone());
+        if let Err(error) = finished {
+            let reason = format!("{error}: {}", error.source);
+            return self.fail(reason, "make room and run again");
+        }
+        self.done.pulled.push(entry);
+        self.next_target()
+    }
+}

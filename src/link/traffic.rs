@@ -1,0 +1,101 @@
+//! What went through a network, and what its people must know about it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::frame::FrameLoss;
+use super::id::DroneId;
+
+/// What went through a network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Bytes received, with all overhead above UDP.
+    pub bytes_in: u64,
+    /// Bytes sent.
+    pub bytes_out: u64,
+    /// Frames received that gave a message.
+    pub frames_in: u64,
+    /// Bytes that gave none.
+    pub loss: FrameLoss,
+}
+
+/// Bytes outside of frames up to this share are no sign of a wrong link: a serial port is opened
+/// in the middle of a frame, and a radio loses ends.
+const USUAL_NOISE: f64 = 0.1;
+/// Fewer are none either.
+const LEAST_NOISE: u64 = 1_000;
+
+/// Something about a link that people must know.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Trouble {
+    /// The same for the same trouble, however often it has been counted.
+    pub key: String,
+    /// What it is, and what to do.
+    pub text: String,
+}
+
+/// What people must know about their links.
+pub fn troubles(traffic: &BTreeMap<u16, Traffic>, doubled: &BTreeSet<DroneId>) -> Vec<Trouble> {
+    let mut all: Vec<Trouble> = doubled
+        .iter()
+        .map(|drone| Trouble {
+            key: format!("doubled {drone}"),
+            text: format!(
+                "drone {drone} is heard from two places at once, and only one of them is listened \
+                 to: two drones with one system id (give each its own SYSID_THISMAV, or put one \
+                 into another network), or one drone over two links"
+            ),
+        })
+        .collect();
+    for (network, of) in traffic {
+        let mut tell = |key: &str, text: String| {
+            let key = format!("{key} {network}");
+            all.push(Trouble { key, text: format!("network {network}: {text}") });
+        };
+        let FrameLoss { noise_bytes, version_1, unknown: _, unsigned, forged } = of.loss;
+        if unsigned > 0 {
+            tell(
+                "unsigned",
+                format!(
+                    "{} not signed: refused. Drones without the key are not heard; give them the \
+                     key, or leave out --key",
+                    frames(unsigned)
+                ),
+            );
+        }
+        if forged > 0 {
+            tell(
+                "forged",
+                format!(
+                    "{} with a wrong signature, or sent before: refused. Somebody has another \
+                     key, or repeats what was said",
+                    frames(forged)
+                ),
+            );
+        }
+        if version_1 > 0 {
+            tell(
+                "version 1",
+                format!(
+                    "{} of MAVLink 1: ignored. Set SERIALn_PROTOCOL of the drones' telemetry port \
+                     to 2 (MAVLink 2)",
+                    frames(version_1)
+                ),
+            );
+        }
+        if noise_bytes > LEAST_NOISE && noise_bytes as f64 > USUAL_NOISE * of.bytes_in as f64 {
+            tell(
+                "noise",
+                format!(
+                    "{noise_bytes} of {} bytes are no MAVLink 2 frames: is the baud rate right, \
+                     and is this the drones' link?",
+                    of.bytes_in
+                ),
+            );
+        }
+    }
+    all
+}
+
+fn frames(count: u64) -> String {
+    if count == 1 { "1 frame".to_owned() } else { format!("{count} frames") }
+}
