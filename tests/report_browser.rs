@@ -103,3 +103,20 @@ fn the_report_fits_a_phone_and_respects_less_motion() {
     tab.whole_page(&folder.join("page.png"));
     tab.finish();
 }
+
+/// What the other tests rely on.
+#[test]
+fn a_page_that_errs_or_fetches_is_noticed() {
+    let Some(mut browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("index.html");
+    let script = "console.error('loud'); fetch('https://updraft.invalid/x').catch(() => {}); \
+                  setTimeout(() => { window.done = true; throw new Error('late'); })";
+    std::fs::write(&page, format!("<title>x</title><script>{script}</script>")).unwrap();
+    let mut tab = browser.open(&format!("file://{}", page.display()), [400, 300]);
+    tab.wait_for("window.done === true");
+    let troubles = tab.troubles().join("\n");
+    for trouble in ["loud", "fetched https://updraft.invalid/x", "exception: "] {
+        assert!(troubles.contains(trouble), "{trouble} was not noticed: {troubles}");
+    }
+}

@@ -290,28 +290,34 @@ impl Tab<'_> {
         File::create(path).unwrap().write_all(&bytes).unwrap();
     }
 
-    /// Looks back: no error in the console, no exception, nothing fetched but the page itself.
-    pub(crate) fn finish(mut self) {
+    /// Looks back: errors and words in the console, exceptions, and whatever was fetched but the page
+    /// itself.
+    pub(crate) fn troubles(&mut self) -> Vec<String> {
+        // An answer to a question comes after all that happened before it.
         self.value("1");
         let session = json!(self.session);
-        for event in self.browser.events.drain(..) {
-            if event["sessionId"] != session {
-                continue;
-            }
+        let address = &self.address;
+        let trouble = |event: Value| {
             let parameters = &event["params"];
-            match event["method"].as_str().unwrap_or("") {
-                "Runtime.exceptionThrown" => panic!("exception: {parameters}"),
-                "Runtime.consoleAPICalled" => panic!("in the console: {parameters}"),
-                "Log.entryAdded" => panic!("in the log: {parameters}"),
+            match event["method"].as_str()? {
+                "Runtime.exceptionThrown" => Some(format!("exception: {parameters}")),
+                "Runtime.consoleAPICalled" => Some(format!("in the console: {parameters}")),
+                "Log.entryAdded" => Some(format!("in the log: {parameters}")),
                 "Network.requestWillBeSent" => {
                     let url = parameters["request"]["url"].as_str().unwrap_or("");
-                    assert!(
-                        url.starts_with("data:") || url == self.address,
-                        "the page fetched {url}"
-                    );
+                    let own = url.starts_with("data:") || url == address;
+                    (!own).then(|| format!("fetched {url}"))
                 }
-                _ => {}
+                _ => None,
             }
-        }
+        };
+        let own = self.browser.events.drain(..).filter(|event| event["sessionId"] == session);
+        own.filter_map(trouble).collect()
+    }
+
+    /// Nothing of it happened.
+    pub(crate) fn finish(mut self) {
+        let troubles = self.troubles();
+        assert!(troubles.is_empty(), "{troubles:#?}");
     }
 }
