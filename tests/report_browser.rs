@@ -17,8 +17,8 @@ use updraft::report::{render, write};
 /// Writes the synthetic campaign's report; the page's address and the folder of screenshots.
 fn report(name: &str) -> (String, PathBuf) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-browser").join(name);
-    let made = render(&whole_campaign(), &provenance()).unwrap();
-    write(&made, &folder).unwrap();
+    let made = render(&whole_campaign(), &provenance()).expect("a report");
+    write(&made, &folder).expect("written");
     (format!("file://{}", folder.join("index.html").display()), folder)
 }
 

@@ -34,7 +34,7 @@ pub(crate) fn whole_campaign() -> Analysis {
     }
     let hover = &mut analysis.flights[1];
     hover.statistics = Some(statistics());
-    let map = hover.map.as_mut().unwrap();
+    let map = hover.map.as_mut().expect("a map");
     for drone in &mut map.drones {
         drone.errors = ErrorBudget {
             window_mps: 0.02,
