@@ -14,8 +14,7 @@ fn main() {
 fn hover() -> FieldInput {
     let places_m: Vec<[f64; 2]> =
         (0..49).map(|i| [7.0 * f64::from(i / 7), 7.0 * f64::from(i % 7)]).collect();
-    let scales =
-        FieldScales { sd_mps: 0.5, length_m: [145.0; 2], tau_s: 186.0, noise_mps: 0.05 };
+    let scales = FieldScales { sd_mps: 0.5, length_m: [145.0; 2], tau_s: 186.0, noise_mps: 0.05 };
     let simulator = Simulator::new(&places_m, scales, 600, 10).unwrap();
     let columns = simulator.flight(&mut stream(1, 0, Purpose::Air));
     let row = |column: &[f64]| column.iter().map(|value| Some(*value)).collect();
