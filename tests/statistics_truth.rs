@@ -106,6 +106,9 @@ fn mean_ln(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
+/// One of the paper's scales.
+type Of = fn(&PaperScales) -> Option<f64>;
+
 /// Flights of 4 x 4 drones, for both tests below.
 const FLIGHTS: u64 = 60;
 const SHORT_S: usize = 200;
@@ -161,7 +164,6 @@ fn the_simulators_air_reads_as_exact_draws_do() {
     };
     let drawn = scales(&|seed| flight(&places, &exact, 1, seed, |_| 0.0));
     let waved = scales(&waves);
-    type Of = fn(&PaperScales) -> Option<f64>;
     let all: [(&str, Of); 2] = [("lambda", |one| one.lambda_m), ("t0", |one| one.t0_s)];
     for (name, of) in all {
         let (one, one_se) = mean_ln(drawn.iter().filter_map(of));
