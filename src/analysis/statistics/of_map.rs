@@ -10,8 +10,6 @@ use crate::analysis::updraft::{self, RUNNING_S};
 use crate::analysis::windows::{Corrected, Target};
 use crate::flight::{Flight, Series};
 
-/// A heading is taken from at most so long before, s.
-const HEADING_AGE_S: f64 = 1.0;
 /// Fewest samples in a second.
 const FEWEST_PER_SECOND: usize = 3;
 /// No hover is longer, whatever times a damaged log claims, s.
@@ -22,8 +20,10 @@ const LONGEST_S: usize = 200_000;
 pub(in crate::analysis) struct HoverSeen {
     /// Means over each second of the tilt-corrected pulse, us, and of the vertical velocity, m/s.
     seconds: Vec<Option<(f64, f64)>>,
-    /// Where the mean attitude leans to, degrees clockwise from north.
-    towards_deg: Option<f64>,
+    /// Tangents of the mean lean forward and to the right.
+    forward_right: [f64; 2],
+    /// Mean heading, degrees clockwise from north.
+    heading_deg: Option<f64>,
 }
 
 impl HoverSeen {
@@ -46,30 +46,35 @@ impl HoverSeen {
                 mean(&corrected.pulse_phi_us).zip(mean(&flight.velocity_up_mps))
             })
             .collect();
-        Self { seconds, towards_deg: towards_deg(flight, hover) }
+        Self {
+            seconds,
+            forward_right: forward_right(flight, hover),
+            heading_deg: heading_deg(flight, hover),
+        }
     }
 }
 
-/// Where the thrust points to on average, degrees clockwise from north; `None` without headings.
-fn towards_deg(flight: &Flight, hover: &Target) -> Option<f64> {
-    let range = flight.roll_rad.range(hover.start_s, hover.end_s);
-    let times = flight.roll_rad.time_s.get(range.clone())?;
-    let rolls = flight.roll_rad.value.get(range)?;
-    let (mut north, mut east, mut count) = (0.0, 0.0, 0);
-    for (time, roll) in times.iter().zip(rolls) {
-        let pitch = flight.pitch_rad.latest(*time, HEADING_AGE_S);
-        let yaw = flight.yaw_deg.latest(*time, HEADING_AGE_S);
-        if let Some((pitch, yaw)) = pitch.zip(yaw) {
-            // Body up in the frame of the heading: forward with the nose down, right with the right
-            // side down.
-            let (forward, right) = (-pitch.tan(), roll.tan() / pitch.cos());
-            let (sin, cos) = yaw.to_radians().sin_cos();
-            north += cos * forward - sin * right;
-            east += sin * forward + cos * right;
-            count += 1;
-        }
+/// Tangents of the mean attitude: forward with the nose down, right with the right side down.
+fn forward_right(flight: &Flight, hover: &Target) -> [f64; 2] {
+    let mean = |series: &Series| {
+        let values = series.between(hover.start_s, hover.end_s);
+        if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+    };
+    let (roll, pitch) = (mean(&flight.roll_rad), mean(&flight.pitch_rad));
+    [-pitch.tan(), roll.tan() / pitch.cos()]
+}
+
+/// Mean heading, which jumps at north; `None` without headings.
+fn heading_deg(flight: &Flight, hover: &Target) -> Option<f64> {
+    let headings = flight.yaw_deg.between(hover.start_s, hover.end_s);
+    let (mut north, mut east) = (0.0, 0.0);
+    for heading in headings {
+        let (sin, cos) = heading.to_radians().sin_cos();
+        north += cos;
+        east += sin;
     }
-    (count > 0).then(|| f64::atan2(east, north).to_degrees().rem_euclid(360.0))
+    let known = !headings.is_empty() && f64::hypot(north, east) > 0.0;
+    known.then(|| f64::atan2(east, north).to_degrees().rem_euclid(360.0))
 }
 
 /// Statistics of a map and of what its logs showed, in the order of the map's drones.
@@ -113,7 +118,8 @@ pub(in crate::analysis) fn of_map(
             slot: drone.slot,
             name: drone.name.clone(),
             lean_deg: drone.tilt_deg,
-            towards_deg: seen.towards_deg,
+            forward_right: seen.forward_right,
+            heading_deg: seen.heading_deg,
         })
         .collect();
     statistics.wind = tilt_wind(&leans, map.leaning.map(|leaning| leaning.drag_speed_mps));
