@@ -5,8 +5,8 @@
 mod study_support;
 
 use study_support::{result, small};
-use updraft::analysis::result::Rejection;
-use updraft::report::{Provenance, render_study, study_summary};
+use updraft::analysis::result::{ANALYSIS_SCHEMA, Analysis, Rejection};
+use updraft::report::{Provenance, render_study, render_with_study, study_summary};
 use updraft::study::StudyPlan;
 use updraft::study::result::StudyResult;
 
@@ -104,6 +104,18 @@ fn the_report_says_what_the_study_says() {
         assert!(!svg.contains("NaN"), "{name}");
     }
     assert_eq!(report, render_study(&study, &Provenance::default()).unwrap());
+
+    // The report of a campaign that holds it has the paper's figure and table.
+    let analysis = Analysis {
+        schema: ANALYSIS_SCHEMA.to_owned(),
+        made_by: String::new(),
+        title: String::new(),
+        flights: Vec::new(),
+        warnings: Vec::new(),
+    };
+    let whole = render_with_study(&analysis, &study, &Provenance::default()).unwrap();
+    assert!(whole.figures.iter().map(|(name, _)| name).eq(["fig2-study"]));
+    assert!(whole.html.contains("8.207 ± 0.020") && whole.html.contains("Table I"));
     for width in [40, 80, 100, 200] {
         let text = study_summary(&study, width, false);
         assert!(text.lines().all(|line| line.chars().count() <= width), "{text}");

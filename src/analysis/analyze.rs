@@ -18,10 +18,11 @@ use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::prefer::{better_law, describes};
 use super::refer::refer_calibration;
 use super::result::{
-    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, FlightAnalysis, Laws, TableRow,
-    Unmeasured, UnusedLog, UpdraftMap,
+    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
+    TableRow, Unmeasured, UnusedLog, UpdraftMap,
 };
 use super::slots::{SlotMatch, match_slots};
+use super::statistics::{StatisticsOptions, of_map};
 use super::updraft::{self, DroneSeries};
 use super::wind::Leaning;
 use super::windows::{Tilt, WindowOptions};
@@ -130,6 +131,8 @@ pub struct AnalysisOptions {
     /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
     /// updraft (simulations), Table II for other fleets (of two drones or more).
     pub paper: Option<PaperTable>,
+    /// How statistics of a map are made.
+    pub statistics: StatisticsOptions,
     /// Most points of a trace for figures.
     pub trace_points: usize,
 }
@@ -175,6 +178,7 @@ impl Default for AnalysisOptions {
             paper_windows: false,
             map_law: None,
             paper: None,
+            statistics: StatisticsOptions::default(),
             trace_points: 1200,
         }
     }
@@ -356,9 +360,9 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         Purpose::Measurement
     });
     let mut drones = Vec::new();
-    let mut updrafts = Vec::new();
+    let (mut updrafts, mut seen) = (Vec::new(), Vec::new());
     let mut unmeasured = Vec::new();
-    for One { mut drone, calibration, updraft, .. } in ones {
+    for One { mut drone, calibration, updraft, hover, .. } in ones {
         let (slot, name) = (drone.slot, drone.name.clone());
         let nothing = |reason| Unmeasured { slot, name: name.clone(), reason };
         match (purpose, calibration, updraft) {
@@ -368,6 +372,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
                 drone
                     .warnings
                     .extend(partial_law(shared, slot, &name).filter(|_| mapping == FLOCK));
+                seen.push(hover);
                 updrafts.push((slot, name.clone(), drone.home_m, series, mapping));
             }
             (Purpose::Measurement, _, Some(Err(reason))) => unmeasured.push(nothing(reason)),
@@ -400,11 +405,13 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
     }
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
     warnings.extend(map.as_ref().and_then(wind_caution));
+    let statistics = map.as_ref().map(|map| of_map(map, &seen, &options.statistics));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
         indicator: options.indicator,
         planned: input.plan.is_some(),
+        orientation_deg: input.plan.map(|plan| plan.site.orientation_deg),
         true_updraft_mps: input.true_updraft_mps,
         logs: input.logs.len(),
         missing: account::missing(input, &drones, &unused),
@@ -412,6 +419,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         flock,
         table,
         map,
+        statistics,
         unmeasured,
         paper_table: paper.map(|paper| paper.number().to_owned()),
         warnings,
@@ -472,9 +480,14 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             height_m: series.height_m,
             mapping: mapping.to_owned(),
             mean: series.mean,
+            mean_interval_mps: None,
+            errors: ErrorBudget::default(),
             systematic_mps: series.systematic_mps,
             tilt_deg: series.tilt_deg,
             updraft_mps: series.at(&times),
+            sd_mps: Vec::new(),
+            interval_mps: Vec::new(),
+            quality: Vec::new(),
             truth_mps: truth_of(slot),
         })
         .collect();
@@ -489,5 +502,9 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         flock: shared.map_reference.and_then(|reference| reference.flock.clone()),
         time_s: times.iter().map(|time| *time as f64).collect(),
         drones,
+        battery: None,
+        calibration_air: None,
+        common: None,
+        truth: None,
     }
 }

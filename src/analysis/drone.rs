@@ -4,6 +4,7 @@ use super::analyze::{AnalysisOptions, FlightInput, LogInput, MapLaw};
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::offset::OffsetMap;
 use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats};
+use super::statistics::HoverSeen;
 use super::stats::mean_sd;
 use super::steps::steady;
 use super::updraft::{self, DroneSeries, Lean};
@@ -33,6 +34,8 @@ pub(super) struct One {
     pub(super) calibration: Result<Laws, CalibrationError>,
     /// The air, with the mapping used; or why there is none. `None` without reference laws.
     pub(super) updraft: Option<Result<(DroneSeries, &'static str), String>>,
+    /// Its hover, for the statistics.
+    pub(super) hover: HoverSeen,
 }
 
 /// Everything about one log.
@@ -96,7 +99,8 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         warnings,
     };
     let (losses, skipped_bytes) = (flight.losses(), flight.scan.bad_bytes);
-    Ok(One { drone, losses, skipped_bytes, calibration, updraft })
+    let hover = HoverSeen::of(&flight, &corrected, &targets);
+    Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover })
 }
 
 /// What one log showed.

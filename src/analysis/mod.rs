@@ -5,6 +5,7 @@
 
 mod account;
 mod analyze;
+pub mod budget;
 pub mod calibrate;
 mod caution;
 pub mod density;
@@ -18,6 +19,7 @@ pub mod prefer;
 mod refer;
 pub mod result;
 mod slots;
+pub mod statistics;
 mod stats;
 mod steps;
 pub mod updraft;

@@ -3,8 +3,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use super::budget::{
+    BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, TruthCheck,
+};
 use super::density::Density;
 use super::offset::OffsetMap;
+use super::statistics::result::FieldStatistics;
 use super::wind::Leaning;
 use crate::base::estimate::Estimate;
 use crate::flight::{Clock, Indicator};
@@ -40,6 +44,10 @@ pub struct FlightAnalysis {
     pub indicator: Indicator,
     /// Whether windows came from a plan (else from the log's desired velocity).
     pub planned: bool,
+    /// Direction of the show frame's x axis (forward), degrees clockwise from north; absent without a
+    /// plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation_deg: Option<f64>,
     /// The true vertical air speed in this flight, m/s, when it was simulated in uniform air.
     pub true_updraft_mps: Option<f64>,
     /// Analysed drones, in slot order.
@@ -57,6 +65,9 @@ pub struct FlightAnalysis {
     pub table: Vec<TableRow>,
     /// The map of the air, for measurements.
     pub map: Option<UpdraftMap>,
+    /// Statistics of the map: scales of the air in space and time, wind, averaging times.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub statistics: Option<FieldStatistics>,
     /// Drones whose log was read but gave no law (calibrations) or no value of the map
     /// (measurements).
     #[serde(default)]
@@ -432,6 +443,19 @@ pub struct UpdraftMap {
     pub time_s: Vec<f64>,
     /// The drones' estimates.
     pub drones: Vec<DroneUpdraft>,
+    /// How pulses were referred to one battery voltage; absent: they were not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub battery: Option<BatteryCorrection>,
+    /// Slow air during the calibration, whose mean is the doubt about the zero; absent: the
+    /// calibration does not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_air: Option<CalibrationAir>,
+    /// The error that all drones share; absent: not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub common: Option<CommonError>,
+    /// Comparison with the true air, when it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<TruthCheck>,
 }
 
 /// One drone's estimate of the vertical air speed.
@@ -447,8 +471,15 @@ pub struct DroneUpdraft {
     pub height_m: f64,
     /// Mapping used: `own` or `flock`.
     pub mapping: String,
-    /// Mean over the hover with its standard error, m/s, up positive.
+    /// Mean over the hover, m/s, up positive, with its standard error: that of
+    /// [`DroneUpdraft::errors`], which holds all origins.
     pub mean: Estimate,
+    /// Interval that holds the true mean with a probability of 95 %, m/s; absent: not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_interval_mps: Option<[f64; 2]>,
+    /// Where the error of the mean comes from.
+    #[serde(default)]
+    pub errors: ErrorBudget,
     /// Systematic error of the mean from wind on the leaning drone, m/s: a bound, not a standard
     /// error, and the same in sign for drones in the same wind.
     #[serde(default)]
@@ -458,6 +489,16 @@ pub struct DroneUpdraft {
     pub tilt_deg: f64,
     /// Running 10 s estimate at each of [`UpdraftMap::time_s`], m/s; null where the log has none.
     pub updraft_mps: Vec<Option<f64>>,
+    /// Statistical error of each value (its own noise alone), m/s; empty: not known.
+    #[serde(default)]
+    pub sd_mps: Vec<Option<f64>>,
+    /// Interval that holds the true value with a probability of 95 %, all origins of error
+    /// included, m/s; empty: not known.
+    #[serde(default)]
+    pub interval_mps: Vec<Option<[f64; 2]>>,
+    /// What is doubtful, by stretches of time.
+    #[serde(default)]
+    pub quality: Vec<QualityFlag>,
     /// True value at the same times, when it is known.
     pub truth_mps: Option<Vec<f64>>,
 }

@@ -9,7 +9,8 @@
 //!   calibration/   template.toml  vehicle.toml  plan.json  show.skyc  skyb/01.skyb  show.csv.zip  logs/01.BIN
 //!                  truth/01.csv
 //!   hover/         ...
-//!   analysis.json  report/index.html
+//!   study/         study.json  report/index.html
+//!   analysis.json  report/index.html  fields/updraft.csv  fields/updraft.parquet
 //! ```
 
 pub mod lock;
@@ -286,6 +287,21 @@ pub fn flights(folder: &Path) -> Result<Vec<FlightFolder>, CampaignError> {
         return Ok(vec![flight]);
     }
     Err(CampaignError::NoPlan { path: folder.to_owned() })
+}
+
+/// The measured fields as CSV, in the folder of an analysis.
+pub fn fields_csv(folder: &Path) -> PathBuf {
+    folder.join("fields").join("updraft.csv")
+}
+
+/// The measured fields as Parquet, in the folder of an analysis.
+pub fn fields_parquet(folder: &Path) -> PathBuf {
+    folder.join("fields").join("updraft.parquet")
+}
+
+/// The results of the simulation study that a campaign may hold.
+pub fn study_result(folder: &Path) -> PathBuf {
+    folder.join("study").join("study.json")
 }
 
 /// Whether a folder is a campaign or one flight of it.

@@ -3,31 +3,29 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::found::{Found, Work, find, find_tables, stem};
+use super::fields::{read_study, write_fields};
 use super::load::{has_extension, load_shows};
 use super::progress::Progress;
-use super::simulate::{made_by, sha256};
+use super::provenance::provenance;
 use super::words;
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, OffsetRule, analyze};
-use crate::base::file::{read_whole, write_whole};
+use crate::base::file::write_whole;
 use crate::base::time::GpsTime;
 use crate::campaign::{self, to_json};
 use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
-use crate::report::{self, InputFile, Provenance, terminal_summary};
+use crate::report::{self, terminal_summary};
 use crate::vehicle::library;
 
-/// Largest log that is hashed, bytes.
-const MAX_LOG_BYTES: u64 = 4 << 30;
 /// Width of the terminal summary, columns.
 const WIDTH: usize = 100;
 
@@ -183,6 +181,34 @@ impl AnalyzeOptions {
     }
 }
 
+impl AnalyzeOptions {
+    /// How it was analysed, for the report: (what, how).
+    fn words(&self) -> Vec<(&'static str, String)> {
+        fn name(value: &impl ValueEnum) -> String {
+            let value = value.to_possible_value();
+            value.map_or_else(String::new, |value| value.get_name().to_owned())
+        }
+        let corrected = |off: bool| if off { "not corrected" } else { "corrected" }.to_owned();
+        let windows = if self.paper {
+            "medians, weighted by the samples' standard deviation (the paper's way)"
+        } else {
+            "trimmed means, weighted by their standard errors"
+        };
+        vec![
+            ("law of the map", name(&self.law)),
+            ("tilt correction", name(&self.tilt)),
+            ("rotor effort", name(&self.indicator)),
+            ("offset over time and height", name(&self.offset)),
+            ("windows", windows.to_owned()),
+            ("air density at height, in the map", corrected(self.no_density)),
+            (
+                "wind on leaning drones, in the map, where their drag is known",
+                corrected(self.no_wind),
+            ),
+        ]
+    }
+}
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct AnalyzeOutput<'a> {
@@ -290,11 +316,16 @@ fn finish(
     if let Some(folder) = output {
         let json = to_json(&analysis)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-        let provenance = provenance(work);
-        let made = report::render(&analysis, &provenance)?;
+        let provenance = provenance(work, options.words());
+        let study = read_study(context, &work.root);
+        let made = match &study {
+            Some(study) => report::render_with_study(&analysis, study, &provenance)?,
+            None => report::render(&analysis, &provenance)?,
+        };
         let report_folder = folder.join("report");
         report::write(&made, &report_folder)?;
         write_whole(&folder.join("analysis.json"), &json)?;
+        write_fields(&analysis, folder)?;
         // A page that says that nothing was found is written, but there is nothing to point at.
         page = (!nothing).then(|| report_folder.join(report::PAGE_FILE));
     }
@@ -364,31 +395,5 @@ fn name_apart(flights: &mut [Found], paths: &[PathBuf]) {
     }
     for (flight, path) in flights.iter_mut().zip(paths) {
         flight.name = stem(path);
-    }
-}
-
-fn provenance(work: &Work) -> Provenance {
-    let paths: Vec<&Path> =
-        work.flights.iter().flat_map(|flight| &flight.logs).map(|log| log.path.as_path()).collect();
-    let inputs = paths
-        .par_iter()
-        .map(|path| {
-            // A log that cannot be read is already named as missing by the analysis.
-            let sha256 = read_whole(path, MAX_LOG_BYTES)
-                .map_or_else(|error| format!("not read: {error}"), |bytes| sha256(&bytes));
-            let shown = path.strip_prefix(&work.root).unwrap_or(path);
-            InputFile { path: shown.display().to_string(), sha256 }
-        })
-        .collect();
-    let shown: Vec<_> = std::env::args()
-        .skip(1)
-        .map(|word| if word.contains(' ') { format!("'{word}'") } else { word })
-        .collect();
-    Provenance {
-        program: made_by(),
-        command: format!("updraft {}", shown.join(" ")),
-        seed: work.flights.iter().find_map(|flight| flight.seed),
-        made_at: String::new(),
-        inputs,
     }
 }

@@ -41,7 +41,7 @@ const WANTED: &[Select<'static>] = &[
     Select { message: "EKF1", fields: EKF },
     Select { message: "XKF4", fields: &["TimeUS", "C", "PI"] },
     Select { message: "RCOU", fields: MOTORS },
-    Select { message: "ATT", fields: &["TimeUS", "TimeMS", "Roll", "Pitch"] },
+    Select { message: "ATT", fields: &["TimeUS", "TimeMS", "Roll", "Pitch", "Yaw"] },
     Select { message: "GUIP", fields: &["TimeUS", "Type", "vX", "vY", "vZ"] },
     Select { message: "PSCD", fields: &["TimeUS", "DVD", "TVD"] },
     Select { message: "PSCN", fields: &["TimeUS", "DVN", "TVN"] },

@@ -49,6 +49,8 @@ pub(super) fn load(
         )
     })?;
     let attitude = |field: &str| messages.rows("ATT")?.series(field, f64::to_radians);
+    let yaw = messages.rows("ATT").and_then(|rows| rows.series("Yaw", |yaw| yaw));
+    let yaw = yaw.unwrap_or_default();
     let (Some(roll), Some(pitch)) = (attitude("Roll"), attitude("Pitch")) else {
         return Err(missing(
             "attitude",
@@ -157,6 +159,7 @@ pub(super) fn load(
         pulse_min_us: cut(pulse_min),
         roll_rad: cut(roll),
         pitch_rad: cut(pitch),
+        yaw_deg: cut(yaw),
         desired_up_mps: desired_up.map(cut).filter(|series| !series.is_empty()),
         desired_horizontal_mps: desired_horizontal.map(cut).filter(|series| !series.is_empty()),
         voltage_v: voltage_v.map(cut),

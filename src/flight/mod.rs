@@ -9,7 +9,7 @@
 //! | pulses | RCOU, channels by SERVOn_FUNCTION 33..40, else C1..C4 |
 //! | rotor speeds | ESC |
 //! | electrical power | BAT, CURR |
-//! | roll, pitch | ATT |
+//! | roll, pitch, heading | ATT |
 //! | desired vertical velocity | GUIP, PSCD, CTUN |
 //! | battery | BAT, CURR |
 //! | show time and stage | SHOW |
@@ -73,6 +73,8 @@ pub struct Flight {
     pub roll_rad: Series,
     /// Pitch, radians.
     pub pitch_rad: Series,
+    /// Heading, degrees clockwise from north; empty if the log has none. It jumps at north.
+    pub yaw_deg: Series,
     /// Desired vertical velocity, m/s, up positive, where the log has it.
     pub desired_up_mps: Option<Series>,
     /// Desired horizontal speed, m/s, where the log has it (tells horizontal legs from hovers).

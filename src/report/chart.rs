@@ -7,18 +7,31 @@ use kuva::plot::scatter::{MarkerShape, ScatterPlot};
 use kuva::plot::{BandPlot, LinePlot};
 use kuva::render::layout::{ComputedLayout, Layout};
 use kuva::render::plots::Plot;
-use kuva::render::render::{
-    PathData, Primitive, Scene, TextAnchor, render_multiple, render_twin_y,
-};
+use kuva::render::render::{PathData, Primitive, Scene, TextAnchor, render_multiple};
 use kuva::render::theme::Theme;
 
 use super::axis::Axis;
 use super::colour::{INK, RULE};
+use super::shapes::Shape;
 use super::sheet::FONT;
 use super::text::{clean, usable};
 
-/// Pixels right of a panel with a right axis.
-const RIGHT_AXIS_MARGIN: f64 = 62.0;
+/// Pixels right of a panel.
+const RIGHT_MARGIN: f64 = 16.0;
+/// Pixels right of a panel with a colour bar.
+const BAR_MARGIN: f64 = 62.0;
+/// Pixels left of, above and below every panel's frame.
+const LEFT_MARGIN: f64 = 66.0;
+const TOP_MARGIN: f64 = 30.0;
+const BOTTOM_MARGIN: f64 = 46.0;
+
+/// Where the frame of a panel of a size lies in it, [x, y, width, height], pixels; `room_right`: with
+/// [`Panel::leave_room_right`].
+pub(super) fn frame(width: f64, height: f64, room_right: bool) -> [f64; 4] {
+    let right = if room_right { BAR_MARGIN } else { RIGHT_MARGIN };
+    let size = [width - LEFT_MARGIN - right, height - TOP_MARGIN - BOTTOM_MARGIN];
+    [LEFT_MARGIN, TOP_MARGIN, size[0], size[1]]
+}
 
 /// A point with half lengths of its error bars.
 #[derive(Clone, Copy, Debug)]
@@ -42,8 +55,10 @@ pub(super) struct Panel {
     x: Axis,
     y: Axis,
     plots: Vec<Plot>,
-    right: Option<(Axis, Vec<Plot>)>,
     bars: Vec<(Vec<Mark>, String)>,
+    shapes: Vec<Shape>,
+    front_shapes: Vec<Shape>,
+    log_x: bool,
     legend: Vec<LegendEntry>,
     legend_position: LegendPosition,
     legend_box: bool,
@@ -58,12 +73,14 @@ impl Panel {
             x,
             y,
             plots: Vec::new(),
-            right: None,
             bars: Vec::new(),
+            shapes: Vec::new(),
+            front_shapes: Vec::new(),
+            log_x: false,
             legend: Vec::new(),
             legend_position: LegendPosition::InsideTopLeft,
             legend_box: true,
-            right_margin: 16.0,
+            right_margin: RIGHT_MARGIN,
         }
     }
 
@@ -83,15 +100,9 @@ impl Panel {
         self.right_margin = width;
     }
 
-    /// Leaves room on the right, as a panel with a right axis does, so that both line up.
+    /// Leaves room on the right, for a colour bar.
     pub(super) fn leave_room_right(&mut self) {
-        self.right_margin = RIGHT_AXIS_MARGIN;
-    }
-
-    /// A second axis on the right, with its own lines.
-    pub(super) fn right_axis(&mut self, axis: Axis, lines: Vec<Plot>) {
-        self.right = Some((axis, lines));
-        self.leave_room_right();
+        self.right_margin = BAR_MARGIN;
     }
 
     /// An entry of the legend.
@@ -139,6 +150,21 @@ impl Panel {
         self.bars.push((marks, colour.to_owned()));
     }
 
+    /// An area or strokes behind everything else, in the order given.
+    pub(super) fn shape(&mut self, shape: Shape) {
+        self.shapes.push(shape);
+    }
+
+    /// An area or strokes in front of everything else.
+    pub(super) fn front_shape(&mut self, shape: Shape) {
+        self.front_shapes.push(shape);
+    }
+
+    /// A logarithmic x axis.
+    pub(super) fn logarithmic_x(&mut self) {
+        self.log_x = true;
+    }
+
     /// Draws the panel.
     pub(super) fn draw(self, width: f64, height: f64) -> Scene {
         let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
@@ -150,41 +176,31 @@ impl Panel {
             .with_x_axis_max(self.x.max)
             .with_y_axis_min(self.y.min)
             .with_y_axis_max(self.y.max)
-            .with_x_tick_step(self.x.step)
             .with_y_tick_step(self.y.step)
             .with_x_tick_format(self.x.format())
             .with_y_tick_format(self.y.format())
-            .with_force_margins(66.0, self.right_margin)
-            .with_force_margins_y(30.0, 46.0)
+            .with_force_margins(LEFT_MARGIN, self.right_margin)
+            .with_force_margins_y(TOP_MARGIN, BOTTOM_MARGIN)
             .with_label_size(13)
             .with_tick_size(12)
             .with_body_size(12)
             .with_font_family(FONT)
             .with_theme(theme());
+        layout =
+            if self.log_x { layout.with_log_x() } else { layout.with_x_tick_step(self.x.step) };
         if !self.legend.is_empty() {
             layout = layout
                 .with_legend_entries(self.legend)
                 .with_legend_position(self.legend_position)
                 .with_legend_box(self.legend_box);
         }
-        let mut scene;
-        if let Some((axis, lines)) = self.right {
-            layout = layout
-                .with_y2_range(axis.min, axis.max)
-                .with_y2_axis_min(axis.min)
-                .with_y2_axis_max(axis.max)
-                .with_y2_label(axis.label.clone())
-                .with_y2_tick_format(axis.format());
-            let computed = ComputedLayout::from_layout(&layout);
-            scene = render_twin_y(self.plots, lines, layout);
-            insert_bars(&mut scene, &computed, &self.bars);
-        } else {
-            let computed = ComputedLayout::from_layout(&layout);
-            scene = render_multiple(self.plots, layout);
-            insert_bars(&mut scene, &computed, &self.bars);
-        }
+        let computed = ComputedLayout::from_layout(&layout);
+        let mut scene = render_multiple(self.plots, layout);
+        insert_behind(&mut scene, &computed, &self.shapes, &self.bars);
+        let front = self.front_shapes.iter().filter_map(|shape| shape.path(&computed));
+        scene.elements.extend(front);
         scene.elements.push(Primitive::Text {
-            x: 66.0,
+            x: LEFT_MARGIN,
             y: 17.0,
             content: self.title,
             size: 14,
@@ -197,8 +213,8 @@ impl Panel {
     }
 }
 
-/// Lines for [`Panel::right_axis`], broken where a point cannot be drawn.
-pub(super) fn lines(points: &[(f64, f64)], colour: &str, width: f64, dash: &str) -> Vec<Plot> {
+/// Lines, broken where a point cannot be drawn.
+fn lines(points: &[(f64, f64)], colour: &str, width: f64, dash: &str) -> Vec<Plot> {
     points
         .split(|&(x, y)| !(usable(x) && usable(y)))
         .filter(|run| run.len() > 1)
@@ -240,11 +256,18 @@ pub(super) fn thinned(points: &[(f64, f64)], buckets: usize) -> Vec<(f64, f64)> 
     kept
 }
 
-/// All bars of a colour in one path: three elements for each bar would make big files.
-fn insert_bars(scene: &mut Scene, computed: &ComputedLayout, bars: &[(Vec<Mark>, String)]) {
+/// Shapes, then error bars, behind the plots. All bars of a colour are one path: three elements for
+/// each bar would make big files.
+fn insert_behind(
+    scene: &mut Scene,
+    computed: &ComputedLayout,
+    shapes: &[Shape],
+    bars: &[(Vec<Mark>, String)],
+) {
     let (left, right) = (computed.map_x(computed.x_range.0), computed.map_x(computed.x_range.1));
     let (bottom, top) = (computed.map_y(computed.y_range.0), computed.map_y(computed.y_range.1));
-    let mut paths = Vec::new();
+    let mut paths: Vec<Primitive> =
+        shapes.iter().filter_map(|shape| shape.path(computed)).collect();
     for (marks, colour) in bars {
         let mut d = String::new();
         for mark in marks {

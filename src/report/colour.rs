@@ -54,6 +54,11 @@ pub(super) fn diverging(position: f64) -> String {
     hex(blend(&DIVERGING, f64::midpoint(position, 1.0)))
 }
 
+/// The same as red, green and blue.
+pub(super) fn diverging_rgb(position: f64) -> [u8; 3] {
+    blend(&DIVERGING, f64::midpoint(position, 1.0)).map(|c| c.round() as u8)
+}
+
 /// Ink that is readable on [`diverging`] at this position.
 pub(super) fn ink_on_diverging(position: f64) -> &'static str {
     let [r, g, b] = blend(&DIVERGING, f64::midpoint(position, 1.0));

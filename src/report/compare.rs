@@ -7,7 +7,7 @@ use crate::base::estimate::Estimate;
 use crate::flight::Alignment;
 use crate::mission::plan::Purpose;
 
-use super::figure_air::{deviation, mean, mean_truth};
+use super::figures::air::{deviation, mean, mean_truth};
 use super::law;
 use super::text::{
     NONE, clean, count, estimate, fixed, parameter, reduced, rejection, signed, symbol, unit,

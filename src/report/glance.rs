@@ -10,9 +10,10 @@ use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 
 use super::compare::{better_words, drones_of, flags, fleet_air, nothing};
+use super::figures::air;
+use super::law;
 use super::page::capitalised;
 use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable, value_of};
-use super::{figure_air, law};
 
 /// More flights than this are summed up at the top of the page.
 const SUMMED_FLIGHTS: usize = 3;
@@ -86,7 +87,7 @@ fn fit_error(analysis: &Analysis) -> Option<(f64, usize)> {
             })
         })
     };
-    figure_air::mean(errors()).map(|mean| (mean.sqrt(), errors().count()))
+    air::mean(errors()).map(|mean| (mean.sqrt(), errors().count()))
 }
 
 fn error_of(of: Estimate) -> String {

@@ -13,18 +13,29 @@ mod axis;
 mod chart;
 mod colour;
 mod compare;
-mod figure_air;
-mod figure_drone;
-mod figure_laws;
-mod figure_map;
-mod figure_study;
+mod drone_table;
+mod errors;
+pub mod fields;
+#[cfg(feature = "parquet")]
+pub mod fields_parquet;
+mod figures;
+mod film;
+mod frames;
 mod glance;
 mod law;
 mod notes;
+mod offset_field;
 mod page;
+mod page_air;
+mod page_flight;
+mod raster;
+mod scales;
+mod shapes;
 mod sheet;
+mod statistics_lines;
 mod study_page;
 mod study_terminal;
+mod surface;
 mod svg;
 mod table;
 mod terminal;
@@ -36,6 +47,7 @@ use thiserror::Error;
 
 use crate::analysis::result::Analysis;
 use crate::base::file::{FileError, write_whole};
+use crate::study::result::StudyResult;
 
 pub use study_page::render_study;
 pub use study_terminal::study_summary;
@@ -57,6 +69,8 @@ pub struct Provenance {
     pub seed: Option<u64>,
     /// When it was made, as text; the library has no clock. May be empty.
     pub made_at: String,
+    /// How it was analysed: (what, how).
+    pub settings: Vec<(String, String)>,
     /// The files that the analysis read.
     pub inputs: Vec<InputFile>,
 }
@@ -102,8 +116,23 @@ struct Figure {
 }
 
 /// Makes the page and the figures.
+///
+/// # Errors
+/// [`ReportError::Page`], a bug of this program.
 pub fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Report, ReportError> {
-    page::render(analysis, provenance)
+    page::render(analysis, None, provenance)
+}
+
+/// The same with the paper's Fig. 2 and Table I, from a finished simulation study.
+///
+/// # Errors
+/// [`ReportError::Page`], a bug of this program.
+pub fn render_with_study(
+    analysis: &Analysis,
+    study: &StudyResult,
+    provenance: &Provenance,
+) -> Result<Report, ReportError> {
+    page::render(analysis, Some(study), provenance)
 }
 
 /// Writes `index.html` and `figures/*.svg` to `folder`, the page last: where it is, all is.

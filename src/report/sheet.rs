@@ -6,7 +6,7 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::render::{PathData, Primitive, Scene};
 
 use super::colour::INK;
-use super::svg::escape;
+use super::svg::{Drawing, escape};
 use super::text::clean;
 
 /// Font of figures; all are found on the reader's machine or replaced there.
@@ -19,6 +19,7 @@ const KUVA_CLIP: &str = "kuva-clip-";
 /// A drawing that panels are put on.
 pub(super) struct Sheet {
     scene: Scene,
+    overlay: String,
 }
 
 impl Sheet {
@@ -27,7 +28,7 @@ impl Sheet {
         let mut scene = Scene::new(width, height);
         scene.font_family = Some(FONT.to_owned());
         scene.text_color = Some(INK.to_owned());
-        Self { scene }
+        Self { scene, overlay: String::new() }
     }
 
     /// Puts a panel at (x, y).
@@ -54,12 +55,20 @@ impl Sheet {
         })));
     }
 
+    /// Lays a drawing over the panels; its coordinates are the sheet's.
+    pub(super) fn lay_over(&mut self, drawing: Drawing) {
+        self.overlay.push_str(&drawing.into_body());
+    }
+
     /// The SVG. `name` makes ids unique in a page with several figures; `title` is read aloud.
     pub(super) fn svg(&self, name: &str, title: &str) -> String {
         let drawn = SvgBackend::new().render_scene(&self.scene);
         let body = drawn.split_once('>').map_or("", |(_, body)| body);
         let head = svg_head(self.scene.width, self.scene.height, title);
-        format!("{head}{}", tidied(&renumbered(body, name)))
+        let tidy = tidied(&renumbered(body, name));
+        // The overlay is tidy by itself, and its pictures hold digits that are no coordinates.
+        let inner = tidy.trim_end().strip_suffix("</svg>").unwrap_or(&tidy);
+        format!("{head}{inner}{}</svg>", self.overlay)
     }
 }
 

@@ -6,7 +6,7 @@ use minijinja::{Environment, UndefinedBehavior, context};
 use crate::study::paper;
 use crate::study::result::StudyResult;
 
-use super::figure_study::{self, rho};
+use super::figures::study::{self as figure_study, rho};
 use super::study_terminal::{ConditionWords, range_rows, windows};
 use super::text::{NONE, clean, count, estimate, symbol, unit};
 use super::{Provenance, Report, ReportError};
@@ -113,7 +113,8 @@ fn tiles(study: &StudyResult) -> Vec<Value> {
     tiles
 }
 
-fn law_table(study: &StudyResult) -> Vec<Value> {
+/// Table I beside the paper's values.
+pub(super) fn law_table(study: &StudyResult) -> Vec<Value> {
     study
         .paper_way
         .table

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::study::paper;
 use crate::study::result::{ConditionResult, Evaluation, StudyResult, WindowCount};
 
-use super::figure_study::rho;
+use super::figures::study::rho;
 use super::table::{Align, Column, lines};
 use super::text::{NONE, clean, count, estimate, shortened, signed, symbol, unit};
 

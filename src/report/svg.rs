@@ -73,6 +73,27 @@ impl Drawing {
         );
     }
 
+    /// A line through points.
+    pub(super) fn polyline(&mut self, points: &[(f64, f64)], stroke: &str, more: &str) {
+        let mut d = String::new();
+        for (x, y) in points {
+            let _ = write!(d, "{}{x:.1} {y:.1}", if d.is_empty() { "M" } else { "L" });
+        }
+        let _ = write!(
+            self.body,
+            "<path d=\"{d}\" fill=\"none\" stroke=\"{stroke}\"{}{more}/>",
+            if more.is_empty() { "" } else { " " },
+        );
+    }
+
+    /// A disc with an outline: centre, radius.
+    pub(super) fn disc(&mut self, [x, y]: [f64; 2], r: f64, fill: &str, stroke: &str) {
+        let _ = write!(
+            self.body,
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{r:.1}\" fill=\"{fill}\" stroke=\"{stroke}\"/>",
+        );
+    }
+
     /// A text; `turn_deg` rotates it around its position.
     pub(super) fn text(&mut self, at: [f64; 2], text: &str, style: TextStyle<'_>, turn_deg: f64) {
         let [x, y] = at;
@@ -95,6 +116,11 @@ impl Drawing {
         let _ = write!(self.body, ">{}</text>", escape(&clean(text)));
     }
 
+    /// An element of our own making.
+    pub(super) fn raw(&mut self, element: &str) {
+        self.body.push_str(element);
+    }
+
     /// Opens a group with a tooltip.
     pub(super) fn open(&mut self, tooltip: &str) {
         let _ = write!(self.body, "<g><title>{}</title>", escape(&clean(tooltip)));
@@ -103,6 +129,16 @@ impl Drawing {
     /// Closes the group.
     pub(super) fn close(&mut self) {
         self.body.push_str("</g>");
+    }
+
+    /// A drawing without a ground of its own, to be laid over another.
+    pub(super) fn overlay() -> Self {
+        Self { width: 0.0, height: 0.0, body: String::new() }
+    }
+
+    /// What was drawn, without the outer element.
+    pub(super) fn into_body(self) -> String {
+        self.body
     }
 
     /// The whole SVG; `title` is read aloud.

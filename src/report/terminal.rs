@@ -9,9 +9,10 @@ use super::compare::{
     better_words, clock, compared, comparison, drone_laws, drones_of, fleet_air, flock_lines,
     nothing, scatter_line, table_heading, windows_used,
 };
-use super::figure_air::mean_truth;
+use super::figures::air::mean_truth;
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
 use super::page::capitalised;
+use super::statistics_lines::statistics_lines;
 use super::table::{Align, Column, lines};
 use super::text::{NONE, clean, count, fixed, purpose, shortened, signed, usable};
 
@@ -129,6 +130,9 @@ impl Output {
         self.flock(flight);
         if let Some(map) = &flight.map {
             self.map(map);
+        }
+        for line in statistics_lines(flight) {
+            self.wrapped("", "  ", &line);
         }
         self.drones(flight);
         self.list("  Notes on drones", &note_lines(flight));

@@ -2,6 +2,7 @@
 
 use crate::analysis::result::{Fit, Parameter, Rejection};
 use crate::base::estimate::Estimate;
+use crate::flight::Indicator;
 use crate::mission::plan::{Kind, Purpose};
 
 /// Shown instead of a number that does not exist.
@@ -110,6 +111,16 @@ pub(super) fn unit(unit: &str) -> String {
     }
 }
 
+/// Axis label of rotor effort: `tilt-corrected pulse width uφ (µs)`.
+pub(super) fn effort_label(indicator: Indicator) -> String {
+    let name = match indicator {
+        Indicator::Pulse => "tilt-corrected pulse width",
+        Indicator::RotorSpeed => "tilt-corrected rotor speed",
+        Indicator::Power => "tilt-corrected power",
+    };
+    format!("{name} uφ ({})", unit(indicator.unit()))
+}
+
 /// The report's symbol of a parameter.
 pub(super) fn symbol(name: &str) -> String {
     match name {
@@ -160,6 +171,15 @@ pub(super) fn rejection(rejection: Rejection) -> &'static str {
 /// A parameter of a fit by its symbol.
 pub(super) fn parameter<'fit>(fit: Option<&'fit Fit>, name: &str) -> Option<&'fit Parameter> {
     fit?.parameters.iter().find(|parameter| parameter.name == name)
+}
+
+/// Foreign words as a sentence: a capital first letter and a full stop.
+pub(super) fn sentence(text: &str) -> String {
+    let text = clean(text.trim());
+    let mut letters = text.chars();
+    let Some(first) = letters.next() else { return text };
+    let body: String = first.to_uppercase().chain(letters).collect();
+    if body.ends_with(['.', '!', '?']) { body } else { format!("{body}.") }
 }
 
 /// Plural by count: `1 drone`, `3 drones`.

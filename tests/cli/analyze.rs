@@ -14,6 +14,12 @@ fn a_campaign_becomes_laws_and_a_report() {
     assert!(!analysed.out.contains('\u{1b}'), "no colours into a pipe");
     assert!(bench.path("campaign/analysis.json").is_file());
 
+    assert!(!bench.path("campaign/fields").exists(), "a calibration has no fields");
+    let page = fs::read_to_string(bench.path("campaign/report/index.html")).unwrap();
+    for input in ["plan.json", "vehicle.toml", "flight.json"] {
+        assert!(page.contains(input), "{input} is an input, with its hash");
+    }
+
     let coloured = bench.expect(0, &["analyze", "campaign", "--no-report", "--color", "always"]);
     assert!(coloured.out.contains('\u{1b}'));
     let mut plain = bench.command(&["analyze", "campaign", "--no-report"]);
@@ -25,6 +31,18 @@ fn a_campaign_becomes_laws_and_a_report() {
     let value = json.json("updraft.analyze/1");
     assert_eq!(value["analysis"]["flights"][0]["drones"].as_array().unwrap().len(), 2);
     assert!(value["report"].is_null());
+}
+
+#[test]
+fn a_study_that_cannot_be_read_is_told_and_left_out() {
+    let bench = Bench::new();
+    bench.fly();
+    fs::create_dir(bench.path("campaign/study")).unwrap();
+    let study = bench.path("campaign/study/study.json");
+    fs::write(&study, "{\"schema\": ").unwrap();
+    let broken = bench.expect(0, &["analyze", "campaign"]);
+    assert!(broken.err.contains("goes without Fig. 2 and Table I"), "{broken}");
+    assert!(broken.err.contains("study.json is not valid"), "{broken}");
 }
 
 #[test]

@@ -76,7 +76,7 @@ fn every_log_comes_home(grid: &str, count: u16, rate: &str, after: &str) {
     let more = ["0.02", "--rate", rate, "--gone", "3", "--reboot", "1,2", "--after", after];
     let _fleet = bench.fleet(&station, &[&faults[..], &more].concat());
 
-    let pull = ["logs", "pull", "home", "--connect", &link, "--wait", "10", "--patience", "10"];
+    let pull = ["logs", "pull", "home", "--connect", &link, "--wait", "10", "--patience", "20"];
     let first = bench.killed_pull(&pull);
     let second = bench.killed_pull(&pull);
     assert!(second > first, "the second goes on where the first was killed");

@@ -119,6 +119,9 @@ fn quiet_prints_the_path_of_the_result_and_what_is_wrong() {
     quiet(&["analyze", "campaign", "--no-report"], "");
     let run = ["run", "--grid", "1x2", "--duration", "60", "-o", "whole"];
     quiet(&[&run[..], SHORT].concat(), "whole/report/index.html\n");
+    for file in ["fields/updraft.csv", "analysis.json", "report/figures/fig5-hover.svg"] {
+        assert!(bench.path("whole").join(file).is_file(), "{file}");
+    }
     // What is asked for itself is printed as ever.
     for args in [&["inspect", "campaign"][..], &["effects"], &["schema", "plan"], &["man"]] {
         let (loud, hushed) = (bench.expect(0, args), [args, &["--quiet"]].concat());

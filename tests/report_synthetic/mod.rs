@@ -4,18 +4,24 @@
 
 #![allow(dead_code, clippy::allow_attributes, reason = "each test binary uses a part")]
 
+mod whole;
+
 use std::f64::consts::TAU;
 
 use rand::Rng as _;
 use updraft::analysis::result::{
-    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, Fit, FlightAnalysis, Laws, Missing,
-    Parameter, Rejection, SampleStats, TableRow, Trace, Unmeasured, UpdraftMap, WindowStats,
+    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, Fit, FlightAnalysis, Laws,
+    Missing, Parameter, Rejection, SampleStats, TableRow, Trace, Unmeasured, UpdraftMap,
+    WindowStats,
 };
 use updraft::base::estimate::Estimate;
 use updraft::base::rng::{self, Purpose as Stream};
 use updraft::flight::{Alignment, Clock};
 use updraft::mission::plan::{Kind, Purpose};
 use updraft::report::{InputFile, Provenance};
+
+#[allow(unused_imports, reason = "each test binary uses a part")]
+pub(crate) use whole::whole_campaign;
 
 /// The paper's simulated law.
 const A: f64 = 8.14;
@@ -85,6 +91,7 @@ pub(crate) fn provenance() -> Provenance {
         command: "updraft run --grid 7x7 --spacing 7 --seed 2024 -o my-campaign".to_owned(),
         seed: Some(2024),
         made_at: "2026-11-20 12:00 UTC".to_owned(),
+        settings: vec![("law of the map".to_owned(), "auto".to_owned())],
         inputs: (1..=3)
             .map(|i| InputFile {
                 path: format!("calibration/logs/{i:02}.BIN"),
@@ -126,6 +133,7 @@ pub(crate) fn calibration(
         indicator: updraft::flight::Indicator::Pulse,
         purpose: Purpose::Calibration,
         planned: true,
+        orientation_deg: Some(30.0),
         warnings: Vec::new(),
         unused: Vec::new(),
         partly_used: Vec::new(),
@@ -144,6 +152,7 @@ pub(crate) fn calibration(
         table: if drones > 1 { table } else { Vec::new() },
         map: None,
         unmeasured: Vec::new(),
+        statistics: None,
         paper_table: Some("I".to_owned()),
     }
 }
@@ -387,9 +396,14 @@ pub(crate) fn hover() -> FlightAnalysis {
             height_m: 100.0,
             mapping: if [41].contains(&slot) { "flock" } else { "own" }.to_owned(),
             mean: Estimate::new(mean, 0.028),
+            mean_interval_mps: None,
+            errors: ErrorBudget::default(),
             systematic_mps: 0.11,
             tilt_deg: 1.2,
             updraft_mps: updraft,
+            sd_mps: Vec::new(),
+            interval_mps: Vec::new(),
+            quality: Vec::new(),
             truth_mps: Some(truth),
         }));
         drones.push(DroneAnalysis {
@@ -415,6 +429,7 @@ pub(crate) fn hover() -> FlightAnalysis {
         indicator: updraft::flight::Indicator::Pulse,
         purpose: Purpose::Measurement,
         planned: true,
+        orientation_deg: Some(30.0),
         warnings: Vec::new(),
         unused: Vec::new(),
         partly_used: Vec::new(),
@@ -436,6 +451,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             name: "Drone 44".to_owned(),
             reason: "the hover from 95 to 685 s was rejected: a motor touched its limit".to_owned(),
         }],
+        statistics: None,
         paper_table: None,
         map: Some(UpdraftMap {
             law: "signed quadratic".to_owned(),
@@ -444,6 +460,10 @@ pub(crate) fn hover() -> FlightAnalysis {
             flock: None,
             time_s,
             drones: estimates,
+            battery: None,
+            calibration_air: None,
+            common: None,
+            truth: None,
         }),
     }
 }

@@ -8,6 +8,8 @@ use crate::protocol::ftp::{Op, Packet, Refusal};
 /// Longest pause between repetitions.
 const MOST_PAUSE: Micros = 3 * S;
 
+/// Longest pause at least: where many share a link, its queue alone can hold an answer that long.
+const LEAST_PAUSE: Micros = 2_500 * MS;
 /// A request is repeated so often within its patience, at least, unless the link itself is slower.
 const TRIES: Micros = 12;
 
@@ -83,7 +85,7 @@ impl Exchange {
         }
         let timeout = caller.timeout();
         let pause = timeout.saturating_mul(1 << self.tries.min(6)) / 2;
-        let most = MOST_PAUSE.min(self.patience / TRIES).max(timeout);
+        let most = MOST_PAUSE.min(self.patience / TRIES).max(LEAST_PAUSE).max(timeout);
         let pause = pause.max(timeout).min(most) + self.work;
         if self.tries > 0 && now < self.sent + pause {
             return Wish::Wait((self.sent + pause).min(first + self.patience));

@@ -48,21 +48,11 @@ impl<S: Sink> Get<S> {
         match (self.bursts.front(), self.bursts.len()) {
             (None, _) => self.reads.is_empty(),
             // One more while one comes, once its length is known: it is served right after it.
-            (Some(burst), 1) => self.burst_packets.is_some_and(|packets| {
-                burst.heard.is_some_and(|heard| self.is_late(burst, heard, packets))
-            }),
+            (Some(Burst { heard: Some((_, number)), .. }), 1) => {
+                self.burst_packets.is_some_and(|packets| number + 1 > packets / 2)
+            }
             _ => false,
         }
-    }
-
-    /// Whether a burst that has come this far is over before an answer could be here.
-    fn is_late(&self, burst: &Burst, (at, number): (Micros, u64), packets: u64) -> bool {
-        let came = number + 1;
-        // The mean of a few packets says little: they come in heaps.
-        let is_steady = came > packets / 8;
-        let each = at.saturating_sub(burst.since) as f64 / came as f64;
-        let left = packets.saturating_sub(came) as f64 * each;
-        came > packets / 2 || (is_steady && left < self.caller.timeout() as f64)
     }
 
     pub(super) fn send_burst(&mut self, now: Micros, offset: u64) -> MavMessage {

@@ -8,14 +8,16 @@ use crate::base::estimate::Estimate;
 use crate::study::Condition;
 use crate::study::result::{ConditionResult, StudyFlight, StudyResult};
 
-use super::Figure;
-use super::axis::{Axis, nice_step};
-use super::chart::{Mark, Panel};
-use super::colour::{BLUE, FAINT, GREEN, INK, MUTED, VERMILLION, sequential};
-use super::figure_laws::{PULSE_LABEL, VELOCITY_LABEL};
-use super::sheet::Sheet;
-use super::text::{count, fixed, signed, usable};
+use super::laws::{PULSE_LABEL, VELOCITY_LABEL};
+use crate::report::Figure;
+use crate::report::axis::{Axis, nice_step};
+use crate::report::chart::{Mark, Panel};
+use crate::report::colour::{BLUE, FAINT, GREEN, INK, MUTED, VERMILLION, sequential};
+use crate::report::sheet::Sheet;
+use crate::report::text::{count, fixed, signed, usable};
 
+/// Name of the paper's Fig. 2.
+pub(in crate::report) const FIG2: &str = "fig2-study";
 /// Samples of a drawn curve.
 const CURVE_POINTS: u32 = 61;
 /// Panels in a row of the figure of winds.
@@ -32,7 +34,7 @@ struct Coloured<'a> {
 }
 
 /// All figures that the study has data for.
-pub(super) fn figures(study: &StudyResult) -> Vec<Figure> {
+pub(in crate::report) fn figures(study: &StudyResult) -> Vec<Figure> {
     [still(study), winds(study), errors(study)].into_iter().flatten().collect()
 }
 
@@ -136,7 +138,7 @@ fn still(study: &StudyResult) -> Option<Figure> {
     sheet.place(panel.draw(1040.0, 720.0), 0.0, 0.0);
     sheet.cover([70.0, 33.0, 350.0, 242.0]);
     sheet.place(inset(&coloured).draw(350.0, 250.0), 68.0, 24.0);
-    let name = "fig2-study".to_owned();
+    let name = FIG2.to_owned();
     let title = "Pulse width against vertical velocity in still air, by updraft".to_owned();
     let rho = study
         .paper_way
@@ -295,7 +297,7 @@ fn errors(study: &StudyResult) -> Option<Figure> {
 }
 
 /// Rho with as many digits as its distance from 1 asks for.
-pub(super) fn rho(rho: f64) -> String {
+pub(in crate::report) fn rho(rho: f64) -> String {
     let gap = 1.0 - rho.abs();
     if gap <= 0.0 || !gap.is_finite() {
         return fixed(rho, 6);

@@ -5,12 +5,12 @@ use kuva::plot::scatter::MarkerShape;
 
 use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
 
-use super::Figure;
-use super::axis::Axis;
-use super::chart::{Mark, Panel};
-use super::colour::{BLUE, VERMILLION};
-use super::sheet::Sheet;
-use super::text::{clean, usable};
+use crate::report::Figure;
+use crate::report::axis::Axis;
+use crate::report::chart::{Mark, Panel};
+use crate::report::colour::{BLUE, VERMILLION};
+use crate::report::sheet::Sheet;
+use crate::report::text::{clean, usable};
 
 /// Mean and standard deviation between drones at one time, and the mean truth.
 struct Instant {
@@ -21,14 +21,14 @@ struct Instant {
 }
 
 /// Mean truth of a drone over the times that it was estimated at.
-pub(super) fn mean_truth(drone: &DroneUpdraft) -> Option<f64> {
+pub(in crate::report) fn mean_truth(drone: &DroneUpdraft) -> Option<f64> {
     let truth = drone.truth_mps.as_ref()?;
     let pairs = drone.updraft_mps.iter().zip(truth);
     mean(pairs.filter(|(estimate, _)| estimate.is_some()).map(|(_, &truth)| truth))
 }
 
 /// Mean of the usable values.
-pub(super) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+pub(in crate::report) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, n) = values
         .filter(|&value| usable(value))
         .fold((0.0, 0_usize), |(sum, n), value| (sum + value, n + 1));
@@ -36,7 +36,7 @@ pub(super) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// Standard deviation (n - 1) of the usable values; `None` below two.
-pub(super) fn deviation(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+pub(in crate::report) fn deviation(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     let middle = mean(values.clone())?;
     let (sum, n) = values
         .filter(|&value| usable(value))
@@ -68,7 +68,11 @@ fn instants(map: &UpdraftMap) -> Vec<Instant> {
 }
 
 /// Fleet mean over time, beside estimate against truth; `None` if nothing was estimated.
-pub(super) fn figure(flight: &FlightAnalysis, key: &str, map: &UpdraftMap) -> Option<Figure> {
+pub(in crate::report) fn figure(
+    flight: &FlightAnalysis,
+    key: &str,
+    map: &UpdraftMap,
+) -> Option<Figure> {
     let instants = instants(map);
     if instants.len() < 2 {
         return None;

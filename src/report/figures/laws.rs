@@ -6,24 +6,24 @@ use kuva::plot::scatter::MarkerShape;
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::base::estimate::Estimate;
 
-use super::Figure;
-use super::axis::Axis;
-use super::chart::{Mark, Panel};
-use super::colour::{BLUE, INK, MUTED, VERMILLION, sequential};
-use super::law;
-use super::sheet::Sheet;
-use super::text::{clean, count, parameter, shortened, signed, usable};
+use crate::report::Figure;
+use crate::report::axis::Axis;
+use crate::report::chart::{Mark, Panel};
+use crate::report::colour::{BLUE, INK, MUTED, VERMILLION, sequential};
+use crate::report::law;
+use crate::report::sheet::Sheet;
+use crate::report::text::{clean, count, effort_label, parameter, shortened, signed, usable};
 
 /// Label of the pulse-width axis.
-pub(super) const PULSE_LABEL: &str = "tilt-corrected pulse width u cos φ (µs)";
+pub(in crate::report) const PULSE_LABEL: &str = "tilt-corrected pulse width uφ (µs)";
 /// Label of the velocity axis.
-pub(super) const VELOCITY_LABEL: &str = "vertical velocity (m/s, up positive)";
+pub(in crate::report) const VELOCITY_LABEL: &str = "vertical velocity (m/s, up positive)";
 
 /// Longest legend; more flights are drawn without an entry.
 const LEGEND_LIMIT: usize = 12;
 
 /// The figure over all flights that have moving windows; `None` without any.
-pub(super) fn figure(analysis: &Analysis) -> Option<Figure> {
+pub(in crate::report) fn figure(analysis: &Analysis) -> Option<Figure> {
     let flights: Vec<&FlightAnalysis> = analysis
         .flights
         .iter()
@@ -37,7 +37,8 @@ pub(super) fn figure(analysis: &Analysis) -> Option<Figure> {
         return None;
     }
     let v = Axis::around(VELOCITY_LABEL, windows().map(|window| law::mark(window).x), 1.0);
-    let u = Axis::around(PULSE_LABEL, windows().map(|window| law::mark(window).y), 10.0);
+    let effort = flights.first().map_or_else(String::new, |flight| effort_label(flight.indicator));
+    let u = Axis::around(&effort, windows().map(|window| law::mark(window).y), 10.0);
     let mut panel = Panel::new("(a) Windows and fitted laws", v.clone(), u);
 
     let colours = flight_colours(&flights);

@@ -1,0 +1,383 @@
+//! The Gaussian field of maximum likelihood.
+//!
+//! `sd² exp(-r / lambda) exp(-|dt| / tau)` plus independent noise, seen through a running mean, with
+//! an unknown mean of every drone (and, if asked for, an unknown slope, and an unknown common value
+//! at every time). The values that are a running mean apart are means of neighbouring blocks. Rotated
+//! to the eigenvectors of the covariance in space, each mode is one autoregressive process of first
+//! order, averaged over blocks, plus white noise: a Kalman filter with one state gives its
+//! likelihood. Means and slopes are integrated out (restricted likelihood), else the time scale would
+//! come out short. The variance is found in closed form, time scale and noise by search, and the
+//! length on a fixed grid of logarithms with interpolation, so that eigenvectors are computed once.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::field::Field;
+use super::search::minimum;
+use super::simulate::covariance;
+
+/// Step of the grid of ln(lambda).
+const STEP: f64 = 0.25;
+/// Lengths from this share of the spacing ...
+const SHORTEST: f64 = 0.25;
+/// ... to this multiple of the extent are tried.
+const LONGEST: f64 = 60.0;
+/// Range of the noise's variance over that of the air, logarithms.
+const LN_NOISE: (f64, f64) = (-18.0, 4.0);
+/// A search by steps that has not ended by then will not.
+const MOST_STEPS: usize = 200;
+
+/// What is taken for unknown besides each drone's mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Unknown {
+    /// A slope over time of each drone.
+    pub(super) slope: bool,
+    /// A common value of all drones at each time.
+    pub(super) common: bool,
+}
+
+/// Which (drone, second) the likelihood is of: all combinations of some drones and some seconds.
+#[derive(Clone, Debug)]
+pub(super) struct Blocks {
+    /// Drones.
+    pub(super) drones: Vec<usize>,
+    /// Seconds, one for each block.
+    seconds: Vec<usize>,
+    /// Blocks from the one before to this one.
+    steps: Vec<usize>,
+    /// Seconds in a block.
+    running: usize,
+}
+
+impl Blocks {
+    /// Blocks without gaps: drones or blocks are dropped, whichever loses less.
+    pub(super) fn of(field: &Field) -> Option<Self> {
+        let first = ((field.seconds - 1) % field.running) / 2;
+        let mut seconds: Vec<usize> = (first..field.seconds).step_by(field.running).collect();
+        let mut drones: Vec<usize> = (0..field.drones()).collect();
+        loop {
+            let known = |drone: usize, second: usize| {
+                let value = field.rows.get(drone).and_then(|row| row.get(second));
+                value.is_some_and(|value| value.is_finite())
+            };
+            let gaps_of_drone =
+                |drone: &usize| seconds.iter().filter(|second| !known(*drone, **second)).count();
+            let gaps_of_second =
+                |second: &usize| drones.iter().filter(|drone| !known(**drone, *second)).count();
+            let worst_drone = drones.iter().copied().max_by_key(gaps_of_drone)?;
+            let worst_second = seconds.iter().copied().max_by_key(gaps_of_second)?;
+            let (of_drone, of_second) =
+                (gaps_of_drone(&worst_drone), gaps_of_second(&worst_second));
+            if of_drone == 0 {
+                break;
+            }
+            if of_drone * drones.len() > of_second * seconds.len() {
+                drones.retain(|drone| *drone != worst_drone);
+            } else {
+                seconds.retain(|second| *second != worst_second);
+            }
+        }
+        let before = std::iter::once(None).chain(seconds.iter().copied().map(Some));
+        let steps = seconds
+            .iter()
+            .zip(before)
+            .map(|(second, before)| before.map_or(1, |before| (second - before) / field.running))
+            .collect();
+        let enough = drones.len() >= super::field::FEWEST_DRONES && seconds.len() >= 6;
+        enough.then_some(Self { drones, seconds, steps, running: field.running })
+    }
+
+    /// Blocks of each drone.
+    pub(super) fn count(&self) -> usize {
+        self.seconds.len()
+    }
+
+    /// The values, one row for each drone, from columns of seconds.
+    pub(super) fn take(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let at = |list: &[usize], index: usize| list.get(index).copied().unwrap_or(0);
+        DMatrix::from_fn(self.drones.len(), self.seconds.len(), |drone, block| {
+            let place = (at(&self.seconds, block), at(&self.drones, drone));
+            columns.get(place).copied().unwrap_or(0.0)
+        })
+    }
+}
+
+/// Covariance in space at one length, as modes.
+struct Modes {
+    ln_length: f64,
+    variance: Vec<f64>,
+    /// Rows: modes.
+    vectors: DMatrix<f64>,
+}
+
+/// The likelihood of fields at fixed places and times.
+pub(super) struct Likelihood {
+    blocks: Blocks,
+    unknown: Unknown,
+    grid: Vec<Modes>,
+    length_s: f64,
+}
+
+/// A fitted field.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fitted {
+    pub(super) sd_mps: f64,
+    pub(super) lambda_m: f64,
+    pub(super) tau_s: f64,
+    pub(super) noise_mps: f64,
+    pub(super) log_likelihood: f64,
+    /// The length ran to the end of its range.
+    pub(super) length_at_end: bool,
+    /// The time ran to the end of its range.
+    pub(super) time_at_end: bool,
+}
+
+/// The best of one length: ln(tau), ln(noise ratio), and what follows from them.
+#[derive(Clone, Copy, Debug)]
+struct Best {
+    at: [f64; 2],
+    log_likelihood: f64,
+    variance: f64,
+}
+
+impl Likelihood {
+    pub(super) fn new(field: &Field, blocks: &Blocks, unknown: Unknown) -> Self {
+        let places: Vec<[f64; 2]> =
+            blocks.drones.iter().filter_map(|drone| field.places.get(*drone).copied()).collect();
+        let low = (SHORTEST * field.spacing_m()).ln();
+        let high = (LONGEST * field.extent_m()).ln();
+        let count = ((high - low) / STEP).ceil() as usize + 1;
+        let contrasts = unknown.common.then(|| contrasts(places.len()));
+        let grid = (0..count)
+            .into_par_iter()
+            .map(|index| {
+                let ln_length = low + STEP * index as f64;
+                let mut kernel = covariance(&places, [ln_length.exp(); 2]);
+                if let Some(contrasts) = &contrasts {
+                    kernel = contrasts * kernel * contrasts.transpose();
+                }
+                let modes = kernel.symmetric_eigen();
+                let mut vectors = modes.eigenvectors.transpose();
+                if let Some(contrasts) = &contrasts {
+                    vectors *= contrasts;
+                }
+                let variance = modes.eigenvalues.iter().map(|value| value.max(1e-12)).collect();
+                Modes { ln_length, variance, vectors }
+            })
+            .collect();
+        Self { blocks: blocks.clone(), unknown, grid, length_s: field.seconds as f64 }
+    }
+
+    /// The field of maximum likelihood for values of one row per drone, searched from a guess of
+    /// length (m) and time (s).
+    pub(super) fn fit(&self, values: &DMatrix<f64>, guess: (f64, f64)) -> Option<Fitted> {
+        let last = self.grid.len().checked_sub(1)?;
+        let first_guess = self.grid.first()?.ln_length;
+        let mut index = (((guess.0.ln() - first_guess) / STEP).round().max(0.0) as usize).min(last);
+        let mut found: Vec<Option<Best>> = vec![None; self.grid.len()];
+        let mut start = [guess.1.ln(), -4.0];
+        let mut best = |index: usize, start: [f64; 2]| -> Option<Best> {
+            let slot = found.get_mut(index)?;
+            if slot.is_none() {
+                *slot = self.best(values, self.grid.get(index)?, start);
+            }
+            *slot
+        };
+        for _ in 0..MOST_STEPS {
+            let here = best(index, start)?;
+            start = here.at;
+            let below = index.checked_sub(1).and_then(|index| best(index, start));
+            let above = if index < last { best(index + 1, start) } else { None };
+            let level = |one: Option<Best>| one.map_or(f64::NEG_INFINITY, |one| one.log_likelihood);
+            if level(below) > here.log_likelihood && level(below) >= level(above) {
+                index -= 1;
+            } else if level(above) > here.log_likelihood {
+                index += 1;
+            } else {
+                return Some(self.between(index, below, here, above));
+            }
+        }
+        None
+    }
+
+    /// The parabola through three neighbouring lengths at its top.
+    fn between(
+        &self,
+        index: usize,
+        below: Option<Best>,
+        here: Best,
+        above: Option<Best>,
+    ) -> Fitted {
+        let ln_length = self.grid.get(index).map_or(0.0, |modes| modes.ln_length);
+        let (shift, ends) = match (below, above) {
+            (Some(below), Some(above)) => {
+                let (low, mid, high) =
+                    (below.log_likelihood, here.log_likelihood, above.log_likelihood);
+                let curvature = low - 2.0 * mid + high;
+                let shift = if curvature < 0.0 { 0.5 * (low - high) / curvature } else { 0.0 };
+                (shift.clamp(-0.5, 0.5), Some((below, above)))
+            }
+            _ => (0.0, None),
+        };
+        let blend = |of: &dyn Fn(&Best) -> f64| {
+            let middle = of(&here);
+            ends.map_or(middle, |(below, above)| {
+                let (low, high) = (of(&below), of(&above));
+                middle
+                    + 0.5 * (high - low) * shift
+                    + 0.5 * (low - 2.0 * middle + high) * shift * shift
+            })
+        };
+        let tau_s = blend(&|best| best.at[0]).exp();
+        let variance = blend(&|best| best.variance.ln()).exp();
+        let noise = blend(&|best| best.at[1]).min(LN_NOISE.1).exp();
+        let (shortest, longest) = self.time_range();
+        Fitted {
+            sd_mps: variance.sqrt(),
+            lambda_m: (ln_length + STEP * shift).exp(),
+            tau_s,
+            noise_mps: (variance * noise).sqrt(),
+            log_likelihood: blend(&|best| best.log_likelihood),
+            length_at_end: ends.is_none(),
+            time_at_end: tau_s < 1.05 * shortest.exp() || tau_s > 0.95 * longest.exp(),
+        }
+    }
+
+    /// Range of ln(tau): from a tenth of a block (or a second) to 30 records.
+    fn time_range(&self) -> (f64, f64) {
+        ((0.1 * self.blocks.running as f64).max(0.5).ln(), (30.0 * self.length_s).ln())
+    }
+
+    fn best(&self, values: &DMatrix<f64>, modes: &Modes, start: [f64; 2]) -> Option<Best> {
+        let rotated = &modes.vectors * values;
+        let (shortest, longest) = self.time_range();
+        let inside =
+            |at: [f64; 2]| [at[0].clamp(shortest, longest), at[1].clamp(LN_NOISE.0, LN_NOISE.1)];
+        let loss = |at: [f64; 2]| {
+            let near = inside(at);
+            let outside = (at[0] - near[0]).powi(2) + (at[1] - near[1]).powi(2);
+            -self.profile(modes, &rotated, near).0 + 10.0 * outside
+        };
+        let at = inside(minimum(loss, inside(start)));
+        let (log_likelihood, variance) = self.profile(modes, &rotated, at);
+        let usable = log_likelihood.is_finite() && variance > 0.0;
+        usable.then_some(Best { at, log_likelihood, variance })
+    }
+
+    /// Restricted log-likelihood at the best variance, and that variance.
+    fn profile(&self, modes: &Modes, rotated: &DMatrix<f64>, at: [f64; 2]) -> (f64, f64) {
+        let noise = at[1].exp();
+        let filter = BlockFilter::new(at[0].exp(), self.blocks.running);
+        let count = modes.variance.len();
+        let blank = || vec![0.0; count];
+        let mut p: Vec<f64> = modes.variance.clone();
+        let (mut m, mut one, mut time) = (blank(), blank(), blank());
+        let (mut squares, mut determinant) = (blank(), vec![1.0; count]);
+        // Sums over time of products of innovations: of 1, of time, and of the data with each.
+        let (mut s11, mut s1y) = (blank(), blank());
+        let (mut s1t, mut stt, mut sty) = (blank(), blank(), blank());
+        let blocks = self.blocks.count();
+        let (mut ln_determinant, mut elapsed) = (0.0, 0.0);
+        let half = self.blocks.steps.iter().sum::<usize>() as f64 / 2.0;
+        for (block, (step, column)) in
+            self.blocks.steps.iter().zip(rotated.column_iter()).enumerate()
+        {
+            if *step > 1 {
+                let keep = filter.keep.powi(*step as i32 - 1);
+                for ((p, m), (one, (time, s))) in p
+                    .iter_mut()
+                    .zip(&mut m)
+                    .zip(one.iter_mut().zip(time.iter_mut().zip(&modes.variance)))
+                {
+                    *p = keep * keep * *p + (1.0 - keep * keep) * s;
+                    *m *= keep;
+                    *one *= keep;
+                    *time *= keep;
+                }
+            }
+            elapsed += *step as f64;
+            let clock = (elapsed - half) / half;
+            let data = column.as_slice();
+            let slope = self.unknown.slope;
+            for i in 0..count {
+                let (s, prior, y) = (modes.variance[i], p[i], data[i]);
+                let f = filter.a * filter.a * prior + filter.r * s + noise;
+                let weight = 1.0 / f;
+                let gain = (filter.keep * filter.a * prior + filter.qr * s) * weight;
+                p[i] = filter.keep * filter.keep * prior + filter.q * s - gain * gain * f;
+                let v = y - filter.a * m[i];
+                m[i] = filter.keep * m[i] + gain * v;
+                let v1 = 1.0 - filter.a * one[i];
+                one[i] = filter.keep * one[i] + gain * v1;
+                squares[i] += v * v * weight;
+                s11[i] += v1 * v1 * weight;
+                s1y[i] += v1 * v * weight;
+                determinant[i] *= f;
+                if slope {
+                    let vt = clock - filter.a * time[i];
+                    time[i] = filter.keep * time[i] + gain * vt;
+                    s1t[i] += v1 * vt * weight;
+                    stt[i] += vt * vt * weight;
+                    sty[i] += vt * v * weight;
+                }
+            }
+            if block % 16 == 15 || block + 1 == blocks {
+                for determinant in &mut determinant {
+                    ln_determinant += determinant.ln();
+                    *determinant = 1.0;
+                }
+            }
+        }
+        let mut sum = 0.0;
+        for i in 0..count {
+            sum += squares[i] - s1y[i] * s1y[i] / s11[i];
+            ln_determinant += s11[i].ln();
+            if self.unknown.slope {
+                let rest = stt[i] - s1t[i] * s1t[i] / s11[i];
+                let with = sty[i] - s1t[i] * s1y[i] / s11[i];
+                sum -= with * with / rest;
+                ln_determinant += rest.ln();
+            }
+        }
+        let free = count * (blocks - 1 - usize::from(self.unknown.slope));
+        let variance = sum / free as f64;
+        (-0.5 * (free as f64 * (variance.ln() + 1.0) + ln_determinant), variance)
+    }
+}
+
+/// A process of first order averaged over blocks. With x the process at the end of the block before:
+/// the next end is `keep x` plus noise of variance `q`, the block's mean `a x` plus noise of variance
+/// `r`, and the two noises have the covariance `qr` (all times the variance of the process).
+struct BlockFilter {
+    keep: f64,
+    a: f64,
+    q: f64,
+    r: f64,
+    qr: f64,
+}
+
+impl BlockFilter {
+    fn new(tau_s: f64, running: usize) -> Self {
+        let one = (-1.0 / tau_s).exp();
+        let n = running as f64;
+        let keep = one.powi(running as i32);
+        let sum: f64 = (0..running).map(|lag| one.powi(lag as i32)).sum();
+        let mean_variance = (n + 2.0
+            * (1..running).map(|lag| (n - lag as f64) * one.powi(lag as i32)).sum::<f64>())
+            / (n * n);
+        let a = one * sum / n;
+        Self { keep, a, q: 1.0 - keep * keep, r: mean_variance - a * a, qr: sum / n - keep * a }
+    }
+}
+
+/// Orthonormal rows that are orthogonal to a common value (Helmert's).
+fn contrasts(count: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(count.saturating_sub(1), count, |row, column| {
+        let n = (row + 1) as f64;
+        match column {
+            _ if column <= row => 1.0 / (n * (n + 1.0)).sqrt(),
+            _ if column == row + 1 => -(n / (n + 1.0)).sqrt(),
+            _ => 0.0,
+        }
+    })
+}

@@ -1,0 +1,139 @@
+//! The statistics of a flight's map: what its logs showed, as the input of the pure functions.
+
+use super::averaging::{Seconds, averaging};
+use super::field::FieldInput;
+use super::make::{StatisticsOptions, field_statistics};
+use super::result::FieldStatistics;
+use super::tilt_wind::{MeanLean, tilt_wind};
+use crate::analysis::result::{Laws, UpdraftMap};
+use crate::analysis::updraft::{self, RUNNING_S};
+use crate::analysis::windows::{Corrected, Target};
+use crate::flight::{Flight, Series};
+
+/// Fewest samples in a second.
+const FEWEST_PER_SECOND: usize = 3;
+/// No hover is longer, whatever times a damaged log claims, s.
+const LONGEST_S: usize = 200_000;
+
+/// What a log showed of its hover, besides the running means of the map.
+#[derive(Clone, Debug, Default)]
+pub(in crate::analysis) struct HoverSeen {
+    /// Means over each second of the tilt-corrected pulse, us, and of the vertical velocity, m/s.
+    seconds: Vec<Option<(f64, f64)>>,
+    /// Tangents of the mean lean forward and to the right.
+    forward_right: [f64; 2],
+    /// Mean heading, degrees clockwise from north.
+    heading_deg: Option<f64>,
+}
+
+impl HoverSeen {
+    /// Of the longest hover.
+    pub(in crate::analysis) fn of(
+        flight: &Flight,
+        corrected: &Corrected,
+        targets: &[Target],
+    ) -> Self {
+        let Some(hover) = updraft::hover(targets) else { return Self::default() };
+        let length = (hover.end_s - hover.start_s).floor().max(0.0) as usize;
+        let seconds = (0..length.min(LONGEST_S))
+            .map(|second| {
+                let from = hover.start_s + second as f64;
+                let mean = |series: &Series| {
+                    let values = series.between(from, from + 1.0);
+                    (values.len() >= FEWEST_PER_SECOND)
+                        .then(|| values.iter().sum::<f64>() / values.len() as f64)
+                };
+                mean(&corrected.pulse_phi_us).zip(mean(&flight.velocity_up_mps))
+            })
+            .collect();
+        Self {
+            seconds,
+            forward_right: forward_right(flight, hover),
+            heading_deg: heading_deg(flight, hover),
+        }
+    }
+}
+
+/// Tangents of the mean attitude: forward with the nose down, right with the right side down.
+fn forward_right(flight: &Flight, hover: &Target) -> [f64; 2] {
+    let mean = |series: &Series| {
+        let values = series.between(hover.start_s, hover.end_s);
+        if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+    };
+    let (roll, pitch) = (mean(&flight.roll_rad), mean(&flight.pitch_rad));
+    [-pitch.tan(), roll.tan() / pitch.cos()]
+}
+
+/// Mean heading, which jumps at north; `None` without headings.
+fn heading_deg(flight: &Flight, hover: &Target) -> Option<f64> {
+    let headings = flight.yaw_deg.between(hover.start_s, hover.end_s);
+    let (mut north, mut east) = (0.0, 0.0);
+    for heading in headings {
+        let (sin, cos) = heading.to_radians().sin_cos();
+        north += cos;
+        east += sin;
+    }
+    let known = !headings.is_empty() && f64::hypot(north, east) > 0.0;
+    known.then(|| f64::atan2(east, north).to_degrees().rem_euclid(360.0))
+}
+
+/// Statistics of a map and of what its logs showed, in the order of the map's drones.
+pub(in crate::analysis) fn of_map(
+    map: &UpdraftMap,
+    seen: &[HoverSeen],
+    options: &StatisticsOptions,
+) -> FieldStatistics {
+    let input = FieldInput {
+        places_m: map.drones.iter().map(|one| one.position_m.unwrap_or([f64::NAN; 2])).collect(),
+        values_mps: map.drones.iter().map(|one| one.updraft_mps.clone()).collect(),
+        running_s: RUNNING_S as usize,
+    };
+    let mut statistics = field_statistics(&input, options);
+    let drones = || map.drones.iter().zip(seen);
+    match map.flock.as_ref().and_then(slope_us_per_mps) {
+        Some(slope) => {
+            let fleet: Vec<Seconds> = drones()
+                .map(|(drone, seen)| Seconds {
+                    slot: drone.slot,
+                    name: drone.name.clone(),
+                    values_mps: seen
+                        .seconds
+                        .iter()
+                        .map(|second| second.map(|(pulse_us, up_mps)| up_mps - pulse_us / slope))
+                        .collect(),
+                })
+                .collect();
+            match averaging(&fleet) {
+                Ok(found) => statistics.averaging = Some(found),
+                Err(reason) => statistics.absent.push(reason),
+            }
+        }
+        None => statistics.absent.push(
+            "no averaging times: there is no law of the flock to turn pulses into speeds"
+                .to_owned(),
+        ),
+    }
+    let leans: Vec<MeanLean> = drones()
+        .map(|(drone, seen)| MeanLean {
+            slot: drone.slot,
+            name: drone.name.clone(),
+            lean_deg: drone.tilt_deg,
+            forward_right: seen.forward_right,
+            heading_deg: seen.heading_deg,
+        })
+        .collect();
+    statistics.wind = tilt_wind(&leans, map.leaning.map(|leaning| leaning.drag_speed_mps));
+    statistics
+}
+
+/// Pulse per speed of the flock: of its line, else of its signed square up to 1 m/s, as the slope of
+/// the square itself is 0 in still air.
+fn slope_us_per_mps(laws: &Laws) -> Option<f64> {
+    let first = |fit: &crate::analysis::result::Fit| Some(fit.parameters.first()?.estimate.value);
+    let slope = laws
+        .linear
+        .as_ref()
+        .and_then(first)
+        .or_else(|| laws.signed_quadratic.as_ref().and_then(first))?;
+    (slope.is_finite() && slope > 0.0).then_some(slope)
+}

@@ -1,0 +1,415 @@
+//! What the statistics of a hover say: scales of the air in space and time with their errors, the
+//! horizontal wind, and how long an average must be.
+//!
+//! Lengths are m, times s, speeds m/s (up positive). The unit of a [`Scale`] is that of the field's
+//! name. Wherever a number has `fit_se`, that is the standard error of the curve fit alone, as the
+//! paper gives it: it takes the points for independent, which they are not, and is too small by an
+//! order of magnitude or more. `interval_95` is the honest one.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::base::estimate::Estimate;
+
+/// Statistics of the map of the air of one hover.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FieldStatistics {
+    /// What they are made of.
+    pub record: FieldRecord,
+    /// Correlation of pairs of drones over their distance (the paper's eq. 8 and Fig. 6a, c, d).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub space: Option<SpaceCorrelation>,
+    /// Autocorrelation of the drones over time (the paper's eq. 9 and Fig. 6b).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<TimeCorrelation>,
+    /// The Gaussian field of maximum likelihood: exponential in space and in time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub likelihood: Option<FieldModel>,
+    /// The same estimates from the data as measured, without each drone's trend, without what all
+    /// drones have in common, and without both. Air moves on scales that this changes little; what it
+    /// changes much came from drift (a sagging battery is one) or from scales beyond grid and record.
+    #[serde(default)]
+    pub variants: Vec<Variant>,
+    /// The simulated flights that intervals and biases come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulated: Option<Simulated>,
+    /// Horizontal wind from the lean of the drones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wind: Option<TiltWind>,
+    /// How long an average must be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub averaging: Option<Averaging>,
+    /// What could not be said, one sentence each with the reason.
+    #[serde(default)]
+    pub absent: Vec<String>,
+}
+
+/// The data that the statistics are made of.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FieldRecord {
+    /// Drones with a place and a usable series.
+    pub drones: usize,
+    /// Length of the record, s.
+    pub length_s: f64,
+    /// Share of (drone, second) without a value, among those drones.
+    pub missing_share: f64,
+    /// Length of the running mean that the values were taken through, s.
+    pub running_mean_s: f64,
+    /// Smallest distance between two drones, m.
+    pub spacing_m: f64,
+    /// Largest distance between two drones, m.
+    pub extent_m: f64,
+    /// Standard deviation of the values about each drone's mean, m/s, root mean square over drones.
+    pub sd_mps: f64,
+    /// Standard deviation of the fleet's mean over time, m/s: what all drones have in common.
+    pub common_sd_mps: f64,
+}
+
+/// From where to where.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// An estimated scale with its errors, in the unit of the field's name.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scale {
+    /// The estimate.
+    pub value: f64,
+    /// Standard error of the curve fit, as the paper gives it; see the module's note.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit_se: Option<f64>,
+    /// 95 % interval for the true value: 95 of 100 flights in such air give one that holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_95: Option<Interval>,
+    /// What this estimator reads, on this grid and record, in air of a known scale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reads: Option<Reads>,
+    /// The paper's value and the error that it gives.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paper: Option<Estimate>,
+}
+
+/// What an estimator reads in simulated flights of the same drones and the same length.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Reads {
+    /// The true scale of the simulated air.
+    pub truth: f64,
+    /// Median of the estimates.
+    pub median: f64,
+    /// 5th and 95th percentile of the estimates.
+    pub range_90: Interval,
+    /// Simulated flights that gave an estimate.
+    pub flights: usize,
+}
+
+/// Correlation over distance.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SpaceCorrelation {
+    /// All pairs of drones (Fig. 6a).
+    pub all: DistanceCorrelation,
+    /// Pairs with the same y: along x of the show frame (Fig. 6c).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along_x: Option<DistanceCorrelation>,
+    /// Pairs with the same x: along y of the show frame (Fig. 6d).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along_y: Option<DistanceCorrelation>,
+    /// Whether the two directions differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub anisotropy: Option<Anisotropy>,
+    /// What this grid and record make of it, in a sentence.
+    pub words: String,
+}
+
+/// Correlation over distance for one choice of pairs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DistanceCorrelation {
+    /// Pairs of the same nominal distance, nearest first.
+    pub classes: Vec<DistanceClass>,
+    /// The paper's estimate, m: `exp(-r / lambda)` fitted to the medians, all alike.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lambda_m: Option<Scale>,
+    /// The same with each median weighted by its simulated variance, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weighted_lambda_m: Option<Scale>,
+    /// `C0 exp(-r / lambda)` fitted to the medians.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub with_nugget: Option<NuggetFit>,
+}
+
+/// The pairs of one nominal distance.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DistanceClass {
+    /// Nominal distance, m: between the places of the plan.
+    pub nominal_m: f64,
+    /// Median distance of the pairs, m.
+    pub distance_m: f64,
+    /// Correlation of each pair, ascending.
+    pub correlations: Vec<f64>,
+    /// Median (the line in the violins of Fig. 6).
+    pub median: f64,
+    /// Mean (the dots).
+    pub mean: f64,
+    /// First and third quartile.
+    pub quartiles: Interval,
+    /// Standard deviation of the median between simulated flights in the same air: its honest error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub median_se: Option<f64>,
+}
+
+/// An exponential that need not be 1 at distance 0: independent noise and small eddies lower it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NuggetFit {
+    /// Correlation that remains at distance 0.
+    pub c0: Estimate,
+    /// Length, m.
+    pub lambda_m: Scale,
+}
+
+/// The lengths along x and y compared.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Anisotropy {
+    /// Length along y over length along x (the paper: 2.08).
+    pub ratio: f64,
+    /// Share of flights in isotropic air whose two lengths differ by this factor or more, either way
+    /// round.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p_value: Option<f64>,
+    /// In a sentence.
+    pub words: String,
+}
+
+/// Autocorrelation over time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TimeCorrelation {
+    /// Lag, s.
+    pub lag_s: Vec<f64>,
+    /// Mean over drones at each lag. Each drone's value is the mean of the products of all pairs of
+    /// its values that are a lag apart (not divided by the length of the record, which would shrink
+    /// it).
+    pub mean: Vec<f64>,
+    /// Standard deviation between drones at each lag.
+    pub sd_between_drones: Vec<f64>,
+    /// Drones with a value at each lag.
+    pub drones: Vec<usize>,
+    /// Lag of the first zero crossing of the mean, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_zero_s: Option<f64>,
+    /// The paper's line through the points up to there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<TimeLine>,
+    /// What the length of the record does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_record: Option<HalfRecord>,
+    /// What this record makes of it, in a sentence.
+    pub words: String,
+}
+
+/// `A (dt - t0)`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TimeLine {
+    /// A, 1/s, with the error of the curve fit.
+    pub slope_per_s: Estimate,
+    /// t0, s. Its interval and its `reads` are for the t0 that flights of this length give on average
+    /// in such air: t0 is no property of the air, as it depends on the length of the record.
+    pub t0_s: Scale,
+    /// Lags fitted.
+    pub points: usize,
+}
+
+/// t0 of a shorter record: if it shrinks with it, it is made by the length and not by the air.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HalfRecord {
+    /// Length of each half, s.
+    pub length_s: f64,
+    /// t0 of the first half, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_t0_s: Option<f64>,
+    /// t0 of the second half, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_t0_s: Option<f64>,
+    /// Mean of the halves over the whole: 1 where the length does not matter, 0.5 where it is all.
+    pub ratio: f64,
+    /// The same ratio in simulated flights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulated_ratio: Option<Reads>,
+    /// In a sentence.
+    pub words: String,
+}
+
+/// A Gaussian field: `sd² exp(-r / lambda) exp(-|dt| / tau)`, independent noise on every drone, and
+/// an unknown mean of every drone, seen through the running mean. Fitted to means of blocks as long
+/// as the running mean.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FieldModel {
+    /// Standard deviation of the air, m/s.
+    pub sd_mps: Scale,
+    /// Correlation length (1/e), m.
+    pub lambda_m: Scale,
+    /// Correlation time (1/e), s.
+    pub tau_s: Scale,
+    /// Standard deviation of the independent part of a block's mean, m/s: noise and small eddies.
+    pub nugget_mps: Scale,
+    /// Logarithm of the restricted likelihood.
+    pub log_likelihood: f64,
+    /// Drones used.
+    pub drones: usize,
+    /// Blocks used of each.
+    pub blocks: usize,
+    /// Length of a block, s.
+    pub block_s: f64,
+    /// A scale that ran into the end of the searched range, or another doubt; one sentence each.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+}
+
+/// What was taken out of the data before the estimates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Treatment {
+    /// Nothing (but each drone's mean, as always).
+    #[default]
+    AsMeasured,
+    /// A straight line over time, of each drone.
+    Detrended,
+    /// The mean of all drones at each second.
+    CommonRemoved,
+    /// Both.
+    DetrendedCommonRemoved,
+}
+
+impl Treatment {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::AsMeasured => "as measured",
+            Self::Detrended => "each drone's trend removed",
+            Self::CommonRemoved => "common mode removed",
+            Self::DetrendedCommonRemoved => "trends and common mode removed",
+        }
+    }
+}
+
+/// The estimates after a [`Treatment`], without intervals.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Variant {
+    /// What was taken out.
+    pub treatment: Treatment,
+    /// The paper's length, m, over all pairs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lambda_m: Option<f64>,
+    /// The same along x, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lambda_x_m: Option<f64>,
+    /// The same along y, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lambda_y_m: Option<f64>,
+    /// The paper's time, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub t0_s: Option<f64>,
+    /// Length of maximum likelihood, m; the model knows what was taken out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub likelihood_lambda_m: Option<f64>,
+    /// Time of maximum likelihood, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub likelihood_tau_s: Option<f64>,
+}
+
+/// Simulated flights: fields of the model of maximum likelihood at the same places and seconds, with
+/// the same missing values, the same running mean and the estimated noise.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Simulated {
+    /// Flights.
+    pub flights: usize,
+    /// Seed: the same data and seed give the same intervals.
+    pub seed: u64,
+    /// What they are, in a sentence.
+    pub words: String,
+}
+
+/// Horizontal wind that the drones lean against.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TiltWind {
+    /// Wind at which the drag of the vehicle is its weight, m/s; absent: its drag is not known, and
+    /// only leans are given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drag_speed_mps: Option<f64>,
+    /// Mean speed over the fleet, m/s, with the standard error from the spread of the drones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_mps: Option<Estimate>,
+    /// Where the fleet's mean wind comes from, degrees clockwise from north.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_deg: Option<f64>,
+    /// Mean lean of the fleet, degrees.
+    pub lean_deg: f64,
+    /// The drones.
+    pub drones: Vec<DroneWind>,
+    /// In a sentence.
+    pub words: String,
+}
+
+/// The wind on one drone.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DroneWind {
+    /// Slot number, if planned.
+    pub slot: Option<u16>,
+    /// Label.
+    pub name: String,
+    /// Angle of the mean attitude from the vertical, degrees.
+    pub lean_deg: f64,
+    /// Direction that it leans to, which is where the wind comes from, degrees clockwise from north;
+    /// absent: the log has no heading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_deg: Option<f64>,
+    /// Wind speed, m/s; absent: the drag of the vehicle is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_mps: Option<f64>,
+}
+
+/// Allan deviation of the vertical air speed: how much averages over neighbouring spans differ
+/// (divided by the square root of 2).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Averaging {
+    /// Length of the averages, s.
+    pub averaging_s: Vec<f64>,
+    /// Median over the fleet, m/s.
+    pub median_mps: Vec<f64>,
+    /// Quartiles over the fleet, m/s.
+    pub quartiles_mps: Vec<Interval>,
+    /// The drones.
+    pub drones: Vec<DroneAveraging>,
+    /// Averages shorter than this are smoothed by the running mean, and their deviation is too small,
+    /// s; 0: there was no running mean.
+    pub smoothed_below_s: f64,
+    /// Where the fleet's median is smallest: the average that repeats best.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub best: Option<Reached>,
+    /// Shortest averages whose deviation is below round values.
+    #[serde(default)]
+    pub reached: Vec<Reached>,
+    /// How long a baseline average must be, in a sentence.
+    pub words: String,
+}
+
+/// The Allan deviation of one drone at each of [`Averaging::averaging_s`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DroneAveraging {
+    /// Slot number, if planned.
+    pub slot: Option<u16>,
+    /// Label.
+    pub name: String,
+    /// Deviation, m/s; null where gaps leave too few averages.
+    pub deviation_mps: Vec<Option<f64>>,
+}
+
+/// A deviation and the averaging time that reaches it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Reached {
+    /// Allan deviation, m/s.
+    pub deviation_mps: f64,
+    /// Length of the average, s.
+    pub averaging_s: f64,
+}

@@ -1,0 +1,154 @@
+//! Horizontal wind from the lean of the drones: a drone that holds its place leans against the wind.
+
+use super::result::{DroneWind, TiltWind};
+use super::words::digits;
+use crate::base::estimate::Estimate;
+
+/// A lean that is no wind: trim of the accelerometers, a centre of mass off the middle, degrees.
+const TRIM_DEG: f64 = 0.2;
+/// Steepest lean that is taken for wind: its tangent.
+const STEEPEST: f64 = 2.0;
+
+/// How one drone leans on average.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeanLean {
+    /// Slot number, if planned.
+    pub slot: Option<u16>,
+    /// Label.
+    pub name: String,
+    /// Angle of the mean attitude from the vertical, degrees.
+    pub lean_deg: f64,
+    /// Tangents of the mean lean forward and to the right, in the frame of the vehicle.
+    pub forward_right: [f64; 2],
+    /// Heading of the vehicle, degrees clockwise from north; `None`: not known.
+    pub heading_deg: Option<f64>,
+}
+
+impl MeanLean {
+    /// The wind that it leans against along its own axes, m/s: the drag on each pair of faces grows
+    /// with the square of the flow onto them. Without drag, the lean itself.
+    fn flow(&self, drag_speed_mps: Option<f64>) -> [f64; 2] {
+        self.forward_right.map(|tangent| match drag_speed_mps {
+            Some(drag) => drag * tangent.abs().min(STEEPEST).sqrt().copysign(tangent),
+            None => tangent,
+        })
+    }
+}
+
+/// The wind on drones that hold their place; `drag_speed_mps` is the wind onto one of its sides at
+/// which the vehicle would lean by 45 degrees.
+pub fn tilt_wind(leans: &[MeanLean], drag_speed_mps: Option<f64>) -> Option<TiltWind> {
+    let count = leans.len() as f64;
+    if leans.is_empty() {
+        return None;
+    }
+    let size = |[forward, right]: [f64; 2]| forward.hypot(right);
+    let drones: Vec<DroneWind> = leans
+        .iter()
+        .map(|lean| {
+            let flow = lean.flow(drag_speed_mps);
+            let bearing = flow[1].atan2(flow[0]).to_degrees();
+            DroneWind {
+                slot: lean.slot,
+                name: lean.name.clone(),
+                lean_deg: lean.lean_deg,
+                from_deg: lean.heading_deg.map(|heading| (heading + bearing).rem_euclid(360.0)),
+                speed_mps: drag_speed_mps.map(|_| size(flow)),
+            }
+        })
+        .collect();
+    // The mean of vectors: leans that point everywhere are no wind.
+    let (mut north, mut east, mut known) = (0.0, 0.0, 0.0);
+    for (lean, drone) in leans.iter().zip(&drones) {
+        if let Some(from) = drone.from_deg {
+            let (sin, cos) = from.to_radians().sin_cos();
+            north += size(lean.flow(drag_speed_mps)) * cos;
+            east += size(lean.flow(drag_speed_mps)) * sin;
+            known += 1.0;
+        }
+    }
+    let from_deg = (known > 0.0).then(|| east.atan2(north).to_degrees().rem_euclid(360.0));
+    let lean_deg = leans.iter().map(|lean| lean.lean_deg).sum::<f64>() / count;
+    let speeds: Vec<f64> = drones.iter().filter_map(|drone| drone.speed_mps).collect();
+    let mean = speeds.iter().sum::<f64>() / count;
+    let variance =
+        speeds.iter().map(|speed| (speed - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    let speed_mps = drag_speed_mps.map(|_| {
+        let speed = if known > 0.0 { north.hypot(east) / known } else { mean };
+        Estimate::new(speed, (variance / count).sqrt())
+    });
+    let from = from_deg.map_or_else(
+        || " from a direction that is not known (the logs have no heading)".to_owned(),
+        |from| format!(" from {from:.0} degrees"),
+    );
+    let words = match (
+        speed_mps,
+        drag_speed_mps.map(|drag| drag * TRIM_DEG.to_radians().tan().sqrt()),
+    ) {
+        (Some(speed), Some(trim)) => format!(
+            "wind {speed} m/s{from}, from a mean lean of {} degrees and the vehicle's drag (a trim error \
+             of {TRIM_DEG} degrees alone would read as {} m/s in calm air)",
+            digits(lean_deg),
+            digits(trim)
+        ),
+        _ => format!(
+            "the drones lean by {} degrees into a wind{from}; its speed does not follow, as the \
+             vehicle's drag is not known",
+            digits(lean_deg)
+        ),
+    };
+    Some(TiltWind { drag_speed_mps, speed_mps, from_deg, lean_deg, drones, words })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fleet(forward_right: [f64; 2], heading_deg: impl Fn(u16) -> Option<f64>) -> Vec<MeanLean> {
+        (1..=4)
+            .map(|slot| MeanLean {
+                slot: Some(slot),
+                name: format!("{slot}"),
+                lean_deg: forward_right[0].hypot(forward_right[1]).atan().to_degrees(),
+                forward_right,
+                heading_deg: heading_deg(slot),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_lean_with_known_drag_is_a_wind() {
+        // AirSim's stock quad leans by 3.92 degrees in 10 m/s.
+        let forward = 3.92_f64.to_radians().tan();
+        let wind = tilt_wind(&fleet([forward, 0.0], |_| Some(350.0)), Some(38.2)).unwrap();
+        let speed = wind.speed_mps.unwrap();
+        assert!((speed.value - 10.0).abs() < 0.05 && speed.se < 1e-9, "{speed}");
+        assert!((wind.from_deg.unwrap() - 350.0).abs() < 1e-9);
+        insta::assert_snapshot!(wind.words);
+    }
+
+    #[test]
+    fn wind_on_a_corner_is_the_wind_on_its_sides() {
+        let tangent = |mps: f64| (mps / 38.2_f64).powi(2);
+        let corner = fleet([tangent(8.0), -tangent(6.0)], |_| Some(20.0));
+        let wind = tilt_wind(&corner, Some(38.2)).unwrap();
+        assert!((wind.speed_mps.unwrap().value - 10.0).abs() < 1e-9);
+        assert!((wind.from_deg.unwrap() - (360.0 + 20.0 - 36.8699)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn without_drag_only_the_lean_is_told() {
+        let forward = 2_f64.to_radians().tan();
+        let wind = tilt_wind(&fleet([forward, 0.0], |_| None), None).unwrap();
+        assert_eq!((wind.speed_mps, wind.from_deg), (None, None));
+        insta::assert_snapshot!(wind.words);
+        assert!(tilt_wind(&[], None).is_none());
+    }
+
+    #[test]
+    fn leans_to_all_sides_are_no_wind() {
+        let around = fleet([0.02, 0.0], |slot| Some(f64::from(slot) * 90.0));
+        let wind = tilt_wind(&around, Some(38.2)).unwrap();
+        assert!(wind.speed_mps.unwrap().value < 1e-3, "{:?}", wind.speed_mps);
+    }
+}

@@ -1,0 +1,126 @@
+//! The sentences of the statistics.
+
+use super::likelihood::Fitted;
+use super::result::{FieldRecord, FieldStatistics, Scale};
+
+/// A half record whose t0 is below this share of the whole's says that the length makes t0.
+const HALVES: f64 = 0.65;
+/// Above this share the length does not matter.
+const STAYS: f64 = 0.85;
+/// p-values below this are called significant.
+const SIGNIFICANT: f64 = 0.05;
+
+/// What the simulated flights are.
+pub(super) fn simulated(flights: usize, model: &Fitted, record: &FieldRecord) -> String {
+    format!(
+        "{flights} simulated flights of the same {} drones and {:.0} s, with the same gaps and running \
+         mean, in a Gaussian field with the scales of maximum likelihood: s.d. {:.2} m/s, length {} m, \
+         time {} s, independent noise {:.3} m/s",
+        record.drones,
+        record.length_s,
+        model.sd_mps,
+        digits(model.lambda_m),
+        digits(model.tau_s),
+        model.noise_mps
+    )
+}
+
+/// Fills in all sentences that follow from the numbers.
+pub(super) fn fill(statistics: &mut FieldStatistics) {
+    let record = statistics.record.clone();
+    if let Some(space) = &mut statistics.space {
+        space.words = space.all.lambda_m.as_ref().map_or_else(String::new, |scale| {
+            bias(
+                scale,
+                "m",
+                &format!(
+                    "a true length of {{}} m reads as {{}} m with this grid of {} m \
+                and this record of {} s",
+                    digits(record.extent_m),
+                    digits(record.length_s)
+                ),
+            )
+        });
+        if let Some(anisotropy) = &mut space.anisotropy {
+            let times = format!(
+                "the length along y is {:.2} times that along x (the paper: 2.08)",
+                anisotropy.ratio
+            );
+            anisotropy.words = match anisotropy.p_value {
+                Some(p) if p < SIGNIFICANT => format!(
+                    "{times}; only {} of flights in isotropic air differ as much: significant",
+                    percent(p)
+                ),
+                Some(p) => format!(
+                    "{times}; {} of flights in isotropic air differ as much: not significant",
+                    percent(p)
+                ),
+                None => times,
+            };
+        }
+    }
+    if let Some(time) = &mut statistics.time {
+        let tau = statistics.likelihood.as_ref().map(|model| model.tau_s.value);
+        if let Some((line, tau)) = time.line.as_ref().zip(tau) {
+            time.words = line.t0_s.reads.map_or_else(String::new, |reads| format!(
+                "air that forgets in {} s (1/e) gives a t0 of {} s in the median of records of {} s, \
+                 {} to {} s in 90 of 100",
+                digits(tau), digits(reads.median), digits(record.length_s),
+                digits(reads.range_90.low), digits(reads.range_90.high)
+            ));
+        }
+        if let Some(half) = &mut time.half_record {
+            let what = if half.ratio < HALVES {
+                "t0 shrinks with the record: it is made by the record's length, and is no time scale of \
+                 the air"
+            } else if half.ratio > STAYS {
+                "t0 does not shrink with the record: no sign of an effect of its length"
+            } else {
+                "t0 shrinks with the record, less than in proportion: its length is part of it"
+            };
+            let expected = half.simulated_ratio.map_or_else(String::new, |ratio| format!(
+                " (in simulated flights the halves have {:.2} of it in the median, {:.2} to {:.2} in 90 \
+                 of 100)",
+                ratio.median, ratio.range_90.low, ratio.range_90.high
+            ));
+            half.words = format!(
+                "halves of {} s have a t0 of {:.2} times that of the whole: {what}{expected}",
+                digits(half.length_s),
+                half.ratio
+            );
+        }
+    }
+}
+
+fn bias(scale: &Scale, unit: &str, template: &str) -> String {
+    let Some(reads) = scale.reads else { return String::new() };
+    let mut values = [digits(reads.truth), digits(reads.median)].into_iter();
+    let mut text = String::new();
+    for (index, part) in template.split("{}").enumerate() {
+        if index > 0 {
+            text.push_str(&values.next().unwrap_or_default());
+        }
+        text.push_str(part);
+    }
+    format!(
+        "{text} (median; {} to {} {unit} in 90 of 100 flights)",
+        digits(reads.range_90.low),
+        digits(reads.range_90.high)
+    )
+}
+
+/// A scale to three digits.
+pub(super) fn digits(value: f64) -> String {
+    let decimals = if value.abs() >= 100.0 {
+        0
+    } else if value.abs() >= 10.0 {
+        1
+    } else {
+        2
+    };
+    format!("{value:.decimals$}")
+}
+
+fn percent(share: f64) -> String {
+    if share < 0.01 { "less than 1 %".to_owned() } else { format!("{:.0} %", 100.0 * share) }
+}

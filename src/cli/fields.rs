@@ -1,0 +1,58 @@
+//! What an analysis leaves beside its report: the measured fields for other programs; and what it
+//! takes in: a finished study.
+
+use std::path::Path;
+
+use super::context::Context;
+use super::exit::CommandError;
+use crate::analysis::result::Analysis;
+use crate::base::file::write_with;
+use crate::campaign;
+use crate::report::fields;
+use crate::study::result::{STUDY_RESULT_SCHEMA, StudyResult};
+
+/// Writes the fields, if there are any. Those of an earlier analysis that has become empty go.
+pub(super) fn write_fields(analysis: &Analysis, folder: &Path) -> Result<(), CommandError> {
+    let (csv, parquet) = (campaign::fields_csv(folder), campaign::fields_parquet(folder));
+    if !fields::any(analysis) {
+        for old in [csv, parquet] {
+            // Nothing to remove is the usual case.
+            let _ = std::fs::remove_file(old);
+        }
+        return Ok(());
+    }
+    write_with(&csv, |out| fields::write_csv(analysis, out))?;
+    #[cfg(feature = "parquet")]
+    {
+        let bytes = crate::report::fields_parquet::parquet(analysis)
+            .map_err(|error| CommandError::Failed(format!("failed to make Parquet: {error}")))?;
+        crate::base::file::write_whole(&parquet, &bytes)?;
+    }
+    #[cfg(not(feature = "parquet"))]
+    let _ = std::fs::remove_file(parquet);
+    Ok(())
+}
+
+/// The study that a campaign holds; says so, and goes on without, where it cannot be read.
+pub(super) fn read_study(context: &Context, root: &Path) -> Option<StudyResult> {
+    let path = campaign::study_result(root);
+    if !path.is_file() {
+        return None;
+    }
+    match campaign::read_json::<StudyResult>(&path) {
+        Ok(study) if study.schema == STUDY_RESULT_SCHEMA => Some(study),
+        Ok(study) => {
+            context.warn(&format!(
+                "{} has the format \"{}\", this program reads \"{STUDY_RESULT_SCHEMA}\": the report \
+                 goes without Fig. 2 and Table I; fly the study again",
+                path.display(),
+                study.schema
+            ));
+            None
+        }
+        Err(error) => {
+            context.warn(&format!("the report goes without Fig. 2 and Table I: {error}"));
+            None
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Where a report came from: program, command, settings, and every file that was read with its hash.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::found::Work;
+use super::simulate::{made_by, sha256};
+use crate::base::file::read_whole;
+use crate::campaign::{self, FlightFolder};
+use crate::report::{InputFile, Provenance};
+
+/// Largest file that is hashed, bytes.
+const MOST_BYTES: u64 = 4 << 30;
+
+/// The provenance of an analysis.
+pub(super) fn provenance(work: &Work, settings: Vec<(&'static str, String)>) -> Provenance {
+    let mut paths = plans(&work.root);
+    paths.extend(work.flights.iter().flat_map(|flight| &flight.logs).map(|log| log.path.clone()));
+    let inputs = paths
+        .par_iter()
+        .map(|path| {
+            // A log that cannot be read is already named as missing by the analysis.
+            let sha256 = read_whole(path, MOST_BYTES)
+                .map_or_else(|error| format!("not read: {error}"), |bytes| sha256(&bytes));
+            let shown = path.strip_prefix(&work.root).unwrap_or(path);
+            InputFile { path: shown.display().to_string(), sha256 }
+        })
+        .collect();
+    let shown: Vec<_> = std::env::args()
+        .skip(1)
+        .map(|word| if word.contains(' ') { format!("'{word}'") } else { word })
+        .collect();
+    Provenance {
+        program: made_by(),
+        command: format!("updraft {}", shown.join(" ")),
+        seed: work.flights.iter().find_map(|flight| flight.seed),
+        made_at: String::new(),
+        settings: settings.into_iter().map(|(what, how)| (what.to_owned(), how)).collect(),
+        inputs,
+    }
+}
+
+/// What a campaign knows about its flights: plans, vehicles, flight records, and a study.
+fn plans(root: &Path) -> Vec<PathBuf> {
+    if !campaign::is_campaign(root) {
+        return Vec::new();
+    }
+    let flights = campaign::flights(root).unwrap_or_default();
+    let of = |flight: &FlightFolder| [flight.plan(), flight.vehicle(), flight.record()];
+    let mut paths = vec![campaign::index_path(root)];
+    paths.extend(flights.iter().flat_map(of));
+    paths.push(campaign::study_result(root));
+    paths.retain(|path| path.is_file());
+    paths
+}

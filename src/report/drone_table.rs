@@ -1,0 +1,86 @@
+//! The table of all drones of a flight.
+
+use minijinja::context;
+use minijinja::value::Value;
+
+use crate::analysis::result::FlightAnalysis;
+
+use super::compare::{clock, drone_laws, flags, windows_used};
+use super::figures::air::mean_truth;
+use super::text::{NONE, clean, estimate, fixed, shortened, usable};
+
+/// Headings and rows of the table of drones; columns that no drone fills are left out.
+pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
+    let heads = [
+        ("slot", true),
+        ("drone", false),
+        ("W* (m/s)", true),
+        ("systematic ± (m/s)", true),
+        ("true W (m/s)", true),
+        ("mapping", false),
+        ("A (µs/(m/s)²)", true),
+        ("u₀ (µs)", true),
+        ("fitted W* (m/s)", true),
+        ("χ²/ν", true),
+        ("A′ (µs/(m/s))", true),
+        ("u₀ linear (µs)", true),
+        ("χ²/ν linear", true),
+        ("added scatter (µs)", true),
+        ("windows", true),
+        ("clock", false),
+    ];
+    let rows: Vec<(Vec<String>, String)> = flight
+        .drones
+        .iter()
+        .map(|drone| {
+            let laws = drone_laws(drone);
+            let air = flight.map.as_ref().and_then(|map| {
+                map.drones.iter().find(|air| air.slot == drone.slot && air.name == drone.name)
+            });
+            let none = || NONE.to_owned();
+            let cells = vec![
+                drone.slot.map_or_else(none, |slot| slot.to_string()),
+                shortened(&drone.name, 28),
+                air.map_or_else(none, |air| estimate(air.mean)),
+                air.filter(|air| usable(air.systematic_mps) && air.systematic_mps > 0.0)
+                    .map_or_else(none, |air| fixed(air.systematic_mps, 2)),
+                air.and_then(mean_truth).map_or_else(none, |truth| fixed(truth, 3)),
+                air.map_or_else(none, |air| clean(&air.mapping)),
+                laws.a,
+                laws.u0,
+                laws.w,
+                laws.chi2,
+                laws.slope,
+                laws.linear_u0,
+                laws.linear_chi2,
+                laws.scatter,
+                if drone.windows.is_empty() { none() } else { windows_used(drone) },
+                clock(drone).to_owned(),
+            ];
+            (cells, flags(drone).join("; "))
+        })
+        .collect();
+    let filled: Vec<bool> = (0..heads.len())
+        .map(|column| {
+            rows.iter().any(|(cells, _)| {
+                cells.get(column).is_some_and(|cell| !cell.is_empty() && cell != NONE)
+            })
+        })
+        .collect();
+    let kept = || filled.iter().enumerate().filter(|(_, filled)| **filled).map(|(i, _)| i);
+    let head = kept()
+        .filter_map(|column| heads.get(column))
+        .map(|&(label, number)| context! { label, number })
+        .collect();
+    let rows = rows
+        .iter()
+        .map(|(cells, note)| {
+            let cells: Vec<Value> = kept()
+                .filter_map(|column| Some((cells.get(column)?, heads.get(column)?.1)))
+                .map(|(cell, number)| context! { text => cell.clone(), number })
+                .collect();
+            context! { cells, note => note.clone() }
+        })
+        .collect();
+    (head, rows)
+}

@@ -1,0 +1,173 @@
+//! The measured fields as a table for other programs: one row for each drone and second.
+//!
+//! The columns are described in `docs/fields.md`. Places are in the show frame (x forward, y left, z
+//! up, m); speeds are m/s, up positive.
+
+use std::fmt::Write as _;
+use std::io;
+
+use crate::analysis::result::{Analysis, DroneUpdraft, QualityFlag};
+
+use super::text::clean;
+
+/// Names of the columns, in order.
+pub const COLUMNS: [&str; 13] = [
+    "flight",
+    "time_s",
+    "slot",
+    "drone",
+    "x_m",
+    "y_m",
+    "z_m",
+    "w_mps",
+    "sd_mps",
+    "low_mps",
+    "high_mps",
+    "flags",
+    "truth_mps",
+];
+
+/// One drone in one second.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FieldRow {
+    /// Name of the flight.
+    pub flight: String,
+    /// Show time, s.
+    pub time_s: f64,
+    /// Slot number, if planned.
+    pub slot: Option<u16>,
+    /// Label of the drone.
+    pub drone: String,
+    /// Place, m: forward and left, if known; up above home.
+    pub x_m: Option<f64>,
+    /// To the left, m.
+    pub y_m: Option<f64>,
+    /// Above home, m.
+    pub z_m: Option<f64>,
+    /// Running 10 s estimate of the vertical air speed.
+    pub w_mps: Option<f64>,
+    /// Statistical error of the estimate alone.
+    pub sd_mps: Option<f64>,
+    /// Interval that holds the true value with a probability of 95 %, all errors included.
+    pub low_mps: Option<f64>,
+    /// Its upper end.
+    pub high_mps: Option<f64>,
+    /// What is doubtful, by name, separated by semicolons.
+    pub flags: String,
+    /// True vertical air speed, where known.
+    pub truth_mps: Option<f64>,
+}
+
+/// All rows, flight by flight and drone by drone.
+pub fn rows(analysis: &Analysis) -> impl Iterator<Item = FieldRow> + '_ {
+    analysis.flights.iter().flat_map(|flight| {
+        let map = flight.map.iter();
+        map.flat_map(move |map| {
+            map.drones.iter().flat_map(move |drone| {
+                map.time_s
+                    .iter()
+                    .enumerate()
+                    .map(move |(index, &time_s)| row(&flight.name, drone, index, time_s))
+            })
+        })
+    })
+}
+
+/// Whether there is any row.
+pub fn any(analysis: &Analysis) -> bool {
+    rows(analysis).next().is_some()
+}
+
+fn row(flight: &str, drone: &DroneUpdraft, index: usize, time_s: f64) -> FieldRow {
+    let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
+    let interval = drone.interval_mps.get(index).copied().flatten();
+    FieldRow {
+        flight: clean(flight),
+        time_s,
+        slot: drone.slot,
+        drone: clean(&drone.name),
+        x_m: finite(drone.position_m.map(|p| p[0])),
+        y_m: finite(drone.position_m.map(|p| p[1])),
+        z_m: finite(Some(drone.height_m)),
+        w_mps: finite(drone.updraft_mps.get(index).copied().flatten()),
+        sd_mps: finite(drone.sd_mps.get(index).copied().flatten()),
+        low_mps: finite(interval.map(|interval| interval[0])),
+        high_mps: finite(interval.map(|interval| interval[1])),
+        flags: flags(&drone.quality, time_s),
+        truth_mps: finite(drone.truth_mps.as_ref().and_then(|truth| truth.get(index).copied())),
+    }
+}
+
+/// Names of the flags that hold at a time: `low_battery;drift`.
+fn flags(quality: &[QualityFlag], time_s: f64) -> String {
+    let mut names: Vec<String> = quality
+        .iter()
+        .filter(|flag| (flag.start_s..=flag.end_s).contains(&time_s))
+        .filter_map(|flag| Some(serde_json::to_value(flag.flag).ok()?.as_str()?.to_owned()))
+        .collect();
+    names.sort();
+    names.dedup();
+    names.join(";")
+}
+
+/// Writes the rows as CSV: comma, point, a header, empty where there is no value; RFC 4180.
+pub fn write_csv(analysis: &Analysis, out: &mut dyn io::Write) -> io::Result<()> {
+    writeln!(out, "{}", COLUMNS.join(","))?;
+    let mut line = String::new();
+    for row in rows(analysis) {
+        line.clear();
+        quoted(&mut line, &row.flight);
+        let _ = write!(line, ",{}", row.time_s);
+        let _ = write!(line, ",{},", row.slot.map_or(String::new(), |slot| slot.to_string()));
+        quoted(&mut line, &row.drone);
+        for (value, decimals) in [(row.x_m, 2), (row.y_m, 2), (row.z_m, 2), (row.w_mps, 4)]
+            .into_iter()
+            .chain([(row.sd_mps, 4), (row.low_mps, 4), (row.high_mps, 4)])
+        {
+            number(&mut line, value, decimals);
+        }
+        let _ = write!(line, ",{}", row.flags);
+        number(&mut line, row.truth_mps, 4);
+        line.push('\n');
+        out.write_all(line.as_bytes())?;
+    }
+    Ok(())
+}
+
+fn number(line: &mut String, value: Option<f64>, decimals: usize) {
+    line.push(',');
+    if let Some(value) = value {
+        let _ = write!(line, "{value:.decimals$}");
+    }
+}
+
+fn quoted(line: &mut String, text: &str) {
+    if text.contains([',', '"', '\n', '\r']) {
+        let _ = write!(line, "\"{}\"", text.replace('"', "\"\""));
+    } else {
+        line.push_str(text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::result::Quality;
+
+    #[test]
+    fn flags_hold_from_their_start_to_their_end() {
+        let flag =
+            |flag, start_s, end_s| QualityFlag { flag, start_s, end_s, reason: String::new() };
+        let quality = [flag(Quality::LowBattery, 10.0, 20.0), flag(Quality::Drift, 15.0, 30.0)];
+        assert_eq!(flags(&quality, 9.0), "");
+        assert_eq!(flags(&quality, 15.0), "drift;low_battery");
+        assert_eq!(flags(&quality, 30.0), "drift");
+    }
+
+    #[test]
+    fn names_with_commas_and_quotes_stay_one_field() {
+        let mut line = String::new();
+        quoted(&mut line, "a,\"b\"");
+        assert_eq!(line, "\"a,\"\"b\"\"\"");
+    }
+}

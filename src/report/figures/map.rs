@@ -1,0 +1,183 @@
+//! The map of the air: the grid seen from above, coloured by the estimated vertical air speed.
+
+use super::air::mean_truth;
+use super::plan_view::{Projection, axes, colour_bar, empty_places, holes, limit, position};
+use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis, UpdraftMap};
+use crate::report::Figure;
+use crate::report::colour::{FAINT, INK, MUTED, diverging, ink_on_diverging};
+use crate::report::svg::{Anchor, Drawing, TextStyle};
+use crate::report::text::{clean, count, estimate, fixed, signed, usable};
+
+/// Above so many drones the cells are too small for text.
+const TEXT_LIMIT: usize = 400;
+
+/// The map of mean updrafts; `None` if no drone has a position. `key` names the flight in files.
+pub(in crate::report) fn mean_map(
+    analysis: &Analysis,
+    flight: &FlightAnalysis,
+    key: &str,
+    map: &UpdraftMap,
+) -> Option<Figure> {
+    let mut positions: Vec<[f64; 2]> = map.drones.iter().filter_map(position).collect();
+    if positions.is_empty() {
+        return None;
+    }
+    let known = empty_places(analysis, flight);
+    positions.extend(known.iter().map(|(_, home)| *home));
+    let mut empty: Vec<(Option<u16>, [f64; 2])> =
+        known.into_iter().map(|(slot, home)| (Some(slot), home)).collect();
+    let unknown = holes(&positions);
+    positions.extend(&unknown);
+    empty.extend(unknown.into_iter().map(|place| (None, place)));
+    let truths: Vec<Option<f64>> =
+        map.drones.iter().map(|drone| mean_truth(drone).filter(|w| usable(*w))).collect();
+    let truth_known = truths.iter().any(Option::is_some);
+    // Two maps beside each other, or one that fills the sheet.
+    let (top, room) = if truth_known { (40.0, [424.0, 424.0]) } else { (16.0, [800.0, 620.0]) };
+    let projection = Projection::new(&positions, [70.0, top], room, 0.5)?;
+    let [width, height] = projection.size();
+    let limit = limit(
+        map.drones.iter().map(|drone| drone.mean.value).chain(truths.iter().copied().flatten()),
+    );
+    let right = if truth_known { 70.0 + 2.0 * width + 30.0 } else { 70.0 + width };
+    let mut drawing = Drawing::new((right + 130.0).max(380.0), top + height.max(220.0) + 58.0);
+    let with_text = positions.len() <= TEXT_LIMIT;
+    // As many decimals as the largest error asks for, the same in all cells.
+    let largest = map.drones.iter().map(|drone| drone.mean.se).filter(|se| usable(*se));
+    let decimals = with_text.then(|| error_decimals(largest.fold(0.0, f64::max)));
+    for (slot, home) in &empty {
+        empty_cell(&mut drawing, *slot, projection.cell(*home), with_text);
+    }
+    for drone in &map.drones {
+        if let Some(place) = position(drone) {
+            let cell = projection.cell(place);
+            mean_cell(&mut drawing, drone, cell, limit, decimals);
+        }
+    }
+    axes(&mut drawing, &projection);
+    if truth_known {
+        let aside = Projection::new(&positions, [100.0 + width, top], room, 0.5)?;
+        for (drone, truth) in map.drones.iter().zip(&truths) {
+            if let (Some(place), Some(truth)) = (position(drone), truth) {
+                true_cell(&mut drawing, drone, *truth, aside.cell(place), limit, decimals);
+            }
+        }
+        for (projection, words) in [(&projection, "estimated W*"), (&aside, "true W")] {
+            let style = TextStyle { size: 14.0, bold: true, colour: INK, anchor: Anchor::Start };
+            drawing.text([projection.origin()[0], top - 12.0], words, style, 0.0);
+        }
+    }
+    let bar_height = height.clamp(160.0, 420.0);
+    let bar = [right + 34.0, top, 18.0, bar_height];
+    colour_bar(
+        &mut drawing,
+        bar,
+        limit,
+        if truth_known { "mean W* and W (m/s)" } else { "mean updraft W* (m/s)" },
+    );
+    let name = format!("map-{key}");
+    let title = format!("Mean vertical air speed over the grid, {}", clean(&flight.name));
+    let dashed = if empty.is_empty() { "" } else { " Dashed squares are drones without data." };
+    let beside = if truth_known {
+        " Right: the mean of the true air at the same drones and times, on the same scale."
+    } else {
+        ""
+    };
+    Some(Figure {
+        svg: drawing.finish(&title),
+        name,
+        title,
+        caption: format!(
+            "The grid seen from above, one square for each of {}: the mean vertical air speed \
+             over the hover with its standard error below, m/s, up positive. Red is rising air, \
+             blue sinking, white none; the small number is the slot.{beside}{dashed}",
+            count(positions.len() - empty.len(), "drone"),
+        ),
+    })
+}
+
+/// The true mean in a square.
+fn true_cell(
+    drawing: &mut Drawing,
+    drone: &DroneUpdraft,
+    truth: f64,
+    [x, y, w, h]: [f64; 4],
+    limit: f64,
+    decimals: Option<usize>,
+) {
+    drawing.open(&format!("{}: true mean {} m/s", clean(&drone.name), signed(truth, 3)));
+    let fill = diverging(truth / limit);
+    drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
+    if let Some(decimals) = decimals {
+        let colour = ink_on_diverging(truth / limit);
+        let size = (w * 0.23).min(20.0);
+        let style = TextStyle { size, bold: true, colour, anchor: Anchor::Middle };
+        let text = signed(truth, decimals);
+        drawing.text([x + w / 2.0, y + h * 0.56], &text, style, 0.0);
+    }
+    drawing.close();
+}
+
+fn empty_cell(drawing: &mut Drawing, slot: Option<u16>, [x, y, w, h]: [f64; 4], with_text: bool) {
+    let label = slot.map(|slot| slot.to_string());
+    drawing
+        .open(&label.as_ref().map_or("no data".to_owned(), |slot| format!("slot {slot}: no data")));
+    drawing.rect(
+        [x + 2.0, y + 2.0, w - 4.0, h - 4.0],
+        "#fafbfc",
+        &format!("stroke=\"{FAINT}\" stroke-dasharray=\"4 3\""),
+    );
+    if with_text {
+        let style = |size, anchor| TextStyle { size, bold: false, colour: MUTED, anchor };
+        let middle = [x + w / 2.0, y + h * 0.56];
+        drawing.text(middle, "no data", style((w * 0.155).min(13.0), Anchor::Middle), 0.0);
+        if let Some(label) = label {
+            let corner = [x + w * 0.07, y + h * 0.2];
+            drawing.text(corner, &label, style((w * 0.13).min(10.0), Anchor::Start), 0.0);
+        }
+    }
+    drawing.close();
+}
+
+fn mean_cell(
+    drawing: &mut Drawing,
+    drone: &DroneUpdraft,
+    [x, y, w, h]: [f64; 4],
+    limit: f64,
+    decimals: Option<usize>,
+) {
+    let place = drone.mean.value / limit;
+    let fill = if usable(drone.mean.value) { diverging(place) } else { "#ffffff".to_owned() };
+    drawing.open(&format!(
+        "{}: {} m/s, {} mapping",
+        clean(&drone.name),
+        estimate(drone.mean),
+        clean(&drone.mapping),
+    ));
+    drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
+    if let Some(decimals) = decimals {
+        let colour = if usable(drone.mean.value) { ink_on_diverging(place) } else { MUTED };
+        let style = |size: f64, bold| TextStyle { size, bold, colour, anchor: Anchor::Middle };
+        let text = if usable(drone.mean.value) {
+            signed(drone.mean.value, decimals)
+        } else {
+            "n/a".to_owned()
+        };
+        drawing.text([x + w / 2.0, y + h * 0.56], &text, style((w * 0.23).min(20.0), true), 0.0);
+        if usable(drone.mean.se) && drone.mean.se > 0.0 {
+            let text = format!("±{}", fixed(drone.mean.se, decimals));
+            let at = [x + w / 2.0, y + h * 0.79];
+            drawing.text(at, &text, style((w * 0.155).min(13.0), false), 0.0);
+        }
+        if let Some(slot) = drone.slot {
+            let small = TextStyle { anchor: Anchor::Start, ..style((w * 0.13).min(10.0), false) };
+            drawing.text([x + w * 0.07, y + h * 0.2], &slot.to_string(), small, 0.0);
+        }
+    }
+    drawing.close();
+}
+
+/// Decimals for a value with this error in a small cell: two digits of the error, at most three.
+fn error_decimals(se: f64) -> usize {
+    if usable(se) && se > 0.0 { (1 - se.log10().floor() as i32).clamp(1, 3) as usize } else { 2 }
+}

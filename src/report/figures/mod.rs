@@ -1,0 +1,12 @@
+//! The figures, one file each: the paper's Figs. 2 to 6, and what they leave out.
+
+pub(super) mod air;
+pub(super) mod averaging;
+pub(super) mod correlation;
+pub(super) mod drone;
+pub(super) mod evolution;
+pub(super) mod fleet;
+pub(super) mod laws;
+pub(super) mod map;
+mod plan_view;
+pub(super) mod study;

@@ -1,0 +1,96 @@
+//! Figure 5 as a film: the data that the page's script draws.
+//!
+//! Values are whole mm/s in 16 bits, base64, one time after the other; long flights and big fleets
+//! are thinned in time, so that the page stays small.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
+
+use crate::analysis::result::UpdraftMap;
+
+use super::colour::diverging;
+use super::frames::Frames;
+use super::text::shortened;
+
+/// Most values of one field over all times: 0.5 MB in the page.
+const MOST_VALUES: usize = 200_000;
+/// Most times.
+const MOST_TIMES: usize = 3_600;
+/// Stands for no value.
+const NONE: i16 = i16::MIN;
+/// Steps of the colour scale.
+const COLOURS: u32 = 40;
+
+/// What the script reads.
+#[derive(Serialize)]
+struct Data {
+    /// Show time of each frame, s.
+    times: Vec<f64>,
+    names: Vec<String>,
+    /// [forward, left], m.
+    places: Vec<Option<[f64; 2]>>,
+    /// Corners of the triangles, three by three.
+    triangles: Vec<usize>,
+    /// Ends of the scales, m/s.
+    limit: f64,
+    difference_limit: f64,
+    /// From the lower end of the scale to the upper one.
+    colours: Vec<String>,
+    /// Base64 of little-endian 16-bit mm/s, time by time, drone by drone.
+    estimate: String,
+    truth: Option<String>,
+}
+
+/// A film in the page.
+pub(super) struct Film {
+    /// JSON for a `<script type="application/json">`.
+    pub(super) json: String,
+    /// Seconds between frames.
+    pub(super) step_s: f64,
+    /// Frames.
+    pub(super) frames: usize,
+}
+
+/// The film of a map; `None` with fewer than two times.
+pub(super) fn film(map: &UpdraftMap, frames: &Frames<'_>) -> Option<Film> {
+    let drones = map.drones.len();
+    let most = (MOST_VALUES / drones.max(1)).clamp(2, MOST_TIMES);
+    let stride = frames.times.len().div_ceil(most).max(1);
+    let chosen: Vec<usize> = frames.times.iter().copied().step_by(stride).collect();
+    if chosen.len() < 2 {
+        return None;
+    }
+    let encoded = |value: &dyn Fn(usize, usize) -> Option<f64>| {
+        let mut bytes = Vec::with_capacity(2 * drones * chosen.len());
+        for &time in &chosen {
+            for drone in 0..drones {
+                let value = value(drone, time).map_or(NONE, |mps| {
+                    (1000.0 * mps).round().clamp(f64::from(NONE + 1), f64::from(i16::MAX)) as i16
+                });
+                bytes.extend_from_slice(&value.to_le_bytes());
+            }
+        }
+        STANDARD.encode(bytes)
+    };
+    let round = |value: f64, unit: f64| (value / unit).round() * unit;
+    let centimetres = |v: f64| (v * 100.0).round() / 100.0;
+    let data = Data {
+        times: chosen.iter().map(|&time| round(frames.seconds(time), 0.5)).collect(),
+        names: map.drones.iter().map(|drone| shortened(&drone.name, 32)).collect(),
+        places: frames.places.iter().map(|place| place.map(|p| p.map(centimetres))).collect(),
+        triangles: frames.surface.triangles().iter().flatten().copied().collect(),
+        limit: frames.limit_mps,
+        difference_limit: frames.difference_limit_mps,
+        colours: (0..=COLOURS)
+            .map(|i| diverging(2.0 * f64::from(i) / f64::from(COLOURS) - 1.0))
+            .collect(),
+        estimate: encoded(&|drone, time| frames.estimate(drone, time)),
+        truth: frames.truth_known.then(|| encoded(&|drone, time| frames.truth(drone, time))),
+    };
+    let span = data.times.last()? - data.times.first()?;
+    let step_s = span / (chosen.len() - 1) as f64;
+    // `<` could end the script that holds the data.
+    let json = serde_json::to_string(&data).ok()?.replace('<', "\\u003c");
+    Some(Film { json, step_s, frames: chosen.len() })
+}

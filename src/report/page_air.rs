@@ -1,0 +1,79 @@
+//! The part of the page that shows the air: map, film, stills, scales, errors.
+
+use minijinja::context;
+use minijinja::value::Value;
+
+use crate::analysis::result::{Analysis, FlightAnalysis};
+
+use super::axis::decimals_of;
+use super::colour::diverging;
+use super::figures::{air, averaging, correlation, evolution, map as figure_map};
+use super::film::film;
+use super::frames::Frames;
+use super::page::{Gallery, capitalised, flight_key};
+use super::text::{clean, fixed, signed, usable};
+use super::{errors, scales};
+
+/// The maps of a flight, which the page shows first: they are what the fleet was flown for.
+pub(super) fn air_section(
+    analysis: &Analysis,
+    flight: &FlightAnalysis,
+    index: usize,
+    figures: &mut Gallery,
+) -> Option<Value> {
+    let map = flight.map.as_ref()?;
+    let key = flight_key(analysis, index);
+    let frames = Frames::of(map);
+    let mean = figure_map::mean_map(analysis, flight, &key, map).map(|figure| figures.show(figure));
+    let shown = frames.as_ref().and_then(|frames| film(map, frames)).map(|film| {
+        context! {
+            id => format!("film-{key}"),
+            json => Value::from_safe_string(film.json),
+            step => fixed(film.step_s, usize::from(film.step_s.fract() > 0.05)),
+            frames => film.frames,
+            truth => frames.as_ref().is_some_and(|frames| frames.truth_known),
+            bar => colour_bar(frames.as_ref().map_or(1.0, |frames| frames.limit_mps)),
+            difference_bar =>
+                colour_bar(frames.as_ref().map_or(1.0, |frames| frames.difference_limit_mps)),
+        }
+    });
+    let more: Vec<Value> = [
+        frames.as_ref().and_then(|frames| evolution::figure(flight, &key, frames, wind(flight))),
+        air::figure(flight, &key, map),
+    ]
+    .into_iter()
+    .flatten()
+    .map(|figure| figures.show(figure))
+    .collect();
+    let statistics = flight.statistics.as_ref().map(|found| {
+        let correlations = correlation::figure(flight, &key, found).map(|f| figures.show(f));
+        let averaging = found
+            .averaging
+            .as_ref()
+            .and_then(|averaging| averaging::figure(flight, &key, averaging))
+            .map(|figure| figures.show(figure));
+        context! { correlations, averaging, ..scales::section(found) }
+    });
+    Some(
+        context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), mean, film => shown, more, statistics, errors => errors::section(map) },
+    )
+}
+
+/// Where the fleet's mean wind blows to, [forward, left] in m/s, where speed and direction are known.
+fn wind(flight: &FlightAnalysis) -> Option<[f64; 2]> {
+    let wind = flight.statistics.as_ref()?.wind.as_ref()?;
+    let (speed, from_deg) = (wind.speed_mps?.value, wind.from_deg?);
+    // Clockwise from forward, as seen from above.
+    let to_rad = (from_deg + 180.0 - flight.orientation_deg?).to_radians();
+    let (sin, cos) = to_rad.sin_cos();
+    (usable(speed) && usable(to_rad)).then_some([speed * cos, -speed * sin])
+}
+
+/// A colour bar of the page: its gradient and the numbers below it.
+fn colour_bar(limit: f64) -> Value {
+    let colours: Vec<String> = (0..=20).map(|i| diverging(f64::from(i) / 10.0 - 1.0)).collect();
+    let decimals = decimals_of(limit / 2.0);
+    let ticks: Vec<String> =
+        [-1.0, -0.5, 0.0, 0.5, 1.0].iter().map(|part| signed(part * limit, decimals)).collect();
+    context! { colours => colours.join(","), ticks }
+}

@@ -1,0 +1,78 @@
+//! The statistics of a hover in at most three lines, beside the paper's values.
+
+use crate::analysis::result::FlightAnalysis;
+use crate::analysis::statistics::result::{FieldStatistics, Scale};
+
+use super::text::clean;
+
+/// Length, time scale, and the two directions; or why there is nothing of the kind.
+pub(super) fn statistics_lines(flight: &FlightAnalysis) -> Vec<String> {
+    let Some(statistics) = &flight.statistics else { return Vec::new() };
+    let lines: Vec<String> = [length(statistics), time(statistics), directions(statistics)]
+        .into_iter()
+        .flatten()
+        .collect();
+    if lines.is_empty() {
+        return statistics.absent.first().map(|reason| clean(reason)).into_iter().collect();
+    }
+    lines
+}
+
+fn length(statistics: &FieldStatistics) -> Option<String> {
+    let space = statistics.space.as_ref()?;
+    let scale = space.all.lambda_m.as_ref()?;
+    let model = statistics.likelihood.as_ref();
+    let likelihood = model.map_or_else(String::new, |model| {
+        format!("; of maximum likelihood: {}", value(&model.lambda_m, "m"))
+    });
+    Some(format!("correlation length λ {}{likelihood}", with_paper(scale, "m")))
+}
+
+fn time(statistics: &FieldStatistics) -> Option<String> {
+    let scale = &statistics.time.as_ref()?.line.as_ref()?.t0_s;
+    let model = statistics.likelihood.as_ref();
+    let likelihood = model.map_or_else(String::new, |model| {
+        format!("; correlation time of maximum likelihood: {}", value(&model.tau_s, "s"))
+    });
+    Some(format!("zero crossing t₀ {}{likelihood}", with_paper(scale, "s")))
+}
+
+fn directions(statistics: &FieldStatistics) -> Option<String> {
+    let space = statistics.space.as_ref()?;
+    let along_x = space.along_x.as_ref()?.lambda_m.as_ref()?;
+    let along_y = space.along_y.as_ref()?.lambda_m.as_ref()?;
+    let differ =
+        space.anisotropy.as_ref().and_then(|found| found.p_value).map_or_else(String::new, |p| {
+            let significant = if p < 0.05 { "significant" } else { "not significant" };
+            format!("; the difference is {significant} (p = {p:.2})")
+        });
+    Some(format!(
+        "λ along x {}, along y {}{differ}",
+        with_paper(along_x, "m"),
+        with_paper(along_y, "m")
+    ))
+}
+
+/// `152 m (95 %: 66 to 340 m; paper 145.4 ± 3.0)`.
+fn with_paper(scale: &Scale, unit: &str) -> String {
+    let own = value(scale, unit);
+    let Some(paper) = scale.paper else { return own };
+    match own.strip_suffix(')') {
+        Some(open) => format!("{open}; paper {paper})"),
+        None => format!("{own} (paper {paper})"),
+    }
+}
+
+fn value(scale: &Scale, unit: &str) -> String {
+    let digits = |value: f64| {
+        let decimals = usize::from(value.abs() < 100.0);
+        format!("{value:.decimals$}")
+    };
+    let own = format!("{} {unit}", digits(scale.value));
+    match scale.interval_95 {
+        Some(interval) => {
+            format!("{own} (95 %: {} to {} {unit})", digits(interval.low), digits(interval.high))
+        }
+        None => own,
+    }
+}
