@@ -4,24 +4,32 @@
 //! to the map of the air (a measurement, with the laws of a calibration). [`analyze`] does a campaign.
 
 mod account;
+mod air_prior;
 mod analyze;
+mod aware;
+pub mod battery;
 pub mod budget;
 pub mod calibrate;
 mod caution;
+mod corrections;
 pub mod density;
 mod drone;
 pub mod fit;
+mod hover;
 mod ladder;
 pub mod law;
+pub mod lean_table;
 mod matching;
 pub mod prefer;
 mod refer;
 pub mod result;
 mod slots;
 mod stats;
+mod truth;
 pub mod updraft;
 pub mod wind;
 pub mod windows;
+mod zero;
 
 pub use analyze::{
     AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, Progress, TruthSeries, analyze,

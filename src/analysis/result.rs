@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use super::budget::{
-    BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, TruthCheck,
+    BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, Supply,
+    TruthCheck,
 };
 use super::density::Density;
 use super::wind::Leaning;
@@ -261,6 +262,9 @@ pub struct WindowStats {
     pub lean_deg: f64,
     /// Estimated slow offset subtracted before fitting (field mode), us.
     pub offset_us: Option<f64>,
+    /// The battery in the window, where it was logged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply: Option<Supply>,
     /// Why the window is not used in fits; empty: it is used (if it is of the fitted kind).
     pub rejected: Vec<Rejection>,
 }

@@ -81,10 +81,14 @@ pub(super) struct AnalyzeOptions {
     /// Do not correct the map for air density at different heights
     #[arg(long)]
     no_density: bool,
-    /// Do not correct the map for wind on leaning drones (simulated flights of known drag)
+    /// Do not correct the map for the battery's voltage
+    #[arg(long)]
+    no_battery: bool,
+    /// Do not correct the map for wind on leaning drones (vehicles of known drag)
     #[arg(long)]
     no_wind: bool,
-    /// Windows as in the paper: medians, weighted by the samples' standard deviation
+    /// As in the paper: windows by their medians, weighted by the samples' standard deviation; the
+    /// map from those laws alone
     #[arg(long)]
     paper: bool,
 }
@@ -126,6 +130,7 @@ impl AnalyzeOptions {
         if self.paper {
             options.fit.location = Location::Median;
             options.fit.weights = Weights::WindowSd;
+            options.air_aware = false;
         }
         options
     }
@@ -208,6 +213,8 @@ fn finish(
             truth: (!flight.truth.is_empty()).then_some(&flight.truth),
             density: flight.density.filter(|_| !options.no_density),
             leaning: flight.leaning.filter(|_| !options.no_wind),
+            sag: flight.sag.filter(|_| !options.no_battery),
+            lean_table: flight.lean_table.as_ref().filter(|_| !options.no_wind),
             folder: Some(&work.root),
         })
         .collect();

@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::exit::CommandError;
-use super::leaning::leaning;
+use super::leaning::{lean_table, leaning};
 use super::load::has_extension;
+use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
+use crate::analysis::lean_table::LeanTable;
 use crate::analysis::wind::Leaning;
 use crate::analysis::{LogInput, TruthSeries};
 use crate::base::file::FileError;
@@ -33,6 +35,8 @@ pub(super) struct Found {
     pub(super) start: Option<GpsTime>,
     pub(super) density: Option<Density>,
     pub(super) leaning: Option<Leaning>,
+    pub(super) sag: Option<Sag>,
+    pub(super) lean_table: Option<LeanTable>,
     /// What is doubtful about the files, one sentence each.
     pub(super) notes: Vec<String>,
 }
@@ -83,6 +87,8 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         start: None,
         density: plan.map(|plan| density(plan, None)),
         leaning: None,
+        sag: plan.map(|_| Sag::default()),
+        lean_table: None,
         notes: Vec::new(),
     });
     Ok(())
@@ -105,6 +111,8 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     let flown = record.as_ref().zip(vehicle.as_ref());
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
+        sag: sag(flown.is_some(), vehicle.as_ref()),
+        lean_table: vehicle.as_ref().and_then(|vehicle| lean_table(&plan, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
         name: plan.name.clone(),
         purpose: Some(plan.purpose),
@@ -185,6 +193,16 @@ fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
     Density {
         ground_amsl_m: plan.site.ground_amsl_m,
         exponent: if linear { 1.0 } else { REAL_ROTOR_EXPONENT },
+    }
+}
+
+/// How the battery acts on the pulse. Simulated drones without a battery in their physics log one
+/// that does nothing; real ones have one that does.
+fn sag(is_simulated: bool, vehicle: Option<&Vehicle>) -> Option<Sag> {
+    let battery = vehicle.and_then(|vehicle| vehicle.effects.get("battery"));
+    match battery.filter(|battery| battery.on) {
+        Some(_) => Some(Sag::default()),
+        None => (!is_simulated).then(Sag::default),
     }
 }
 

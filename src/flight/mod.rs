@@ -9,7 +9,7 @@
 //! | pulses | RCOU, channels by SERVOn_FUNCTION 33..40, else C1..C4 |
 //! | roll, pitch | ATT |
 //! | desired vertical velocity | GUIP, PSCD, CTUN |
-//! | battery | BAT, CURR |
+//! | battery | BAT (with the voltage at rest), CURR |
 //! | show time and stage | SHOW |
 
 mod align;
@@ -73,6 +73,11 @@ pub struct Flight {
     pub voltage_v: Option<Series>,
     /// Battery current, A.
     pub current_a: Option<Series>,
+    /// Battery voltage without load as the autopilot estimates it (`BAT.VoltR`), V. Unlike the
+    /// voltage at the terminals it does not follow the pulse.
+    pub resting_v: Option<Series>,
+    /// Resistance of the battery as the autopilot found it (`BAT.Res`, median), ohm.
+    pub resistance_ohm: Option<f64>,
     /// Show stage (0..9), at its changes: (show time s, stage).
     pub stages: Vec<(f64, u8)>,
     /// When motors were armed, (start, end) show time s.

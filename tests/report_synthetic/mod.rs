@@ -205,6 +205,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
             tilt_deg: stats(1.2, 0.4),
             lean_deg: 1.1,
             offset_us: None,
+            supply: None,
             rejected: if slot == 23 && v > 3.2 { vec![Rejection::Saturated] } else { Vec::new() },
         });
         let mut time = start;
