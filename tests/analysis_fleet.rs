@@ -32,6 +32,8 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
         truth: None,
         density: None,
         leaning: None,
+        sag: None,
+        lean_table: None,
         folder: None,
     }
 }

@@ -208,3 +208,99 @@ impl Hover {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::{Clock, Series};
+    use crate::mission::plan::Kind;
+
+    fn flown(pulse: impl Fn(f64) -> f64) -> Flight {
+        let time_s: Vec<f64> = (0..2000).map(|index| f64::from(index) / 10.0).collect();
+        let series = |value: Vec<f64>| Series { time_s: time_s.clone(), value };
+        let pulses: Vec<f64> = time_s.iter().map(|time| pulse(*time)).collect();
+        Flight {
+            pulse_us: series(pulses.clone()),
+            pulse_max_us: series(pulses.clone()),
+            pulse_min_us: series(pulses),
+            pulse_limits_us: (1150.0, 1950.0),
+            velocity_up_mps: series(vec![0.0; 2000]),
+            height_m: series(vec![100.0; 2000]),
+            roll_rad: series(vec![0.0; 2000]),
+            pitch_rad: series(vec![0.0; 2000]),
+            clock: Clock { method: Alignment::ShowRows, ..Clock::default() },
+            ..Flight::default()
+        }
+    }
+
+    fn look(flight: &Flight, end_s: f64) -> Hover {
+        let label = String::new();
+        let target = Target { kind: Kind::Hover, label, start_s: 0.0, end_s, commanded_mps: 0.0 };
+        Hover::of(flight, &target, &WindowOptions::default())
+    }
+
+    fn flags(hover: &Hover) -> Vec<(Quality, f64, f64)> {
+        hover.quality.iter().map(|one| (one.flag, one.start_s, one.end_s)).collect()
+    }
+
+    #[test]
+    fn a_motor_at_its_limit_costs_the_seconds_that_it_touches() {
+        let hover = look(&flown(|time| if time == 50.0 { 1950.0 } else { 1540.0 }), 199.0);
+        assert_eq!(flags(&hover), [(Quality::Saturation, 46.0, 55.0)]);
+        assert_eq!(hover.quality[0].reason, "a motor touched its limit: no values from 46 to 55 s");
+        assert_eq!(hover.seconds.len(), 190);
+        assert_eq!(hover.seconds.iter().flatten().count(), 180);
+    }
+
+    #[test]
+    fn a_climb_inside_of_a_hover_costs_its_seconds() {
+        let mut flight = flown(|_| 1540.0);
+        let moving = flight.velocity_up_mps.time_s.iter().map(|time| (80.0..84.0).contains(time));
+        flight.velocity_up_mps.value = moving.map(|moves| f64::from(u8::from(moves))).collect();
+        let hover = look(&flight, 199.0);
+        assert_eq!(flags(&hover), [(Quality::Manoeuvre, 76.0, 88.0)]);
+    }
+
+    #[test]
+    fn a_log_that_ends_early_keeps_what_it_has() {
+        let hover = look(&flown(|_| 1540.0), 300.0);
+        assert_eq!(flags(&hover), [(Quality::Incomplete, 196.0, 295.0)]);
+        let none = Hover { seconds: Vec::new(), ..hover };
+        assert_eq!(none.nothing(), "the hover from 0 to 300 s was rejected: the log ends early");
+        let short = look(&flown(|_| 1540.0), 8.0);
+        assert!(short.nothing().starts_with("the hover is too short: its window has 8 s"));
+    }
+
+    #[test]
+    fn a_gap_is_no_end() {
+        let mut flight = flown(|_| 1540.0);
+        let kept = |time: &f64| !(100.0..103.0).contains(time);
+        let time_s: Vec<f64> = flight.pulse_us.time_s.iter().copied().filter(kept).collect();
+        flight.pulse_us = Series { value: vec![1540.0; time_s.len()], time_s };
+        assert_eq!(flags(&look(&flight, 199.0)), [(Quality::Gap, 95.0, 107.0)]);
+    }
+
+    #[test]
+    fn a_clock_from_take_off_and_a_strong_drift_are_told() {
+        let mut flight = flown(|time| 1540.0 + 0.3 * time);
+        flight.clock.method = Alignment::Takeoff;
+        let hover = look(&flight, 199.0);
+        assert_eq!(hover.quality[0].flag, Quality::Misaligned);
+        let pulses: Vec<(f64, f64)> =
+            hover.seconds.iter().flatten().map(|one| (one.time_s, one.pulse_us)).collect();
+        assert!((hover.trend_us_per_min(&pulses).unwrap() - 18.0).abs() < 0.01);
+        let calm = look(&flown(|time| 1540.0 + 0.1 * time), 199.0);
+        let pulses: Vec<(f64, f64)> =
+            calm.seconds.iter().flatten().map(|one| (one.time_s, one.pulse_us)).collect();
+        assert_eq!(calm.trend_us_per_min(&pulses), None, "6 us per minute are not rare");
+    }
+
+    #[test]
+    fn noise_is_that_of_seconds_and_not_of_slow_air() {
+        let slow = |time: f64| 1540.0 + 20.0 * (time / 60.0).sin();
+        assert!(look(&flown(slow), 199.0).noise_us(26.0) < 0.3);
+        let odd = |time: f64| 1540.0 + if time.floor() as i64 % 2 == 0 { 2.0 } else { -2.0 };
+        let noise = look(&flown(odd), 199.0).noise_us(26.0);
+        assert!((1.0..3.0).contains(&noise), "{noise}");
+    }
+}

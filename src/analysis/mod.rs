@@ -12,6 +12,8 @@ pub mod budget;
 pub mod calibrate;
 mod caution;
 mod corrections;
+#[cfg(test)]
+mod coverage_tests;
 pub mod density;
 mod drone;
 pub mod fit;
