@@ -38,7 +38,7 @@ impl Air {
 /// Choices of the scales, even in their logarithms.
 pub(super) fn grid(sd_steps: u32, taus_s: &[f64], whites_us: &[f64]) -> Vec<Air> {
     let mut grid = Vec::new();
-    let (low, high) = (0.01_f64, 2.5_f64);
+    let (low, high) = (0.004_f64, 2.5_f64);
     for step in 0..sd_steps {
         let share = f64::from(step) / f64::from(sd_steps.max(2) - 1);
         let sd_mps = low * (high / low).powf(share);

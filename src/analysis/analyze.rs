@@ -255,7 +255,6 @@ pub fn analyze_flight(
         .filter(|_| input.density.is_some() || input.leaning.is_some())
         .map(|found| refer_calibration(input.density, input.leaning, found, &options.fit));
     let map_reference = referred.as_ref().or(reference);
-    let map_law = options.map_law.or_else(|| map_reference.map(better_law));
     let corrections = Corrections {
         density: input.density,
         leaning: input.leaning,
@@ -263,9 +262,12 @@ pub fn analyze_flight(
         has_battery: input.sag.is_some(),
     };
     let aware = reference
-        .zip(map_law)
         .filter(|_| options.air_aware && planned_purpose != Some(Purpose::Calibration))
-        .and_then(|(found, law)| Aware::new(found, corrections, input.sag, law));
+        .and_then(|found| Aware::new(found, corrections, input.sag, options.map_law));
+    let map_law = options
+        .map_law
+        .or_else(|| aware.as_ref().map(Aware::law))
+        .or_else(|| map_reference.map(better_law));
     let shared =
         Shared { input, options, reference, map_reference, planned_purpose, map_law, aware };
 

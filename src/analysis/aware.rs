@@ -26,6 +26,8 @@ const TYPICAL_SLOPE: f64 = 26.0;
 const FASTEST_MPS: f64 = 12.0;
 /// Least slope of a line's bend as a share of its slope in hover.
 const LEAST_SLOPE: f64 = 0.2;
+/// A signed quadratic must be this much more probable than a line (logarithm).
+const CLEARLY: f64 = 2.0;
 /// Air further out than the ladder by this is marked, m/s.
 const BEYOND_MPS: f64 = 0.5;
 
@@ -66,12 +68,21 @@ fn pack_of(drone: &DroneAnalysis, battery: Option<BatteryCorrection>) -> Option<
 }
 
 impl<'a> Aware<'a> {
-    /// Fits the calibration for the map; `None` if its windows do not allow it.
+    /// The law of the map.
+    pub(super) fn law(&self) -> MapLaw {
+        match self.zero.shape {
+            Shape::Line => MapLaw::Linear,
+            Shape::SignedQuadratic => MapLaw::SignedQuadratic,
+        }
+    }
+
+    /// Fits the calibration for the map, with the law that the windows speak for unless one is
+    /// given; `None` if they do not allow a fit.
     pub(super) fn new(
         reference: &'a FlightAnalysis,
         corrections: Corrections<'a>,
         sag: Option<Sag>,
-        law: MapLaw,
+        law: Option<MapLaw>,
     ) -> Option<Self> {
         let corrections = Corrections { has_battery: sag.is_some(), ..corrections };
         let battery = sag.and_then(|sag| battery::correction(reference, sag));
@@ -82,32 +93,22 @@ impl<'a> Aware<'a> {
             .map(|slope| slope.value)
             .collect();
         let slope = if slopes.is_empty() { TYPICAL_SLOPE } else { mean_sd(&slopes).0 };
+        let points_of = |hovers| points(reference, &corrections, battery, slope, hovers);
         let shape = match law {
-            MapLaw::Linear => Shape::Line,
-            MapLaw::SignedQuadratic => Shape::SignedQuadratic,
+            Some(MapLaw::Linear) => Shape::Line,
+            Some(MapLaw::SignedQuadratic) => Shape::SignedQuadratic,
+            // Compared on the windows that both take: in hover the signed quadratic says nothing
+            // about its parameters.
+            None => {
+                let evidence = |shape: Shape| {
+                    zero::fit(&points_of(false), reference.drones.len(), shape)
+                        .map_or(f64::NEG_INFINITY, |zero| zero.evidence)
+                };
+                let (line, square) = (evidence(Shape::Line), evidence(Shape::SignedQuadratic));
+                if square > line + CLEARLY { Shape::SignedQuadratic } else { Shape::Line }
+            }
         };
-        let mut points = Vec::new();
-        for (index, drone) in reference.drones.iter().enumerate() {
-            if !counts(reference, drone) {
-                continue;
-            }
-            let pack = pack_of(drone, battery);
-            if battery.is_some() && pack.is_none() {
-                continue;
-            }
-            let mut seen = std::collections::BTreeMap::<String, usize>::new();
-            for window in &drone.windows {
-                let command = (window.commanded_mps * 1000.0).round();
-                let key = format!("{:?} {command}", window.kind);
-                let count = seen.entry(key.clone()).or_default();
-                let number = *count;
-                *count += 1;
-                if is_used(window, shape) {
-                    let referred = corrections.refer(&Raw::of(window), pack.as_ref(), slope);
-                    points.push(point(index, (key, number), window, &referred, slope));
-                }
-            }
-        }
+        let points = points_of(shape == Shape::Line);
         let zero = zero::fit(&points, reference.drones.len(), shape)?;
         Some(Self { reference, corrections, zero, battery, slope })
     }
@@ -297,10 +298,38 @@ impl<'a> Aware<'a> {
     }
 }
 
-fn is_used(window: &WindowStats, shape: Shape) -> bool {
-    // In hover the signed quadratic says nothing about its parameters but through the air's gusts.
-    let hovers = shape == Shape::Line;
-    window.rejected.is_empty() && (window.kind.is_leg() || hovers && window.kind.is_hover())
+/// The usable windows of the drones that count.
+fn points(
+    reference: &FlightAnalysis,
+    corrections: &Corrections<'_>,
+    battery: Option<BatteryCorrection>,
+    slope: f64,
+    hovers: bool,
+) -> Vec<Point> {
+    let mut points = Vec::new();
+    for (index, drone) in reference.drones.iter().enumerate() {
+        if !counts(reference, drone) {
+            continue;
+        }
+        let pack = pack_of(drone, battery);
+        if battery.is_some() && pack.is_none() {
+            continue;
+        }
+        let mut seen = std::collections::BTreeMap::<String, usize>::new();
+        for window in &drone.windows {
+            let command = (window.commanded_mps * 1000.0).round();
+            let key = format!("{:?} {command}", window.kind);
+            let count = seen.entry(key.clone()).or_default();
+            let number = *count;
+            *count += 1;
+            let is_used = window.kind.is_leg() || hovers && window.kind.is_hover();
+            if window.rejected.is_empty() && is_used {
+                let referred = corrections.refer(&Raw::of(window), pack.as_ref(), slope);
+                points.push(point(index, (key, number), window, &referred, slope));
+            }
+        }
+    }
+    points
 }
 
 fn point(
@@ -391,11 +420,10 @@ impl Values<'_> {
 
     fn error(&self, doubts_us: &[f64; DOUBTS], air_mps: f64, sigmas: &[f64; DOUBTS]) -> PulseError {
         let basis = self.shape.basis(air_mps);
-        let own = [1.0, basis[1]];
         let mut own_us2 = 0.0;
-        for row in 0..2 {
-            for column in 0..2 {
-                own_us2 += own[row] * self.law.own[(row, column)] * own[column];
+        for row in 0..PARAMETERS {
+            for column in 0..PARAMETERS {
+                own_us2 += basis[row] * self.law.own[(row, column)] * basis[column];
             }
         }
         let doubts_us = std::array::from_fn(|doubt| {

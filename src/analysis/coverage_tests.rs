@@ -259,7 +259,7 @@ fn campaign(seed: u64, weather: Weather, shape: MapLaw) -> [f64; 3] {
         ..Corrections::default()
     };
     let sag = (shape == MapLaw::Linear).then(Sag::default);
-    let aware = Aware::new(&calibration, corrections, sag, shape).unwrap();
+    let aware = Aware::new(&calibration, corrections, sag, Some(shape)).unwrap();
     let shared = wander(&mut rng, weather.shared, HOVER_S);
     let (mut inside, mut values, mut squares, mut means) = (0, 0, 0.0, 0);
     for drone in 0..DRONES {

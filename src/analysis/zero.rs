@@ -17,7 +17,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use super::air_prior::{Air, Gls, Record, Weighed, grid, quantile, weigh};
 use super::corrections::DOUBTS;
@@ -29,6 +29,8 @@ pub(super) const PARAMETERS: usize = 4;
 const BEND_SD: f64 = 1.5;
 /// Prior standard deviation of the bend `V|V|` (drag), us/(m/s)².
 const DRAG_SD: f64 = 1.5;
+/// Spread of both bends between the drones of a fleet, us/(m/s)².
+const OWN_BEND_SD: f64 = 0.2;
 /// Windows whose times differ by more belong to groups that fly apart, s.
 const SAME_TIME_S: f64 = 5.0;
 /// No mean of a window is known better, us.
@@ -104,8 +106,8 @@ pub(super) struct Point {
 pub(super) struct DroneLaw {
     /// Parameters.
     pub(super) law: [f64; PARAMETERS],
-    /// Covariance of the drone's own constant and slope.
-    pub(super) own: Matrix2<f64>,
+    /// Covariance of the drone's own part of the parameters.
+    pub(super) own: Matrix4<f64>,
     /// What the law's parameters answer to one unit of each doubt.
     pub(super) answers: [[f64; PARAMETERS]; DOUBTS],
 }
@@ -123,6 +125,9 @@ pub(super) struct Zero {
     pub(super) air: CalibrationAir,
     /// Half width of the 95 % interval of the zero over its standard error.
     pub(super) width: f64,
+    /// Logarithm of the probability of the fleet's averages with this shape, but for a constant that
+    /// all shapes have for the same windows.
+    pub(super) evidence: f64,
     /// Lowest and highest vertical speed of the windows, m/s.
     pub(super) speeds_mps: [f64; 2],
 }
@@ -262,16 +267,15 @@ pub(super) fn fit(points: &[Point], drones: usize, shape: Shape) -> Option<Zero>
     let parts = split.of(points, &pulses);
 
     let fleet = fleet_record(shape, points, &split, &parts.cells, rough);
-    let fits = grid(12, &[10.0, 25.0, 60.0, 150.0, 350.0, 800.0], &[0.1, 0.3, 1.0, 3.0, 8.0])
+    let fits = grid(13, &[10.0, 25.0, 60.0, 150.0, 400.0], &[0.1, 0.3, 1.0, 3.0, 8.0])
         .into_iter()
         .filter_map(|air| {
             let fit = fleet.fit(&air)?;
             Some((air, fit.log_likelihood, fit))
         });
     let weighed: Vec<Weighed<Gls>> = weigh(fits);
-    if weighed.is_empty() {
-        return None;
-    }
+    let heaviest = weighed.first()?;
+    let evidence = heaviest.fit.log_likelihood - heaviest.weight.ln();
     let p = shape.parameters();
     let mut gain = DMatrix::zeros(p, fleet.pulse_us.len());
     for one in &weighed {
@@ -309,19 +313,17 @@ pub(super) fn fit(points: &[Point], drones: usize, shape: Shape) -> Option<Zero>
         laws.push(local.as_ref().and_then(|local| {
             let own = local.drones.get(drone)?.as_ref()?;
             let mut law = fleet_law;
-            law[0] += own.value[0];
-            law[1] += own.value[1];
+            law.iter_mut().zip(own.value.iter()).for_each(|(law, own)| *law += own);
             let mut answers = [[0.0; PARAMETERS]; DOUBTS];
             for (doubt, answer) in answers.iter_mut().enumerate() {
                 *answer = whole(&answers_fleet[doubt]);
-                answer[0] += own.answers[doubt][0];
-                answer[1] += own.answers[doubt][1];
+                answer.iter_mut().zip(own.answers[doubt]).for_each(|(all, own)| *all += own);
             }
             Some(DroneLaw { law, own: own.covariance, answers })
         }));
     }
     let answers = std::array::from_fn(|doubt| whole(&answers_fleet[doubt]));
-    let spread = local.as_ref().map_or_else(Matrix2::zeros, |local| local.spread);
+    let spread = local.as_ref().map_or_else(Matrix4::zeros, |local| local.spread);
     let interval = |value: fn(&Air) -> f64| {
         [0.025, 0.975].map(|share| quantile(&weighed, share, |one| value(&one.air)))
     };
@@ -339,6 +341,7 @@ pub(super) fn fit(points: &[Point], drones: usize, shape: Shape) -> Option<Zero>
             local_sd_mps: local.as_ref().map_or(0.0, |local| local.sd_mps),
         },
         width,
+        evidence,
         speeds_mps: [
             speeds.clone().fold(f64::INFINITY, f64::min),
             speeds.fold(f64::NEG_INFINITY, f64::max),
@@ -435,16 +438,16 @@ fn zero_width(
     high / sd
 }
 
-/// One drone's own constant and slope.
+/// One drone's own part of the parameters.
 struct Own {
-    value: Vector2<f64>,
-    covariance: Matrix2<f64>,
-    answers: [[f64; 2]; DOUBTS],
+    value: Vector4<f64>,
+    covariance: Matrix4<f64>,
+    answers: [[f64; PARAMETERS]; DOUBTS],
 }
 
 struct Local {
     drones: Vec<Option<Own>>,
-    spread: Matrix2<f64>,
+    spread: Matrix4<f64>,
     sd_mps: f64,
 }
 
@@ -463,38 +466,42 @@ fn local_air(
     let flown = of_drone.iter().filter(|own| !own.is_empty()).count();
     if flown < 2 {
         let none = || Own {
-            value: Vector2::zeros(),
-            covariance: Matrix2::zeros(),
-            answers: [[0.0; 2]; DOUBTS],
+            value: Vector4::zeros(),
+            covariance: Matrix4::zeros(),
+            answers: [[0.0; PARAMETERS]; DOUBTS],
         };
         return Some(Local {
             drones: of_drone.iter().map(|own| (!own.is_empty()).then(none)).collect(),
-            spread: Matrix2::zeros(),
+            spread: Matrix4::zeros(),
             sd_mps: 0.0,
         });
     }
     // Averages were taken from the same points: deviations are too small by this.
     let grow = (flown as f64 / (flown as f64 - 1.0)).sqrt();
+    let p = shape.parameters();
+    // A drone's bends differ little from the fleet's; its constant and slope are free.
+    let priors: &[usize] = if p > 2 { &[2, 3] } else { &[] };
     let record = |own: &[usize]| {
-        let n = own.len();
+        let (n, rows) = (own.len(), own.len() + priors.len());
+        let padded = |value: &dyn Fn(&Point) -> f64| -> Vec<f64> {
+            let windows = own.iter().map(|index| value(&points[*index]));
+            windows.chain(priors.iter().map(|_| 0.0)).collect()
+        };
+        let mut noise_us = padded(&|point| point.noise_us.max(LEAST_NOISE_US));
+        noise_us[n..].fill(OWN_BEND_SD);
         Record {
-            design: DMatrix::from_fn(
-                n,
-                2,
-                |row, column| {
-                    if column == 0 { 1.0 } else { split.own[own[row]] }
-                },
-            ),
-            pulse_us: DVector::from_fn(n, |row, _| {
-                grow * (pulses[own[row]] - parts.cells[split.cell_of[own[row]]])
+            design: DMatrix::from_fn(rows, p, |row, column| match own.get(row) {
+                Some(index) => shape.basis(points[*index].velocity_mps)[column],
+                None => f64::from(u8::from(priors[row - n] == column)),
             }),
-            noise_us: own.iter().map(|i| points[*i].noise_us.max(LEAST_NOISE_US)).collect(),
-            sensitivity: own
-                .iter()
-                .map(|i| rough_sensitivity(shape, rough, points[*i].velocity_mps))
-                .collect(),
-            time_s: own.iter().map(|i| points[*i].time_s).collect(),
-            height_m: own.iter().map(|i| points[*i].height_m).collect(),
+            pulse_us: DVector::from_fn(rows, |row, _| {
+                let rest = |index: &usize| pulses[*index] - parts.cells[split.cell_of[*index]];
+                own.get(row).map_or(0.0, |index| grow * rest(index))
+            }),
+            noise_us,
+            sensitivity: padded(&|point| rough_sensitivity(shape, rough, point.velocity_mps)),
+            time_s: padded(&|point| point.time_s),
+            height_m: padded(&|point| point.height_m),
             windows: n,
         }
     };
@@ -502,44 +509,50 @@ fn local_air(
         of_drone.iter().map(|own| (own.len() > 2).then(|| record(own))).collect();
     // A few dozen drones tell the scales as well as a thousand.
     let step = records.len().div_ceil(SCALE_DRONES).max(1);
-    let fits =
-        grid(9, &[10.0, 40.0, 160.0, 640.0], &[0.1, 0.4, 1.5, 6.0]).into_iter().filter_map(|air| {
+    let fits = grid(10, &[10.0, 40.0, 120.0, 360.0], &[0.1, 0.4, 1.5, 6.0]).into_iter().filter_map(
+        |air| {
             let mut sum = 0.0;
             for record in records.iter().step_by(step).flatten() {
                 sum += record.fit(&air)?.log_likelihood;
             }
             Some((air, sum, ()))
-        });
+        },
+    );
     let weighed = weigh(fits);
     let drones: Vec<Option<Own>> = of_drone
         .iter()
         .zip(&records)
         .map(|(own, record)| {
             let record = record.as_ref()?;
-            let mut gain = DMatrix::zeros(2, own.len());
-            let mut covariance = Matrix2::zeros();
+            let mut gain = DMatrix::zeros(p, record.pulse_us.len());
+            let mut covariance = Matrix4::zeros();
             for one in &weighed {
                 let fit = record.fit(&one.air)?;
                 gain += &fit.gain * one.weight;
-                covariance += fit.covariance.fixed_view::<2, 2>(0, 0) * one.weight;
+                for (row, column) in (0..p).flat_map(|row| (0..p).map(move |column| (row, column)))
+                {
+                    covariance[(row, column)] += fit.covariance[(row, column)] * one.weight;
+                }
             }
-            let apply = |values: DVector<f64>| {
+            let apply = |values: &DVector<f64>| {
                 let found = &gain * values;
-                Vector2::new(found[0], found[1])
+                Vector4::from_fn(|row, _| found.get(row).copied().unwrap_or(0.0))
             };
             let answers = std::array::from_fn(|doubt| {
                 let cells = &doubts[doubt].cells;
-                let answer = apply(DVector::from_fn(own.len(), |row, _| {
-                    points[own[row]].doubts_us[doubt] - cells[split.cell_of[own[row]]]
-                }));
-                [answer[0], answer[1]]
+                let rest =
+                    |index: &usize| points[*index].doubts_us[doubt] - cells[split.cell_of[*index]];
+                apply(&DVector::from_fn(record.pulse_us.len(), |row, _| {
+                    own.get(row).map_or(0.0, rest)
+                }))
+                .into()
             });
-            Some(Own { value: apply(record.pulse_us.clone()) / grow, covariance, answers })
+            Some(Own { value: apply(&record.pulse_us) / grow, covariance, answers })
         })
         .collect();
-    let known: Vec<Vector2<f64>> = drones.iter().flatten().map(|own| own.value).collect();
+    let known: Vec<Vector4<f64>> = drones.iter().flatten().map(|own| own.value).collect();
     let n = known.len() as f64;
-    let mut spread = Matrix2::zeros();
+    let mut spread = Matrix4::zeros();
     for value in &known {
         spread += value * value.transpose() / (n - 1.0).max(1.0);
     }
