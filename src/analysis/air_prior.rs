@@ -2,7 +2,7 @@
 //!
 //! Windows of a calibration follow a law that is linear in its parameters, plus `S W(t)` with the
 //! sensitivity `S` of the pulse and the air `W`, a Gaussian process with the covariance
-//! `sd² exp(-|dt|/tau - |dh|/H)`, plus white scatter. Neither of the three scales is known: each
+//! `sd² exp(-|dt|/tau)`, plus white scatter. Neither of the three scales is known: each
 //! choice on a grid gives a generalized least squares fit and the likelihood of the windows
 //! (restricted: the law's parameters are integrated out), which weighs it. Air that stays for longer
 //! than the flight cannot be told from the law's constant, and this is how it gets into that
@@ -10,8 +10,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Updrafts decorrelate over this height, m.
-const HEIGHT_SCALE_M: f64 = 150.0;
+/// Time scale that is most likely before the windows are seen, s: a few minutes, as over a field at
+/// show heights.
+const USUAL_TAU_S: f64 = 120.0;
+/// One standard deviation of its logarithm: a factor of 2.2.
+const TAU_SPREAD: f64 = 0.8;
 /// Above this, strong air is taken for less and less likely, m/s.
 const STRONG_MPS: f64 = 1.0;
 /// Choices with less than this share of the weight are dropped.
@@ -29,9 +32,12 @@ pub(super) struct Air {
 }
 
 impl Air {
-    /// Weight before the windows are seen: even in the logarithms of the scales, but for storms.
+    /// Weight before the windows are seen: any strength below that of a storm, and time scales of
+    /// minutes. One short flight cannot tell how slow the air is, and the error of the zero grows
+    /// with that, so that some knowledge must come from outside.
     fn prior(&self) -> f64 {
-        1.0 / (1.0 + (self.sd_mps / STRONG_MPS).powi(2))
+        let tau = (self.tau_s / USUAL_TAU_S).ln() / TAU_SPREAD;
+        (-0.5 * tau * tau).exp() / (1.0 + (self.sd_mps / STRONG_MPS).powi(2))
     }
 }
 
@@ -64,8 +70,9 @@ pub(super) struct Record {
     pub(super) sensitivity: Vec<f64>,
     /// Time of the windows, s.
     pub(super) time_s: Vec<f64>,
-    /// Height of the windows, m.
-    pub(super) height_m: Vec<f64>,
+    /// What one standard error of each doubted drift in time does to the windows, us: it must not be
+    /// taken for air when the scales are weighed.
+    pub(super) doubts_us: Vec<DVector<f64>>,
     /// Rows that are windows; the rest are priors.
     pub(super) windows: usize,
 }
@@ -88,10 +95,9 @@ impl Record {
         for row in 0..n {
             for column in 0..=row {
                 let dt = (self.time_s[row] - self.time_s[column]).abs() / air.tau_s;
-                let dh = (self.height_m[row] - self.height_m[column]).abs() / HEIGHT_SCALE_M;
                 let mut value = self.sensitivity[row] * self.sensitivity[column];
                 if value != 0.0 {
-                    value *= air.sd_mps.powi(2) * (-dt - dh).exp();
+                    value *= air.sd_mps.powi(2) * (-dt).exp();
                 }
                 if row == column {
                     let white = if row < self.windows { air.white_us } else { 0.0 };
@@ -107,22 +113,31 @@ impl Record {
     /// Generalized least squares with one choice of the scales; `None` if the windows do not
     /// determine the law.
     pub(super) fn fit(&self, air: &Air) -> Option<Gls> {
-        let factor: Cholesky<f64, Dyn> = self.covariance(air).cholesky()?;
+        let mut covariance = self.covariance(air);
+        let fit = self.solve(covariance.clone())?;
+        if self.doubts_us.is_empty() {
+            return Some(fit);
+        }
+        for doubt in &self.doubts_us {
+            covariance += doubt * doubt.transpose();
+        }
+        let log_likelihood = self.solve(covariance)?.log_likelihood;
+        Some(Gls { log_likelihood, ..fit })
+    }
+
+    fn solve(&self, covariance: DMatrix<f64>) -> Option<Gls> {
+        let factor: Cholesky<f64, Dyn> = covariance.cholesky()?;
         let whitened = factor.solve(&self.design);
         let normal = (self.design.transpose() * &whitened).cholesky()?;
         let gain = normal.solve(&whitened.transpose());
-        let parameters = &gain * &self.pulse_us;
-        let residual = &self.pulse_us - &self.design * parameters;
+        let residual = &self.pulse_us - &self.design * (&gain * &self.pulse_us);
         let chi2 = residual.dot(&factor.solve(&residual));
         let log_determinant = |factor: &Cholesky<f64, Dyn>| {
             2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>()
         };
         let log_likelihood = -0.5 * (log_determinant(&factor) + log_determinant(&normal) + chi2);
-        log_likelihood.is_finite().then(|| Gls {
-            gain,
-            covariance: normal.inverse(),
-            log_likelihood,
-        })
+        let covariance = normal.inverse();
+        log_likelihood.is_finite().then_some(Gls { gain, covariance, log_likelihood })
     }
 }
 
@@ -188,7 +203,7 @@ mod tests {
             noise_us: vec![1.0; n],
             sensitivity: vec![10.0; n],
             time_s: (0..n).map(|index| 10.0 * index as f64).collect(),
-            height_m: vec![20.0; n],
+            doubts_us: Vec::new(),
             windows: n,
         }
     }
@@ -204,6 +219,19 @@ mod tests {
         // m/s, 0.5 m/s.
         let slow = record.fit(&Air { sd_mps: 0.5, tau_s: 1e7, white_us: 0.0 }).unwrap();
         assert!((slow.covariance[(0, 0)] - 25.25).abs() < 0.01, "{}", slow.covariance);
+    }
+
+    #[test]
+    fn a_doubted_drift_is_not_taken_for_air() {
+        let mut record = record(&[0.0, 2.0, 4.0, 6.0, 8.0]);
+        let air = Air { sd_mps: 0.3, tau_s: 100.0, white_us: 0.3 };
+        let calm = Air { sd_mps: 0.01, ..air };
+        let prefers_air = |record: &Record| {
+            record.fit(&air).unwrap().log_likelihood - record.fit(&calm).unwrap().log_likelihood
+        };
+        assert!(prefers_air(&record) > 1.0);
+        record.doubts_us = vec![DVector::from_fn(5, |row, _| 4.0 * row as f64)];
+        assert!(prefers_air(&record) < 0.0);
     }
 
     #[test]

@@ -93,6 +93,8 @@ impl<'a> Aware<'a> {
             .map(|slope| slope.value)
             .collect();
         let slope = if slopes.is_empty() { TYPICAL_SLOPE } else { mean_sd(&slopes).0 };
+        let mut packs = reference.drones.iter().filter_map(|drone| pack_of(drone, battery));
+        let sigmas = corrections.sigmas(packs.next().as_ref());
         let points_of = |hovers| points(reference, &corrections, battery, slope, hovers);
         let shape = match law {
             Some(MapLaw::Linear) => Shape::Line,
@@ -101,7 +103,7 @@ impl<'a> Aware<'a> {
             // about its parameters.
             None => {
                 let evidence = |shape: Shape| {
-                    zero::fit(&points_of(false), reference.drones.len(), shape)
+                    zero::fit(&points_of(false), reference.drones.len(), shape, &sigmas)
                         .map_or(f64::NEG_INFINITY, |zero| zero.evidence)
                 };
                 let (line, square) = (evidence(Shape::Line), evidence(Shape::SignedQuadratic));
@@ -109,7 +111,7 @@ impl<'a> Aware<'a> {
             }
         };
         let points = points_of(shape == Shape::Line);
-        let zero = zero::fit(&points, reference.drones.len(), shape)?;
+        let zero = zero::fit(&points, reference.drones.len(), shape, &sigmas)?;
         Some(Self { reference, corrections, zero, battery, slope })
     }
 
@@ -343,7 +345,6 @@ fn point(
         drone,
         key,
         time_s: f64::midpoint(window.start_s, window.end_s),
-        height_m: window.height_m,
         velocity_mps: referred.velocity_mps,
         pulse_us: referred.pulse_us,
         noise_us: window.pulse_phi_us.se.hypot(slope * window.velocity_mps.se),

@@ -126,7 +126,7 @@ impl Quality {
             Self::LowBattery => "the battery was nearly empty",
             Self::Gap => "the log has a gap",
             Self::Incomplete => "the log ends early",
-            Self::Manoeuvre => "it moved up or down",
+            Self::Manoeuvre => "it moved up and down",
             Self::Misaligned => "its clock may be off",
             Self::Drift => "the pulse drifted",
             Self::NoVoltage => "no battery voltage in the log",

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use super::air_prior::{Air, Gls, Record, Weighed, grid, quantile, weigh};
-use super::corrections::DOUBTS;
+use super::corrections::{BATTERY, DOUBTS, DRIFT};
 use super::result::CalibrationAir;
 
 /// Parameters of the fleet's law at most: constant, slope, bends.
@@ -93,7 +93,6 @@ pub(super) struct Point {
     /// What was commanded, and its count among equals: the same for all drones of the fleet.
     pub(super) key: (String, usize),
     pub(super) time_s: f64,
-    pub(super) height_m: f64,
     pub(super) velocity_mps: f64,
     pub(super) pulse_us: f64,
     /// Standard error of pulse and velocity together, us.
@@ -135,7 +134,6 @@ pub(super) struct Zero {
 /// Averages over drones of what was flown at the same time.
 struct Cell {
     time_s: f64,
-    height_m: f64,
     velocity_mps: f64,
     members: Vec<usize>,
 }
@@ -149,12 +147,7 @@ fn cells(points: &[Point]) -> (Vec<Cell>, Vec<usize>) {
         let near = |cell: &&usize| (cells[**cell].time_s - point.time_s).abs() < SAME_TIME_S;
         let cell = same.iter().find(near).copied().unwrap_or_else(|| {
             same.push(cells.len());
-            cells.push(Cell {
-                time_s: point.time_s,
-                height_m: 0.0,
-                velocity_mps: 0.0,
-                members: Vec::new(),
-            });
+            cells.push(Cell { time_s: point.time_s, velocity_mps: 0.0, members: Vec::new() });
             cells.len() - 1
         });
         cells[cell].members.push(index);
@@ -165,8 +158,7 @@ fn cells(points: &[Point]) -> (Vec<Cell>, Vec<usize>) {
         let mean = |value: fn(&Point) -> f64| {
             cell.members.iter().map(|index| value(&points[*index])).sum::<f64>() / n
         };
-        let (height, velocity) = (mean(|p| p.height_m), mean(|p| p.velocity_mps));
-        (cell.height_m, cell.velocity_mps) = (height, velocity);
+        cell.velocity_mps = mean(|point| point.velocity_mps);
     }
     (cells, cell_of)
 }
@@ -251,7 +243,14 @@ fn rough_slope(split: &Split, points: &[Point]) -> f64 {
 }
 
 /// Fits the fleet. `None` if the windows do not determine a law.
-pub(super) fn fit(points: &[Point], drones: usize, shape: Shape) -> Option<Zero> {
+///
+/// `sigmas` are the standard errors of the doubts ([`Point::doubts_us`]).
+pub(super) fn fit(
+    points: &[Point],
+    drones: usize,
+    shape: Shape,
+    sigmas: &[f64; DOUBTS],
+) -> Option<Zero> {
     if points.is_empty() {
         return None;
     }
@@ -266,13 +265,18 @@ pub(super) fn fit(points: &[Point], drones: usize, shape: Shape) -> Option<Zero>
         points.iter().enumerate().map(|(index, p)| aligned(index, p.pulse_us)).collect();
     let parts = split.of(points, &pulses);
 
-    let fleet = fleet_record(shape, points, &split, &parts.cells, rough);
-    let fits = grid(13, &[10.0, 25.0, 60.0, 150.0, 400.0], &[0.1, 0.3, 1.0, 3.0, 8.0])
-        .into_iter()
-        .filter_map(|air| {
-            let fit = fleet.fit(&air)?;
-            Some((air, fit.log_likelihood, fit))
-        });
+    let doubts: Vec<Parts> = (0..DOUBTS)
+        .map(|doubt| {
+            let values: Vec<f64> = points.iter().map(|point| point.doubts_us[doubt]).collect();
+            split.of(points, &values)
+        })
+        .collect();
+    let fleet = fleet_record(shape, points, &split, &parts.cells, (&doubts, sigmas), rough);
+    let taus_s = [8.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0];
+    let fits = grid(13, &taus_s, &[0.1, 0.3, 1.0, 3.0, 8.0]).into_iter().filter_map(|air| {
+        let fit = fleet.fit(&air)?;
+        Some((air, fit.log_likelihood, fit))
+    });
     let weighed: Vec<Weighed<Gls>> = weigh(fits);
     let heaviest = weighed.first()?;
     let evidence = heaviest.fit.log_likelihood - heaviest.weight.ln();
@@ -289,12 +293,6 @@ pub(super) fn fit(points: &[Point], drones: usize, shape: Shape) -> Option<Zero>
     }
     let width = zero_width(&weighed, &fleet, &parameters, &common);
 
-    let doubts: Vec<Parts> = (0..DOUBTS)
-        .map(|doubt| {
-            let values: Vec<f64> = points.iter().map(|point| point.doubts_us[doubt]).collect();
-            split.of(points, &values)
-        })
-        .collect();
     let local = local_air(shape, points, &split, &pulses, &parts, &doubts, rough);
     let answer = |parts: &Parts| -> Vec<f64> {
         let mut column = DVector::zeros(fleet.pulse_us.len());
@@ -361,6 +359,7 @@ fn fleet_record(
     points: &[Point],
     split: &Split,
     means: &[f64],
+    (doubts, sigmas): (&[Parts], &[f64; DOUBTS]),
     rough: f64,
 ) -> Record {
     let p = shape.parameters();
@@ -372,7 +371,7 @@ fn fleet_record(
     let mut design = DMatrix::zeros(n, p);
     let mut pulse_us = DVector::zeros(n);
     let (mut noise, mut sensitivity) = (Vec::new(), Vec::new());
-    let (mut time_s, mut height_m) = (Vec::new(), Vec::new());
+    let mut time_s = Vec::new();
     for (row, (cell, mean)) in split.cells.iter().zip(means).enumerate() {
         for (column, value) in shape.basis(cell.velocity_mps).into_iter().take(p).enumerate() {
             design[(row, column)] = value;
@@ -381,17 +380,20 @@ fn fleet_record(
         noise.push(noise_us(points, &cell.members));
         sensitivity.push(rough_sensitivity(shape, rough, cell.velocity_mps));
         time_s.push(cell.time_s);
-        height_m.push(cell.height_m);
     }
     for (row, (parameter, sd)) in priors.iter().enumerate() {
         design[(means.len() + row, *parameter)] = 1.0;
         noise.push(*sd);
         sensitivity.push(0.0);
         time_s.push(0.0);
-        height_m.push(0.0);
     }
     let windows = means.len();
-    Record { design, pulse_us, noise_us: noise, sensitivity, time_s, height_m, windows }
+    let column = |doubt: &Parts, sigma: f64| {
+        DVector::from_fn(n, |row, _| sigma * doubt.cells.get(row).copied().unwrap_or(0.0))
+    };
+    let drifts = [BATTERY, DRIFT].into_iter();
+    let doubts_us = drifts.map(|drift| column(&doubts[drift], sigmas[drift])).collect();
+    Record { design, pulse_us, noise_us: noise, sensitivity, time_s, doubts_us, windows }
 }
 
 fn rough_sensitivity(shape: Shape, rough: f64, air_mps: f64) -> f64 {
@@ -501,7 +503,7 @@ fn local_air(
             noise_us,
             sensitivity: padded(&|point| rough_sensitivity(shape, rough, point.velocity_mps)),
             time_s: padded(&|point| point.time_s),
-            height_m: padded(&|point| point.height_m),
+            doubts_us: Vec::new(),
             windows: n,
         }
     };
