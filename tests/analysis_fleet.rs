@@ -33,6 +33,8 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
         density: None,
         leaning: None,
         thrust_exponent: None,
+        sag: None,
+        lean_table: None,
         folder: None,
     }
 }

@@ -14,7 +14,7 @@ use analysis_support::{
 };
 use updraft::analysis::calibrate::{FitOptions, Location, Weights};
 use updraft::analysis::result::{
-    Analysis, Fit, FlightAnalysis, Rejection, UnusedLog, WindowStats, Yield,
+    Analysis, Fit, FlightAnalysis, Quality, Rejection, UnusedLog, WindowStats, Yield,
 };
 use updraft::analysis::{
     AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, OffsetRule, analyze,
@@ -34,6 +34,8 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
         density: None,
         leaning: None,
         thrust_exponent: None,
+        sag: None,
+        lean_table: None,
         folder: None,
     }
 }
@@ -621,8 +623,11 @@ fn a_rejected_hover_gives_no_value_and_says_why() {
     fn climbs(_: f64) -> f64 {
         0.25
     }
+    fn pinned(_: f64) -> f64 {
+        1950.0
+    }
     let cases: [(OfTime, OfTime, f64, &str); 3] = [
-        (touches, still, 264.0, "a motor touched its limit"),
+        (pinned, still, 264.0, "a motor touched its limit"),
         (calm, swings, 264.0, "it moved up and down"),
         (calm, still, 12.0, "too short"),
     ];
@@ -636,6 +641,16 @@ fn a_rejected_hover_gives_no_value_and_says_why() {
         assert_eq!(values + flight.unmeasured.len(), 2, "{reason}");
         assert_eq!(analysis.what_was_found(), Yield::Partial, "{reason}");
     }
+    // A bad part costs its seconds, and a flag says so; the drone keeps the rest.
+    let partly = measured(touches, still, 264.0);
+    assert!(partly.flights[1].unmeasured.is_empty(), "{:?}", partly.flights[1].unmeasured);
+    let map = partly.flights[1].map.as_ref().unwrap();
+    let drone = map.drones.iter().find(|drone| drone.slot == Some(2)).unwrap();
+    let flag = drone.quality.iter().find(|flag| flag.flag == Quality::Saturation).unwrap();
+    assert_eq!(flag.reason, "a motor touched its limit: no values from 96 to 105 s");
+    let lost = |index: &usize| drone.updraft_mps[*index].is_none();
+    let lost = (0..map.time_s.len()).filter(lost).map(|index| map.time_s[index]);
+    assert_eq!(lost.collect::<Vec<_>>(), (96..=105).map(f64::from).collect::<Vec<_>>());
     let whole = measured(calm, climbs, 264.0);
     assert!(whole.flights[1].unmeasured.is_empty(), "{:?}", whole.flights[1].unmeasured);
 }

@@ -9,12 +9,16 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::account::{self, Account};
+use super::aware::{Aware, Measured};
+use super::battery::Sag;
 use super::calibrate::{self, FitOptions, Location, PaperTable, Weights};
 use super::caution::{fit_cautions, tilt_caution, wind_caution};
+use super::corrections::Corrections;
 use super::density::Density;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
 use super::ladder::mark_partial;
 use super::law::{LINEAR, SIGNED_QUADRATIC};
+use super::lean_table::LeanTable;
 use super::prefer::{better_law, describes};
 use super::refer::refer_calibration;
 use super::result::{
@@ -23,6 +27,7 @@ use super::result::{
 };
 use super::slots::{SlotMatch, match_slots};
 use super::statistics::{StatisticsOptions, of_map};
+use super::truth;
 use super::updraft::{self, DroneSeries};
 use super::wind::Leaning;
 use super::windows::{Tilt, WindowOptions};
@@ -69,6 +74,11 @@ pub struct FlightInput<'a> {
     /// Power of thrust that `u - 1000` goes with, where the vehicle is known: 1 where thrust is linear
     /// in the pulse.
     pub thrust_exponent: Option<f64>,
+    /// How the battery acts on the pulse; `None`: it does not, or is not to be corrected for.
+    pub sag: Option<Sag>,
+    /// What wind does to the vehicle's pulse, where its physics is known and [`FlightInput::leaning`]
+    /// does not say.
+    pub lean_table: Option<&'a LeanTable>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
 }
@@ -79,7 +89,7 @@ impl FlightInput<'_> {
         match indicator {
             Indicator::Pulse => *self,
             Indicator::RotorSpeed | Indicator::Power => {
-                Self { density: None, leaning: None, ..*self }
+                Self { density: None, leaning: None, sag: None, lean_table: None, ..*self }
             }
         }
     }
@@ -133,6 +143,9 @@ pub struct AnalysisOptions {
     pub paper: Option<PaperTable>,
     /// How statistics of a map are made.
     pub statistics: StatisticsOptions,
+    /// Whether the map's calibration law knows about slow air and the map has errors with their
+    /// origins; else the laws of the tables are inverted, as in the paper.
+    pub air_aware: bool,
     /// Most points of a trace for figures.
     pub trace_points: usize,
 }
@@ -179,6 +192,7 @@ impl Default for AnalysisOptions {
             map_law: None,
             paper: None,
             statistics: StatisticsOptions::default(),
+            air_aware: true,
             trace_points: 1200,
         }
     }
@@ -313,8 +327,21 @@ pub fn analyze_flight(
         .filter(|_| input.density.is_some() || input.leaning.is_some())
         .map(|found| refer_calibration(input.density, input.leaning, found, &options.fit));
     let map_reference = referred.as_ref().or(reference);
-    let map_law = options.map_law.or_else(|| map_reference.map(better_law));
-    let shared = Shared { input, options, reference, map_reference, planned_purpose, map_law };
+    let corrections = Corrections {
+        density: input.density,
+        leaning: input.leaning,
+        lean_table: input.lean_table,
+        has_battery: input.sag.is_some(),
+    };
+    let aware = reference
+        .filter(|_| options.air_aware && planned_purpose != Some(Purpose::Calibration))
+        .and_then(|found| Aware::new(found, corrections, input.sag, options.map_law));
+    let map_law = options
+        .map_law
+        .or_else(|| aware.as_ref().map(Aware::law))
+        .or_else(|| map_reference.map(better_law));
+    let shared =
+        Shared { input, options, reference, map_reference, planned_purpose, map_law, aware };
 
     let done = AtomicUsize::new(0);
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
@@ -471,7 +498,10 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         Some(truth_mps) => Some(vec![truth_mps; times.len()]),
         None => shared.input.truth?.get(&slot?)?.at(&times),
     };
-    let drones = updrafts
+    let measured: Vec<&Measured> =
+        series.iter().filter_map(|series| series.measured.as_ref()).collect();
+    let aware = shared.aware.as_ref().filter(|_| !measured.is_empty());
+    let drones: Vec<DroneUpdraft> = updrafts
         .into_iter()
         .map(|(slot, name, position_m, series, mapping)| DroneUpdraft {
             slot,
@@ -480,14 +510,20 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             height_m: series.height_m,
             mapping: mapping.to_owned(),
             mean: series.mean,
-            mean_interval_mps: None,
-            errors: ErrorBudget::default(),
+            mean_interval_mps: series.measured.as_ref().map(|one| one.mean_interval_mps),
+            errors: series.measured.as_ref().map_or_else(ErrorBudget::default, |one| one.errors),
             systematic_mps: series.systematic_mps,
             tilt_deg: series.tilt_deg,
             updraft_mps: series.at(&times),
-            sd_mps: Vec::new(),
-            interval_mps: Vec::new(),
-            quality: Vec::new(),
+            sd_mps: series
+                .measured
+                .as_ref()
+                .map_or_else(Vec::new, |one| series.spread(&one.sd_mps, &times)),
+            interval_mps: series
+                .measured
+                .as_ref()
+                .map_or_else(Vec::new, |one| series.spread(&one.interval_mps, &times)),
+            quality: series.measured.as_ref().map_or_else(Vec::new, |one| one.quality.clone()),
             truth_mps: truth_of(slot),
         })
         .collect();
@@ -501,10 +537,10 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         density: shared.input.density,
         flock: shared.map_reference.and_then(|reference| reference.flock.clone()),
         time_s: times.iter().map(|time| *time as f64).collect(),
+        battery: aware.and_then(|aware| aware.battery),
+        calibration_air: aware.map(|aware| aware.zero.air),
+        common: aware.map(|aware| aware.common(&measured)),
+        truth: truth::check(&drones),
         drones,
-        battery: None,
-        calibration_air: None,
-        common: None,
-        truth: None,
     }
 }

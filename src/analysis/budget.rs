@@ -70,6 +70,17 @@ pub struct CalibrationAir {
     pub local_sd_mps: f64,
 }
 
+/// The battery in a window.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Supply {
+    /// Mean voltage without load, V: as logged, else from voltage, current and resistance.
+    pub resting_v: f64,
+    /// Mean electrical power, W; 0 where no current was logged.
+    pub power_w: f64,
+    /// Resistance of the pack, ohm; 0 where it is not known.
+    pub resistance_ohm: f64,
+}
+
 /// How pulses were referred to one battery voltage: `u - 1000` goes with `(V_ref / V)^exponent`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BatteryCorrection {
@@ -115,7 +126,7 @@ impl Quality {
             Self::LowBattery => "the battery was nearly empty",
             Self::Gap => "the log has a gap",
             Self::Incomplete => "the log ends early",
-            Self::Manoeuvre => "it moved up or down",
+            Self::Manoeuvre => "it moved up and down",
             Self::Misaligned => "its clock may be off",
             Self::Drift => "the pulse drifted",
             Self::NoVoltage => "no battery voltage in the log",

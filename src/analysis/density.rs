@@ -34,6 +34,11 @@ impl Density {
         (here / density_ratio(self.ground_amsl_m)).powf(self.exponent)
     }
 
+    /// Logarithm of the density at a height above ground over that at the ground.
+    pub(super) fn log_ratio(self, height_m: f64) -> f64 {
+        (density_ratio(self.ground_amsl_m + height_m) / density_ratio(self.ground_amsl_m)).ln()
+    }
+
     /// A pulse width measured at a height above ground, referred to the ground, us.
     pub fn refer_us(self, pulse_us: f64, height_m: f64) -> f64 {
         NO_THRUST_US + (pulse_us - NO_THRUST_US) * self.factor(height_m)

@@ -1,7 +1,9 @@
 //! One log of a flight: windows, laws and (with reference laws) the air.
 
 use super::analyze::{AnalysisOptions, FlightInput, LogInput, MapLaw};
+use super::aware::Aware;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
+use super::hover::Hover;
 use super::offset::OffsetMap;
 use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats};
 use super::statistics::HoverSeen;
@@ -22,6 +24,8 @@ pub(super) struct Shared<'a> {
     pub(super) map_reference: Option<&'a FlightAnalysis>,
     pub(super) planned_purpose: Option<Purpose>,
     pub(super) map_law: Option<MapLaw>,
+    /// The calibration with what it tells about errors, for the map.
+    pub(super) aware: Option<Aware<'a>>,
 }
 
 /// What one log gave.
@@ -127,6 +131,14 @@ fn measure(
         .and_then(|law| law_fit(laws, law))
         .ok_or("the calibration has no fit of the law that the map uses")?;
     let hover = updraft::hover(seen.targets).ok_or("no hover was found in the flight")?;
+    if let Some(aware) = &shared.aware {
+        let seconds = Hover::of(seen.flight, hover, &shared.options.windows);
+        let measured = aware.measure(seen.flight, &seconds, slot, name)?;
+        let mapping = if measured.is_own { mapping } else { FLOCK };
+        let systematic_mps = 2.0 * measured.errors.wind_mps;
+        let series = updraft::with_errors(seen.flight, hover, measured, systematic_mps);
+        return Ok((series, mapping));
+    }
     let window = seen.windows.iter().find(|window| {
         window.kind.is_hover() && window.start_s == hover.start_s && window.end_s == hover.end_s
     });

@@ -4,15 +4,23 @@
 //! to the map of the air (a measurement, with the laws of a calibration). [`analyze`] does a campaign.
 
 mod account;
+mod air_prior;
 mod analyze;
+mod aware;
+pub mod battery;
 pub mod budget;
 pub mod calibrate;
 mod caution;
+mod corrections;
+#[cfg(test)]
+mod coverage_tests;
 pub mod density;
 mod drone;
 pub mod fit;
+mod hover;
 mod ladder;
 pub mod law;
+pub mod lean_table;
 mod matching;
 pub mod offset;
 pub mod prefer;
@@ -22,9 +30,11 @@ mod slots;
 pub mod statistics;
 mod stats;
 mod steps;
+mod truth;
 pub mod updraft;
 pub mod wind;
 pub mod windows;
+mod zero;
 
 pub use analyze::{
     AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, OffsetRule, Progress,

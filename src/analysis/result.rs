@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use super::budget::{
-    BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, TruthCheck,
+    BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, Supply,
+    TruthCheck,
 };
 use super::density::Density;
 use super::offset::OffsetMap;
@@ -282,6 +283,9 @@ pub struct WindowStats {
     /// The window lies outside the 0-windows: its offset is the nearest one's.
     #[serde(default)]
     pub offset_outside: bool,
+    /// The battery in the window, where it was logged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply: Option<Supply>,
     /// Why the window is not used in fits; empty: it is used (if it is of the fitted kind).
     pub rejected: Vec<Rejection>,
 }

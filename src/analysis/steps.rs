@@ -24,7 +24,8 @@ pub(super) fn steady(flight: &Flight, steps: &Steps) -> Vec<Target> {
     for (time_s, velocity_mps) in smoothed(&flight.velocity_up_mps) {
         let mean = run.iter().map(|(_, value)| value).sum::<f64>() / run.len().max(1) as f64;
         let follows = run.last().is_some_and(|(last, _)| time_s - last < 2.0 * STEP_S);
-        if !run.is_empty() && !(follows && (velocity_mps - mean).abs() <= steps.wobble_mps) {
+        let goes_on = follows && (velocity_mps - mean).abs() <= steps.wobble_mps;
+        if !run.is_empty() && !goes_on {
             targets.extend(target(&run, steps));
             run.clear();
         }

@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::aware::Measured;
 use super::law::Law;
 use super::result::{Fit, WindowStats};
 use super::stats::{block_error, mean_sd};
@@ -27,7 +28,7 @@ const LONGEST_S: usize = 200_000;
 const STEEP_MPS: f64 = 0.05;
 
 /// One drone's updraft on the 1 s grid, before the fleet's common times are known.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct DroneSeries {
     /// Whole second of show time of the first bin; bin k covers [k - 0.5, k + 0.5).
     pub first_s: i64,
@@ -41,6 +42,8 @@ pub struct DroneSeries {
     pub tilt_deg: f64,
     /// Mean height above home, m.
     pub height_m: f64,
+    /// Errors, where the calibration tells them.
+    pub(super) measured: Option<Measured>,
 }
 
 /// What the lean of a drone does to its estimate.
@@ -125,7 +128,27 @@ pub fn estimate(
         systematic_mps: wind::systematic_mps(lean.leaning, law, at_hover, lean.calibration),
         tilt_deg,
         height_m: mean_sd(flight.height_m.between(hover.start_s, hover.end_s)).0,
+        measured: None,
     })
+}
+
+/// The same from a calibration that knows its errors.
+pub(super) fn with_errors(
+    flight: &Flight,
+    hover: &Target,
+    measured: Measured,
+    systematic_mps: f64,
+) -> DroneSeries {
+    let mean = |series: &Series| mean_sd(series.between(hover.start_s, hover.end_s)).0;
+    DroneSeries {
+        first_s: measured.first_s,
+        updraft_mps: measured.updraft_mps.clone(),
+        mean: Estimate::new(measured.mean_mps, measured.errors.total_mps),
+        systematic_mps,
+        tilt_deg: lean_deg(mean(&flight.roll_rad), mean(&flight.pitch_rad)),
+        height_m: mean(&flight.height_m),
+        measured: Some(measured),
+    }
 }
 
 /// Error of `f⁻¹(u)` from the covariance of the law's parameters, m/s.
@@ -151,7 +174,7 @@ fn law_error_mps(law: Law, fit: &Fit, pulse_us: f64) -> f64 {
 }
 
 /// Time-weighted running means by prefix sums, so that the logging rate does not matter.
-struct Running<'a> {
+pub(super) struct Running<'a> {
     times: &'a [f64],
     /// Integral of the piecewise linear signal up to each sample.
     integral: Vec<f64>,
@@ -160,7 +183,7 @@ struct Running<'a> {
 }
 
 impl<'a> Running<'a> {
-    fn new(series: &'a Series, start_s: f64, end_s: f64) -> Self {
+    pub(super) fn new(series: &'a Series, start_s: f64, end_s: f64) -> Self {
         let range = series.range(start_s - GAP_S, end_s + GAP_S);
         let times = series.time_s.get(range.clone()).unwrap_or_default();
         let values = series.value.get(range).unwrap_or_default();
@@ -184,7 +207,7 @@ impl<'a> Running<'a> {
     }
 
     /// Mean over the full window centred on a time; `None` across gaps and beyond the ends.
-    fn mean(&self, centre_s: f64) -> Option<f64> {
+    pub(super) fn mean(&self, centre_s: f64) -> Option<f64> {
         let half = RUNNING_S / 2.0;
         let first = self.times.partition_point(|time| *time < centre_s - half);
         let last = self.times.partition_point(|time| *time <= centre_s + half).checked_sub(1)?;
@@ -212,9 +235,14 @@ pub fn common_times(drones: &[DroneSeries]) -> Vec<i64> {
 impl DroneSeries {
     /// The estimates at common times, `None` outside the drone's own.
     pub fn at(&self, times_s: &[i64]) -> Vec<Option<f64>> {
+        self.spread(&self.updraft_mps, times_s)
+    }
+
+    /// Values of the drone's own seconds at common times.
+    pub(super) fn spread<T: Copy>(&self, own: &[Option<T>], times_s: &[i64]) -> Vec<Option<T>> {
         let value = |time: &i64| {
             let index = usize::try_from(time - self.first_s).ok()?;
-            self.updraft_mps.get(index).copied().flatten()
+            own.get(index).copied().flatten()
         };
         times_s.iter().map(value).collect()
     }

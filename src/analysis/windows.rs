@@ -4,6 +4,7 @@
 //! The paper's rule: of a leg the last 10 s without the last second; of a hover all but the first
 //! 3 s (the controller's overshoot) and the last second.
 
+use super::battery;
 use super::result::{Rejection, SampleStats, WindowStats};
 use super::stats::sample_stats;
 use crate::flight::{Flight, Indicator, Series};
@@ -385,6 +386,7 @@ fn measure_one(
         ),
         offset_us: None,
         offset_outside: false,
+        supply: battery::supply(flight, start, end),
         rejected,
     }
 }

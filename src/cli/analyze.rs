@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::found::{Found, Work, find, find_tables, stem};
 use super::fields::{read_study, write_fields};
+use super::found::{Found, Work, find, find_tables, stem};
 use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::provenance::provenance;
@@ -71,6 +71,7 @@ pub(super) struct AnalyzeArgs {
 /// How to analyse.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Analysis")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch on the command line")]
 pub(super) struct AnalyzeOptions {
     /// Law for the map of the air
     #[arg(long, value_enum, default_value_t = LawChoice::Auto)]
@@ -85,7 +86,10 @@ pub(super) struct AnalyzeOptions {
     /// Do not correct the map for air density at different heights
     #[arg(long)]
     no_density: bool,
-    /// Do not correct the map for wind on leaning drones (simulated flights of known drag)
+    /// Do not correct the map for the battery's voltage
+    #[arg(long)]
+    no_battery: bool,
+    /// Do not correct the map for wind on leaning drones (vehicles of known drag)
     #[arg(long)]
     no_wind: bool,
     /// Subtract the pulse's slow offset over time and height (the paper's eq. 5) before laws are
@@ -93,7 +97,8 @@ pub(super) struct AnalyzeOptions {
     #[arg(long, value_enum, default_value_t = OffsetChoice::Field)]
     offset: OffsetChoice,
     /// Windows as in the paper: medians (means where the offset is subtracted), weighted by the
-    /// samples' standard deviation, tilt as --tilt paper
+    /// samples' standard deviation, tilt as --tilt paper; the
+    /// map from those laws alone
     #[arg(long)]
     paper: bool,
 }
@@ -177,6 +182,7 @@ impl AnalyzeOptions {
             OffsetChoice::Never => OffsetRule::Never,
         };
         options.paper_windows = self.paper;
+        options.air_aware = !self.paper;
         options
     }
 }
@@ -228,11 +234,8 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
     if let Some(mapping) = &args.csv {
         options.indicator = find_tables(mapping, &mut work)?.into();
     }
-    let first = match (&args.csv, args.paths.first()) {
-        (Some(first), _) | (None, Some(first)) => first,
-        (None, None) => {
-            return Err(CommandError::Usage("give a campaign, logs or --csv".to_owned()));
-        }
+    let Some(first) = args.csv.as_ref().or(args.paths.first()) else {
+        return Err(CommandError::Usage("give a campaign, logs or --csv".to_owned()));
     };
     if args.paths.len() < 2 {
         work.root = if first.is_dir() {
@@ -296,6 +299,8 @@ fn finish(
             density: flight.density.filter(|_| !options.no_density),
             leaning: flight.leaning.filter(|_| !options.no_wind),
             thrust_exponent: flight.thrust_exponent,
+            sag: flight.sag.filter(|_| !options.no_battery),
+            lean_table: flight.lean_table.as_ref().filter(|_| !options.no_wind),
             folder: Some(&work.root),
         })
         .collect();

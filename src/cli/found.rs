@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::exit::CommandError;
-use super::leaning::leaning;
+use super::leaning::{lean_table, leaning};
 use super::load::has_extension;
+use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
+use crate::analysis::lean_table::LeanTable;
 use crate::analysis::wind::Leaning;
 use crate::analysis::{LogInput, TruthSeries};
 use crate::base::file::FileError;
@@ -39,6 +41,8 @@ pub(super) struct Found {
     pub(super) leaning: Option<Leaning>,
     /// Power of thrust that `u - 1000` goes with.
     pub(super) thrust_exponent: Option<f64>,
+    pub(super) sag: Option<Sag>,
+    pub(super) lean_table: Option<LeanTable>,
     /// What is doubtful about the files, one sentence each.
     pub(super) notes: Vec<String>,
 }
@@ -90,6 +94,8 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         density: plan.map(|plan| density(plan, None)),
         leaning: None,
         thrust_exponent: None,
+        sag: plan.map(|_| Sag::default()),
+        lean_table: None,
         notes: Vec::new(),
     });
     Ok(())
@@ -127,6 +133,8 @@ pub(super) fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, Com
             density: None,
             leaning: None,
             thrust_exponent: None,
+            sag: None,
+            lean_table: None,
             notes: Vec::new(),
         }
     }));
@@ -159,6 +167,8 @@ fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
     };
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
+        sag: sag(flown.is_some(), vehicle.as_ref()),
+        lean_table: vehicle.as_ref().and_then(|vehicle| lean_table(&plan, vehicle)),
         density: Some(density(&plan, vehicle.as_ref())),
         thrust_exponent: vehicle.as_ref().and_then(linear_thrust),
         name: plan.name.clone(),
@@ -240,6 +250,16 @@ fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
     Density {
         ground_amsl_m: plan.site.ground_amsl_m,
         exponent: if linear { 1.0 } else { REAL_ROTOR_EXPONENT },
+    }
+}
+
+/// How the battery acts on the pulse. Simulated drones without a battery in their physics log one
+/// that does nothing; real ones have one that does.
+fn sag(is_simulated: bool, vehicle: Option<&Vehicle>) -> Option<Sag> {
+    let battery = vehicle.and_then(|vehicle| vehicle.effects.get("battery"));
+    match battery.filter(|battery| battery.on) {
+        Some(_) => Some(Sag::default()),
+        None => (!is_simulated).then(Sag::default),
     }
 }
 

@@ -1,9 +1,11 @@
 //! How simulated drones lean in wind, from the vehicle that was flown.
 
 use super::simulate::sha256;
+use crate::analysis::lean_table::LeanTable;
 use crate::analysis::wind::Leaning;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::campaign::FlightRecord;
+use crate::effects::{Model, Signals};
 use crate::mission::Plan;
 use crate::sim::plant::GRAVITY;
 use crate::sim::plant::drag::Drag;
@@ -23,5 +25,66 @@ pub(super) fn leaning(plan: &Plan, record: &FlightRecord, vehicle: &Vehicle) -> 
     (known && per_square > 0.0).then(|| Leaning {
         thrust_exponent: 1.0,
         drag_speed_mps: (vehicle.airframe.mass_kg * GRAVITY / per_square).sqrt(),
+    })
+}
+
+/// Leans of the table: up to 20 degrees.
+const LEANS: usize = 41;
+const LEAN_STEP_DEG: f64 = 0.5;
+/// Vertical air speeds of the table: -6 to +6 m/s.
+const CLIMBS: usize = 25;
+const FIRST_CLIMB_MPS: f64 = -6.0;
+const CLIMB_STEP_MPS: f64 = 0.5;
+/// Fastest wind that a lean is explained with, m/s.
+const FASTEST_WIND_MPS: f64 = 40.0;
+
+/// What wind does to the pulse of a vehicle by its lean, from the vehicle's own effects (rotor drag,
+/// body drag, translational lift); `None` for vehicles without rotor drag, whose lean says little.
+pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
+    let of = |name: &str, parameter: &str| -> Option<f64> {
+        let effect = crate::effects::find(name)?;
+        vehicle.effects.get(name).filter(|table| table.on)?;
+        let values = crate::effects::select::values_of(effect, vehicle).ok()?;
+        let known = effect.definition().parameters;
+        values.get(known.iter().position(|known| known.name == parameter)?).copied()
+    };
+    let rotor_drag = of("blade-flapping", "drag_per_weight").filter(|drag| *drag > 0.0)?;
+    let body_m2 = of("parasitic-drag", "horizontal_m2").unwrap_or(0.0);
+    let mut still = vehicle.clone();
+    // The voltage is corrected for on its own.
+    still.effects.remove("battery");
+    let model = Model::of(&still).ok()?;
+    let ratio = density_ratio(plan.site.ground_amsl_m);
+    let body = SEA_LEVEL_DENSITY * ratio * body_m2 / 2.0 / (vehicle.airframe.mass_kg * GRAVITY);
+    let lean = |wind_mps: f64| {
+        let mut phi: f64 = 0.0;
+        for _ in 0..8 {
+            phi = (rotor_drag * wind_mps * phi.cos().sqrt() + body * wind_mps * wind_mps).atan();
+        }
+        phi
+    };
+    let wind = |tilt_rad: f64| {
+        let (mut low, mut high) = (0.0, FASTEST_WIND_MPS);
+        for _ in 0..50 {
+            let middle = f64::midpoint(low, high);
+            if lean(middle) < tilt_rad { low = middle } else { high = middle }
+        }
+        high
+    };
+    let change = |tilt_rad: f64, climb_mps: f64| {
+        let calm = Signals { climb_mps, density_ratio: ratio, ..Signals::default() };
+        let windy = Signals { horizontal_mps: wind(tilt_rad), tilt_rad, ..calm };
+        model.pulse_us(&windy) - model.pulse_us(&calm)
+    };
+    let row = |index: usize| {
+        let tilt_rad = (index as f64 * LEAN_STEP_DEG).to_radians();
+        let climbs = (0..CLIMBS).map(|step| FIRST_CLIMB_MPS + step as f64 * CLIMB_STEP_MPS);
+        climbs.map(|climb| if index == 0 { 0.0 } else { change(tilt_rad, climb) }).collect()
+    };
+    Some(LeanTable {
+        lean_step_deg: LEAN_STEP_DEG,
+        first_climb_mps: FIRST_CLIMB_MPS,
+        climb_step_mps: CLIMB_STEP_MPS,
+        change_us: (0..LEANS).map(row).collect(),
     })
 }

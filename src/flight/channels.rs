@@ -12,6 +12,8 @@ const LEAST_FEED_FORWARD: f64 = 0.05;
 const GUIDED_WITH_VELOCITY: [f64; 2] = [3.0, 4.0];
 /// A median above this is centivolts (no show drone flies on 100 V).
 const HIGHEST_VOLTAGE_V: f64 = 100.0;
+/// No pack that flies has more resistance, ohm.
+const HIGHEST_OHM: f64 = 1.0;
 /// Pulse widths that a motor output can have, us; unused outputs are 0, and damage makes others.
 const PULSES_US: std::ops::RangeInclusive<f64> = 500.0..=2500.0;
 /// No multirotor is faster, m/s: what is was damaged in the log.
@@ -47,7 +49,7 @@ const WANTED: &[Select<'static>] = &[
     Select { message: "PSCN", fields: &["TimeUS", "DVN", "TVN"] },
     Select { message: "PSCE", fields: &["TimeUS", "DVE", "TVE"] },
     Select { message: "CTUN", fields: &["TimeUS", "TimeMS", "DCRt"] },
-    Select { message: "BAT", fields: &["TimeUS", "Instance", "Volt", "Curr"] },
+    Select { message: "BAT", fields: &["TimeUS", "Instance", "Volt", "VoltR", "Curr", "Res"] },
     Select { message: "ESC", fields: &["TimeUS", "Instance", "RPM"] },
     Select { message: "CURR", fields: &["TimeUS", "TimeMS", "Volt", "Curr"] },
     Select { message: "SHOW", fields: &["TimeUS", "ClockMS", "Stage"] },
@@ -351,6 +353,22 @@ impl Messages {
             }
         }
         speed.value.iter().any(|rpm| *rpm > 0.0).then_some(speed)
+    }
+
+    /// Battery voltage at rest as the autopilot estimates it, V, and the resistance of the pack
+    /// that it found, ohm.
+    pub(super) fn resting(&self) -> (Option<Series>, Option<f64>) {
+        let Some(mut rows) = self.rows("BAT").cloned() else { return (None, None) };
+        if let Some(instances) = rows.column("Instance").map(<[f64]>::to_vec) {
+            rows.retain(|row| instances.get(row) == Some(&0.0));
+        }
+        let positive = |value: f64| if value > 0.0 { value } else { f64::NAN };
+        let resistance = rows.series("Res", positive).and_then(|series| {
+            let mut values = series.value;
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied()
+        });
+        (rows.series("VoltR", positive), resistance.filter(|ohm| *ohm < HIGHEST_OHM))
     }
 
     /// GPS rows with a 3-D fix: (board time s, milliseconds since the GPS epoch).

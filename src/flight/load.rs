@@ -144,6 +144,7 @@ pub(super) fn load(
         }
     }
     let (voltage_v, current_a) = messages.battery();
+    let (resting_v, resistance_ohm) = messages.resting();
     let show = |time: f64| time - clock.offset_s;
     let place = messages.places().into_iter().find(|(time, ..)| *time >= flight.0 - MARGIN_S);
     Ok(Flight {
@@ -165,6 +166,8 @@ pub(super) fn load(
         voltage_v: voltage_v.map(cut),
         current_a: current_a.map(cut),
         truth_up_mps: None,
+        resting_v: resting_v.map(cut).filter(|series| !series.is_empty()),
+        resistance_ohm,
         stages: stages.into_iter().map(|(time, stage)| (show(time), stage)).collect(),
         armed_s: armed.into_iter().map(|(start, end)| (show(start), show(end))).collect(),
         pulse_limits_us,

@@ -11,7 +11,7 @@
 //! | electrical power | BAT, CURR |
 //! | roll, pitch, heading | ATT |
 //! | desired vertical velocity | GUIP, PSCD, CTUN |
-//! | battery | BAT, CURR |
+//! | battery | BAT (with the voltage at rest), CURR |
 //! | show time and stage | SHOW |
 
 mod align;
@@ -86,6 +86,11 @@ pub struct Flight {
     /// True vertical velocity of the air, m/s, up positive, where something beside the drone measured
     /// it.
     pub truth_up_mps: Option<Series>,
+    /// Battery voltage without load as the autopilot estimates it (`BAT.VoltR`), V. Unlike the
+    /// voltage at the terminals it does not follow the pulse.
+    pub resting_v: Option<Series>,
+    /// Resistance of the battery as the autopilot found it (`BAT.Res`, median), ohm.
+    pub resistance_ohm: Option<f64>,
     /// Show stage (0..9), at its changes: (show time s, stage).
     pub stages: Vec<(f64, u8)>,
     /// When motors were armed, (start, end) show time s.

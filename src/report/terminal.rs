@@ -291,7 +291,39 @@ impl Output {
             "  ",
             &format!("standard error of one drone: {} m/s{systematic}", fixed(air.se, 3)),
         );
-        if let Some(rms) = air.rms_error {
+        if let Some(common) = &map.common {
+            self.wrapped(
+                "",
+                "  ",
+                &format!(
+                    "of that common to all drones: {} m/s (zero {}, battery {}, wind {}, density \
+                     {}); 95 % interval of the common shift: ±{} m/s",
+                    fixed(common.se_mps, 3),
+                    fixed(common.zero_mps, 3),
+                    fixed(common.battery_mps, 3),
+                    fixed(common.wind_mps, 3),
+                    fixed(common.density_mps, 3),
+                    fixed(common.half_width_mps, 2),
+                ),
+            );
+        }
+        if let Some(truth) = map.truth.filter(|_| map.common.is_some()) {
+            self.wrapped(
+                "",
+                "  ",
+                &format!(
+                    "against the truth: rms error {} m/s, bias {}, rms without it {}; {} % of {} \
+                     values and {} % of {} means inside of their 95 % intervals",
+                    fixed(truth.rms_mps, 3),
+                    signed(truth.bias_mps, 3),
+                    fixed(truth.rms_without_bias_mps, 3),
+                    fixed(100.0 * truth.inside_share, 0),
+                    truth.values,
+                    fixed(100.0 * truth.means_inside_share, 0),
+                    truth.drones,
+                ),
+            );
+        } else if let Some(rms) = air.rms_error {
             let known = map.drones.iter().filter(|drone| mean_truth(drone).is_some()).count();
             self.line(
                 "",

@@ -216,6 +216,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
             tilt_form_us: 0.0,
             offset_us: None,
             offset_outside: false,
+            supply: None,
             rejected: if slot == 23 && v > 3.2 { vec![Rejection::Saturated] } else { Vec::new() },
         });
         let mut time = start;

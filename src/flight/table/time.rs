@@ -18,7 +18,7 @@ pub(super) fn seconds_of(text: &str) -> Option<f64> {
         && (0.0..60.0).contains(&minute)
         && (0.0..61.0).contains(&second);
     let days = days_from_civil(year as i64, month as i64, day as i64);
-    in_range.then(|| days as f64 * 86_400.0 + hour * 3600.0 + minute * 60.0 + second)
+    in_range.then_some(days as f64 * 86_400.0 + hour * 3600.0 + minute * 60.0 + second)
 }
 
 fn three(text: &str, between: char) -> Option<[f64; 3]> {

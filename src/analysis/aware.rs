@@ -1,0 +1,447 @@
+//! The map's values with their errors: from the fleet's calibration law ([`super::zero`]) and a
+//! drone's hover.
+//!
+//! Errors are made up where they are normal, in microseconds, and carried to metres per second
+//! through the inverse of the law by quantiles, not by its slope: the signed quadratic has none at
+//! hover, and the ends of an interval stay what they are under any rising function.
+
+use super::analyze::MapLaw;
+use super::battery::{self, Pack, Sag, Slow};
+use super::budget::{BatteryCorrection, CommonError, ErrorBudget, Quality, QualityFlag};
+use super::corrections::{BATTERY, Corrections, DENSITY, DOUBTS, DRIFT, Raw, Referred, WIND};
+use super::drone::same_drone;
+use super::hover::{Hover, Second};
+use super::result::{DroneAnalysis, FlightAnalysis, WindowStats};
+use super::stats::mean_sd;
+use super::zero::{self, DroneLaw, PARAMETERS, Point, Shape, Zero};
+use crate::flight::Flight;
+
+/// Standard errors to each side of a normal 95 % interval.
+const NORMAL: f64 = 1.96;
+/// Seconds in a running mean.
+const RUNNING: f64 = 10.0;
+/// Slope of the pulse where nothing better is known, us/(m/s).
+const TYPICAL_SLOPE: f64 = 26.0;
+/// Beyond this the inverse is not looked for, m/s.
+const FASTEST_MPS: f64 = 12.0;
+/// Least slope of a line's bend as a share of its slope in hover.
+const LEAST_SLOPE: f64 = 0.2;
+/// A signed quadratic must be this much more probable than a line (logarithm).
+const CLEARLY: f64 = 2.0;
+/// Air further out than the ladder by this is marked, m/s.
+const BEYOND_MPS: f64 = 0.5;
+
+/// A calibration ready for the map.
+pub(super) struct Aware<'a> {
+    reference: &'a FlightAnalysis,
+    corrections: Corrections<'a>,
+    pub(super) zero: Zero,
+    pub(super) battery: Option<BatteryCorrection>,
+    slope: f64,
+}
+
+/// What one drone's hover gave.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Measured {
+    pub(super) first_s: i64,
+    pub(super) updraft_mps: Vec<Option<f64>>,
+    pub(super) sd_mps: Vec<Option<f64>>,
+    pub(super) interval_mps: Vec<Option<[f64; 2]>>,
+    pub(super) mean_mps: f64,
+    pub(super) mean_interval_mps: [f64; 2],
+    pub(super) errors: ErrorBudget,
+    pub(super) quality: Vec<QualityFlag>,
+    pub(super) is_own: bool,
+    /// The law's derivatives over its slope, for the fleet's common error.
+    basis: [f64; PARAMETERS],
+    /// Signed standard errors from the doubts, m/s.
+    doubts_mps: [f64; DOUBTS],
+}
+
+/// Whether a drone's windows count for the fleet.
+fn counts(reference: &FlightAnalysis, drone: &DroneAnalysis) -> bool {
+    drone.laws.is_some() && (drone.partial_ladder.is_none() || reference.flock.is_none())
+}
+
+fn pack_of(drone: &DroneAnalysis, battery: Option<BatteryCorrection>) -> Option<Pack> {
+    Pack::of(&battery::of_hovers(&drone.windows), battery?)
+}
+
+impl<'a> Aware<'a> {
+    /// The law of the map.
+    pub(super) fn law(&self) -> MapLaw {
+        match self.zero.shape {
+            Shape::Line => MapLaw::Linear,
+            Shape::SignedQuadratic => MapLaw::SignedQuadratic,
+        }
+    }
+
+    /// Fits the calibration for the map, with the law that the windows speak for unless one is
+    /// given; `None` if they do not allow a fit.
+    pub(super) fn new(
+        reference: &'a FlightAnalysis,
+        corrections: Corrections<'a>,
+        sag: Option<Sag>,
+        law: Option<MapLaw>,
+    ) -> Option<Self> {
+        let corrections = Corrections { has_battery: sag.is_some(), ..corrections };
+        let battery = sag.and_then(|sag| battery::correction(reference, sag));
+        let slopes: Vec<f64> = reference
+            .drones
+            .iter()
+            .filter_map(|drone| Some(drone.laws.as_ref()?.linear.as_ref()?.parameters[0].estimate))
+            .map(|slope| slope.value)
+            .collect();
+        let slope = if slopes.is_empty() { TYPICAL_SLOPE } else { mean_sd(&slopes).0 };
+        let mut packs = reference.drones.iter().filter_map(|drone| pack_of(drone, battery));
+        let sigmas = corrections.sigmas(packs.next().as_ref());
+        let points_of = |hovers| points(reference, &corrections, battery, slope, hovers);
+        let shape = match law {
+            Some(MapLaw::Linear) => Shape::Line,
+            Some(MapLaw::SignedQuadratic) => Shape::SignedQuadratic,
+            // Compared on the windows that both take: in hover the signed quadratic says nothing
+            // about its parameters.
+            None => {
+                let evidence = |shape: Shape| {
+                    zero::fit(&points_of(false), reference.drones.len(), shape, &sigmas)
+                        .map_or(f64::NEG_INFINITY, |zero| zero.evidence)
+                };
+                let (line, square) = (evidence(Shape::Line), evidence(Shape::SignedQuadratic));
+                if square > line + CLEARLY { Shape::SignedQuadratic } else { Shape::Line }
+            }
+        };
+        let points = points_of(shape == Shape::Line);
+        let zero = zero::fit(&points, reference.drones.len(), shape, &sigmas)?;
+        Some(Self { reference, corrections, zero, battery, slope })
+    }
+
+    /// The air over one drone's hover. `Err`: why there is not one value.
+    pub(super) fn measure(
+        &self,
+        flight: &Flight,
+        hover: &Hover,
+        slot: Option<u16>,
+        name: &str,
+    ) -> Result<Measured, String> {
+        let found = same_drone(self.reference, slot, name);
+        let index = found
+            .and_then(|found| self.reference.drones.iter().position(|d| std::ptr::eq(d, found)));
+        let own = index.and_then(|index| self.zero.drones.get(index)?.as_ref());
+        let law = own.unwrap_or(&self.zero.flock);
+        let pack = found.and_then(|drone| pack_of(drone, self.battery)).or_else(|| {
+            self.reference.drones.iter().find_map(|drone| pack_of(drone, self.battery))
+        });
+        let slow = Slow::of(flight);
+        let pack = pack.filter(|_| slow.is_some());
+        let refer = |second: &Second| {
+            let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
+            let raw = Raw {
+                time_s: second.time_s,
+                pulse_us: second.pulse_us,
+                velocity_mps: second.velocity_mps,
+                lean_deg: second.lean_deg,
+                height_m: second.height_m,
+                resting_v,
+            };
+            (self.corrections.refer(&raw, pack.as_ref(), self.slope), raw)
+        };
+        let mut quality = hover.quality.clone();
+        let referred: Vec<Option<(Referred, Raw)>> =
+            hover.seconds.iter().map(|second| second.as_ref().map(refer)).collect();
+        let values = Values { shape: self.zero.shape, law, zero: &self.zero };
+        let sigmas = self.corrections.sigmas(pack.as_ref());
+        let mut measured =
+            Measured { first_s: hover.first_s, is_own: own.is_some(), ..Measured::default() };
+        let mut known: Vec<(Referred, f64)> = Vec::new();
+        for one in &referred {
+            let found = one.and_then(|(one, _)| Some((one, values.air_mps(one.pulse_us)?)));
+            let Some((one, air_mps)) = found else {
+                measured.updraft_mps.push(None);
+                measured.sd_mps.push(None);
+                measured.interval_mps.push(None);
+                continue;
+            };
+            known.push((one, air_mps));
+            let noise_us = hover.noise_us(values.slope(air_mps)) / RUNNING.sqrt();
+            let error = values.error(&one.doubts_us, air_mps, &sigmas);
+            let half_us = error.half_us(self.zero.width, noise_us);
+            let interval = values.interval(&one, half_us);
+            let noise = values.interval(&one, NORMAL * noise_us);
+            measured.updraft_mps.push(Some(one.velocity_mps - air_mps));
+            measured.interval_mps.push(interval);
+            measured.sd_mps.push(noise.map(|[low, high]| (high - low) / (2.0 * NORMAL)));
+        }
+        if known.is_empty() {
+            return Err(hover.nothing());
+        }
+        self.mean(&mut measured, &known, &values, hover, &sigmas);
+        let [low, high] = self.zero.speeds_mps;
+        let beyond =
+            |(_, air): &&(Referred, f64)| *air < low - BEYOND_MPS || *air > high + BEYOND_MPS;
+        let count = known.iter().filter(beyond).count();
+        let mut flag = |flag: Quality, reason: String| {
+            quality.push(QualityFlag { flag, start_s: hover.start_s, end_s: hover.end_s, reason });
+        };
+        if count > 0 {
+            flag(
+                Quality::BeyondLadder,
+                format!("{count} s of faster air than the ladder's {low:+.1} to {high:+.1} m/s"),
+            );
+        }
+        if self.corrections.has_battery && pack.is_none() {
+            flag(Quality::NoVoltage, "no battery voltage in the log: not corrected".to_owned());
+        }
+        if let Some(pack) = &pack {
+            let volts = referred.iter().flatten().filter_map(|(_, raw)| raw.resting_v);
+            let least = volts.fold(f64::INFINITY, f64::min);
+            let share = pack.volts(least) / pack.correction.reference_v;
+            if share < battery::LOW_SHARE {
+                flag(
+                    Quality::LowBattery,
+                    format!("{least:.2} V at rest, {:.0} % of the calibration's", 100.0 * share),
+                );
+            }
+        }
+        if let Some(per_minute) = hover.trend_us_per_min(&known_times(&referred)) {
+            flag(Quality::Drift, format!("the pulse drifts by {per_minute:+.0} us per minute"));
+        }
+        measured.quality = quality;
+        Ok(measured)
+    }
+
+    fn mean(
+        &self,
+        measured: &mut Measured,
+        known: &[(Referred, f64)],
+        values: &Values<'_>,
+        hover: &Hover,
+        sigmas: &[f64; DOUBTS],
+    ) {
+        let n = known.len() as f64;
+        let mean =
+            |value: &dyn Fn(&(Referred, f64)) -> f64| known.iter().map(value).sum::<f64>() / n;
+        let air_mps = mean(&|(_, air)| *air);
+        measured.mean_mps = mean(&|(one, air)| one.velocity_mps - air);
+        let doubts_us: [f64; DOUBTS] =
+            std::array::from_fn(|doubt| mean(&|(one, _)| one.doubts_us[doubt]));
+        let mut error = values.error(&doubts_us, air_mps, sigmas);
+        // The mean of the derivatives, not the derivatives at the mean.
+        error.basis =
+            std::array::from_fn(|column| mean(&|(_, air)| values.shape.basis(*air)[column]));
+        error.common_us2 = values.common_us2(&error.basis);
+        let slope = values.slope(air_mps);
+        let noise_us = hover.noise_us(slope) / n.sqrt();
+        let half_us = error.half_us(self.zero.width, noise_us);
+        let end = |offset: f64| {
+            mean(&|(one, air)| {
+                let moved = values.air_mps(one.pulse_us + offset).unwrap_or(*air);
+                one.velocity_mps - moved
+            })
+        };
+        let bias = hover.velocity_bias_mps;
+        let (low, high) = (end(half_us), end(-half_us));
+        let per_mps = if high > low { 2.0 * half_us / (high - low) } else { slope };
+        let wider = |side: f64| measured.mean_mps + side.signum() * side.hypot(NORMAL * bias);
+        measured.mean_interval_mps =
+            [wider(low - measured.mean_mps), wider(high - measured.mean_mps)];
+        let doubt = |index: usize| (error.doubts_us[index] / per_mps).abs();
+        let zero_us2 = self.zero.common[(0, 0)].max(0.0);
+        let rest_us2 = (error.common_us2 - zero_us2).max(0.0);
+        let zero_us2 = error.common_us2 - rest_us2;
+        let errors = ErrorBudget {
+            window_mps: noise_us / per_mps,
+            law_mps: (error.own_us2 + rest_us2).sqrt() / per_mps,
+            zero_mps: zero_us2.sqrt() / per_mps,
+            battery_mps: doubt(BATTERY).hypot(doubt(DRIFT)),
+            wind_mps: doubt(WIND),
+            density_mps: doubt(DENSITY),
+            velocity_mps: bias,
+            total_mps: 0.0,
+        };
+        let total_mps = [
+            errors.window_mps,
+            errors.law_mps,
+            errors.zero_mps,
+            errors.battery_mps,
+            errors.wind_mps,
+            errors.density_mps,
+            errors.velocity_mps,
+        ]
+        .into_iter()
+        .fold(0.0, f64::hypot);
+        measured.errors = ErrorBudget { total_mps, ..errors };
+        measured.basis = error.basis.map(|value| value / per_mps);
+        measured.doubts_mps = error.doubts_us.map(|value| value / per_mps);
+    }
+
+    /// The error that these drones share.
+    pub(super) fn common(&self, drones: &[&Measured]) -> CommonError {
+        let n = drones.len().max(1) as f64;
+        let basis: [f64; PARAMETERS] = std::array::from_fn(|column| {
+            drones.iter().map(|drone| drone.basis[column]).sum::<f64>() / n
+        });
+        let values = Values { shape: self.zero.shape, law: &self.zero.flock, zero: &self.zero };
+        let shared2 = values.common_us2(&basis);
+        let zero2 = (self.zero.common[(0, 0)].max(0.0) * basis[0] * basis[0]).min(shared2);
+        let doubt = |index: usize| {
+            (drones.iter().map(|drone| drone.doubts_mps[index]).sum::<f64>() / n).abs()
+        };
+        let battery_mps = doubt(BATTERY).hypot(doubt(DRIFT));
+        let rest = battery_mps.hypot(doubt(WIND)).hypot(doubt(DENSITY));
+        CommonError {
+            se_mps: shared2.sqrt().hypot(rest),
+            half_width_mps: (self.zero.width * shared2.sqrt()).hypot(NORMAL * rest),
+            zero_mps: zero2.sqrt(),
+            battery_mps,
+            wind_mps: doubt(WIND),
+            density_mps: doubt(DENSITY),
+            law_mps: (shared2 - zero2).max(0.0).sqrt(),
+        }
+    }
+}
+
+/// The usable windows of the drones that count.
+fn points(
+    reference: &FlightAnalysis,
+    corrections: &Corrections<'_>,
+    battery: Option<BatteryCorrection>,
+    slope: f64,
+    hovers: bool,
+) -> Vec<Point> {
+    let mut points = Vec::new();
+    for (index, drone) in reference.drones.iter().enumerate() {
+        if !counts(reference, drone) {
+            continue;
+        }
+        let pack = pack_of(drone, battery);
+        if battery.is_some() && pack.is_none() {
+            continue;
+        }
+        let mut seen = std::collections::BTreeMap::<String, usize>::new();
+        for window in &drone.windows {
+            let command = (window.commanded_mps * 1000.0).round();
+            let key = format!("{:?} {command}", window.kind);
+            let count = seen.entry(key.clone()).or_default();
+            let number = *count;
+            *count += 1;
+            let is_used = window.kind.is_leg() || hovers && window.kind.is_hover();
+            if window.rejected.is_empty() && is_used {
+                let referred = corrections.refer(&Raw::of(window), pack.as_ref(), slope);
+                points.push(point(index, (key, number), window, &referred, slope));
+            }
+        }
+    }
+    points
+}
+
+fn point(
+    drone: usize,
+    key: (String, usize),
+    window: &WindowStats,
+    referred: &Referred,
+    slope: f64,
+) -> Point {
+    Point {
+        drone,
+        key,
+        time_s: f64::midpoint(window.start_s, window.end_s),
+        velocity_mps: referred.velocity_mps,
+        pulse_us: referred.pulse_us,
+        noise_us: window.pulse_phi_us.se.hypot(slope * window.velocity_mps.se),
+        doubts_us: referred.doubts_us,
+    }
+}
+
+fn known_times(referred: &[Option<(Referred, Raw)>]) -> Vec<(f64, f64)> {
+    referred.iter().flatten().map(|(one, raw)| (raw.time_s, one.pulse_us)).collect()
+}
+
+/// One drone's law with its errors.
+struct Values<'a> {
+    shape: Shape,
+    law: &'a DroneLaw,
+    zero: &'a Zero,
+}
+
+/// Errors of a pulse against the law, us.
+struct PulseError {
+    basis: [f64; PARAMETERS],
+    common_us2: f64,
+    own_us2: f64,
+    doubts_us: [f64; DOUBTS],
+}
+
+impl PulseError {
+    /// Half width of the 95 % interval, us.
+    fn half_us(&self, width: f64, noise_us: f64) -> f64 {
+        let doubts: f64 = self.doubts_us.iter().map(|doubt| doubt * doubt).sum();
+        let rest = self.own_us2 + doubts + noise_us * noise_us;
+        (width * width * self.common_us2 + NORMAL * NORMAL * rest).sqrt()
+    }
+}
+
+impl Values<'_> {
+    fn slope(&self, air_mps: f64) -> f64 {
+        self.shape.slope(&self.law.law, air_mps)
+    }
+
+    /// Inverse of the law, m/s; `None` where it has none.
+    fn air_mps(&self, pulse_us: f64) -> Option<f64> {
+        let law = &self.law.law;
+        if self.shape == Shape::SignedQuadratic {
+            let ratio = (pulse_us - law[0]) / law[1];
+            let air = ratio.signum() * ratio.abs().sqrt();
+            return (law[1] > 0.0 && air.abs() <= FASTEST_MPS).then_some(air);
+        }
+        let mut air = (pulse_us - law[0]) / law[1];
+        for _ in 0..20 {
+            let slope = self.slope(air);
+            if !(slope >= LEAST_SLOPE * law[1] && air.abs() <= FASTEST_MPS) {
+                return None;
+            }
+            let step = (self.shape.pulse_us(law, air) - pulse_us) / slope;
+            air -= step;
+            if step.abs() < 1e-9 {
+                break;
+            }
+        }
+        air.is_finite().then_some(air)
+    }
+
+    fn common_us2(&self, basis: &[f64; PARAMETERS]) -> f64 {
+        let p = self.zero.common.nrows();
+        let mut sum = 0.0;
+        for row in 0..p {
+            for column in 0..p {
+                sum += basis[row] * self.zero.common[(row, column)] * basis[column];
+            }
+        }
+        sum.max(0.0)
+    }
+
+    fn error(&self, doubts_us: &[f64; DOUBTS], air_mps: f64, sigmas: &[f64; DOUBTS]) -> PulseError {
+        let basis = self.shape.basis(air_mps);
+        let mut own_us2 = 0.0;
+        for row in 0..PARAMETERS {
+            for column in 0..PARAMETERS {
+                own_us2 += basis[row] * self.law.own[(row, column)] * basis[column];
+            }
+        }
+        let doubts_us = std::array::from_fn(|doubt| {
+            let answer: f64 = basis.iter().zip(&self.law.answers[doubt]).map(|(b, a)| b * a).sum();
+            sigmas[doubt] * (doubts_us[doubt] - answer)
+        });
+        PulseError {
+            basis,
+            common_us2: self.common_us2(&basis),
+            own_us2: own_us2.max(0.0),
+            doubts_us,
+        }
+    }
+
+    fn interval(&self, one: &Referred, half_us: f64) -> Option<[f64; 2]> {
+        let low = one.velocity_mps - self.air_mps(one.pulse_us + half_us)?;
+        let high = one.velocity_mps - self.air_mps(one.pulse_us - half_us)?;
+        Some([low, high])
+    }
+}

@@ -1,0 +1,158 @@
+//! What is known about pulses besides the vertical air speed, taken away before laws are fitted for
+//! the map, with the doubt that each correction leaves.
+//!
+//! A doubt is one number for the whole fleet (how much more or less than assumed a correction should
+//! have been). It moves calibration and hover together: what is left of it in the map is the
+//! difference between the two, and [`Referred::doubts_us`] holds what is needed to take it.
+
+use super::battery::Pack;
+use super::density::Density;
+use super::lean_table::LeanTable;
+use super::result::WindowStats;
+use super::wind::Leaning;
+
+/// Doubts in their order: battery, drift, wind, density.
+pub(super) const DOUBTS: usize = 4;
+/// Place of the battery's doubt.
+pub(super) const BATTERY: usize = 0;
+/// Place of the doubt about other drift in time.
+pub(super) const DRIFT: usize = 1;
+/// Place of the wind's doubt.
+pub(super) const WIND: usize = 2;
+/// Place of the density's doubt.
+pub(super) const DENSITY: usize = 3;
+
+/// Pulse at which the rotors make no thrust, us.
+const NO_THRUST_US: f64 = 1000.0;
+/// Motors and controllers warm up over this time, s.
+const WARM_UP_S: f64 = 100.0;
+/// What that does to the pulse: standard error, us (magnets lose a little flux, windings gain
+/// resistance; the signs oppose each other).
+const WARM_UP_US: f64 = 3.0;
+/// Drift where a battery acts on the pulse and its voltage is not known: standard error, us per
+/// minute of flight. A small drone's pack falls by half a percent a minute, one percent is 5.5 us.
+const UNKNOWN_VOLTAGE_US: f64 = 3.0;
+/// Share of a wind correction that may be wrong.
+const WIND_SHARE: f64 = 0.15;
+/// Where wind could not be corrected for, the most that it may have done is two standard errors.
+const UNKNOWN_WIND_SHARE: f64 = 0.5;
+/// Error of the exponent of density where the thrust curve is known.
+const DENSITY_EXPONENT: f64 = 0.1;
+/// And where it is not: anything from 0 to 1.
+const UNKNOWN_DENSITY_EXPONENT: f64 = 0.5;
+/// Height over which density falls by 1/e, m.
+const DENSITY_SCALE_M: f64 = 10_400.0;
+/// Sensitivity of the pulse to thrust where it is not known (du/dlnT), us.
+const THRUST_US: f64 = 300.0;
+/// Most that wind does to an unknown small drone at a lean of one degree, us; it grows with the
+/// square of the lean.
+const UNKNOWN_WIND_US: f64 = 1.5;
+
+/// Which corrections the map of a flight has.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Corrections<'a> {
+    pub(super) density: Option<Density>,
+    pub(super) leaning: Option<Leaning>,
+    pub(super) lean_table: Option<&'a LeanTable>,
+    /// Whether a battery acts on the pulse.
+    pub(super) has_battery: bool,
+}
+
+/// A stretch of flight as logged.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Raw {
+    pub(super) time_s: f64,
+    pub(super) pulse_us: f64,
+    pub(super) velocity_mps: f64,
+    pub(super) lean_deg: f64,
+    pub(super) height_m: f64,
+    pub(super) resting_v: Option<f64>,
+}
+
+impl Raw {
+    pub(super) fn of(window: &WindowStats) -> Self {
+        Self {
+            time_s: f64::midpoint(window.start_s, window.end_s),
+            pulse_us: window.pulse_us.mean,
+            velocity_mps: window.velocity_mps.mean,
+            lean_deg: window.lean_deg,
+            height_m: window.height_m,
+            resting_v: window.supply.map(|supply| supply.resting_v),
+        }
+    }
+}
+
+/// The same referred to level flight, the ground's density and the reference voltage.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Referred {
+    /// Vertical speed with what the wind adds along the rotor axis, m/s.
+    pub(super) velocity_mps: f64,
+    /// Pulse, us.
+    pub(super) pulse_us: f64,
+    /// Change of the pulse per unit of each doubt, us.
+    pub(super) doubts_us: [f64; DOUBTS],
+}
+
+impl Corrections<'_> {
+    /// Standard errors of the doubts (units of [`Referred::doubts_us`]).
+    pub(super) fn sigmas(&self, pack: Option<&Pack>) -> [f64; DOUBTS] {
+        let mut sigmas = [0.0; DOUBTS];
+        if let Some(pack) = pack {
+            sigmas[BATTERY] = pack.correction.exponent_se;
+        }
+        // Both kinds of drift are scaled to us in `refer`.
+        sigmas[DRIFT] = if self.has_battery { 1.0 } else { 0.0 };
+        let known = self.leaning.is_some() || self.lean_table.is_some();
+        sigmas[WIND] = if known { WIND_SHARE } else { UNKNOWN_WIND_SHARE };
+        sigmas[DENSITY] = match self.density {
+            // AirSim's thrust is linear by definition; the weather of the day is not the standard's.
+            Some(density) if density.exponent == 1.0 => 0.0,
+            Some(_) => DENSITY_EXPONENT,
+            None => UNKNOWN_DENSITY_EXPONENT,
+        };
+        sigmas
+    }
+
+    /// Takes away what is known.
+    pub(super) fn refer(&self, raw: &Raw, pack: Option<&Pack>, slope: f64) -> Referred {
+        let mut pulse_us = raw.pulse_us;
+        let mut velocity_mps = raw.velocity_mps;
+        let mut doubts_us = [0.0; DOUBTS];
+        if let Some(leaning) = self.leaning {
+            let axial = leaning.axial_mps(raw.lean_deg);
+            let level = leaning.level_us(pulse_us, raw.lean_deg);
+            doubts_us[WIND] = slope * axial + (level - pulse_us);
+            velocity_mps += axial;
+            pulse_us = level;
+        } else if let Some(table) = self.lean_table {
+            let change = table.at(raw.lean_deg, raw.velocity_mps);
+            doubts_us[WIND] = change;
+            pulse_us -= change;
+        } else {
+            // Leaning by drag, the thrust is m g cos(phi); by acceleration, m g / cos(phi). Neither
+            // is corrected; translational lift is more than both.
+            let cos = raw.lean_deg.to_radians().cos();
+            doubts_us[WIND] = UNKNOWN_WIND_US * raw.lean_deg.powi(2) + THRUST_US * (1.0 - cos);
+        }
+        let log_density = match self.density {
+            Some(density) => {
+                pulse_us = density.refer_us(pulse_us, raw.height_m);
+                density.log_ratio(raw.height_m)
+            }
+            None => -raw.height_m / DENSITY_SCALE_M,
+        };
+        doubts_us[DENSITY] = (pulse_us - NO_THRUST_US) * log_density;
+        let flown_s = raw.time_s.max(0.0);
+        let warm = WARM_UP_US * (1.0 - (-flown_s / WARM_UP_S).exp());
+        match pack.zip(raw.resting_v) {
+            Some((pack, resting_v)) => {
+                let (referred, per_exponent) = pack.refer(pulse_us, resting_v);
+                pulse_us = referred;
+                doubts_us[BATTERY] = per_exponent;
+                doubts_us[DRIFT] = warm;
+            }
+            None => doubts_us[DRIFT] = warm.hypot(UNKNOWN_VOLTAGE_US * flown_s / 60.0),
+        }
+        Referred { velocity_mps, pulse_us, doubts_us }
+    }
+}

@@ -1,0 +1,60 @@
+//! What wind does to the pulse of a vehicle whose physics is known: by lean and climb, as a table.
+//!
+//! A drone with rotor drag leans by a degree or more for each metre per second of wind, and its
+//! rotors gain more from the fresh air (translational lift) than leaning costs. Wind is not logged,
+//! but the lean is: the table says by how much the pulse differs from that of level flight in air
+//! without wind.
+
+/// Change of the pulse by lean and vertical air speed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LeanTable {
+    /// Step of the lean from 0 on, degrees.
+    pub lean_step_deg: f64,
+    /// Lowest vertical air speed, m/s.
+    pub first_climb_mps: f64,
+    /// Step of the vertical air speed, m/s.
+    pub climb_step_mps: f64,
+    /// For each lean the changes for each vertical air speed, us.
+    pub change_us: Vec<Vec<f64>>,
+}
+
+impl LeanTable {
+    /// Change of the pulse, us, by linear interpolation; at the table's edges beyond them.
+    pub fn at(&self, lean_deg: f64, climb_mps: f64) -> f64 {
+        let place = |value: f64, first: f64, step: f64, n: usize| {
+            let place = ((value - first) / step).clamp(0.0, (n.max(1) - 1) as f64);
+            let low = (place as usize).min(n.saturating_sub(2));
+            (low, place - low as f64)
+        };
+        let (row, down) = place(lean_deg, 0.0, self.lean_step_deg, self.change_us.len());
+        let along = |row: usize| {
+            let Some(row) = self.change_us.get(row) else { return 0.0 };
+            let (column, right) =
+                place(climb_mps, self.first_climb_mps, self.climb_step_mps, row.len());
+            let value = |column: usize| row.get(column).copied().unwrap_or(0.0);
+            value(column) * (1.0 - right) + value(column + 1) * right
+        };
+        let next = (row + 1).min(self.change_us.len().saturating_sub(1));
+        along(row) * (1.0 - down) + along(next) * down
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interpolates_inside_and_holds_the_edges() {
+        let table = LeanTable {
+            lean_step_deg: 2.0,
+            first_climb_mps: -1.0,
+            climb_step_mps: 1.0,
+            change_us: vec![vec![0.0; 3], vec![-10.0, -8.0, -6.0]],
+        };
+        assert_eq!(table.at(0.0, 0.3), 0.0);
+        assert_eq!(table.at(1.0, 0.0), -4.0);
+        assert_eq!(table.at(2.0, 0.5), -7.0);
+        assert_eq!(table.at(9.0, 9.0), -6.0);
+        assert_eq!(LeanTable::default().at(3.0, 1.0), 0.0);
+    }
+}

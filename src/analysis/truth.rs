@@ -1,0 +1,90 @@
+//! A map beside the true air.
+
+use super::budget::TruthCheck;
+use super::result::DroneUpdraft;
+
+/// Compares estimates with the truth; `None` where the truth is not known.
+pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
+    let mut check = TruthCheck::default();
+    let (mut sum, mut squares, mut inside, mut intervals) = (0.0, 0.0, 0_usize, 0_usize);
+    let (mut means_inside, mut means) = (0_usize, 0_usize);
+    for drone in drones {
+        let Some(truth) = &drone.truth_mps else { continue };
+        let (mut true_sum, mut values) = (0.0, 0_usize);
+        for (index, (estimate, truth)) in drone.updraft_mps.iter().zip(truth).enumerate() {
+            let Some(estimate) = estimate else { continue };
+            let error = estimate - truth;
+            sum += error;
+            squares += error * error;
+            true_sum += truth;
+            values += 1;
+            if let Some(Some([low, high])) = drone.interval_mps.get(index) {
+                intervals += 1;
+                inside += usize::from((*low..=*high).contains(truth));
+            }
+        }
+        if values == 0 {
+            continue;
+        }
+        check.drones += 1;
+        check.values += values;
+        if let Some([low, high]) = drone.mean_interval_mps {
+            means += 1;
+            means_inside += usize::from((low..=high).contains(&(true_sum / values as f64)));
+        }
+    }
+    if check.values == 0 {
+        return None;
+    }
+    let n = check.values as f64;
+    let share = |count: usize, of: usize| if of > 0 { count as f64 / of as f64 } else { 0.0 };
+    check.bias_mps = sum / n;
+    check.rms_mps = (squares / n).sqrt();
+    check.rms_without_bias_mps = (squares / n - check.bias_mps.powi(2)).max(0.0).sqrt();
+    check.inside_share = share(inside, intervals);
+    check.means_inside_share = share(means_inside, means);
+    Some(check)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drone(updraft_mps: Vec<Option<f64>>, truth_mps: Option<Vec<f64>>) -> DroneUpdraft {
+        let interval = |value: &Option<f64>| value.map(|value| [value - 0.15, value + 0.15]);
+        DroneUpdraft {
+            slot: Some(1),
+            name: String::new(),
+            position_m: None,
+            height_m: 100.0,
+            mapping: "own".to_owned(),
+            mean: crate::base::estimate::Estimate::new(0.0, 0.1),
+            mean_interval_mps: Some([0.0, 0.3]),
+            errors: super::super::budget::ErrorBudget::default(),
+            systematic_mps: 0.0,
+            tilt_deg: 0.0,
+            interval_mps: updraft_mps.iter().map(interval).collect(),
+            updraft_mps,
+            sd_mps: Vec::new(),
+            quality: Vec::new(),
+            truth_mps,
+        }
+    }
+
+    #[test]
+    fn counts_what_is_there_and_known() {
+        let values = vec![Some(0.2), Some(0.4), None, Some(0.3)];
+        let found = check(&[
+            drone(values.clone(), Some(vec![0.1, 0.2, 9.0, 0.3])),
+            drone(values, None),
+            drone(vec![None; 4], Some(vec![0.0; 4])),
+        ])
+        .unwrap();
+        assert_eq!((found.drones, found.values), (1, 3));
+        assert!((found.bias_mps - 0.1).abs() < 1e-12);
+        assert!((found.rms_mps - (0.05_f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert!((found.inside_share - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!(found.means_inside_share, 1.0, "0.2 is in 0.0 to 0.3");
+        assert_eq!(check(&[drone(vec![Some(1.0)], None)]), None);
+    }
+}
