@@ -389,7 +389,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
     let mut drones = Vec::new();
     let (mut updrafts, mut seen) = (Vec::new(), Vec::new());
     let mut unmeasured = Vec::new();
-    for One { mut drone, calibration, updraft, hover, .. } in ones {
+    for One { mut drone, calibration, updraft, hover, truth, .. } in ones {
         let (slot, name) = (drone.slot, drone.name.clone());
         let nothing = |reason| Unmeasured { slot, name: name.clone(), reason };
         match (purpose, calibration, updraft) {
@@ -400,7 +400,7 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
                     .warnings
                     .extend(partial_law(shared, slot, &name).filter(|_| mapping == FLOCK));
                 seen.push(hover);
-                updrafts.push((slot, name.clone(), drone.home_m, series, mapping));
+                updrafts.push((slot, name.clone(), drone.home_m, series, mapping, truth));
             }
             (Purpose::Measurement, _, Some(Err(reason))) => unmeasured.push(nothing(reason)),
             (Purpose::Measurement, _, None) => {}
@@ -488,22 +488,24 @@ fn partial_law(shared: &Shared<'_>, slot: Option<u16>, name: &str) -> Option<Str
     ))
 }
 
-type NamedUpdraft = (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str);
+type NamedUpdraft =
+    (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str, Option<TruthSeries>);
 
 fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
     let uniform_mps = shared.input.true_updraft_mps;
     let series: Vec<DroneSeries> = updrafts.iter().map(|named| named.3.clone()).collect();
     let times = updraft::common_times(&series);
-    let truth_of = |slot: Option<u16>| match uniform_mps {
-        Some(truth_mps) => Some(vec![truth_mps; times.len()]),
-        None => shared.input.truth?.get(&slot?)?.at(&times),
+    let truth_of = |slot: Option<u16>, own: Option<TruthSeries>| match (uniform_mps, own) {
+        (Some(truth_mps), _) => Some(vec![truth_mps; times.len()]),
+        (None, Some(own)) => own.at(&times),
+        (None, None) => shared.input.truth?.get(&slot?)?.at(&times),
     };
     let measured: Vec<&Measured> =
         series.iter().filter_map(|series| series.measured.as_ref()).collect();
     let aware = shared.aware.as_ref().filter(|_| !measured.is_empty());
     let drones: Vec<DroneUpdraft> = updrafts
         .into_iter()
-        .map(|(slot, name, position_m, series, mapping)| DroneUpdraft {
+        .map(|(slot, name, position_m, series, mapping, truth)| DroneUpdraft {
             slot,
             name,
             position_m,
@@ -524,7 +526,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
                 .as_ref()
                 .map_or_else(Vec::new, |one| series.spread(&one.interval_mps, &times)),
             quality: series.measured.as_ref().map_or_else(Vec::new, |one| one.quality.clone()),
-            truth_mps: truth_of(slot),
+            truth_mps: truth_of(slot, truth),
         })
         .collect();
     UpdraftMap {

@@ -163,6 +163,9 @@ pub struct TruthCheck {
     pub values: usize,
     /// Root mean square of estimate less truth over all values, m/s.
     pub rms_mps: f64,
+    /// Root mean square of the truth itself, m/s: the error of answering zero everywhere.
+    #[serde(default)]
+    pub zero_rms_mps: f64,
     /// Mean of estimate less truth, m/s.
     pub bias_mps: f64,
     /// Root mean square without that mean, m/s: what is left when the common zero is known.

@@ -1,6 +1,6 @@
 //! One log of a flight: windows, laws and (with reference laws) the air.
 
-use super::analyze::{AnalysisOptions, FlightInput, LogInput, MapLaw};
+use super::analyze::{AnalysisOptions, FlightInput, LogInput, MapLaw, TruthSeries};
 use super::aware::Aware;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::hover::Hover;
@@ -9,7 +9,7 @@ use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats
 use super::statistics::HoverSeen;
 use super::stats::mean_sd;
 use super::steps::steady;
-use super::updraft::{self, DroneSeries, Lean};
+use super::updraft::{self, DroneSeries, Lean, RUNNING_S, Running};
 use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
 use crate::flight::{Alignment, Flight, FlightOptions, table};
@@ -40,6 +40,8 @@ pub(super) struct One {
     pub(super) updraft: Option<Result<(DroneSeries, &'static str), String>>,
     /// Its hover, for the statistics.
     pub(super) hover: HoverSeen,
+    /// What something beside the drone measured of the air.
+    pub(super) truth: Option<TruthSeries>,
 }
 
 /// Everything about one log.
@@ -104,7 +106,20 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     };
     let (losses, skipped_bytes) = (flight.losses(), flight.scan.bad_bytes);
     let hover = HoverSeen::of(&flight, &corrected, &targets);
-    Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover })
+    let truth = true_air(&flight, &targets);
+    Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, truth })
+}
+
+/// The true air over the hover as the map sees it: means over the 10 s around each second.
+fn true_air(flight: &Flight, targets: &[Target]) -> Option<TruthSeries> {
+    let (truth, hover) = (flight.truth_up_mps.as_ref()?, updraft::hover(targets)?);
+    let running = Running::new(truth, hover.start_s, hover.end_s);
+    let half = RUNNING_S / 2.0;
+    let (first_s, last_s) =
+        ((hover.start_s + half).ceil() as i64, (hover.end_s - half).floor() as i64);
+    let means: Option<Vec<f64>> =
+        (first_s..=last_s).map(|time| running.mean(time as f64)).collect();
+    Some(TruthSeries { first_s, updraft_mps: means? })
 }
 
 /// What one log showed.

@@ -6,7 +6,8 @@ use super::result::DroneUpdraft;
 /// Compares estimates with the truth; `None` where the truth is not known.
 pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
     let mut check = TruthCheck::default();
-    let (mut sum, mut squares, mut inside, mut intervals) = (0.0, 0.0, 0_usize, 0_usize);
+    let (mut sum, mut squares, mut true_squares) = (0.0, 0.0, 0.0);
+    let (mut inside, mut intervals) = (0_usize, 0_usize);
     let (mut means_inside, mut means) = (0_usize, 0_usize);
     for drone in drones {
         let Some(truth) = &drone.truth_mps else { continue };
@@ -17,6 +18,7 @@ pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
             sum += error;
             squares += error * error;
             true_sum += truth;
+            true_squares += truth * truth;
             values += 1;
             if let Some(Some([low, high])) = drone.interval_mps.get(index) {
                 intervals += 1;
@@ -40,6 +42,7 @@ pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
     let share = |count: usize, of: usize| if of > 0 { count as f64 / of as f64 } else { 0.0 };
     check.bias_mps = sum / n;
     check.rms_mps = (squares / n).sqrt();
+    check.zero_rms_mps = (true_squares / n).sqrt();
     check.rms_without_bias_mps = (squares / n - check.bias_mps.powi(2)).max(0.0).sqrt();
     check.inside_share = share(inside, intervals);
     check.means_inside_share = share(means_inside, means);
@@ -83,6 +86,7 @@ mod tests {
         assert_eq!((found.drones, found.values), (1, 3));
         assert!((found.bias_mps - 0.1).abs() < 1e-12);
         assert!((found.rms_mps - (0.05_f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert!((found.zero_rms_mps - (0.14_f64 / 3.0).sqrt()).abs() < 1e-12);
         assert!((found.inside_share - 2.0 / 3.0).abs() < 1e-12);
         assert_eq!(found.means_inside_share, 1.0, "0.2 is in 0.0 to 0.3");
         assert_eq!(check(&[drone(vec![Some(1.0)], None)]), None);

@@ -312,9 +312,10 @@ impl Output {
                 "",
                 "  ",
                 &format!(
-                    "against the truth: rms error {} m/s, bias {}, rms without it {}; {} % of {} \
-                     values and {} % of {} means inside of their 95 % intervals",
+                    "against the truth: rms error {} m/s (answering zero: {}), bias {}, rms without \
+                     it {}; {} % of {} values and {} % of {} means inside of their 95 % intervals",
                     fixed(truth.rms_mps, 3),
+                    fixed(truth.zero_rms_mps, 3),
                     signed(truth.bias_mps, 3),
                     fixed(truth.rms_without_bias_mps, 3),
                     fixed(100.0 * truth.inside_share, 0),

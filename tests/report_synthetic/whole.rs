@@ -67,6 +67,7 @@ pub(crate) fn whole_campaign() -> Analysis {
         law_mps: 0.02,
     });
     map.truth = Some(TruthCheck {
+        zero_rms_mps: 0.5,
         drones: map.drones.len(),
         values: 24_000,
         rms_mps: 0.101,
