@@ -140,6 +140,8 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
                     let pulse = world.pulse_us(drone, climb - wind, resting_v, height_m, middle)
                         + noise * normal(rng);
                     WindowStats {
+                        offset_outside: false,
+                        tilt_form_us: 0.0,
                         kind,
                         label: String::new(),
                         start_s,
@@ -158,6 +160,7 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
                 })
                 .collect();
             DroneAnalysis {
+                offset: None,
                 slot: Some(drone as u16 + 1),
                 name: format!("Drone {drone}"),
                 source: String::new(),
@@ -172,6 +175,9 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
         })
         .collect();
     FlightAnalysis {
+        indicator: crate::flight::Indicator::Pulse,
+        orientation_deg: None,
+        statistics: None,
         name: String::new(),
         purpose: Purpose::Calibration,
         planned: true,
