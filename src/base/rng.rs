@@ -19,6 +19,8 @@ pub enum Purpose {
     Effects = 5,
     /// Faults of a simulated radio link.
     Link = 6,
+    /// Logs that a simulated campaign loses.
+    Losses = 7,
 }
 
 /// The random stream of one drone and purpose. PCG's output is stable across releases.

@@ -299,9 +299,14 @@ pub fn fields_parquet(folder: &Path) -> PathBuf {
     folder.join("fields").join("updraft.parquet")
 }
 
+/// The simulation study that belongs to a campaign.
+pub fn study_folder(folder: &Path) -> PathBuf {
+    folder.join("study")
+}
+
 /// The results of the simulation study that a campaign may hold.
 pub fn study_result(folder: &Path) -> PathBuf {
-    folder.join("study").join("study.json")
+    study_folder(folder).join("study.json")
 }
 
 /// Whether a folder is a campaign or one flight of it.

@@ -63,12 +63,18 @@ fn effect(text: &str) -> Result<String, String> {
     Ok(text.to_owned())
 }
 
+/// `--air still`: nothing is added.
+const STILL: &str = "still";
+
 /// What one `--air` asks for.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AirSpecs(Vec<AirSpec>);
 
 /// Parser of `--air`.
 pub(super) fn air_specs(text: &str) -> Result<AirSpecs, String> {
+    if text == STILL {
+        return Ok(AirSpecs::default());
+    }
     spec::load(text).map(AirSpecs).map_err(|error| super::exit::with_reasons(&error))
 }
 
@@ -76,7 +82,8 @@ pub(super) fn air_specs(text: &str) -> Result<AirSpecs, String> {
 pub(super) fn air_help() -> String {
     let files: Vec<_> = spec::builtin_names().collect();
     format!(
-        "Kinds of air for --air, with their keys and [defaults]; several --air add up:\n{}\n\
+        "Kinds of air for --air, with their keys and [defaults]; several --air add up (`still`: \
+         none):\n{}\n\
          Mean wind: that of the uniform parts, and of profiles at their reference height.\n\
          Files of several that come with the program: {}\n",
         spec::help_text(),
@@ -101,6 +108,11 @@ pub(super) fn updraft(text: &str) -> Result<f64, String> {
 }
 
 impl AirArgs {
+    /// Whether anything but a uniform wind is asked for.
+    pub(super) fn moves(&self) -> bool {
+        self.specs.iter().any(|specs| !specs.0.is_empty())
+    }
+
     /// The air of a flight with a uniform vertical speed.
     pub(super) fn air(&self, updraft_mps: f64) -> Air {
         let (sin, cos) = self.wind_from.to_radians().sin_cos();
@@ -177,6 +189,12 @@ pub(super) fn parse_slots(text: &str) -> Result<SlotSet, String> {
         slots.extend(first..=last);
     }
     Ok(SlotSet(slots))
+}
+
+impl FromIterator<u16> for SlotSet {
+    fn from_iter<I: IntoIterator<Item = u16>>(slots: I) -> Self {
+        Self(slots.into_iter().collect())
+    }
 }
 
 impl SlotSet {

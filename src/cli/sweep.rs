@@ -16,6 +16,8 @@ use crate::report::{self, Provenance};
 use crate::study::result::StudyResult;
 use crate::study::{Settings, StudyPlan, Work, evaluate};
 
+/// Name of the built-in study.
+const BUILT_IN: &str = "study";
 /// Width of the terminal summary, columns: at most, and at least.
 const WIDTH: usize = 100;
 const MIN_WIDTH: usize = 60;
@@ -33,7 +35,7 @@ in cells/: the same command goes on where an interrupted one stopped, and a chan
 what changed. The grammar is in docs/study.md. Exit code 3: done, but some flights were lost.")]
 pub(super) struct SweepArgs {
     /// Study: a file or the built-in name
-    #[arg(default_value = "study")]
+    #[arg(default_value = BUILT_IN)]
     study: String,
     /// Folder of the study's flights and results
     #[arg(short, long, value_name = "FOLDER", default_value = "study")]
@@ -96,7 +98,7 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
         let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
         context.print(&report::study_summary(&result, width, context.color))?;
     }
-    let page = write(args, &result)?;
+    let page = write(&args.output, command(args), args.seed, &result)?;
     if context.json {
         context.print_json(&SweepOutput {
             schema: "updraft.sweep/1",
@@ -115,6 +117,25 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
     Ok(if result.lost.is_empty() { Exit::Done } else { Exit::Losses })
 }
 
+/// Flies the built-in study into a folder, for the report of a campaign. Finished flights are kept.
+pub(super) fn fly_study(context: &Context, folder: &Path, seed: u64) -> Result<(), CommandError> {
+    let watch = Stopwatch::start();
+    let study = StudyPlan::load(BUILT_IN)?;
+    let work = Work::open(&study, folder, Settings { seed, keep_logs: false, force: false })?;
+    let progress = Progress::new(context, "flying the study", work.open_flights() as u64);
+    let flown = work.fly(context.stop_flag(), &|| progress.advance());
+    progress.finish();
+    let flown = flown?;
+    context.check_stop()?;
+    let result = evaluate(&study, seed, &flown)?;
+    for lost in &result.lost {
+        context.warn(&format!("{}: {}", lost.name, lost.reason));
+    }
+    write(folder, format!("updraft run --seed {seed}"), seed, &result)?;
+    context.say(&format!("Flew the simulation study ({} flights) in {watch}", flown.flown));
+    Ok(())
+}
+
 /// A study in a campaign's folder would overwrite its report.
 fn refuse_campaign(folder: &Path) -> Result<(), CommandError> {
     if campaign::is_campaign(folder) {
@@ -127,20 +148,21 @@ fn refuse_campaign(folder: &Path) -> Result<(), CommandError> {
 }
 
 /// Writes the results; the page last, so that where it is, all is.
-fn write(args: &SweepArgs, result: &StudyResult) -> Result<PathBuf, CommandError> {
+fn write(
+    folder: &Path,
+    command: String,
+    seed: u64,
+    result: &StudyResult,
+) -> Result<PathBuf, CommandError> {
     let json = to_json(result)
         .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-    let provenance = Provenance {
-        program: made_by(),
-        command: command(args),
-        seed: Some(args.seed),
-        ..Provenance::default()
-    };
+    let provenance =
+        Provenance { program: made_by(), command, seed: Some(seed), ..Provenance::default() };
     let made = report::render_study(result, &provenance)?;
-    let folder = args.output.join("report");
-    write_whole(&args.output.join("study.json"), &json)?;
-    report::write(&made, &folder)?;
-    Ok(folder.join(report::PAGE_FILE))
+    let pages = folder.join("report");
+    write_whole(&folder.join("study.json"), &json)?;
+    report::write(&made, &pages)?;
+    Ok(pages.join(report::PAGE_FILE))
 }
 
 /// The command line that gives these results.

@@ -140,7 +140,19 @@ fn wind_biases_the_map_by_less_than_is_stated() {
         let wind = ["--calibration-wind", calibration, "--wind", hover];
         let flown =
             ["run", "--grid", "1x1", "--duration", "40", "--speeds", "1,2,3", "--leg", "15"];
-        let place = ["--updraft", "1", "-o", "campaign", "--force", "--quiet"];
+        let place = [
+            "--updraft",
+            "1",
+            "-o",
+            "campaign",
+            "--force",
+            "--quiet",
+            "--vehicle",
+            "airsim-generic-quad",
+            "--air",
+            "still",
+            "--no-study",
+        ];
         bench.expect(0, &[&flown[..], &wind, &place].concat());
         for corrected in [true, false] {
             let mut words = vec!["analyze", "campaign", "--no-report", "--json", "--quiet"];

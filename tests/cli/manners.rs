@@ -117,7 +117,7 @@ fn quiet_prints_the_path_of_the_result_and_what_is_wrong() {
     quiet(&["simulate", "campaign"], "");
     quiet(&["analyze", "campaign"], "campaign/report/index.html\n");
     quiet(&["analyze", "campaign", "--no-report"], "");
-    let run = ["run", "--grid", "1x2", "--duration", "60", "-o", "whole"];
+    let run = ["run", "--grid", "1x2", "--duration", "60", "-o", "whole", "--no-study"];
     quiet(&[&run[..], SHORT].concat(), "whole/report/index.html\n");
     for file in ["fields/updraft.csv", "analysis.json", "report/figures/fig5-hover.svg"] {
         assert!(bench.path("whole").join(file).is_file(), "{file}");

@@ -160,7 +160,20 @@ fn an_interrupted_run_leaves_whole_logs_and_goes_on() {
 #[test]
 fn run_does_it_all_and_finds_it_done() {
     let bench = Bench::new();
-    let args = ["run", "--grid", "1x2", "--duration", "60", "-o", "campaign"];
+    let args = [
+        "run",
+        "--grid",
+        "1x2",
+        "--duration",
+        "60",
+        "-o",
+        "campaign",
+        "--vehicle",
+        "airsim-generic-quad",
+        "--air",
+        "still",
+        "--no-study",
+    ];
     let ran = bench.expect(0, &[&args[..], SHORT].concat());
     assert!(ran.out.contains("signed quadratic"), "{ran}");
     assert!(ran.err.starts_with("Planned calibration and hover for 2 drones in "), "{ran}");
