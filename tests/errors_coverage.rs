@@ -13,6 +13,7 @@
 //! `UPDRAFT_CAMPAIGNS` sets the campaigns of each kind of air in the first one (30).
 
 #![expect(clippy::unwrap_used, reason = "a test fails")]
+#![expect(clippy::print_stdout, reason = "the long runs print their shares")]
 
 use std::path::Path;
 use std::process::Command;

@@ -167,7 +167,9 @@ pub(super) fn weigh<T: Send>(
     }
     let keep = |weighed: &mut Vec<Weighed<T>>| {
         let sum: f64 = weighed.iter().map(|one| one.weight).sum();
-        weighed.iter_mut().for_each(|one| one.weight /= sum);
+        for one in weighed {
+            one.weight /= sum;
+        }
     };
     keep(&mut weighed);
     weighed.retain(|one| one.weight > NEGLIGIBLE);

@@ -65,7 +65,7 @@ pub struct FlightInput<'a> {
     /// How the vehicle leans in wind, where its drag is known; `None`: the map is not corrected for
     /// wind, and says how wrong it may be.
     pub leaning: Option<Leaning>,
-    /// How the battery acts on the pulse; `None`: it does not, or is not to be corrected for.
+    /// How the battery acts on the pulse; `None`: it does not.
     pub sag: Option<Sag>,
     /// What wind does to the vehicle's pulse, where its physics is known and [`FlightInput::leaning`]
     /// does not say.

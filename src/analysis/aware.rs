@@ -114,7 +114,7 @@ impl<'a> Aware<'a> {
             }
         };
         let points = points_of(shape == Shape::Line);
-        let zero = Fleet::new(&points, reference.drones.len(), shape, &sigmas)?.laws()?;
+        let zero = Fleet::new(&points, reference.drones.len(), shape, &sigmas)?.laws();
         Some(Self { reference, corrections, zero, battery, slope })
     }
 
@@ -205,7 +205,7 @@ impl<'a> Aware<'a> {
                 );
             }
         }
-        if let Some(per_minute) = hover.trend_us_per_min(&known_times(&referred)) {
+        if let Some(per_minute) = Hover::trend_us_per_min(&known_times(&referred)) {
             flag(Quality::Drift, format!("the pulse drifts by {per_minute:+.0} us per minute"));
         }
         measured.quality = quality;

@@ -38,7 +38,7 @@ pub(super) fn local_air(
     parts: &Parts,
     doubts: &[Parts],
     rough: f64,
-) -> Option<Local> {
+) -> Local {
     let mut of_drone: Vec<Vec<usize>> = vec![Vec::new(); split.drones];
     points.iter().enumerate().for_each(|(index, point)| of_drone[point.drone].push(index));
     let flown = of_drone.iter().filter(|own| !own.is_empty()).count();
@@ -48,11 +48,11 @@ pub(super) fn local_air(
             covariance: Matrix4::zeros(),
             answers: [[0.0; PARAMETERS]; DOUBTS],
         };
-        return Some(Local {
+        return Local {
             drones: of_drone.iter().map(|own| (!own.is_empty()).then(none)).collect(),
             spread: Matrix4::zeros(),
             sd_mps: 0.0,
-        });
+        };
     }
     // Averages were taken from the same points: deviations are too small by this.
     let grow = (flown as f64 / (flown as f64 - 1.0)).sqrt();
@@ -132,5 +132,5 @@ pub(super) fn local_air(
         spread += value * value.transpose() / (n - 1.0).max(1.0);
     }
     spread *= 1.0 + 1.0 / n.max(1.0);
-    Some(Local { drones, spread, sd_mps: quantile(&weighed, 0.5, |one| one.air.sd_mps) })
+    Local { drones, spread, sd_mps: quantile(&weighed, 0.5, |one| one.air.sd_mps) }
 }

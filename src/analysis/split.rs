@@ -34,11 +34,8 @@ fn cells(points: &[Point]) -> (Vec<Cell>, Vec<usize>) {
         cell_of.push(cell);
     }
     for cell in &mut cells {
-        let n = cell.members.len() as f64;
-        let mean = |value: fn(&Point) -> f64| {
-            cell.members.iter().map(|index| value(&points[*index])).sum::<f64>() / n
-        };
-        cell.velocity_mps = mean(|point| point.velocity_mps);
+        let sum: f64 = cell.members.iter().map(|index| points[*index].velocity_mps).sum();
+        cell.velocity_mps = sum / cell.members.len() as f64;
     }
     (cells, cell_of)
 }
@@ -102,7 +99,9 @@ impl Split {
             for part in 0..2 {
                 let mean = flown.iter().map(|drone| parts.drones[*drone][part]).sum::<f64>()
                     / flown.len().max(1) as f64;
-                flown.iter().for_each(|drone| parts.drones[*drone][part] -= mean);
+                for drone in &flown {
+                    parts.drones[*drone][part] -= mean;
+                }
             }
         }
         parts

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::air_prior::{Air, Gls, Record, Weighed, grid, quantile, weigh};
 use super::corrections::{BATTERY, DOUBTS, DRIFT};
-use super::local::local_air;
+use super::local::{Own, local_air};
 use super::result::CalibrationAir;
 use super::shape::{PARAMETERS, Shape};
 use super::split::{Parts, Point, Split, noise_us, rough_sensitivity, rough_slope};
@@ -130,10 +130,9 @@ impl<'a> Fleet<'a> {
     }
 
     /// The laws of the fleet and of its drones.
-    pub(super) fn laws(self) -> Option<Zero> {
+    pub(super) fn laws(self) -> Zero {
         let Self { shape, points, split, pulses, parts, doubts, rough, record: fleet, weighed } =
             self;
-        let drones = split.drones;
         let p = shape.parameters();
         let mut gain = DMatrix::zeros(p, fleet.pulse_us.len());
         for one in &weighed {
@@ -160,44 +159,40 @@ impl<'a> Fleet<'a> {
             all
         };
         let fleet_law = whole(parameters.as_slice());
-        let mut laws = Vec::new();
-        for drone in 0..drones {
-            laws.push(local.as_ref().and_then(|local| {
-                let own = local.drones.get(drone)?.as_ref()?;
-                let mut law = fleet_law;
-                law.iter_mut().zip(own.value.iter()).for_each(|(law, own)| *law += own);
-                let mut answers = [[0.0; PARAMETERS]; DOUBTS];
-                for (doubt, answer) in answers.iter_mut().enumerate() {
-                    *answer = whole(&answers_fleet[doubt]);
-                    answer.iter_mut().zip(own.answers[doubt]).for_each(|(all, own)| *all += own);
-                }
-                Some(DroneLaw { law, own: own.covariance, answers })
-            }));
-        }
+        let law_of = |own: &Own| {
+            let mut law = fleet_law;
+            law.iter_mut().zip(own.value.iter()).for_each(|(law, own)| *law += own);
+            let mut answers = [[0.0; PARAMETERS]; DOUBTS];
+            for (doubt, answer) in answers.iter_mut().enumerate() {
+                *answer = whole(&answers_fleet[doubt]);
+                answer.iter_mut().zip(own.answers[doubt]).for_each(|(all, own)| *all += own);
+            }
+            DroneLaw { law, own: own.covariance, answers }
+        };
+        let drones = local.drones.iter().map(|own| own.as_ref().map(law_of)).collect();
         let answers = std::array::from_fn(|doubt| whole(&answers_fleet[doubt]));
-        let spread = local.as_ref().map_or_else(Matrix4::zeros, |local| local.spread);
         let interval = |value: fn(&Air) -> f64| {
             [0.025, 0.975].map(|share| quantile(&weighed, share, |one| value(&one.air)))
         };
         let speeds = points.iter().map(|point| point.velocity_mps);
-        Some(Zero {
+        Zero {
             shape,
             common,
-            drones: laws,
-            flock: DroneLaw { law: fleet_law, own: spread, answers },
+            drones,
+            flock: DroneLaw { law: fleet_law, own: local.spread, answers },
             air: CalibrationAir {
                 sd_mps: quantile(&weighed, 0.5, |one| one.air.sd_mps),
                 sd_interval_mps: interval(|air| air.sd_mps),
                 time_scale_s: quantile(&weighed, 0.5, |one| one.air.tau_s),
                 time_scale_interval_s: interval(|air| air.tau_s),
-                local_sd_mps: local.as_ref().map_or(0.0, |local| local.sd_mps),
+                local_sd_mps: local.sd_mps,
             },
             width,
             speeds_mps: [
                 speeds.clone().fold(f64::INFINITY, f64::min),
                 speeds.fold(f64::NEG_INFINITY, f64::max),
             ],
-        })
+        }
     }
 }
 

@@ -14,6 +14,7 @@ use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::simulate::{made_by, sha256};
 use super::words;
+use crate::analysis::battery::Sag;
 use crate::analysis::calibrate::{Location, Weights};
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
@@ -78,19 +79,27 @@ pub(super) struct AnalyzeOptions {
     /// simulated flights of known drag has its own, see --no-wind)
     #[arg(long, value_enum, default_value_t = TiltChoice::Paper)]
     tilt: TiltChoice,
+    #[command(flatten)]
+    without: Uncorrected,
+    /// As in the paper: windows by their medians, weighted by the samples' standard deviation; the
+    /// map from those laws alone
+    #[arg(long)]
+    paper: bool,
+}
+
+/// What the map is not corrected for.
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Analysis")]
+struct Uncorrected {
     /// Do not correct the map for air density at different heights
     #[arg(long)]
     no_density: bool,
-    /// Do not correct the map for the battery's voltage
+    /// Do not correct the map for the battery's voltage: what it may have done is then in its error
     #[arg(long)]
     no_battery: bool,
     /// Do not correct the map for wind on leaning drones (vehicles of known drag)
     #[arg(long)]
     no_wind: bool,
-    /// As in the paper: windows by their medians, weighted by the samples' standard deviation; the
-    /// map from those laws alone
-    #[arg(long)]
-    paper: bool,
 }
 
 /// Law for the map of the air.
@@ -211,10 +220,12 @@ fn finish(
             start: flight.start,
             true_updraft_mps: flight.true_updraft_mps,
             truth: (!flight.truth.is_empty()).then_some(&flight.truth),
-            density: flight.density.filter(|_| !options.no_density),
-            leaning: flight.leaning.filter(|_| !options.no_wind),
-            sag: flight.sag.filter(|_| !options.no_battery),
-            lean_table: flight.lean_table.as_ref().filter(|_| !options.no_wind),
+            density: flight.density.filter(|_| !options.without.no_density),
+            leaning: flight.leaning.filter(|_| !options.without.no_wind),
+            sag: flight
+                .sag
+                .map(|sag| if options.without.no_battery { Sag::UNCORRECTED } else { sag }),
+            lean_table: flight.lean_table.as_ref().filter(|_| !options.without.no_wind),
             folder: Some(&work.root),
         })
         .collect();

@@ -87,7 +87,7 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         start: None,
         density: plan.map(|plan| density(plan, None)),
         leaning: None,
-        sag: plan.map(|_| Sag::default()),
+        sag: Some(if plan.is_some() { Sag::default() } else { Sag::UNKNOWN }),
         lean_table: None,
         notes: Vec::new(),
     });
