@@ -61,13 +61,14 @@ fn campaign(vehicle: &str, air: &str, size: &str, seed: u64) -> Outcome {
     let mut rng: Pcg64 = stream(seed, 0, Purpose::Sensors);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     // The stated doubts: 5 % of the battery's exponent, 3 us of warming up, and 15 % of what wind
-    // does, which goes with the square of the drag.
+    // does, from the drag that tells the wind and the lift that it gives.
     let (exponent, warm_us) = (1.0 + 0.05 * normal(), 3.0 * normal());
-    let drag = 0.021 * (1.0 + 0.075 * normal());
+    let (drag, lift) = (0.021 * (1.0 + 0.075 * normal()), 0.5 + 0.035 * normal());
     let truth = match vehicle {
         "pixel" => format!(
             "--effect battery.exponent={exponent:.4} --effect motor-thermal.drift_us={warm_us:.3} \
-             --effect motor-thermal.time_s=100 --effect blade-flapping.drag_per_weight={drag:.5}"
+             --effect motor-thermal.time_s=100 --effect blade-flapping.drag_per_weight={drag:.5} \
+             --effect translational-lift.inflow_share={lift:.4}"
         ),
         _ => String::new(),
     };

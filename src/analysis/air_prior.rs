@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 /// Time scale that is most likely before the windows are seen, s: a few minutes, as over a field at
 /// show heights.
-const USUAL_TAU_S: f64 = 120.0;
+const USUAL_TAU_S: f64 = 150.0;
 /// One standard deviation of its logarithm: a factor of 2.2.
 const TAU_SPREAD: f64 = 0.8;
 /// Above this, strong air is taken for less and less likely, m/s.
