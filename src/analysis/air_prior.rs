@@ -9,10 +9,11 @@
 //! constant's error.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
 
 /// Time scale that is most likely before the windows are seen, s: a few minutes, as over a field at
 /// show heights.
-const USUAL_TAU_S: f64 = 120.0;
+const USUAL_TAU_S: f64 = 150.0;
 /// One standard deviation of its logarithm: a factor of 2.2.
 const TAU_SPREAD: f64 = 0.8;
 /// Above this, strong air is taken for less and less likely, m/s.
@@ -35,7 +36,7 @@ impl Air {
     /// Weight before the windows are seen: any strength below that of a storm, and time scales of
     /// minutes. One short flight cannot tell how slow the air is, and the error of the zero grows
     /// with that, so that some knowledge must come from outside.
-    fn prior(&self) -> f64 {
+    pub(super) fn prior(&self) -> f64 {
         let tau = (self.tau_s / USUAL_TAU_S).ln() / TAU_SPREAD;
         (-0.5 * tau * tau).exp() / (1.0 + (self.sd_mps / STRONG_MPS).powi(2))
     }
@@ -149,22 +150,26 @@ pub(super) struct Weighed<T> {
     pub(super) fit: T,
 }
 
-/// All choices that count, with weights that add up to one, heaviest first.
-pub(super) fn weigh<T>(fits: impl Iterator<Item = (Air, f64, T)>) -> Vec<Weighed<T>> {
-    let mut weighed: Vec<Weighed<T>> = fits
-        .map(|(air, log_likelihood, fit)| Weighed {
-            air,
-            weight: log_likelihood + air.prior().ln(),
-            fit,
-        })
-        .collect();
+/// All choices that count, with weights that add up to one, heaviest first; `fit` gives the logarithm
+/// of a choice's likelihood.
+pub(super) fn weigh<T: Send>(
+    grid: &[Air],
+    fit: impl Fn(&Air) -> Option<(f64, T)> + Sync,
+) -> Vec<Weighed<T>> {
+    let one = |air: &Air| {
+        let (log_likelihood, fit) = fit(air)?;
+        Some(Weighed { air: *air, weight: log_likelihood + air.prior().ln(), fit })
+    };
+    let mut weighed: Vec<Weighed<T>> = grid.par_iter().filter_map(one).collect();
     let most = weighed.iter().map(|one| one.weight).fold(f64::NEG_INFINITY, f64::max);
     for one in &mut weighed {
         one.weight = (one.weight - most).exp();
     }
     let keep = |weighed: &mut Vec<Weighed<T>>| {
         let sum: f64 = weighed.iter().map(|one| one.weight).sum();
-        weighed.iter_mut().for_each(|one| one.weight /= sum);
+        for one in weighed {
+            one.weight /= sum;
+        }
     };
     keep(&mut weighed);
     weighed.retain(|one| one.weight > NEGLIGIBLE);
@@ -239,11 +244,10 @@ mod tests {
         let still: Vec<f64> = (0..20).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
         let record = record(&still);
         let grid = grid(8, &[20.0, 200.0], &[0.2, 2.0]);
-        let fits = grid.iter().filter_map(|air| {
+        let weighed = weigh(&grid, |air| {
             let fit = record.fit(air)?;
-            Some((*air, fit.log_likelihood, fit))
+            Some((fit.log_likelihood, fit))
         });
-        let weighed = weigh(fits);
         assert!((weighed.iter().map(|one| one.weight).sum::<f64>() - 1.0).abs() < 1e-12);
         assert!(quantile(&weighed, 0.5, |one| one.air.sd_mps) < 0.1);
     }

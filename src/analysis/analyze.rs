@@ -74,7 +74,7 @@ pub struct FlightInput<'a> {
     /// Power of thrust that `u - 1000` goes with, where the vehicle is known: 1 where thrust is linear
     /// in the pulse.
     pub thrust_exponent: Option<f64>,
-    /// How the battery acts on the pulse; `None`: it does not, or is not to be corrected for.
+    /// How the battery acts on the pulse; `None`: it does not.
     pub sag: Option<Sag>,
     /// What wind does to the vehicle's pulse, where its physics is known and [`FlightInput::leaning`]
     /// does not say.

@@ -12,8 +12,10 @@ use super::corrections::{BATTERY, Corrections, DENSITY, DOUBTS, DRIFT, Raw, Refe
 use super::drone::same_drone;
 use super::hover::{Hover, Second};
 use super::result::{DroneAnalysis, FlightAnalysis, WindowStats};
+use super::shape::{PARAMETERS, Shape};
+use super::split::Point;
 use super::stats::mean_sd;
-use super::zero::{self, DroneLaw, PARAMETERS, Point, Shape, Zero};
+use super::zero::{DroneLaw, Fleet, Zero};
 use crate::flight::Flight;
 
 /// Standard errors to each side of a normal 95 % interval.
@@ -102,16 +104,17 @@ impl<'a> Aware<'a> {
             // Compared on the windows that both take: in hover the signed quadratic says nothing
             // about its parameters.
             None => {
+                let legs = points_of(false);
                 let evidence = |shape: Shape| {
-                    zero::fit(&points_of(false), reference.drones.len(), shape, &sigmas)
-                        .map_or(f64::NEG_INFINITY, |zero| zero.evidence)
+                    Fleet::new(&legs, reference.drones.len(), shape, &sigmas)
+                        .map_or(f64::NEG_INFINITY, |fleet| fleet.evidence())
                 };
                 let (line, square) = (evidence(Shape::Line), evidence(Shape::SignedQuadratic));
                 if square > line + CLEARLY { Shape::SignedQuadratic } else { Shape::Line }
             }
         };
         let points = points_of(shape == Shape::Line);
-        let zero = zero::fit(&points, reference.drones.len(), shape, &sigmas)?;
+        let zero = Fleet::new(&points, reference.drones.len(), shape, &sigmas)?.laws();
         Some(Self { reference, corrections, zero, battery, slope })
     }
 
@@ -202,7 +205,7 @@ impl<'a> Aware<'a> {
                 );
             }
         }
-        if let Some(per_minute) = hover.trend_us_per_min(&known_times(&referred)) {
+        if let Some(per_minute) = Hover::trend_us_per_min(&known_times(&referred)) {
             flag(Quality::Drift, format!("the pulse drifts by {per_minute:+.0} us per minute"));
         }
         measured.quality = quality;

@@ -35,6 +35,13 @@ pub struct Sag {
     pub exponent_se: f64,
 }
 
+impl Sag {
+    /// Not corrected for: all of what the voltage may have done is error.
+    pub const UNCORRECTED: Self = Self { exponent: 0.0, exponent_se: 1.0 };
+    /// Logs of an unknown vehicle, which may be simulated with a battery that acts on nothing.
+    pub const UNKNOWN: Self = Self { exponent: 0.5, exponent_se: 0.5 };
+}
+
 impl Default for Sag {
     /// A controller that passes on a share of the voltage.
     fn default() -> Self {

@@ -9,10 +9,11 @@ use super::analyze::MapLaw;
 use super::aware::Aware;
 use super::battery::Sag;
 use super::budget::Supply;
+use super::calibrate::FitOptions;
 use super::corrections::Corrections;
 use super::density::Density;
 use super::hover::Hover;
-use super::result::{DroneAnalysis, FlightAnalysis, SampleStats, WindowStats};
+use super::result::{DroneAnalysis, FlightAnalysis, SampleStats, Trace, WindowStats};
 use super::windows::{Target, WindowOptions};
 use crate::base::rng::{Purpose as Stream, stream};
 use crate::flight::{Clock, Flight, Series};
@@ -166,10 +167,10 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
                 source: String::new(),
                 home_m: None,
                 clock: Clock::default(),
-                laws: super::calibrate::calibrate(&windows, &Default::default()).ok(),
+                laws: super::calibrate::calibrate(&windows, &FitOptions::default()).ok(),
                 windows,
                 partial_ladder: None,
-                trace: Default::default(),
+                trace: Trace::default(),
                 warnings: Vec::new(),
             }
         })
@@ -231,9 +232,8 @@ fn hover(
         clock: Clock { method: crate::flight::Alignment::ShowRows, ..Clock::default() },
         ..Flight::default()
     };
-    let truth = (0..)
-        .map(|second| second as f64)
-        .take_while(|second| *second < HOVER_S)
+    let truth = (0..HOVER_S as i32)
+        .map(f64::from)
         .map(|second| {
             // The trapezoids of the running mean.
             let (from, to) = ((second - 5.0) / STEP_S, (second + 5.0) / STEP_S);

@@ -168,7 +168,7 @@ impl Hover {
     }
 
     /// Trend of pulses through the hover, us per minute, if it is worth a flag.
-    pub(super) fn trend_us_per_min(&self, pulses: &[(f64, f64)]) -> Option<f64> {
+    pub(super) fn trend_us_per_min(pulses: &[(f64, f64)]) -> Option<f64> {
         let (first, last) = (pulses.first()?.0, pulses.last()?.0);
         let n = pulses.len() as f64;
         let mean = |value: fn(&(f64, f64)) -> f64| pulses.iter().map(value).sum::<f64>() / n;
@@ -288,11 +288,11 @@ mod tests {
         assert_eq!(hover.quality[0].flag, Quality::Misaligned);
         let pulses: Vec<(f64, f64)> =
             hover.seconds.iter().flatten().map(|one| (one.time_s, one.pulse_us)).collect();
-        assert!((hover.trend_us_per_min(&pulses).unwrap() - 18.0).abs() < 0.01);
+        assert!((Hover::trend_us_per_min(&pulses).unwrap() - 18.0).abs() < 0.01);
         let calm = look(&flown(|time| 1540.0 + 0.1 * time), 199.0);
         let pulses: Vec<(f64, f64)> =
             calm.seconds.iter().flatten().map(|one| (one.time_s, one.pulse_us)).collect();
-        assert_eq!(calm.trend_us_per_min(&pulses), None, "6 us per minute are not rare");
+        assert_eq!(Hover::trend_us_per_min(&pulses), None, "6 us per minute are not rare");
     }
 
     #[test]

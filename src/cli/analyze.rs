@@ -14,6 +14,7 @@ use super::load::{has_extension, load_shows};
 use super::progress::Progress;
 use super::provenance::provenance;
 use super::words;
+use crate::analysis::battery::Sag;
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, OffsetRule, analyze};
@@ -71,7 +72,6 @@ pub(super) struct AnalyzeArgs {
 /// How to analyse.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Analysis")]
-#[expect(clippy::struct_excessive_bools, reason = "each is a switch on the command line")]
 pub(super) struct AnalyzeOptions {
     /// Law for the map of the air
     #[arg(long, value_enum, default_value_t = LawChoice::Auto)]
@@ -83,24 +83,31 @@ pub(super) struct AnalyzeOptions {
     /// has its own, see --no-wind)
     #[arg(long, value_enum, default_value_t = TiltChoice::Thrust)]
     tilt: TiltChoice,
+    #[command(flatten)]
+    without: Uncorrected,
+    /// Subtract the pulse's slow offset over time and height (the paper's eq. 5) before laws are
+    /// fitted
+    #[arg(long, value_enum, default_value_t = OffsetChoice::Field)]
+    offset: OffsetChoice,
+    /// As in the paper: windows by their medians (means where the offset is subtracted), weighted by
+    /// the samples' standard deviation, tilt as --tilt paper; the map from those laws alone
+    #[arg(long)]
+    paper: bool,
+}
+
+/// What the map is not corrected for.
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Analysis")]
+struct Uncorrected {
     /// Do not correct the map for air density at different heights
     #[arg(long)]
     no_density: bool,
-    /// Do not correct the map for the battery's voltage
+    /// Do not correct the map for the battery's voltage: what it may have done is then in its error
     #[arg(long)]
     no_battery: bool,
     /// Do not correct the map for wind on leaning drones (vehicles of known drag)
     #[arg(long)]
     no_wind: bool,
-    /// Subtract the pulse's slow offset over time and height (the paper's eq. 5) before laws are
-    /// fitted
-    #[arg(long, value_enum, default_value_t = OffsetChoice::Field)]
-    offset: OffsetChoice,
-    /// Windows as in the paper: medians (means where the offset is subtracted), weighted by the
-    /// samples' standard deviation, tilt as --tilt paper; the
-    /// map from those laws alone
-    #[arg(long)]
-    paper: bool,
 }
 
 /// Law for the map of the air.
@@ -206,10 +213,10 @@ impl AnalyzeOptions {
             ("rotor effort", name(&self.indicator)),
             ("offset over time and height", name(&self.offset)),
             ("windows", windows.to_owned()),
-            ("air density at height, in the map", corrected(self.no_density)),
+            ("air density at height, in the map", corrected(self.without.no_density)),
             (
                 "wind on leaning drones, in the map, where their drag is known",
-                corrected(self.no_wind),
+                corrected(self.without.no_wind),
             ),
         ]
     }
@@ -296,11 +303,13 @@ fn finish(
             start: flight.start,
             true_updraft_mps: flight.true_updraft_mps,
             truth: (!flight.truth.is_empty()).then_some(&flight.truth),
-            density: flight.density.filter(|_| !options.no_density),
-            leaning: flight.leaning.filter(|_| !options.no_wind),
+            density: flight.density.filter(|_| !options.without.no_density),
+            leaning: flight.leaning.filter(|_| !options.without.no_wind),
             thrust_exponent: flight.thrust_exponent,
-            sag: flight.sag.filter(|_| !options.no_battery),
-            lean_table: flight.lean_table.as_ref().filter(|_| !options.no_wind),
+            sag: flight
+                .sag
+                .map(|sag| if options.without.no_battery { Sag::UNCORRECTED } else { sag }),
+            lean_table: flight.lean_table.as_ref().filter(|_| !options.without.no_wind),
             folder: Some(&work.root),
         })
         .collect();

@@ -94,7 +94,7 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         density: plan.map(|plan| density(plan, None)),
         leaning: None,
         thrust_exponent: None,
-        sag: plan.map(|_| Sag::default()),
+        sag: Some(if plan.is_some() { Sag::default() } else { Sag::UNKNOWN }),
         lean_table: None,
         notes: Vec::new(),
     });

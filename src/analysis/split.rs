@@ -1,0 +1,150 @@
+//! Windows of a fleet split into averages over drones and the drones' deviations from them.
+
+use std::collections::BTreeMap;
+
+use super::corrections::DOUBTS;
+use super::shape::Shape;
+
+/// No mean of a window is known better, us.
+pub(super) const LEAST_NOISE_US: f64 = 0.1;
+/// Rounds of the separation into fleet and drones.
+const ROUNDS: usize = 12;
+/// Windows whose times differ by more belong to groups that fly apart, s.
+const SAME_TIME_S: f64 = 5.0;
+/// Averages over drones of what was flown at the same time.
+pub(super) struct Cell {
+    pub(super) time_s: f64,
+    pub(super) velocity_mps: f64,
+    pub(super) members: Vec<usize>,
+}
+
+fn cells(points: &[Point]) -> (Vec<Cell>, Vec<usize>) {
+    let mut found: BTreeMap<&(String, usize), Vec<usize>> = BTreeMap::new();
+    let mut cells: Vec<Cell> = Vec::new();
+    let mut cell_of = Vec::new();
+    for (index, point) in points.iter().enumerate() {
+        let same = found.entry(&point.key).or_default();
+        let near = |cell: &&usize| (cells[**cell].time_s - point.time_s).abs() < SAME_TIME_S;
+        let cell = same.iter().find(near).copied().unwrap_or_else(|| {
+            same.push(cells.len());
+            cells.push(Cell { time_s: point.time_s, velocity_mps: 0.0, members: Vec::new() });
+            cells.len() - 1
+        });
+        cells[cell].members.push(index);
+        cell_of.push(cell);
+    }
+    for cell in &mut cells {
+        let sum: f64 = cell.members.iter().map(|index| points[*index].velocity_mps).sum();
+        cell.velocity_mps = sum / cell.members.len() as f64;
+    }
+    (cells, cell_of)
+}
+
+/// Splits values of the points into averages of cells and a constant and slope for each drone.
+pub(super) struct Split {
+    pub(super) drones: usize,
+    pub(super) cells: Vec<Cell>,
+    pub(super) cell_of: Vec<usize>,
+    /// What a drone's slope is multiplied with, less its mean over the drone's points.
+    pub(super) own: Vec<f64>,
+}
+
+pub(super) struct Parts {
+    pub(super) cells: Vec<f64>,
+    /// Constant (at the mean of the drone's speeds) and slope.
+    pub(super) drones: Vec<[f64; 2]>,
+}
+
+impl Split {
+    pub(super) fn new(shape: Shape, points: &[Point], drones: usize) -> Self {
+        let (cells, cell_of) = cells(points);
+        let own = points.iter().map(|point| shape.own(point.velocity_mps)).collect();
+        Self { drones, cells, cell_of, own }
+    }
+
+    /// Alternating least squares; deviations of the drones have the mean zero.
+    pub(super) fn of(&self, points: &[Point], values: &[f64]) -> Parts {
+        let mut parts =
+            Parts { cells: vec![0.0; self.cells.len()], drones: vec![[0.0; 2]; self.drones] };
+        for _ in 0..ROUNDS {
+            for (cell, mean) in self.cells.iter().zip(&mut parts.cells) {
+                let rest = |index: &usize| {
+                    let [constant, slope] = parts.drones[points[*index].drone];
+                    values[*index] - constant - slope * self.own[*index]
+                };
+                *mean = cell.members.iter().map(rest).sum::<f64>() / cell.members.len() as f64;
+            }
+            let mut sums = vec![[0.0; 5]; self.drones];
+            for (index, point) in points.iter().enumerate() {
+                let rest = values[index] - parts.cells[self.cell_of[index]];
+                let x = self.own[index];
+                let sum = &mut sums[point.drone];
+                for (sum, term) in sum.iter_mut().zip([1.0, x, x * x, rest, x * rest]) {
+                    *sum += term;
+                }
+            }
+            let mut flown: Vec<usize> = Vec::new();
+            for (drone, [n, x, xx, y, xy]) in sums.iter().enumerate() {
+                let determinant = n * xx - x * x;
+                parts.drones[drone] = if determinant > 1e-9 {
+                    let slope = (n * xy - x * y) / determinant;
+                    [(y - slope * x) / n, slope]
+                } else {
+                    [if *n > 0.0 { y / n } else { 0.0 }, 0.0]
+                };
+                if *n > 0.0 {
+                    flown.push(drone);
+                }
+            }
+            for part in 0..2 {
+                let mean = flown.iter().map(|drone| parts.drones[*drone][part]).sum::<f64>()
+                    / flown.len().max(1) as f64;
+                for drone in &flown {
+                    parts.drones[*drone][part] -= mean;
+                }
+            }
+        }
+        parts
+    }
+}
+
+/// One usable window of one drone, referred.
+#[derive(Clone, Debug)]
+pub(super) struct Point {
+    /// Index of the drone.
+    pub(super) drone: usize,
+    /// What was commanded, and its count among equals: the same for all drones of the fleet.
+    pub(super) key: (String, usize),
+    pub(super) time_s: f64,
+    pub(super) velocity_mps: f64,
+    pub(super) pulse_us: f64,
+    /// Standard error of pulse and velocity together, us.
+    pub(super) noise_us: f64,
+    pub(super) doubts_us: [f64; DOUBTS],
+}
+
+/// Slope of an unweighted line through the points, us per unit of the shape's second term.
+pub(super) fn rough_slope(split: &Split, points: &[Point]) -> f64 {
+    let n = points.len() as f64;
+    let mean_x = split.own.iter().sum::<f64>() / n;
+    let mean_y = points.iter().map(|point| point.pulse_us).sum::<f64>() / n;
+    let (mut xx, mut xy) = (0.0, 0.0);
+    for (point, x) in points.iter().zip(&split.own) {
+        xx += (x - mean_x).powi(2);
+        xy += (x - mean_x) * (point.pulse_us - mean_y);
+    }
+    if xx > 1e-9 { xy / xx } else { 0.0 }
+}
+
+pub(super) fn noise_us(points: &[Point], members: &[usize]) -> f64 {
+    let squares: f64 =
+        members.iter().map(|i| points[*i].noise_us.max(LEAST_NOISE_US).powi(2)).sum();
+    squares.sqrt() / members.len() as f64
+}
+
+pub(super) fn rough_sensitivity(shape: Shape, rough: f64, air_mps: f64) -> f64 {
+    match shape {
+        Shape::Line => rough,
+        Shape::SignedQuadratic => 2.0 * rough * air_mps.abs(),
+    }
+}
