@@ -8,8 +8,8 @@ use updraft::report::fields::{COLUMNS, rows, write_csv};
 
 fn csv(analysis: &Analysis) -> String {
     let mut bytes = Vec::new();
-    write_csv(analysis, &mut bytes).unwrap();
-    String::from_utf8(bytes).unwrap()
+    write_csv(analysis, &mut bytes).expect("memory takes all");
+    String::from_utf8(bytes).expect("UTF-8")
 }
 
 #[test]

@@ -29,6 +29,7 @@ fn input<'a>(name: &'a str, plan: &'a Plan, logs: &'a [LogInput]) -> FlightInput
         truth: None,
         density: None,
         leaning: None,
+        thrust_exponent: None,
         folder: None,
     }
 }

@@ -151,7 +151,7 @@ mod tests {
         let scale = Scale {
             value: 98.37,
             fit_se: Some(2.04),
-            interval_95: Some(Interval { low: 51.2, high: 1234.5 }),
+            interval_95: Some(Interval { low: 51.2, high: 1234.6 }),
             ..Scale::default()
         };
         assert_eq!(paper_form(&scale), "98.4 ± 2.0");

@@ -30,7 +30,7 @@ const LAW: [f64; 2] = [412.0, 560.0];
 const OFFSET_TOP: f64 = 2.0 * TRACES[1];
 const LAW_LEFT: f64 = 628.0;
 /// Picture elements of the offset.
-const ELEMENTS: (usize, usize) = (246, 70);
+const ELEMENTS: (usize, usize) = (164, 46);
 
 /// Axes and scales shared by all drones of a flight, so that they compare when one flips through
 /// them.
