@@ -16,6 +16,7 @@ use updraft::analysis::calibrate::{FitOptions, Location, Weights};
 use updraft::analysis::result::{
     Analysis, Fit, FlightAnalysis, Quality, Rejection, UnusedLog, WindowStats, Yield,
 };
+use updraft::analysis::windows::{Tilt, WindowOptions};
 use updraft::analysis::{
     AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, OffsetRule, analyze,
     analyze_flight,

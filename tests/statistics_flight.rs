@@ -30,6 +30,8 @@ fn input<'a>(name: &'a str, plan: &'a Plan, logs: &'a [LogInput]) -> FlightInput
         density: None,
         leaning: None,
         thrust_exponent: None,
+        sag: None,
+        lean_table: None,
         folder: None,
     }
 }

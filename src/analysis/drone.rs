@@ -167,10 +167,10 @@ fn measure(
         ));
     }
     let length_s = hover.end_s - hover.start_s;
-    if length_s < updraft::RUNNING_S {
+    if length_s < RUNNING_S {
         return Err(format!(
-            "the hover is too short: its window has {length_s:.0} s, the running mean needs {:.0} s",
-            updraft::RUNNING_S
+            "the hover is too short: its window has {length_s:.0} s, the running mean needs \
+             {RUNNING_S:.0} s"
         ));
     }
     let leveled = input.leaning.map(|leaning| leaning.level_series(seen.flight, seen.corrected));

@@ -214,6 +214,7 @@ impl AnalyzeOptions {
             ("offset over time and height", name(&self.offset)),
             ("windows", windows.to_owned()),
             ("air density at height, in the map", corrected(self.without.no_density)),
+            ("battery voltage, in the map", corrected(self.without.no_battery)),
             (
                 "wind on leaning drones, in the map, where their drag is known",
                 corrected(self.without.no_wind),
