@@ -88,8 +88,15 @@ pub(super) fn fit_line(fit: &Fit) -> String {
         Some(chi2) => parts.push(format!("χ²/ν = {} (ν = {})", reduced(chi2), fit.dof)),
         None => parts.push("no errors: as many parameters as windows".to_owned()),
     }
-    parts.push(format!("rms {} µs over {}", fixed(fit.rms_us, 2), count(fit.points, "point")));
+    let rms = fixed(fit.rms_us, 2);
+    parts.push(format!("rms {rms} {} over {}", effort_unit(fit), count(fit.points, "point")));
     parts.join(", ")
+}
+
+/// The unit of rotor effort in a fit: that of u0.
+fn effort_unit(fit: &Fit) -> String {
+    let offset = fit.parameters.iter().find(|parameter| parameter.name == "u0");
+    offset.map_or_else(String::new, |parameter| unit(&parameter.unit))
 }
 
 /// The flock's fits in words: (law, line).
@@ -112,10 +119,11 @@ pub(super) fn scatter_line(laws: &Laws) -> Option<String> {
     let added = laws.sigma_added_us.filter(|added| usable(*added))?;
     Some(if added > 0.0 {
         format!(
-            "added scatter: {} µs on every window, beyond its own noise, so that the errors above \
+            "added scatter: {} {} on every window, beyond its own noise, so that the errors above \
              hold for the better law (turbulence longer than a window, and what the law does not \
              describe); χ²/ν is from before that",
-            significant(added)
+            significant(added),
+            laws.linear.as_ref().map_or_else(String::new, effort_unit)
         )
     } else {
         "added scatter: none; the better law describes the windows to within their own noise"

@@ -7,10 +7,11 @@ use crate::analysis::result::FlightAnalysis;
 
 use super::compare::{clock, drone_laws, flags, windows_used};
 use super::figures::air::mean_truth;
-use super::text::{NONE, clean, estimate, fixed, shortened, usable};
+use super::text::{NONE, clean, estimate, fixed, shortened, unit, usable};
 
 /// Headings and rows of the table of drones; columns that no drone fills are left out.
 pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
+    let effort = unit(flight.indicator.unit());
     let heads = [
         ("slot", true),
         ("drone", false),
@@ -18,14 +19,14 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("systematic ± (m/s)", true),
         ("true W (m/s)", true),
         ("mapping", false),
-        ("A (µs/(m/s)²)", true),
-        ("u₀ (µs)", true),
+        (&*format!("A ({effort}/(m/s)²)"), true),
+        (&*format!("u₀ ({effort})"), true),
         ("fitted W* (m/s)", true),
         ("χ²/ν", true),
-        ("A′ (µs/(m/s))", true),
-        ("u₀ linear (µs)", true),
+        (&*format!("A′ ({effort}/(m/s))"), true),
+        (&*format!("u₀ linear ({effort})"), true),
         ("χ²/ν linear", true),
-        ("added scatter (µs)", true),
+        (&*format!("added scatter ({effort})"), true),
         ("windows", true),
         ("clock", false),
     ];

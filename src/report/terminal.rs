@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
+use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
 use super::compare::{
@@ -208,6 +209,7 @@ impl Output {
     }
 
     fn drones(&mut self, flight: &FlightAnalysis) {
+        let added = if flight.indicator == Indicator::Pulse { "added µs" } else { "added" };
         let columns = [
             column("slot", Align::Right, 0),
             column("name", Align::Left, 3),
@@ -219,7 +221,7 @@ impl Output {
             column("χ²/ν (linear)", Align::Right, 6),
             column("u₀ (linear)", Align::Right, 5),
             column("windows", Align::Right, 4),
-            column("added µs", Align::Right, 4),
+            column(added, Align::Right, 4),
             column("clock", Align::Left, 7),
         ];
         // In a measurement the map says it all.
