@@ -162,7 +162,8 @@ fn wind_biases_the_map_by_less_than_is_stated() {
             println!("wind {calibration}, {hover}, corrected {corrected}: {value} ± {stated}");
             assert!((value - 1.0).abs() < stated, "{value} ± {stated}");
             if corrected {
-                assert!((value - 1.0).abs() < 0.06 && stated < 0.5, "{value} ± {stated}");
+                // Six legs of one drone: the law that knows of slow air cannot claim more.
+                assert!((value - 1.0).abs() < 0.06 && stated < 2.0, "{value} ± {stated}");
             } else if hover == "10" {
                 assert!(ended.out.contains("wind: the drones leaned 4"), "{ended}");
             }
