@@ -175,6 +175,7 @@ pub fn import(
                     method: Method::Import,
                     method_reason: None,
                     verified: Verified::Copy,
+                    incomplete: None,
                     attempts: 1,
                     at_unix_s: options.unix_s,
                 };

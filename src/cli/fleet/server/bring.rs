@@ -352,6 +352,7 @@ impl Puller<'_> {
             method: Method::SkybrushServer,
             method_reason: None,
             verified: Verified::Size,
+            incomplete: None,
             attempts: target.tries,
             at_unix_s: SystemClock::start().unix_us() / 1_000_000,
         })?;
