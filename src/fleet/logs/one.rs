@@ -178,6 +178,13 @@ impl PullOne {
         self.tally.new_bytes + now
     }
 
+    /// Logs that are home count as well.
+    fn with_finished(&self, of_target: Progress) -> Progress {
+        let finished: u64 = self.done.pulled.iter().map(|entry| entry.size_bytes).sum();
+        let Progress { done, total } = of_target;
+        Progress { done: done + finished, total: total + finished }
+    }
+
     /// When something of use was heard last.
     pub fn heard(&self) -> Option<Micros> {
         let now = match &self.stage {
@@ -370,9 +377,9 @@ impl Machine for PullOne {
 
     fn progress(&self) -> Progress {
         match &self.stage {
-            Stage::Get(get) => get.progress(),
-            Stage::LogGet(get) => get.progress(),
-            _ => Progress { done: self.held, total: self.size },
+            Stage::Get(get) => self.with_finished(get.progress()),
+            Stage::LogGet(get) => self.with_finished(get.progress()),
+            _ => self.with_finished(Progress { done: self.held, total: self.size }),
         }
     }
 }

@@ -403,6 +403,16 @@ mod tests {
     }
 
     #[test]
+    fn what_cannot_be_written_is_said_once_and_without_advice() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("01.BIN");
+        let mut part = PartFile::open(&path, "a").unwrap();
+        part.file = File::open(part_path(&path)).unwrap();
+        let said = part.put(0, 0, &[7; 100]).unwrap_err();
+        assert!(said.starts_with("cannot write ") && !said.contains(';'), "{said}");
+    }
+
+    #[test]
     fn a_sample_finds_a_difference() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("01.BIN");

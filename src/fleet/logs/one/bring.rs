@@ -125,6 +125,7 @@ impl PullOne {
         match got.result {
             Err(error) => self.on_ftp_failed(part, error),
             Ok(size) => {
+                self.held = part.have().total();
                 if size != self.size {
                     self.resize(size);
                 }
@@ -138,6 +139,7 @@ impl PullOne {
         self.held = part.have().total();
         match error {
             LogProtocolError::Silent { .. } => self.fail_silent(error.to_string()),
+            LogProtocolError::Sink(reason) => self.fail(reason.clone(), "make room and run again"),
             _ => self.fail(error.to_string(), "run again; or take its card and import"),
         }
     }
@@ -145,7 +147,10 @@ impl PullOne {
     pub(super) fn on_log_got(&mut self, got: LogGot<PartFile>) -> Stage {
         self.tally.new_bytes += got.tally.new_bytes;
         match got.result {
-            Ok(_) => Stage::Settle(got.sink),
+            Ok(_) => {
+                self.held = got.sink.have().total();
+                Stage::Settle(got.sink)
+            }
             Err(error) => self.on_log_failed(got.sink, &error),
         }
     }

@@ -85,7 +85,7 @@ impl PullOne {
             at_unix_s: self.options.unix_s,
         };
         self.attempts = 0;
-        self.held = 0;
+        (self.held, self.size) = (0, 0);
         let mark = match (self.is_damaged, self.replaces) {
             (true, _) => Some("damaged"),
             (_, true) => Some("other"),
