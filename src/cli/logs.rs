@@ -41,7 +41,10 @@ pub(super) use listing::{ListRow, ListedLog};
 
 Logs come over MAVFTP, or over the log messages where that fails. What has come is kept at every
 interruption; a log is given its name when its checksum (or size, and pieces read again) agrees with
-the drone's, and logs/manifest.json says how. Exit code 3: some logs are missing; each is named with
+the drone's, and logs/manifest.json says how. A log that is home is compared with the drone's: a
+longer one is continued, and a file that was damaged since goes to logs/older and comes again. An
+armed drone gives no logs. Drones that are off are waited for (--wait) while the others' logs come.
+Exit code 3: some logs are missing; each is named with
 the reason and what to do.")]
 pub(super) struct LogsArgs {
     #[command(subcommand)]
