@@ -363,7 +363,7 @@ pub fn propose_clear(
                     slot,
                     first: *first,
                     second: *second,
-                }))
+                }));
             }
             [] => {}
         }

@@ -10,6 +10,7 @@ mod settle;
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use self::home::Begun;
 pub use self::options::{Failure, OneDone, OneOptions, Which};
 use super::manifest::{AtHome, Shelf};
 use super::part::{PartFile, Sample, Sums};
@@ -75,14 +76,8 @@ pub struct PullOne {
     home: AtHome,
     /// The drone has more of it.
     is_outgrown: bool,
-    /// What is there at home of the target is damaged.
-    is_damaged: bool,
-    /// The download was begun with the log at home...
-    is_seeded: bool,
-    /// ... which is known to be whole, ...
-    is_guarded: bool,
-    /// ... but was not the beginning of this one.
-    replaces: bool,
+    /// What the download of the target began with.
+    begun: Begun,
     rounds: u32,
     restarts: u32,
     attempts: u32,
@@ -150,10 +145,7 @@ impl PullOne {
             incomplete: None,
             home: AtHome::Nothing,
             is_outgrown: false,
-            is_damaged: false,
-            is_seeded: false,
-            is_guarded: false,
-            replaces: false,
+            begun: Begun::Empty,
             rounds: 0,
             restarts: 0,
             attempts: 0,

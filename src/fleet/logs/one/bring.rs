@@ -1,6 +1,7 @@
 //! The bytes of a log: continued where an earlier run ended, begun anew when it is another log,
 //! by MAVFTP or by the log messages.
 
+use super::home::Begun;
 use super::{MOST_RESTARTS, PullOne, SAMPLE_BYTES, Stage};
 use crate::fleet::ftp::FtpError;
 use crate::fleet::ftp::get::{Get, GetOptions, Got};
@@ -65,7 +66,9 @@ impl PullOne {
     /// The part is of another file.
     pub(super) fn restart(&mut self, mut part: PartFile, why: &str) -> Stage {
         self.restarts += 1;
-        self.replaces |= self.is_seeded;
+        if self.begun.is_seeded() {
+            self.begun = Begun::Anew;
+        }
         if self.restarts > MOST_RESTARTS {
             if self.reason.is_none() {
                 return self.fall_back(format!("MAVFTP: {why}, {} times", self.restarts));

@@ -127,7 +127,7 @@ impl PullOne {
         }
         (self.rounds, self.restarts, self.grows) = (0, 0, None);
         self.resize(target.size);
-        self.is_outgrown |= self.is_seeded;
+        self.is_outgrown |= self.begun.is_seeded();
         let identity = format!("drone={} source={}", self.drone, target.source);
         self.target = Some(target);
         let opened = path

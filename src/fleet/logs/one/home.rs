@@ -17,6 +17,37 @@ pub(super) enum Needed {
     Rest,
 }
 
+/// What a download began with, and what becomes of what is at home.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Begun {
+    /// Nothing; what is at home is replaced, as was asked for.
+    Empty,
+    /// Nothing: what is at home is damaged, and set aside.
+    Damaged,
+    /// The log at home, which is known to be whole, and stays if it is another.
+    Whole,
+    /// The log at home, which is only a beginning.
+    Beginning,
+    /// Nothing in the end: the log at home was not its beginning, and is set aside.
+    Anew,
+}
+
+impl Begun {
+    /// Whether the log at home is in it.
+    pub(super) fn is_seeded(self) -> bool {
+        matches!(self, Self::Whole | Self::Beginning)
+    }
+
+    /// What the log at home is called when it is set aside.
+    pub(super) fn mark(self) -> Option<&'static str> {
+        match self {
+            Self::Damaged => Some("damaged"),
+            Self::Anew => Some("other"),
+            Self::Empty | Self::Whole | Self::Beginning => None,
+        }
+    }
+}
+
 impl PullOne {
     /// The log at home, if it is intact and the one that is wanted.
     fn intact(&self) -> Option<&ManifestEntry> {
@@ -47,15 +78,16 @@ impl PullOne {
         let is_slots = target.file == self.file;
         let at_home =
             if is_slots { self.home.clone() } else { self.shelf.borrow().at_home(&target.file) };
-        (self.is_seeded, self.replaces, self.is_guarded) = (false, false, false);
-        self.is_damaged = false;
+        self.begun = Begun::Empty;
         if self.options.again {
             return Needed::Whole;
         }
         let entry = match at_home {
             AtHome::Intact(entry) => entry,
             at_home => {
-                self.is_damaged = matches!(at_home, AtHome::Damaged(_));
+                if matches!(at_home, AtHome::Damaged(_)) {
+                    self.begun = Begun::Damaged;
+                }
                 return Needed::Whole;
             }
         };
@@ -68,8 +100,7 @@ impl PullOne {
         match (target.size.cmp(&entry.size_bytes), is_whole) {
             (Ordering::Equal, true) if is_same => Needed::Nothing(None),
             (Ordering::Greater, _) | (Ordering::Equal, false) => {
-                self.is_seeded = true;
-                self.is_guarded = is_whole;
+                self.begun = if is_whole { Begun::Whole } else { Begun::Beginning };
                 Needed::Rest
             }
             _ => Needed::Nothing(Some("the drone's log is another, and not longer".to_owned())),
@@ -78,7 +109,7 @@ impl PullOne {
 
     /// Its log does not begin as what is there of it.
     pub(super) fn on_another(&mut self, part: PartFile) -> Stage {
-        if self.is_guarded && self.is_seeded {
+        if self.begun == Begun::Whole {
             part.discard();
             let why = "the drone's log is another (--again brings it)".to_owned();
             if let Some(target) = self.target.take() {

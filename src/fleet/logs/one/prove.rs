@@ -86,12 +86,8 @@ impl PullOne {
         };
         self.attempts = 0;
         (self.held, self.size) = (0, 0);
-        let mark = match (self.is_damaged, self.replaces) {
-            (true, _) => Some("damaged"),
-            (_, true) => Some("other"),
-            _ => None,
-        };
-        let aside = mark.map_or(Ok(()), |mark| self.shelf.borrow().set_aside(&entry.file, mark));
+        let set_aside = |mark| self.shelf.borrow().set_aside(&entry.file, mark);
+        let aside = self.begun.mark().map_or(Ok(()), set_aside);
         let finished = aside.and_then(|()| self.shelf.borrow_mut().finish(part, entry.clone()));
         if let Err(error) = finished {
             let reason = format!("{error}: {}", error.source);
