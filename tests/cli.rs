@@ -33,6 +33,9 @@ mod inspect;
 mod lock;
 #[path = "cli/logs.rs"]
 mod logs;
+#[cfg(unix)]
+#[path = "cli/logs_pull.rs"]
+mod logs_pull;
 #[path = "cli/manners.rs"]
 mod manners;
 #[path = "cli/plan.rs"]

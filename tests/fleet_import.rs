@@ -107,3 +107,37 @@ fn logs_find_their_slots_by_id_and_by_home() {
     let report = import(&[cards.join("a")], &plan, &logs, &options).unwrap();
     assert!(report.taken[0].source.ends_with("00000001.BIN"));
 }
+
+#[test]
+fn a_log_that_ends_too_early_is_not_known_to_be_whole() {
+    let plan = plan();
+    let armed = |states: &[i64]| {
+        let mut log = LogWriter::new(Vec::new(), &[&catalog::PARM, &catalog::ARM]).unwrap();
+        let mut row = vec![Value::Int(0); catalog::PARM.format.len()];
+        row[1] = Value::Text("SYSID_THISMAV");
+        row[2] = Value::Float(3.0);
+        log.row(&catalog::PARM, &row).unwrap();
+        for state in states {
+            let mut row = vec![Value::Int(0); catalog::ARM.format.len()];
+            row[1] = Value::Int(*state);
+            log.row(&catalog::ARM, &row).unwrap();
+        }
+        log.finish().unwrap()
+    };
+    let whole = armed(&[1, 0]);
+    let cases = [
+        (whole.clone(), None),
+        (armed(&[1]), Some("it ends while the drone is armed")),
+        (whole[..whole.len() - 3].to_vec(), Some("it ends in the middle of a message")),
+    ];
+    for (bytes, why) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        put(folder.path(), "card/00000012.BIN", &bytes);
+        let logs = folder.path().join("logs");
+        let report = import(&[folder.path().join("card")], &plan, &logs, &options(&plan)).unwrap();
+        let entry = &report.taken[0];
+        assert_eq!((entry.incomplete.as_deref(), entry.boot), (why, Some(12)));
+        let faults = verify(&logs).unwrap().remove(0).faults;
+        assert_eq!(!faults.is_empty(), why.is_some(), "{faults:?}");
+    }
+}

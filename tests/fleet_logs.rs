@@ -171,12 +171,19 @@ fn all_but_the_drone_that_is_gone_come_home_whole_through_everything() {
     let checked = verify(&logs).unwrap();
     assert!(checked.iter().all(|one| one.faults.len() == 1
         && one.faults[0].to_string().starts_with("is what the drone had, but no log")));
-    // Nothing is asked for that is there.
-    let before = net.carried.up;
-    net.vehicles.clear();
+    // Of what is there only the list is asked for; and of drones that are gone it stays.
+    let before = net.carried.down;
     let outcomes = pull(&mut net, &logs, &wanted[..3], &options(4), &mut NoWatch).unwrap();
+    assert_eq!(
+        (&*done(&outcomes, 2).there, &done(&outcomes, 2).unchecked),
+        (&["02.BIN".to_owned()][..], &None)
+    );
+    let heartbeats_and_lists = net.carried.down - before;
+    assert!(heartbeats_and_lists < 20_000, "{heartbeats_and_lists}");
+    net.vehicles.clear();
+    let outcomes = pull(&mut net, &logs, &wanted[..3], &options(5), &mut NoWatch).unwrap();
     assert_eq!(done(&outcomes, 2).there, ["02.BIN"]);
-    assert_eq!(net.carried.up, before);
+    assert!(done(&outcomes, 2).unchecked.as_ref().unwrap().starts_with("no answer for 12 s"));
 }
 
 fn one(net: &mut LossyNet<Eventful>, logs: &Path, options: &PullOptions) -> OneDone {
@@ -206,8 +213,10 @@ fn a_log_that_grows_is_a_prefix_of_what_is_on_the_drone() {
     net.vehicles.get_mut(&drone(1)).unwrap().grows = Some((S, 4_000 * S));
     let folder = tempfile::tempdir().unwrap();
     let done = one(&mut net, folder.path(), &options(1));
-    assert_eq!(done.failure, None);
+    let failure = done.failure.unwrap();
+    assert_eq!(failure.reason, "its log still grows, and what is home is its beginning");
     assert_eq!(done.pulled[0].verified, Verified::Sample);
+    assert!(done.pulled[0].incomplete.is_some());
     let bytes = fs::read(folder.path().join("01.BIN")).unwrap();
     let all = net.vehicles[&drone(1)].vehicle.storage.get(LOG).unwrap();
     assert!(bytes.len() > 300_000 && all.starts_with(&bytes));

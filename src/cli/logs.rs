@@ -2,6 +2,7 @@
 
 mod dry;
 mod listing;
+mod who;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,7 +13,7 @@ use serde::Serialize;
 use super::clock::SystemClock;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::fleet::bring::{Wish, bring};
+use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::{one_flight, server};
@@ -40,7 +41,10 @@ pub(super) use listing::{ListRow, ListedLog};
 
 Logs come over MAVFTP, or over the log messages where that fails. What has come is kept at every
 interruption; a log is given its name when its checksum (or size, and pieces read again) agrees with
-the drone's, and logs/manifest.json says how. Exit code 3: some logs are missing; each is named with
+the drone's, and logs/manifest.json says how. A log that is home is compared with the drone's: a
+longer one is continued, and a file that was damaged since goes to logs/older and comes again. An
+armed drone gives no logs. Drones that are off are waited for (--wait) while the others' logs come.
+Exit code 3: some logs are missing; each is named with
 the reason and what to do.")]
 pub(super) struct LogsArgs {
     #[command(subcommand)]
@@ -149,23 +153,6 @@ pub(super) fn run(context: &Context, args: &LogsArgs) -> Result<Exit, CommandErr
     }
 }
 
-/// The table of the campaign; without one it is found from where the drones stand.
-fn with_table(crew: &mut Crew<'_>, wait_s: f64) -> Result<(), CommandError> {
-    if FleetTable::path(&crew.folder.0).exists() {
-        crew.table = FleetTable::read(&crew.folder.0)?;
-        let wanted = crew.table.drones.iter().map(|line| line.drone).collect();
-        // Drones that are off are told of one by one.
-        crew.hear_anyone(wait_s, Some(&wanted))
-    } else {
-        crew.listen(wait_s)?;
-        if crew.assign(false)? {
-            Ok(())
-        } else {
-            Err(CommandError::Usage("whose log is whose is not clear: see above".to_owned()))
-        }
-    }
-}
-
 fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     has_slots(&plan, args.slots.as_ref())?;
@@ -179,12 +166,9 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
     };
     let mut station = args.connect.open(links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    with_table(&mut crew, args.connect.wait)?;
-    if let Some(slots) = &args.slots {
-        crew.table.drones.retain(|line| slots.contains(line.slot));
-    }
+    let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait)?;
     let listed = crew.list_logs()?;
-    let rows: Vec<ListRow> = crew
+    let mut rows: Vec<ListRow> = crew
         .table
         .drones
         .iter()
@@ -207,6 +191,13 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
             }
         })
         .collect();
+    rows.extend(nobody.into_iter().map(|(slot, why)| ListRow {
+        drone: "-".to_owned(),
+        slot: Some(slot),
+        logs: Vec::new(),
+        reason: Some(why),
+    }));
+    rows.sort_by_key(|row| row.slot);
     listing::show(context, rows)
 }
 
@@ -286,6 +277,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
         rate: args.rate.map(f64::from),
         at_once: args.at_once.into(),
         patience_s: args.patience,
+        wait_s: args.connect.wait,
         quiet: false,
         is_durable: true,
     };
@@ -309,12 +301,23 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     };
     let mut station = args.connect.open(links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    with_table(&mut crew, args.connect.wait)?;
-    let mut table = crew.table.clone();
-    if let Some(slots) = &args.slots {
-        table.drones.retain(|line| slots.contains(line.slot));
+    let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait)?;
+    let table = crew.table.clone();
+    let mut brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
+    let nobody = nobody.into_iter().map(|(slot, why)| Brought {
+        slot,
+        drone: None,
+        state: "missing",
+        bytes: 0,
+        reason: Some(why),
+        unchecked: None,
+    });
+    let nobody: Vec<Brought> = nobody.collect();
+    for loss in nobody.iter().filter_map(Brought::loss) {
+        context.warn(&loss);
     }
-    let brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
+    brought.extend(nobody);
+    brought.sort_by_key(|one| one.slot);
     let lost: Vec<u16> =
         brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
     end_pull(context, args, &plan, brought, &lost)
@@ -413,6 +416,15 @@ fn cards(context: &Context, args: &ImportArgs) -> Result<Exit, CommandError> {
     let report = import(&args.cards, &plan, &folder.logs(), &options)?;
     for (path, reason) in &report.left {
         context.warn(&format!("{} was left: {reason}", path.display()));
+    }
+    for (entry, why) in
+        report.taken.iter().filter_map(|entry| Some((entry, entry.incomplete.as_ref()?)))
+    {
+        context.warn(&format!(
+            "{} is not known to be whole: {why}; `updraft logs pull` brings the rest if the drone \
+             has it",
+            entry.file
+        ));
     }
     if !report.missing.is_empty() {
         let slots: Vec<String> = report.missing.iter().map(ToString::to_string).collect();

@@ -188,6 +188,12 @@ pub enum SlotProblem {
         /// The other.
         second: DroneId,
     },
+    /// Its place is not known, and no table gives it a slot.
+    #[error("drone {drone} does not say where it stands: is it on, with GPS?")]
+    Nowhere {
+        /// The vehicle.
+        drone: DroneId,
+    },
     /// A vehicle that belongs to no slot.
     #[error("drone {drone} is on but has no slot: switch it off, or give it one")]
     Unassigned {
@@ -323,6 +329,46 @@ pub fn propose(
         _ => true,
     });
     if problems.is_empty() { Ok(table) } else { Err(problems) }
+}
+
+/// The vehicles that stand on a slot of their own, each near enough and alone, whatever the others
+/// do; and every vehicle that does not.
+pub fn propose_clear(
+    plan: &Plan,
+    telemetry: &Telemetry,
+    now: Micros,
+) -> (FleetTable, Vec<SlotProblem>) {
+    let stands = stands(plan, telemetry, now);
+    let allowed_m = allowed_m(plan);
+    let mut problems = Vec::new();
+    let mut on: BTreeMap<u16, Vec<DroneId>> = BTreeMap::new();
+    for drone in telemetry.drones.keys().copied() {
+        match stands.get(&drone) {
+            None => problems.push(SlotProblem::Nowhere { drone }),
+            Some(stand) if stand.distance_m <= allowed_m => {
+                on.entry(stand.nearest).or_default().push(drone);
+            }
+            Some(stand) => {
+                let (slot, distance_m) = (stand.nearest, stand.distance_m);
+                problems.push(SlotProblem::TooFar { drone, slot, distance_m, allowed_m });
+            }
+        }
+    }
+    let mut clear = Vec::new();
+    for (slot, drones) in on {
+        match drones.as_slice() {
+            [drone] => clear.push((*drone, slot)),
+            [first, others @ ..] => {
+                problems.extend(others.iter().map(|second| SlotProblem::BothOn {
+                    slot,
+                    first: *first,
+                    second: *second,
+                }));
+            }
+            [] => {}
+        }
+    }
+    (FleetTable::new(clear), problems)
 }
 
 /// Who stands where, as a picture of the grid seen from above: the show's x axis points up, so

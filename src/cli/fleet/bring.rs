@@ -1,15 +1,17 @@
 //! Bringing logs home: `logs pull` and the end of `fly`.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::atomic::Ordering;
+mod bar;
+mod shares;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 
+use self::bar::Bar;
 use super::connect::run_number;
 use crate::base::file::create_folder;
 use crate::campaign::FlightFolder;
-use crate::cli::clock::{Stopwatch, SystemClock};
+use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::simulate::made_by;
@@ -17,7 +19,6 @@ use crate::fleet::logs::one::{OneOptions, Which};
 use crate::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use crate::fleet::slots::FleetTable;
 use crate::link::clock::{Clock as _, Micros, S};
-use crate::link::drive::{Progress as Share, Watch};
 use crate::link::id::DroneId;
 use crate::link::net::Net;
 use crate::mission::Plan;
@@ -32,6 +33,8 @@ pub(in crate::cli) struct Wish {
     pub(in crate::cli) rate: Option<f64>,
     pub(in crate::cli) at_once: usize,
     pub(in crate::cli) patience_s: f64,
+    /// A drone that was never heard is given up after so long, s.
+    pub(in crate::cli) wait_s: f64,
     /// Waits for the disk.
     pub(in crate::cli) is_durable: bool,
     /// Says nothing: the caller tells what is missing.
@@ -47,6 +50,7 @@ impl Default for Wish {
             rate: None,
             at_once: 12,
             patience_s: 60.0,
+            wait_s: 60.0,
             is_durable: true,
             quiet: false,
         }
@@ -57,60 +61,30 @@ impl Default for Wish {
 #[derive(Clone, Debug, Serialize)]
 pub(in crate::cli) struct Brought {
     pub(in crate::cli) slot: u16,
-    pub(in crate::cli) drone: DroneId,
+    /// None: nobody is known to stand there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(in crate::cli) drone: Option<DroneId>,
     /// `pulled`, `there` or `missing`.
     pub(in crate::cli) state: &'static str,
     pub(in crate::cli) bytes: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(in crate::cli) reason: Option<String>,
+    /// Why what is there could not be compared with what the drone has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(in crate::cli) unchecked: Option<String>,
 }
 
 impl Brought {
     /// In a sentence why there is no log; `None`: there is one.
     pub(in crate::cli) fn loss(&self) -> Option<String> {
         let reason = self.reason.as_deref().unwrap_or("unknown");
-        (self.state == "missing")
-            .then(|| format!("no log of drone {} (slot {}): {reason}", self.drone, self.slot))
-    }
-}
-
-struct Bar<'a> {
-    context: &'a Context,
-    line: ProgressBar,
-    watch: Stopwatch,
-    shares: BTreeMap<DroneId, Share>,
-    /// Of all drones: adding them up at every message would cost more than the message.
-    sum: Share,
-    over: BTreeSet<DroneId>,
-    said: u64,
-}
-
-impl Watch for Bar<'_> {
-    fn on_progress(&mut self, drone: DroneId, progress: Share, over: bool) {
-        let before = self.shares.insert(drone, progress).unwrap_or_default();
-        let sum = &mut self.sum;
-        sum.done = (sum.done + progress.done).saturating_sub(before.done);
-        sum.total = (sum.total + progress.total).saturating_sub(before.total);
-        if over {
-            self.over.insert(drone);
-        }
-        let done = self.sum.done;
-        self.line.set_length(self.sum.total);
-        self.line.set_position(done);
-        let tens = self.watch.elapsed().as_secs() / 10;
-        if !self.context.interactive && tens > self.said {
-            self.said = tens;
-            self.context.say(&format!(
-                "bringing logs home: {:.1} MB, {} drones done after {}",
-                done as f64 / 1e6,
-                self.over.len(),
-                self.watch
-            ));
-        }
-    }
-
-    fn stop(&mut self, _: Micros) -> bool {
-        self.context.stop_flag().load(Ordering::SeqCst)
+        let slot = self.slot;
+        (self.state == "missing").then(|| match (self.drone, self.bytes) {
+            (None, _) => format!("no log of slot {slot}: {reason}"),
+            (Some(drone), 0) => format!("no log of drone {drone} (slot {slot}): {reason}"),
+            // Its beginning came, or older logs.
+            (Some(drone), _) => format!("not all of drone {drone} (slot {slot}): {reason}"),
+        })
     }
 }
 
@@ -139,6 +113,7 @@ pub(in crate::cli) fn bring(
         each: OneOptions {
             which: wish.which,
             patience: (wish.patience_s * S as f64) as Micros,
+            wait: (wish.wait_s * S as f64) as Micros,
             most_size: wish.most_bytes,
             again: wish.again,
             is_durable: wish.is_durable,
@@ -150,33 +125,17 @@ pub(in crate::cli) fn bring(
         bytes_per_s: wish.rate,
         made_by: made_by(),
     };
-    let target = if context.interactive {
-        ProgressDrawTarget::stderr()
-    } else {
-        ProgressDrawTarget::hidden()
-    };
-    let bar = ProgressBar::with_draw_target(None, target);
-    if let Ok(style) = ProgressStyle::with_template(
-        "logs [{bar:40.cyan/blue}] {bytes}/{total_bytes} {bytes_per_sec} (eta {eta})",
-    ) {
-        bar.set_style(style.progress_chars("━╸ "));
-    }
-    let mut watch = Bar {
-        context,
-        line: bar,
-        watch: Stopwatch::start(),
-        shares: BTreeMap::new(),
-        sum: Share::default(),
-        over: BTreeSet::new(),
-        said: 0,
-    };
-    let outcomes = pull(net, &folder.logs(), &wanted, &options, &mut watch)
+    let heard: BTreeSet<DroneId> = net.heard().into_iter().collect();
+    let absent = wanted.iter().filter(|one| !heard.contains(&one.drone));
+    let absent = absent.map(|one| (one.drone, one.slot)).collect();
+    let mut bar = Bar::new(context, absent, quiet);
+    let outcomes = pull(net, &folder.logs(), &wanted, &options, &mut bar)
         .map_err(|error| CommandError::Failed(with_reasons(&error)))?;
-    watch.line.finish_and_clear();
+    bar.finish();
     let brought: Vec<Brought> = wanted
         .iter()
         .map(|wanted| {
-            let (state, bytes, reason) = match outcomes.get(&wanted.drone) {
+            let (state, bytes, reason, unchecked) = match outcomes.get(&wanted.drone) {
                 Some(Outcome::Done(done)) => {
                     let bytes = done.pulled.iter().map(|entry| entry.size_bytes).sum();
                     let reason = done.failure.as_ref().map(|failure| {
@@ -192,13 +151,26 @@ pub(in crate::cli) fn bring(
                         (None, true) => "there",
                         (None, false) => "pulled",
                     };
-                    (state, bytes, reason)
+                    (state, bytes, reason, done.unchecked.clone())
                 }
-                Some(Outcome::Stopped) | None => ("missing", 0, Some("interrupted".to_owned())),
+                Some(Outcome::Stopped) | None => {
+                    ("missing", 0, Some("interrupted".to_owned()), None)
+                }
             };
-            Brought { slot: wanted.slot, drone: wanted.drone, state, bytes, reason }
+            let (slot, drone) = (wanted.slot, Some(wanted.drone));
+            Brought { slot, drone, state, bytes, reason, unchecked }
         })
         .collect();
+    let unchecked = brought
+        .iter()
+        .filter(|one| one.state == "there")
+        .filter_map(|one| Some((one.drone?, one.slot, one.unchecked.as_ref()?)));
+    for (drone, slot, why) in unchecked.filter(|_| !quiet) {
+        context.warn(&format!(
+            "the log of drone {drone} (slot {slot}) is there, but was not compared with the \
+             drone's: {why}"
+        ));
+    }
     for loss in brought.iter().filter_map(Brought::loss).filter(|_| !quiet) {
         context.warn(&loss);
     }
@@ -214,7 +186,7 @@ pub(in crate::cli) fn bring(
         state("pulled") + state("there"),
         brought.len(),
         bytes as f64 / 1e6,
-        watch.watch,
+        bar.watch,
         match state("there") {
             0 => String::new(),
             there => format!(" ({there} had come before)"),

@@ -24,7 +24,7 @@ pub(super) fn lines(
         let path = folder.log(slot, plan.slots.len());
         let place = path.strip_prefix(&folder.0).unwrap_or(&path).display();
         let line = if path.exists() && !args.again && args.log == Which::Newest {
-            format!("nothing: {place} is there")
+            format!("the list of its logs, and what {place} lacks")
         } else {
             format!("the list of its logs, and {what}, for {place}")
         };

@@ -61,17 +61,27 @@ pub struct Identity {
     pub home: Option<Geodetic>,
     /// First and last time by its satellites.
     pub span: Option<(GpsTime, GpsTime)>,
+    /// What tells that it is only the beginning of a log.
+    pub cut: Option<&'static str>,
 }
 
 /// Reads what a log says of itself.
 pub fn identity(log: &Log) -> Identity {
-    let (tables, _) = log.select(&[
+    let (tables, stats) = log.select(&[
         Select { message: "PARM", fields: &["Name", "Value"] },
         Select { message: "ORGN", fields: &["Lat", "Lng", "Alt"] },
         Select { message: "GPS", fields: &["Status", "GMS", "GWk", "Lat", "Lng", "Alt"] },
+        Select { message: "ARM", fields: &["ArmState"] },
     ]);
-    let [parameters, origins, positions] = tables.as_slice() else {
-        return Identity { system: None, home: None, span: None };
+    let [parameters, origins, positions, armings] = tables.as_slice() else {
+        return Identity { system: None, home: None, span: None, cut: None };
+    };
+    // The firmware writes of disarming before it closes its log.
+    let is_armed = armings.number("ArmState").and_then(<[f64]>::last).is_some_and(|at| *at > 0.0);
+    let cut = match (stats.truncated_bytes > 0, is_armed) {
+        (true, _) => Some("it ends in the middle of a message"),
+        (_, true) => Some("it ends while the drone is armed"),
+        _ => None,
     };
     let names = parameters.text("Name").unwrap_or_default();
     let values = parameters.number("Value").unwrap_or_default();
@@ -90,7 +100,15 @@ pub fn identity(log: &Log) -> Identity {
         system: system.map(|(_, value)| *value).filter(|value| is_id(*value)).map(|v| v as u8),
         home,
         span: time(rows.first()).zip(time(rows.last())),
+        cut,
     }
+}
+
+/// The number of a log in the name that the firmware gave it: `00000012.BIN`.
+fn number(path: &Path) -> Option<u32> {
+    let stem = path.file_stem()?.to_str()?;
+    let is_number = stem.len() == 8 && stem.bytes().all(|byte| byte.is_ascii_digit());
+    if is_number { stem.parse().ok() } else { None }
 }
 
 fn at(table: &Table, field: &str, row: usize) -> Option<f64> {
@@ -160,7 +178,7 @@ pub fn import(
             continue;
         }
         let best = choose(candidates, options.start, &mut report.left);
-        let Some(Candidate { path, .. }) = best else { continue };
+        let Some(Candidate { path, identity }) = best else { continue };
         match copy(&path, &target) {
             Err(error) => report.left.push((path, format!("{error}: {}", error.source))),
             Ok(sums) => {
@@ -168,13 +186,14 @@ pub fn import(
                     file: file.clone(),
                     slot,
                     drone: None,
-                    boot: None,
+                    boot: number(&path),
                     source: path.display().to_string(),
                     size_bytes: sums.size,
                     sha256: sums.sha256,
                     method: Method::Import,
                     method_reason: None,
                     verified: Verified::Copy,
+                    incomplete: identity.cut.map(str::to_owned),
                     attempts: 1,
                     at_unix_s: options.unix_s,
                 };

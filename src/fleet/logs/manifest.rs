@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::part::PartFile;
-use crate::base::file::{FileError, write_whole};
+use super::part::{PartFile, sums};
+use crate::base::file::{FileError, create_folder, write_whole};
 use crate::campaign::{CampaignError, read_json, to_json};
 use crate::link::id::DroneId;
 
@@ -54,10 +54,38 @@ pub struct ManifestEntry {
     pub method_reason: Option<String>,
     /// How it was compared with the drone's.
     pub verified: Verified,
+    /// Why it is, or may be, only the beginning of the drone's log; a later pull brings the rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub incomplete: Option<String>,
     /// How often it was begun or continued.
     pub attempts: u32,
     /// When it was whole, Unix seconds.
     pub at_unix_s: u64,
+}
+
+/// What is at home of a file of a shelf.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AtHome {
+    /// Neither a file nor an entry.
+    Nothing,
+    /// A file that the manifest does not know.
+    Foreign,
+    /// An entry whose file is gone.
+    Gone(ManifestEntry),
+    /// The file is no longer what its entry says.
+    Damaged(ManifestEntry),
+    /// Size and SHA-256 are those of the entry.
+    Intact(ManifestEntry),
+}
+
+impl AtHome {
+    /// What the manifest says of it.
+    pub fn entry(&self) -> Option<&ManifestEntry> {
+        match self {
+            Self::Nothing | Self::Foreign => None,
+            Self::Gone(entry) | Self::Damaged(entry) | Self::Intact(entry) => Some(entry),
+        }
+    }
 }
 
 /// How a log came.
@@ -133,6 +161,37 @@ impl Shelf {
     /// The entry of a file.
     pub fn entry(&self, file: &str) -> Option<&ManifestEntry> {
         self.manifest.logs.iter().find(|entry| entry.file == file)
+    }
+
+    /// What is there of a file, read through: the manifest's word alone is not taken for it.
+    pub fn at_home(&self, file: &str) -> AtHome {
+        let path = self.path(file);
+        let size = std::fs::metadata(&path).map(|about| about.len()).ok();
+        match (self.entry(file).cloned(), size) {
+            (None, None) => AtHome::Nothing,
+            (None, Some(_)) => AtHome::Foreign,
+            (Some(entry), None) => AtHome::Gone(entry),
+            (Some(entry), Some(size)) => {
+                let is_intact = size == entry.size_bytes
+                    && sums(&path).is_ok_and(|found| found.sha256 == entry.sha256);
+                if is_intact { AtHome::Intact(entry) } else { AtHome::Damaged(entry) }
+            }
+        }
+    }
+
+    /// Moves a file to the older logs under a free name with `mark`: `older/07-damaged-1.BIN`.
+    pub fn set_aside(&self, file: &str, mark: &str) -> Result<(), FileError> {
+        let from = self.path(file);
+        let stem = file.strip_prefix("older/").unwrap_or(file).trim_end_matches(".BIN");
+        create_folder(&self.folder.join("older"))?;
+        let name = |number: u32| self.folder.join(format!("older/{stem}-{mark}-{number}.BIN"));
+        let to = (1..=u32::MAX).map(name).find(|path| !path.exists());
+        match to.map(|to| std::fs::rename(&from, to)) {
+            Some(Err(source)) if source.kind() != std::io::ErrorKind::NotFound => {
+                Err(FileError::new("move aside", &from, source))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Writes an entry.

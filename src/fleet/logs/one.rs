@@ -2,14 +2,17 @@
 
 mod bring;
 mod choose;
+mod home;
 mod options;
 mod prove;
+mod settle;
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use self::home::Begun;
 pub use self::options::{Failure, OneDone, OneOptions, Which};
-use super::manifest::Shelf;
+use super::manifest::{AtHome, Shelf};
 use super::part::{PartFile, Sample, Sums};
 use crate::fleet::budget::Budget;
 use crate::fleet::ftp::Caller;
@@ -28,7 +31,7 @@ use crate::link::id::DroneId;
 const FTP_PATIENCE: Micros = 12 * S;
 /// A drone whose last heartbeat is older is not heard.
 const HEARD: Micros = 4 * S;
-/// A log that still grows is continued so often; then what was listed is taken.
+/// A checksum that differs is asked for again so often, at the size that the log has then.
 const MOST_ROUNDS: u32 = 3;
 /// A log that turns out to be another is begun anew so often.
 const MOST_RESTARTS: u32 = 3;
@@ -63,6 +66,18 @@ pub struct PullOne {
     targets: Vec<Target>,
     target: Option<Target>,
     size: u64,
+    /// Since when the log on the drone has this size, as far as is known.
+    sized: Micros,
+    /// When it was found growing first.
+    grows: Option<Micros>,
+    /// Why only its beginning comes.
+    incomplete: Option<String>,
+    /// What was at home of the slot's file.
+    home: AtHome,
+    /// The drone has more of it.
+    is_outgrown: bool,
+    /// What the download of the target began with.
+    begun: Begun,
     rounds: u32,
     restarts: u32,
     attempts: u32,
@@ -83,7 +98,10 @@ enum Stage {
     /// A part of an earlier run: is it of the same file?
     Probe(Box<Get<Sample>>, PartFile),
     Get(Box<Get<PartFile>>),
+    /// All bytes came: will its size stay?
+    Settle(PartFile),
     Relist(List, PartFile),
+    LogRelist(LogList, PartFile),
     Sum(Sum, PartFile, Sums),
     Sample(Box<Get<Sample>>, PartFile, Sums),
     LogList(LogList),
@@ -122,6 +140,12 @@ impl PullOne {
             targets: Vec::new(),
             target: None,
             size: 0,
+            sized: 0,
+            grows: None,
+            incomplete: None,
+            home: AtHome::Nothing,
+            is_outgrown: false,
+            begun: Begun::Empty,
             rounds: 0,
             restarts: 0,
             attempts: 0,
@@ -146,6 +170,13 @@ impl PullOne {
         self.tally.new_bytes + now
     }
 
+    /// Logs that are home count as well.
+    fn with_finished(&self, of_target: Progress) -> Progress {
+        let finished: u64 = self.done.pulled.iter().map(|entry| entry.size_bytes).sum();
+        let Progress { done, total } = of_target;
+        Progress { done: done + finished, total: total + finished }
+    }
+
     /// When something of use was heard last.
     pub fn heard(&self) -> Option<Micros> {
         let now = match &self.stage {
@@ -156,7 +187,20 @@ impl PullOne {
         now.max(self.heartbeat)
     }
 
+    /// Whether it only lets time pass, and needs nothing of its link.
+    pub fn is_idle(&self) -> bool {
+        matches!(self.stage, Stage::Settle(_))
+    }
+
     fn fail(&mut self, reason: String, advice: &'static str) -> Stage {
+        if self.is_excused() {
+            self.leave(self.file.clone(), Some(reason));
+            return Stage::Over;
+        }
+        self.fail_for_sure(reason, advice)
+    }
+
+    fn fail_for_sure(&mut self, reason: String, advice: &'static str) -> Stage {
         let kept_bytes = self.held;
         self.done.failure.get_or_insert(Failure { reason, advice, kept_bytes });
         Stage::Over
@@ -191,35 +235,12 @@ impl PullOne {
     }
 
     fn start(&mut self) -> Stage {
-        let there = {
-            let shelf = self.shelf.borrow();
-            let path = shelf.path(&self.file);
-            let size = std::fs::metadata(&path).map(|about| about.len()).ok();
-            match (shelf.entry(&self.file), size) {
-                (Some(entry), Some(size)) if entry.size_bytes == size => {
-                    Some(match self.options.which {
-                        Which::Newest => true,
-                        Which::Number(number) => entry.boot == Some(number),
-                        Which::All => false,
-                    })
-                }
-                (None, Some(_)) => None,
-                _ => Some(false),
-            }
-        };
-        match there {
-            _ if self.options.again => {}
-            Some(true) => {
-                self.done.there.push(self.file.clone());
-                return Stage::Over;
-            }
-            Some(false) => {}
-            None => {
-                return self.fail(
-                    format!("{} is there, but the manifest does not know it", self.file),
-                    "move the file away, or bring the log again in its place (--again)",
-                );
-            }
+        self.home = self.shelf.borrow().at_home(&self.file);
+        if self.home == AtHome::Foreign && !self.options.again {
+            return self.fail(
+                format!("{} is there, but the manifest does not know it", self.file),
+                "move the file away, or bring the log again in its place (--again)",
+            );
         }
         match self.list(FTP_PATIENCE) {
             Some(list) => Stage::List(list),
@@ -246,6 +267,13 @@ impl PullOne {
                 machine!(get, got => self.on_probed(part, &got.sink, got.result), Stage::Probe(get, part))
             }
             Stage::Get(mut get) => machine!(get, got => self.on_got(got), Stage::Get(get)),
+            Stage::Settle(part) => match self.settles() {
+                Some(until) => (Stage::Settle(part), Next::Step(Step::Wait(until))),
+                None => (Stage::Over, Next::Go(Box::new(self.relist(part)))),
+            },
+            Stage::LogRelist(mut list, part) => {
+                machine!(list, done => self.on_log_relisted(part, done), Stage::LogRelist(list, part))
+            }
             Stage::Relist(mut list, part) => {
                 machine!(list, done => self.on_relisted(part, done), Stage::Relist(list, part))
             }
@@ -266,7 +294,7 @@ impl PullOne {
             Stage::LogProbe(mut get, part) => machine!(
                 get,
                 got => match got.result {
-                    _ if got.sink.differs => self.restart(part, "the log on the drone is another"),
+                    _ if got.sink.differs => self.on_another(part),
                     Ok(_) => self.begin(part, false),
                     Err(error) => self.on_log_failed(part, &error),
                 },
@@ -297,7 +325,11 @@ impl Machine for PullOne {
             let armed = dialect::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
             if beat.base_mode.contains(armed) && !matches!(self.stage, Stage::Over) {
                 // A link is not loaded while anything flies on it.
-                self.stage = self.fail("it is armed".to_owned(), "land and disarm, then run again");
+                // The open log grows, and its checksum is right for a moment only.
+                self.stage = self.fail_for_sure(
+                    "the drone is armed and gives no logs: disarm it".to_owned(),
+                    "then run again",
+                );
             }
             return;
         }
@@ -308,12 +340,14 @@ impl Machine for PullOne {
             }
             Stage::Get(machine) => machine.on_message(now, message),
             Stage::Sum(machine, ..) => machine.on_message(now, message),
-            Stage::LogList(machine) => machine.on_message(now, message),
+            Stage::LogList(machine) | Stage::LogRelist(machine, _) => {
+                machine.on_message(now, message);
+            }
             Stage::LogProbe(machine, _) | Stage::LogSample(machine, ..) => {
                 machine.on_message(now, message);
             }
             Stage::LogGet(machine) => machine.on_message(now, message),
-            Stage::Start | Stage::Over => {}
+            Stage::Start | Stage::Settle(_) | Stage::Over => {}
         }
     }
 
@@ -335,9 +369,9 @@ impl Machine for PullOne {
 
     fn progress(&self) -> Progress {
         match &self.stage {
-            Stage::Get(get) => get.progress(),
-            Stage::LogGet(get) => get.progress(),
-            _ => Progress { done: self.held, total: self.size },
+            Stage::Get(get) => self.with_finished(get.progress()),
+            Stage::LogGet(get) => self.with_finished(get.progress()),
+            _ => self.with_finished(Progress { done: self.held, total: self.size }),
         }
     }
 }

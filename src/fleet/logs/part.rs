@@ -138,6 +138,31 @@ impl PartFile {
         result.map_err(|source| FileError::new("write", &journal_path(&self.path), source))
     }
 
+    /// Begins with the bytes of `from`: an earlier log whose beginning this one is thought to have.
+    /// Ranges that came already are kept.
+    pub fn seed(&mut self, from: &Path) -> Result<(), FileError> {
+        let read = |source| FileError::new("read", from, source);
+        let part = part_path(&self.path);
+        let write = |source| FileError::new("write", &part, source);
+        if self.have.total() > 0 {
+            return Ok(());
+        }
+        let mut earlier = File::open(from).map_err(read)?;
+        self.file.seek(SeekFrom::Start(0)).map_err(write)?;
+        let length = std::io::copy(&mut earlier, &mut self.file).map_err(write)?;
+        self.position = length;
+        self.have.insert(0, length);
+        self.fresh.insert(0, length);
+        self.sync()
+    }
+
+    /// Removes it: nothing of it is wanted.
+    pub fn discard(self) {
+        // What cannot be removed is begun anew by the next download.
+        let _ = fs::remove_file(journal_path(&self.path));
+        let _ = fs::remove_file(part_path(&self.path));
+    }
+
     /// The final file's path.
     pub fn path(&self) -> &Path {
         &self.path
@@ -207,10 +232,7 @@ impl Sink for PartFile {
             return Ok(0);
         }
         let explain = |error: &dyn std::fmt::Display| {
-            format!(
-                "cannot write {}: {error}; make room and run again, what came is kept",
-                part_path(&self.path).display()
-            )
+            format!("cannot write {}: {error}", part_path(&self.path).display())
         };
         if self.position != offset {
             self.file.seek(SeekFrom::Start(offset)).map_err(|error| explain(&error))?;
@@ -378,6 +400,16 @@ mod tests {
         part.file.set_len(50).unwrap();
         drop(part);
         assert_eq!(PartFile::open(&path, "a").unwrap().have().total(), 0);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_once_and_without_advice() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("01.BIN");
+        let mut part = PartFile::open(&path, "a").unwrap();
+        part.file = File::open(part_path(&path)).unwrap();
+        let said = part.put(0, 0, &[7; 100]).unwrap_err();
+        assert!(said.starts_with("cannot write ") && !said.contains(';'), "{said}");
     }
 
     #[test]

@@ -180,7 +180,8 @@ impl Lane {
 
     fn start(&mut self, now: Micros) {
         let is_busy = |one: &&Running| {
-            now < one.machine.heard().unwrap_or(one.started).max(one.started) + SILENT
+            !one.machine.is_idle()
+                && now < one.machine.heard().unwrap_or(one.started).max(one.started) + SILENT
         };
         let mut busy = self.running.values().filter(is_busy).count();
         let bytes: u64 = self.running.values().map(|one| one.machine.new_bytes()).sum();

@@ -34,6 +34,9 @@ pub enum Fault {
     /// Another content.
     #[error("has changed since it came (another SHA-256); pull or import it again")]
     Changed,
+    /// Not all of it.
+    #[error("is not known to be whole: {0}; pull it again, or import its card")]
+    Incomplete(String),
     /// Whole, but no log.
     #[error("is what the drone had, but no log that can be read: {0}")]
     NotALog(String),
@@ -55,6 +58,7 @@ pub fn verify(folder: &Path) -> Result<Vec<Checked>, CampaignError> {
             }
             Ok(found) if found.sha256 != entry.sha256 => faults.push(Fault::Changed),
             Ok(_) => {
+                faults.extend(entry.incomplete.clone().map(Fault::Incomplete));
                 if let Err(error) = Log::open(&path) {
                     faults.push(Fault::NotALog(error.to_string()));
                 }

@@ -12,7 +12,7 @@ use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::fleet::bring::Wish;
 use crate::cli::simulate::made_by;
-use crate::fleet::logs::manifest::{ManifestEntry, Method, Shelf, Verified};
+use crate::fleet::logs::manifest::{AtHome, ManifestEntry, Method, Shelf, Verified};
 use crate::fleet::logs::one::Which;
 use crate::fleet::logs::part::sums_of;
 use crate::link::clock::Clock as _;
@@ -191,24 +191,27 @@ impl Foreman for Puller<'_> {
 impl Puller<'_> {
     /// Whether anything has to be asked at all.
     fn look(&self, one: &mut One) {
-        let path = self.shelf.path(&one.file);
-        if self.wish.again || !path.exists() {
+        if self.wish.again {
             return;
         }
-        let Some(entry) = self.shelf.entry(&one.file) else {
-            one.fail(format!(
-                "{} is there, but the manifest does not know it; move the file away, or bring the \
-                 log again in its place (--again)",
-                one.file
-            ));
-            return;
-        };
-        let whole = has_size(&path, entry.size_bytes);
-        one.over = match self.wish.which {
-            Which::Newest => whole,
-            Which::Number(number) => whole && entry.boot == Some(number),
-            Which::All => false,
-        };
+        match self.shelf.at_home(&one.file) {
+            AtHome::Foreign => {
+                one.fail(format!(
+                    "{} is there, but the manifest does not know it; move the file away, or bring \
+                     the log again in its place (--again)",
+                    one.file
+                ));
+            }
+            AtHome::Intact(entry) if entry.incomplete.is_none() => {
+                one.over = match self.wish.which {
+                    Which::Newest => true,
+                    Which::Number(number) => entry.boot == Some(number),
+                    Which::All => false,
+                };
+            }
+            // What is damaged, or only a beginning, comes again.
+            _ => {}
+        }
     }
 
     fn after(&mut self, drone: &str, one: &mut One, outcome: Outcome) -> Option<Job> {
@@ -339,6 +342,9 @@ impl Puller<'_> {
         if let Some(folder) = path.parent() {
             create_folder(folder)?;
         }
+        if matches!(self.shelf.at_home(&target.file), AtHome::Damaged(_)) {
+            self.shelf.set_aside(&target.file, "damaged")?;
+        }
         let sums = sums_of(bytes);
         // The entry is first: a file without one would be anybody's.
         self.shelf.add(ManifestEntry {
@@ -352,6 +358,7 @@ impl Puller<'_> {
             method: Method::SkybrushServer,
             method_reason: None,
             verified: Verified::Size,
+            incomplete: None,
             attempts: target.tries,
             at_unix_s: SystemClock::start().unix_us() / 1_000_000,
         })?;

@@ -1,10 +1,10 @@
 //! The bytes of a log: continued where an earlier run ended, begun anew when it is another log,
 //! by MAVFTP or by the log messages.
 
-use super::{MOST_RESTARTS, MOST_ROUNDS, PullOne, SAMPLE_BYTES, Stage};
+use super::home::Begun;
+use super::{MOST_RESTARTS, PullOne, SAMPLE_BYTES, Stage};
 use crate::fleet::ftp::FtpError;
 use crate::fleet::ftp::get::{Get, GetOptions, Got};
-use crate::fleet::ftp::list::Listed;
 use crate::fleet::log_protocol::LogProtocolError;
 use crate::fleet::log_protocol::get::{LogGet, LogGot};
 use crate::fleet::logs::part::{PartFile, Sample};
@@ -66,6 +66,9 @@ impl PullOne {
     /// The part is of another file.
     pub(super) fn restart(&mut self, mut part: PartFile, why: &str) -> Stage {
         self.restarts += 1;
+        if self.begun.is_seeded() {
+            self.begun = Begun::Anew;
+        }
         if self.restarts > MOST_RESTARTS {
             if self.reason.is_none() {
                 return self.fall_back(format!("MAVFTP: {why}, {} times", self.restarts));
@@ -91,7 +94,7 @@ impl PullOne {
         result: Result<u64, FtpError>,
     ) -> Stage {
         match result {
-            _ if sample.differs => self.restart(part, "the log on the drone is another"),
+            _ if sample.differs => self.on_another(part),
             Ok(_) => self.begin(part, false),
             Err(FtpError::Changed { .. }) => {
                 self.restart(part, "the log on the drone is smaller than what came of it")
@@ -125,37 +128,11 @@ impl PullOne {
         match got.result {
             Err(error) => self.on_ftp_failed(part, error),
             Ok(size) => {
-                self.size = size;
-                self.rounds += 1;
-                match self.list(self.options.patience) {
-                    Some(list) => Stage::Relist(list, part),
-                    None => self.compare(part, false),
+                self.held = part.have().total();
+                if size != self.size {
+                    self.resize(size);
                 }
-            }
-        }
-    }
-
-    /// Has it grown meanwhile?
-    pub(super) fn on_relisted(
-        &mut self,
-        part: PartFile,
-        outcome: Result<Vec<Listed>, FtpError>,
-    ) -> Stage {
-        let Some(target) = &self.target else { return Stage::Over };
-        let name = target.source.rsplit('/').next().unwrap_or_default();
-        let names = outcome.unwrap_or_default();
-        let size = names.iter().find(|listed| listed.name == name).and_then(|listed| listed.size);
-        match size {
-            Some(size) if size > self.size && self.rounds < MOST_ROUNDS => {
-                self.size = size;
-                self.begin(part, false)
-            }
-            Some(size) if size < self.size => {
-                self.restart(part, "the log on the drone is smaller than what came of it")
-            }
-            size => {
-                let is_settled = size == Some(self.size);
-                self.compare(part, is_settled)
+                Stage::Settle(part)
             }
         }
     }
@@ -165,6 +142,7 @@ impl PullOne {
         self.held = part.have().total();
         match error {
             LogProtocolError::Silent { .. } => self.fail_silent(error.to_string()),
+            LogProtocolError::Sink(reason) => self.fail(reason.clone(), "make room and run again"),
             _ => self.fail(error.to_string(), "run again; or take its card and import"),
         }
     }
@@ -172,7 +150,10 @@ impl PullOne {
     pub(super) fn on_log_got(&mut self, got: LogGot<PartFile>) -> Stage {
         self.tally.new_bytes += got.tally.new_bytes;
         match got.result {
-            Ok(_) => self.compare(got.sink, false),
+            Ok(_) => {
+                self.held = got.sink.have().total();
+                Stage::Settle(got.sink)
+            }
             Err(error) => self.on_log_failed(got.sink, &error),
         }
     }

@@ -1,5 +1,6 @@
 //! Which of a drone's logs are brought home, and into which files.
 
+use super::home::Needed;
 use super::{FTP_PATIENCE, PullOne, Stage, Target, Which};
 use crate::base::file::create_folder;
 use crate::fleet::ftp::FtpError;
@@ -24,7 +25,11 @@ impl PullOne {
             // A drone that is only just being switched on, or boots.
             Err(FtpError::Silent { .. }) if !self.is_heard() => {
                 let heard = self.heartbeat.or(self.started).unwrap_or(self.now);
-                if self.now >= heard + self.options.patience {
+                let patience = match self.heartbeat {
+                    Some(_) => self.options.patience,
+                    None => self.options.wait,
+                };
+                if self.now >= heard + patience || self.is_excused() {
                     let seconds = self.now.saturating_sub(heard) / S;
                     return self.fail_silent(FtpError::Silent { seconds }.to_string());
                 }
@@ -72,8 +77,16 @@ impl PullOne {
                 .fail("the drone has no logs".to_owned(), "check its card and LOG_BACKEND_TYPE");
         };
         let newest = *newest;
+        // The log of this flight is home, or was: a later one is of another flight.
+        let known = self.number_at_home();
+        let known = known.filter(|known| logs.iter().any(|(number, ..)| number == known));
+        if self.number_at_home().is_some() && known.is_none() && self.is_excused() {
+            let why = "the drone has this log no more".to_owned();
+            self.leave(self.file.clone(), Some(why));
+            return Stage::Over;
+        }
         let wanted = |number: u32| match self.options.which {
-            Which::Newest => number == newest,
+            Which::Newest => number == known.unwrap_or(newest),
             Which::Number(wanted) => number == wanted,
             Which::All => true,
         };
@@ -101,25 +114,20 @@ impl PullOne {
 
     pub(super) fn next_target(&mut self) -> Stage {
         let Some(target) = self.targets.pop() else { return Stage::Over };
-        let (path, is_there) = {
-            let shelf = self.shelf.borrow();
-            let path = shelf.path(&target.file);
-            let is_there = shelf.entry(&target.file).is_some_and(|entry| {
-                entry.source == target.source
-                    && std::fs::metadata(&path).is_ok_and(|about| about.len() == entry.size_bytes)
-            });
-            (path, is_there)
-        };
-        if is_there && !self.options.again {
-            self.done.there.push(target.file);
+        let needed = self.needed(&target);
+        if let Needed::Nothing(unchecked) = needed {
+            self.leave(target.file, unchecked);
             return self.next_target();
         }
+        let path = self.shelf.borrow().path(&target.file);
         if target.size > self.options.most_size {
             let most = self.options.most_size;
             let error = FtpError::TooLarge { size: target.size, most };
             return self.fail(error.to_string(), "allow more (--max-size), if that is its size");
         }
-        (self.size, self.rounds, self.restarts) = (target.size, 0, 0);
+        (self.rounds, self.restarts, self.grows) = (0, 0, None);
+        self.resize(target.size);
+        self.is_outgrown |= self.begun.is_seeded();
         let identity = format!("drone={} source={}", self.drone, target.source);
         self.target = Some(target);
         let opened = path
@@ -127,7 +135,13 @@ impl PullOne {
             .map_or(Ok(()), create_folder)
             .and_then(|()| PartFile::open(&path, &identity))
             .map(|part| if self.options.is_durable { part } else { part.without_waiting() });
-        match opened {
+        let seeded = opened.and_then(|mut part| {
+            if matches!(needed, Needed::Rest) {
+                part.seed(&path)?;
+            }
+            Ok(part)
+        });
+        match seeded {
             Ok(part) => self.begin(part, true),
             Err(error) => {
                 let reason = format!("{error}: {}", error.source);

@@ -21,6 +21,8 @@ pub struct OneOptions {
     pub which: Which,
     /// A drone is given up after so long without an answer.
     pub patience: Micros,
+    /// A drone that was never heard is given up after so long.
+    pub wait: Micros,
     /// Larger logs are refused, bytes.
     pub most_size: u64,
     /// Folders of logs, as autopilots name them; the first that is there is taken.
@@ -41,6 +43,7 @@ impl Default for OneOptions {
         Self {
             which: Which::Newest,
             patience: 60 * S,
+            wait: 60 * S,
             most_size: 2 << 30,
             folders: vec!["/APM/LOGS".to_owned(), "logs".to_owned()],
             again: false,
@@ -69,6 +72,8 @@ pub struct OneDone {
     pub pulled: Vec<ManifestEntry>,
     /// There already: file names.
     pub there: Vec<String>,
+    /// Why what is there could not be compared with what the drone has now.
+    pub unchecked: Option<String>,
     /// Why not all.
     pub failure: Option<Failure>,
 }

@@ -1,7 +1,7 @@
 //! Whether what came is what the drone has: by its checksum, or by pieces that are read again.
 //! Only then the file gets its name.
 
-use super::{MOST_ROUNDS, PullOne, SAMPLE_BYTES, SAMPLES, Stage};
+use super::{Failure, MOST_ROUNDS, PullOne, SAMPLE_BYTES, SAMPLES, Stage};
 use crate::fleet::ftp::FtpError;
 use crate::fleet::ftp::get::Get;
 use crate::fleet::ftp::sum::Sum;
@@ -52,10 +52,7 @@ impl PullOne {
             // It may have grown between the list and the checksum.
             Ok(_) if self.rounds < MOST_ROUNDS => {
                 self.rounds += 1;
-                match self.list(self.options.patience) {
-                    Some(list) => Stage::Relist(list, part),
-                    None => self.restart(part, "the checksum differs"),
-                }
+                Stage::Settle(part)
             }
             Ok(_) => self.restart(part, "the checksum differs"),
             Err(error @ FtpError::Silent { .. }) => self.on_ftp_failed(part, error),
@@ -83,15 +80,26 @@ impl PullOne {
             method: if self.reason.is_none() { Method::Mavftp } else { Method::LogMessages },
             method_reason: self.reason.clone(),
             verified,
+            incomplete: self.incomplete.take(),
             attempts: self.attempts,
             at_unix_s: self.options.unix_s,
         };
         self.attempts = 0;
-        self.held = 0;
-        let finished = self.shelf.borrow_mut().finish(part, entry.clone());
+        (self.held, self.size) = (0, 0);
+        let set_aside = |mark| self.shelf.borrow().set_aside(&entry.file, mark);
+        let aside = self.begun.mark().map_or(Ok(()), set_aside);
+        let finished = aside.and_then(|()| self.shelf.borrow_mut().finish(part, entry.clone()));
         if let Err(error) = finished {
             let reason = format!("{error}: {}", error.source);
-            return self.fail(reason, "make room and run again");
+            return self.fail_for_sure(reason, "make room and run again");
+        }
+        if entry.incomplete.is_some() {
+            self.done.failure.get_or_insert(Failure {
+                reason: "its log still grows, and what is home is its beginning".to_owned(),
+                advice: "wait until 15 s after disarming (with LOG_DISARMED 1: reboot it), then \
+                         run again",
+                kept_bytes: entry.size_bytes,
+            });
         }
         self.done.pulled.push(entry);
         self.next_target()
