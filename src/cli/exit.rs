@@ -89,6 +89,9 @@ pub enum CommandError {
     /// The arguments do not fit together.
     #[error("{0}")]
     Usage(String),
+    /// A check failed, or a person has said no: nothing was started.
+    #[error("{0}")]
+    Unsafe(String),
     /// Something unexpected, with its reason.
     #[error("{0}")]
     Failed(String),
@@ -166,6 +169,7 @@ impl CommandError {
             | Self::Failed(_) => Exit::Failed,
             Self::Effect(_) | Self::Log(_) | Self::Usage(_) => Exit::Usage,
             Self::Nothing(_) => Exit::Nothing,
+            Self::Unsafe(_) => Exit::Unsafe,
             Self::Interrupted => Exit::Interrupted,
             Self::BrokenPipe => Exit::Done,
         }

@@ -11,7 +11,7 @@ use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::sim::{Hangar, Mishaps, TO_START};
-use super::fleet::{LeadArgs, dry, fly_now, guide_now, one_flight, server, tables};
+use super::fleet::{LeadArgs, dry, end, fly_now, guide_now, one_flight, server, tables};
 use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FlightFolder};
@@ -99,7 +99,8 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
         Target::Links(links) => {
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             let mut station = args.connect.open(links)?;
-            let mut crew = Crew::new(context, &mut station, &folder, &plan);
+            let mut desk = end::desk(context, &mut station, &folder);
+            let mut crew = Crew::new(context, &mut desk, &folder, &plan);
             crew.is_guided = args.guided;
             crew.listen(args.connect.wait)?;
             fly(context, &mut crew, args)

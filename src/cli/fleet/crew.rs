@@ -14,6 +14,7 @@ use std::sync::atomic::Ordering;
 
 use serde::Serialize;
 
+use crate::base::file::FileError;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
@@ -98,6 +99,15 @@ struct Note<'a> {
     step: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     text: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    drones: Vec<NoteOf<'a>>,
+}
+
+/// What became of a drone.
+#[derive(Serialize)]
+struct NoteOf<'a> {
+    drone: DroneId,
+    outcome: &'a str,
 }
 
 impl<'a> Crew<'a> {
@@ -256,12 +266,70 @@ impl<'a> Crew<'a> {
         self.drones().iter().filter(|drone| down(drone)).count()
     }
 
+    /// Listens for a moment. An order to end the flight ends the command, too.
+    pub(in crate::cli) fn idle(&mut self) -> Result<(), CommandError> {
+        while let Some(received) = self.net.recv(self.net.now() + 20 * MS)? {
+            self.telemetry.on_message(self.net.now(), &received);
+        }
+        self.context.check_stop()?;
+        self.not_ordered_down()
+    }
+
+    /// Refuses to go on towards a start when somebody has ordered drones down.
+    pub(in crate::cli) fn not_ordered_down(&self) -> Result<(), CommandError> {
+        if self.net.ordered_down().is_empty() {
+            return Ok(());
+        }
+        Err(CommandError::Unsafe(
+            "nothing was started: `fleet abort` or `fleet land` came from another terminal"
+                .to_owned(),
+        ))
+    }
+
     fn note(&mut self, step: &str, text: Option<String>) -> Result<(), CommandError> {
+        self.note_each(step, text, &BTreeMap::new())
+    }
+
+    /// Writes down what became of each drone in a step.
+    fn note_each(
+        &mut self,
+        step: &str,
+        text: Option<String>,
+        drones: &BTreeMap<DroneId, String>,
+    ) -> Result<(), CommandError> {
         if self.is_virtual {
             return Ok(());
         }
-        let event = Note { step, text };
-        let entry = Entry { unix_us: self.clock.unix_us(), drone: None, event: &event };
-        Ok(Journal::open(&self.folder.0)?.write(&entry)?)
+        Ok(write_note(self.folder, self.clock, &Note { step, text, drones: outcomes(drones) })?)
     }
+
+    /// The same where a disk that is full must not stand in the way: warns then.
+    fn try_note(&mut self, step: &str, drones: &BTreeMap<DroneId, String>) {
+        if let Err(error) = self.note_each(step, None, drones) {
+            self.context.warn(&format!("not in the journal: {error}"));
+        }
+    }
+}
+
+fn outcomes(drones: &BTreeMap<DroneId, String>) -> Vec<NoteOf<'_>> {
+    drones.iter().map(|(drone, outcome)| NoteOf { drone: *drone, outcome }).collect()
+}
+
+fn write_note(
+    folder: &FlightFolder,
+    clock: SystemClock,
+    event: &Note<'_>,
+) -> Result<(), FileError> {
+    let entry = Entry { unix_us: clock.unix_us(), drone: None, event };
+    Journal::open(&folder.0)?.write(&entry)
+}
+
+/// Writes into the journal what became of drones in a step.
+pub(super) fn write_outcomes(
+    folder: &FlightFolder,
+    clock: SystemClock,
+    step: &str,
+    drones: &BTreeMap<DroneId, String>,
+) -> Result<(), FileError> {
+    write_note(folder, clock, &Note { step, text: None, drones: outcomes(drones) })
 }

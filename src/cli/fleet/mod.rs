@@ -4,14 +4,16 @@ pub(super) mod bring;
 pub(super) mod connect;
 pub(super) mod crew;
 pub(super) mod dry;
+pub(super) mod end;
 pub(super) mod server;
 pub(super) mod sim;
 pub(super) mod tables;
 pub(super) mod virtual_drones;
 
-use std::collections::BTreeSet;
 use std::io::{BufRead as _, IsTerminal as _, Write as _};
 use std::path::PathBuf;
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
@@ -20,10 +22,12 @@ use self::crew::Crew;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use crate::campaign::{self, FlightFolder};
-use crate::fleet::abort::{Aborted, Action};
+use crate::fleet::abort::Action;
 use crate::fleet::preflight::Preflight;
 use crate::fleet::start::{Start, StartOptions};
+use crate::link::address::Address;
 use crate::link::id::DroneId;
+use crate::link::station::Station;
 use crate::mission::Plan;
 
 /// Arguments of `updraft fleet`.
@@ -170,8 +174,8 @@ pub(super) fn run(context: &Context, args: &FleetArgs) -> Result<Exit, CommandEr
         FleetCommand::Upload(args) => upload(context, args),
         FleetCommand::Preflight(args) => preflight(context, args),
         FleetCommand::Start(args) => start(context, args),
-        FleetCommand::Abort(args) => end(context, args, Action::Return),
-        FleetCommand::Land(args) => end(context, args, Action::Land),
+        FleetCommand::Abort(args) => end::run(context, args, Action::Return),
+        FleetCommand::Land(args) => end::run(context, args, Action::Land),
         FleetCommand::Restore(args) => restore(context, args),
         FleetCommand::Virtual(args) => virtual_drones::run(context, args),
     }
@@ -186,7 +190,7 @@ fn with_crew(
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     match args.connect.target()? {
         Target::Links(links) => {
-            let mut station = args.connect.open(links)?;
+            let mut station = open(&args.campaign, &args.connect, links)?;
             let mut crew = Crew::new(context, &mut station, &folder, &plan);
             crew.listen(args.connect.wait)?;
             body(&mut crew)
@@ -204,13 +208,29 @@ fn with_crew(
     }
 }
 
+/// The same for a step that flies: `fleet abort` of other terminals is carried out meanwhile.
+fn with_desk(
+    context: &Context,
+    args: &StepArgs,
+    body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
+) -> Result<Exit, CommandError> {
+    with_crew(context, args, |crew| {
+        let folder = crew.folder;
+        let plan = crew.plan;
+        let mut desk = end::desk(context, crew.net, folder);
+        let mut with = Crew::new(context, &mut desk, folder, plan);
+        with.telemetry = std::mem::take(&mut crew.telemetry);
+        body(&mut with)
+    })
+}
+
 /// Clocks and slots; refuses to go on when a drone stands wrong.
 fn prepare(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<(), CommandError> {
     crew.greet()?;
     if crew.assign(args.assign)? {
         return Ok(());
     }
-    Err(CommandError::Usage("nothing was sent: the drones do not stand as planned".to_owned()))
+    Err(CommandError::Unsafe("nothing was sent: the drones do not stand as planned".to_owned()))
 }
 
 /// The table of drones that were loaded by an earlier command.
@@ -253,12 +273,30 @@ fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
     })
 }
 
+/// Opens the links, and says who holds them if another command of this campaign does.
+fn open(
+    campaign: &std::path::Path,
+    connect: &ConnectArgs,
+    links: Vec<Address>,
+) -> Result<Station, CommandError> {
+    connect.open(links).map_err(|error| match error {
+        CommandError::Failed(text) if !end::flying(campaign, None).is_empty() => {
+            CommandError::Failed(format!(
+                "{text}\n  the link is held by the command that flies this campaign: it tells what \
+                 happens and writes it into fleet-journal.ndjson; `fleet abort` and `fleet land` \
+                 reach it"
+            ))
+        }
+        other => other,
+    })
+}
+
 fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
     if args.upload.step.dry_run {
         return dry::start(context, &args.upload.step, args.lead.lead);
     }
     let _lock = context.lock(&args.upload.step.campaign)?;
-    with_crew(context, &args.upload.step, |crew| {
+    with_desk(context, &args.upload.step, |crew| {
         let table = look(crew, &args.upload)?;
         if !table.go() {
             return tables::preflight(context, &table);
@@ -276,9 +314,15 @@ pub(super) fn fly_now(
     needs_person(lead)?;
     let mut start = crew.announce(lead.options())?;
     say_start(context, crew, &start, "Every drone has the start time");
-    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
-        crew.cancel(&mut start)?;
-        return Err(CommandError::Usage("not authorized: the start was taken back".to_owned()));
+    let yes = lead.yes || {
+        let answer = asked("Authorize the start? Type yes: ", || crew.idle());
+        if !matches!(answer, Ok(true)) {
+            crew.cancel(&mut start)?;
+        }
+        answer?
+    };
+    if !yes {
+        return Err(CommandError::Unsafe("not authorized: the start was taken back".to_owned()));
     }
     crew.authorize(&mut start)?;
     context.say("Authorized. Ctrl-C stops watching; `updraft fleet abort` sends everyone home");
@@ -295,8 +339,8 @@ pub(super) fn guide_now(
     needs_person(lead)?;
     let start = crew.set_guided_start(lead.options())?;
     say_start(context, crew, &start, "The start time, by the drones' clocks");
-    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
-        return Err(CommandError::Usage("not authorized: nobody takes off".to_owned()));
+    if !lead.yes && !asked("Authorize the start? Type yes: ", || crew.idle())? {
+        return Err(CommandError::Unsafe("not authorized: nobody takes off".to_owned()));
     }
     crew.authorize_guided(&start)?;
     context.say(
@@ -328,56 +372,33 @@ fn say_start(context: &Context, crew: &mut Crew<'_>, start: &Start, what: &str) 
 fn landed(context: &Context, crew: &Crew<'_>, quiet: bool) -> Exit {
     let landed = crew.landed();
     context.say(&format!("{landed} of {} drones have landed", crew.table.drones.len()));
+    let quiet = quiet && crew.net.ordered_down().is_empty();
     if landed == crew.table.drones.len() && quiet { Exit::Done } else { Exit::Losses }
 }
 
-/// Asks a person.
-fn asked(question: &str) -> Result<bool, CommandError> {
+/// Asks a person. While they think, the links are listened to and orders carried out.
+pub(super) fn asked(
+    question: &str,
+    mut meanwhile: impl FnMut() -> Result<(), CommandError>,
+) -> Result<bool, CommandError> {
     let failed = |error: std::io::Error| CommandError::Failed(format!("failed to ask: {error}"));
     let mut err = std::io::stderr().lock();
     err.write_all(question.as_bytes()).and_then(|()| err.flush()).map_err(failed)?;
-    let mut answer = String::new();
-    std::io::stdin().lock().read_line(&mut answer).map_err(failed)?;
-    Ok(answer.trim().eq_ignore_ascii_case("yes"))
-}
-
-fn end(context: &Context, args: &EndArgs, action: Action) -> Result<Exit, CommandError> {
-    if args.step.dry_run {
-        return dry::end(context, &args.step, action);
-    }
-    let only: Option<BTreeSet<DroneId>> =
-        args.drones.as_ref().map(|drones| drones.iter().copied().collect());
-    let links = match args.step.connect.target()? {
-        Target::Links(links) => links,
-        Target::Server(address) => return server::end(context, &address, only.as_ref(), action),
-        Target::Sim => {
-            return Err(CommandError::Usage(
-                "give the drones' own links with --connect".to_owned(),
-            ));
-        }
+    drop(err);
+    let (answers, answered) = std::sync::mpsc::sync_channel(1);
+    // Ends with the program if nobody answers.
+    let read = move || {
+        let mut answer = String::new();
+        let _ = answers.send(std::io::stdin().lock().read_line(&mut answer).map(|_| answer));
     };
-    let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())
-        // Nobody looks for a flight's name while drones fall: any plan will do.
-        .or_else(|error| any_flight(&args.step.campaign).ok_or(error))?;
-    let mut station = args.step.connect.open(links)?;
-    let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    crew.hear_anyone(args.step.connect.wait, only.as_ref())?;
-    let done = crew.abort(only.as_ref(), action)?;
-    let unsure = done.values().filter(|done| matches!(done, Aborted::Unconfirmed { .. })).count();
-    if context.json {
-        context.print_json(&tables::EndOutput::new(&done))?;
-    } else {
-        for (drone, done) in &done {
-            context.print(&format!("drone {drone}: {done}\n"))?;
+    std::thread::Builder::new().name("answer".to_owned()).spawn(read).map_err(failed)?;
+    loop {
+        match answered.recv_timeout(Duration::from_millis(50)) {
+            Ok(answer) => return Ok(answer.map_err(failed)?.trim().eq_ignore_ascii_case("yes")),
+            Err(RecvTimeoutError::Timeout) => meanwhile()?,
+            Err(RecvTimeoutError::Disconnected) => return Ok(false),
         }
     }
-    Ok(if unsure == 0 { Exit::Done } else { Exit::Losses })
-}
-
-fn any_flight(campaign: &std::path::Path) -> Option<(FlightFolder, Plan)> {
-    let folder = campaign::flights(campaign).ok()?.into_iter().next()?;
-    let plan = folder.read_plan().ok()?;
-    Some((folder, plan))
 }
 
 fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> {

@@ -101,6 +101,7 @@ impl<'a> Crew<'a> {
         &mut self,
         options: StartOptions,
     ) -> Result<Start, CommandError> {
+        self.not_ordered_down()?;
         let now = self.net.now();
         Start::announce(self.drones(), &self.telemetry, options, now).map_err(refused)
     }
@@ -111,6 +112,7 @@ impl<'a> Crew<'a> {
         while let Some(received) = self.net.recv(0)? {
             crate::link::drive::Watch::on_message(&mut self.telemetry, self.net.now(), &received);
         }
+        self.not_ordered_down()?;
         start.check_time(&self.telemetry, self.net.now()).map_err(refused)?;
         if let Some(time) = start.time() {
             StartRecord::new(made_by(), time).write(self.folder)?;
@@ -144,8 +146,11 @@ impl<'a> Crew<'a> {
         }
         let eyes = self.eyes(Some(start_gps_ms))?;
         self.context.set_flies(true);
-        let (eyes, failed) = self.stream(machines, eyes);
+        let (eyes, failed, ended) = self.stream(machines, eyes);
         self.context.set_flies(false);
+        if !ended.is_empty() {
+            self.try_note("abort", &ended);
+        }
         let written = failed.map_or(Ok(()), |reason| self.note("link", Some(reason)));
         let alarms = self.close(eyes);
         self.context.check_stop()?;
@@ -158,9 +163,10 @@ impl<'a> Crew<'a> {
         &mut self,
         machines: BTreeMap<DroneId, Guided>,
         mut eyes: Eyes<'a>,
-    ) -> (Eyes<'a>, Option<String>) {
+    ) -> (Eyes<'a>, Option<String>, BTreeMap<DroneId, String>) {
         let drones = self.drones();
         let context = self.context;
+        let mut ended = BTreeMap::new();
         let mut net = Stubborn::new(&mut *self.net, context);
         let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
         for (drone, outcome) in done {
@@ -169,7 +175,8 @@ impl<'a> Crew<'a> {
             }
         }
         // Those that were taken over or called home are still on their way.
-        while context.check_stop().is_ok() && !eyes.is_over() {
+        let going_on = |net: &Stubborn<'_>| net.ordered_down().into_values().any(|on| on);
+        while context.check_stop().is_ok() && (!eyes.is_over() || going_on(&net)) {
             let until = net.now() + 100 * MS;
             if let Ok(Some(received)) = net.recv(until) {
                 eyes.on_message(net.now(), &received);
@@ -182,15 +189,25 @@ impl<'a> Crew<'a> {
                  at once",
             );
             eyes.finishes = true;
+            // Those that were ordered down meanwhile do that already.
+            let ordered = net.ordered_down();
             let end = |drone: &DroneId| {
                 (*drone, Abort::new(*drone, Action::Return, eyes.telemetry().get(*drone)))
             };
-            let machines: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
+            let free = drones.iter().filter(|drone| !ordered.contains_key(drone));
+            let machines: BTreeMap<DroneId, Abort> = free.map(end).collect();
             let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
             for (drone, end) in done {
                 context.insist(&format!("drone {drone}: {end}"));
+                ended.insert(drone, end.to_string());
+            }
+            while going_on(&net) {
+                let until = net.now() + 100 * MS;
+                if let Ok(Some(received)) = net.recv(until) {
+                    eyes.on_message(net.now(), &received);
+                }
             }
         }
-        (eyes, net.failed)
+        (eyes, net.failed, ended)
     }
 }

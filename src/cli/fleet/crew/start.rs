@@ -9,6 +9,7 @@ use crate::base::time::GpsTime;
 use crate::cli::exit::CommandError;
 use crate::fleet::journal::Journal;
 use crate::fleet::start::{Start, StartOptions};
+use crate::fleet::telemetry::Drone;
 use crate::fleet::watch::{self, Monitor};
 use crate::link::clock::{MS, S};
 use crate::link::drive::Watch as _;
@@ -22,6 +23,7 @@ impl<'a> Crew<'a> {
     ) -> Result<Start, CommandError> {
         let refused =
             |error: crate::fleet::start::StartRefusal| CommandError::Failed(error.to_string());
+        self.not_ordered_down()?;
         let mut start = Start::announce(self.drones(), &self.telemetry, options, self.net.now())
             .map_err(refused)?;
         self.until_taken(&mut start)?;
@@ -30,6 +32,10 @@ impl<'a> Crew<'a> {
 
     /// Authorizes a start that all have taken, and waits until all know.
     pub(in crate::cli) fn authorize(&mut self, start: &mut Start) -> Result<(), CommandError> {
+        if let Err(ordered) = self.not_ordered_down() {
+            self.cancel(start)?;
+            return Err(ordered);
+        }
         start
             .authorize(&self.telemetry, self.net.now())
             .map_err(|error| CommandError::Failed(error.to_string()))?;
@@ -46,6 +52,10 @@ impl<'a> Crew<'a> {
                 self.net.broadcast(&packet)?;
             }
             let late = start.late(&self.telemetry, now);
+            if let Err(ordered) = self.not_ordered_down() {
+                self.cancel(start)?;
+                return Err(ordered);
+            }
             if late.is_empty() {
                 return Ok(());
             }
@@ -76,7 +86,20 @@ impl<'a> Crew<'a> {
                 self.telemetry.on_message(self.net.now(), &received);
             }
         }
-        self.note("cancelled", None)
+        self.finish_orders()?;
+        self.try_note("cancelled", &BTreeMap::new());
+        Ok(())
+    }
+
+    /// Goes on until what another terminal has ordered is confirmed or given up.
+    pub(super) fn finish_orders(&mut self) -> Result<(), CommandError> {
+        while self.net.ordered_down().values().any(|going_on| *going_on) {
+            let until = self.net.now() + 100 * MS;
+            if let Some(received) = self.net.recv(until)? {
+                self.telemetry.on_message(self.net.now(), &received);
+            }
+        }
+        Ok(())
     }
 
     /// Watches the show until everyone has landed. Drones whose flight gave an alarm.
@@ -95,7 +118,14 @@ impl<'a> Crew<'a> {
                 eyes.on_message(self.net.now(), &received);
             }
             eyes.stop(self.net.now());
-            if eyes.is_over() {
+            let ordered = self.net.ordered_down();
+            let going_on = ordered.values().any(|going_on| *going_on);
+            let down = |drone: &DroneId| {
+                let armed = eyes.telemetry().get(*drone).and_then(Drone::is_armed);
+                ordered.contains_key(drone) && armed == Some(false)
+            };
+            let all_down = !ordered.is_empty() && self.drones().iter().all(down);
+            if !going_on && (eyes.is_over() || all_down) {
                 break Ok(());
             }
             if self.context.stop_flag().load(Ordering::SeqCst) {

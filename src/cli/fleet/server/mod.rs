@@ -109,7 +109,7 @@ pub(in crate::cli) fn fly(
         return Ok(Exit::Unsafe);
     }
     let Some(unix_s) = start(&mut client, &flight, lead)? else {
-        return Err(CommandError::Usage("not authorized: the start was taken back".to_owned()));
+        return Err(CommandError::Unsafe("not authorized: the start was taken back".to_owned()));
     };
     context.say(&format!(
         "Authorized. Ctrl-C stops watching; `{}` sends everyone home",
@@ -155,7 +155,7 @@ fn start(
         duration_s: flight.plan.duration_ms as f64 / 1000.0,
     };
     client.set_start(&start)?;
-    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
+    if !lead.yes && !asked("Authorize the start? Type yes: ", || context.check_stop())? {
         client.set_start(&StartConfig::none())?;
         return Ok(None);
     }
