@@ -35,6 +35,8 @@ mod lock;
 mod logs;
 #[path = "cli/manners.rs"]
 mod manners;
+#[path = "cli/orders.rs"]
+mod orders;
 #[path = "cli/plan.rs"]
 mod plan;
 #[path = "cli/simulate.rs"]

@@ -108,7 +108,7 @@ pub(in crate::cli) fn fly(
         context.insist("NO-GO: nothing was started; Skybrush Live tells more of these drones");
         return Ok(Exit::Unsafe);
     }
-    let Some(unix_s) = start(&mut client, &flight, lead)? else {
+    let Some(unix_s) = start(context, &mut client, &flight, lead)? else {
         return Err(CommandError::Unsafe("not authorized: the start was taken back".to_owned()));
     };
     context.say(&format!(
@@ -142,6 +142,7 @@ pub(in crate::cli) fn fly(
 /// The two steps of a start: its time, and its authorization; the Unix time, s, if a person or
 /// `--yes` authorized it.
 fn start(
+    context: &Context,
     client: &mut Client,
     flight: &Flight<'_>,
     lead: &LeadArgs,
@@ -155,9 +156,12 @@ fn start(
         duration_s: flight.plan.duration_ms as f64 / 1000.0,
     };
     client.set_start(&start)?;
-    if !lead.yes && !asked("Authorize the start? Type yes: ", || context.check_stop())? {
-        client.set_start(&StartConfig::none())?;
-        return Ok(None);
+    if !lead.yes {
+        let answer = asked("Authorize the start? Type yes: ", || context.check_stop());
+        if !matches!(answer, Ok(true)) {
+            client.set_start(&StartConfig::none())?;
+            return answer.map(|_| None);
+        }
     }
     // A person may take their time.
     let left_s = unix_s as f64 - SystemClock::start().unix_us() as f64 * 1e-6;
