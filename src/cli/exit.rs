@@ -101,6 +101,9 @@ pub enum CommandError {
     /// Ctrl-C.
     #[error("interrupted; the same command goes on where it stopped")]
     Interrupted,
+    /// Ctrl-C, with what becomes of what was going on.
+    #[error("{0}")]
+    Stopped(&'static str),
     /// Standard output was closed by its reader, which is how pipes end.
     #[error("standard output was closed")]
     BrokenPipe,
@@ -170,7 +173,7 @@ impl CommandError {
             Self::Effect(_) | Self::Log(_) | Self::Usage(_) => Exit::Usage,
             Self::Nothing(_) => Exit::Nothing,
             Self::Unsafe(_) => Exit::Unsafe,
-            Self::Interrupted => Exit::Interrupted,
+            Self::Interrupted | Self::Stopped(_) => Exit::Interrupted,
             Self::BrokenPipe => Exit::Done,
         }
     }

@@ -11,6 +11,7 @@ pub mod exit;
 mod fleet;
 mod flown;
 mod fly;
+mod fly_output;
 mod found;
 mod inspect;
 mod leaning;

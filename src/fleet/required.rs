@@ -185,6 +185,13 @@ pub struct Standing {
 }
 
 impl Standing {
+    /// In a sentence what could not be mended.
+    pub fn complaint(&self) -> String {
+        let failed = self.failed.iter().map(ToString::to_string);
+        let wrong: Vec<String> = failed.chain(self.wrong.iter().map(ToString::to_string)).collect();
+        format!("not all parameters could be set: {}", wrong.join("; "))
+    }
+
     /// Whether everything is as it must be.
     pub fn is_right(&self) -> bool {
         self.wrong.is_empty() && self.failed.is_none()
@@ -280,13 +287,16 @@ impl Machine for CheckParams {
                             self.standing.values.insert(name.to_owned(), *value);
                             if let Err(error) = done {
                                 self.standing.values.insert(name.to_owned(), was);
-                                self.standing.failed = Some(error);
-                                let rest = to_mend.drain(..).map(|(difference, _)| difference);
-                                self.standing.wrong.extend(rest);
-                                self.phase = Phase::Over;
-                                continue;
+                                // A drone that answers is asked for the others; one that does not
+                                // is not waited for once more.
+                                let silent = matches!(error, SetError::Silent { .. });
+                                self.standing.failed.get_or_insert(error);
+                                let tried = if silent { to_mend.len() } else { 1 };
+                                let left = to_mend.drain(..tried).map(|(difference, _)| difference);
+                                self.standing.wrong.extend(left);
+                            } else {
+                                to_mend.pop_front();
                             }
-                            to_mend.pop_front();
                             if let Phase::Set(_, set) = &mut self.phase {
                                 *set = None;
                             }

@@ -260,10 +260,12 @@ impl<'a> Crew<'a> {
 
     /// Drones of the table that are down and disarmed.
     pub(in crate::cli) fn landed(&self) -> usize {
-        let down = |drone: &DroneId| {
-            self.telemetry.get(*drone).is_some_and(|of| of.is_armed() == Some(false))
-        };
-        self.drones().iter().filter(|drone| down(drone)).count()
+        self.drones().into_iter().filter(|drone| self.has_landed(*drone)).count()
+    }
+
+    /// Whether a drone is down and disarmed.
+    pub(in crate::cli) fn has_landed(&self, drone: DroneId) -> bool {
+        self.telemetry.get(drone).is_some_and(|of| of.is_armed() == Some(false))
     }
 
     /// Listens for a moment. An order to end the flight ends the command, too.
@@ -284,6 +286,17 @@ impl<'a> Crew<'a> {
             "nothing was started: `fleet abort` or `fleet land` came from another terminal"
                 .to_owned(),
         ))
+    }
+
+    /// What became of each drone of the table: refused for a reason, or fine.
+    fn outcomes_of(
+        &self,
+        fine: impl Fn(&DroneId) -> String,
+        bad: &BTreeMap<DroneId, String>,
+    ) -> BTreeMap<DroneId, String> {
+        let refused = |drone: DroneId| bad.get(&drone).map(|reason| format!("refused: {reason}"));
+        let of = |drone: DroneId| (drone, refused(drone).unwrap_or_else(|| fine(&drone)));
+        self.drones().into_iter().map(of).collect()
     }
 
     fn note(&mut self, step: &str, text: Option<String>) -> Result<(), CommandError> {

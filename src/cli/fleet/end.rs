@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::connect::Target;
 use super::crew::Crew;
-use super::{EndArgs, dry, one_flight, server, tables};
+use super::{EndArgs, StepArgs, dry, one_flight, server, tables};
 use crate::campaign::lock::FolderLock;
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::cli::clock::{Stopwatch, SystemClock};
@@ -127,7 +127,9 @@ fn order(
     loop {
         if let Some(place) = given.iter().position(|given| given.answer().is_some()) {
             let taken = given.swap_remove(place);
-            given.iter().for_each(|other| drop(other.withdraw()));
+            for other in &given {
+                other.withdraw();
+            }
             context.say("The link is held by a running station: it carries the order out");
             return follow(context, taken).map(Some);
         }
@@ -168,8 +170,9 @@ fn follow(context: &Context, given: Given) -> Result<BTreeMap<DroneId, Aborted>,
             )));
         }
         if context.check_stop().is_err() {
-            context.insist("Nobody waits any more; the running station goes on with the order");
-            return Err(CommandError::Interrupted);
+            return Err(CommandError::Stopped(
+                "stopped: nobody waits any more, and the running station goes on with the order",
+            ));
         }
         std::thread::sleep(PAUSE);
     }
@@ -210,7 +213,7 @@ pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<E
     } else if is_busy(campaign) {
         unanswered = "another updraft works in this campaign and takes no orders";
     }
-    let (folder, plan) = find(args)?;
+    let (folder, plan) = find(&args.step)?;
     let mut station = args.step.connect.open(links).map_err(|error| match error {
         CommandError::Failed(text) if !unanswered.is_empty() => {
             CommandError::Failed(format!("{unanswered}, and {text}\n  what to do: {INSTEAD}"))
@@ -224,15 +227,18 @@ pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<E
     crew.hear_anyone(args.step.connect.wait, only.as_ref())?;
     let done = crew.abort(only.as_ref(), action, args.step.connect.wait)?;
     let exit = print(context, &done)?;
-    context.check_stop()?;
+    if context.check_stop().is_err() {
+        return Err(CommandError::Stopped(
+            "stopped: drones that are not named above have not confirmed it and may fly on",
+        ));
+    }
     Ok(exit)
 }
 
 /// The flight that is meant: nobody looks for its name while drones fall, any plan will do.
-pub(super) fn find(args: &EndArgs) -> Result<(FlightFolder, Plan), CommandError> {
-    let campaign = &args.step.campaign;
-    one_flight(campaign, args.step.flight.as_deref())
-        .or_else(|error| any_flight(campaign).ok_or(error))
+pub(super) fn find(args: &StepArgs) -> Result<(FlightFolder, Plan), CommandError> {
+    let campaign = &args.campaign;
+    one_flight(campaign, args.flight.as_deref()).or_else(|error| any_flight(campaign).ok_or(error))
 }
 
 fn print(context: &Context, done: &BTreeMap<DroneId, Aborted>) -> Result<Exit, CommandError> {

@@ -10,6 +10,7 @@ pub(super) mod sim;
 pub(super) mod tables;
 pub(super) mod virtual_drones;
 
+use std::collections::BTreeMap;
 use std::io::{BufRead as _, IsTerminal as _, Write as _};
 use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
@@ -21,10 +22,11 @@ use self::connect::{ConnectArgs, Target};
 use self::crew::Crew;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use crate::campaign::lock::FolderLock;
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::abort::Action;
 use crate::fleet::preflight::Preflight;
-use crate::fleet::start::{Start, StartOptions};
+use crate::fleet::start::{LEAST_LEAD_S, MOST_LEAD_S, Start, StartOptions};
 use crate::link::address::Address;
 use crate::link::id::DroneId;
 use crate::link::station::Station;
@@ -100,12 +102,23 @@ pub(super) struct UploadArgs {
 /// How a start is given.
 #[derive(Clone, Debug, Args)]
 pub(super) struct LeadArgs {
-    /// From now to the start, s of the drones' time
-    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = connect::seconds)]
+    /// From now to the start, s of the drones' time: 20 to 43200
+    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = lead_seconds)]
     pub(super) lead: f64,
     /// Authorize the start without asking
     #[arg(short, long)]
     pub(super) yes: bool,
+}
+
+/// Parser of `--lead`: nothing has been sent when it refuses.
+fn lead_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (LEAST_LEAD_S..=MOST_LEAD_S).contains(&value) => Ok(value),
+        _ => Err(format!(
+            "a lead between {LEAST_LEAD_S} and {MOST_LEAD_S} s: the drones set their home and arm in \
+             the last 10 s"
+        )),
+    }
 }
 
 impl LeadArgs {
@@ -144,11 +157,35 @@ pub(super) struct EndArgs {
     drones: Option<Vec<DroneId>>,
 }
 
+/// A campaign is a folder that is there.
+fn needs_folder(campaign: &std::path::Path) -> Result<(), CommandError> {
+    if campaign.is_file() {
+        return Err(CommandError::Usage(format!(
+            "{} is a file: give the campaign's folder",
+            campaign.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Locks a campaign; a folder that is not there is not made.
+pub(super) fn lock(
+    context: &Context,
+    campaign: &std::path::Path,
+) -> Result<FolderLock, CommandError> {
+    needs_folder(campaign)?;
+    if !campaign.exists() {
+        campaign::flights(campaign)?;
+    }
+    context.lock(campaign)
+}
+
 /// The one flight of a campaign that is meant.
 pub(super) fn one_flight(
     campaign: &std::path::Path,
     name: Option<&str>,
 ) -> Result<(FlightFolder, Plan), CommandError> {
+    needs_folder(campaign)?;
     let mut names = Vec::new();
     let mut found = Vec::new();
     for folder in campaign::flights(campaign)? {
@@ -245,7 +282,7 @@ fn preflight(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError>
     if args.step.dry_run {
         return dry::preflight(context, &args.step);
     }
-    let _lock = context.lock(&args.step.campaign)?;
+    let _lock = lock(context, &args.step.campaign)?;
     with_crew(context, &args.step, |crew| tables::preflight(context, &look(crew, args)?))
 }
 
@@ -260,16 +297,18 @@ fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
     if args.step.dry_run {
         return dry::upload(context, &args.step);
     }
-    let _lock = context.lock(&args.step.campaign)?;
+    let _lock = lock(context, &args.step.campaign)?;
     with_crew(context, &args.step, |crew| {
         prepare(crew, args)?;
         let refused = crew.upload()?;
         // The fence's own switch is one of the parameters.
-        crew.params(args.set_params)?;
+        let right = crew.params(args.set_params)?;
         if context.json {
             context.print_json(&tables::UploadOutput::new(&crew.table, &refused))?;
         }
-        Ok(if refused.is_empty() { Exit::Done } else { Exit::Losses })
+        // Without --set-params nothing was to be set.
+        let set = right || !args.set_params;
+        Ok(if refused.is_empty() && set { Exit::Done } else { Exit::Losses })
     })
 }
 
@@ -295,22 +334,25 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
     if args.upload.step.dry_run {
         return dry::start(context, &args.upload.step, args.lead.lead);
     }
-    let _lock = context.lock(&args.upload.step.campaign)?;
+    let _lock = lock(context, &args.upload.step.campaign)?;
     with_desk(context, &args.upload.step, |crew| {
         let table = look(crew, &args.upload)?;
         if !table.go() {
             return tables::preflight(context, &table);
         }
-        fly_now(context, crew, &args.lead)
+        fly_now(context, crew, &args.lead).map(|(exit, _)| exit)
     })
 }
+
+/// What gave an alarm, by drone.
+pub(super) type Alarms = BTreeMap<DroneId, Vec<String>>;
 
 /// The two steps of a start, and the show.
 pub(super) fn fly_now(
     context: &Context,
     crew: &mut Crew<'_>,
     lead: &LeadArgs,
-) -> Result<Exit, CommandError> {
+) -> Result<(Exit, Alarms), CommandError> {
     needs_person(lead)?;
     let mut start = crew.announce(lead.options())?;
     say_start(context, crew, &start, "Every drone has the start time");
@@ -327,7 +369,7 @@ pub(super) fn fly_now(
     crew.authorize(&mut start)?;
     context.say("Authorized. Ctrl-C stops watching; `updraft fleet abort` sends everyone home");
     let alarms = crew.watch(&mut start)?;
-    Ok(landed(context, crew, alarms.is_empty()))
+    Ok((landed(context, crew, alarms.is_empty()), alarms))
 }
 
 /// The same for drones that the station flies itself.
@@ -335,7 +377,7 @@ pub(super) fn guide_now(
     context: &Context,
     crew: &mut Crew<'_>,
     lead: &LeadArgs,
-) -> Result<Exit, CommandError> {
+) -> Result<(Exit, Alarms), CommandError> {
     needs_person(lead)?;
     let start = crew.set_guided_start(lead.options())?;
     say_start(context, crew, &start, "The start time, by the drones' clocks");
@@ -348,7 +390,7 @@ pub(super) fn guide_now(
          fleet abort`",
     );
     let alarms = crew.fly_guided(&start)?;
-    Ok(landed(context, crew, alarms.is_empty()))
+    Ok((landed(context, crew, alarms.is_empty()), alarms))
 }
 
 fn needs_person(lead: &LeadArgs) -> Result<(), CommandError> {
@@ -405,7 +447,7 @@ fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> 
     if args.step.dry_run {
         return dry::restore(context, &args.step, args.fence_off);
     }
-    let _lock = context.lock(&args.step.campaign)?;
+    let _lock = lock(context, &args.step.campaign)?;
     with_crew(context, &args.step, |crew| {
         let left = crew.restore(args.fence_off)?;
         let but = if left.is_empty() { "" } else { ", but for the drones named above" };

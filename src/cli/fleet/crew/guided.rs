@@ -22,6 +22,10 @@ use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 use crate::show::Trajectory;
 
+/// What became of guided drones when Ctrl-C was pressed.
+const SENT_HOME: &str = "stopped: this program flew the drones and has sent them home; those above that have not \
+     confirmed it need their remote controls";
+
 #[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
 fn refused(error: StartRefusal) -> CommandError {
     CommandError::Failed(error.to_string())
@@ -92,7 +96,9 @@ impl<'a> Crew<'a> {
             self.context.warn(&format!("drone {drone} (slot {slot}): {reason}"));
         }
         bad.extend(silent);
-        self.note("guided", Some(format!("{} refused", bad.len())))?;
+        let fine = |_: &DroneId| "fence set and read back, guided".to_owned();
+        let outcomes = self.outcomes_of(fine, &bad);
+        self.note_each("guided", Some(format!("{} refused", bad.len())), &outcomes)?;
         Ok(bad)
     }
 
@@ -153,7 +159,9 @@ impl<'a> Crew<'a> {
         }
         let written = failed.map_or(Ok(()), |reason| self.note("link", Some(reason)));
         let alarms = self.close(eyes);
-        self.context.check_stop()?;
+        if self.context.check_stop().is_err() {
+            return Err(CommandError::Stopped(SENT_HOME));
+        }
         written?;
         alarms
     }

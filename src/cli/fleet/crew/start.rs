@@ -15,6 +15,10 @@ use crate::link::clock::{MS, S};
 use crate::link::drive::Watch as _;
 use crate::link::id::DroneId;
 
+/// What becomes of drones in the show mode when nobody watches them.
+const FLY_ON: &str = "stopped: nobody watches any more, and the drones fly on by themselves; `updraft fleet \
+     abort` sends them home, `updraft fleet land` lands them where they are";
+
 impl<'a> Crew<'a> {
     /// Sets a start and waits until every drone has taken it.
     pub(in crate::cli) fn announce(
@@ -129,11 +133,11 @@ impl<'a> Crew<'a> {
                 break Ok(());
             }
             if self.context.stop_flag().load(Ordering::SeqCst) {
-                self.context.insist(
-                    "Nobody watches any more; the drones fly on by themselves. `updraft fleet abort` \
-                     sends them home, `updraft fleet land` lands them where they are",
-                );
-                break Err(CommandError::Interrupted);
+                break Err(if self.is_virtual {
+                    CommandError::Interrupted
+                } else {
+                    CommandError::Stopped(FLY_ON)
+                });
             }
         };
         let alarms = self.close(eyes);
@@ -146,8 +150,12 @@ impl<'a> Crew<'a> {
         let mut monitor =
             Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
         monitor.set_start(start_gps_ms);
-        let journal = if self.is_virtual { None } else { Some(Journal::open(&self.folder.0)?) };
-        Ok(Eyes::new(self.context, monitor, journal, self.clock))
+        let mut eyes = Eyes::new(self.context, monitor, self.clock, self.is_virtual);
+        if !self.is_virtual {
+            // Drones that are about to fly are watched, journal or not.
+            eyes.write_into(Journal::open(&self.folder.0));
+        }
+        Ok(eyes)
     }
 
     /// What was seen: the drones whose flight gave an alarm.

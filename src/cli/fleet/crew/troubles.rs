@@ -10,7 +10,9 @@ impl Crew<'_> {
         for trouble in troubles(&self.net.traffic(), &self.net.doubled()) {
             if self.told.insert(trouble.key) {
                 self.context.warn(&trouble.text);
-                self.note("link", Some(trouble.text))?;
+                if let Err(error) = self.note("link", Some(trouble.text)) {
+                    self.context.warn(&format!("not in the journal: {error}"));
+                }
             }
         }
         Ok(())
