@@ -44,7 +44,7 @@ fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
     let all = drones.fly(
         station.parse().unwrap(),
         || {
-            let upload = bench.expect(2, &[&["fleet"][..], &step("upload")[..]].concat());
+            let upload = bench.expect(4, &[&["fleet"][..], &step("upload")[..]].concat());
             let fly = bench.expect(4, &[&step("fly")[..], &["--yes"]].concat());
             // With a table that does not fit how they stand.
             let line = |slot: u16, system: u8| {
@@ -53,7 +53,7 @@ fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
             let lines = [line(1, 1), line(2, 2), line(3, 3), line(4, 4)];
             let table = serde_json::json!({ "schema": "updraft.fleet/1", "drones": lines });
             fs::write(bench.path("campaign/fleet.json"), table.to_string()).unwrap();
-            let table = bench.expect(2, &[&["fleet"][..], &step("upload")[..]].concat());
+            let table = bench.expect(4, &[&["fleet"][..], &step("upload")[..]].concat());
             [upload, fly, table].map(|ended| said(&ended, &station)).join("\n----\n")
         },
         assert_untouched,
@@ -145,6 +145,19 @@ fn a_station_with_a_key_refuses_what_is_not_signed_and_says_so() {
         assert!(last.contains("\"step\":\"link\"") && last.contains("refused"), "{last}");
     }
     insta::assert_snapshot!(all);
+}
+
+#[test]
+fn a_station_without_the_drones_key_is_told_to_give_it() {
+    let bench = Bench::new();
+    bench.planned("1x2", "campaign");
+    let mut drones = bench.drones();
+    drones.key = Some(Key::from_bytes([7; 32]));
+    let station = free_port();
+    let link = format!("udpin:{station}");
+    let step = ["fleet", "status", "campaign", "--connect", &link, "--wait", "20"];
+    let ended = drones.fly(station.parse().unwrap(), || bench.expect(0, &step), assert_untouched);
+    assert!(ended.err.contains("the drones' frames are signed: give --key"), "{ended}");
 }
 
 #[test]

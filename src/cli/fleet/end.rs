@@ -225,7 +225,8 @@ pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<E
     })?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
     crew.hear_anyone(args.step.connect.wait, only.as_ref())?;
-    let done = crew.abort(only.as_ref(), action, args.step.connect.wait)?;
+    let left_s = args.step.connect.wait - crew.net.now() as f64 * 1e-6;
+    let done = crew.abort(only.as_ref(), action, left_s.max(0.0))?;
     let exit = print(context, &done)?;
     if context.check_stop().is_err() {
         return Err(CommandError::Stopped(

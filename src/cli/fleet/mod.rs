@@ -7,26 +7,23 @@ pub(super) mod dry;
 pub(super) mod end;
 pub(super) mod server;
 pub(super) mod sim;
+pub(super) mod start;
 pub(super) mod tables;
 pub(super) mod virtual_drones;
 
-use std::collections::BTreeMap;
-use std::io::{BufRead as _, IsTerminal as _, Write as _};
 use std::path::PathBuf;
-use std::sync::mpsc::RecvTimeoutError;
-use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
 use self::connect::{ConnectArgs, Target};
 use self::crew::Crew;
+use self::start::{LeadArgs, fly_now};
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use crate::campaign::lock::FolderLock;
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::abort::Action;
 use crate::fleet::preflight::Preflight;
-use crate::fleet::start::{LEAST_LEAD_S, MOST_LEAD_S, Start, StartOptions};
 use crate::link::address::Address;
 use crate::link::id::DroneId;
 use crate::link::station::Station;
@@ -97,34 +94,6 @@ pub(super) struct UploadArgs {
     /// Find anew which drone flies which slot, from where they stand
     #[arg(long)]
     assign: bool,
-}
-
-/// How a start is given.
-#[derive(Clone, Debug, Args)]
-pub(super) struct LeadArgs {
-    /// From now to the start, s of the drones' time: 20 to 43200
-    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = lead_seconds)]
-    pub(super) lead: f64,
-    /// Authorize the start without asking
-    #[arg(short, long)]
-    pub(super) yes: bool,
-}
-
-/// Parser of `--lead`: nothing has been sent when it refuses.
-fn lead_seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (LEAST_LEAD_S..=MOST_LEAD_S).contains(&value) => Ok(value),
-        _ => Err(format!(
-            "a lead between {LEAST_LEAD_S} and {MOST_LEAD_S} s: the drones set their home and arm in \
-             the last 10 s"
-        )),
-    }
-}
-
-impl LeadArgs {
-    fn options(&self) -> StartOptions {
-        StartOptions { lead_s: self.lead, ..StartOptions::default() }
-    }
 }
 
 /// Arguments of `fleet start`.
@@ -306,10 +275,13 @@ fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
         if context.json {
             context.print_json(&tables::UploadOutput::new(&crew.table, &refused))?;
         }
-        // Without --set-params nothing was to be set.
-        let set = right || !args.set_params;
-        Ok(if refused.is_empty() && set { Exit::Done } else { Exit::Losses })
+        Ok(uploaded(refused.is_empty(), right, args.set_params))
     })
+}
+
+/// How an upload ends. Without `--set-params` no parameter was to be set, and nothing is lost.
+fn uploaded(all_loaded: bool, params_right: bool, set_params: bool) -> Exit {
+    if all_loaded && (params_right || !set_params) { Exit::Done } else { Exit::Losses }
 }
 
 /// Opens the links, and says who holds them if another command of this campaign does.
@@ -344,105 +316,6 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
     })
 }
 
-/// What gave an alarm, by drone.
-pub(super) type Alarms = BTreeMap<DroneId, Vec<String>>;
-
-/// The two steps of a start, and the show.
-pub(super) fn fly_now(
-    context: &Context,
-    crew: &mut Crew<'_>,
-    lead: &LeadArgs,
-) -> Result<(Exit, Alarms), CommandError> {
-    needs_person(lead)?;
-    let mut start = crew.announce(lead.options())?;
-    say_start(context, crew, &start, "Every drone has the start time");
-    let yes = lead.yes || {
-        let answer = asked("Authorize the start? Type yes: ", || crew.idle());
-        if !matches!(answer, Ok(true)) {
-            crew.cancel(&mut start)?;
-        }
-        answer?
-    };
-    if !yes {
-        return Err(CommandError::Unsafe("not authorized: the start was taken back".to_owned()));
-    }
-    crew.authorize(&mut start)?;
-    context.say("Authorized. Ctrl-C stops watching; `updraft fleet abort` sends everyone home");
-    let alarms = crew.watch(&mut start)?;
-    Ok((landed(context, crew, alarms.is_empty()), alarms))
-}
-
-/// The same for drones that the station flies itself.
-pub(super) fn guide_now(
-    context: &Context,
-    crew: &mut Crew<'_>,
-    lead: &LeadArgs,
-) -> Result<(Exit, Alarms), CommandError> {
-    needs_person(lead)?;
-    let start = crew.set_guided_start(lead.options())?;
-    say_start(context, crew, &start, "The start time, by the drones' clocks");
-    if !lead.yes && !asked("Authorize the start? Type yes: ", || crew.idle())? {
-        return Err(CommandError::Unsafe("not authorized: nobody takes off".to_owned()));
-    }
-    crew.authorize_guided(&start)?;
-    context.say(
-        "Authorized. This program flies the drones: Ctrl-C sends everyone home, as does `updraft \
-         fleet abort`",
-    );
-    let alarms = crew.fly_guided(&start)?;
-    Ok((landed(context, crew, alarms.is_empty()), alarms))
-}
-
-fn needs_person(lead: &LeadArgs) -> Result<(), CommandError> {
-    if !lead.yes && !std::io::stdin().is_terminal() {
-        return Err(CommandError::Usage(
-            "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
-        ));
-    }
-    Ok(())
-}
-
-fn say_start(context: &Context, crew: &mut Crew<'_>, start: &Start, what: &str) {
-    let time = start.time().map_or_else(String::new, tables::time_of_day);
-    context.say(&format!(
-        "{what}: {time} ({} s of the GPS week), in {:.0} s",
-        start.second_of_week(),
-        start.left_s(&crew.telemetry, crew.net.now()).unwrap_or(0.0)
-    ));
-}
-
-fn landed(context: &Context, crew: &Crew<'_>, quiet: bool) -> Exit {
-    let landed = crew.landed();
-    context.say(&format!("{landed} of {} drones have landed", crew.table.drones.len()));
-    let quiet = quiet && crew.net.ordered_down().is_empty();
-    if landed == crew.table.drones.len() && quiet { Exit::Done } else { Exit::Losses }
-}
-
-/// Asks a person. While they think, the links are listened to and orders carried out.
-pub(super) fn asked(
-    question: &str,
-    mut meanwhile: impl FnMut() -> Result<(), CommandError>,
-) -> Result<bool, CommandError> {
-    let failed = |error: std::io::Error| CommandError::Failed(format!("failed to ask: {error}"));
-    let mut err = std::io::stderr().lock();
-    err.write_all(question.as_bytes()).and_then(|()| err.flush()).map_err(failed)?;
-    drop(err);
-    let (answers, answered) = std::sync::mpsc::sync_channel(1);
-    // Ends with the program if nobody answers.
-    let read = move || {
-        let mut answer = String::new();
-        let _ = answers.send(std::io::stdin().lock().read_line(&mut answer).map(|_| answer));
-    };
-    std::thread::Builder::new().name("answer".to_owned()).spawn(read).map_err(failed)?;
-    loop {
-        match answered.recv_timeout(Duration::from_millis(50)) {
-            Ok(answer) => return Ok(answer.map_err(failed)?.trim().eq_ignore_ascii_case("yes")),
-            Err(RecvTimeoutError::Timeout) => meanwhile()?,
-            Err(RecvTimeoutError::Disconnected) => return Ok(false),
-        }
-    }
-}
-
 fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> {
     if args.step.dry_run {
         return dry::restore(context, &args.step, args.fence_off);
@@ -454,4 +327,17 @@ fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> 
         context.say(&format!("Parameters are as they were{but}"));
         Ok(if left.is_empty() { Exit::Done } else { Exit::Losses })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_that_could_not_be_set_cost_the_exit_code_of_an_upload() {
+        assert_eq!(uploaded(true, true, true), Exit::Done);
+        assert_eq!(uploaded(true, false, true), Exit::Losses);
+        assert_eq!(uploaded(true, false, false), Exit::Done);
+        assert_eq!(uploaded(false, true, false), Exit::Losses);
+    }
 }

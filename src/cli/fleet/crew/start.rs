@@ -8,7 +8,7 @@ use super::eyes::Eyes;
 use crate::base::time::GpsTime;
 use crate::cli::exit::CommandError;
 use crate::fleet::journal::Journal;
-use crate::fleet::start::{Start, StartOptions};
+use crate::fleet::start::{Phase, Start, StartOptions};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::watch::{self, Monitor};
 use crate::link::clock::{MS, S};
@@ -114,7 +114,16 @@ impl<'a> Crew<'a> {
         let mut eyes = self.eyes(start.time().map(GpsTime::total_ms))?;
         let outcome = loop {
             let now = self.net.now();
-            if let Some(packet) = start.due(eyes.telemetry(), now) {
+            let ordered = self.net.ordered_down();
+            let before = start.left_s(eyes.telemetry(), now).is_some_and(|left_s| left_s > 0.0);
+            if !ordered.is_empty() && before && start.phase() != Phase::Cancelled {
+                // A start packet has no address: who goes on needs a new one.
+                self.context.insist("The start is taken back for everyone");
+                start.cancel(now);
+            }
+            let cancelled = start.phase() == Phase::Cancelled;
+            let told = cancelled && start.late(eyes.telemetry(), now).is_empty();
+            if let Some(packet) = start.due(eyes.telemetry(), now).filter(|_| !told) {
                 self.net.broadcast(&packet)?;
             }
             let next = start.next().clamp(now + MS, now + 100 * MS);
@@ -122,13 +131,13 @@ impl<'a> Crew<'a> {
                 eyes.on_message(self.net.now(), &received);
             }
             eyes.stop(self.net.now());
-            let ordered = self.net.ordered_down();
             let going_on = ordered.values().any(|going_on| *going_on);
             let down = |drone: &DroneId| {
                 let armed = eyes.telemetry().get(*drone).and_then(Drone::is_armed);
-                ordered.contains_key(drone) && armed == Some(false)
+                (cancelled || ordered.contains_key(drone)) && armed == Some(false)
             };
-            let all_down = !ordered.is_empty() && self.drones().iter().all(down);
+            let all_down =
+                told == cancelled && !ordered.is_empty() && self.drones().iter().all(down);
             if !going_on && (eyes.is_over() || all_down) {
                 break Ok(());
             }

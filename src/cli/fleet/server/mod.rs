@@ -19,7 +19,7 @@ use self::rows::sum_up;
 use self::standing::assign;
 use self::upload::Shows;
 use super::bring::Wish;
-use super::{LeadArgs, asked, needs_person};
+use super::start::{LeadArgs, asked, needs_person};
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
