@@ -178,7 +178,7 @@ fn two_drones_with_one_system_id_are_reported() {
             assert_eq!(json["drones"][0]["doubled"], true);
             assert!(json["networks"][0]["frames_in"].as_u64().unwrap() > 10);
             // The other one's slot is empty, whichever of them spoke first: nothing is sent.
-            let upload = bench.expect(2, &[&["fleet", "upload"][..], &step[..]].concat());
+            let upload = bench.expect(4, &[&["fleet", "upload"][..], &step[..]].concat());
             let empty = |slot: u8| upload.err.contains(&format!("slot {slot} has no drone"));
             assert!(
                 empty(1) != empty(2) && upload.err.contains("nothing was sent"),
