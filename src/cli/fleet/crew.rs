@@ -159,7 +159,7 @@ impl<'a> Crew<'a> {
                 self.telemetry.on_message(self.net.now(), &received);
             }
         }
-        self.tell_troubles()?;
+        self.tell_troubles();
         if self.telemetry.drones.is_empty() {
             return Err(CommandError::Nothing(format!(
                 "no drone was heard within {wait_s:.0} s: are they on, and is --connect right?"

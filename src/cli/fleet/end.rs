@@ -139,8 +139,8 @@ fn order(
         std::thread::sleep(PAUSE);
     }
     // One that was taken at the last moment is waited for.
-    let taken = given.into_iter().filter(|given| !given.withdraw()).next();
-    match taken {
+    let mut taken: Vec<Given> = given.into_iter().filter(|given| !given.withdraw()).collect();
+    match taken.pop() {
         Some(taken) => follow(context, taken).map(Some),
         None => Ok(None),
     }

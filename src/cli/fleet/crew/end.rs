@@ -33,7 +33,7 @@ impl Crew<'_> {
                 return Ok(());
             }
             if now >= until {
-                self.tell_troubles()?;
+                self.tell_troubles();
                 return if heard.is_empty() {
                     Err(CommandError::Nothing(
                         "no drone was heard: use their remote controls".to_owned(),

@@ -150,7 +150,7 @@ impl<'a> Crew<'a> {
             };
             machines.insert(line.drone, Guided::new(line.drone, flight));
         }
-        let eyes = self.eyes(Some(start_gps_ms))?;
+        let eyes = self.eyes(Some(start_gps_ms));
         self.context.set_flies(true);
         let (eyes, failed, ended) = self.stream(machines, eyes);
         self.context.set_flies(false);

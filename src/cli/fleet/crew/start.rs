@@ -111,7 +111,7 @@ impl<'a> Crew<'a> {
         &mut self,
         start: &mut Start,
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
-        let mut eyes = self.eyes(start.time().map(GpsTime::total_ms))?;
+        let mut eyes = self.eyes(start.time().map(GpsTime::total_ms));
         let outcome = loop {
             let now = self.net.now();
             let ordered = self.net.ordered_down();
@@ -154,7 +154,7 @@ impl<'a> Crew<'a> {
     }
 
     /// Watches a flight from here on.
-    pub(super) fn eyes(&mut self, start_gps_ms: Option<i64>) -> Result<Eyes<'a>, CommandError> {
+    pub(super) fn eyes(&mut self, start_gps_ms: Option<i64>) -> Eyes<'a> {
         let telemetry = std::mem::take(&mut self.telemetry);
         let mut monitor =
             Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
@@ -164,7 +164,7 @@ impl<'a> Crew<'a> {
             // Drones that are about to fly are watched, journal or not.
             eyes.write_into(Journal::open(&self.folder.0));
         }
-        Ok(eyes)
+        eyes
     }
 
     /// What was seen: the drones whose flight gave an alarm.
@@ -174,7 +174,7 @@ impl<'a> Crew<'a> {
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
         let (telemetry, alarms) = eyes.close();
         self.telemetry = telemetry;
-        self.tell_troubles()?;
+        self.tell_troubles();
         Ok(alarms?)
     }
 }

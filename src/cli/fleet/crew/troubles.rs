@@ -1,12 +1,11 @@
 //! What is wrong with the links: told once each, and written into the journal.
 
 use super::Crew;
-use crate::cli::exit::CommandError;
 use crate::link::traffic::troubles;
 
 impl Crew<'_> {
     /// Tells what people must know about their links and has not been told yet.
-    pub(super) fn tell_troubles(&mut self) -> Result<(), CommandError> {
+    pub(super) fn tell_troubles(&mut self) {
         for trouble in troubles(&self.net.traffic(), &self.net.doubled()) {
             if self.told.insert(trouble.key) {
                 self.context.warn(&trouble.text);
@@ -15,6 +14,5 @@ impl Crew<'_> {
                 }
             }
         }
-        Ok(())
     }
 }
