@@ -38,6 +38,8 @@ mod logs;
 mod logs_pull;
 #[path = "cli/manners.rs"]
 mod manners;
+#[path = "cli/orders.rs"]
+mod orders;
 #[path = "cli/plan.rs"]
 mod plan;
 #[path = "cli/simulate.rs"]

@@ -35,6 +35,7 @@ fn json_schemas_are_current() {
         (Format::Fleet, "fleet"),
         (Format::Changes, "changes"),
         (Format::Preflight, "preflight"),
+        (Format::Fly, "fly"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();

@@ -89,6 +89,9 @@ pub enum CommandError {
     /// The arguments do not fit together.
     #[error("{0}")]
     Usage(String),
+    /// A check failed, or a person has said no: nothing was started.
+    #[error("{0}")]
+    Unsafe(String),
     /// Something unexpected, with its reason.
     #[error("{0}")]
     Failed(String),
@@ -98,6 +101,9 @@ pub enum CommandError {
     /// Ctrl-C.
     #[error("interrupted; the same command goes on where it stopped")]
     Interrupted,
+    /// Ctrl-C, with what becomes of what was going on.
+    #[error("{0}")]
+    Stopped(&'static str),
     /// Standard output was closed by its reader, which is how pipes end.
     #[error("standard output was closed")]
     BrokenPipe,
@@ -166,7 +172,8 @@ impl CommandError {
             | Self::Failed(_) => Exit::Failed,
             Self::Effect(_) | Self::Log(_) | Self::Usage(_) => Exit::Usage,
             Self::Nothing(_) => Exit::Nothing,
-            Self::Interrupted => Exit::Interrupted,
+            Self::Unsafe(_) => Exit::Unsafe,
+            Self::Interrupted | Self::Stopped(_) => Exit::Interrupted,
             Self::BrokenPipe => Exit::Done,
         }
     }

@@ -1,5 +1,6 @@
 //! `updraft fly`: upload, preflight, start, watch, and bring the logs home.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -11,11 +12,15 @@ use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::sim::{Hangar, Mishaps, TO_START};
-use super::fleet::{LeadArgs, dry, fly_now, guide_now, one_flight, server, tables};
+use super::fleet::start::{LeadArgs, fly_now, guide_now};
+use super::fleet::tables::PreflightOutput;
+use super::fleet::{dry, end, lock, one_flight, server};
+use super::fly_output::{FlightEnd, FlightOutput, FlyOutput, LogOutput};
 use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
 use crate::base::time::GpsTime;
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::start::StartOptions;
+use crate::link::id::DroneId;
 use crate::mission::Plan;
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
@@ -94,54 +99,76 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
                 .to_owned(),
         ));
     }
-    let _lock = context.lock(&args.campaign)?;
+    let _lock = lock(context, &args.campaign)?;
+    let (flights, exit) = fly_target(context, args, target)?;
+    if context.json {
+        context.print_json(&FlyOutput::new(flights))?;
+    }
+    Ok(exit)
+}
+
+fn fly_target(
+    context: &Context,
+    args: &FlyArgs,
+    target: Target,
+) -> Result<(Vec<FlightOutput>, Exit), CommandError> {
     match target {
         Target::Links(links) => {
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             let mut station = args.connect.open(links)?;
-            let mut crew = Crew::new(context, &mut station, &folder, &plan);
+            let mut desk = end::desk(context, &mut station, &folder);
+            let mut crew = Crew::new(context, &mut desk, &folder, &plan);
             crew.is_guided = args.guided;
             crew.listen(args.connect.wait)?;
-            fly(context, &mut crew, args)
+            let (flight, exit) = fly(context, &mut crew, args)?;
+            Ok((vec![flight], exit))
         }
         Target::Sim => {
             let simulation = args.air.simulation(args.updraft, args.force);
             let mut lost = false;
-            let mut any = false;
+            let mut flights = Vec::new();
             for folder in campaign::flights(&args.campaign)? {
                 let plan = folder.read_plan()?;
                 if args.flight.as_ref().is_some_and(|name| *name != plan.name) {
                     continue;
                 }
-                any = true;
-                lost |= !fly_virtual(context, &folder, &plan, &simulation)?.failed.is_empty();
+                let (flown, output) = fly_and_tell(context, &folder, &plan, &simulation)?;
+                lost |= !flown.failed.is_empty();
+                flights.push(output);
             }
-            if !any {
+            if flights.is_empty() {
                 one_flight(&args.campaign, args.flight.as_deref())?;
             }
-            Ok(if lost { Exit::Losses } else { Exit::Done })
+            Ok((flights, if lost { Exit::Losses } else { Exit::Done }))
         }
         Target::Server(address) => {
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             let (with_logs, wait_s) = (!args.no_logs, args.connect.wait);
-            server::fly(context, &address, &folder, &plan, &args.lead, with_logs, wait_s)
+            let (flight, exit) =
+                server::fly(context, &address, &folder, &plan, &args.lead, with_logs, wait_s)?;
+            Ok((vec![flight], exit))
         }
     }
 }
 
 /// The whole flight of real drones.
-fn fly(context: &Context, crew: &mut Crew<'_>, args: &FlyArgs) -> Result<Exit, CommandError> {
+fn fly(
+    context: &Context,
+    crew: &mut Crew<'_>,
+    args: &FlyArgs,
+) -> Result<(FlightOutput, Exit), CommandError> {
     crew.greet()?;
     if !crew.assign(args.assign)? {
         context.insist("NO-GO: nothing was sent, as the drones do not stand as planned");
-        return Ok(Exit::Unsafe);
+        return Ok((FlightOutput::no_go(&crew.plan.name, Vec::new(), None), Exit::Unsafe));
     }
     let refused = if args.guided {
         crew.make_guided()?
     } else {
         if let Some(mixed) = crew.firmwares() {
             context.insist(&mixed);
-            return Ok(Exit::Unsafe);
+            let drones = not_started(crew, &BTreeMap::new());
+            return Ok((FlightOutput::no_go(&crew.plan.name, drones, None), Exit::Unsafe));
         }
         crew.upload()?
     };
@@ -149,21 +176,47 @@ fn fly(context: &Context, crew: &mut Crew<'_>, args: &FlyArgs) -> Result<Exit, C
     crew.params(args.set_params)?;
     let table = crew.preflight(args.connect.wait)?;
     if !refused.is_empty() || !table.go() {
-        tables::preflight(context, &table)?;
-        return Ok(Exit::Unsafe);
+        if context.json {
+            context.insist(&table.to_string());
+        } else {
+            context.emit(&table.to_string())?;
+        }
+        let drones = not_started(crew, &refused);
+        let found = Some(PreflightOutput::of(&table));
+        return Ok((FlightOutput::no_go(&crew.plan.name, drones, found), Exit::Unsafe));
     }
-    context.print(&table.to_string())?;
-    let flown = if args.guided {
+    if context.json {
+        context.say(&table.to_string());
+    } else {
+        context.print(&table.to_string())?;
+    }
+    let (flown, alarms) = if args.guided {
         guide_now(context, crew, &args.lead)?
     } else {
         fly_now(context, crew, &args.lead)?
     };
+    let mut output = FlightOutput::flown(crew, &alarms, Some(PreflightOutput::of(&table)));
     if args.no_logs {
-        return Ok(flown);
+        return Ok((output, flown));
     }
     let brought = bring(context, crew.net, crew.folder, crew.plan, &crew.table, &Wish::default())?;
     let lost = brought.iter().any(|one| one.state == "missing");
-    Ok(if lost { Exit::Losses } else { flown })
+    output.logs = brought.iter().map(LogOutput::from).collect();
+    Ok((output, if lost { Exit::Losses } else { flown }))
+}
+
+/// The drones of a flight that is not started, with what each has refused.
+fn not_started(
+    crew: &Crew<'_>,
+    refused: &BTreeMap<DroneId, String>,
+) -> Vec<(u16, String, Vec<String>)> {
+    let drones = crew.table.drones.iter();
+    drones
+        .map(|line| {
+            let reasons = refused.get(&line.drone).cloned().into_iter().collect();
+            (line.slot, line.drone.to_string(), reasons)
+        })
+        .collect()
 }
 
 /// A flight by virtual drones: over MAVLink, like real ones, with logs that come home.
@@ -173,14 +226,37 @@ pub(super) fn fly_virtual(
     plan: &Plan,
     simulation: &Simulation,
 ) -> Result<Flown, CommandError> {
+    fly_and_tell(context, folder, plan, simulation).map(|(flown, _)| flown)
+}
+
+/// The same, with what `--json` prints of it.
+fn fly_and_tell(
+    context: &Context,
+    folder: &FlightFolder,
+    plan: &Plan,
+    simulation: &Simulation,
+) -> Result<(Flown, FlightOutput), CommandError> {
     let watch = Stopwatch::start();
     let ready = make_ready(context, folder, plan, simulation)?;
+    let mut output = FlightOutput {
+        flight: plan.name.clone(),
+        outcome: FlightEnd::Flown,
+        preflight: None,
+        drones: Vec::new(),
+        logs: ready.wanted.iter().map(|slot| LogOutput::there(slot.slot)).collect(),
+    };
     let mut failed = Vec::new();
     if !ready.open.is_empty() {
-        let brought = launch(context, folder, plan, simulation, &ready)?;
+        let (flown, brought) = launch(context, folder, plan, simulation, &ready)?;
         failed.extend(brought.iter().filter_map(Brought::loss));
+        output.drones = flown.drones;
+        for one in &brought {
+            output.logs.retain(|log| log.slot != one.slot);
+            output.logs.push(LogOutput::from(one));
+        }
+        output.logs.sort_by_key(|log| log.slot);
     }
-    settle(context, folder, plan, ready, failed, watch)
+    Ok((settle(context, folder, plan, ready, failed, watch)?, output))
 }
 
 fn launch(
@@ -189,7 +265,7 @@ fn launch(
     plan: &Plan,
     simulation: &Simulation,
     ready: &Ready<'_>,
-) -> Result<Vec<Brought>, CommandError> {
+) -> Result<(FlightOutput, Vec<Brought>), CommandError> {
     let start = ready.record.start;
     let switched_on = GpsTime::from_total_ms(start.total_ms() - (TO_START / 1000) as i64)
         .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
@@ -229,9 +305,10 @@ fn launch(
         let options = StartOptions { at: Some(start), ..StartOptions::default() };
         let mut start = crew.announce(options)?;
         crew.authorize(&mut start)?;
-        crew.watch(&mut start)?;
+        let alarms = crew.watch(&mut start)?;
+        let flown = FlightOutput::flown(&crew, &alarms, None);
         // Virtual drones fly again at any time.
         let wish = Wish { quiet: true, is_durable: false, ..Wish::default() };
-        bring(context, crew.net, folder, plan, &crew.table, &wish)
+        Ok((flown, bring(context, crew.net, folder, plan, &crew.table, &wish)?))
     })
 }

@@ -12,6 +12,7 @@ mod fields;
 mod fleet;
 mod flown;
 mod fly;
+mod fly_output;
 mod found;
 mod inspect;
 mod leaning;

@@ -7,6 +7,7 @@ use schemars::schema_for;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::fleet::tables::PreflightOutput;
+use super::fly_output::FlyOutput;
 use crate::analysis::result::Analysis;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{CampaignIndex, FlightRecord};
@@ -60,6 +61,8 @@ pub enum Format {
     Changes,
     /// what `updraft fleet preflight --json` prints
     Preflight,
+    /// what `updraft fly --json` prints
+    Fly,
 }
 
 impl Format {
@@ -78,6 +81,7 @@ impl Format {
             Self::Fleet => schema_for!(FleetTable),
             Self::Changes => schema_for!(Changes),
             Self::Preflight => schema_for!(PreflightOutput),
+            Self::Fly => schema_for!(FlyOutput),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;
         text.push('\n');

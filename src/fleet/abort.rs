@@ -5,6 +5,8 @@
 //! heartbeat confirms it. A drone that is not flying has its start taken back instead. Nothing
 //! else is sent meanwhile.
 
+use serde::{Deserialize, Serialize};
+
 use super::messages::{GUIDED, LAND, RTL, set_mode, start_packet};
 use super::telemetry::Drone;
 use crate::link::clock::{MS, Micros, S};
@@ -30,7 +32,8 @@ const STATUS_WITHIN: Micros = 3 * S;
 const REFUSALS: u32 = 3;
 
 /// What drones in the air do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Action {
     /// Return to where they took off, and land there.
     Return,
@@ -49,7 +52,8 @@ impl Action {
 }
 
 /// How an abort ended for one drone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Aborted {
     /// Its heartbeat says that it does this; for a return that was refused, that it lands.
     Confirmed(Action),
@@ -60,6 +64,15 @@ pub enum Aborted {
         /// How often.
         told: u32,
     },
+    /// It was never heard, so that nothing reaches it.
+    Unheard,
+}
+
+impl Aborted {
+    /// Whether the drone itself has confirmed it.
+    pub fn is_confirmed(self) -> bool {
+        matches!(self, Self::Confirmed(_) | Self::Grounded)
+    }
 }
 
 impl std::fmt::Display for Aborted {
@@ -71,6 +84,9 @@ impl std::fmt::Display for Aborted {
             Self::Unconfirmed { told } => {
                 write!(f, "NOT CONFIRMED after {told} tries: use its remote control")
             }
+            Self::Unheard => {
+                f.write_str("NOT HEARD, so nothing was sent to it: use its remote control")
+            }
         }
     }
 }
@@ -80,6 +96,9 @@ impl std::fmt::Display for Aborted {
 pub struct Abort {
     drone: DroneId,
     action: Action,
+    /// A drone that is not heard within this is given up.
+    heard_within: Micros,
+    heard: bool,
     begun: Option<Micros>,
     next: Micros,
     /// The second of the two messages of a round is still to be sent.
@@ -99,6 +118,7 @@ impl Abort {
     /// disarmed is not pulled out of its mode. It cannot fly before its next heartbeats: arming
     /// comes eight seconds before the take-off.
     pub fn new(drone: DroneId, action: Action, known: Option<&Drone>) -> Self {
+        let heard = known.is_some();
         let known = known.filter(|known| {
             let old = |at: Micros| known.heard.saturating_sub(at) > KNOWN_WITHIN;
             !known.armed.is_some_and(|(at, _)| old(at))
@@ -109,6 +129,8 @@ impl Abort {
         Self {
             drone,
             action,
+            heard_within: GIVE_UP,
+            heard,
             begun: None,
             next: 0,
             cancel_next: false,
@@ -120,6 +142,12 @@ impl Abort {
             told: 0,
             refusals: 0,
         }
+    }
+
+    /// The same, giving up a drone that has never been heard and is not within this time.
+    #[must_use]
+    pub fn heard_within(self, heard_within: Micros) -> Self {
+        Self { heard_within, ..self }
     }
 
     /// Armed, but not in the air: there it lands at once, where a return might not disarm. Kept,
@@ -155,6 +183,7 @@ impl Machine for Abort {
     type Done = Aborted;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        self.heard = true;
         let Some(begun) = self.begun else { return };
         let after = now >= begun + SETTLE;
         match message {
@@ -199,6 +228,9 @@ impl Machine for Abort {
         }
         if now < self.next {
             return Step::Wait(self.next);
+        }
+        if !self.heard && now >= begun + self.heard_within {
+            return Step::Done(Aborted::Unheard);
         }
         if now >= begun + GIVE_UP {
             return Step::Done(Aborted::Unconfirmed { told: self.told });

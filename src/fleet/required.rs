@@ -185,6 +185,13 @@ pub struct Standing {
 }
 
 impl Standing {
+    /// In a sentence what could not be mended.
+    pub fn complaint(&self) -> String {
+        let failed = self.failed.iter().map(ToString::to_string);
+        let wrong: Vec<String> = failed.chain(self.wrong.iter().map(ToString::to_string)).collect();
+        format!("not all parameters could be set: {}", wrong.join("; "))
+    }
+
     /// Whether everything is as it must be.
     pub fn is_right(&self) -> bool {
         self.wrong.is_empty() && self.failed.is_none()
@@ -280,13 +287,16 @@ impl Machine for CheckParams {
                             self.standing.values.insert(name.to_owned(), *value);
                             if let Err(error) = done {
                                 self.standing.values.insert(name.to_owned(), was);
-                                self.standing.failed = Some(error);
-                                let rest = to_mend.drain(..).map(|(difference, _)| difference);
-                                self.standing.wrong.extend(rest);
-                                self.phase = Phase::Over;
-                                continue;
+                                // A drone that answers is asked for the others; one that does not
+                                // is not waited for once more.
+                                let silent = matches!(error, SetError::Silent { .. });
+                                self.standing.failed.get_or_insert(error);
+                                let tried = if silent { to_mend.len() } else { 1 };
+                                let left = to_mend.drain(..tried).map(|(difference, _)| difference);
+                                self.standing.wrong.extend(left);
+                            } else {
+                                to_mend.pop_front();
                             }
-                            to_mend.pop_front();
                             if let Phase::Set(_, set) = &mut self.phase {
                                 *set = None;
                             }
@@ -306,5 +316,74 @@ impl Machine for CheckParams {
                 Progress { done: total, total }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::frame::dialect::PARAM_VALUE_DATA;
+
+    const DRONE: DroneId = DroneId { network: 0, system: 1 };
+
+    fn require(name: &'static str) -> Requirement {
+        Requirement { name, wanted: Wanted::AtLeast(1.0), why: "it must" }
+    }
+
+    /// Talks to a drone whose parameters are all 0 and that takes no value for `stubborn`; for
+    /// `deaf` it does not answer to being set at all.
+    fn standing(stubborn: &str, deaf: &str) -> Standing {
+        let mut values: BTreeMap<String, f32> =
+            ["A", "B", "C"].into_iter().map(|name| (name.to_owned(), 0.0)).collect();
+        let all = ["A", "B", "C"].map(require).to_vec();
+        let (mut check, mut now) = (CheckParams::new(DRONE, all, true), 0);
+        for _ in 0..10_000 {
+            let name = match check.poll(now) {
+                Step::Done(standing) => return standing,
+                Step::Wait(until) => {
+                    now = until;
+                    continue;
+                }
+                Step::Send(message) => match *message {
+                    MavMessage::PARAM_REQUEST_READ(read) => {
+                        super::super::messages::chars(&read.param_id[..])
+                    }
+                    MavMessage::PARAM_SET(set) => {
+                        let name = super::super::messages::chars(&set.param_id[..]);
+                        if name == deaf {
+                            continue;
+                        }
+                        if name != stubborn {
+                            values.insert(name.clone(), set.param_value);
+                        }
+                        name
+                    }
+                    _ => continue,
+                },
+            };
+            let param_value = values[&name];
+            let param_id = name.as_str().into();
+            let answer = PARAM_VALUE_DATA { param_value, param_id, ..PARAM_VALUE_DATA::default() };
+            check.on_message(now, &MavMessage::PARAM_VALUE(answer));
+        }
+        panic!("it does not end");
+    }
+
+    #[test]
+    fn what_a_drone_does_not_take_is_said_and_the_rest_is_set() {
+        let standing = standing("A", "");
+        assert!(!standing.is_right());
+        assert_eq!(standing.values["A"].to_bits(), 0.0_f32.to_bits());
+        assert_eq!(standing.values["C"].to_bits(), 1.0_f32.to_bits(), "the others are set");
+        let complaint = standing.complaint();
+        assert!(complaint.contains("A is 0 after it was set to 1"), "{complaint}");
+        assert!(!complaint.contains("C is"), "{complaint}");
+    }
+
+    #[test]
+    fn a_drone_that_does_not_answer_to_a_set_has_all_that_is_left_named() {
+        let complaint = standing("", "B").complaint();
+        assert!(complaint.contains("no answer when B is set to 1"), "{complaint}");
+        assert!(complaint.contains("C is 0, it must be 1 or more"), "{complaint}");
     }
 }

@@ -35,9 +35,9 @@ impl Default for StartOptions {
 }
 
 /// Shortest lead that leaves time for both steps and the firmware's own, s.
-const LEAST_LEAD_S: f64 = 20.0;
+pub const LEAST_LEAD_S: f64 = 20.0;
 /// Longest: a start is not set for days, s. Times of the past half week read as passed.
-const MOST_LEAD_S: f64 = 12.0 * 3600.0;
+pub const MOST_LEAD_S: f64 = 12.0 * 3600.0;
 
 /// Why no start is set or authorized.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

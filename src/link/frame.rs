@@ -84,6 +84,8 @@ pub struct FrameReader {
     bytes: Vec<u8>,
     /// What was lost so far.
     pub loss: FrameLoss,
+    /// Signed frames that came where no signature is looked at.
+    pub signed: u64,
 }
 
 impl FrameReader {
@@ -125,6 +127,8 @@ impl FrameReader {
                             self.loss.forged += 1;
                             continue;
                         }
+                    } else {
+                        self.signed += u64::from(signed);
                     }
                     match parse(frame) {
                         Some(frame) => break Some(frame),

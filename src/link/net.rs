@@ -46,4 +46,10 @@ pub trait Net {
     fn doubled(&self) -> BTreeSet<DroneId> {
         BTreeSet::new()
     }
+
+    /// Vehicles that another process has ordered down through this station, and whether that is
+    /// still going on.
+    fn ordered_down(&self) -> BTreeMap<DroneId, bool> {
+        BTreeMap::new()
+    }
 }

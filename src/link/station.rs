@@ -146,7 +146,7 @@ impl Station {
         let mut datagram = FrameReader::default();
         let is_stream = self.ports[port].stream.is_some();
         let reader = self.ports[port].stream.as_mut().unwrap_or(&mut datagram);
-        let before = reader.loss;
+        let (before, signed) = (reader.loss, reader.signed);
         reader.push(&bytes);
         let mut frames = Vec::new();
         while let Some(frame) = reader.next(verifier.as_deref_mut()) {
@@ -155,10 +155,11 @@ impl Station {
         if !is_stream {
             reader.end_of_datagram();
         }
-        let loss = reader.loss;
+        let (loss, signed) = (reader.loss, reader.signed - signed);
         let traffic = self.traffic.entry(network).or_default();
         traffic.bytes_in += bytes.len() as u64;
         traffic.frames_in += frames.len() as u64;
+        traffic.signed += signed;
         traffic.loss.noise_bytes += loss.noise_bytes - before.noise_bytes;
         traffic.loss.version_1 += loss.version_1 - before.version_1;
         traffic.loss.unknown += loss.unknown - before.unknown;

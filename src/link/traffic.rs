@@ -14,6 +14,9 @@ pub struct Traffic {
     pub bytes_out: u64,
     /// Frames received that gave a message.
     pub frames_in: u64,
+    /// Frames that are signed although the station has no key: whoever signs hears nothing that
+    /// is not.
+    pub signed: u64,
     /// Bytes that gave none.
     pub loss: FrameLoss,
 }
@@ -52,6 +55,13 @@ pub fn troubles(traffic: &BTreeMap<u16, Traffic>, doubled: &BTreeSet<DroneId>) -
             all.push(Trouble { key, text: format!("network {network}: {text}") });
         };
         let FrameLoss { noise_bytes, version_1, unknown: _, unsigned, forged } = of.loss;
+        if of.signed > 0 {
+            tell(
+                "signed",
+                "the drones' frames are signed: give --key, or they refuse what this station says"
+                    .to_owned(),
+            );
+        }
         if unsigned > 0 {
             tell(
                 "unsigned",

@@ -44,7 +44,7 @@ fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
     let all = drones.fly(
         station.parse().unwrap(),
         || {
-            let upload = bench.expect(2, &[&["fleet"][..], &step("upload")[..]].concat());
+            let upload = bench.expect(4, &[&["fleet"][..], &step("upload")[..]].concat());
             let fly = bench.expect(4, &[&step("fly")[..], &["--yes"]].concat());
             // With a table that does not fit how they stand.
             let line = |slot: u16, system: u8| {
@@ -53,7 +53,7 @@ fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
             let lines = [line(1, 1), line(2, 2), line(3, 3), line(4, 4)];
             let table = serde_json::json!({ "schema": "updraft.fleet/1", "drones": lines });
             fs::write(bench.path("campaign/fleet.json"), table.to_string()).unwrap();
-            let table = bench.expect(2, &[&["fleet"][..], &step("upload")[..]].concat());
+            let table = bench.expect(4, &[&["fleet"][..], &step("upload")[..]].concat());
             [upload, fly, table].map(|ended| said(&ended, &station)).join("\n----\n")
         },
         assert_untouched,
@@ -148,6 +148,19 @@ fn a_station_with_a_key_refuses_what_is_not_signed_and_says_so() {
 }
 
 #[test]
+fn a_station_without_the_drones_key_is_told_to_give_it() {
+    let bench = Bench::new();
+    bench.planned("1x2", "campaign");
+    let mut drones = bench.drones();
+    drones.key = Some(Key::from_bytes([7; 32]));
+    let station = free_port();
+    let link = format!("udpin:{station}");
+    let step = ["fleet", "status", "campaign", "--connect", &link, "--wait", "20"];
+    let ended = drones.fly(station.parse().unwrap(), || bench.expect(0, &step), assert_untouched);
+    assert!(ended.err.contains("the drones' frames are signed: give --key"), "{ended}");
+}
+
+#[test]
 fn two_drones_with_one_system_id_are_reported() {
     let bench = Bench::new();
     bench.planned("1x2", "campaign");
@@ -165,7 +178,7 @@ fn two_drones_with_one_system_id_are_reported() {
             assert_eq!(json["drones"][0]["doubled"], true);
             assert!(json["networks"][0]["frames_in"].as_u64().unwrap() > 10);
             // The other one's slot is empty, whichever of them spoke first: nothing is sent.
-            let upload = bench.expect(2, &[&["fleet", "upload"][..], &step[..]].concat());
+            let upload = bench.expect(4, &[&["fleet", "upload"][..], &step[..]].concat());
             let empty = |slot: u8| upload.err.contains(&format!("slot {slot} has no drone"));
             assert!(
                 empty(1) != empty(2) && upload.err.contains("nothing was sent"),

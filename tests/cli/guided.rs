@@ -11,7 +11,7 @@ use crate::fleet::{Fleet, free_port};
 use crate::support::{Bench, Ended};
 
 /// A station that flies drones, and what it says.
-struct Flight<'a> {
+pub(crate) struct Flight<'a> {
     bench: &'a Bench,
     child: Child,
 }
@@ -25,19 +25,23 @@ impl Drop for Flight<'_> {
 
 impl<'a> Flight<'a> {
     fn begin(bench: &'a Bench, link: &str) -> Self {
-        let mut command = bench.command(&flown(link));
+        Self::of(bench, &flown(link))
+    }
+
+    pub(crate) fn of(bench: &'a Bench, args: &[&str]) -> Self {
+        let mut command = bench.command(args);
         let err = fs::File::create(bench.path("err.txt")).unwrap();
         let child = command.stdout(Stdio::null()).stderr(err).spawn().unwrap();
         Self { bench, child }
     }
 
-    fn said(&self) -> String {
+    pub(crate) fn said(&self) -> String {
         fs::read_to_string(self.bench.path("err.txt")).unwrap()
     }
 
     /// Waits until it has said this.
     #[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
-    fn hear(&mut self, text: &str) {
+    pub(crate) fn hear(&mut self, text: &str) {
         let begun = Instant::now();
         while !self.said().contains(text) {
             assert!(begun.elapsed() < Duration::from_mins(2), "no {text:?}:\n{}", self.said());
@@ -46,13 +50,13 @@ impl<'a> Flight<'a> {
         }
     }
 
-    fn signal(&self, name: &str) {
+    pub(crate) fn signal(&self, name: &str) {
         let id = self.child.id().to_string();
         assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
     }
 
     #[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
-    fn end(&mut self) -> Option<i32> {
+    pub(crate) fn end(&mut self) -> Option<i32> {
         let begun = Instant::now();
         while self.child.try_wait().unwrap().is_none() {
             assert!(begun.elapsed() < Duration::from_mins(1), "it goes on:\n{}", self.said());
@@ -62,12 +66,12 @@ impl<'a> Flight<'a> {
     }
 }
 
-fn flown(link: &str) -> Vec<&str> {
+pub(crate) fn flown(link: &str) -> Vec<&str> {
     let args = ["fly", "campaign", "--connect", link, "--guided", "--set-params", "--yes"];
     [&args[..], &["--lead", "40", "--wait", "20"]].concat()
 }
 
-fn stage(more: &[&str]) -> (Bench, Fleet, String) {
+pub(crate) fn stage(more: &[&str]) -> (Bench, Fleet, String) {
     let bench = Bench::new();
     bench.planned("1x2", "campaign");
     bench.planned("1x2", "drones");
@@ -77,7 +81,7 @@ fn stage(more: &[&str]) -> (Bench, Fleet, String) {
 }
 
 /// Flight mode of each drone, by `fleet status`.
-fn modes(bench: &Bench, link: &str) -> Vec<String> {
+pub(crate) fn modes(bench: &Bench, link: &str) -> Vec<String> {
     let status = ["fleet", "status", "campaign", "--connect", link, "--wait", "5", "--json"];
     let ended = bench.expect(0, &status);
     let value: serde_json::Value = serde_json::from_str(&ended.out).unwrap();
@@ -117,6 +121,9 @@ fn ctrl_c_sends_guided_drones_home() {
     assert_eq!(flight.end(), Some(130), "{}", flight.said());
     let said = flight.said();
     assert!(said.contains("drone 1: returns") && said.contains("drone 2: returns"), "{said}");
+    assert!(said.contains("has sent them home") && !said.contains("where it stopped"), "{said}");
+    let journal = fs::read_to_string(bench.path("campaign/fleet-journal.ndjson")).unwrap();
+    assert!(journal.contains("\"step\":\"abort\"") && journal.contains("returns"), "{journal}");
     assert_eq!(modes(&bench, &link), ["RTL", "RTL"]);
 }
 

@@ -14,6 +14,7 @@ use std::sync::atomic::Ordering;
 
 use serde::Serialize;
 
+use crate::base::file::FileError;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
@@ -98,6 +99,15 @@ struct Note<'a> {
     step: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     text: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    drones: Vec<NoteOf<'a>>,
+}
+
+/// What became of a drone.
+#[derive(Serialize)]
+struct NoteOf<'a> {
+    drone: DroneId,
+    outcome: &'a str,
 }
 
 impl<'a> Crew<'a> {
@@ -149,7 +159,7 @@ impl<'a> Crew<'a> {
                 self.telemetry.on_message(self.net.now(), &received);
             }
         }
-        self.tell_troubles()?;
+        self.tell_troubles();
         if self.telemetry.drones.is_empty() {
             return Err(CommandError::Nothing(format!(
                 "no drone was heard within {wait_s:.0} s: are they on, and is --connect right?"
@@ -250,18 +260,89 @@ impl<'a> Crew<'a> {
 
     /// Drones of the table that are down and disarmed.
     pub(in crate::cli) fn landed(&self) -> usize {
-        let down = |drone: &DroneId| {
-            self.telemetry.get(*drone).is_some_and(|of| of.is_armed() == Some(false))
-        };
-        self.drones().iter().filter(|drone| down(drone)).count()
+        self.drones().into_iter().filter(|drone| self.has_landed(*drone)).count()
+    }
+
+    /// Whether a drone is down and disarmed.
+    pub(in crate::cli) fn has_landed(&self, drone: DroneId) -> bool {
+        self.telemetry.get(drone).is_some_and(|of| of.is_armed() == Some(false))
+    }
+
+    /// Listens for a moment. An order to end the flight ends the command, too.
+    pub(in crate::cli) fn idle(&mut self) -> Result<(), CommandError> {
+        while let Some(received) = self.net.recv(self.net.now() + 20 * MS)? {
+            self.telemetry.on_message(self.net.now(), &received);
+        }
+        self.context.check_stop()?;
+        self.not_ordered_down()
+    }
+
+    /// Refuses to go on towards a start when somebody has ordered drones down.
+    pub(in crate::cli) fn not_ordered_down(&self) -> Result<(), CommandError> {
+        if self.net.ordered_down().is_empty() {
+            return Ok(());
+        }
+        Err(CommandError::Unsafe(
+            "nothing was started: `fleet abort` or `fleet land` came from another terminal"
+                .to_owned(),
+        ))
+    }
+
+    /// What became of each drone of the table: refused for a reason, or fine.
+    fn outcomes_of(
+        &self,
+        fine: impl Fn(&DroneId) -> String,
+        bad: &BTreeMap<DroneId, String>,
+    ) -> BTreeMap<DroneId, String> {
+        let refused = |drone: DroneId| bad.get(&drone).map(|reason| format!("refused: {reason}"));
+        let of = |drone: DroneId| (drone, refused(drone).unwrap_or_else(|| fine(&drone)));
+        self.drones().into_iter().map(of).collect()
     }
 
     fn note(&mut self, step: &str, text: Option<String>) -> Result<(), CommandError> {
+        self.note_each(step, text, &BTreeMap::new())
+    }
+
+    /// Writes down what became of each drone in a step.
+    fn note_each(
+        &mut self,
+        step: &str,
+        text: Option<String>,
+        drones: &BTreeMap<DroneId, String>,
+    ) -> Result<(), CommandError> {
         if self.is_virtual {
             return Ok(());
         }
-        let event = Note { step, text };
-        let entry = Entry { unix_us: self.clock.unix_us(), drone: None, event: &event };
-        Ok(Journal::open(&self.folder.0)?.write(&entry)?)
+        Ok(write_note(self.folder, self.clock, &Note { step, text, drones: outcomes(drones) })?)
     }
+
+    /// The same where a disk that is full must not stand in the way: warns then.
+    fn try_note(&mut self, step: &str, drones: &BTreeMap<DroneId, String>) {
+        if let Err(error) = self.note_each(step, None, drones) {
+            self.context.warn(&format!("not in the journal: {error}"));
+        }
+    }
+}
+
+fn outcomes(drones: &BTreeMap<DroneId, String>) -> Vec<NoteOf<'_>> {
+    drones.iter().map(|(drone, outcome)| NoteOf { drone: *drone, outcome }).collect()
+}
+
+fn write_note(
+    folder: &FlightFolder,
+    clock: SystemClock,
+    event: &Note<'_>,
+) -> Result<(), FileError> {
+    let entry = Entry { unix_us: clock.unix_us(), drone: None, event };
+    Journal::open(&folder.0)?.write(&entry)
+}
+
+/// Writes into the journal what became of drones in a step.
+pub(super) fn write_outcomes(
+    folder: &FlightFolder,
+    clock: SystemClock,
+    step: &str,
+    drones: &BTreeMap<DroneId, String>,
+) -> Result<(), FileError> {
+    write_note(folder, clock, &Note { step, text: None, drones: outcomes(drones) })
 }

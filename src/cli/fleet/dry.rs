@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::connect::Target;
 use super::crew::Crew;
-use super::{StepArgs, one_flight, server};
+use super::{StepArgs, end, one_flight, server};
 use crate::base::frame::Geodetic;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
@@ -20,7 +20,7 @@ use crate::fleet::dry_run::{Obliging, dry_run};
 use crate::fleet::fence::PutFence;
 use crate::fleet::greet::Greet;
 use crate::fleet::guided::{Flight, Guided};
-use crate::fleet::messages::{GUIDED, set_mode, start_packet, text};
+use crate::fleet::messages::{GUIDED, set_mode};
 use crate::fleet::params::ReadParams;
 use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::slots::FleetTable;
@@ -33,7 +33,6 @@ use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
-use crate::protocol::show::{LEAVE_TIME, StartConfig};
 use crate::show::Trajectory;
 
 /// Most messages shown of a conversation.
@@ -289,16 +288,12 @@ pub(in crate::cli) fn restore(
 }
 
 fn start_lines(lead_s: f64) -> Vec<String> {
-    let packet = |authorization| {
-        text(&start_packet(&StartConfig {
-            start_tow_s: 0,
-            authorization,
-            countdown_ms: LEAVE_TIME,
-        }))
+    let packet = |authorized| {
+        format!("DATA16 start packet: the drones' GPS time + {lead_s:.0} s (by then), {authorized}")
     };
     vec![
-        format!("once a second, with the drones' GPS time + {lead_s:.0} s: {}", packet(0)),
-        format!("once authorized, until the start: {}", packet(1)),
+        format!("once a second: {}", packet("not authorized")),
+        format!("once authorized, until the start: {}", packet("authorized")),
     ]
 }
 
@@ -312,7 +307,10 @@ pub(in crate::cli) fn end(
         let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
         return server::dry_end(context, &plan, action);
     }
-    let dry = Dry::of(args)?;
+    // As without --dry-run: any flight will do.
+    let (folder, plan) = end::find(args)?;
+    let table = table(&folder.0, &plan)?;
+    let dry = Dry { folder, plan, table };
     let lines = |drone| {
         let slot = dry.table.slot_of(drone).and_then(|slot| dry.plan.slot(slot));
         let mut vehicle = Obliging::new(drone, true, place(&dry.plan, slot));

@@ -4,26 +4,29 @@ pub(super) mod bring;
 pub(super) mod connect;
 pub(super) mod crew;
 pub(super) mod dry;
+pub(super) mod end;
 pub(super) mod server;
 pub(super) mod sim;
+pub(super) mod start;
 pub(super) mod tables;
 pub(super) mod virtual_drones;
 
-use std::collections::BTreeSet;
-use std::io::{BufRead as _, IsTerminal as _, Write as _};
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
 use self::connect::{ConnectArgs, Target};
 use self::crew::Crew;
+use self::start::{LeadArgs, fly_now};
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use crate::campaign::lock::FolderLock;
 use crate::campaign::{self, FlightFolder};
-use crate::fleet::abort::{Aborted, Action};
+use crate::fleet::abort::Action;
 use crate::fleet::preflight::Preflight;
-use crate::fleet::start::{Start, StartOptions};
+use crate::link::address::Address;
 use crate::link::id::DroneId;
+use crate::link::station::Station;
 use crate::mission::Plan;
 
 /// Arguments of `updraft fleet`.
@@ -93,23 +96,6 @@ pub(super) struct UploadArgs {
     assign: bool,
 }
 
-/// How a start is given.
-#[derive(Clone, Debug, Args)]
-pub(super) struct LeadArgs {
-    /// From now to the start, s of the drones' time
-    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = connect::seconds)]
-    pub(super) lead: f64,
-    /// Authorize the start without asking
-    #[arg(short, long)]
-    pub(super) yes: bool,
-}
-
-impl LeadArgs {
-    fn options(&self) -> StartOptions {
-        StartOptions { lead_s: self.lead, ..StartOptions::default() }
-    }
-}
-
 /// Arguments of `fleet start`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct StartArgs {
@@ -140,11 +126,35 @@ pub(super) struct EndArgs {
     drones: Option<Vec<DroneId>>,
 }
 
+/// A campaign is a folder that is there.
+fn needs_folder(campaign: &std::path::Path) -> Result<(), CommandError> {
+    if campaign.is_file() {
+        return Err(CommandError::Usage(format!(
+            "{} is a file: give the campaign's folder",
+            campaign.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Locks a campaign; a folder that is not there is not made.
+pub(super) fn lock(
+    context: &Context,
+    campaign: &std::path::Path,
+) -> Result<FolderLock, CommandError> {
+    needs_folder(campaign)?;
+    if !campaign.exists() {
+        campaign::flights(campaign)?;
+    }
+    context.lock(campaign)
+}
+
 /// The one flight of a campaign that is meant.
 pub(super) fn one_flight(
     campaign: &std::path::Path,
     name: Option<&str>,
 ) -> Result<(FlightFolder, Plan), CommandError> {
+    needs_folder(campaign)?;
     let mut names = Vec::new();
     let mut found = Vec::new();
     for folder in campaign::flights(campaign)? {
@@ -170,8 +180,8 @@ pub(super) fn run(context: &Context, args: &FleetArgs) -> Result<Exit, CommandEr
         FleetCommand::Upload(args) => upload(context, args),
         FleetCommand::Preflight(args) => preflight(context, args),
         FleetCommand::Start(args) => start(context, args),
-        FleetCommand::Abort(args) => end(context, args, Action::Return),
-        FleetCommand::Land(args) => end(context, args, Action::Land),
+        FleetCommand::Abort(args) => end::run(context, args, Action::Return),
+        FleetCommand::Land(args) => end::run(context, args, Action::Land),
         FleetCommand::Restore(args) => restore(context, args),
         FleetCommand::Virtual(args) => virtual_drones::run(context, args),
     }
@@ -186,7 +196,7 @@ fn with_crew(
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     match args.connect.target()? {
         Target::Links(links) => {
-            let mut station = args.connect.open(links)?;
+            let mut station = open(&args.campaign, &args.connect, links)?;
             let mut crew = Crew::new(context, &mut station, &folder, &plan);
             crew.listen(args.connect.wait)?;
             body(&mut crew)
@@ -204,13 +214,29 @@ fn with_crew(
     }
 }
 
+/// The same for a step that flies: `fleet abort` of other terminals is carried out meanwhile.
+fn with_desk(
+    context: &Context,
+    args: &StepArgs,
+    body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
+) -> Result<Exit, CommandError> {
+    with_crew(context, args, |crew| {
+        let folder = crew.folder;
+        let plan = crew.plan;
+        let mut desk = end::desk(context, crew.net, folder);
+        let mut with = Crew::new(context, &mut desk, folder, plan);
+        with.telemetry = std::mem::take(&mut crew.telemetry);
+        body(&mut with)
+    })
+}
+
 /// Clocks and slots; refuses to go on when a drone stands wrong.
 fn prepare(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<(), CommandError> {
     crew.greet()?;
     if crew.assign(args.assign)? {
         return Ok(());
     }
-    Err(CommandError::Usage("nothing was sent: the drones do not stand as planned".to_owned()))
+    Err(CommandError::Unsafe("nothing was sent: the drones do not stand as planned".to_owned()))
 }
 
 /// The table of drones that were loaded by an earlier command.
@@ -225,7 +251,7 @@ fn preflight(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError>
     if args.step.dry_run {
         return dry::preflight(context, &args.step);
     }
-    let _lock = context.lock(&args.step.campaign)?;
+    let _lock = lock(context, &args.step.campaign)?;
     with_crew(context, &args.step, |crew| tables::preflight(context, &look(crew, args)?))
 }
 
@@ -240,16 +266,39 @@ fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
     if args.step.dry_run {
         return dry::upload(context, &args.step);
     }
-    let _lock = context.lock(&args.step.campaign)?;
+    let _lock = lock(context, &args.step.campaign)?;
     with_crew(context, &args.step, |crew| {
         prepare(crew, args)?;
         let refused = crew.upload()?;
         // The fence's own switch is one of the parameters.
-        crew.params(args.set_params)?;
+        let right = crew.params(args.set_params)?;
         if context.json {
             context.print_json(&tables::UploadOutput::new(&crew.table, &refused))?;
         }
-        Ok(if refused.is_empty() { Exit::Done } else { Exit::Losses })
+        Ok(uploaded(refused.is_empty(), right, args.set_params))
+    })
+}
+
+/// How an upload ends. Without `--set-params` no parameter was to be set, and nothing is lost.
+fn uploaded(all_loaded: bool, params_right: bool, set_params: bool) -> Exit {
+    if all_loaded && (params_right || !set_params) { Exit::Done } else { Exit::Losses }
+}
+
+/// Opens the links, and says who holds them if another command of this campaign does.
+fn open(
+    campaign: &std::path::Path,
+    connect: &ConnectArgs,
+    links: Vec<Address>,
+) -> Result<Station, CommandError> {
+    connect.open(links).map_err(|error| match error {
+        CommandError::Failed(text) if !end::flying(campaign, None).is_empty() => {
+            CommandError::Failed(format!(
+                "{text}\n  the link is held by the command that flies this campaign: it tells what \
+                 happens and writes it into fleet-journal.ndjson; `fleet abort` and `fleet land` \
+                 reach it"
+            ))
+        }
+        other => other,
     })
 }
 
@@ -257,138 +306,38 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
     if args.upload.step.dry_run {
         return dry::start(context, &args.upload.step, args.lead.lead);
     }
-    let _lock = context.lock(&args.upload.step.campaign)?;
-    with_crew(context, &args.upload.step, |crew| {
+    let _lock = lock(context, &args.upload.step.campaign)?;
+    with_desk(context, &args.upload.step, |crew| {
         let table = look(crew, &args.upload)?;
         if !table.go() {
             return tables::preflight(context, &table);
         }
-        fly_now(context, crew, &args.lead)
+        fly_now(context, crew, &args.lead).map(|(exit, _)| exit)
     })
-}
-
-/// The two steps of a start, and the show.
-pub(super) fn fly_now(
-    context: &Context,
-    crew: &mut Crew<'_>,
-    lead: &LeadArgs,
-) -> Result<Exit, CommandError> {
-    needs_person(lead)?;
-    let mut start = crew.announce(lead.options())?;
-    say_start(context, crew, &start, "Every drone has the start time");
-    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
-        crew.cancel(&mut start)?;
-        return Err(CommandError::Usage("not authorized: the start was taken back".to_owned()));
-    }
-    crew.authorize(&mut start)?;
-    context.say("Authorized. Ctrl-C stops watching; `updraft fleet abort` sends everyone home");
-    let alarms = crew.watch(&mut start)?;
-    Ok(landed(context, crew, alarms.is_empty()))
-}
-
-/// The same for drones that the station flies itself.
-pub(super) fn guide_now(
-    context: &Context,
-    crew: &mut Crew<'_>,
-    lead: &LeadArgs,
-) -> Result<Exit, CommandError> {
-    needs_person(lead)?;
-    let start = crew.set_guided_start(lead.options())?;
-    say_start(context, crew, &start, "The start time, by the drones' clocks");
-    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
-        return Err(CommandError::Usage("not authorized: nobody takes off".to_owned()));
-    }
-    crew.authorize_guided(&start)?;
-    context.say(
-        "Authorized. This program flies the drones: Ctrl-C sends everyone home, as does `updraft \
-         fleet abort`",
-    );
-    let alarms = crew.fly_guided(&start)?;
-    Ok(landed(context, crew, alarms.is_empty()))
-}
-
-fn needs_person(lead: &LeadArgs) -> Result<(), CommandError> {
-    if !lead.yes && !std::io::stdin().is_terminal() {
-        return Err(CommandError::Usage(
-            "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
-        ));
-    }
-    Ok(())
-}
-
-fn say_start(context: &Context, crew: &mut Crew<'_>, start: &Start, what: &str) {
-    let time = start.time().map_or_else(String::new, tables::time_of_day);
-    context.say(&format!(
-        "{what}: {time} ({} s of the GPS week), in {:.0} s",
-        start.second_of_week(),
-        start.left_s(&crew.telemetry, crew.net.now()).unwrap_or(0.0)
-    ));
-}
-
-fn landed(context: &Context, crew: &Crew<'_>, quiet: bool) -> Exit {
-    let landed = crew.landed();
-    context.say(&format!("{landed} of {} drones have landed", crew.table.drones.len()));
-    if landed == crew.table.drones.len() && quiet { Exit::Done } else { Exit::Losses }
-}
-
-/// Asks a person.
-fn asked(question: &str) -> Result<bool, CommandError> {
-    let failed = |error: std::io::Error| CommandError::Failed(format!("failed to ask: {error}"));
-    let mut err = std::io::stderr().lock();
-    err.write_all(question.as_bytes()).and_then(|()| err.flush()).map_err(failed)?;
-    let mut answer = String::new();
-    std::io::stdin().lock().read_line(&mut answer).map_err(failed)?;
-    Ok(answer.trim().eq_ignore_ascii_case("yes"))
-}
-
-fn end(context: &Context, args: &EndArgs, action: Action) -> Result<Exit, CommandError> {
-    if args.step.dry_run {
-        return dry::end(context, &args.step, action);
-    }
-    let only: Option<BTreeSet<DroneId>> =
-        args.drones.as_ref().map(|drones| drones.iter().copied().collect());
-    let links = match args.step.connect.target()? {
-        Target::Links(links) => links,
-        Target::Server(address) => return server::end(context, &address, only.as_ref(), action),
-        Target::Sim => {
-            return Err(CommandError::Usage(
-                "give the drones' own links with --connect".to_owned(),
-            ));
-        }
-    };
-    let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())
-        // Nobody looks for a flight's name while drones fall: any plan will do.
-        .or_else(|error| any_flight(&args.step.campaign).ok_or(error))?;
-    let mut station = args.step.connect.open(links)?;
-    let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    crew.hear_anyone(args.step.connect.wait, only.as_ref())?;
-    let done = crew.abort(only.as_ref(), action)?;
-    let unsure = done.values().filter(|done| matches!(done, Aborted::Unconfirmed { .. })).count();
-    if context.json {
-        context.print_json(&tables::EndOutput::new(&done))?;
-    } else {
-        for (drone, done) in &done {
-            context.print(&format!("drone {drone}: {done}\n"))?;
-        }
-    }
-    Ok(if unsure == 0 { Exit::Done } else { Exit::Losses })
-}
-
-fn any_flight(campaign: &std::path::Path) -> Option<(FlightFolder, Plan)> {
-    let folder = campaign::flights(campaign).ok()?.into_iter().next()?;
-    let plan = folder.read_plan().ok()?;
-    Some((folder, plan))
 }
 
 fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> {
     if args.step.dry_run {
         return dry::restore(context, &args.step, args.fence_off);
     }
-    let _lock = context.lock(&args.step.campaign)?;
+    let _lock = lock(context, &args.step.campaign)?;
     with_crew(context, &args.step, |crew| {
         let left = crew.restore(args.fence_off)?;
         let but = if left.is_empty() { "" } else { ", but for the drones named above" };
         context.say(&format!("Parameters are as they were{but}"));
         Ok(if left.is_empty() { Exit::Done } else { Exit::Losses })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_that_could_not_be_set_cost_the_exit_code_of_an_upload() {
+        assert_eq!(uploaded(true, true, true), Exit::Done);
+        assert_eq!(uploaded(true, false, true), Exit::Losses);
+        assert_eq!(uploaded(true, false, false), Exit::Done);
+        assert_eq!(uploaded(false, true, false), Exit::Losses);
+    }
 }

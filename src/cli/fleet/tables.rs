@@ -192,6 +192,16 @@ pub(in crate::cli) fn preflight(
     table: &Preflight,
 ) -> Result<Exit, CommandError> {
     if context.json {
+        context.print_json(&PreflightOutput::of(table))?;
+    } else {
+        context.emit(&table.to_string())?;
+    }
+    Ok(if table.go() { Exit::Done } else { Exit::Unsafe })
+}
+
+impl PreflightOutput {
+    /// Of a table.
+    pub(in crate::cli) fn of(table: &Preflight) -> Self {
         let drones = table.rows.iter().map(|row| PreflightRow {
             slot: row.slot,
             drone: row.drone,
@@ -199,17 +209,14 @@ pub(in crate::cli) fn preflight(
             cells: row.cells.iter().map(|cell| cell.text.clone()).collect(),
             no_go: row.cells.iter().filter_map(|cell| cell.no_go.clone()).collect(),
         });
-        context.print_json(&PreflightOutput {
+        Self {
             schema: "updraft.preflight/1",
             go: table.go(),
             columns: COLUMNS,
             drones: drones.collect(),
             fleet: table.fleet.clone(),
-        })?;
-    } else {
-        context.emit(&table.to_string())?;
+        }
     }
-    Ok(if table.go() { Exit::Done } else { Exit::Unsafe })
 }
 
 /// What an upload prints under `--json`.
@@ -258,7 +265,7 @@ impl EndOutput {
     pub(super) fn new(done: &BTreeMap<DroneId, Aborted>) -> Self {
         let drones = done.iter().map(|(drone, done)| EndRow {
             drone: *drone,
-            confirmed: !matches!(done, Aborted::Unconfirmed { .. }),
+            confirmed: done.is_confirmed(),
             text: done.to_string(),
         });
         Self { schema: "updraft.abort/1", drones: drones.collect() }

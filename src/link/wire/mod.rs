@@ -46,15 +46,31 @@ pub type Halves = (Box<dyn Sending>, Box<dyn Receiving>);
 /// # Errors
 /// When the address is not there, taken, or not allowed.
 pub fn open(address: &Address) -> Result<Halves, NetError> {
-    let (opened, hint) = match &address.way {
+    let (opened, wrong) = match &address.way {
         Way::UdpIn(host) => {
             (udp::listen(host), "is another ground station listening on the same port?")
         }
         Way::UdpOut(host) => (udp::connect(host), "is the host name right?"),
-        Way::Tcp(host) => (tcp::connect(host), "does anything listen there?"),
+        Way::Tcp(host) => {
+            (tcp::connect(host), "does anything listen there, and is the host name right?")
+        }
         Way::Serial(device, baud) => {
             (serial::open(device, *baud), "is the radio plugged in, and may you use the device?")
         }
     };
-    opened.map_err(|source| NetError::Open { address: address.clone(), hint, source })
+    opened.map_err(|source| {
+        let is_udp = matches!(address.way, Way::UdpIn(_));
+        let hint = match source.kind() {
+            io::ErrorKind::AddrInUse => wrong,
+            io::ErrorKind::AddrNotAvailable if is_udp => {
+                "this computer does not have that address: give its own, or 0.0.0.0 for all"
+            }
+            io::ErrorKind::PermissionDenied if is_udp => {
+                "may you listen there? Give a port above 1023"
+            }
+            _ if is_udp => "the host name is not known to this computer: is it right?",
+            _ => wrong,
+        };
+        NetError::Open { address: address.clone(), hint, source }
+    })
 }

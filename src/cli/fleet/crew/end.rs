@@ -3,14 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Crew;
+use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
+use crate::cli::fleet::end::{waiting, word};
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
-use crate::link::clock::{MS, Micros};
-use crate::link::drive::Watch as _;
+use crate::link::clock::{MS, Micros, S};
+use crate::link::drive::{Progress, Watch, drive};
 use crate::link::id::DroneId;
 
 impl Crew<'_> {
-    /// Listens until these drones (or anyone, and a moment more) are heard.
+    /// Listens until one of these drones (or anyone, and a moment more) is heard.
     pub(in crate::cli) fn hear_anyone(
         &mut self,
         wait_s: f64,
@@ -23,13 +25,15 @@ impl Crew<'_> {
             let now = self.net.now();
             let heard: BTreeSet<DroneId> = self.net.heard().into_iter().collect();
             let enough = match only {
-                Some(only) => only.is_subset(&heard),
+                // The others are told as soon as they are heard.
+                Some(only) => !only.is_disjoint(&heard),
                 None => !heard.is_empty() && now >= begun + 1500 * MS,
             };
             if enough {
                 return Ok(());
             }
             if now >= until {
+                self.tell_troubles();
                 return if heard.is_empty() {
                     Err(CommandError::Nothing(
                         "no drone was heard: use their remote controls".to_owned(),
@@ -44,21 +48,55 @@ impl Crew<'_> {
         }
     }
 
-    /// Ends the flight of these drones (all: of everyone who is heard).
+    /// Ends the flight of these drones (all: of everyone who is heard), giving up those that are
+    /// not heard within `wait_s`. What is done by Ctrl-C is there then.
     pub(in crate::cli) fn abort(
         &mut self,
         only: Option<&BTreeSet<DroneId>>,
         action: Action,
+        wait_s: f64,
     ) -> Result<BTreeMap<DroneId, Aborted>, CommandError> {
         let heard: BTreeSet<DroneId> =
             self.net.heard().into_iter().chain(self.telemetry.drones.keys().copied()).collect();
-        let machines = only
-            .unwrap_or(&heard)
-            .iter()
-            .map(|drone| (*drone, Abort::new(*drone, action, self.telemetry.get(*drone))))
-            .collect();
-        let done = self.all(machines, ALL_AT_ONCE)?;
-        self.note("abort", Some(format!("{} drones", done.len())))?;
+        let drones = only.unwrap_or(&heard);
+        let end = |drone: &DroneId| {
+            let abort = Abort::new(*drone, action, self.telemetry.get(*drone));
+            (*drone, abort.heard_within((wait_s * 1e6) as Micros))
+        };
+        let machines: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
+        let next = self.net.now() + TELL;
+        let mut ears = Waiting { context: self.context, open: drones.clone(), next };
+        let done = drive(self.net, machines, ALL_AT_ONCE, &mut ears)?;
+        let outcomes = drones.iter().map(|drone| {
+            (*drone, done.get(drone).map_or("not confirmed".to_owned(), Aborted::to_string))
+        });
+        self.try_note(word(action), &outcomes.collect());
         Ok(done)
+    }
+}
+
+/// Who has not confirmed is told so often.
+const TELL: Micros = 5 * S;
+
+/// Tells who has not confirmed yet.
+struct Waiting<'a> {
+    context: &'a Context,
+    open: BTreeSet<DroneId>,
+    next: Micros,
+}
+
+impl Watch for Waiting<'_> {
+    fn on_progress(&mut self, drone: DroneId, _: Progress, over: bool) {
+        if over {
+            self.open.remove(&drone);
+        }
+    }
+
+    fn stop(&mut self, now: Micros) -> bool {
+        if now >= self.next && !self.open.is_empty() {
+            self.next = now + TELL;
+            self.context.say(&waiting(self.open.iter().copied()));
+        }
+        self.context.check_stop().is_err()
     }
 }

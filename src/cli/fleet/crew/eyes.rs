@@ -17,7 +17,8 @@ use crate::link::net::Received;
 pub(super) struct Eyes<'a> {
     context: &'a Context,
     monitor: Monitor,
-    /// `None`: virtual drones, of which nothing is kept and only alarms are told.
+    /// Virtual drones, of which nothing is kept and only alarms are told.
+    is_virtual: bool,
     journal: Option<Journal>,
     clock: SystemClock,
     alarms: BTreeMap<DroneId, Vec<String>>,
@@ -30,11 +31,23 @@ impl<'a> Eyes<'a> {
     pub(super) fn new(
         context: &'a Context,
         monitor: Monitor,
-        journal: Option<Journal>,
         clock: SystemClock,
+        is_virtual: bool,
     ) -> Self {
+        let journal = None;
         let (alarms, failed) = (BTreeMap::new(), None);
-        Self { context, monitor, journal, clock, alarms, failed, finishes: false }
+        Self { context, monitor, is_virtual, journal, clock, alarms, failed, finishes: false }
+    }
+
+    /// Writes what happens into a journal, if there is one.
+    pub(super) fn write_into(&mut self, journal: Result<Journal, FileError>) {
+        match journal {
+            Ok(journal) => self.journal = Some(journal),
+            Err(error) => {
+                self.context.warn(&format!("{error}; the flight is watched all the same"));
+                self.failed = Some(error);
+            }
+        }
     }
 
     pub(super) fn telemetry(&self) -> &Telemetry {
@@ -63,7 +76,7 @@ impl<'a> Eyes<'a> {
             }
             if told.event.is_alarm() {
                 self.alarm(told.drone, told.event.to_string());
-            } else if self.journal.is_some() {
+            } else if !self.is_virtual {
                 self.context.say(&format!("drone {}: {}", told.drone, told.event));
             }
         }

@@ -22,6 +22,10 @@ use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 use crate::show::Trajectory;
 
+/// What became of guided drones when Ctrl-C was pressed.
+const SENT_HOME: &str = "stopped: this program flew the drones and has sent them home; those above that have not \
+     confirmed it need their remote controls";
+
 #[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
 fn refused(error: StartRefusal) -> CommandError {
     CommandError::Failed(error.to_string())
@@ -92,7 +96,9 @@ impl<'a> Crew<'a> {
             self.context.warn(&format!("drone {drone} (slot {slot}): {reason}"));
         }
         bad.extend(silent);
-        self.note("guided", Some(format!("{} refused", bad.len())))?;
+        let fine = |_: &DroneId| "fence set and read back, guided".to_owned();
+        let outcomes = self.outcomes_of(fine, &bad);
+        self.note_each("guided", Some(format!("{} refused", bad.len())), &outcomes)?;
         Ok(bad)
     }
 
@@ -101,6 +107,7 @@ impl<'a> Crew<'a> {
         &mut self,
         options: StartOptions,
     ) -> Result<Start, CommandError> {
+        self.not_ordered_down()?;
         let now = self.net.now();
         Start::announce(self.drones(), &self.telemetry, options, now).map_err(refused)
     }
@@ -111,6 +118,7 @@ impl<'a> Crew<'a> {
         while let Some(received) = self.net.recv(0)? {
             crate::link::drive::Watch::on_message(&mut self.telemetry, self.net.now(), &received);
         }
+        self.not_ordered_down()?;
         start.check_time(&self.telemetry, self.net.now()).map_err(refused)?;
         if let Some(time) = start.time() {
             StartRecord::new(made_by(), time).write(self.folder)?;
@@ -142,13 +150,18 @@ impl<'a> Crew<'a> {
             };
             machines.insert(line.drone, Guided::new(line.drone, flight));
         }
-        let eyes = self.eyes(Some(start_gps_ms))?;
+        let eyes = self.eyes(Some(start_gps_ms));
         self.context.set_flies(true);
-        let (eyes, failed) = self.stream(machines, eyes);
+        let (eyes, failed, ended) = self.stream(machines, eyes);
         self.context.set_flies(false);
+        if !ended.is_empty() {
+            self.try_note("abort", &ended);
+        }
         let written = failed.map_or(Ok(()), |reason| self.note("link", Some(reason)));
         let alarms = self.close(eyes);
-        self.context.check_stop()?;
+        if self.context.check_stop().is_err() {
+            return Err(CommandError::Stopped(SENT_HOME));
+        }
         written?;
         alarms
     }
@@ -158,9 +171,10 @@ impl<'a> Crew<'a> {
         &mut self,
         machines: BTreeMap<DroneId, Guided>,
         mut eyes: Eyes<'a>,
-    ) -> (Eyes<'a>, Option<String>) {
+    ) -> (Eyes<'a>, Option<String>, BTreeMap<DroneId, String>) {
         let drones = self.drones();
         let context = self.context;
+        let mut ended = BTreeMap::new();
         let mut net = Stubborn::new(&mut *self.net, context);
         let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
         for (drone, outcome) in done {
@@ -169,7 +183,8 @@ impl<'a> Crew<'a> {
             }
         }
         // Those that were taken over or called home are still on their way.
-        while context.check_stop().is_ok() && !eyes.is_over() {
+        let going_on = |net: &Stubborn<'_>| net.ordered_down().into_values().any(|on| on);
+        while context.check_stop().is_ok() && (!eyes.is_over() || going_on(&net)) {
             let until = net.now() + 100 * MS;
             if let Ok(Some(received)) = net.recv(until) {
                 eyes.on_message(net.now(), &received);
@@ -182,15 +197,25 @@ impl<'a> Crew<'a> {
                  at once",
             );
             eyes.finishes = true;
+            // Those that were ordered down meanwhile do that already.
+            let ordered = net.ordered_down();
             let end = |drone: &DroneId| {
                 (*drone, Abort::new(*drone, Action::Return, eyes.telemetry().get(*drone)))
             };
-            let machines: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
+            let free = drones.iter().filter(|drone| !ordered.contains_key(drone));
+            let machines: BTreeMap<DroneId, Abort> = free.map(end).collect();
             let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
             for (drone, end) in done {
                 context.insist(&format!("drone {drone}: {end}"));
+                ended.insert(drone, end.to_string());
+            }
+            while going_on(&net) {
+                let until = net.now() + 100 * MS;
+                if let Ok(Some(received)) = net.recv(until) {
+                    eyes.on_message(net.now(), &received);
+                }
             }
         }
-        (eyes, net.failed)
+        (eyes, net.failed, ended)
     }
 }

@@ -72,7 +72,14 @@ impl Crew<'_> {
         let wanted: Vec<DroneId> = machines.keys().copied().collect();
         let done = self.all(machines, AT_ONCE)?;
         let mut left = Vec::new();
+        let mut outcomes = BTreeMap::new();
         for drone in wanted {
+            let outcome = match done.get(&drone) {
+                Some(Ok(())) => "put back".to_owned(),
+                Some(Err(error)) => error.to_string(),
+                None => "no answer".to_owned(),
+            };
+            outcomes.insert(drone, outcome);
             match done.get(&drone) {
                 Some(Ok(())) => changes.forget(drone, fence_off),
                 Some(Err(error)) => {
@@ -94,7 +101,7 @@ impl Crew<'_> {
                 ));
             }
         }
-        self.note("restore", Some(format!("{} refused", left.len())))?;
+        self.note_each("restore", Some(format!("{} refused", left.len())), &outcomes)?;
         Ok(left)
     }
 }

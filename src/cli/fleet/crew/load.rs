@@ -8,7 +8,7 @@ use crate::base::file::read_whole;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::connect::run_number;
 use crate::cli::words;
-use crate::fleet::changes::Changes;
+use crate::fleet::changes::{Change, Changes};
 use crate::fleet::fence::Fence;
 use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::sum::Sum;
@@ -55,6 +55,33 @@ impl Crew<'_> {
                 words::count(changed, "parameter"),
                 words::count(standings.len(), "drone")
             ));
+        }
+        let mut unset = BTreeMap::new();
+        for drone in self.drones() {
+            match standings.get(&drone) {
+                Some(standing) if may_change && !standing.is_right() => {
+                    unset.insert(drone, standing.complaint());
+                }
+                Some(_) => {}
+                None => {
+                    wrong += 1;
+                    unset.insert(drone, "its parameters were not read".to_owned());
+                }
+            }
+        }
+        for (drone, complaint) in &unset {
+            let slot = self.table.slot_of(*drone).unwrap_or(0);
+            self.context.warn(&format!("drone {drone} (slot {slot}): {complaint}"));
+        }
+        if may_change {
+            let fine = |drone: &DroneId| {
+                let changed = standings.get(drone).map_or(&[][..], |of| &of.changed);
+                let one = |of: &Change| format!("{} {} -> {}", of.name, of.was, of.now);
+                let all: Vec<String> = changed.iter().map(one).collect();
+                if all.is_empty() { "right".to_owned() } else { format!("set: {}", all.join(", ")) }
+            };
+            let outcomes = self.outcomes_of(fine, &unset);
+            self.note_each("parameters", None, &outcomes)?;
         }
         self.known.params.extend(standings);
         if wrong > 0 && !may_change {
@@ -103,11 +130,13 @@ impl Crew<'_> {
         // Virtual drones share no radio.
         let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
         let done = self.all(uploads, at_once)?;
-        let mut written = 0;
+        let mut written = std::collections::BTreeSet::new();
         for (drone, outcome) in done {
             match outcome {
                 Ok(loaded) => {
-                    written += usize::from(loaded.written);
+                    if loaded.written {
+                        written.insert(drone);
+                    }
                     self.known.loaded.insert(drone);
                     self.known.fenced.insert(drone);
                 }
@@ -120,11 +149,17 @@ impl Crew<'_> {
         }
         if !self.is_virtual {
             self.context.say(&format!(
-                "Loaded {} of {count} drones ({written} written, the others had the file)",
-                count - refused.len()
+                "Loaded {} of {count} drones ({} written, the others had the file)",
+                count - refused.len(),
+                written.len()
             ));
         }
-        self.note("upload", Some(format!("{} refused", refused.len())))?;
+        let fine = |drone: &DroneId| {
+            let file = if written.contains(drone) { "file written" } else { "file was there" };
+            format!("loaded: {file}, fence set and read back")
+        };
+        let outcomes = self.outcomes_of(fine, &refused);
+        self.note_each("upload", Some(format!("{} refused", refused.len())), &outcomes)?;
         Ok(refused)
     }
 

@@ -8,11 +8,16 @@ use super::eyes::Eyes;
 use crate::base::time::GpsTime;
 use crate::cli::exit::CommandError;
 use crate::fleet::journal::Journal;
-use crate::fleet::start::{Start, StartOptions};
+use crate::fleet::start::{Phase, Start, StartOptions};
+use crate::fleet::telemetry::Drone;
 use crate::fleet::watch::{self, Monitor};
 use crate::link::clock::{MS, S};
 use crate::link::drive::Watch as _;
 use crate::link::id::DroneId;
+
+/// What becomes of drones in the show mode when nobody watches them.
+const FLY_ON: &str = "stopped: nobody watches any more, and the drones fly on by themselves; `updraft fleet \
+     abort` sends them home, `updraft fleet land` lands them where they are";
 
 impl<'a> Crew<'a> {
     /// Sets a start and waits until every drone has taken it.
@@ -22,6 +27,7 @@ impl<'a> Crew<'a> {
     ) -> Result<Start, CommandError> {
         let refused =
             |error: crate::fleet::start::StartRefusal| CommandError::Failed(error.to_string());
+        self.not_ordered_down()?;
         let mut start = Start::announce(self.drones(), &self.telemetry, options, self.net.now())
             .map_err(refused)?;
         self.until_taken(&mut start)?;
@@ -30,6 +36,10 @@ impl<'a> Crew<'a> {
 
     /// Authorizes a start that all have taken, and waits until all know.
     pub(in crate::cli) fn authorize(&mut self, start: &mut Start) -> Result<(), CommandError> {
+        if let Err(ordered) = self.not_ordered_down() {
+            self.cancel(start)?;
+            return Err(ordered);
+        }
         start
             .authorize(&self.telemetry, self.net.now())
             .map_err(|error| CommandError::Failed(error.to_string()))?;
@@ -46,6 +56,10 @@ impl<'a> Crew<'a> {
                 self.net.broadcast(&packet)?;
             }
             let late = start.late(&self.telemetry, now);
+            if let Err(ordered) = self.not_ordered_down() {
+                self.cancel(start)?;
+                return Err(ordered);
+            }
             if late.is_empty() {
                 return Ok(());
             }
@@ -76,7 +90,20 @@ impl<'a> Crew<'a> {
                 self.telemetry.on_message(self.net.now(), &received);
             }
         }
-        self.note("cancelled", None)
+        self.finish_orders()?;
+        self.try_note("cancelled", &BTreeMap::new());
+        Ok(())
+    }
+
+    /// Goes on until what another terminal has ordered is confirmed or given up.
+    pub(super) fn finish_orders(&mut self) -> Result<(), CommandError> {
+        while self.net.ordered_down().values().any(|going_on| *going_on) {
+            let until = self.net.now() + 100 * MS;
+            if let Some(received) = self.net.recv(until)? {
+                self.telemetry.on_message(self.net.now(), &received);
+            }
+        }
+        Ok(())
     }
 
     /// Watches the show until everyone has landed. Drones whose flight gave an alarm.
@@ -84,10 +111,19 @@ impl<'a> Crew<'a> {
         &mut self,
         start: &mut Start,
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
-        let mut eyes = self.eyes(start.time().map(GpsTime::total_ms))?;
+        let mut eyes = self.eyes(start.time().map(GpsTime::total_ms));
         let outcome = loop {
             let now = self.net.now();
-            if let Some(packet) = start.due(eyes.telemetry(), now) {
+            let ordered = self.net.ordered_down();
+            let before = start.left_s(eyes.telemetry(), now).is_some_and(|left_s| left_s > 0.0);
+            if !ordered.is_empty() && before && start.phase() != Phase::Cancelled {
+                // A start packet has no address: who goes on needs a new one.
+                self.context.insist("The start is taken back for everyone");
+                start.cancel(now);
+            }
+            let cancelled = start.phase() == Phase::Cancelled;
+            let told = cancelled && start.late(eyes.telemetry(), now).is_empty();
+            if let Some(packet) = start.due(eyes.telemetry(), now).filter(|_| !told) {
                 self.net.broadcast(&packet)?;
             }
             let next = start.next().clamp(now + MS, now + 100 * MS);
@@ -95,15 +131,22 @@ impl<'a> Crew<'a> {
                 eyes.on_message(self.net.now(), &received);
             }
             eyes.stop(self.net.now());
-            if eyes.is_over() {
+            let going_on = ordered.values().any(|going_on| *going_on);
+            let down = |drone: &DroneId| {
+                let armed = eyes.telemetry().get(*drone).and_then(Drone::is_armed);
+                (cancelled || ordered.contains_key(drone)) && armed == Some(false)
+            };
+            let all_down =
+                told == cancelled && !ordered.is_empty() && self.drones().iter().all(down);
+            if !going_on && (eyes.is_over() || all_down) {
                 break Ok(());
             }
             if self.context.stop_flag().load(Ordering::SeqCst) {
-                self.context.insist(
-                    "Nobody watches any more; the drones fly on by themselves. `updraft fleet abort` \
-                     sends them home, `updraft fleet land` lands them where they are",
-                );
-                break Err(CommandError::Interrupted);
+                break Err(if self.is_virtual {
+                    CommandError::Interrupted
+                } else {
+                    CommandError::Stopped(FLY_ON)
+                });
             }
         };
         let alarms = self.close(eyes);
@@ -111,13 +154,17 @@ impl<'a> Crew<'a> {
     }
 
     /// Watches a flight from here on.
-    pub(super) fn eyes(&mut self, start_gps_ms: Option<i64>) -> Result<Eyes<'a>, CommandError> {
+    pub(super) fn eyes(&mut self, start_gps_ms: Option<i64>) -> Eyes<'a> {
         let telemetry = std::mem::take(&mut self.telemetry);
         let mut monitor =
             Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
         monitor.set_start(start_gps_ms);
-        let journal = if self.is_virtual { None } else { Some(Journal::open(&self.folder.0)?) };
-        Ok(Eyes::new(self.context, monitor, journal, self.clock))
+        let mut eyes = Eyes::new(self.context, monitor, self.clock, self.is_virtual);
+        if !self.is_virtual {
+            // Drones that are about to fly are watched, journal or not.
+            eyes.write_into(Journal::open(&self.folder.0));
+        }
+        eyes
     }
 
     /// What was seen: the drones whose flight gave an alarm.
@@ -127,7 +174,7 @@ impl<'a> Crew<'a> {
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
         let (telemetry, alarms) = eyes.close();
         self.telemetry = telemetry;
-        self.tell_troubles()?;
+        self.tell_troubles();
         Ok(alarms?)
     }
 }

@@ -1,5 +1,6 @@
 //! Links that may fail while drones are in the air.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::cli::context::Context;
@@ -73,6 +74,10 @@ impl Net for Stubborn<'_> {
 
     fn heard(&self) -> Vec<DroneId> {
         self.net.heard()
+    }
+
+    fn ordered_down(&self) -> BTreeMap<DroneId, bool> {
+        self.net.ordered_down()
     }
 }
 

@@ -1,18 +1,18 @@
 //! What is wrong with the links: told once each, and written into the journal.
 
 use super::Crew;
-use crate::cli::exit::CommandError;
 use crate::link::traffic::troubles;
 
 impl Crew<'_> {
     /// Tells what people must know about their links and has not been told yet.
-    pub(super) fn tell_troubles(&mut self) -> Result<(), CommandError> {
+    pub(super) fn tell_troubles(&mut self) {
         for trouble in troubles(&self.net.traffic(), &self.net.doubled()) {
             if self.told.insert(trouble.key) {
                 self.context.warn(&trouble.text);
-                self.note("link", Some(trouble.text))?;
+                if let Err(error) = self.note("link", Some(trouble.text)) {
+                    self.context.warn(&format!("not in the journal: {error}"));
+                }
             }
         }
-        Ok(())
     }
 }

@@ -19,11 +19,12 @@ use self::rows::sum_up;
 use self::standing::assign;
 use self::upload::Shows;
 use super::bring::Wish;
-use super::{LeadArgs, asked, needs_person};
+use super::start::{LeadArgs, asked, needs_person};
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit, with_reasons};
+use crate::cli::fly_output::{DroneEnd, FlightEnd, FlightOutput, LogOutput};
 use crate::fleet::abort::Action;
 use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
@@ -33,6 +34,7 @@ use crate::skybrush_server::{Client, ServerError, StartConfig, end_flight};
 
 pub(in crate::cli) use dry::{dry_end, dry_fly};
 pub(in crate::cli) use logs::{list, pull};
+pub(in crate::cli) use rows::Row;
 
 /// Distance of the fence's circle beyond the farthest corner, m.
 const BEYOND_M: f64 = 10.0;
@@ -80,7 +82,7 @@ pub(in crate::cli) fn fly(
     lead: &LeadArgs,
     with_logs: bool,
     wait_s: f64,
-) -> Result<Exit, CommandError> {
+) -> Result<(FlightOutput, Exit), CommandError> {
     needs_person(lead)?;
     if lead.lead < LEAST_LEAD_S {
         return Err(CommandError::Usage(format!(
@@ -93,11 +95,15 @@ pub(in crate::cli) fn fly(
     let mut client = connect(context, address)?;
     let drones = assign(context, &mut client, plan, wait_s)?;
     let flight = Flight { address, folder, plan, drones: &drones };
+    let not_started = || {
+        let drones = drones.iter().map(|(slot, drone)| (*slot, drone.clone(), Vec::new()));
+        FlightOutput::no_go(&plan.name, drones.collect(), None)
+    };
     let refused = shows.send(context, &mut client, &flight)?;
     if refused > 0 {
         context
             .insist(&format!("NO-GO: {refused} drones do not have the show; nothing was started"));
-        return Ok(Exit::Unsafe);
+        return Ok((not_started(), Exit::Unsafe));
     }
     let ids: Vec<String> = drones.values().cloned().collect();
     let troubled = troubled(&client.status(&ids)?);
@@ -106,10 +112,10 @@ pub(in crate::cli) fn fly(
     }
     if !troubled.is_empty() {
         context.insist("NO-GO: nothing was started; Skybrush Live tells more of these drones");
-        return Ok(Exit::Unsafe);
+        return Ok((not_started(), Exit::Unsafe));
     }
-    let Some(unix_s) = start(&mut client, &flight, lead)? else {
-        return Err(CommandError::Usage("not authorized: the start was taken back".to_owned()));
+    let Some(unix_s) = start(context, &mut client, &flight, lead)? else {
+        return Err(CommandError::Unsafe("not authorized: the start was taken back".to_owned()));
     };
     context.say(&format!(
         "Authorized. Ctrl-C stops watching; `{}` sends everyone home",
@@ -123,25 +129,33 @@ pub(in crate::cli) fn fly(
     context.say(&format!("{landed} of {} drones have landed", drones.len()));
     let flown =
         if watched.in_the_air.is_empty() && !watched.alarms { Exit::Done } else { Exit::Losses };
+    let mut output = not_started();
+    output.outcome = FlightEnd::Flown;
+    for drone in &mut output.drones {
+        let up = watched.in_the_air.contains(&drone.drone);
+        drone.outcome = if up { DroneEnd::NotSeenToLand } else { DroneEnd::Landed };
+    }
     if !with_logs {
-        return Ok(flown);
+        return Ok((output, flown));
     }
     let wanted: Vec<(u16, String)> = drones.into_iter().collect();
     let brought = bring(context, &mut client, address, folder, plan, &wanted, &Wish::default())?;
     sum_up(context, &brought);
+    output.logs = brought.iter().map(LogOutput::from).collect();
     if brought.iter().all(|row| row.state != "missing") {
-        return Ok(flown);
+        return Ok((output, flown));
     }
     let campaign = folder.0.display();
     context.insist(&format!(
         "To try again: updraft logs pull {campaign} --connect skybrush://{address}"
     ));
-    Ok(Exit::Losses)
+    Ok((output, Exit::Losses))
 }
 
 /// The two steps of a start: its time, and its authorization; the Unix time, s, if a person or
 /// `--yes` authorized it.
 fn start(
+    context: &Context,
     client: &mut Client,
     flight: &Flight<'_>,
     lead: &LeadArgs,
@@ -155,9 +169,12 @@ fn start(
         duration_s: flight.plan.duration_ms as f64 / 1000.0,
     };
     client.set_start(&start)?;
-    if !lead.yes && !asked("Authorize the start? Type yes: ")? {
-        client.set_start(&StartConfig::none())?;
-        return Ok(None);
+    if !lead.yes {
+        let answer = asked("Authorize the start? Type yes: ", || context.check_stop());
+        if !matches!(answer, Ok(true)) {
+            client.set_start(&StartConfig::none())?;
+            return answer.map(|_| None);
+        }
     }
     // A person may take their time.
     let left_s = unix_s as f64 - SystemClock::start().unix_us() as f64 * 1e-6;

@@ -128,5 +128,5 @@ pub(super) fn assign(
     for problem in &standing.problems {
         context.warn(problem);
     }
-    Err(CommandError::Usage("the drones do not stand as planned; nothing was sent".to_owned()))
+    Err(CommandError::Unsafe("the drones do not stand as planned; nothing was sent".to_owned()))
 }

@@ -1,0 +1,231 @@
+//! A link on which orders of other processes are carried out, whatever the station is at.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::abort::{Abort, Aborted, Action};
+use super::messages::{LAND, RTL, start_packet};
+use super::orders::{ANSWER_SCHEMA, Answer, Inbox, Taken};
+use super::telemetry::Telemetry;
+use crate::link::clock::{MS, Micros, S};
+use crate::link::drive::{Machine as _, Step, Watch as _};
+use crate::link::error::NetError;
+use crate::link::frame::{MavMessage, dialect};
+use crate::link::id::DroneId;
+use crate::link::net::{Net, Received};
+use crate::link::traffic::Traffic;
+use crate::protocol::show::{CLEAR_TIME, StartConfig, TO_DRONE};
+use dialect::MavCmd;
+
+/// Orders are looked for so often.
+const LOOK: Micros = 500 * MS;
+/// A station that flies has heard its drones long ago: the others are not waited for.
+const HEARD_WITHIN: Micros = 4 * S;
+
+/// What the station's people are told.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Notice {
+    /// An order has come.
+    Ordered {
+        /// What.
+        action: Action,
+        /// Who.
+        drones: Vec<DroneId>,
+    },
+    /// It has ended for a drone.
+    Done {
+        /// What was ordered.
+        action: Action,
+        /// Who.
+        drone: DroneId,
+        /// How it ended.
+        done: Aborted,
+    },
+    /// The answer could not be written; the order is carried out all the same.
+    NoAnswer {
+        /// Why.
+        reason: String,
+    },
+}
+
+struct Open {
+    taken: Taken,
+    answer: Answer,
+}
+
+/// A net that sends drones home or lands them when another process orders it, beside everything
+/// else that goes through it. What would make such a drone fly again is not sent any more.
+pub struct Desk<'a> {
+    net: &'a mut dyn Net,
+    inbox: Option<Inbox>,
+    tell: Box<dyn FnMut(&Notice) + 'a>,
+    telemetry: Telemetry,
+    next_look: Micros,
+    open: Vec<Open>,
+    running: BTreeMap<DroneId, (Abort, Action, Micros)>,
+    ordered: BTreeSet<DroneId>,
+}
+
+impl<'a> Desk<'a> {
+    /// Around a net. `inbox`: where orders come from, if they can.
+    pub fn new(net: &'a mut dyn Net, inbox: Option<Inbox>, tell: impl FnMut(&Notice) + 'a) -> Self {
+        Self {
+            net,
+            inbox,
+            tell: Box::new(tell),
+            telemetry: Telemetry::default(),
+            next_look: 0,
+            open: Vec::new(),
+            running: BTreeMap::new(),
+            ordered: BTreeSet::new(),
+        }
+    }
+
+    fn look(&mut self, now: Micros) {
+        if now < self.next_look {
+            return;
+        }
+        self.next_look = now + LOOK;
+        let orders = self.inbox.as_mut().map(Inbox::take).unwrap_or_default();
+        for taken in orders {
+            let action = taken.order.action;
+            let drones = taken.order.drones.clone().unwrap_or_else(|| self.net.heard());
+            (self.tell)(&Notice::Ordered { action, drones: drones.clone() });
+            for drone in &drones {
+                let abort = Abort::new(*drone, action, self.telemetry.get(*drone));
+                self.running.insert(*drone, (abort.heard_within(HEARD_WITHIN), action, 0));
+                self.ordered.insert(*drone);
+            }
+            let drones = drones.into_iter().map(|drone| (drone, None)).collect();
+            let answer = Answer { schema: ANSWER_SCHEMA.to_owned(), beat: 0, drones };
+            self.open.push(Open { taken, answer });
+        }
+        for open in &mut self.open {
+            open.answer.beat += 1;
+            if let Err(error) = open.taken.answer(&open.answer) {
+                (self.tell)(&Notice::NoAnswer { reason: error.to_string() });
+            }
+        }
+        self.open.retain(|open| !open.answer.is_over());
+    }
+
+    /// Lets the ends of flights go on.
+    fn advance(&mut self, now: Micros) {
+        let mut ended = Vec::new();
+        for (drone, (abort, action, next)) in &mut self.running {
+            if now < *next {
+                continue;
+            }
+            loop {
+                match abort.poll(now) {
+                    // It is repeated: what cannot be sent now may be sent in a moment.
+                    Step::Send(message) => drop(self.net.send(*drone, &message)),
+                    Step::Wait(until) => {
+                        *next = until;
+                        break;
+                    }
+                    Step::Done(done) => {
+                        ended.push((*drone, *action, done));
+                        break;
+                    }
+                }
+            }
+        }
+        for (drone, action, done) in ended {
+            self.running.remove(&drone);
+            (self.tell)(&Notice::Done { action, drone, done });
+            for open in &mut self.open {
+                for (of, answer) in &mut open.answer.drones {
+                    if *of == drone {
+                        answer.get_or_insert(done);
+                    }
+                }
+            }
+            self.next_look = now;
+        }
+    }
+
+    fn hear(&mut self, received: &Received) {
+        let now = self.net.now();
+        self.telemetry.on_message(now, received);
+        if let Some((abort, _, next)) = self.running.get_mut(&received.from) {
+            abort.on_message(now, &received.message);
+            *next = now;
+        }
+    }
+}
+
+/// What takes a drone into the air, or goes on with its flight.
+fn flies(message: &MavMessage) -> bool {
+    match message {
+        MavMessage::SET_POSITION_TARGET_GLOBAL_INT(_) => true,
+        MavMessage::COMMAND_LONG(command) => match command.command {
+            MavCmd::MAV_CMD_DO_SET_MODE => ![RTL, LAND].contains(&(command.param2 as u32)),
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => command.param1 != 0.0,
+            MavCmd::MAV_CMD_NAV_TAKEOFF => true,
+            _ => false,
+        },
+        _ => false,
+    }
+}
+
+/// A start time or an authorization; taking them back is none.
+fn starts(message: &MavMessage) -> bool {
+    let clear = StartConfig { start_tow_s: CLEAR_TIME, authorization: 0, countdown_ms: CLEAR_TIME };
+    matches!(message, MavMessage::DATA16(data) if data.mavtype == TO_DRONE)
+        && *message != start_packet(&clear)
+}
+
+impl Net for Desk<'_> {
+    fn now(&self) -> Micros {
+        self.net.now()
+    }
+
+    fn recv(&mut self, until: Micros) -> Result<Option<Received>, NetError> {
+        loop {
+            let now = self.net.now();
+            self.look(now);
+            self.advance(now);
+            let due = self.running.values().map(|(_, _, next)| *next).min();
+            let next = until.min(self.next_look).min(due.unwrap_or(until));
+            if let Some(received) = self.net.recv(next)? {
+                self.hear(&received);
+                return Ok(Some(received));
+            }
+            if self.net.now() >= until {
+                return Ok(None);
+            }
+        }
+    }
+
+    fn send(&mut self, to: DroneId, message: &MavMessage) -> Result<(), NetError> {
+        let kept = self.ordered.contains(&to) && flies(message);
+        if kept || (!self.ordered.is_empty() && starts(message)) {
+            return Ok(());
+        }
+        self.net.send(to, message)
+    }
+
+    fn broadcast(&mut self, message: &MavMessage) -> Result<(), NetError> {
+        // It has no address: those who were ordered down would hear it, too.
+        if !self.ordered.is_empty() && starts(message) {
+            return Ok(());
+        }
+        self.net.broadcast(message)
+    }
+
+    fn heard(&self) -> Vec<DroneId> {
+        self.net.heard()
+    }
+
+    fn traffic(&self) -> BTreeMap<u16, Traffic> {
+        self.net.traffic()
+    }
+
+    fn doubled(&self) -> BTreeSet<DroneId> {
+        self.net.doubled()
+    }
+
+    fn ordered_down(&self) -> BTreeMap<DroneId, bool> {
+        self.ordered.iter().map(|drone| (*drone, self.running.contains_key(drone))).collect()
+    }
+}
