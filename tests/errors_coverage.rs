@@ -138,7 +138,9 @@ fn a_few_campaigns_hold_what_they_state() {
 #[test]
 fn a_battery_that_is_not_corrected_for_would_be_seen() {
     let folder = tempfile::tempdir().unwrap();
-    let run = format!("run --no-study --direct --truth --no-progress -q --vehicle pixel {SMALL} {STILL} -o c");
+    let run = format!(
+        "run --no-study --direct --truth --no-progress -q --vehicle pixel {SMALL} {STILL} -o c"
+    );
     updraft(&run, folder.path());
     let found = |options: &str| -> TruthCheck {
         let analyze = format!("analyze c --no-report --json --no-progress {options}");

@@ -101,7 +101,7 @@ impl From<&Brought> for LogOutput {
     fn from(brought: &Brought) -> Self {
         Self {
             slot: brought.slot,
-            drone: Some(brought.drone.to_string()),
+            drone: brought.drone.map(|drone| drone.to_string()),
             state: brought.state,
             bytes: brought.bytes,
             reason: brought.reason.clone(),
