@@ -142,12 +142,9 @@ fn the_offset_takes_out_what_height_does() {
     let offset = drone.offset.as_ref().unwrap();
     assert_eq!(offset.points.len(), 15);
     assert!((offset.points.iter().map(|point| point.offset_us).sum::<f64>()).abs() < 1e-6);
-    let outside: Vec<&str> = legs(&drone.windows)
-        .iter()
-        .filter(|leg| leg.offset_outside)
-        .map(|leg| &*leg.label)
-        .collect();
-    assert_eq!(outside, ["up 0.5 m/s"], "only the first climb is outside the 0-windows");
+    let legs = legs(&drone.windows);
+    let outside: Vec<bool> = legs.iter().map(|leg| leg.offset_outside).collect();
+    assert!(outside[0] && !outside[1..].contains(&true), "only the first climb is outside");
 }
 
 #[test]
