@@ -229,11 +229,11 @@ impl Machine for Abort {
         if now < self.next {
             return Step::Wait(self.next);
         }
-        if !self.heard && now >= begun + self.heard_within {
-            return Step::Done(Aborted::Unheard);
-        }
         if now >= begun + GIVE_UP {
             return Step::Done(Aborted::Unconfirmed { told: self.told });
+        }
+        if !self.heard && now >= begun + self.heard_within {
+            return Step::Done(Aborted::Unheard);
         }
         self.next = now + EVERY;
         self.told += 1;
