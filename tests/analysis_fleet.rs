@@ -27,15 +27,7 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
         plan,
         purpose: plan.map(|plan| plan.purpose),
         logs,
-        start: None,
-        true_updraft_mps: None,
-        truth: None,
-        density: None,
-        leaning: None,
-        thrust_exponent: None,
-        sag: None,
-        lean_table: None,
-        folder: None,
+        ..FlightInput::default()
     }
 }
 

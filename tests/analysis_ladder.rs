@@ -24,21 +24,7 @@ use updraft::analysis::{
 use updraft::mission::plan::{Kind, Plan, Purpose};
 
 fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> FlightInput<'a> {
-    FlightInput {
-        name,
-        plan,
-        purpose: None,
-        logs,
-        start: None,
-        true_updraft_mps: None,
-        truth: None,
-        density: None,
-        leaning: None,
-        thrust_exponent: None,
-        sag: None,
-        lean_table: None,
-        folder: None,
-    }
+    FlightInput { name, plan, logs, ..FlightInput::default() }
 }
 
 fn logs(paths: &[PathBuf]) -> Vec<LogInput> {

@@ -154,7 +154,8 @@ fn reads_that_are_always_wrong_are_given_up_for_the_log_messages() {
 
 #[test]
 fn reads_that_are_always_wrong_do_not_matter_where_none_is_needed() {
-    // A request for a burst that arrives twice is served twice: hardly a packet is lost both times.
+    // Supposed, not traced: a request for a burst that arrives twice is served twice, and hardly a
+    // packet is lost both times. The share of repeats and its draws decide how many attempts it takes.
     // An attempt in which none is needs no read, and its checksum is right.
     let (done, bytes) = pulled_over(0.8, reads_lie);
     assert_eq!(done.failure, None);

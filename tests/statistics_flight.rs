@@ -24,15 +24,7 @@ fn input<'a>(name: &'a str, plan: &'a Plan, logs: &'a [LogInput]) -> FlightInput
         plan: Some(plan),
         purpose: Some(plan.purpose),
         logs,
-        start: None,
-        true_updraft_mps: None,
-        truth: None,
-        density: None,
-        leaning: None,
-        thrust_exponent: None,
-        sag: None,
-        lean_table: None,
-        folder: None,
+        ..FlightInput::default()
     }
 }
 

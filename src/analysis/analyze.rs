@@ -37,7 +37,7 @@ use crate::flight::table::Mapping;
 use crate::mission::plan::{Plan, Purpose};
 
 /// One log of a flight.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LogInput {
     /// Slot of the plan by somebody's record. Only the home position in the log counts more; without
     /// a record, the file's number and the system id count.
@@ -49,7 +49,7 @@ pub struct LogInput {
 }
 
 /// One flight to analyse.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FlightInput<'a> {
     /// Short name.
     pub name: &'a str,

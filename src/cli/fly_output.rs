@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::fleet::bring::Brought;
 use super::fleet::crew::Crew;
-use super::fleet::server::Row;
 use super::fleet::tables::PreflightOutput;
 use crate::link::id::DroneId;
 
@@ -81,7 +80,7 @@ pub(in crate::cli) struct DroneOutput {
 }
 
 /// One drone's log.
-#[derive(Serialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub(in crate::cli) struct LogOutput {
     /// Number of the slot.
     pub(in crate::cli) slot: u16,
@@ -105,18 +104,6 @@ impl From<&Brought> for LogOutput {
             state: brought.state,
             bytes: brought.bytes,
             reason: brought.reason.clone(),
-        }
-    }
-}
-
-impl From<&Row> for LogOutput {
-    fn from(row: &Row) -> Self {
-        Self {
-            slot: row.slot,
-            drone: row.drone.clone(),
-            state: row.state,
-            bytes: row.bytes,
-            reason: row.reason.clone(),
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::base::file::write_whole;
 use crate::campaign::{self, to_json};
 use crate::report::{self, Provenance};
 use crate::study::result::StudyResult;
-use crate::study::{Settings, StudyPlan, Work, evaluate};
+use crate::study::{Flown, Settings, StudyPlan, Work, evaluate};
 
 /// Name of the built-in study.
 const BUILT_IN: &str = "study";
@@ -75,25 +75,9 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
     if open < total {
         context.say(&format!("{} of {total} flights are there already", total - open));
     }
-    let progress = Progress::new(context, "flying", open as u64);
-    let fly = || work.fly(context.stop_flag(), &|| progress.advance());
-    let flown = match args.jobs {
-        Some(jobs) => rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(jobs))
-            .build()
-            .map_err(|error| CommandError::Failed(format!("failed to start threads: {error}")))?
-            .install(fly),
-        None => fly(),
-    };
-    progress.finish();
-    let flown = flown?;
+    let flown = fly(context, work, "flying", args.jobs)?;
     let flying = watch.to_string();
-    context.check_stop()?;
-
-    let result = evaluate(&study, args.seed, &flown)?;
-    for lost in &result.lost {
-        context.warn(&format!("{}: {}", lost.name, lost.reason));
-    }
+    let result = evaluated(context, &study, args.seed, &flown)?;
     if !context.json {
         let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
         context.print(&report::study_summary(&result, width, context.color))?;
@@ -117,20 +101,50 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
     Ok(if result.lost.is_empty() { Exit::Done } else { Exit::Losses })
 }
 
+/// Flies what is open of a study, `jobs` flights at the same time.
+fn fly(
+    context: &Context,
+    work: Work<'_>,
+    doing: &'static str,
+    jobs: Option<u16>,
+) -> Result<Flown, CommandError> {
+    let progress = Progress::new(context, doing, work.open_flights() as u64);
+    let fly = || work.fly(context.stop_flag(), &|| progress.advance());
+    let flown = match jobs {
+        Some(jobs) => rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(jobs))
+            .build()
+            .map_err(|error| CommandError::Failed(format!("failed to start threads: {error}")))?
+            .install(fly),
+        None => fly(),
+    };
+    progress.finish();
+    let flown = flown?;
+    context.check_stop()?;
+    Ok(flown)
+}
+
+/// The results of a study; flights that were lost are named.
+fn evaluated(
+    context: &Context,
+    study: &StudyPlan,
+    seed: u64,
+    flown: &Flown,
+) -> Result<StudyResult, CommandError> {
+    let result = evaluate(study, seed, flown)?;
+    for lost in &result.lost {
+        context.warn(&format!("{}: {}", lost.name, lost.reason));
+    }
+    Ok(result)
+}
+
 /// Flies the built-in study into a folder, for the report of a campaign. Finished flights are kept.
 pub(super) fn fly_study(context: &Context, folder: &Path, seed: u64) -> Result<(), CommandError> {
     let watch = Stopwatch::start();
     let study = StudyPlan::load(BUILT_IN)?;
     let work = Work::open(&study, folder, Settings { seed, keep_logs: false, force: false })?;
-    let progress = Progress::new(context, "flying the study", work.open_flights() as u64);
-    let flown = work.fly(context.stop_flag(), &|| progress.advance());
-    progress.finish();
-    let flown = flown?;
-    context.check_stop()?;
-    let result = evaluate(&study, seed, &flown)?;
-    for lost in &result.lost {
-        context.warn(&format!("{}: {}", lost.name, lost.reason));
-    }
+    let flown = fly(context, work, "flying the study", None)?;
+    let result = evaluated(context, &study, seed, &flown)?;
     write(folder, format!("updraft run --seed {seed}"), seed, &result)?;
     context.say(&format!("Flew the simulation study ({} flights) in {watch}", flown.flown));
     Ok(())

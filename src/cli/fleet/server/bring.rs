@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::rows::Row;
 use super::stopped;
 use crate::base::file::{create_folder, write_whole};
 use crate::campaign::FlightFolder;
@@ -11,6 +10,7 @@ use crate::cli::clock::{Stopwatch, SystemClock};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::fleet::bring::Wish;
+use crate::cli::fly_output::LogOutput;
 use crate::cli::simulate::made_by;
 use crate::fleet::logs::manifest::{AtHome, ManifestEntry, Method, Shelf, Verified};
 use crate::fleet::logs::one::Which;
@@ -36,7 +36,7 @@ pub(super) fn bring(
     plan: &Plan,
     wanted: &[(u16, String)],
     wish: &Wish,
-) -> Result<Vec<Row>, CommandError> {
+) -> Result<Vec<LogOutput>, CommandError> {
     create_folder(&folder.logs())?;
     let shelf = Shelf::open(&folder.logs(), &made_by())?;
     let watch = Stopwatch::start();
@@ -69,7 +69,7 @@ pub(super) fn bring(
     if let Some(broke) = &broke {
         context.warn(broke);
     }
-    let rows: Vec<Row> = wanted
+    let rows: Vec<LogOutput> = wanted
         .iter()
         .filter_map(|(slot, id)| {
             let one = puller.ones.get(id)?;
@@ -80,7 +80,13 @@ pub(super) fn bring(
                 None if one.pulled == 0 => "there",
                 None => "pulled",
             };
-            Some(Row { slot: *slot, drone: Some(id.clone()), state, bytes: one.bytes, reason })
+            Some(LogOutput {
+                slot: *slot,
+                drone: Some(id.clone()),
+                state,
+                bytes: one.bytes,
+                reason,
+            })
         })
         .collect();
     for row in &rows {

@@ -1,13 +1,14 @@
 //! `logs list` and `logs pull` through the server.
 
 use super::bring::bring;
-use super::rows::{Row, sum_up};
+use super::rows::sum_up;
 use super::standing::{Standing, standing};
 use super::{connect, stopped};
 use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::bring::Wish;
+use crate::cli::fly_output::LogOutput;
 use crate::cli::logs::{ListRow, ListedLog};
 use crate::cli::simulate::SlotSet;
 use crate::mission::Plan;
@@ -77,7 +78,7 @@ pub(in crate::cli) fn pull(
     slots: Option<&SlotSet>,
     wish: &Wish,
     wait_s: f64,
-) -> Result<Vec<Row>, CommandError> {
+) -> Result<Vec<LogOutput>, CommandError> {
     let (mut client, standing, meant) = meet(context, address, plan, slots, wait_s)?;
     let (wanted, lost): (Vec<u16>, Vec<u16>) =
         meant.into_iter().partition(|slot| standing.found.contains_key(slot));
@@ -92,7 +93,7 @@ pub(in crate::cli) fn pull(
         .filter_map(|slot| standing.found.get(&slot).map(|id| (slot, id.clone())))
         .collect();
     let mut rows = bring(context, &mut client, address, folder, plan, &wanted, wish)?;
-    let nobody = |slot| Row {
+    let nobody = |slot| LogOutput {
         slot,
         drone: None,
         state: "missing",

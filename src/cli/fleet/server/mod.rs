@@ -24,7 +24,7 @@ use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit, with_reasons};
-use crate::cli::fly_output::{DroneEnd, FlightEnd, FlightOutput, LogOutput};
+use crate::cli::fly_output::{DroneEnd, FlightEnd, FlightOutput};
 use crate::fleet::abort::Action;
 use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
@@ -34,7 +34,6 @@ use crate::skybrush_server::{Client, ServerError, StartConfig, end_flight};
 
 pub(in crate::cli) use dry::{dry_end, dry_fly};
 pub(in crate::cli) use logs::{list, pull};
-pub(in crate::cli) use rows::Row;
 
 /// Distance of the fence's circle beyond the farthest corner, m.
 const BEYOND_M: f64 = 10.0;
@@ -141,7 +140,7 @@ pub(in crate::cli) fn fly(
     let wanted: Vec<(u16, String)> = drones.into_iter().collect();
     let brought = bring(context, &mut client, address, folder, plan, &wanted, &Wish::default())?;
     sum_up(context, &brought);
-    output.logs = brought.iter().map(LogOutput::from).collect();
+    output.logs.clone_from(&brought);
     if brought.iter().all(|row| row.state != "missing") {
         return Ok((output, flown));
     }
