@@ -154,6 +154,10 @@ enum Phase {
     Params(SetParams),
 }
 
+/// The corners are on the drone by now: a radio that is silent for half a minute is waited for
+/// rather than a whole upload given up.
+const PARAMS: Patience = Patience { every: S, tries: 30 };
+
 /// Puts a fence on a vehicle and reads it back.
 #[derive(Clone, Debug)]
 pub struct PutFence {
@@ -317,8 +321,7 @@ impl Machine for PutFence {
                 };
             }
             if let Phase::Acknowledge = self.phase {
-                let params =
-                    SetParams::new(drone, self.fence.params()).with_patience(self.patience);
+                let params = SetParams::new(drone, self.fence.params()).with_patience(PARAMS);
                 self.phase = Phase::Params(params);
                 return Step::send(fence_ack(drone));
             }
