@@ -38,6 +38,7 @@ pub mod cli;
 pub mod effects;
 pub mod fleet;
 pub mod flight;
+pub mod gap;
 pub mod link;
 pub mod log;
 pub mod mission;

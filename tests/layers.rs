@@ -27,8 +27,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("virtual_fleet", &["base", "vehicle", "mission", "show", "sim", "log", "link", "protocol"]),
     ("flight", &["base", "vehicle", "mission", "log"]),
     ("analysis", &["base", "vehicle", "mission", "log", "flight"]),
+    ("gap", &["base", "vehicle", "mission", "show", "effects", "sim", "log", "flight", "analysis"]),
     ("study", &["base", "vehicle", "mission", "show", "sim", "log", "flight", "analysis"]),
-    ("report", &["base", "vehicle", "mission", "flight", "analysis", "study"]),
+    ("report", &["base", "vehicle", "mission", "flight", "analysis", "gap", "study"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

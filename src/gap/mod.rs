@@ -1,0 +1,5 @@
+//! Where simulation and measurement disagree, which physics is missing, and what cannot be known.
+
+pub mod verdict;
+
+pub use verdict::Verdict;

@@ -1,0 +1,317 @@
+//! What the comparison of measurement and simulation says: the words of `gap/verdict.json`.
+//!
+//! Its JSON schema is `docs/schema/verdict.schema.json`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Name and version of the format.
+pub const VERDICT_SCHEMA: &str = "updraft.verdict/1";
+
+/// Where simulation and measurement of one campaign disagree, and what is missing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Verdict {
+    /// Format name and version: `updraft.verdict/1`.
+    pub schema: String,
+    /// Program and version.
+    pub made_by: String,
+    /// Vehicle whose model was held against the logs.
+    pub vehicle: String,
+    /// The verdict in one or two sentences.
+    pub summary: String,
+    /// What was used.
+    pub data: DataUsed,
+    /// What the sensor of vertical velocity says against the height, before any look at the pulse.
+    pub sensor: SensorChannel,
+    /// What was found, in the order in which it was found; empty: none.
+    pub steps: Vec<Step>,
+    /// What became of the search after the last step.
+    pub rest: Rest,
+    /// Effects that this flight could not have shown, and how large they would have to be.
+    pub detectable: Vec<Detectable>,
+    /// Noise and shared air, as estimated with everything found in the model.
+    pub noise: Noise,
+    /// Differences between drones.
+    pub drones: Drones,
+    /// The gap before and after, on data that was not used for fitting.
+    pub gap: Gap,
+    /// Where they disagree: the residual by regime.
+    pub regimes: Vec<Regime>,
+    /// What a reader must know, one sentence each.
+    pub cautions: Vec<String>,
+}
+
+/// What went into a verdict.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DataUsed {
+    /// Logs given.
+    pub logs: usize,
+    /// Drones used.
+    pub drones: usize,
+    /// Command groups with their numbers of drones.
+    pub groups: Vec<(String, usize)>,
+    /// Steady bins in each group.
+    pub bins: Vec<usize>,
+    /// Slots held out from fitting.
+    pub held_out: Vec<u16>,
+    /// Logs or drones left out, with their reasons.
+    pub left_out: Vec<String>,
+}
+
+/// Vertical velocity V_U against the rate of change of the height.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SensorChannel {
+    /// Mean bias of V_U over the fleet, m/s, up positive; absent: it could not be told.
+    pub bias_mps: Option<Interval>,
+    /// Lag of V_U, s.
+    pub lag_s: Option<Interval>,
+    /// Drones whose own bias is beyond what is usual: (slot, bias m/s).
+    pub biased_drones: Vec<(u16, f64)>,
+    /// Whether bias or lag is large enough to be named.
+    pub named: bool,
+}
+
+/// A value with its 95 % interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Interval {
+    /// The value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// One thing that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Step {
+    /// What it is.
+    pub finding: Finding,
+    /// Gain of log-likelihood, nats.
+    pub gain_nats: f64,
+    /// What a flight with nothing to find exceeds with the chance [`Step::alpha`], nats.
+    pub threshold_nats: f64,
+    /// Chance of naming anything when there is nothing.
+    pub alpha: f64,
+    /// Standard deviation of what it does to the pulse over the bins, us.
+    pub size_us: f64,
+    /// Other candidates and their gains, best first.
+    pub rivals: Vec<Rival>,
+    /// Held-out gap before and after this step, us (drone means and shared air removed).
+    pub held_out_us: Option<(f64, f64)>,
+    /// Shape that was found, for drawing: what it depends on, and (x, us) with the standard error.
+    pub shape: Option<Shape>,
+}
+
+/// What was found in a step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Finding {
+    /// One effect of the library.
+    Name {
+        /// Its name.
+        effect: String,
+        /// Its parameters that were fitted.
+        parameters: Vec<Fitted>,
+        /// Whether the model had it with another value.
+        was_there: bool,
+    },
+    /// Several effects explain it equally well; the first is in the model.
+    Class {
+        /// Their names, best first.
+        effects: Vec<String>,
+        /// Parameters of the first.
+        parameters: Vec<Fitted>,
+    },
+    /// Nothing in the library, but it depends on something.
+    Unknown {
+        /// What it depends on: `climb`, `time`, `height`, `wind`, `voltage`, `climb-time`,
+        /// `heading`, `step`.
+        depends_on: String,
+        /// A compact formula that describes it, if one does.
+        formula: Option<String>,
+    },
+}
+
+impl Finding {
+    /// Effects of the library that are named or in the class.
+    pub fn effects(&self) -> Vec<&str> {
+        match self {
+            Self::Name { effect, .. } => vec![effect],
+            Self::Class { effects, .. } => effects.iter().map(String::as_str).collect(),
+            Self::Unknown { .. } => Vec::new(),
+        }
+    }
+}
+
+/// A fitted parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Fitted {
+    /// Name in vehicle files.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Value with its 95 % interval.
+    pub value: Interval,
+    /// Value in the model that was held against the logs; absent: it did not have the effect.
+    pub before: Option<f64>,
+}
+
+/// Another candidate of a step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rival {
+    /// Effect, or what a free shape depends on.
+    pub name: String,
+    /// Whether it is a free shape.
+    pub generic: bool,
+    /// Gain of log-likelihood, nats (free shapes: less their penalty).
+    pub gain_nats: f64,
+}
+
+/// A curve with its standard error.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Shape {
+    /// What it is drawn against, with unit.
+    pub axis: String,
+    /// Places.
+    pub x: Vec<f64>,
+    /// Change of the pulse, us.
+    pub us: Vec<f64>,
+    /// Its standard error, us.
+    pub se_us: Vec<f64>,
+}
+
+/// The end of the search.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rest {
+    /// Largest gain that was left, nats.
+    pub gain_nats: f64,
+    /// The candidate that had it.
+    pub candidate: String,
+    /// What would have been needed.
+    pub threshold_nats: f64,
+    /// Reduced chi² of what is left, with the estimated noise.
+    pub reduced_chi2: f64,
+}
+
+/// What a flight can see of one effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Detectable {
+    /// The effect.
+    pub effect: String,
+    /// The parameter that says how large it is.
+    pub parameter: String,
+    /// Unit of the parameter.
+    pub unit: String,
+    /// Size that is usual (what the library takes when nothing is stated).
+    pub usual: f64,
+    /// Smallest size that this flight shows with a chance of a half; absent: it does not show it at
+    /// any size, and `why` says so.
+    pub smallest: Option<f64>,
+    /// Fisher z of the usual size: its effect over its error with everything else free.
+    pub usual_z: f64,
+    /// Whether the usual size would have been found (z of 5 or more).
+    pub would_be_seen: bool,
+    /// Effects whose traces this flight cannot tell from it (correlation above 0.9).
+    pub like: Vec<String>,
+    /// Why it cannot be seen; empty otherwise.
+    pub why: String,
+}
+
+/// Noise and air, estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Noise {
+    /// Standard deviation of the updraft that all drones share, m/s.
+    pub shared_air_mps: f64,
+    /// Its time scale, s.
+    pub shared_air_s: f64,
+    /// Slow updraft of each drone's own place, m/s.
+    pub own_air_mps: f64,
+    /// Gusts of each drone, m/s.
+    pub gusts_mps: f64,
+    /// Their time scale, s.
+    pub gusts_s: f64,
+    /// White noise of a bin, us.
+    pub white_us: f64,
+    /// Spread of the hover pulse between drones, us.
+    pub drones_us: f64,
+    /// Relative spread of the response between drones.
+    pub slopes: f64,
+    /// Response that is assumed for the air where the model has none, us/(m/s).
+    pub least_response: f64,
+}
+
+/// Differences between drones.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Drones {
+    /// Offset of the hover pulse of each slot from the fleet's, us, and its relative response.
+    pub each: Vec<DroneOffset>,
+    /// Correlation of offsets and responses: thrust spread makes it positive, mass spread less so.
+    pub correlation: Option<f64>,
+    /// What the spread is, in words.
+    pub words: Vec<String>,
+}
+
+/// One drone against the fleet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DroneOffset {
+    /// Slot.
+    pub slot: u16,
+    /// Hover pulse above the fleet's, us.
+    pub offset_us: f64,
+    /// Response over the fleet's, minus 1.
+    pub slope: f64,
+    /// Whether the drone was held out from fitting.
+    pub held_out: bool,
+}
+
+/// The gap before and after.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Gap {
+    /// On drones that were held out.
+    pub drones: Option<Shrink>,
+    /// On rungs that were held out in rotation.
+    pub rungs: Option<Shrink>,
+}
+
+/// A gap before and after, root mean squares.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Shrink {
+    /// Before, drone means removed, us.
+    pub before_us: Interval,
+    /// After, us.
+    pub after_us: Interval,
+    /// Before, without the air that the other drones saw, us.
+    pub before_without_air_us: f64,
+    /// After, without that air, us.
+    pub after_without_air_us: f64,
+    /// What noise and air alone leave, us.
+    pub floor_us: f64,
+    /// The same of the vertical air speed, m/s, by the response of the model after.
+    pub before_mps: f64,
+    /// After, m/s.
+    pub after_mps: f64,
+    /// Reduced chi² before and after, with the noise estimated after.
+    pub chi2: (f64, f64),
+    /// Share of the excess over the floor that is gone, with its 95 % interval.
+    pub excess_shrink: Interval,
+}
+
+/// The residual of one regime.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Regime {
+    /// What is held apart: `climb`, `height`, `time`, `place`, `drone`, `voltage`, `lean`.
+    pub by: String,
+    /// The regime, for people.
+    pub label: String,
+    /// Where it is on the axis.
+    pub x: f64,
+    /// Mean residual before, us, and its standard error (shared air included).
+    pub before_us: (f64, f64),
+    /// Mean residual after, us.
+    pub after_us: f64,
+    /// Mean residual before, m/s of vertical air speed by the response of the model after.
+    pub before_mps: f64,
+    /// Bins in it, over all drones.
+    pub bins: usize,
+}
