@@ -1,6 +1,6 @@
 //! Air that must be accelerated with the rotors.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::reference::DENSITY;
 use super::{Change, Effect, Now, Own, Reference, Signals, Start};
 use crate::vehicle::Airframe;
@@ -43,6 +43,7 @@ impl Effect for AddedMass {
             }],
             hooks: &[Hook::Loads],
             shown: (Signal::Acceleration, -2.0, 2.0),
+            sought: Sought::No("acts while accelerating only, and steady flight is compared"),
         }
     }
 

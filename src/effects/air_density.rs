@@ -1,6 +1,6 @@
 //! Air that is not the standard atmosphere's: warmer, colder, other pressure.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Air, Effect, Now, Own, Reference, Signals};
 
 const TEMPERATURE: usize = 0;
@@ -52,6 +52,9 @@ impl Effect for AirDensity {
             ],
             hooks: &[Hook::Air],
             shown: (Signal::Density, 0.9, 1.05),
+            sought: Sought::No(
+                "known physics: computed from temperature and pressure, never fitted",
+            ),
         }
     }
 

@@ -1,6 +1,6 @@
 //! A lithium battery: open-circuit voltage by charge, less current times resistance.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Effect, Now, Own, Reading, Reference, Signals, Start};
 use crate::vehicle::{Airframe, RotorLaw, Vehicle};
 
@@ -37,6 +37,13 @@ pub(super) fn cell_v(charge: f64) -> f64 {
     let index = (place as usize).min(9);
     let (low, high) = (CELL_V[index], CELL_V[index + 1]);
     low + (high - low) * (place - index as f64)
+}
+
+/// Charge of a cell, 0..1, at an open-circuit voltage, V: the inverse of the discharge curve.
+pub fn charge_of_cell(volts: f64) -> f64 {
+    let above = CELL_V.partition_point(|known| *known <= volts).clamp(1, CELL_V.len() - 1);
+    let (low, high) = (CELL_V[above - 1], CELL_V[above]);
+    ((above - 1) as f64 + (volts - low) / (high - low)) / 10.0
 }
 
 fn resting_v(values: &Values, used_ah: f64) -> f64 {
@@ -174,6 +181,7 @@ impl Effect for Battery {
             ],
             hooks: &[Hook::Command],
             shown: (Signal::ChargeUsed, 0.0, 2.0),
+            sought: Sought::Shape { size: "exponent", sizes: &[1.0], shape: None },
         }
     }
 
@@ -231,5 +239,8 @@ mod tests {
         assert_eq!((cell_v(1.0), cell_v(0.0), cell_v(7.0)), (4.2, 3.27, 4.2));
         assert!(CELL_V.windows(2).all(|pair| pair[0] < pair[1]));
         assert!((cell_v(0.95) - 4.155).abs() < 1e-12);
+        for charge in [0.0, 0.03, 0.5, 0.87, 1.0] {
+            assert!((charge_of_cell(cell_v(charge)) - charge).abs() < 1e-12);
+        }
     }
 }

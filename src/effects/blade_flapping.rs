@@ -1,6 +1,6 @@
 //! Horizontal drag of the rotors: blade flapping and induced drag.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Change, Effect, Now, Own, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
@@ -39,6 +39,7 @@ impl Effect for BladeFlapping {
             }],
             hooks: &[Hook::Loads],
             shown: (Signal::Horizontal, 0.0, 8.0),
+            sought: Sought::Shape { size: "drag_per_weight", sizes: &[0.021], shape: None },
         }
     }
 

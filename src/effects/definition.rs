@@ -35,6 +35,25 @@ pub struct Definition {
     pub hooks: &'static [Hook],
     /// The signal along which it is shown, with the range.
     pub shown: (Signal, f64, f64),
+    /// How it is looked for where simulation and measurement disagree.
+    pub sought: Sought,
+}
+
+/// How an effect is looked for in the residual of measured against simulated pulses.
+#[derive(Debug)]
+pub enum Sought {
+    /// By its closed form.
+    Shape {
+        /// The parameter that says how large it is.
+        size: &'static str,
+        /// Sizes to try; the effect is 0 at size 0.
+        sizes: &'static [f64],
+        /// Another parameter that changes the shape, with values to try.
+        shape: Option<(&'static str, &'static [f64])>,
+    },
+    /// Not in the pulse of steady flight: known physics that is computed, or another channel's; why,
+    /// for people.
+    No(&'static str),
 }
 
 /// One parameter of an effect.

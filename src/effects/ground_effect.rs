@@ -1,6 +1,6 @@
 //! Near the ground the rotors' wake cannot leave, and thrust grows.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Change, Effect, Now, Own, Reference, Signals};
 
 const RADIUS: usize = 0;
@@ -87,6 +87,7 @@ impl Effect for GroundEffect {
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Height, 0.1, 3.0),
+            sought: Sought::Shape { size: "radius_m", sizes: &[0.08], shape: None },
         }
     }
 

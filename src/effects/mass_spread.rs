@@ -1,6 +1,6 @@
 //! Mass differs from drone to drone.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Effect, Own, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
@@ -34,6 +34,9 @@ impl Effect for MassSpread {
             }],
             hooks: &[Hook::Drone],
             shown: (Signal::Drone, -2.0, 2.0),
+            sought: Sought::No(
+                "a difference between drones: told from their offsets, not from the fleet's pulse",
+            ),
         }
     }
 

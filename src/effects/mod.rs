@@ -9,7 +9,7 @@
 pub mod active;
 mod added_mass;
 mod air_density;
-mod battery;
+pub mod battery;
 mod blade_flapping;
 pub mod definition;
 pub mod doc;
@@ -34,7 +34,7 @@ mod velocity_error;
 mod vortex_ring;
 
 pub use active::{Active, Air, Change, Now, Own, Reading, Start};
-pub use definition::{Class, Definition, Hook, Parameter, Signal, Values};
+pub use definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 pub use error::EffectError;
 pub use model::Model;
 pub use reference::Reference;

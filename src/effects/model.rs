@@ -51,8 +51,9 @@ impl Model {
     fn direct_us(&self, signals: &Signals) -> f64 {
         let at = self.reference.in_air(signals.density_ratio);
         let density = super::reference::DENSITY * signals.density_ratio;
-        let climb = signals.climb_mps;
-        let drag_n = self.base_drag_m2 * density * climb * climb.abs();
+        // The faces of AirSim's box meet the air along the rotor axis: a lean into the wind adds to it.
+        let along = signals.axial_mps();
+        let drag_n = self.base_drag_m2 * density * along * along.abs();
         at.hover_us() + at.thrust_us(1.0 + drag_n / at.weight_n()) + self.sum(signals, false)
     }
 

@@ -1,6 +1,6 @@
 //! Motors and controllers warm up.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Effect, Now, Own, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
@@ -48,6 +48,11 @@ impl Effect for MotorThermal {
             ],
             hooks: &[Hook::Command],
             shown: (Signal::Time, 0.0, 600.0),
+            sought: Sought::Shape {
+                size: "drift_us",
+                sizes: &[-12.0, 12.0],
+                shape: Some(("time_s", &[60.0, 100.0, 160.0])),
+            },
         }
     }
 

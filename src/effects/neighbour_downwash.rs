@@ -1,6 +1,6 @@
 //! The array of drones drives a sinking motion of the air it hovers in.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::reference::DENSITY;
 use super::{Air, Effect, Now, Own, Reference, Signals, Start, momentum};
 use crate::vehicle::Airframe;
@@ -74,6 +74,7 @@ impl Effect for NeighbourDownwash {
             ],
             hooks: &[Hook::Air],
             shown: (Signal::Neighbours, 0.0, 8.0),
+            sought: Sought::Shape { size: "strength", sizes: &[1.0], shape: None },
         }
     }
 

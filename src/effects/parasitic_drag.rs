@@ -1,6 +1,6 @@
 //! Drag of the body in the air stream.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::reference::DENSITY;
 use super::{Change, Effect, Now, Own, Reference, Signals};
 use crate::vehicle::Vehicle;
@@ -57,6 +57,7 @@ impl Effect for ParasiticDrag {
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Climb, -3.5, 3.5),
+            sought: Sought::Shape { size: "vertical_m2", sizes: &[0.02], shape: None },
         }
     }
 

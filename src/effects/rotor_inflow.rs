@@ -1,6 +1,6 @@
 //! Thrust falls with the flow through the rotor: momentum and blade element theory.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::reference::DENSITY;
 use super::{Change, Effect, Now, Own, Reference, Signals, Start, momentum};
 use crate::vehicle::{Airframe, Vehicle};
@@ -101,6 +101,11 @@ impl Effect for RotorInflow {
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Climb, -3.5, 3.5),
+            sought: Sought::Shape {
+                size: "inflow_share",
+                sizes: &[0.15, 0.3, 0.5, 0.7],
+                shape: None,
+            },
         }
     }
 

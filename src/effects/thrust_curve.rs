@@ -1,6 +1,6 @@
 //! The motor controller's curve from command to thrust is not the model's.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Effect, Own, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
@@ -51,6 +51,7 @@ impl Effect for ThrustCurve {
             }],
             hooks: &[Hook::Command],
             shown: (Signal::ModelIncrement, -100.0, 100.0),
+            sought: Sought::Shape { size: "expo", sizes: &[-0.3, 0.3, 0.6], shape: None },
         }
     }
 

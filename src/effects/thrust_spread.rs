@@ -1,6 +1,6 @@
 //! The rotors' thrust coefficient differs from drone to drone.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Effect, Own, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
@@ -32,6 +32,9 @@ impl Effect for ThrustSpread {
             }],
             hooks: &[Hook::Drone],
             shown: (Signal::Drone, -2.0, 2.0),
+            sought: Sought::No(
+                "a difference between drones: told from their offsets and responses",
+            ),
         }
     }
 

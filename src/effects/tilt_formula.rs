@@ -1,6 +1,6 @@
 //! The paper's correction of the pulse for tilt takes too much away.
 
-use super::definition::{Class, Definition, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Parameter, Signal, Sought, Values};
 use super::{Effect, Reference, Signals};
 
 const SENSITIVITY: usize = 0;
@@ -34,6 +34,7 @@ impl Effect for TiltFormula {
             }],
             hooks: &[],
             shown: (Signal::Tilt, 0.0, 0.2),
+            sought: Sought::No("known: the correction by thrust has no such error"),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Horizontal air speed carries the rotor's own inflow away.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::rotor_inflow::{Disc, LEAST_SHARE, MOST_SHARE, flow_us, share_of};
 use super::{Change, Effect, Now, Own, Reference, Signals, Start, momentum};
 use crate::vehicle::Airframe;
@@ -37,6 +37,7 @@ impl Effect for TranslationalLift {
             }],
             hooks: &[Hook::Loads],
             shown: (Signal::Horizontal, 0.0, 8.0),
+            sought: Sought::Shape { size: "inflow_share", sizes: &[0.5], shape: None },
         }
     }
 

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI};
 use rand_distr::{Distribution as _, StandardNormal};
 use statrs::function::erf::erf;
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::model::base_drag_m2;
 use super::reference::DENSITY;
 use super::{Air, Effect, Now, Own, Reference, Signals, Start, parasitic_drag};
@@ -86,6 +86,7 @@ impl Effect for Turbulence {
             ],
             hooks: &[Hook::Air],
             shown: (Signal::Climb, -3.5, 3.5),
+            sought: Sought::No("known physics: computed from the gusts that the logs show"),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The drone's idea of its vertical velocity is off or late.
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::{Effect, Own, Reference, Signals};
 
 const BIAS: usize = 0;
@@ -56,6 +56,7 @@ impl Effect for VelocityError {
             ],
             hooks: &[Hook::Sense],
             shown: (Signal::Drone, -2.0, 2.0),
+            sought: Sought::No("told from the velocity against the height, without the pulse"),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::definition::{Class, Definition, Hook, Parameter, Signal, Values};
+use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::rotor_inflow::{Disc, LEAST_SHARE, MOST_SHARE, flow_us, share_of};
 use super::{Change, Effect, Now, Own, Reference, Signals, Start, momentum};
 use crate::vehicle::Airframe;
@@ -89,6 +89,11 @@ impl Effect for VortexRing {
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Climb, -6.0, 1.0),
+            sought: Sought::Shape {
+                size: "inflow_share",
+                sizes: &[0.5],
+                shape: Some(("onset", &[0.4, 0.5, 0.6, 0.7])),
+            },
         }
     }
 

@@ -1,5 +1,36 @@
 //! Where simulation and measurement disagree, which physics is missing, and what cannot be known.
 
+mod bins;
+mod candidates;
+mod compare;
+pub mod data;
+mod detectable;
+mod drones;
+mod error;
+mod explain;
+mod filter;
+mod formula;
+mod generic;
+mod gls;
+mod heldout;
+mod lean;
+mod make;
+mod measure;
+mod minimise;
+mod noise;
+mod posterior;
+mod refine;
+mod refly;
+mod regimes;
+mod scene;
+mod search;
+mod sensor;
 pub mod verdict;
+pub mod words;
 
+pub use compare::Simulated;
+pub use data::{Data, Flown};
+pub use error::GapError;
+pub use explain::{Found, Options, search};
+pub use make::{Explained, Input, explain};
 pub use verdict::Verdict;

@@ -1,0 +1,125 @@
+//! Steady bins: stretches of constant commanded velocity, cut into pieces of about three seconds.
+//!
+//! Measured and simulated pulses are compared in these (physics note, section 3.2): long enough for
+//! noise to average, short enough that the air's own time scale shows.
+
+use crate::mission::plan::{Kind, Segment};
+
+/// Nothing is compared for so long after a change of the command, s.
+const SETTLE_S: f64 = 5.0;
+/// The same for hovers, which are short, s.
+const SETTLE_HOVER_S: f64 = 4.0;
+/// Cut at the end, s.
+const TRIM_S: f64 = 0.5;
+/// Shortest bin, s; bins are shorter than twice this.
+const SHORTEST_S: f64 = 2.5;
+
+/// One bin of a command group.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bin {
+    /// What is flown.
+    pub kind: Kind,
+    /// Start, show time, s.
+    pub start_s: f64,
+    /// End, excluded, s.
+    pub end_s: f64,
+    /// Commanded velocity, show frame, m/s, z up positive.
+    pub velocity_mps: [f64; 3],
+    /// Which segment of the group it is of; bins of one segment are held out together.
+    pub segment: usize,
+}
+
+impl Bin {
+    /// Its middle, show time, s.
+    pub fn middle_s(&self) -> f64 {
+        f64::midpoint(self.start_s, self.end_s)
+    }
+
+    /// Its length, s.
+    pub fn length_s(&self) -> f64 {
+        self.end_s - self.start_s
+    }
+
+    /// Commanded vertical velocity, m/s, up positive.
+    pub fn climb_mps(&self) -> f64 {
+        self.velocity_mps[2]
+    }
+
+    /// Whether the command has a horizontal part.
+    pub fn is_horizontal(&self) -> bool {
+        self.velocity_mps[0].hypot(self.velocity_mps[1]) > 0.1
+    }
+}
+
+/// The bins of what a group flies.
+pub fn of_segments(segments: &[Segment]) -> Vec<Bin> {
+    let steady = |segment: &&Segment| {
+        let flown =
+            !matches!(segment.kind, Kind::Wait | Kind::Takeoff | Kind::Ramp | Kind::Landing);
+        flown && segment.from_velocity_mps.is_none_or(|from| from == segment.velocity_mps)
+    };
+    let mut bins = Vec::new();
+    for (index, segment) in segments.iter().enumerate().filter(|(_, segment)| steady(segment)) {
+        let settle_s = if segment.kind.is_hover() { SETTLE_HOVER_S } else { SETTLE_S };
+        let start_s = segment.start_ms as f64 / 1000.0 + settle_s;
+        let end_s = segment.end_ms as f64 / 1000.0 - TRIM_S;
+        bins.extend(cut(segment.kind, start_s, end_s, segment.velocity_mps, index));
+    }
+    bins
+}
+
+/// Cuts a steady stretch into bins.
+pub fn cut(
+    kind: Kind,
+    start_s: f64,
+    end_s: f64,
+    velocity_mps: [f64; 3],
+    segment: usize,
+) -> impl Iterator<Item = Bin> {
+    let count = ((end_s - start_s) / SHORTEST_S).floor().max(0.0) as usize;
+    let length_s = (end_s - start_s) / count.max(1) as f64;
+    (0..count).map(move |index| Bin {
+        kind,
+        start_s: start_s + index as f64 * length_s,
+        end_s: start_s + (index + 1) as f64 * length_s,
+        velocity_mps,
+        segment,
+    })
+}
+
+/// What one drone did in one bin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BinValues {
+    /// Mean pulse of all rotors, brought to level flight, us.
+    pub pulse_us: f64,
+    /// Mean vertical velocity, m/s, up positive.
+    pub climb_mps: f64,
+    /// Mean height above home, m.
+    pub height_m: f64,
+    /// Mean lean of the thrust axis, show frame x and y, rad.
+    pub lean_rad: [f64; 2],
+    /// Battery voltage at rest, V; NaN: not logged.
+    pub resting_v: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mission::resolve::resolve;
+
+    #[test]
+    fn the_paper_ladder_has_its_bins_after_the_transients() {
+        let plan = resolve("calibration", &[]).unwrap().flights.remove(0).plan;
+        let bins = of_segments(&plan.groups[0].segments);
+        let legs = bins.iter().filter(|bin| bin.kind.is_leg()).count();
+        assert_eq!(legs, 14 * 5, "14.5 s of each leg");
+        let hovers = bins.iter().filter(|bin| bin.kind.is_hover()).count();
+        assert_eq!(hovers, 15 * 2);
+        for bin in &bins {
+            let segment = &plan.groups[0].segments[bin.segment];
+            assert!(bin.start_s >= segment.start_ms as f64 / 1000.0 + 4.0);
+            assert!(bin.end_s < segment.end_ms as f64 / 1000.0);
+            assert!((SHORTEST_S..2.0 * SHORTEST_S).contains(&bin.length_s()), "{bin:?}");
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! What may be missing: effects of the library in their closed forms, and motions of the air that
+//! look like them.
+
+use super::gls::Column;
+use super::scene::Scene;
+use crate::effects::{EffectError, LIBRARY, Sought};
+use crate::vehicle::{EffectTable, Vehicle};
+
+/// Change of a size that is in the model already, for its derivative.
+const CHANGE: f64 = 0.15;
+
+/// Something that may be missing.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// Name: the effect's, or that of a motion of the air.
+    pub name: &'static str,
+    /// Whether it is an effect of the vehicle that can be added to its model.
+    pub of_vehicle: bool,
+    /// Whether the model has it with another size.
+    pub was_there: bool,
+    /// The parameter that says how large it is, its unit and bounds.
+    pub size: Option<Size>,
+    /// Forms of it.
+    pub variants: Vec<Variant>,
+}
+
+/// The parameter of an effect that says how large it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Smallest value.
+    pub low: f64,
+    /// Largest value.
+    pub high: f64,
+    /// What the model has now; 0: nothing.
+    pub now: f64,
+    /// What is usual.
+    pub usual: f64,
+}
+
+/// One form of a candidate: an effect at one size and shape.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    /// The vehicle with it.
+    pub vehicle: Option<Vehicle>,
+    /// Size of the effect in it.
+    pub size: f64,
+    /// What it adds to the pulse, us.
+    pub column: Column,
+}
+
+/// All effects of the library that steady flight can show, held against a vehicle.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>, EffectError> {
+    let base = scene.pulses(vehicle)?;
+    let mut found = Vec::new();
+    for effect in LIBRARY.iter().copied() {
+        let definition = effect.definition();
+        let Sought::Shape { size, sizes, shape } = &definition.sought else { continue };
+        let Some(parameter) = definition.parameters.iter().find(|known| known.name == *size) else {
+            continue;
+        };
+        let table = vehicle.effects.get(definition.name).filter(|table| table.on);
+        let now = table.map_or(0.0, |table| {
+            let stated = table.parameters.get(*size).copied();
+            stated.unwrap_or_else(|| (parameter.default)(vehicle))
+        });
+        let sizes: Vec<f64> = if now == 0.0 {
+            sizes.to_vec()
+        } else {
+            let step = now * CHANGE;
+            vec![if now + step <= parameter.high { now + step } else { now - step }]
+        };
+        // A size that is in the model keeps its shape.
+        let shapes: Vec<Option<(&str, f64)>> = match shape {
+            Some((name, values)) if now == 0.0 => {
+                values.iter().map(|value| Some((*name, *value))).collect()
+            }
+            _ => vec![None],
+        };
+        let mut variants = Vec::new();
+        for value in sizes {
+            for shape in &shapes {
+                let mut other = vehicle.clone();
+                prepare(&mut other, definition.name, scene);
+                set(&mut other, definition.name, size, value);
+                if let Some((name, value)) = shape {
+                    set(&mut other, definition.name, name, *value);
+                }
+                // A form that the vehicle cannot have is no candidate.
+                let Ok(pulses) = scene.pulses(&other) else { continue };
+                let column = difference(&pulses, &base);
+                variants.push(Variant { vehicle: Some(other), size: value, column });
+            }
+        }
+        let usual = sizes_usual(definition.name, vehicle, parameter.default);
+        found.push(Candidate {
+            name: definition.name,
+            of_vehicle: true,
+            was_there: now != 0.0,
+            size: Some(Size {
+                name: parameter.name,
+                unit: parameter.unit,
+                low: parameter.low,
+                high: parameter.high,
+                now,
+                usual,
+            }),
+            variants,
+        });
+    }
+    Ok(found)
+}
+
+fn sizes_usual(name: &str, vehicle: &Vehicle, default: fn(&Vehicle) -> f64) -> f64 {
+    // An expo of 0 is no effect: the thrust curve of small motors.
+    if name == "thrust-curve" { 0.5 } else { default(vehicle) }
+}
+
+/// Sets what the logs say of an effect that is to be tried.
+fn prepare(vehicle: &mut Vehicle, name: &str, scene: &Scene) {
+    let is_new = !vehicle.effects.get(name).is_some_and(|table| table.on);
+    if name == "battery" && is_new && scene.resting_v > 0.0 {
+        set(vehicle, name, "cells", scene.cells);
+        set(vehicle, name, "initial_charge", 1.0);
+        // The model's hover is taken for that at the flight's mean voltage.
+        set(vehicle, name, "reference_v", scene.resting_v);
+    }
+}
+
+/// Sets a parameter of an effect and switches it on.
+pub fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f64) {
+    let table = vehicle.effects.entry(effect.to_owned()).or_insert_with(EffectTable::default);
+    table.on = true;
+    table.parameters.insert(parameter.to_owned(), value);
+}
+
+/// One column less another.
+pub fn difference(a: &Column, b: &Column) -> Column {
+    match (a, b) {
+        (Column::Shared(a), Column::Shared(b)) => Column::Shared(
+            a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect(),
+        ),
+        (Column::Own(a), _) => Column::Own(own(a, |group, drone, bin| -b.at(group, drone, bin))),
+        (Column::Shared(_), Column::Own(b)) => {
+            let negative = own(b, |group, drone, bin| -a.at(group, drone, bin));
+            Column::Own(
+                negative
+                    .into_iter()
+                    .map(|drones| {
+                        drones
+                            .into_iter()
+                            .map(|bins: Vec<f64>| bins.into_iter().map(|v| -v).collect())
+                            .collect()
+                    })
+                    .collect(),
+            )
+        }
+    }
+}
+
+fn own(a: &super::gls::Pulses, add: impl Fn(usize, usize, usize) -> f64) -> super::gls::Pulses {
+    a.iter()
+        .enumerate()
+        .map(|(group, drones)| {
+            drones
+                .iter()
+                .enumerate()
+                .map(|(drone, bins)| {
+                    let moved = bins.iter().enumerate();
+                    moved.map(|(bin, value)| value + add(group, drone, bin)).collect()
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// Motions of the air that an effect may be mistaken for: not the vehicle's, and never added to it.
+pub fn of_the_air(scene: &Scene, response: &[Vec<f64>], least: f64) -> Vec<Candidate> {
+    let last_s = scene.signals.iter().flatten().map(|s| s.time_s).fold(1.0, f64::max);
+    let column = |of: &dyn Fn(&crate::effects::Signals) -> f64| {
+        let group = |(signals, response): (&Vec<crate::effects::Signals>, &Vec<f64>)| {
+            signals.iter().zip(response).map(|(s, r)| -(r.abs() + least) * of(s)).collect()
+        };
+        Column::Shared(scene.signals.iter().zip(response).map(group).collect())
+    };
+    let air = |name, column| Candidate {
+        name,
+        of_vehicle: false,
+        was_there: false,
+        size: None,
+        variants: vec![Variant { vehicle: None, size: 1.0, column }],
+    };
+    vec![
+        air("updraft-drift", column(&|signals| signals.time_s / last_s)),
+        // Free convection near the ground: w grows with the cube root of height.
+        air("updraft-profile", column(&|signals| (signals.height_m.max(0.0) / 100.0).cbrt())),
+    ]
+}

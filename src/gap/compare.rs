@@ -1,0 +1,279 @@
+//! One comparison: the measured side, the simulated side, and the residual for any vehicle.
+
+use std::f64::consts::PI;
+
+use super::bins::BinValues;
+use super::candidates::difference;
+use super::data::Data;
+use super::error::GapError;
+use super::gls::{Column, Pulses};
+use super::lean::{LeanLaw, Wind, wind};
+use super::noise::{GRADIENT, GUSTS, GroupPattern, Hyper, OWN, SHARED};
+use super::refly::{mean_drone, refly};
+use super::scene::Scene;
+use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
+use crate::effects::{EffectError, Model, Reference, Signals};
+use crate::mission::plan::Plan;
+use crate::vehicle::Vehicle;
+
+/// The simulated side of a comparison.
+#[derive(Clone, Debug)]
+pub enum Simulated<'a> {
+    /// The embedded simulator re-flies the plan.
+    Refly(&'a Plan),
+    /// Somebody else's simulation: its bins by group.
+    Given(Vec<Vec<Option<BinValues>>>),
+}
+
+/// Both sides in the same bins, for one state of the model.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// The measured side; bins that the simulated side lacks are gone.
+    pub data: Data,
+    /// The simulated side, by group and bin.
+    pub side: Vec<Vec<BinValues>>,
+    /// What closed forms look at.
+    pub scene: Scene,
+    /// The wind.
+    pub wind: Wind,
+    /// What the closed loop does besides the closed form, by group and bin, us.
+    closure_us: Vec<Vec<f64>>,
+    /// The fleet's mean drone of the model.
+    pub vehicle: Vehicle,
+}
+
+/// Power of thrust that `u - 1000` goes with at hover.
+pub fn thrust_exponent(vehicle: &Vehicle) -> f64 {
+    let at = Reference::of(vehicle);
+    (at.sensitivity_us() / (at.hover_us() - 1000.0)).clamp(0.2, 1.5)
+}
+
+/// Ground height of a comparison, m above mean sea level.
+fn amsl_m(plan: Option<&Plan>) -> f64 {
+    plan.map_or(0.0, |plan| plan.site.ground_amsl_m)
+}
+
+impl Comparison {
+    /// Flies (or takes) the simulated side of a vehicle.
+    ///
+    /// # Errors
+    /// The vehicle cannot fly the plan, or nothing is common to both sides.
+    pub fn new(
+        data: &Data,
+        vehicle: &Vehicle,
+        simulated: &Simulated<'_>,
+        plan: Option<&Plan>,
+    ) -> Result<Self, GapError> {
+        let vehicle = mean_drone(vehicle);
+        let amsl_m = amsl_m(plan);
+        let law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY * density_ratio(amsl_m));
+        let blown = wind(data, law);
+        let values: Vec<Vec<Option<BinValues>>> = match simulated {
+            Simulated::Given(values) => values.clone(),
+            Simulated::Refly(plan) => fly_groups(data, &vehicle, plan, blown.mean_mps)?,
+        };
+        let has = |group: usize, bin: usize| values[group][bin].is_some();
+        let data = data.keep(has);
+        let side: Vec<Vec<BinValues>> =
+            values.into_iter().map(|group| group.into_iter().flatten().collect()).collect();
+        if data.groups.iter().map(|group| group.bins.len()).sum::<usize>() < FEWEST_BINS {
+            return Err(GapError::NothingCommon);
+        }
+        let blown = wind(&data, law);
+        let scene = Scene::measured(&data, &side, &blown, amsl_m);
+        let simulated_scene = scene.simulated(&data, &side, blown.mean_mps);
+        let closed = simulated_scene.pulses(&vehicle)?;
+        let closure_us = side
+            .iter()
+            .enumerate()
+            .map(|(group, bins)| {
+                let apart =
+                    |(bin, values): (usize, &BinValues)| values.pulse_us - closed.at(group, 0, bin);
+                bins.iter().enumerate().map(apart).collect()
+            })
+            .collect();
+        Ok(Self { data, side, scene, wind: blown, closure_us, vehicle })
+    }
+
+    /// Measured less simulated pulses of all drones for a vehicle whose closed form is near the
+    /// model's; with the mean effect of gusts of this strength on a curved response, m/s.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub fn residual(&self, vehicle: &Vehicle, gusts_mps: f64) -> Result<Pulses, EffectError> {
+        let closed = self.scene.pulses(vehicle)?;
+        let bent = rectified(&self.scene, vehicle, gusts_mps)?;
+        Ok(self
+            .data
+            .groups
+            .iter()
+            .enumerate()
+            .map(|(group, of)| {
+                let drone = |(drone, values): (usize, &Vec<BinValues>)| {
+                    values
+                        .iter()
+                        .enumerate()
+                        .map(|(bin, values)| {
+                            let model = closed.at(group, drone, bin)
+                                + self.closure_us[group][bin]
+                                + bent[group][bin];
+                            values.pulse_us - model
+                        })
+                        .collect()
+                };
+                of.measured.iter().enumerate().map(drone).collect()
+            })
+            .collect())
+    }
+
+    /// What the noise needs to know of the groups, for a vehicle.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub fn patterns(&self, vehicle: &Vehicle) -> Result<Vec<GroupPattern>, EffectError> {
+        let response = self.scene.response(vehicle)?;
+        let closed = self.scene.pulses(vehicle)?;
+        Ok(self
+            .data
+            .groups
+            .iter()
+            .enumerate()
+            .map(|(group, of)| {
+                let pulse = |bin: usize| {
+                    let count = of.slots.len().max(1);
+                    (0..count).map(|drone| closed.at(group, drone, bin)).sum::<f64>() / count as f64
+                };
+                let pulses: Vec<f64> = (0..of.bins.len()).map(pulse).collect();
+                let hovers = of.bins.iter().zip(&pulses).filter(|(bin, _)| bin.kind.is_hover());
+                let (sum, count) = hovers.fold((0.0, 0.0), |(s, c), (_, p)| (s + p, c + 1.0));
+                let hover_us = if count > 0.0 {
+                    sum / count
+                } else {
+                    pulses.iter().sum::<f64>() / pulses.len().max(1) as f64
+                };
+                GroupPattern {
+                    drones: of.slots.len(),
+                    time_s: of.bins.iter().map(super::bins::Bin::middle_s).collect(),
+                    height_m: self.scene.signals[group].iter().map(|s| s.height_m).collect(),
+                    response: response[group].clone(),
+                    slope_us: pulses.iter().map(|pulse| pulse - hover_us).collect(),
+                }
+            })
+            .collect())
+    }
+
+    /// Only some bins, chosen by the places of group and bin.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(usize, usize) -> bool) -> Self {
+        fn pick<T: Clone>(values: &[Vec<T>], keep: &impl Fn(usize, usize) -> bool) -> Vec<Vec<T>> {
+            let bins = |(group, bins): (usize, &Vec<T>)| {
+                let kept = bins.iter().enumerate().filter(|(bin, _)| keep(group, *bin));
+                kept.map(|(_, value)| value.clone()).collect()
+            };
+            values.iter().enumerate().map(bins).collect()
+        }
+        let wind = Wind { air_mps: pick(&self.wind.air_mps, &keep), ..self.wind.clone() };
+        Self {
+            data: self.data.keep(&keep),
+            side: pick(&self.side, &keep),
+            scene: self.scene.only(&keep),
+            wind,
+            closure_us: pick(&self.closure_us, &keep),
+            vehicle: self.vehicle.clone(),
+        }
+    }
+
+    /// Direction of the air over ground-fixed axes by group and bin, rad from the nose.
+    pub fn headings(&self) -> Vec<Vec<f64>> {
+        // Show drones keep their nose along show x.
+        let angle = |air: &[f64; 2]| air[1].atan2(air[0]).clamp(-PI, PI);
+        self.wind.air_mps.iter().map(|group| group.iter().map(angle).collect()).collect()
+    }
+
+    /// What a change of the vehicle adds to the pulse.
+    ///
+    /// # Errors
+    /// Effects of a vehicle that are not valid.
+    pub fn change(&self, from: &Vehicle, to: &Vehicle) -> Result<Column, EffectError> {
+        Ok(difference(&self.scene.pulses(to)?, &self.scene.pulses(from)?))
+    }
+}
+
+/// Fewest bins of a comparison.
+const FEWEST_BINS: usize = 12;
+
+/// Standard deviation of the vertical air that a noise says a drone meets, m/s.
+pub fn gusts_mps(hyper: &Hyper) -> f64 {
+    let square = |place| hyper.get(place).powi(2);
+    (square(SHARED) + square(GRADIENT) + square(OWN) + square(GUSTS)).sqrt()
+}
+
+fn fly_groups(
+    data: &Data,
+    vehicle: &Vehicle,
+    plan: &Plan,
+    wind_mps: [f64; 2],
+) -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
+    use rayon::prelude::*;
+    data.groups
+        .par_iter()
+        .map(|group| {
+            // The drone nearest to the group's middle stands for all.
+            let count = group.place_m.len().max(1) as f64;
+            let middle = |axis: usize| group.place_m.iter().map(|p| p[axis]).sum::<f64>() / count;
+            let (x, y) = (middle(0), middle(1));
+            let apart = |place: &[f64; 2]| (place[0] - x).hypot(place[1] - y);
+            let nearest = group.slots.iter().zip(&group.place_m);
+            let nearest = nearest.min_by(|a, b| apart(a.1).total_cmp(&apart(b.1)));
+            let slot =
+                nearest.and_then(|(slot, _)| plan.slot(*slot)).ok_or(GapError::NothingCommon)?;
+            let exponent = thrust_exponent(vehicle);
+            Ok(refly(vehicle, plan, slot, &group.bins, wind_mps, exponent)?)
+        })
+        .collect()
+}
+
+/// Nodes and weights of the mean over a normal distribution (Gauss-Hermite, 7 points).
+const NODES: [(f64, f64); 7] = [
+    (-3.750_439_717_725_742, 0.000_548_268_855_972_217),
+    (-2.366_759_410_734_541, 0.030_757_123_967_586_5),
+    (-1.154_405_394_739_968, 0.240_123_178_605_012_9),
+    (0.0, 0.457_142_857_142_857_1),
+    (1.154_405_394_739_968, 0.240_123_178_605_012_9),
+    (2.366_759_410_734_541, 0.030_757_123_967_586_5),
+    (3.750_439_717_725_742, 0.000_548_268_855_972_217),
+];
+
+/// Mean of the pulse in gusts less the pulse in their mean: known physics, computed and never named
+/// (physics note, section 2.4, number 17).
+fn rectified(
+    scene: &Scene,
+    vehicle: &Vehicle,
+    gusts_mps: f64,
+) -> Result<Vec<Vec<f64>>, EffectError> {
+    let model = Model::of(vehicle)?;
+    let of = |signals: &Signals| {
+        if gusts_mps <= 0.0 {
+            return 0.0;
+        }
+        let at = |node: f64| {
+            let climb_mps = signals.climb_mps - node * gusts_mps;
+            model.pulse_us(&Signals { climb_mps, ..*signals })
+        };
+        NODES.iter().map(|(node, weight)| weight * at(*node)).sum::<f64>() - at(0.0)
+    };
+    Ok(scene.signals.iter().map(|group| group.iter().map(of).collect()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_have_the_moments_of_a_normal_distribution() {
+        let moment = |power: i32| NODES.iter().map(|(x, w)| w * x.powi(power)).sum::<f64>();
+        for (power, wanted) in [(0, 1.0), (2, 1.0), (4, 3.0), (6, 15.0), (8, 105.0)] {
+            assert!((moment(power) - wanted).abs() < 1e-9 * wanted, "{power}: {}", moment(power));
+        }
+    }
+}

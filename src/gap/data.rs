@@ -1,0 +1,297 @@
+//! The measured side: all drones of a campaign's flight in the same steady bins.
+
+use super::bins::{Bin, BinValues, cut, of_segments};
+use super::measure::measured;
+use crate::analysis::windows::inferred;
+use crate::flight::Flight;
+use crate::mission::plan::{Plan, Slot};
+
+/// A bin is kept when this share of the drones has it.
+const BIN_SHARE: f64 = 0.8;
+/// A drone is kept when it has this share of the kept bins; the others are filled.
+const DRONE_SHARE: f64 = 0.9;
+/// Drones stand next to each other within this many grid spacings.
+const NEXT_SPACINGS: f64 = 1.5;
+
+/// One drone's log, and who flew it.
+#[derive(Debug)]
+pub struct Flown<'a> {
+    /// Slot of the plan; without a plan a running number from 1.
+    pub slot: u16,
+    /// The log.
+    pub flight: &'a Flight,
+}
+
+/// All drones of a command group.
+#[derive(Clone, Debug, Default)]
+pub struct Group {
+    /// Its name.
+    pub name: String,
+    /// Its bins, in the order of time.
+    pub bins: Vec<Bin>,
+    /// Slots, in order.
+    pub slots: Vec<u16>,
+    /// Where each drone's home is, show frame, m.
+    pub place_m: Vec<[f64; 2]>,
+    /// How many drones stand next to each.
+    pub neighbours: Vec<f64>,
+    /// What each drone did in each bin.
+    pub measured: Vec<Vec<BinValues>>,
+    /// Motors started, show time, s (earliest of the drones).
+    pub armed_s: f64,
+}
+
+impl Group {
+    /// Mean over the drones of something in a bin.
+    pub fn mean(&self, bin: usize, of: impl Fn(&BinValues) -> f64) -> f64 {
+        let sum: f64 = self.measured.iter().map(|drone| of(&drone[bin])).sum();
+        sum / self.measured.len().max(1) as f64
+    }
+
+    /// Only some of its drones.
+    #[must_use]
+    fn only(&self, keep: impl Fn(usize) -> bool) -> Self {
+        fn pick<T: Clone>(values: &[T], keep: &impl Fn(usize) -> bool) -> Vec<T> {
+            let kept = values.iter().enumerate().filter(|(index, _)| keep(*index));
+            kept.map(|(_, value)| value.clone()).collect()
+        }
+        Self {
+            name: self.name.clone(),
+            bins: self.bins.clone(),
+            slots: pick(&self.slots, &keep),
+            place_m: pick(&self.place_m, &keep),
+            neighbours: pick(&self.neighbours, &keep),
+            measured: pick(&self.measured, &keep),
+            armed_s: self.armed_s,
+        }
+    }
+}
+
+/// The measured side of a comparison.
+#[derive(Clone, Debug, Default)]
+pub struct Data {
+    /// Command groups that have drones.
+    pub groups: Vec<Group>,
+    /// Drones left out, with their reasons.
+    pub left_out: Vec<String>,
+}
+
+impl Data {
+    /// Drones in steady bins of the plan's groups.
+    pub fn of_plan(plan: &Plan, flown: &[Flown<'_>], thrust_exponent: f64) -> Self {
+        let mut data = Self::default();
+        for (index, group) in plan.groups.iter().enumerate() {
+            let bins = of_segments(&group.segments);
+            let of_group = |slot: &Slot| usize::from(slot.group) == index;
+            let drones: Vec<(&Slot, &Flight)> = flown
+                .iter()
+                .filter_map(|one| Some((plan.slot(one.slot)?, one.flight)))
+                .filter(|(slot, _)| of_group(slot))
+                .collect();
+            let orientation = plan.site.orientation_deg;
+            let values: Vec<(u16, [f64; 2], Vec<Option<BinValues>>)> = drones
+                .iter()
+                .map(|(slot, flight)| {
+                    let place = [slot.home_m[0], slot.home_m[1]];
+                    let values = measured(flight, &bins, orientation, thrust_exponent);
+                    (slot.slot, place, values)
+                })
+                .collect();
+            let armed = drones.iter().filter_map(|(_, flight)| flight.armed_s.first());
+            let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
+            data.add(&group.name, bins, values, armed_s);
+        }
+        let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
+        data.count_neighbours(&plan.slots, spacing_m);
+        data
+    }
+
+    /// Drones without a plan: bins from the first log's own commands.
+    pub fn of_logs(flown: &[Flown<'_>], thrust_exponent: f64) -> Self {
+        let mut data = Self::default();
+        let bins: Vec<Bin> = flown
+            .iter()
+            .map(|one| inferred(one.flight))
+            .find(|targets| !targets.is_empty())
+            .unwrap_or_default()
+            .iter()
+            .enumerate()
+            .flat_map(|(index, target)| {
+                let velocity = [0.0, 0.0, target.commanded_mps];
+                cut(target.kind, target.start_s, target.end_s, velocity, index)
+            })
+            .collect();
+        let values = flown
+            .iter()
+            .map(|one| (one.slot, [0.0; 2], measured(one.flight, &bins, 0.0, thrust_exponent)))
+            .collect();
+        let armed = flown.iter().filter_map(|one| one.flight.armed_s.first());
+        let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
+        data.add("all", bins, values, armed_s);
+        data
+    }
+
+    /// The same bins of other logs, averaged: an external simulation. `None`: it lacks the bin.
+    pub fn averaged(
+        &self,
+        flown: &[Flown<'_>],
+        thrust_exponent: f64,
+    ) -> Vec<Vec<Option<BinValues>>> {
+        self.groups
+            .iter()
+            .map(|group| {
+                let all: Vec<Vec<Option<BinValues>>> = flown
+                    .iter()
+                    .map(|one| measured(one.flight, &group.bins, 0.0, thrust_exponent))
+                    .collect();
+                (0..group.bins.len())
+                    .map(|bin| average(all.iter().filter_map(|drone| drone[bin].as_ref())))
+                    .collect()
+            })
+            .collect()
+    }
+
+    fn add(
+        &mut self,
+        name: &str,
+        bins: Vec<Bin>,
+        drones: Vec<(u16, [f64; 2], Vec<Option<BinValues>>)>,
+        armed_s: f64,
+    ) {
+        let has_any =
+            |drone: &(u16, [f64; 2], Vec<Option<BinValues>>)| drone.2.iter().any(Option::is_some);
+        for (slot, ..) in drones.iter().filter(|drone| !has_any(drone)) {
+            self.left_out.push(format!("slot {slot}: no steady flight of the plan in its log"));
+        }
+        let drones: Vec<_> = drones.into_iter().filter(has_any).collect();
+        let needed = (drones.len() as f64 * BIN_SHARE).ceil() as usize;
+        let kept: Vec<usize> = (0..bins.len())
+            .filter(|bin| drones.iter().filter(|drone| drone.2[*bin].is_some()).count() >= needed)
+            .collect();
+        let mut group = Group {
+            name: name.to_owned(),
+            bins: kept.iter().map(|bin| bins[*bin].clone()).collect(),
+            armed_s: if armed_s.is_finite() { armed_s } else { 0.0 },
+            ..Group::default()
+        };
+        let mut holes = Vec::new();
+        for (slot, place_m, values) in drones {
+            let there: Vec<Option<BinValues>> = kept.iter().map(|bin| values[*bin]).collect();
+            let count = there.iter().filter(|value| value.is_some()).count();
+            if (count as f64) < DRONE_SHARE * kept.len() as f64 || count == 0 {
+                self.left_out.push(format!(
+                    "slot {slot}: only {count} of {} steady bins are usable (gaps in the log, \
+                     motors at a limit, or another flight)",
+                    kept.len()
+                ));
+                continue;
+            }
+            group.slots.push(slot);
+            group.place_m.push(place_m);
+            holes.push(there);
+        }
+        group.measured = fill(&holes);
+        group.neighbours = vec![0.0; group.slots.len()];
+        if !group.slots.is_empty() && !group.bins.is_empty() {
+            self.groups.push(group);
+        }
+    }
+
+    fn count_neighbours(&mut self, slots: &[Slot], spacing_m: f64) {
+        let next = |a: &[f64; 2], b: &[f64; 3]| {
+            let apart_m = (a[0] - b[0]).hypot(a[1] - b[1]);
+            apart_m > 0.1 && apart_m < NEXT_SPACINGS * spacing_m
+        };
+        for group in &mut self.groups {
+            let count = |place: &[f64; 2]| {
+                slots.iter().filter(|slot| next(place, &slot.home_m)).count() as f64
+            };
+            group.neighbours = group.place_m.iter().map(count).collect();
+        }
+    }
+
+    /// Drones in all.
+    pub fn drones(&self) -> usize {
+        self.groups.iter().map(|group| group.slots.len()).sum()
+    }
+
+    /// Drones of each group.
+    pub fn counts(&self) -> Vec<usize> {
+        self.groups.iter().map(|group| group.slots.len()).collect()
+    }
+
+    /// Those that are fitted, and those that are held out: every fourth drone of each group of at
+    /// least eight.
+    pub fn split(&self) -> (Self, Self) {
+        let is_held = |group: &Group, index: usize| group.slots.len() >= 8 && index % 4 == 2;
+        let part = |held: bool| Self {
+            groups: self
+                .groups
+                .iter()
+                .map(|group| group.only(|index| is_held(group, index) == held))
+                .collect(),
+            left_out: self.left_out.clone(),
+        };
+        (part(false), part(true))
+    }
+
+    /// Only some bins, chosen by the places of group and bin.
+    #[must_use]
+    pub fn keep(&self, keep: impl Fn(usize, usize) -> bool) -> Self {
+        let mut data = self.clone();
+        for (index, group) in data.groups.iter_mut().enumerate() {
+            let kept: Vec<bool> = (0..group.bins.len()).map(|bin| keep(index, bin)).collect();
+            let pick = |values: &[BinValues]| {
+                values.iter().zip(&kept).filter(|(_, keep)| **keep).map(|(v, _)| *v).collect()
+            };
+            group.measured = group.measured.iter().map(|drone| pick(drone)).collect();
+            let bins = group.bins.iter().zip(&kept).filter(|(_, keep)| **keep);
+            group.bins = bins.map(|(bin, _)| bin.clone()).collect();
+        }
+        data
+    }
+}
+
+/// Fills holes with the group's mean of the bin, moved by the drone's own offset from it.
+fn fill(drones: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
+    let bins = drones.first().map_or(0, Vec::len);
+    let means: Vec<Option<BinValues>> = (0..bins)
+        .map(|bin| average(drones.iter().filter_map(|drone| drone[bin].as_ref())))
+        .collect();
+    drones
+        .iter()
+        .map(|drone| {
+            let apart: Vec<f64> = drone
+                .iter()
+                .zip(&means)
+                .filter_map(|(own, mean)| Some((*own)?.pulse_us - (*mean)?.pulse_us))
+                .collect();
+            let offset_us = apart.iter().sum::<f64>() / apart.len().max(1) as f64;
+            let value = |(own, mean): (&Option<BinValues>, &Option<BinValues>)| {
+                own.or_else(|| mean.map(|m| BinValues { pulse_us: m.pulse_us + offset_us, ..m }))
+            };
+            drone.iter().zip(&means).filter_map(value).collect()
+        })
+        .collect()
+}
+
+fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues> {
+    let mut sum = BinValues::default();
+    let mut count = 0.0;
+    for value in values {
+        count += 1.0;
+        sum.pulse_us += value.pulse_us;
+        sum.climb_mps += value.climb_mps;
+        sum.height_m += value.height_m;
+        sum.lean_rad[0] += value.lean_rad[0];
+        sum.lean_rad[1] += value.lean_rad[1];
+        sum.resting_v += value.resting_v;
+    }
+    (count > 0.0).then(|| BinValues {
+        pulse_us: sum.pulse_us / count,
+        climb_mps: sum.climb_mps / count,
+        height_m: sum.height_m / count,
+        lean_rad: sum.lean_rad.map(|sum| sum / count),
+        resting_v: sum.resting_v / count,
+    })
+}

@@ -1,0 +1,111 @@
+//! What a flight could not have shown: the smallest size of each effect that would have been named.
+
+use super::candidates::{Candidate, library};
+use super::error::GapError;
+use super::explain::Found;
+use super::gls::{Problem, Solution, Split, White};
+use super::search::FLOOR_NATS;
+use super::verdict::Detectable;
+use crate::effects::{LIBRARY, Sought};
+
+/// Fisher z from which an effect is found nearly always.
+const SEEN_Z: f64 = 5.0;
+/// Correlation from which two effects leave the same trace.
+const SAME: f64 = 0.9;
+/// A trace this small says nothing, us per usual size.
+const NOTHING_US: f64 = 0.05;
+
+/// The table for everything in the library, with the final model and noise.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
+    let comparison = &found.comparison;
+    let patterns = comparison.patterns(&found.vehicle)?;
+    let split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
+    let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.hyper);
+    let candidates = library(&found.vehicle, &comparison.scene)?;
+    let drones = comparison.data.counts();
+    let best: Vec<(&Candidate, Option<(White, f64, f64)>)> = candidates
+        .iter()
+        .map(|candidate| (candidate, strongest(candidate, &solution, &drones)))
+        .collect();
+    let mut table = Vec::new();
+    for effect in LIBRARY.iter().copied() {
+        let definition = effect.definition();
+        let nothing = |why: &str| Detectable {
+            effect: definition.name.to_owned(),
+            parameter: String::new(),
+            unit: String::new(),
+            usual: 0.0,
+            smallest: None,
+            usual_z: 0.0,
+            would_be_seen: false,
+            like: Vec::new(),
+            why: why.to_owned(),
+        };
+        if let Sought::No(why) = &definition.sought {
+            table.push(nothing(why));
+            continue;
+        }
+        let Some((candidate, trace)) =
+            best.iter().find(|(candidate, _)| candidate.name == definition.name)
+        else {
+            continue;
+        };
+        let (Some(size), Some((white, per_size, us))) = (candidate.size, trace) else {
+            table.push(nothing("the vehicle cannot have it"));
+            continue;
+        };
+        let usual_z = per_size * size.usual;
+        let smallest = (2.0 * FLOOR_NATS).sqrt() / per_size;
+        let like: Vec<String> = best
+            .iter()
+            .filter(|(other, _)| other.name != candidate.name)
+            .filter_map(|(other, trace)| Some((other, trace.as_ref()?)))
+            .filter(|(_, (other, ..))| solution.likeness(white, other).abs() > SAME)
+            .map(|(other, _)| other.name.to_owned())
+            .collect();
+        let excited = us * size.usual > NOTHING_US;
+        let reach = smallest.is_finite() && smallest <= size.high && excited;
+        let why = if !excited {
+            "this flight does not excite it: its trace is below a twentieth of a microsecond"
+        } else if !reach {
+            "even the largest possible size is lost in air and noise"
+        } else {
+            ""
+        };
+        table.push(Detectable {
+            effect: definition.name.to_owned(),
+            parameter: size.name.to_owned(),
+            unit: size.unit.to_owned(),
+            usual: size.usual,
+            smallest: reach.then_some(smallest),
+            usual_z: if usual_z.is_finite() { usual_z } else { 0.0 },
+            would_be_seen: usual_z >= SEEN_Z,
+            like,
+            why: why.to_owned(),
+        });
+    }
+    Ok(table)
+}
+
+/// The form of a candidate that the flight shows best: whitened, its z and its trace (us) per unit of
+/// the size.
+fn strongest(
+    candidate: &Candidate,
+    solution: &Solution,
+    drones: &[usize],
+) -> Option<(White, f64, f64)> {
+    let now = candidate.size.map_or(0.0, |size| size.now);
+    candidate
+        .variants
+        .iter()
+        .map(|variant| {
+            let white = solution.white(&variant.column);
+            let by = (variant.size - now).abs().max(1e-12);
+            let per_size = solution.information(&white).max(0.0).sqrt() / by;
+            (white, per_size, variant.column.spread(drones) / by)
+        })
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+}

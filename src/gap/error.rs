@@ -1,0 +1,48 @@
+//! Why a comparison cannot be made.
+
+use thiserror::Error;
+
+use crate::effects::EffectError;
+use crate::sim::SimError;
+
+/// A comparison of measurement and simulation that cannot be made.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum GapError {
+    /// No drone has steady flight.
+    #[error(
+        "no log has steady flight of the plan to compare{}", 
+        .reasons.iter().take(10).map(|reason| format!("\n  {reason}")).collect::<String>()
+    )]
+    NothingMeasured {
+        /// Why each was left out.
+        reasons: Vec<String>,
+    },
+    /// Too few bins on both sides.
+    #[error(
+        "measurement and simulation have too little steady flight in common: were both flown from \
+         the same plan?"
+    )]
+    NothingCommon,
+    /// The pulse never changes.
+    #[error(
+        "the pulse is the same ({value_us:.1} us) in all of the flight: the logs hold a constant, \
+         not motor outputs"
+    )]
+    ConstantPulse {
+        /// Its value, us.
+        value_us: f64,
+    },
+    /// Neither a plan nor logs of a simulation.
+    #[error(
+        "there is no simulated side: give the plan that was flown (--plan), so that it can be flown \
+         again, or logs of a simulation (--simulated)"
+    )]
+    NoSimulatedSide,
+    /// The model could not be flown.
+    #[error("the model's flight failed")]
+    Simulation(#[from] SimError),
+    /// The model is not valid.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+}

@@ -1,0 +1,427 @@
+//! The workflow: find, name, add, and again, until nothing passes.
+
+use super::candidates::{Candidate, library, of_the_air};
+use super::compare::{Comparison, Simulated, gusts_mps};
+use super::data::Data;
+use super::error::GapError;
+use super::generic::{Generic, all};
+use super::gls::{Column, Likelihood, Problem, Split};
+use super::noise::{GroupPattern, Hyper, LEAST, WHITE};
+use super::refine::{Parameter, fitted, parameters_of, refine, slopes, value_of};
+use super::search::{Ranked, RankedGeneric, Round, Sought, Thresholds, round, thresholds};
+use super::verdict::{Finding, Rest, Rival, Shape, Step};
+use crate::mission::plan::Plan;
+use crate::vehicle::Vehicle;
+
+/// Choices of the workflow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Chance of naming anything in a step when there is nothing.
+    pub alpha: f64,
+    /// Simulated flights for the thresholds.
+    pub replicates: usize,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Most effects that are named.
+    pub most_steps: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { alpha: 0.005, replicates: 60, seed: 1, most_steps: 4 }
+    }
+}
+
+/// Rivals within so many nats explain as well.
+const CLASS_NATS: f64 = 4.0;
+/// Rivals must leave a similar trace: correlation with everything else partialled out.
+const ALIKE: f64 = 0.6;
+/// A free shape is another thing than the best effect when it gains this much more.
+const FREE_BETTER: f64 = 1.25;
+/// And when this share of its gain is left with the effect in the model.
+const FREE_LEFT: f64 = 0.35;
+/// Effects smaller than this are not named in the field, us: 0.1 m/s.
+const MATERIAL_US: f64 = 2.5;
+
+/// Smallest effect that is named, us: where air and noise are much smaller than in the field (a single
+/// drone in a simulator's still air), smaller effects are real.
+fn material_us(groups: &[GroupPattern], hyper: &Hyper) -> f64 {
+    let responses = || groups.iter().flat_map(|group| &group.response);
+    let mean = responses().map(|one| one.abs()).sum::<f64>() / responses().count().max(1) as f64;
+    let noise_us = hyper.get(WHITE) + (mean + hyper.get(LEAST)) * gusts_mps(hyper);
+    (2.0 * noise_us).clamp(0.75, MATERIAL_US)
+}
+
+/// What the loop knows at its end.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The model with what was found.
+    pub vehicle: Vehicle,
+    /// The last comparison, against that model.
+    pub comparison: Comparison,
+    /// Regressors of what is no effect of the vehicle.
+    pub extras: Vec<Column>,
+    /// Fitted parameters.
+    pub parameters: Vec<Parameter>,
+    /// Their values and standard errors.
+    pub values: Vec<(f64, f64)>,
+    /// Noise with everything in the model.
+    pub hyper: Hyper,
+    /// Strength of gusts that the rectification was computed with, m/s.
+    pub gusts_mps: f64,
+    /// What was found.
+    pub steps: Vec<Step>,
+    /// The end of the search.
+    pub rest: Rest,
+}
+
+/// Runs the loop on the drones that are to be fitted.
+///
+/// # Errors
+/// See [`GapError`].
+pub fn search(
+    data: &Data,
+    vehicle: &Vehicle,
+    simulated: &Simulated<'_>,
+    plan: Option<&Plan>,
+    options: &Options,
+) -> Result<Found, GapError> {
+    let mut comparison = Comparison::new(data, vehicle, simulated, plan)?;
+    let mut found = Found {
+        vehicle: comparison.vehicle.clone(),
+        comparison: comparison.clone(),
+        extras: Vec::new(),
+        parameters: Vec::new(),
+        values: Vec::new(),
+        hyper: Hyper::default(),
+        gusts_mps: 0.0,
+        steps: Vec::new(),
+        rest: Rest::default(),
+    };
+    for step in 0..=options.most_steps {
+        let patterns = comparison.patterns(&found.vehicle)?;
+        let mut split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
+        // Gusts that the residual shows bend the model's curve: known physics first.
+        let mut free = found.extras.clone();
+        free.extend(slopes(&comparison, &found.vehicle, &found.parameters)?);
+        let with_extras = |split| Problem::new(&patterns, split).with(&free);
+        let quick = with_extras(&split).fit(found.hyper, Likelihood::Profile);
+        found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
+        split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
+        // What was named before stays free: its size may change with what comes after.
+        let problem = Problem::new(&patterns, &split).with(&free);
+        let least = quick.hyper.get(LEAST);
+        let mut candidates = library(&found.vehicle, &comparison.scene)?;
+        let response: Vec<Vec<f64>> = patterns.iter().map(|group| group.response.clone()).collect();
+        candidates.extend(of_the_air(&comparison.scene, &response, least));
+        let generics = all(&comparison.scene, &comparison.headings());
+        let drones = comparison.data.counts();
+        let sought = Sought { library: &candidates, generics: &generics, drones: &drones };
+        let round = round(&problem, quick.hyper, sought);
+        found.hyper = round.base.hyper;
+        let material_us = material_us(&patterns, &round.base.hyper);
+        let decision = decide(&problem, &round, sought, material_us, options, step);
+        found.rest = Rest {
+            gain_nats: round.best().max(round.best_generic()),
+            candidate: best_name(&round, sought),
+            threshold_nats: decision.thresholds.library,
+            reduced_chi2: round.base.chi2 / round.base.freedom.max(1.0),
+        };
+        if step == options.most_steps {
+            found.comparison = comparison;
+            break;
+        }
+        match decision.what {
+            What::Nothing => {
+                found.comparison = comparison;
+                break;
+            }
+            What::Effects(members) => {
+                let best = &members[0];
+                let candidate = &candidates[best.candidate];
+                let variant = &candidate.variants[best.variant];
+                let rivals = rivals(&round, sought);
+                if let Some(changed) = &variant.vehicle {
+                    let before =
+                        candidate.was_there.then(|| candidate.size.map(|size| size.now)).flatten();
+                    let mut next = changed.clone();
+                    if let Some(size) = candidate.size {
+                        let start = size.now + best.beta * (variant.size - size.now);
+                        super::candidates::set(
+                            &mut next,
+                            candidate.name,
+                            size.name,
+                            start.clamp(size.low, size.high),
+                        );
+                    }
+                    let known = found.parameters.iter().any(|p| p.effect == candidate.name);
+                    if !known {
+                        let more =
+                            parameters_of(&comparison, &next, candidate.name, before, &round.base)?;
+                        found.parameters.extend(more);
+                    }
+                    found.vehicle = next;
+                    found.hyper = best.hyper;
+                    found.refit(&comparison)?;
+                } else {
+                    found.extras.push(variant.column.clone());
+                    found.hyper = best.hyper;
+                }
+                let names: Vec<String> =
+                    members.iter().map(|one| candidates[one.candidate].name.to_owned()).collect();
+                let finding = finding(names, &found, candidate.was_there);
+                found.steps.push(Step {
+                    finding,
+                    gain_nats: best.gain,
+                    threshold_nats: decision.thresholds.library,
+                    alpha: options.alpha,
+                    size_us: best.size_us,
+                    rivals,
+                    held_out_us: None,
+                    shape: drawn(&comparison, variant, best.beta),
+                });
+            }
+            What::Free(free) => {
+                let generic = &generics[free.generic];
+                let shape = generic.shape(&free.beta);
+                found.extras.extend(generic.columns.iter().cloned());
+                found.hyper = free.hyper;
+                found.steps.push(Step {
+                    finding: Finding::Unknown {
+                        depends_on: generic.depends_on.to_owned(),
+                        formula: super::formula::formula(generic.depends_on, &shape),
+                    },
+                    gain_nats: free.gain,
+                    threshold_nats: decision.thresholds.generic,
+                    alpha: options.alpha,
+                    size_us: free.size_us,
+                    rivals: rivals(&round, sought),
+                    held_out_us: None,
+                    shape: Some(shape),
+                });
+            }
+        }
+        if matches!(simulated, Simulated::Refly(_)) {
+            comparison = Comparison::new(data, &found.vehicle, simulated, plan)?;
+            if !found.parameters.is_empty() {
+                // Against the re-flown model: what closed forms leave is small, and taken up here.
+                found.refit(&comparison)?;
+            }
+        }
+        found.comparison = comparison.clone();
+    }
+    settle(&mut found);
+    Ok(found)
+}
+
+/// Takes the last joint fit into the steps.
+pub(super) fn settle(found: &mut Found) {
+    let Found { steps, parameters, values, .. } = found;
+    for step in steps {
+        let of = |effect: &str| -> Vec<super::verdict::Fitted> {
+            let all = parameters.iter().zip(values.iter());
+            let own = all.filter(|(parameter, _)| parameter.effect == effect);
+            let (parameters, values): (Vec<_>, Vec<_>) = own.map(|(p, v)| (p.clone(), *v)).unzip();
+            fitted(&parameters, &values)
+        };
+        match &mut step.finding {
+            Finding::Name { effect, parameters, .. } => *parameters = of(effect),
+            Finding::Class { effects, parameters } => {
+                if let Some(first) = effects.first() {
+                    *parameters = of(first);
+                }
+            }
+            Finding::Unknown { .. } => {}
+        }
+    }
+}
+
+fn finding(names: Vec<String>, found: &Found, was_there: bool) -> Finding {
+    let _ = found;
+    match &names[..] {
+        [effect] => Finding::Name { effect: effect.clone(), parameters: Vec::new(), was_there },
+        _ => Finding::Class { effects: names, parameters: Vec::new() },
+    }
+}
+
+fn drawn(
+    comparison: &Comparison,
+    variant: &super::candidates::Variant,
+    beta: f64,
+) -> Option<Shape> {
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for (group, signals) in comparison.scene.signals.iter().enumerate() {
+        for (bin, signal) in signals.iter().enumerate() {
+            points.push((signal.climb_mps, beta * variant.column.at(group, 0, bin)));
+        }
+    }
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = points.len().div_ceil(40).max(1);
+    let mean = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+        let chunks = points.chunks(size);
+        chunks.map(|chunk| chunk.iter().map(of).sum::<f64>() / chunk.len() as f64).collect()
+    };
+    Some(Shape {
+        axis: "vertical velocity (m/s)".to_owned(),
+        x: mean(|point| point.0),
+        us: mean(|point| point.1),
+        se_us: Vec::new(),
+    })
+}
+
+fn rivals(round: &Round, sought: Sought<'_>) -> Vec<Rival> {
+    let effects = round.library.iter().map(|ranked| Rival {
+        name: sought.library[ranked.candidate].name.to_owned(),
+        generic: false,
+        gain_nats: ranked.gain,
+    });
+    let free = round.generics.iter().map(|free| Rival {
+        name: sought.generics[free.generic].depends_on.to_owned(),
+        generic: true,
+        gain_nats: free.gain,
+    });
+    let mut all: Vec<Rival> = effects.chain(free).filter(|rival| rival.gain_nats > 0.5).collect();
+    all.sort_by(|a, b| b.gain_nats.total_cmp(&a.gain_nats));
+    all.truncate(10);
+    all
+}
+
+fn best_name(round: &Round, sought: Sought<'_>) -> String {
+    if round.best() >= round.best_generic() {
+        let best = round.library.first();
+        best.map_or_else(String::new, |one| sought.library[one.candidate].name.to_owned())
+    } else {
+        let best = round.generics.first();
+        best.map_or_else(String::new, |one| sought.generics[one.generic].depends_on.to_owned())
+    }
+}
+
+enum What {
+    Nothing,
+    /// Best first; more than one: a class.
+    Effects(Vec<Ranked>),
+    Free(RankedGeneric),
+}
+
+struct Decision {
+    what: What,
+    thresholds: Thresholds,
+}
+
+fn decide(
+    problem: &Problem<'_>,
+    round: &Round,
+    sought: Sought<'_>,
+    material_us: f64,
+    options: &Options,
+    step: usize,
+) -> Decision {
+    let floor = super::search::FLOOR_NATS;
+    let mut limits = Thresholds { library: floor, generic: floor };
+    let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
+    let is_named = |ranked: &&Ranked| {
+        // That the shared air drifted is what it does: a rival, never a finding.
+        sought.library[ranked.candidate].name != "updraft-drift"
+            && ranked.fitted
+            && ranked.size_us >= material_us
+    };
+    let best = round.library.iter().find(is_named);
+    let free = round.generics.iter().find(|free| free.size_us >= material_us);
+    let best_gain = best.map_or(0.0, |best| best.gain);
+    let free_gain = free.map_or(0.0, |free| free.gain);
+    if best_gain < floor && free_gain < floor {
+        return nothing(limits);
+    }
+    let seed = options.seed.wrapping_add(1000 * step as u64);
+    // Far above any threshold there is nothing to find out about it.
+    if best_gain.max(free_gain) < SURE_NATS {
+        limits = thresholds(problem, &round.base, sought, options.replicates, options.alpha, seed);
+    }
+    if let Some(free) =
+        free.filter(|free| free.gain > limits.generic && free.gain > FREE_BETTER * best_gain)
+    {
+        let left = match best.filter(|best| best.gain > limits.library) {
+            None => free.gain,
+            Some(best) => left_with(problem, sought, best, free),
+        };
+        if left > limits.generic.max(FREE_LEFT * free.gain) {
+            return Decision { what: What::Free(free.clone()), thresholds: limits };
+        }
+    }
+    let Some(best) = best.filter(|best| best.gain > limits.library) else {
+        return nothing(limits);
+    };
+    let column =
+        |ranked: &Ranked| &sought.library[ranked.candidate].variants[ranked.variant].column;
+    let at = problem.at(&best.hyper);
+    let own = at.white(column(best));
+    let alike = |ranked: &&Ranked| {
+        ranked.candidate != best.candidate
+            && ranked.gain > best.gain - CLASS_NATS
+            && at.likeness(&own, &at.white(column(ranked))).abs() > ALIKE
+    };
+    let mut members = vec![best.clone()];
+    members.extend(round.library.iter().filter(alike).cloned());
+    Decision { what: What::Effects(members), thresholds: limits }
+}
+
+/// Gains above this need no threshold, nats.
+const SURE_NATS: f64 = 40.0;
+
+/// What a free shape still gains with an effect in the model, nats.
+fn left_with(
+    problem: &Problem<'_>,
+    sought: Sought<'_>,
+    best: &Ranked,
+    free: &RankedGeneric,
+) -> f64 {
+    let column = &sought.library[best.candidate].variants[best.variant].column;
+    let generic: &Generic = &sought.generics[free.generic];
+    let with = problem.with([column]);
+    let before = with.fit(best.hyper, Likelihood::Profile);
+    let both = with.with(&generic.columns).fit(free.hyper, Likelihood::Profile);
+    both.log_posterior() - before.log_posterior() - generic.penalty
+}
+
+/// Whether a list of candidates has an effect, for tests and for what may be asked next.
+pub fn has(candidates: &[Candidate], name: &str) -> bool {
+    candidates.iter().any(|candidate| candidate.name == name)
+}
+
+/// A fitted value by effect and parameter.
+pub fn found_value(found: &Found, effect: &str, parameter: &str) -> Option<f64> {
+    value_of(&found.vehicle, effect, parameter)
+}
+
+impl Found {
+    /// Fits all sizes and the noise anew; the gusts of that noise bend the model's curve, so twice.
+    pub(super) fn refit(&mut self, comparison: &Comparison) -> Result<(), GapError> {
+        for _ in 0..REFITS {
+            let fit = refine(
+                comparison,
+                &self.vehicle,
+                &self.parameters,
+                &self.extras,
+                self.hyper,
+                self.gusts_mps,
+                true,
+            )?;
+            self.vehicle = fit.vehicle;
+            self.values = fit.values;
+            self.hyper = fit.hyper;
+            let before_mps = self.gusts_mps;
+            self.gusts_mps = gusts_mps(&self.hyper).min(MOST_GUSTS_MPS);
+            if (self.gusts_mps - before_mps).abs() < SAME_GUSTS_MPS {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Joint fits after each finding, at most.
+const REFITS: usize = 4;
+/// Gusts this near to those of the fit before change nothing, m/s.
+const SAME_GUSTS_MPS: f64 = 0.02;
+/// Stronger gusts are not believed while the model still lacks its response to them, m/s.
+const MOST_GUSTS_MPS: f64 = 1.5;

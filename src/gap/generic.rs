@@ -1,0 +1,207 @@
+//! Free shapes: what depends on something, though no effect of the library says how.
+
+use super::gls::Column;
+use super::scene::Scene;
+use crate::effects::Signals;
+use crate::gap::verdict::Shape;
+
+/// A family of regressors that together make a free shape along one signal.
+#[derive(Clone, Debug)]
+pub struct Generic {
+    /// What it depends on.
+    pub depends_on: &'static str,
+    /// Label with unit.
+    pub axis: &'static str,
+    /// Regressors.
+    pub columns: Vec<Column>,
+    /// The signal itself by group and bin, for drawing.
+    pub along: Vec<Vec<f64>>,
+    /// Nats that its freedom takes: 2 for each regressor beyond the first, and the logarithm of how
+    /// many such families are tried.
+    pub penalty: f64,
+}
+
+/// Wavelengths of height that are tried, m.
+const WAVES_M: [f64; 7] = [10.0, 15.0, 20.0, 28.0, 40.0, 56.0, 80.0];
+/// Instants at which a step is tried.
+const STEPS: usize = 15;
+/// A signal that moves less than this share of its scale says nothing.
+const LEAST_SPAN: f64 = 0.05;
+
+/// All free shapes that the flight can show.
+pub fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
+    let mut found = Vec::new();
+    let along = |of: &dyn Fn(&Signals) -> f64| -> Vec<Vec<f64>> {
+        scene.signals.iter().map(|group| group.iter().map(of).collect()).collect()
+    };
+    let climb = along(&|s| s.climb_mps);
+    let time = along(&|s| s.time_s);
+    let height = along(&|s| s.height_m);
+    let wind = along(&|s| s.horizontal_mps);
+    found.extend(smooth("climb", "vertical velocity (m/s)", &climb, 5, 0.5));
+    found.extend(smooth("time", "time since arming (s)", &time, 3, 30.0));
+    found.extend(smooth("height", "height (m)", &height, 3, 3.0));
+    found.extend(smooth("wind", "horizontal air speed (m/s)", &wind, 3, 1.5));
+    for wave_m in WAVES_M {
+        let phase = |of: fn(f64) -> f64| {
+            Column::Shared(map(&height, &|h| of(std::f64::consts::TAU * h / wave_m)))
+        };
+        if span(&height) > 0.7 * wave_m {
+            found.push(Generic {
+                depends_on: "height",
+                axis: "height (m)",
+                columns: vec![phase(f64::sin), phase(f64::cos)],
+                along: height.clone(),
+                penalty: 2.0 + (WAVES_M.len() as f64).ln(),
+            });
+        }
+    }
+    let middle = f64::midpoint(least(&time), most(&time));
+    let half = (most(&time) - least(&time)).max(1.0) / 2.0;
+    let product = |of: fn(f64) -> f64| {
+        let value = |(climb, time): (&f64, &f64)| of(*climb) * (time - middle) / half;
+        let group = |(c, t): (&Vec<f64>, &Vec<f64>)| c.iter().zip(t).map(value).collect();
+        climb.iter().zip(&time).map(group).collect::<Vec<Vec<f64>>>()
+    };
+    let crossed = product(|v| v);
+    found.push(Generic {
+        depends_on: "climb-time",
+        axis: "vertical velocity times time, scaled",
+        columns: vec![Column::Shared(crossed.clone()), Column::Shared(product(f64::abs))],
+        along: crossed,
+        penalty: 2.0,
+    });
+    for step in 1..=STEPS {
+        let at_s = least(&time) + (most(&time) - least(&time)) * step as f64 / (STEPS + 1) as f64;
+        found.push(Generic {
+            depends_on: "step",
+            axis: "time since arming (s)",
+            columns: vec![Column::Shared(map(&time, &|t| if t < at_s { 0.0 } else { 1.0 }))],
+            along: time.clone(),
+            penalty: (STEPS as f64).ln(),
+        });
+    }
+    if let Some(charge) = scene.charge.as_ref().filter(|charge| {
+        let values = charge.iter().flatten().flatten();
+        let (low, high) = values.fold((1.0_f64, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
+        high - low > 0.05
+    }) {
+        let powers = (1..=3).map(|power| {
+            let drone =
+                |bins: &Vec<f64>| bins.iter().map(|c| chebyshev(power, 2.0 * c - 1.0)).collect();
+            let group = |drones: &Vec<Vec<f64>>| drones.iter().map(drone).collect();
+            Column::Own(charge.iter().map(group).collect())
+        });
+        let mean = |drones: &Vec<Vec<f64>>| -> Vec<f64> {
+            let bins = drones.first().map_or(0, Vec::len);
+            let count = drones.len().max(1) as f64;
+            (0..bins).map(|bin| drones.iter().map(|d| d[bin]).sum::<f64>() / count).collect()
+        };
+        found.push(Generic {
+            depends_on: "voltage",
+            axis: "charge by the voltage at rest (share)",
+            columns: powers.collect(),
+            along: charge.iter().map(mean).collect(),
+            penalty: 4.0,
+        });
+    }
+    // A direction that does not change is an offset.
+    let turns = |of: fn(f64) -> f64| {
+        let value = |(angle, signals): (&f64, &Signals)| of(*angle) * signals.horizontal_mps;
+        let group = |(angles, signals): (&Vec<f64>, &Vec<Signals>)| {
+            angles.iter().zip(signals).map(value).collect()
+        };
+        headings.iter().zip(&scene.signals).map(group).collect::<Vec<Vec<f64>>>()
+    };
+    let (ahead, aside) = (turns(f64::cos), turns(f64::sin));
+    if span(&ahead).max(span(&aside)) > 1.5 {
+        found.push(Generic {
+            depends_on: "heading",
+            axis: "direction of the air from the nose (rad)",
+            columns: vec![Column::Shared(ahead), Column::Shared(aside)],
+            along: headings.to_vec(),
+            penalty: 2.0,
+        });
+    }
+    found
+}
+
+fn smooth(
+    depends_on: &'static str,
+    axis: &'static str,
+    along: &[Vec<f64>],
+    order: usize,
+    least_span: f64,
+) -> Option<Generic> {
+    let (low, high) = (least(along), most(along));
+    if !(high - low).is_finite() || high - low < least_span.max(LEAST_SPAN * high.abs()) {
+        return None;
+    }
+    let scaled = |value: f64| (2.0 * value - low - high) / (high - low);
+    let columns =
+        (1..=order).map(|power| Column::Shared(map(along, &|v| chebyshev(power, scaled(v)))));
+    Some(Generic {
+        depends_on,
+        axis,
+        columns: columns.collect(),
+        along: along.to_vec(),
+        penalty: 2.0 * (order as f64 - 1.0),
+    })
+}
+
+fn chebyshev(order: usize, x: f64) -> f64 {
+    (order as f64 * x.clamp(-1.0, 1.0).acos()).cos()
+}
+
+fn map(values: &[Vec<f64>], of: &dyn Fn(f64) -> f64) -> Vec<Vec<f64>> {
+    values.iter().map(|group| group.iter().map(|value| of(*value)).collect()).collect()
+}
+
+fn least(values: &[Vec<f64>]) -> f64 {
+    values.iter().flatten().copied().fold(f64::INFINITY, f64::min)
+}
+
+fn most(values: &[Vec<f64>]) -> f64 {
+    values.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
+fn span(values: &[Vec<f64>]) -> f64 {
+    most(values) - least(values)
+}
+
+/// Points of a drawn shape.
+const POINTS: usize = 40;
+
+impl Generic {
+    /// The shape with these coefficients, by its signal: means in up to forty places.
+    pub fn shape(&self, beta: &[f64]) -> Shape {
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for (group, along) in self.along.iter().enumerate() {
+            for (bin, x) in along.iter().enumerate() {
+                let value = |column: &Column| match column {
+                    Column::Shared(values) => values[group][bin],
+                    Column::Own(values) => {
+                        let count = values[group].len().max(1) as f64;
+                        values[group].iter().map(|drone| drone[bin]).sum::<f64>() / count
+                    }
+                };
+                let us = self.columns.iter().zip(beta).map(|(c, b)| b * value(c)).sum();
+                points.push((*x, us));
+            }
+        }
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let size = points.len().div_ceil(POINTS).max(1);
+        let mean = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+            points
+                .chunks(size)
+                .map(|chunk| chunk.iter().map(of).sum::<f64>() / chunk.len() as f64)
+                .collect()
+        };
+        Shape {
+            axis: self.axis.to_owned(),
+            x: mean(|point| point.0),
+            us: mean(|point| point.1),
+            se_us: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! Generalised least squares with the noise's covariance: what regressors explain, with the shared
+//! air, drones' offsets and scatter partialled out exactly.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::minimise::minimise;
+use super::noise::{GroupPattern, Hyper, Whitener};
+
+/// Values of all drones, by group, drone and bin.
+pub type Pulses = Vec<Vec<Vec<f64>>>;
+
+/// A regressor.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column {
+    /// The same for all drones of a group: by group and bin.
+    Shared(Vec<Vec<f64>>),
+    /// Each drone has its own: by group, drone and bin.
+    Own(Pulses),
+}
+
+impl Column {
+    /// Means over each group's drones.
+    fn means(&self) -> Vec<Vec<f64>> {
+        match self {
+            Self::Shared(values) => values.clone(),
+            Self::Own(values) => values.iter().map(|drones| mean_of(drones)).collect(),
+        }
+    }
+
+    /// Only some bins, chosen by the places of group and bin.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(usize, usize) -> bool) -> Self {
+        let bins = |group: usize, bins: &Vec<f64>| -> Vec<f64> {
+            let kept = bins.iter().enumerate().filter(|(bin, _)| keep(group, *bin));
+            kept.map(|(_, value)| *value).collect()
+        };
+        match self {
+            Self::Shared(values) => {
+                Self::Shared(values.iter().enumerate().map(|(g, values)| bins(g, values)).collect())
+            }
+            Self::Own(values) => {
+                let drones = |(g, drones): (usize, &Vec<Vec<f64>>)| {
+                    drones.iter().map(|values| bins(g, values)).collect()
+                };
+                Self::Own(values.iter().enumerate().map(drones).collect())
+            }
+        }
+    }
+
+    /// Its value for one drone and bin.
+    pub fn at(&self, group: usize, drone: usize, bin: usize) -> f64 {
+        match self {
+            Self::Shared(values) => values[group][bin],
+            Self::Own(values) => values[group][drone][bin],
+        }
+    }
+
+    /// Standard deviation over all bins and drones.
+    pub fn spread(&self, drones: &[usize]) -> f64 {
+        let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        let mut add = |value: f64, weight: f64| {
+            count += weight;
+            sum += weight * value;
+            squares += weight * value * value;
+        };
+        match self {
+            Self::Shared(values) => {
+                for (bins, drones) in values.iter().zip(drones) {
+                    bins.iter().for_each(|value| add(*value, *drones as f64));
+                }
+            }
+            Self::Own(values) => {
+                values.iter().flatten().flatten().for_each(|value| add(*value, 1.0))
+            }
+        }
+        (squares / count - (sum / count).powi(2)).max(0.0).sqrt()
+    }
+}
+
+fn mean_of(drones: &[Vec<f64>]) -> Vec<f64> {
+    let count = drones.len() as f64;
+    let bins = drones.first().map_or(0, Vec::len);
+    (0..bins).map(|bin| drones.iter().map(|drone| drone[bin]).sum::<f64>() / count).collect()
+}
+
+/// Pulses split into groups' means and drones' deviations.
+#[derive(Clone, Debug)]
+pub struct Split {
+    means: Vec<Vec<f64>>,
+    deviations: Pulses,
+}
+
+impl Split {
+    /// Of pulses by group, drone and bin.
+    pub fn of(pulses: &Pulses) -> Self {
+        let means: Vec<Vec<f64>> = pulses.iter().map(|drones| mean_of(drones)).collect();
+        let deviations = pulses
+            .iter()
+            .zip(&means)
+            .map(|(drones, mean)| {
+                let from_mean =
+                    |drone: &Vec<f64>| drone.iter().zip(mean).map(|(a, b)| a - b).collect();
+                drones.iter().map(from_mean).collect()
+            })
+            .collect();
+        Self { means, deviations }
+    }
+
+    fn of_column(column: &Column) -> Self {
+        match column {
+            Column::Shared(_) => Self { means: column.means(), deviations: Vec::new() },
+            Column::Own(values) => Self::of(values),
+        }
+    }
+}
+
+/// Something whitened.
+#[derive(Clone, Debug)]
+pub struct White {
+    means: Vec<f64>,
+    deviations: Vec<f64>,
+}
+
+impl White {
+    fn of(whitener: &Whitener, split: &Split) -> Self {
+        let deviations = split
+            .deviations
+            .iter()
+            .enumerate()
+            .flat_map(|(group, drones)| {
+                drones.iter().flat_map(move |drone| whitener.deviation(group, drone))
+            })
+            .collect();
+        Self { means: whitener.means(&split.means), deviations }
+    }
+
+    fn dot(&self, other: &Self) -> f64 {
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        product(&self.means, &other.means) + product(&self.deviations, &other.deviations)
+    }
+}
+
+/// A problem: measured against the model, and the regressors that are in the model already.
+#[derive(Clone, Debug)]
+pub struct Problem<'a> {
+    /// Patterns of the groups.
+    pub groups: &'a [GroupPattern],
+    /// What is to be explained.
+    pub pulses: &'a Split,
+    /// Regressors that are free: the common offset first.
+    pub columns: Vec<Split>,
+}
+
+impl<'a> Problem<'a> {
+    /// With a common offset.
+    pub fn new(groups: &'a [GroupPattern], pulses: &'a Split) -> Self {
+        let ones = groups.iter().map(|group| vec![1.0; group.time_s.len()]).collect();
+        Self { groups, pulses, columns: vec![Split::of_column(&Column::Shared(ones))] }
+    }
+
+    /// With further regressors.
+    #[must_use]
+    pub fn with<'c>(&self, columns: impl IntoIterator<Item = &'c Column>) -> Self {
+        let mut more = self.clone();
+        more.columns.extend(columns.into_iter().map(Split::of_column));
+        more
+    }
+
+    /// At fixed noise.
+    pub fn at(&self, hyper: &Hyper) -> Solution {
+        let whitener = Whitener::new(self.groups, hyper);
+        let y = White::of(&whitener, self.pulses);
+        let columns: Vec<White> =
+            self.columns.iter().map(|column| White::of(&whitener, column)).collect();
+        Solution::new(whitener, y, columns, *hyper)
+    }
+
+    /// Most probable noise from a start, with everything linear at its best.
+    pub fn fit(&self, start: Hyper, likelihood: Likelihood) -> Solution {
+        let objective = |at: &[f64; super::noise::COUNT]| {
+            let hyper = Hyper(*at);
+            let solution = self.at(&hyper);
+            -(solution.log_likelihood(likelihood) + hyper.log_prior())
+        };
+        let (at, _) = minimise(start.0, objective);
+        self.at(&Hyper(at))
+    }
+}
+
+/// Which likelihood the noise is fitted with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Likelihood {
+    /// Maximum likelihood: gains of regressors can be compared.
+    Profile,
+    /// Restricted: knows that regressors were fitted; for intervals.
+    Restricted,
+}
+
+/// A problem solved at one noise.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The noise.
+    pub hyper: Hyper,
+    whitener: Whitener,
+    y: White,
+    columns: Vec<White>,
+    factor: Option<Cholesky<f64, Dyn>>,
+    /// Coefficients of the regressors.
+    pub beta: Vec<f64>,
+    /// Weighted sum of squares that is left.
+    pub chi2: f64,
+    /// Observations less regressors.
+    pub freedom: f64,
+}
+
+/// What a regressor would gain at fixed noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gain {
+    /// Its coefficient.
+    pub beta: f64,
+    /// Standard error of it.
+    pub se: f64,
+    /// Gain of log-likelihood, nats.
+    pub nats: f64,
+}
+
+impl Solution {
+    fn new(whitener: Whitener, y: White, columns: Vec<White>, hyper: Hyper) -> Self {
+        let count = columns.len();
+        let normal =
+            DMatrix::from_fn(count, count, |row, column| columns[row].dot(&columns[column]));
+        let right = DVector::from_fn(count, |row, _| columns[row].dot(&y));
+        let factor = normal.cholesky();
+        let beta = factor.as_ref().map_or_else(
+            || vec![0.0; count],
+            |factor| factor.solve(&right).iter().copied().collect(),
+        );
+        let explained: f64 = beta.iter().zip(right.iter()).map(|(beta, right)| beta * right).sum();
+        let total = y.dot(&y);
+        let freedom = (y.means.len() + y.deviations.len()) as f64 - count as f64;
+        Self { hyper, whitener, y, columns, factor, beta, chi2: total - explained, freedom }
+    }
+
+    /// Logarithm of the likelihood, without its constant; −∞ where regressors are collinear.
+    pub fn log_likelihood(&self, likelihood: Likelihood) -> f64 {
+        let Some(factor) = &self.factor else { return f64::NEG_INFINITY };
+        let mut twice = self.whitener.log_det + self.chi2;
+        if likelihood == Likelihood::Restricted {
+            twice += 2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        }
+        -0.5 * twice
+    }
+
+    /// Log-likelihood with the prior of the noise.
+    pub fn log_posterior(&self) -> f64 {
+        self.log_likelihood(Likelihood::Profile) + self.hyper.log_prior()
+    }
+
+    /// Covariance of the coefficients.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let count = self.columns.len();
+        self.factor.as_ref().map_or_else(|| DMatrix::zeros(count, count), Cholesky::inverse)
+    }
+
+    /// What one more regressor would gain, with all others free, at this noise.
+    pub fn gain(&self, column: &Column) -> Gain {
+        let white = self.white(column);
+        let Some((information, score)) = self.partial(&white) else { return Gain::default() };
+        let beta = score / information;
+        Gain { beta, se: information.recip().sqrt(), nats: 0.5 * score * beta }
+    }
+
+    /// What several more regressors would gain together: coefficients and nats.
+    pub fn gain_of_all(&self, columns: &[Column]) -> (Vec<f64>, f64) {
+        let whites: Vec<White> = columns.iter().map(|column| self.white(column)).collect();
+        let count = whites.len();
+        let residual = self.residual_of(&self.y);
+        let parts: Vec<White> = whites.iter().map(|white| self.residual_of(white)).collect();
+        let normal = DMatrix::from_fn(count, count, |row, column| {
+            parts[row].dot(&parts[column]) + if row == column { 1e-9 } else { 0.0 }
+        });
+        let right = DVector::from_fn(count, |row, _| parts[row].dot(&residual));
+        let Some(factor) = normal.cholesky() else { return (vec![0.0; count], 0.0) };
+        let beta = factor.solve(&right);
+        (beta.iter().copied().collect(), 0.5 * beta.dot(&right))
+    }
+
+    /// A regressor whitened.
+    pub fn white(&self, column: &Column) -> White {
+        White::of(&self.whitener, &Split::of_column(column))
+    }
+
+    /// Correlation of two regressors with everything in the model partialled out.
+    pub fn likeness(&self, one: &White, other: &White) -> f64 {
+        let (one, other) = (self.residual_of(one), self.residual_of(other));
+        one.dot(&other) / (one.dot(&one) * other.dot(&other)).sqrt().max(f64::MIN_POSITIVE)
+    }
+
+    /// Information on a coefficient: over its square root, a size becomes a Fisher z.
+    pub fn information(&self, white: &White) -> f64 {
+        let part = self.residual_of(white);
+        part.dot(&part)
+    }
+
+    fn partial(&self, white: &White) -> Option<(f64, f64)> {
+        let part = self.residual_of(white);
+        let information = part.dot(&part);
+        (information > 1e-9 * white.dot(white).max(1e-12)).then(|| (information, part.dot(&self.y)))
+    }
+
+    /// What the model's regressors leave of something.
+    fn residual_of(&self, white: &White) -> White {
+        let Some(factor) = &self.factor else { return white.clone() };
+        let right = DVector::from_fn(self.columns.len(), |row, _| self.columns[row].dot(white));
+        let beta = factor.solve(&right);
+        let mut rest = white.clone();
+        if rest.deviations.is_empty() && self.columns.iter().any(|c| !c.deviations.is_empty()) {
+            rest.deviations = vec![0.0; self.y.deviations.len()];
+        }
+        for (column, beta) in self.columns.iter().zip(beta.iter()) {
+            for (value, part) in rest.means.iter_mut().zip(&column.means) {
+                *value -= beta * part;
+            }
+            for (value, part) in rest.deviations.iter_mut().zip(&column.deviations) {
+                *value -= beta * part;
+            }
+        }
+        rest
+    }
+
+    /// Pulses of all drones that this noise makes.
+    pub fn simulate(&self, draw: impl FnMut() -> f64) -> Pulses {
+        self.whitener.simulate(draw)
+    }
+}

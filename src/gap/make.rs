@@ -1,0 +1,206 @@
+//! From logs to a verdict and a model.
+
+use super::compare::{Comparison, Simulated};
+use super::data::{Data, Flown};
+use super::detectable::detectable;
+use super::drones::drones;
+use super::error::GapError;
+use super::explain::{Found, Options, search};
+use super::heldout::gap;
+use super::noise::{
+    GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SLOPES, WHITE,
+};
+use super::regimes::regimes;
+use super::sensor::sensor;
+use super::verdict::{DataUsed, Drones, Noise, SensorChannel, VERDICT_SCHEMA, Verdict};
+use super::words::summary;
+use crate::mission::plan::Plan;
+use crate::vehicle::Vehicle;
+
+/// What is compared.
+#[derive(Debug)]
+pub struct Input<'a> {
+    /// The model that is held against the logs.
+    pub vehicle: &'a Vehicle,
+    /// The plan that was flown, if there is one.
+    pub plan: Option<&'a Plan>,
+    /// The drones' logs.
+    pub flown: &'a [Flown<'a>],
+    /// Logs of somebody else's simulation; without them the plan is flown again.
+    pub simulated: Option<&'a [Flown<'a>]>,
+    /// Logs that could not be used, with their reasons.
+    pub left_out: Vec<String>,
+}
+
+/// A verdict with the model that it leads to.
+#[derive(Clone, Debug)]
+pub struct Explained {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The vehicle with what was found, as a vehicle file has it.
+    pub model: Vehicle,
+    /// The search, for what comes after.
+    pub found: Found,
+}
+
+/// A pulse that moves less than this is a constant, us.
+const CONSTANT_US: f64 = 0.02;
+
+/// Compares, names, adds and shows.
+///
+/// # Errors
+/// See [`GapError`].
+pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapError> {
+    let exponent = super::compare::thrust_exponent(input.vehicle);
+    let data = match input.plan {
+        Some(plan) => Data::of_plan(plan, input.flown, exponent),
+        None => Data::of_logs(input.flown, exponent),
+    };
+    if data.drones() == 0 {
+        return Err(GapError::NothingMeasured { reasons: data.left_out });
+    }
+    constant(&data)?;
+    let simulated = match (input.simulated, input.plan) {
+        (Some(flown), _) => Simulated::Given(data.averaged(flown, exponent)),
+        (None, Some(plan)) => Simulated::Refly(plan),
+        (None, None) => return Err(GapError::NoSimulatedSide),
+    };
+    let (train, held) = data.split();
+    let train_side = part(&simulated, &data);
+    let mut found = search(&train, input.vehicle, &train_side, input.plan, options)?;
+    let shrink = gap(&train, &held, input.vehicle, &train_side, input.plan, &found, options.seed)?;
+    let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
+    let whole = Comparison::new(&data, &found.vehicle, &simulated, input.plan)?;
+    if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
+        // The sizes that go into the model are those of all drones.
+        found.refit(&whole)?;
+        super::explain::settle(&mut found);
+    }
+    let held_slots: Vec<u16> = held.groups.iter().flat_map(|group| group.slots.clone()).collect();
+    let channel = match input.plan {
+        Some(plan) => sensor(input.flown, |slot| plan.slot(slot).map(|slot| plan.segments(slot))),
+        None => SensorChannel::default(),
+    };
+    let mut left_out = input.left_out.clone();
+    left_out.extend(data.left_out.iter().cloned());
+    let used = DataUsed {
+        logs: input.flown.len() + input.left_out.len(),
+        drones: data.drones(),
+        groups: data.groups.iter().map(|g| (g.name.clone(), g.slots.len())).collect(),
+        bins: whole.data.groups.iter().map(|group| group.bins.len()).collect(),
+        held_out: held_slots.clone(),
+        left_out,
+    };
+    let differences = if found.extras.is_empty() {
+        drones(&whole, &found, |slot| held_slots.contains(&slot))?
+    } else {
+        Drones::default()
+    };
+    let mut verdict = Verdict {
+        schema: VERDICT_SCHEMA.to_owned(),
+        made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
+        vehicle: input.vehicle.name.clone(),
+        summary: String::new(),
+        data: used,
+        sensor: channel,
+        steps: found.steps.clone(),
+        rest: found.rest.clone(),
+        detectable: detectable(&found)?,
+        noise: noise(&found.hyper),
+        drones: differences,
+        gap: shrink,
+        regimes: regimes(&before, &whole, &found, options.seed)?,
+        cautions: cautions(&data, &found, input),
+    };
+    verdict.summary = summary(&verdict);
+    Ok(Explained { verdict, model: model(input.vehicle, &found), found })
+}
+
+/// The simulated side for the fitted drones: the same groups.
+fn part<'a>(simulated: &Simulated<'a>, _data: &Data) -> Simulated<'a> {
+    simulated.clone()
+}
+
+fn constant(data: &Data) -> Result<(), GapError> {
+    let pulses = || data.groups.iter().flat_map(|group| &group.measured).flatten();
+    let low = pulses().map(|values| values.pulse_us).fold(f64::INFINITY, f64::min);
+    let high = pulses().map(|values| values.pulse_us).fold(f64::NEG_INFINITY, f64::max);
+    if high - low < CONSTANT_US { Err(GapError::ConstantPulse { value_us: low }) } else { Ok(()) }
+}
+
+fn noise(hyper: &Hyper) -> Noise {
+    Noise {
+        shared_air_mps: hyper.get(SHARED),
+        shared_air_s: hyper.get(SHARED_TIME),
+        own_air_mps: hyper.get(OWN),
+        gusts_mps: hyper.get(GUSTS),
+        gusts_s: hyper.get(GUST_TIME),
+        white_us: hyper.get(WHITE),
+        drones_us: hyper.get(OFFSETS),
+        slopes: hyper.get(SLOPES),
+        least_response: hyper.get(LEAST),
+    }
+}
+
+/// The vehicle file with what was found; what makes drones differ stays as it was.
+fn model(vehicle: &Vehicle, found: &Found) -> Vehicle {
+    let mut model = vehicle.clone();
+    for parameter in &found.parameters {
+        let Some(table) = found.vehicle.effects.get(parameter.effect) else { continue };
+        let entry = model.effects.entry(parameter.effect.to_owned()).or_default();
+        entry.on = true;
+        for (name, value) in &table.parameters {
+            entry.parameters.insert(name.clone(), *value);
+        }
+        // The spread between drones that the mean drone was flown without.
+        if let Some(spread) =
+            vehicle.effects.get(parameter.effect).and_then(|t| t.parameters.get("spread"))
+        {
+            entry.parameters.insert("spread".to_owned(), *spread);
+        }
+    }
+    if !found.parameters.is_empty() {
+        model.name = format!("{}-found", vehicle.name);
+        let names: Vec<&str> = found.parameters.iter().map(|parameter| parameter.effect).collect();
+        model.source =
+            format!("{}; {} found in measured flights", vehicle.source, names.join(", "));
+    }
+    model
+}
+
+fn cautions(data: &Data, found: &Found, input: &Input<'_>) -> Vec<String> {
+    let mut cautions = Vec::new();
+    let drones = data.drones();
+    if drones == 1 {
+        cautions.push(
+            "one drone: its own offset and the air at its place cannot be told from the model's \
+             errors; nothing is held out but rungs"
+                .to_owned(),
+        );
+    } else if drones < 8 {
+        cautions.push(format!("{drones} drones: none is held out from fitting"));
+    }
+    if let Some(plan) = input.plan
+        && drones * 2 <= plan.slots.len()
+    {
+        cautions.push(format!(
+            "only {drones} of {} drones gave a usable log: intervals are wide, and groups may be \
+             uneven",
+            plan.slots.len()
+        ));
+    }
+    if data.groups.len() == 1 && input.simulated.is_none() {
+        cautions.push(
+            "all drones climb at the same time: what depends on climb speed is mixed with the \
+             shared air (calibration-counterphase tells them apart)"
+                .to_owned(),
+        );
+    }
+    if found.comparison.scene.charge.is_none() {
+        cautions.push(
+            "the logs have no voltage at rest (BAT.VoltR): battery sag is looked for by time alone"
+                .to_owned(),
+        );
+    }
+    cautions
+}

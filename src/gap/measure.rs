@@ -1,0 +1,106 @@
+//! What a log says in each steady bin.
+
+use super::bins::{Bin, BinValues};
+use crate::flight::{Flight, Indicator};
+
+/// Fewest samples in a usable bin.
+const FEWEST_SAMPLES: usize = 5;
+/// A silence longer than this breaks a bin, s.
+const GAP_S: f64 = 1.0;
+/// A bin is left out when its mean velocity is further than this from the command, m/s.
+const FOLLOW_MPS: f64 = 0.3;
+/// Pulse quantum, us: a motor within it of its limit is at the limit.
+const QUANTUM_US: f64 = 1.0;
+/// Share of samples at a limit from which a bin counts as saturated.
+const SATURATED_SHARE: f64 = 0.05;
+
+/// The bins of one drone's flight; `None`: not usable there (a gap in the log, saturated motors, the
+/// command was not followed).
+///
+/// `orientation_deg` is the show frame's, clockwise from north to x; `thrust_exponent` the power of
+/// thrust that `u - 1000` goes with.
+pub fn measured(
+    flight: &Flight,
+    bins: &[Bin],
+    orientation_deg: f64,
+    thrust_exponent: f64,
+) -> Vec<Option<BinValues>> {
+    let turn = orientation_deg.to_radians().sin_cos();
+    bins.iter().map(|bin| one(flight, bin, turn, thrust_exponent)).collect()
+}
+
+fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Option<BinValues> {
+    let (start_s, end_s) = (bin.start_s, bin.end_s);
+    let pulses = flight.pulse_us.between(start_s, end_s);
+    if pulses.len() < FEWEST_SAMPLES || flight.pulse_us.longest_gap_s(start_s, end_s) > GAP_S {
+        return None;
+    }
+    if flight.indicator == Indicator::Pulse && is_saturated(flight, start_s, end_s) {
+        return None;
+    }
+    let climb_mps = mean(flight.velocity_up_mps.between(start_s, end_s))?;
+    if (climb_mps - bin.climb_mps()).abs() > FOLLOW_MPS {
+        return None;
+    }
+    let lean_rad = lean(flight, start_s, end_s, turn)?;
+    let pulse = mean(pulses)?;
+    let zero = flight.indicator.without_thrust();
+    let exponent = match flight.indicator {
+        Indicator::Pulse => thrust_exponent,
+        other => other.thrust_exponent(),
+    };
+    let cos = lean_rad[0].hypot(lean_rad[1]).cos();
+    let resting_v = flight.resting_v.as_ref().and_then(|series| {
+        // Logged once a second or ten times.
+        mean(series.between(start_s - 0.5, end_s + 0.5)).filter(|volts| *volts > 0.0)
+    });
+    let values = BinValues {
+        pulse_us: zero + (pulse - zero) * cos.powf(exponent),
+        climb_mps,
+        height_m: mean(flight.height_m.between(start_s, end_s))?,
+        lean_rad,
+        resting_v: resting_v.unwrap_or(f64::NAN),
+    };
+    (values.pulse_us.is_finite() && values.height_m.is_finite()).then_some(values)
+}
+
+fn is_saturated(flight: &Flight, start_s: f64, end_s: f64) -> bool {
+    let (low, high) = flight.pulse_limits_us;
+    let share = |values: &[f64], at: &dyn Fn(f64) -> bool| {
+        let count = values.iter().filter(|value| at(**value)).count();
+        count as f64 / values.len().max(1) as f64
+    };
+    share(flight.pulse_max_us.between(start_s, end_s), &|value| value >= high - QUANTUM_US)
+        > SATURATED_SHARE
+        || share(flight.pulse_min_us.between(start_s, end_s), &|value| value <= low + QUANTUM_US)
+            > SATURATED_SHARE
+}
+
+/// Mean horizontal part of the thrust axis, show frame.
+fn lean(flight: &Flight, start_s: f64, end_s: f64, (sin, cos): (f64, f64)) -> Option<[f64; 2]> {
+    let times = flight.roll_rad.times_between(start_s, end_s);
+    let rolls = flight.roll_rad.between(start_s, end_s);
+    let (mut north, mut east, mut count) = (0.0, 0.0, 0.0);
+    for (time_s, roll) in times.iter().zip(rolls) {
+        let Some(pitch) = flight.pitch_rad.at(*time_s, GAP_S) else { continue };
+        // Heading jumps at north: the value in force, not between two.
+        let yaw_deg = flight.yaw_deg.latest(*time_s, GAP_S).unwrap_or(0.0);
+        let (yaw_sin, yaw_cos) = yaw_deg.to_radians().sin_cos();
+        // Nose down pulls forward, right side down pulls right.
+        let (forward, right) = (-pitch.sin() * roll.cos(), roll.sin());
+        north += forward * yaw_cos - right * yaw_sin;
+        east += forward * yaw_sin + right * yaw_cos;
+        count += 1.0;
+    }
+    if count == 0.0 {
+        return None;
+    }
+    let (north, east) = (north / count, east / count);
+    // Show x is `orientation` clockwise from north, show y to the left of it.
+    Some([cos * north + sin * east, sin * north - cos * east])
+}
+
+pub(super) fn mean(values: &[f64]) -> Option<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    mean.is_finite().then_some(mean)
+}

@@ -1,0 +1,123 @@
+//! A quasi-Newton search for smooth functions of a few variables without derivatives at hand.
+
+/// Step of the difference quotients; variables are logarithms.
+const STEP: f64 = 1e-4;
+/// The search ends when a step gains less.
+const ENOUGH: f64 = 2e-3;
+const MOST_STEPS: usize = 40;
+/// Longest step of any variable.
+const LONGEST: f64 = 1.0;
+
+/// Where a function is least, from a start, and its value there. BFGS with a backtracking line
+/// search; values that are not numbers count as infinite.
+pub(super) fn minimise<const N: usize>(
+    start: [f64; N],
+    function: impl Fn(&[f64; N]) -> f64,
+) -> ([f64; N], f64) {
+    let value_at = |at: &[f64; N]| {
+        let value = function(at);
+        if value.is_finite() { value } else { f64::INFINITY }
+    };
+    let gradient_at = |at: &[f64; N], value: f64| {
+        let mut gradient = [0.0; N];
+        for (index, slope) in gradient.iter_mut().enumerate() {
+            let mut moved = *at;
+            moved[index] += STEP;
+            *slope = (value_at(&moved) - value) / STEP;
+        }
+        gradient
+    };
+    let mut at = start;
+    let mut value = value_at(&at);
+    let mut gradient = gradient_at(&at, value);
+    let mut inverse = identity::<N>();
+    let mut small = 0;
+    for _ in 0..MOST_STEPS {
+        let mut direction = [0.0; N];
+        for (row, part) in direction.iter_mut().enumerate() {
+            *part = -dot(&inverse[row], &gradient);
+        }
+        if dot(&direction, &gradient) >= 0.0 {
+            inverse = identity();
+            direction = gradient.map(|slope| -slope);
+        }
+        let longest = direction.iter().fold(0.0_f64, |most, part| most.max(part.abs()));
+        if longest > LONGEST {
+            direction = direction.map(|part| part * LONGEST / longest);
+        }
+        let slope = dot(&direction, &gradient);
+        let mut length = 1.0;
+        let mut found = None;
+        for _ in 0..12 {
+            let mut next = at;
+            for (part, by) in next.iter_mut().zip(&direction) {
+                *part += length * by;
+            }
+            let next_value = value_at(&next);
+            if next_value <= value + 1e-4 * length * slope {
+                found = Some((next, next_value));
+                break;
+            }
+            length *= 0.4;
+        }
+        let Some((next, next_value)) = found else { break };
+        let next_gradient = gradient_at(&next, next_value);
+        let gained = value - next_value;
+        update(&mut inverse, &difference(&next, &at), &difference(&next_gradient, &gradient));
+        (at, value, gradient) = (next, next_value, next_gradient);
+        small = if gained < ENOUGH { small + 1 } else { 0 };
+        if small == 2 {
+            break;
+        }
+    }
+    (at, value)
+}
+
+fn identity<const N: usize>() -> [[f64; N]; N] {
+    let mut matrix = [[0.0; N]; N];
+    for (index, row) in matrix.iter_mut().enumerate() {
+        // The curvature of a log-likelihood by a logarithm is about the number of time scales.
+        row[index] = 0.1;
+    }
+    matrix
+}
+
+fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn difference<const N: usize>(a: &[f64; N], b: &[f64; N]) -> [f64; N] {
+    let mut result = *a;
+    result.iter_mut().zip(b).for_each(|(a, b)| *a -= b);
+    result
+}
+
+fn update<const N: usize>(inverse: &mut [[f64; N]; N], step: &[f64; N], change: &[f64; N]) {
+    let curvature = dot(step, change);
+    if curvature <= 1e-12 {
+        return;
+    }
+    let mut moved = [0.0; N];
+    for (row, part) in moved.iter_mut().enumerate() {
+        *part = dot(&inverse[row], change);
+    }
+    let scale = (1.0 + dot(change, &moved) / curvature) / curvature;
+    for row in 0..N {
+        for column in 0..N {
+            inverse[row][column] += scale * step[row] * step[column]
+                - (moved[row] * step[column] + step[row] * moved[column]) / curvature;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bent_valley_is_followed() {
+        let (at, value) =
+            minimise([-1.2, 1.0], |[x, y]| 20.0 * (y - x * x).powi(2) + (1.0 - x).powi(2));
+        assert!(value < 1e-2 && (at[0] - 1.0).abs() < 0.1, "{at:?} {value}");
+    }
+}

@@ -1,0 +1,234 @@
+//! What pulses do besides the model: the shared air, each drone's own air, offsets and scatter.
+//!
+//! The data model of the physics note, section 3.2: drone i in bin k of its group reads
+//!
+//! ```text
+//! y = mean + a_i + b_i r_k + (S_k + s0) (W(t_k) + X_i(t_k) + g_i(t_k)) + e
+//! ```
+//!
+//! with W the updraft that all share (it may change with height), X a slow updraft of the drone's own place, g its gusts, a its hover pulse, b its relative response, S the model's response to vertical air speed and s0 what it
+//! is at least. Within a command group the likelihood splits exactly into the group's mean and the
+//! deviations of its drones; both are whitened by filters.
+
+use super::filter::{Filter, Observation, State};
+
+/// Parameters of the noise, by their logarithms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hyper(pub [f64; COUNT]);
+
+/// Number of parameters.
+pub const COUNT: usize = 10;
+/// Places in [`Hyper`].
+pub const SHARED: usize = 0;
+/// Time scale of the shared air.
+pub const SHARED_TIME: usize = 1;
+/// Slow own air.
+pub const OWN: usize = 2;
+/// Gusts.
+pub const GUSTS: usize = 3;
+/// Time scale of gusts.
+pub const GUST_TIME: usize = 4;
+/// White noise of a bin, us.
+pub const WHITE: usize = 5;
+/// Spread of hover pulses, us.
+pub const OFFSETS: usize = 6;
+/// Relative spread of responses.
+pub const SLOPES: usize = 7;
+/// Least response to vertical air speed, us/(m/s).
+pub const LEAST: usize = 8;
+/// How the shared updraft changes with height, m/s per 50 m.
+pub const GRADIENT: usize = 9;
+
+/// Prior of each parameter: median, and a standard deviation as a factor. Wide: they keep the search
+/// where weather and drones can be, and decide only what the flight does not say (a record of a few
+/// time scales hardly tells the time scale).
+const PRIOR: [(f64, f64); COUNT] = [
+    (0.3, 2.5),
+    (60.0, 2.0),
+    (0.1, 2.5),
+    (0.15, 2.5),
+    (8.0, 1.6),
+    (2.0, 2.5),
+    (10.0, 2.5),
+    (0.05, 2.0),
+    (3.0, 2.5),
+    (0.08, 2.0),
+];
+
+impl Default for Hyper {
+    fn default() -> Self {
+        Self(PRIOR.map(|(median, _)| f64::ln(median)))
+    }
+}
+
+impl Hyper {
+    /// One parameter.
+    pub fn get(&self, place: usize) -> f64 {
+        self.0[place].exp()
+    }
+
+    /// Logarithm of the prior density, without its constant.
+    pub fn log_prior(&self) -> f64 {
+        let square = |(value, (median, factor)): (&f64, &(f64, f64))| {
+            ((value - median.ln()) / factor.ln()).powi(2)
+        };
+        -0.5 * self.0.iter().zip(&PRIOR).map(square).sum::<f64>()
+    }
+}
+
+/// One command group as the noise needs it.
+#[derive(Clone, Debug, Default)]
+pub struct GroupPattern {
+    /// Drones in it.
+    pub drones: usize,
+    /// Middle of each bin, s.
+    pub time_s: Vec<f64>,
+    /// Height in each bin, m.
+    pub height_m: Vec<f64>,
+    /// The model's response to vertical air speed in each bin, us/(m/s).
+    pub response: Vec<f64>,
+    /// What a relative error of the response does in each bin, us.
+    pub slope_us: Vec<f64>,
+}
+
+/// The whitening filters of all groups at one set of parameters.
+#[derive(Clone, Debug)]
+pub struct Whitener {
+    /// Means of all groups together: (group, bin) in the order of time, and their filter.
+    order: Vec<(usize, usize)>,
+    means: Filter,
+    /// Deviations within each group.
+    deviations: Vec<Filter>,
+    drones: Vec<usize>,
+    /// Minus twice the logarithm of the normalisation, without the constant.
+    pub log_det: f64,
+}
+
+const SHARED_STATES: usize = 2;
+const OWN_STATES: usize = 4;
+/// Heights are taken from here, m, in units of [`ALOFT_M`].
+const MIDDLE_M: f64 = 45.0;
+const ALOFT_M: f64 = 50.0;
+
+impl GroupPattern {
+    /// Height of a bin in units of the gradient.
+    pub fn aloft(&self, bin: usize) -> f64 {
+        (self.height_m[bin] - MIDDLE_M) / ALOFT_M
+    }
+}
+
+impl Whitener {
+    /// For these groups and this noise.
+    pub fn new(groups: &[GroupPattern], hyper: &Hyper) -> Self {
+        let square = |place: usize| hyper.get(place).powi(2);
+        let own = |share: f64| {
+            [
+                State { variance: square(OWN) * share, time_s: hyper.get(SHARED_TIME) },
+                State { variance: square(GUSTS) * share, time_s: hyper.get(GUST_TIME) },
+                State { variance: square(OFFSETS) * share, time_s: f64::INFINITY },
+                State { variance: square(SLOPES) * share, time_s: f64::INFINITY },
+            ]
+        };
+        let least = hyper.get(LEAST);
+        let looks = |group: &GroupPattern, bin: usize, first: usize| {
+            let response = group.response[bin].abs() + least;
+            vec![
+                (first, response),
+                (first + 1, response),
+                (first + 2, 1.0),
+                (first + 3, group.slope_us[bin]),
+            ]
+        };
+        let mut order: Vec<(usize, usize)> = groups
+            .iter()
+            .enumerate()
+            .flat_map(|(index, group)| (0..group.time_s.len()).map(move |bin| (index, bin)))
+            .collect();
+        order.sort_by(|a, b| groups[a.0].time_s[a.1].total_cmp(&groups[b.0].time_s[b.1]));
+        let time_s = hyper.get(SHARED_TIME);
+        let mut states = vec![
+            State { variance: square(SHARED), time_s },
+            State { variance: square(GRADIENT), time_s },
+        ];
+        for group in groups {
+            states.extend(own(1.0 / group.drones.max(1) as f64));
+        }
+        let observations: Vec<Observation> = order
+            .iter()
+            .map(|(index, bin)| {
+                let group = &groups[*index];
+                let mut looks_at = looks(group, *bin, SHARED_STATES + OWN_STATES * index);
+                let response = group.response[*bin].abs() + least;
+                looks_at.push((0, response));
+                looks_at.push((1, response * group.aloft(*bin)));
+                Observation {
+                    time_s: group.time_s[*bin],
+                    looks_at,
+                    noise: square(WHITE) / group.drones.max(1) as f64,
+                }
+            })
+            .collect();
+        let means = Filter::new(&states, &observations);
+        let mut log_det = means.log_det;
+        let deviations: Vec<Filter> = groups
+            .iter()
+            .map(|group| {
+                let observations: Vec<Observation> = (0..group.time_s.len())
+                    .map(|bin| Observation {
+                        time_s: group.time_s[bin],
+                        looks_at: looks(group, bin, 0),
+                        noise: square(WHITE),
+                    })
+                    .collect();
+                let filter = Filter::new(&own(1.0), &observations);
+                log_det += filter.log_det * group.drones.saturating_sub(1) as f64;
+                filter
+            })
+            .collect();
+        let drones = groups.iter().map(|group| group.drones).collect();
+        Self { order, means, deviations, drones, log_det }
+    }
+
+    /// Whitens the groups' means, by group and bin.
+    pub fn means(&self, by_group: &[Vec<f64>]) -> Vec<f64> {
+        let series: Vec<f64> =
+            self.order.iter().map(|(group, bin)| by_group[*group][*bin]).collect();
+        self.means.whiten(&series)
+    }
+
+    /// Whitens one drone's deviations from its group's mean.
+    pub fn deviation(&self, group: usize, series: &[f64]) -> Vec<f64> {
+        self.deviations[group].whiten(series)
+    }
+
+    /// Pulses of all drones that the noise alone makes, by group and drone: from independent noise.
+    pub fn simulate(&self, mut draw: impl FnMut() -> f64) -> Vec<Vec<Vec<f64>>> {
+        let noise: Vec<f64> = self.order.iter().map(|_| draw()).collect();
+        let series = self.means.colour(&noise);
+        let mut means: Vec<Vec<f64>> = self.drones.iter().map(|_| Vec::new()).collect();
+        for ((group, _), value) in self.order.iter().zip(series) {
+            means[*group].push(value);
+        }
+        means
+            .iter()
+            .enumerate()
+            .map(|(group, mean)| {
+                let filter = &self.deviations[group];
+                let drones: Vec<Vec<f64>> = (0..self.drones[group])
+                    .map(|_| filter.colour(&mean.iter().map(|_| draw()).collect::<Vec<_>>()))
+                    .collect();
+                let count = drones.len() as f64;
+                let centre: Vec<f64> = (0..mean.len())
+                    .map(|bin| drones.iter().map(|drone| drone[bin]).sum::<f64>() / count)
+                    .collect();
+                drones
+                    .into_iter()
+                    .map(|drone| {
+                        let parts = drone.iter().zip(&centre).zip(mean);
+                        parts.map(|((value, centre), mean)| value - centre + mean).collect()
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+}

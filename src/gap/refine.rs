@@ -1,0 +1,203 @@
+//! Sizes of what was named: a joint fit of all parameters in the noise's own metric.
+
+use super::candidates::set;
+use super::compare::Comparison;
+use super::error::GapError;
+use super::gls::{Column, Likelihood, Problem, Solution, Split};
+use super::noise::Hyper;
+use super::verdict::{Fitted, Interval};
+use crate::effects::{find, select};
+use crate::vehicle::Vehicle;
+
+/// Rounds of Gauss-Newton; the forms are nearly linear in their sizes.
+const ROUNDS: usize = 8;
+/// Step of the derivatives, share of a parameter's value or of its usual step.
+const STEP: f64 = 0.02;
+/// A second parameter (the form) is fitted when its own z is at least this.
+const FORM_Z: f64 = 4.0;
+/// Factor of a 95 % interval: the noise is estimated too, from few time scales.
+const INTERVAL: f64 = 2.1;
+
+/// One fitted parameter of the model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Effect.
+    pub effect: &'static str,
+    /// Name.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Bounds.
+    pub bounds: (f64, f64),
+    /// Value in the model that was held against the logs; `None`: it lacked the effect.
+    pub before: Option<f64>,
+}
+
+/// A joint fit.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The vehicle with the fitted values.
+    pub vehicle: Vehicle,
+    /// Its noise (restricted likelihood).
+    pub hyper: Hyper,
+    /// The linearised problem at its end.
+    pub solution: Solution,
+    /// Value and standard error of each parameter.
+    pub values: Vec<(f64, f64)>,
+}
+
+/// A parameter's value in a vehicle.
+pub fn value_of(vehicle: &Vehicle, effect: &str, parameter: &str) -> Option<f64> {
+    let known = find(effect)?;
+    vehicle.effects.get(effect).filter(|table| table.on)?;
+    let values = select::values_of(known, vehicle).ok()?;
+    let place = known.definition().parameters.iter().position(|p| p.name == parameter)?;
+    values.get(place).copied()
+}
+
+/// Fits the parameters jointly, from the values that the vehicle has, with further regressors free.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub fn refine(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+    parameters: &[Parameter],
+    extras: &[Column],
+    start: Hyper,
+    gusts_mps: f64,
+    fit_noise: bool,
+) -> Result<Fit, GapError> {
+    let mut vehicle = vehicle.clone();
+    let mut hyper = start;
+    let mut last = None;
+    for round in 0..ROUNDS {
+        let patterns = comparison.patterns(&vehicle)?;
+        let split = Split::of(&comparison.residual(&vehicle, gusts_mps)?);
+        let slopes = slopes(comparison, &vehicle, parameters)?;
+        let problem = Problem::new(&patterns, &split).with(extras).with(&slopes);
+        let is_fitted = fit_noise && (round == 0 || round == 2);
+        let solution =
+            if is_fitted { problem.fit(hyper, Likelihood::Restricted) } else { problem.at(&hyper) };
+        hyper = solution.hyper;
+        let first = solution.beta.len() - parameters.len();
+        let covariance = solution.covariance();
+        let mut moved: f64 = 0.0;
+        let mut values = Vec::new();
+        for (index, parameter) in parameters.iter().enumerate() {
+            let place = first + index;
+            let se = covariance[(place, place)].max(0.0).sqrt();
+            let now = value_of(&vehicle, parameter.effect, parameter.name).unwrap_or(0.0);
+            let (low, high) = parameter.bounds;
+            let farthest = (0.5 * now.abs()).max(0.05 * (high - low).min(1.0)).max(2.0 * se);
+            let by = solution.beta[place].clamp(-farthest, farthest);
+        }
+        last = Some(Fit { vehicle: vehicle.clone(), hyper, solution, values });
+        if moved < 0.05 && (round >= 2 || !fit_noise) {
+            break;
+        }
+    }
+    last.ok_or(GapError::NothingCommon)
+}
+
+/// Derivatives of the model's pulse by each parameter.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub fn slopes(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+    parameters: &[Parameter],
+) -> Result<Vec<Column>, GapError> {
+    let mut columns = Vec::new();
+    for parameter in parameters {
+        let now = value_of(vehicle, parameter.effect, parameter.name).unwrap_or(0.0);
+        let (low, high) = parameter.bounds;
+        let mut by = STEP * now.abs().max(0.02 * (high - low).min(1.0));
+        if now + by > high {
+            by = -by;
+        }
+        let mut other = vehicle.clone();
+        set(&mut other, parameter.effect, parameter.name, now + by);
+        let change = comparison.change(vehicle, &other)?;
+        columns.push(scaled(&change, 1.0 / by));
+    }
+    Ok(columns)
+}
+
+fn scaled(column: &Column, factor: f64) -> Column {
+    let bins = |bins: &Vec<f64>| bins.iter().map(|value| value * factor).collect::<Vec<f64>>();
+    match column {
+        Column::Shared(values) => Column::Shared(values.iter().map(bins).collect()),
+        Column::Own(values) => {
+            let drones = |drones: &Vec<Vec<f64>>| drones.iter().map(bins).collect();
+            Column::Own(values.iter().map(drones).collect())
+        }
+    }
+}
+
+/// Parameters of an effect that is named: its size, and its form where the flight tells it.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub fn parameters_of(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+    effect: &str,
+    before: Option<f64>,
+    base: &Solution,
+) -> Result<Vec<Parameter>, GapError> {
+    let Some(known) = find(effect) else { return Ok(Vec::new()) };
+    let definition = known.definition();
+    let crate::effects::Sought::Shape { size, shape, .. } = &definition.sought else {
+        return Ok(Vec::new());
+    };
+    let of = |name: &str| {
+        let parameter = definition.parameters.iter().find(|known| known.name == name)?;
+        Some(Parameter {
+            effect: definition.name,
+            name: parameter.name,
+            unit: parameter.unit,
+            bounds: (parameter.low, parameter.high),
+            before: None,
+        })
+    };
+    let mut found: Vec<Parameter> =
+        of(size).map(|parameter| Parameter { before, ..parameter }).into_iter().collect();
+    if let Some((name, values)) = shape
+        && let Some(parameter) = of(name)
+    {
+        let both = [found.clone(), vec![parameter.clone()]].concat();
+        let columns = slopes(comparison, vehicle, &both)?;
+        if let [size, form] = &columns[..] {
+            // What the form says beyond the size, over the range that is tried.
+            let (size, form) = (base.white(size), base.white(form));
+            let alike = base.likeness(&size, &form);
+            let information = base.information(&form) * (1.0 - alike * alike).max(0.0);
+            let range = values.iter().copied().fold(0.0, f64::max)
+                - values.iter().copied().fold(f64::INFINITY, f64::min);
+            if information.sqrt() * range > FORM_Z {
+                found.push(parameter);
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Fitted values with their intervals, for the verdict.
+pub fn fitted(parameters: &[Parameter], values: &[(f64, f64)]) -> Vec<Fitted> {
+    let one = |(parameter, (value, se)): (&Parameter, &(f64, f64))| {
+        let (low, high) = parameter.bounds;
+        Fitted {
+            name: parameter.name.to_owned(),
+            unit: parameter.unit.to_owned(),
+            value: Interval {
+                value: *value,
+                low: (value - INTERVAL * se).max(low),
+                high: (value + INTERVAL * se).min(high),
+            },
+            before: parameter.before,
+        }
+    };
+    parameters.iter().zip(values).map(one).collect()
+}

@@ -1,0 +1,139 @@
+//! The simulator re-flies what was commanded: the model's side of the comparison.
+
+use std::io;
+
+use nalgebra::Vector3;
+
+use super::bins::{Bin, BinValues};
+use crate::base::time::GpsTime;
+use crate::mission::plan::{Plan, Slot};
+use crate::show::Trajectory;
+use crate::sim::recorder::{Moment, Recorder};
+use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly_with};
+use crate::vehicle::Vehicle;
+
+/// Values are taken at every so many control steps (50 Hz).
+const EVERY: u64 = 8;
+
+/// The fleet's mean drone: what makes drones differ is off.
+pub fn mean_drone(vehicle: &Vehicle) -> Vehicle {
+    let mut mean = vehicle.clone();
+    for (name, parameter) in
+        [("mass-spread", "sd"), ("thrust-spread", "sd"), ("rotor-inflow", "spread")]
+    {
+        if let Some(table) = mean.effects.get_mut(name) {
+            table.parameters.insert(parameter.to_owned(), 0.0);
+        }
+    }
+    if let Some(table) = mean.effects.get_mut("velocity-error") {
+        table.parameters.insert("sd_mps".to_owned(), 0.0);
+    }
+    mean
+}
+
+/// Flies one slot of a plan in a uniform wind (show frame, m/s) and gives its bins.
+///
+/// # Errors
+/// The flight failed: a vehicle that cannot fly, or effects that are not valid.
+pub fn refly(
+    vehicle: &Vehicle,
+    plan: &Plan,
+    slot: &Slot,
+    bins: &[Bin],
+    wind_mps: [f64; 2],
+    thrust_exponent: f64,
+) -> Result<Vec<Option<BinValues>>, SimError> {
+    let trajectory = Trajectory::of_slot(plan, slot);
+    let air = Uniform(Vector3::new(wind_mps[0], wind_mps[1], 0.0));
+    let setup = FlightSetup {
+        vehicle,
+        trajectory: &trajectory,
+        home_m: slot.home_m.into(),
+        frame: plan.site.frame(),
+        atmosphere: &air,
+        seed: 1,
+        drone: slot.slot,
+        start: GpsTime { week: 2400, tow_ms: 0 },
+        lights: &[],
+        full_logs: false,
+        hooks: Hooks::default(),
+    };
+    let mut recorder = BinRecorder::new(bins, slot.home_m[2]);
+    fly_with(&setup, &mut recorder)?;
+    Ok(recorder.values(thrust_exponent))
+}
+
+struct Sums {
+    count: f64,
+    pulse_us: f64,
+    climb_mps: f64,
+    height_m: f64,
+    lean_rad: [f64; 2],
+    resting_v: f64,
+}
+
+struct BinRecorder<'a> {
+    bins: &'a [Bin],
+    sums: Vec<Sums>,
+    home_z_m: f64,
+    at: usize,
+}
+
+impl<'a> BinRecorder<'a> {
+    fn new(bins: &'a [Bin], home_z_m: f64) -> Self {
+        let empty = || Sums {
+            count: 0.0,
+            pulse_us: 0.0,
+            climb_mps: 0.0,
+            height_m: 0.0,
+            lean_rad: [0.0; 2],
+            resting_v: 0.0,
+        };
+        Self { bins, sums: bins.iter().map(|_| empty()).collect(), home_z_m, at: 0 }
+    }
+
+    fn values(self, thrust_exponent: f64) -> Vec<Option<BinValues>> {
+        let value = |sums: Sums| {
+            let mean = |sum: f64| sum / sums.count;
+            let lean_rad = sums.lean_rad.map(mean);
+            let cos = lean_rad[0].hypot(lean_rad[1]).cos();
+            (sums.count > 0.0).then(|| BinValues {
+                pulse_us: 1000.0 + (mean(sums.pulse_us) - 1000.0) * cos.powf(thrust_exponent),
+                climb_mps: mean(sums.climb_mps),
+                height_m: mean(sums.height_m),
+                lean_rad,
+                resting_v: mean(sums.resting_v),
+            })
+        };
+        self.sums.into_iter().map(value).collect()
+    }
+}
+
+impl Recorder for BinRecorder<'_> {
+    fn record(&mut self, moment: &Moment<'_>) -> io::Result<()> {
+        if !moment.step.is_multiple_of(EVERY) {
+            return Ok(());
+        }
+        let time_s = moment.time_us as f64 * 1e-6;
+        while self.bins.get(self.at).is_some_and(|bin| time_s >= bin.end_s) {
+            self.at += 1;
+        }
+        let (Some(bin), Some(sums)) = (self.bins.get(self.at), self.sums.get_mut(self.at)) else {
+            return Ok(());
+        };
+        if time_s < bin.start_s {
+            return Ok(());
+        }
+        let pulses = moment.pilot.motors.pulses_us;
+        sums.count += 1.0;
+        sums.pulse_us +=
+            pulses.iter().map(|pulse| f64::from(*pulse)).sum::<f64>() / pulses.len() as f64;
+        sums.climb_mps += moment.estimate.velocity_mps.z;
+        sums.height_m += moment.estimate.position_m.z - self.home_z_m;
+        let up = moment.plant.motion().rotation.column(2).into_owned();
+        sums.lean_rad[0] += up.x;
+        sums.lean_rad[1] += up.y;
+        sums.resting_v += moment.plant.battery().map_or(f64::NAN, |battery| battery.resting_v);
+        Ok(())
+    }
+}

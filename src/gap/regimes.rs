@@ -1,0 +1,157 @@
+//! The map of disagreement: the residual by climb speed, height, time, wind, voltage, place, drone.
+
+use rand_distr::{Distribution as _, StandardNormal};
+
+use super::compare::Comparison;
+use super::error::GapError;
+use super::explain::Found;
+use super::gls::Pulses;
+use super::noise::{LEAST, Whitener};
+use super::verdict::Regime;
+use crate::base::rng::{Purpose, stream};
+
+/// Classes of a continuous regime.
+const CLASSES: usize = 8;
+/// Simulated flights for the standard errors.
+const DRAWS: usize = 60;
+
+/// One way of holding bins apart: its name and the class of a bin: (label, place on the axis).
+struct Axis<'a> {
+    by: &'static str,
+    of: Box<dyn Fn(usize, usize, usize) -> Option<(String, f64)> + 'a>,
+}
+
+/// The residual before and after in each regime; drone means are removed but for the drones' own.
+///
+/// # Errors
+/// Effects of a vehicle that are not valid.
+pub fn regimes(
+    before: &Comparison,
+    after: &Comparison,
+    found: &Found,
+    seed: u64,
+) -> Result<Vec<Regime>, GapError> {
+    let start = before.residual(&before.vehicle, found.gusts_mps)?;
+    let end = after.residual(&found.vehicle, found.gusts_mps)?;
+    let patterns = after.patterns(&found.vehicle)?;
+    let whitener = Whitener::new(&patterns, &found.hyper);
+    let draws: Vec<Pulses> = (0..DRAWS)
+        .map(|index| {
+            let mut rng = stream(seed, index as u64, Purpose::Resampling);
+            centred(&whitener.simulate(|| StandardNormal.sample(&mut rng)))
+        })
+        .collect();
+    let (flat_start, flat_end) = (centred(&start), centred(&end));
+    let least = found.hyper.get(LEAST);
+    let mut rows = Vec::new();
+    for axis in axes(after) {
+        let by_drone = axis.by == "drone" || axis.by == "place";
+        let (from, to) = if by_drone { (&start, &end) } else { (&flat_start, &flat_end) };
+        let mut classes: Vec<(String, f64, Vec<(usize, usize, usize)>)> = Vec::new();
+        for (group, drones) in to.iter().enumerate() {
+            for (drone, bins) in drones.iter().enumerate() {
+                for bin in 0..bins.len() {
+                    let Some((label, x)) = (axis.of)(group, drone, bin) else { continue };
+                    match classes.iter_mut().find(|class| class.0 == label) {
+                        Some(class) => class.2.push((group, drone, bin)),
+                        None => classes.push((label, x, vec![(group, drone, bin)])),
+                    }
+                }
+            }
+        }
+        classes.sort_by(|a, b| a.1.total_cmp(&b.1));
+        for (label, x, places) in classes {
+            let mean = |pulses: &Pulses| {
+                places.iter().map(|(g, d, b)| pulses[*g][*d][*b]).sum::<f64>() / places.len() as f64
+            };
+            let square = draws.iter().map(|draw| mean(draw).powi(2)).sum::<f64>();
+            let response = places
+                .iter()
+                .map(|(group, _, bin)| patterns[*group].response[*bin].abs() + least)
+                .sum::<f64>()
+                / places.len() as f64;
+            let before_us = mean(from);
+            rows.push(Regime {
+                by: axis.by.to_owned(),
+                label,
+                x,
+                before_us: (before_us, (square / DRAWS as f64).sqrt()),
+                after_us: mean(to),
+                before_mps: before_us / response.max(1.0),
+                bins: places.len(),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+/// Pulses without each drone's mean.
+fn centred(pulses: &Pulses) -> Pulses {
+    let drone = |bins: &Vec<f64>| {
+        let mean = bins.iter().sum::<f64>() / bins.len().max(1) as f64;
+        bins.iter().map(|value| value - mean).collect()
+    };
+    pulses.iter().map(|drones| drones.iter().map(drone).collect()).collect()
+}
+
+fn axes(after: &Comparison) -> Vec<Axis<'_>> {
+    let signals = &after.scene.signals;
+    let groups = &after.data.groups;
+    let classed =
+        move |by: &'static str, unit: &'static str, of: fn(&crate::effects::Signals) -> f64| {
+            let values = || signals.iter().flatten().map(of);
+            let low = values().fold(f64::INFINITY, f64::min);
+            let high = values().fold(f64::NEG_INFINITY, f64::max);
+            let width = ((high - low) / CLASSES as f64).max(1e-9);
+            Axis {
+                by,
+                of: Box::new(move |group, _, bin| {
+                    let value = of(signals.get(group)?.get(bin)?);
+                    let class = (((value - low) / width) as usize).min(CLASSES - 1);
+                    let from = low + class as f64 * width;
+                    let label = format!("{from:.1} to {:.1} {unit}", from + width);
+                    Some((label, from + width / 2.0))
+                }),
+            }
+        };
+    let mut axes = vec![
+        Axis {
+            by: "climb",
+            of: Box::new(move |group, _, bin| {
+                let bin = groups.get(group)?.bins.get(bin)?;
+                (!bin.is_horizontal())
+                    .then(|| (format!("{:+.1} m/s", bin.climb_mps()), bin.climb_mps()))
+            }),
+        },
+        classed("height", "m", |s| s.height_m),
+        classed("time", "s", |s| s.time_s),
+        classed("wind", "m/s", |s| s.horizontal_mps),
+        classed("lean", "deg", |s| s.tilt_rad.to_degrees()),
+        Axis {
+            by: "drone",
+            of: Box::new(move |group, drone, _| {
+                let slot = *groups.get(group)?.slots.get(drone)?;
+                Some((format!("slot {slot}"), f64::from(slot)))
+            }),
+        },
+        Axis {
+            by: "place",
+            of: Box::new(move |group, drone, _| {
+                let count = *groups.get(group)?.neighbours.get(drone)?;
+                Some((format!("{count:.0} neighbours"), count))
+            }),
+        },
+    ];
+    if let Some(charge) = &after.scene.charge {
+        axes.push(Axis {
+            by: "voltage",
+            of: Box::new(move |group, drone, bin| {
+                let share = charge.get(group)?.get(drone)?.get(bin)?;
+                let class = (share * 10.0).floor().clamp(0.0, 9.0);
+                let label = format!("charge {:.0} to {:.0} %", class * 10.0, class * 10.0 + 10.0);
+                Some((label, class / 10.0 + 0.05))
+            }),
+        });
+    }
+    axes
+}

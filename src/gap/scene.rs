@@ -1,0 +1,196 @@
+//! What closed forms look at in each bin, and the pulses that a model asks for there.
+
+use super::bins::BinValues;
+use super::data::Data;
+use super::gls::Column;
+use super::lean::Wind;
+use crate::base::air::density_ratio;
+use crate::effects::battery::charge_of_cell;
+use crate::effects::{EffectError, Model, Reference, Signals, find, select};
+use crate::vehicle::Vehicle;
+
+/// Open-circuit voltage above which there must be another cell, V.
+const FULL_CELL_V: f64 = 4.25;
+
+/// Steady signals of a comparison: what was flown and what the logs say of wind and battery. None of
+/// them follows the pulse: terminal voltage, current and measured acceleration do and are never used
+/// (endogenous regressors, physics note, section 3.2).
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// By group and bin.
+    pub signals: Vec<Vec<Signals>>,
+    /// Charge left by the voltage at rest, by group, drone and bin, 0..1; `None`: not logged.
+    pub charge: Option<Vec<Vec<Vec<f64>>>>,
+    /// Cells in series by that voltage.
+    pub cells: f64,
+    /// Mean voltage at rest, V; 0: not logged.
+    pub resting_v: f64,
+    neighbours: Vec<Vec<f64>>,
+}
+
+impl Scene {
+    /// What the drones flew in: commanded climb as the simulator followed it, heights, air.
+    pub fn measured(data: &Data, side: &[Vec<BinValues>], wind: &Wind, amsl_m: f64) -> Self {
+        let signals = data
+            .groups
+            .iter()
+            .enumerate()
+            .map(|(index, group)| {
+                let signal = |bin: usize| {
+                    let air = wind.air_mps[index][bin];
+                    let lean = |axis: usize| group.mean(bin, |values| values.lean_rad[axis]);
+                    let height_m = group.mean(bin, |values| values.height_m);
+                    Signals {
+                        climb_mps: side[index][bin].climb_mps,
+                        horizontal_mps: air[0].hypot(air[1]),
+                        tilt_rad: lean(0).hypot(lean(1)),
+                        height_m,
+                        time_s: group.bins[bin].middle_s() - group.armed_s,
+                        density_ratio: density_ratio(amsl_m + height_m),
+                        ..Signals::default()
+                    }
+                };
+                (0..group.bins.len()).map(signal).collect()
+            })
+            .collect();
+        let volts: Vec<f64> = data
+            .groups
+            .iter()
+            .flat_map(|group| &group.measured)
+            .flatten()
+            .map(|v| v.resting_v)
+            .collect();
+        let logged =
+            !volts.is_empty() && volts.iter().all(|volts| volts.is_finite() && *volts > 1.0);
+        let most = volts.iter().copied().fold(0.0, f64::max);
+        let cells = if logged { (most / FULL_CELL_V).ceil().max(1.0) } else { 1.0 };
+        let charge = logged.then(|| {
+            let of = |values: &BinValues| charge_of_cell(values.resting_v / cells);
+            let drones = |group: &super::data::Group| -> Vec<Vec<f64>> {
+                group.measured.iter().map(|drone| drone.iter().map(of).collect()).collect()
+            };
+            data.groups.iter().map(drones).collect()
+        });
+        let resting_v = if logged { volts.iter().sum::<f64>() / volts.len() as f64 } else { 0.0 };
+        let neighbours = data.groups.iter().map(|group| group.neighbours.clone()).collect();
+        Self { signals, charge, cells, resting_v, neighbours }
+    }
+
+    /// Only some bins, chosen by the places of group and bin.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(usize, usize) -> bool) -> Self {
+        let mut scene = self.clone();
+        for (group, signals) in scene.signals.iter_mut().enumerate() {
+            let mut bin = 0;
+            signals.retain(|_| {
+                bin += 1;
+                keep(group, bin - 1)
+            });
+        }
+        for (group, drones) in scene.charge.iter_mut().flatten().enumerate() {
+            for charge in drones {
+                let mut bin = 0;
+                charge.retain(|_| {
+                    bin += 1;
+                    keep(group, bin - 1)
+                });
+            }
+        }
+        scene
+    }
+
+    /// The simulator's own flight: its leans in the mean wind.
+    #[must_use]
+    pub fn simulated(&self, data: &Data, side: &[Vec<BinValues>], wind: [f64; 2]) -> Self {
+        let mut scene = Self { charge: None, ..self.clone() };
+        for (index, group) in data.groups.iter().enumerate() {
+            for (bin, signals) in scene.signals[index].iter_mut().enumerate() {
+                let values = side[index][bin];
+                let velocity = group.bins[bin].velocity_mps;
+                signals.horizontal_mps = (velocity[0] - wind[0]).hypot(velocity[1] - wind[1]);
+                signals.tilt_rad = values.lean_rad[0].hypot(values.lean_rad[1]);
+            }
+        }
+        scene.neighbours.iter_mut().flatten().for_each(|count| *count = 0.0);
+        scene
+    }
+
+    /// Pulses that a vehicle's model asks for, us.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
+        let model = Model::of(vehicle)?;
+        let battery = Battery::of(vehicle)?;
+        let is_on = |name: &str| vehicle.effects.get(name).is_some_and(|table| table.on);
+        let hover_ah_per_s = battery.as_ref().map_or(0.0, |battery| battery.hover_ah_per_s);
+        let at = |signals: &Signals, charge: Option<f64>, neighbours: f64| {
+            let charge_used_ah = match (&battery, charge) {
+                (Some(battery), Some(charge)) => (battery.initial - charge) * battery.capacity_ah,
+                _ => hover_ah_per_s * signals.time_s.max(0.0),
+            };
+            model.pulse_us(&Signals { charge_used_ah, neighbours, ..*signals })
+        };
+        let own = (battery.is_some() && self.charge.is_some()) || is_on("neighbour-downwash");
+        if !own {
+            let of = |signals: &Vec<Signals>| signals.iter().map(|s| at(s, None, 0.0)).collect();
+            return Ok(Column::Shared(self.signals.iter().map(of).collect()));
+        }
+        let drone = |group: usize, drone: usize| -> Vec<f64> {
+            self.signals[group]
+                .iter()
+                .enumerate()
+                .map(|(bin, signals)| {
+                    let charge = self.charge.as_ref().map(|charge| charge[group][drone][bin]);
+                    at(signals, charge, self.neighbours[group][drone])
+                })
+                .collect()
+        };
+        let group = |index: usize| {
+            (0..self.neighbours[index].len()).map(|which| drone(index, which)).collect()
+        };
+        Ok(Column::Own((0..self.signals.len()).map(group).collect()))
+    }
+
+    /// Response to vertical air speed of a model, us/(m/s), by group and bin: by differences, so that
+    /// effects that build on the rest of the model are in it.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub fn response(&self, vehicle: &Vehicle) -> Result<Vec<Vec<f64>>, EffectError> {
+        let model = Model::of(vehicle)?;
+        let half_mps = 0.05;
+        let of = |signals: &Signals| {
+            let at = |climb_mps| model.pulse_us(&Signals { climb_mps, ..*signals });
+            (at(signals.climb_mps + half_mps) - at(signals.climb_mps - half_mps)) / (2.0 * half_mps)
+        };
+        Ok(self.signals.iter().map(|group| group.iter().map(of).collect()).collect())
+    }
+}
+
+struct Battery {
+    initial: f64,
+    capacity_ah: f64,
+    hover_ah_per_s: f64,
+}
+
+impl Battery {
+    fn of(vehicle: &Vehicle) -> Result<Option<Self>, EffectError> {
+        let name = "battery";
+        let Some(effect) = find(name) else { return Ok(None) };
+        if !vehicle.effects.get(name).is_some_and(|table| table.on) {
+            return Ok(None);
+        }
+        let values = select::values_of(effect, vehicle)?;
+        let of = |parameter: &str| {
+            let place = effect.definition().parameters.iter().position(|p| p.name == parameter);
+            place.and_then(|place| values.get(place)).copied().unwrap_or_default()
+        };
+        let power_w = Reference::of(vehicle).hover_w() + of("avionics_w");
+        Ok(Some(Self {
+            initial: of("initial_charge"),
+            capacity_ah: of("capacity_ah"),
+            hover_ah_per_s: power_w / of("reference_v").max(0.1) / 3600.0,
+        }))
+    }
+}

@@ -1,0 +1,323 @@
+//! One round of the search: what would explain the residual best, and whether that is more than
+//! chance makes.
+
+use rand_distr::{Distribution as _, StandardNormal};
+use rayon::prelude::*;
+
+use super::candidates::{Candidate, Variant};
+use super::generic::Generic;
+use super::gls::{Column, Likelihood, Problem, Solution, Split};
+use super::noise::{GroupPattern, Hyper};
+use crate::base::rng::{Purpose, stream};
+
+/// Candidates this near to the best by the quick scan are fitted with their own noise, nats.
+const NEAR_NATS: f64 = 7.0;
+/// At most so many.
+const MOST_FITTED: usize = 6;
+/// A multiple of the effect's tried form beyond this is another effect.
+const MOST_BETA: f64 = 5.0;
+
+/// One candidate's best form in a round.
+#[derive(Clone, Debug)]
+pub struct Ranked {
+    /// Place in the list of candidates.
+    pub candidate: usize,
+    /// Its best form.
+    pub variant: usize,
+    /// Gain, nats: with the noise fitted anew where [`Ranked::fitted`].
+    pub gain: f64,
+    /// Coefficient on the form.
+    pub beta: f64,
+    /// What it does to the pulse: standard deviation over bins, us.
+    pub size_us: f64,
+    /// Noise with it in the model.
+    pub hyper: Hyper,
+    /// Whether the noise was fitted anew.
+    pub fitted: bool,
+}
+
+/// The best free shapes of a round.
+#[derive(Clone, Debug)]
+pub struct RankedGeneric {
+    /// Place in the list.
+    pub generic: usize,
+    /// Gain less its penalty, nats.
+    pub gain: f64,
+    /// Coefficients.
+    pub beta: Vec<f64>,
+    /// Standard deviation over bins, us.
+    pub size_us: f64,
+    /// Noise with it in the model.
+    pub hyper: Hyper,
+}
+
+/// What a round found.
+#[derive(Clone, Debug)]
+pub struct Round {
+    /// The model so far with its noise.
+    pub base: Solution,
+    /// Candidates, best first.
+    pub library: Vec<Ranked>,
+    /// Free shapes, best first; the best one of each signal.
+    pub generics: Vec<RankedGeneric>,
+}
+
+impl Round {
+    /// Largest gain of an effect that can be named.
+    pub fn best(&self) -> f64 {
+        self.library.first().map_or(0.0, |best| best.gain)
+    }
+
+    /// Largest gain of a free shape.
+    pub fn best_generic(&self) -> f64 {
+        self.generics.first().map_or(0.0, |best| best.gain)
+    }
+}
+
+/// What is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Sought<'a> {
+    /// Effects and motions of the air.
+    pub library: &'a [Candidate],
+    /// Free shapes.
+    pub generics: &'a [Generic],
+    /// Drones of each group.
+    pub drones: &'a [usize],
+}
+
+/// Looks once.
+pub fn round(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>) -> Round {
+    let base = problem.fit(start, Likelihood::Profile);
+    let mut library = scan(&base, sought);
+    let best = library.first().map_or(0.0, |best| best.gain);
+    let near = |ranked: &Ranked| ranked.gain > 0.5 && ranked.gain > best - NEAR_NATS;
+    let count = library.iter().take(MOST_FITTED).filter(|ranked| near(ranked)).count();
+    let before = base.log_posterior();
+    let fitted: Vec<Ranked> = library
+        .par_iter()
+        .take(count)
+        .map(|ranked| refit(problem, &base, before, ranked, sought))
+        .collect();
+    library.splice(..count, fitted);
+    library.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let generics = free_shapes(problem, &base, before, sought);
+    Round { base, library, generics }
+}
+
+/// Whether a coefficient makes a size that the effect can have.
+fn admissible(candidate: &Candidate, variant: &Variant, beta: f64) -> bool {
+    let Some(size) = candidate.size else { return beta.abs() > 0.0 };
+    if candidate.was_there {
+        let moved = size.now + beta * (variant.size - size.now);
+        return (size.low..=size.high).contains(&moved) && beta.is_finite();
+    }
+    beta > 0.0 && beta <= MOST_BETA
+}
+
+fn scan(base: &Solution, sought: Sought<'_>) -> Vec<Ranked> {
+    let mut ranked: Vec<Ranked> = sought
+        .library
+        .iter()
+        .enumerate()
+        .filter_map(|(index, candidate)| {
+            let forms = candidate.variants.iter().enumerate();
+            forms
+                .filter_map(|(place, variant)| {
+                    let gain = base.gain(&variant.column);
+                    admissible(candidate, variant, gain.beta).then(|| Ranked {
+                        candidate: index,
+                        variant: place,
+                        gain: gain.nats,
+                        beta: gain.beta,
+                        size_us: gain.beta.abs() * variant.column.spread(sought.drones),
+                        hyper: base.hyper,
+                        fitted: false,
+                    })
+                })
+                .max_by(|a, b| a.gain.total_cmp(&b.gain))
+        })
+        .collect();
+    ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    ranked
+}
+
+fn refit(
+    problem: &Problem<'_>,
+    base: &Solution,
+    before: f64,
+    ranked: &Ranked,
+    sought: Sought<'_>,
+) -> Ranked {
+    let candidate = &sought.library[ranked.candidate];
+    let variant = &candidate.variants[ranked.variant];
+    let with = problem.with([&variant.column]).fit(base.hyper, Likelihood::Profile);
+    let beta = with.beta.last().copied().unwrap_or(0.0);
+    let gain = with.log_posterior() - before;
+    if !admissible(candidate, variant, beta) || gain < ranked.gain {
+        // The noise at its start is a fit as well.
+        return Ranked { fitted: true, ..ranked.clone() };
+    }
+    Ranked {
+        gain,
+        beta,
+        size_us: beta.abs() * variant.column.spread(sought.drones),
+        hyper: with.hyper,
+        fitted: true,
+        ..ranked.clone()
+    }
+}
+
+fn free_shapes(
+    problem: &Problem<'_>,
+    base: &Solution,
+    before: f64,
+    sought: Sought<'_>,
+) -> Vec<RankedGeneric> {
+    let mut best: Vec<RankedGeneric> = Vec::new();
+    for (index, generic) in sought.generics.iter().enumerate() {
+        let (beta, nats) = base.gain_of_all(&generic.columns);
+        let gain = nats - generic.penalty;
+        let found = RankedGeneric { generic: index, gain, beta, size_us: 0.0, hyper: base.hyper };
+        let same =
+            |other: &RankedGeneric| sought.generics[other.generic].depends_on == generic.depends_on;
+        match best.iter_mut().find(|other| same(other)) {
+            Some(other) if other.gain < gain => *other = found,
+            Some(_) => {}
+            None => best.push(found),
+        }
+    }
+    best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let refitted: Vec<RankedGeneric> = best
+        .par_iter()
+        .take(2)
+        .map(|found| {
+            if found.gain < 0.5 {
+                return found.clone();
+            }
+            let generic = &sought.generics[found.generic];
+            let with = problem.with(&generic.columns).fit(base.hyper, Likelihood::Profile);
+            let gain = with.log_posterior() - before - generic.penalty;
+            let first = with.beta.len() - generic.columns.len();
+            if gain < found.gain {
+                return found.clone();
+            }
+            RankedGeneric {
+                gain,
+                beta: with.beta[first..].to_vec(),
+                hyper: with.hyper,
+                ..found.clone()
+            }
+        })
+        .collect();
+    best.splice(..refitted.len(), refitted);
+    for found in &mut best {
+        let generic = &sought.generics[found.generic];
+        found.size_us = spread(&generic.columns, &found.beta, sought.drones);
+    }
+    best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    best
+}
+
+/// Standard deviation over bins of a sum of regressors, us.
+pub fn spread(columns: &[Column], beta: &[f64], drones: &[usize]) -> f64 {
+    let Some(first) = columns.first() else { return 0.0 };
+    let value = |group: usize, drone: usize, bin: usize| {
+        columns.iter().zip(beta).map(|(c, b)| b * c.at(group, drone, bin)).sum::<f64>()
+    };
+    let sum = match first {
+        Column::Shared(values) => Column::Shared(
+            values
+                .iter()
+                .enumerate()
+                .map(|(group, bins)| (0..bins.len()).map(|bin| value(group, 0, bin)).collect())
+                .collect(),
+        ),
+        Column::Own(values) => Column::Own(
+            values
+                .iter()
+                .enumerate()
+                .map(|(group, list)| {
+                    let one = |drone: usize| {
+                        (0..list[drone].len()).map(|bin| value(group, drone, bin)).collect()
+                    };
+                    (0..list.len()).map(one).collect()
+                })
+                .collect(),
+        ),
+    };
+    sum.spread(drones)
+}
+
+/// Thresholds: gains that flights with nothing to find exceed with a small chance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds {
+    /// For effects of the library, nats.
+    pub library: f64,
+    /// For free shapes, nats.
+    pub generic: f64,
+}
+
+/// The least threshold, nats: z = 4 against a single alternative (physics note, section 3.3).
+pub const FLOOR_NATS: f64 = 8.0;
+/// Share of the replicates whose gains tell the tail.
+const TAIL: f64 = 0.25;
+
+/// Thresholds from flights simulated from the fitted noise with the same pattern: a parametric
+/// bootstrap, the same for any number of threads.
+pub fn thresholds(
+    problem: &Problem<'_>,
+    base: &Solution,
+    sought: Sought<'_>,
+    replicates: usize,
+    alpha: f64,
+    seed: u64,
+) -> Thresholds {
+    let gains: Vec<(f64, f64)> = (0..replicates)
+        .into_par_iter()
+        .map(|index| {
+            let mut rng = stream(seed, index as u64, Purpose::Resampling);
+            let pulses = base.simulate(|| StandardNormal.sample(&mut rng));
+            let split = Split::of(&pulses);
+            let null = Problem {
+                groups: problem.groups,
+                pulses: &split,
+                columns: problem.columns.clone(),
+            };
+            let round = round(&null, base.hyper, sought);
+            (round.best(), round.best_generic())
+        })
+        .collect();
+    let tail = |of: fn(&(f64, f64)) -> f64| quantile(gains.iter().map(of).collect(), alpha);
+    Thresholds {
+        library: tail(|gain| gain.0).max(FLOOR_NATS),
+        generic: tail(|gain| gain.1).max(FLOOR_NATS),
+    }
+}
+
+/// What values exceed with the chance `alpha`, by an exponential tail through the largest of them.
+fn quantile(mut values: Vec<f64>, alpha: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let tail = ((values.len() as f64 * TAIL) as usize).max(1);
+    let Some(start) = values.len().checked_sub(tail + 1).and_then(|place| values.get(place)) else {
+        return 0.0;
+    };
+    let share = tail as f64 / values.len() as f64;
+    let excess =
+        values.iter().rev().take(tail).map(|value| value - start).sum::<f64>() / tail as f64;
+    start + excess * (share / alpha).ln().max(0.0)
+}
+
+/// Patterns of groups.
+pub type Patterns = Vec<GroupPattern>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tail_of_an_exponential_is_found() {
+        let values: Vec<f64> = (1..400).map(|index| -(f64::from(index) / 400.0).ln()).collect();
+        let found = quantile(values, 0.005);
+        assert!((found - 200_f64.ln()).abs() < 0.1, "{found}");
+    }
+}

@@ -1,0 +1,145 @@
+//! The sensor channel: vertical velocity V_U against the rate of change of the height, before any
+//! look at the pulse.
+
+use super::data::Flown;
+use super::verdict::{Interval, SensorChannel};
+use crate::flight::{Flight, Series};
+use crate::mission::plan::Segment;
+
+/// A bias beyond this is named, m/s (0.5 us of pulse per 0.02 m/s on the show drone).
+const NAMED_BIAS_MPS: f64 = 0.05;
+/// A lag beyond this is named, s.
+const NAMED_LAG_S: f64 = 0.1;
+/// A drone's own bias beyond this is told, m/s.
+const TOLD_BIAS_MPS: f64 = 0.1;
+/// Steady stretches shorter than this tell no rate, s.
+const SHORTEST_S: f64 = 6.0;
+const GAP_S: f64 = 1.0;
+/// Lags that are tried, s.
+const LAGS: usize = 41;
+const LAG_STEP_S: f64 = 0.02;
+const FIRST_LAG_S: f64 = -0.2;
+
+/// What the velocities of a fleet say. `segments` gives what a slot flew.
+pub fn sensor<'a>(
+    flown: &[Flown<'_>],
+    segments: impl Fn(u16) -> Option<&'a [Segment]>,
+) -> SensorChannel {
+    let mut biases = Vec::new();
+    let mut lags = Vec::new();
+    for one in flown {
+        let Some(segments) = segments(one.slot) else { continue };
+        if let Some(bias) = bias(one.flight, segments) {
+            biases.push((one.slot, bias));
+        }
+        lags.extend(lag(one.flight, segments));
+    }
+    let values: Vec<f64> = biases.iter().map(|(_, bias)| *bias).collect();
+    let bias_mps = interval(&values);
+    let lag_s = interval(&lags);
+    let beyond = |found: Option<Interval>, limit: f64| {
+        found
+            .is_some_and(|found| found.value.abs() > limit && (found.low > 0.0 || found.high < 0.0))
+    };
+    let named = beyond(bias_mps, NAMED_BIAS_MPS) || beyond(lag_s, NAMED_LAG_S);
+    let centre = bias_mps.map_or(0.0, |bias| bias.value);
+    let biased_drones =
+        biases.iter().filter(|(_, bias)| (bias - centre).abs() > TOLD_BIAS_MPS).copied().collect();
+    SensorChannel { bias_mps, lag_s, biased_drones, named }
+}
+
+/// Mean with the interval that the drones' scatter gives.
+fn interval(values: &[f64]) -> Option<Interval> {
+    let count = values.len() as f64;
+    if values.is_empty() {
+        return None;
+    }
+    let mean = values.iter().sum::<f64>() / count;
+    let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    let se = if values.len() > 1 { (square / (count - 1.0) / count).sqrt() } else { f64::NAN };
+    // One drone has no scatter: what a filter's velocity is usually off by.
+    let se = if se.is_finite() { se } else { 0.02 };
+    Some(Interval { value: mean, low: mean - 2.1 * se, high: mean + 2.1 * se })
+}
+
+/// Mean of V_U less the rise of the height over all steady stretches, m/s.
+fn bias(flight: &Flight, segments: &[Segment]) -> Option<f64> {
+    let (mut moved_m, mut rose_m, mut lasted_s) = (0.0, 0.0, 0.0);
+    for segment in segments {
+        let start_s = segment.start_ms as f64 / 1000.0 + 2.0;
+        let end_s = segment.end_ms as f64 / 1000.0 - 0.2;
+        let flies = segment.kind.is_leg() || segment.kind.is_hover();
+        if !flies || end_s - start_s < SHORTEST_S {
+            continue;
+        }
+        let (Some(from_m), Some(to_m)) =
+            (flight.height_m.at(start_s, GAP_S), flight.height_m.at(end_s, GAP_S))
+        else {
+            continue;
+        };
+        let Some(integral_m) = integral(&flight.velocity_up_mps, start_s, end_s) else { continue };
+        moved_m += integral_m;
+        rose_m += to_m - from_m;
+        lasted_s += end_s - start_s;
+    }
+    (lasted_s > 4.0 * SHORTEST_S).then(|| (moved_m - rose_m) / lasted_s)
+}
+
+/// Integral of a series by trapezoids; `None` with gaps.
+fn integral(series: &Series, start_s: f64, end_s: f64) -> Option<f64> {
+    if series.longest_gap_s(start_s, end_s) > GAP_S {
+        return None;
+    }
+    let mut points = vec![(start_s, series.at(start_s, GAP_S)?)];
+    let times = series.times_between(start_s, end_s);
+    points.extend(times.iter().copied().zip(series.between(start_s, end_s).iter().copied()));
+    points.push((end_s, series.at(end_s, GAP_S)?));
+    let area = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0) * f64::midpoint(pair[0].1, pair[1].1);
+    Some(points.windows(2).map(area).sum())
+}
+
+/// The time by which V_U is later than the rate of the height, s: the shift with which it matches
+/// best where the command changes.
+fn lag(flight: &Flight, segments: &[Segment]) -> Option<f64> {
+    let changes: Vec<f64> = segments
+        .windows(2)
+        .filter(|pair| (pair[1].velocity_mps[2] - pair[0].velocity_mps[2]).abs() > 0.8)
+        .map(|pair| pair[1].start_ms as f64 / 1000.0)
+        .filter(|time_s| *time_s > 1.0)
+        .collect();
+    if changes.len() < 4 {
+        return None;
+    }
+    let half_s = 0.1;
+    let misfit = |lag_s: f64| {
+        let (mut sum, mut count) = (0.0, 0);
+        for change in &changes {
+            for step in 0..60 {
+                let time_s = change - 1.0 + f64::from(step) * 0.1;
+                let height = |at| flight.height_m.at(at, GAP_S);
+                let (Some(before), Some(after), Some(velocity)) = (
+                    height(time_s - half_s),
+                    height(time_s + half_s),
+                    flight.velocity_up_mps.at(time_s + lag_s, GAP_S),
+                ) else {
+                    continue;
+                };
+                sum += (velocity - (after - before) / (2.0 * half_s)).powi(2);
+                count += 1;
+            }
+        }
+        (count > 100).then(|| sum / f64::from(count))
+    };
+    let tried: Vec<f64> = (0..LAGS).map(|index| FIRST_LAG_S + index as f64 * LAG_STEP_S).collect();
+    let misfits: Option<Vec<f64>> = tried.iter().map(|lag| misfit(*lag)).collect();
+    let misfits = misfits?;
+    let best = (0..misfits.len()).min_by(|a, b| misfits[*a].total_cmp(&misfits[*b]))?;
+    if best == 0 || best + 1 == misfits.len() {
+        return Some(tried[best]);
+    }
+    // The bottom of the parabola through three points.
+    let (left, middle, right) = (misfits[best - 1], misfits[best], misfits[best + 1]);
+    let bend = left - 2.0 * middle + right;
+    let by = if bend > 0.0 { 0.5 * (left - right) / bend } else { 0.0 };
+    Some(tried[best] + by.clamp(-1.0, 1.0) * LAG_STEP_S)
+}

@@ -1,0 +1,98 @@
+//! The verdict in plain words.
+
+use super::verdict::{Finding, Fitted, Step, Verdict};
+
+/// One finding as a phrase: `rotor-inflow (inflow_share 0.42, 0.39 to 0.45)`.
+pub fn phrase(finding: &Finding) -> String {
+    match finding {
+        Finding::Name { effect, parameters, was_there } => {
+            let again = if *was_there { ", with another size than the model's" } else { "" };
+            format!("{effect}{}{again}", values(parameters))
+        }
+        Finding::Class { effects, parameters } => format!(
+            "{}: this flight cannot separate them{}",
+            either(effects),
+            if parameters.is_empty() {
+                String::new()
+            } else {
+                format!(" (as {}{})", effects[0], values(parameters))
+            }
+        ),
+        Finding::Unknown { depends_on, formula } => {
+            let shape = formula.as_ref().map_or_else(String::new, |text| format!(", about {text}"));
+            format!("something that is not in the library and depends on {depends_on}{shape}")
+        }
+    }
+}
+
+fn either(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
+fn values(parameters: &[Fitted]) -> String {
+    let one = |fitted: &Fitted| {
+        let unit = if fitted.unit.is_empty() { String::new() } else { format!(" {}", fitted.unit) };
+        let before = fitted
+            .before
+            .map_or_else(String::new, |before| format!(", the model had {}", short(before)));
+        format!(
+            "{} {}{unit}, {} to {}{before}",
+            fitted.name,
+            short(fitted.value.value),
+            short(fitted.value.low),
+            short(fitted.value.high)
+        )
+    };
+    if parameters.is_empty() {
+        return String::new();
+    }
+    format!(" ({})", parameters.iter().map(one).collect::<Vec<_>>().join("; "))
+}
+
+/// Three significant digits.
+pub fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value:.0}");
+    }
+    let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{value:.digits$}")
+}
+
+/// The verdict in one or two sentences.
+pub fn summary(verdict: &Verdict) -> String {
+    let mut text = if verdict.steps.is_empty() {
+        let would = verdict.detectable.iter().filter(|one| one.would_be_seen).count();
+        format!(
+            "Nothing is missing that this flight could show: of {} effects it would have shown {} at \
+             their usual size.",
+            verdict.detectable.len(),
+            would
+        )
+    } else {
+        let named: Vec<String> =
+            verdict.steps.iter().map(|step: &Step| phrase(&step.finding)).collect();
+        format!("The model lacks {}.", named.join("; and "))
+    };
+    if verdict.sensor.named {
+        let bias = verdict.sensor.bias_mps.map_or(0.0, |bias| bias.value);
+        let lag = verdict.sensor.lag_s.map_or(0.0, |lag| lag.value);
+        text.push_str(&format!(
+            " The vertical velocity itself is off by {bias:+.3} m/s and late by {lag:.2} s \
+             (velocity-error)."
+        ));
+    }
+    if let Some(shrink) =
+        verdict.gap.drones.or(verdict.gap.rungs).filter(|_| !verdict.steps.is_empty())
+    {
+        text.push_str(&format!(
+            " On data that was not used for fitting the gap goes from {:.1} to {:.1} us; noise and air \
+             alone leave {:.1}.",
+            shrink.before_without_air_us, shrink.after_without_air_us, shrink.floor_us
+        ));
+    }
+    text
+}
