@@ -9,20 +9,20 @@
 //! [`score`] compares one verdict with the truth, [`table`] many.
 
 pub mod air;
-//MOD pub mod classes;
+pub mod classes;
 pub mod error;
-//MOD pub mod explain;
+pub mod explain;
 pub mod fly;
 pub mod foreign;
 pub mod hide;
-//MOD pub mod interval;
+pub mod interval;
 pub mod scenario;
-//MOD pub mod score;
-//MOD pub mod seal;
+pub mod score;
+pub mod seal;
 //MOD pub mod series;
 //MOD pub mod table;
 pub mod vehicles;
 
 pub use error::BlindError;
-//MOD pub use explain::Explain;
+pub use explain::Explain;
 pub use scenario::{AirClass, Base, Cell, Protocol, Scenario};
