@@ -12,8 +12,7 @@ pub const CLASSES: &[&[&str]] = &[
 
 /// Whether two effects are in one class (or are one).
 pub fn equivalent(left: &str, right: &str) -> bool {
-    left == right
-        || CLASSES.iter().any(|class| class.contains(&left) && class.contains(&right))
+    left == right || CLASSES.iter().any(|class| class.contains(&left) && class.contains(&right))
 }
 
 /// Whether an effect is alone in its class.

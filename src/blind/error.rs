@@ -82,7 +82,9 @@ pub enum BlindError {
         first: u64,
     },
     /// A seed of the wrong range.
-    #[error("seed {seed} is for scoring: whoever tunes with it spoils it; tune with seeds below {first}")]
+    #[error(
+        "seed {seed} is for scoring: whoever tunes with it spoils it; tune with seeds below {first}"
+    )]
     ScoringSeed {
         /// As asked for.
         seed: u64,

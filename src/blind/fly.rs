@@ -76,8 +76,7 @@ pub fn fly(
     sweep_partial(&folder.logs())?;
     let text = |what, reason: String| BlindError::Text { what, reason };
     let known = scenario.cell.base.known()?;
-    let known =
-        toml::to_string(&known).map_err(|error| text("the vehicle", error.to_string()))?;
+    let known = toml::to_string(&known).map_err(|error| text("the vehicle", error.to_string()))?;
     write_whole(&folder.template(), flight.template_text.as_bytes())?;
     write_whole(&folder.vehicle(), known.as_bytes())?;
     let air = BlindAir::new(&scenario.nuisance.air, scenario.seed);
@@ -91,8 +90,8 @@ pub fn fly(
         .filter(|(slot, _)| !missing.contains(&slot.slot))
         .map(|(slot, drone)| {
             let path = folder.log(slot.slot, count);
-            let drone: ShowDrone = as_flown(drone)
-                .map_err(|source| BlindError::Skyb { slot: slot.slot, source })?;
+            let drone: ShowDrone =
+                as_flown(drone).map_err(|source| BlindError::Skyb { slot: slot.slot, source })?;
             let vehicle = true_vehicle(scenario, slot.slot)?;
             let setup = FlightSetup {
                 vehicle: &vehicle,

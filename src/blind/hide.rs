@@ -326,8 +326,7 @@ fn airsim_drag_m2(vehicle: &Vehicle) -> [f64; 2] {
     let frame = &vehicle.airframe;
     let [length, width, height] = frame.body_m;
     let discs_m2 = 4.0 * std::f64::consts::PI * frame.rotor_diameter_m.powi(2);
-    let sides_m2 =
-        4.0 * std::f64::consts::PI * frame.rotor_diameter_m * frame.rotor_height_m;
+    let sides_m2 = 4.0 * std::f64::consts::PI * frame.rotor_diameter_m * frame.rotor_height_m;
     let coefficient = frame.drag_coefficient;
     [coefficient * (length * width + discs_m2), coefficient * (width * height + sides_m2)]
 }

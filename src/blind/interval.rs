@@ -15,8 +15,7 @@ pub fn clopper_pearson(count: usize, total: usize) -> (f64, f64) {
     }
     let (k, n) = (count as f64, total as f64);
     let low = if count == 0 { 0.0 } else { beta_quantile(k, n - k + 1.0, ALPHA / 2.0) };
-    let high =
-        if count == total { 1.0 } else { beta_quantile(k + 1.0, n - k, 1.0 - ALPHA / 2.0) };
+    let high = if count == total { 1.0 } else { beta_quantile(k + 1.0, n - k, 1.0 - ALPHA / 2.0) };
     (low, high)
 }
 

@@ -16,11 +16,13 @@ pub mod fly;
 pub mod foreign;
 pub mod hide;
 pub mod interval;
+mod metrics;
+pub mod render;
 pub mod scenario;
 pub mod score;
 pub mod seal;
-//MOD pub mod series;
-//MOD pub mod table;
+pub mod series;
+pub mod table;
 pub mod vehicles;
 
 pub use error::BlindError;

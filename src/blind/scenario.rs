@@ -145,8 +145,7 @@ pub struct Cell {
 impl Cell {
     /// A short name: `paper-calm-airsim-none`.
     pub fn name(&self) -> String {
-        let hidden =
-            if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") };
+        let hidden = if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") };
         format!("{}-{}-{}-{hidden}", self.protocol.name(), self.air.name(), self.base.name())
     }
 }
@@ -216,13 +215,7 @@ impl Scenario {
             hidden.push(drawn);
         }
         let nuisance = nuisance(seed, cell)?;
-        Ok(Self {
-            schema: SCENARIO_SCHEMA.to_owned(),
-            seed,
-            cell: cell.clone(),
-            hidden,
-            nuisance,
-        })
+        Ok(Self { schema: SCENARIO_SCHEMA.to_owned(), seed, cell: cell.clone(), hidden, nuisance })
     }
 
     /// Slots in all.

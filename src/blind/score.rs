@@ -138,8 +138,8 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
         outcome.raw_shrink = (before > 0.0).then(|| 1.0 - after / before);
         outcome.excess_shrink = Some(shrink.excess_shrink.value);
         // Without the air, which is the same before and after and only blurs the difference.
-        outcome.made_worse = !outcome.found.is_empty()
-            && shrink.after_without_air_us > shrink.before_without_air_us;
+        outcome.made_worse =
+            !outcome.found.is_empty() && shrink.after_without_air_us > shrink.before_without_air_us;
     }
     outcome
 }

@@ -7,6 +7,7 @@ use thiserror::Error;
 use super::load::LoadError;
 use crate::base::causes::with_causes;
 use crate::base::file::FileError;
+use crate::blind::BlindError;
 use crate::campaign::CampaignError;
 use crate::campaign::write::WriteError;
 use crate::log::LogError;
@@ -86,6 +87,9 @@ pub enum CommandError {
     /// A study could not be read, flown or evaluated.
     #[error(transparent)]
     Study(Box<StudyError>),
+    /// A blind flight could not be drawn, flown or scored.
+    #[error(transparent)]
+    Blind(Box<BlindError>),
     /// The arguments do not fit together.
     #[error("{0}")]
     Usage(String),
@@ -145,6 +149,21 @@ impl From<SimError> for CommandError {
     }
 }
 
+impl From<BlindError> for CommandError {
+    fn from(error: BlindError) -> Self {
+        match error {
+            BlindError::File(error) => Self::File(error),
+            BlindError::Campaign(error) => Self::Campaign(error),
+            BlindError::Mission(error) => error.into(),
+            BlindError::Vehicle(error) => Self::Vehicle(error),
+            BlindError::Effect(error) => Self::Effect(error),
+            BlindError::Sim(error) => error.into(),
+            BlindError::Stopped => Self::Interrupted,
+            other => Self::Blind(Box::new(other)),
+        }
+    }
+}
+
 impl CommandError {
     /// The exit code for this error.
     pub fn exit(&self) -> Exit {
@@ -162,6 +181,13 @@ impl CommandError {
                 StudyError::Record { .. } => Exit::Failed,
                 StudyError::NoStudy { name } => of_name(name),
                 StudyError::NoReference { .. } => Exit::Nothing,
+                _ => Exit::Usage,
+            },
+            Self::Blind(error) => match &**error {
+                BlindError::Skyb { .. }
+                | BlindError::NoVerdict { .. }
+                | BlindError::Explain { .. }
+                | BlindError::Text { .. } => Exit::Failed,
                 _ => Exit::Usage,
             },
             Self::Log(LogError::Open { .. })

@@ -1,6 +1,7 @@
 //! The command line: arguments, one file per subcommand, exit codes.
 
 mod analyze;
+mod blind;
 mod campaign_files;
 mod check;
 mod clock;
@@ -135,6 +136,8 @@ enum Command {
     Analyze(analyze::AnalyzeArgs),
     /// Fly the ladder in every wind and updraft of a study, and correlate what is found with the truth
     Sweep(sweep::SweepArgs),
+    /// Test the search for missing physics: flights that hide some, verdicts, and then the truth
+    Blind(blind::BlindArgs),
     /// List the physics that can be flown, or explain one piece
     Effects(effects::EffectsArgs),
     /// Say what is in a file
@@ -197,6 +200,7 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
         Command::Sweep(args) => sweep::run(context, &args),
+        Command::Blind(args) => blind::run(context, &args),
         Command::Effects(args) => effects::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),

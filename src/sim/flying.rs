@@ -11,7 +11,9 @@ use super::autopilot::director::{Abort, Stage};
 use super::autopilot::motors::Spool;
 use super::autopilot::params as p;
 use super::error::SimError;
-use super::flight::{Beyond, FlightSetup, FlightSummary, STEP_S, STEP_US, armed_at_us, command, validate};
+use super::flight::{
+    Beyond, FlightSetup, FlightSummary, STEP_S, STEP_US, armed_at_us, command, validate,
+};
 use super::plant::rotor::ROTORS;
 use super::plant::{Motion, Plant};
 use super::recorder::{Moment, Recorder};
@@ -70,10 +72,7 @@ impl<'a> Flight<'a> {
     ///
     /// # Errors
     /// See [`SimError`].
-    pub(super) fn beyond(
-        setup: &FlightSetup<'a>,
-        beyond: Beyond<'_>,
-    ) -> Result<Self, SimError> {
+    pub(super) fn beyond(setup: &FlightSetup<'a>, beyond: Beyond<'_>) -> Result<Self, SimError> {
         Self::of_show(setup, None, beyond)
     }
 

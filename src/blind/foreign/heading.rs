@@ -2,7 +2,9 @@
 
 use super::{PULSE_US, TIME_S, lowered};
 use crate::effects::definition::Parameter;
-use crate::effects::{Class, Definition, Effect, Hook, Now, Own, Reference, Signal, Signals, Values};
+use crate::effects::{
+    Class, Definition, Effect, Hook, Now, Own, Reference, Signal, Signals, Values,
+};
 
 const AMPLITUDE: usize = 0;
 const KNEE: usize = 1;

@@ -41,10 +41,7 @@ fn lowered(command: f64, pulse_us: f64) -> f64 {
 }
 
 /// Values by name, in the order of a definition; those not given are 0.
-pub(super) fn values(
-    definition: &Definition,
-    of: impl Fn(&str) -> Option<f64>,
-) -> Values {
+pub(super) fn values(definition: &Definition, of: impl Fn(&str) -> Option<f64>) -> Values {
     let mut values = Values::default();
     for (value, parameter) in values.iter_mut().zip(definition.parameters) {
         *value = of(parameter.name).unwrap_or_default();
