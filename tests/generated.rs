@@ -36,6 +36,9 @@ fn json_schemas_are_current() {
         (Format::Changes, "changes"),
         (Format::Preflight, "preflight"),
         (Format::Fly, "fly"),
+        (Format::Blind, "blind"),
+        (Format::BlindFlight, "blind-flight"),
+        (Format::BlindTruth, "blind-truth"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();
