@@ -56,7 +56,6 @@ fn the_same_seed_gives_the_same_bytes_on_one_thread_and_on_two() {
 
 #[test]
 fn what_is_handed_over_says_nothing_of_the_truth() {
-    let folder = tempfile::tempdir().unwrap();
     for base in [Base::Airsim, Base::Inflow, Base::Pixel] {
         let known = base.known().unwrap();
         for kind in KINDS.iter().filter(|kind| kind.bases.contains(&base)) {
@@ -81,7 +80,6 @@ fn what_is_handed_over_says_nothing_of_the_truth() {
     let truth = Scenario::draw(5, &cell(Protocol::Paper, Base::Airsim, &[])).unwrap();
     let text = planned(&truth).unwrap().template_text;
     assert!(!text.contains("seed"), "{text}");
-    drop(folder);
 }
 
 #[test]
@@ -99,7 +97,6 @@ fn magnitudes_are_within_their_ranges_and_fill_them() {
                 drawn.iter().fold((f64::MAX, 0.0_f64), |(a, b), one| (a.min(*one), b.max(*one)));
             assert!(least >= low * 0.999 && most <= high * 1.001, "{} {drawn:?}", kind.name);
             assert!(least < low * 1.3, "{} {}: {least}", kind.name, base.name());
-            println!("{} {}: {least} to {most}", kind.name, base.name());
         }
     }
 }
@@ -143,6 +140,20 @@ fn enhanced_flights_stagger_charge_and_warmth_and_the_papers_do_not() {
     let truth = Scenario::draw(2, &paper).unwrap();
     assert!(truth.nuisance.charges.iter().all(|charge| *charge == 1.0));
     assert!(truth.nuisance.warm.is_empty());
+}
+
+#[test]
+fn a_run_that_hides_something_hides_each_effect_in_its_turn() {
+    let chosen: BTreeSet<String> = (0..300)
+        .map(|seed| {
+            let cell = Cell::hiding_one(seed, Protocol::Enhanced, AirClass::Moderate, Base::Airsim);
+            assert_eq!(cell.hidden.len(), 1);
+            Scenario::draw(seed, &cell).unwrap().hidden[0].kind.clone()
+        })
+        .collect();
+    let takes =
+        |kind: &&updraft::blind::hide::Kind| !kind.foreign && kind.bases.contains(&Base::Airsim);
+    assert_eq!(chosen.len(), KINDS.iter().filter(takes).count());
 }
 
 #[test]

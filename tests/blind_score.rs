@@ -229,7 +229,6 @@ fn the_seal_opens_after_the_verdict_and_shows_tampering() {
     std::fs::write(&path, "{}").unwrap();
     let opened = seal::open(beside, &path).unwrap();
     assert_eq!((&opened.truth, &opened.truth_sha256), (&truth, &hash));
-    // The same truth with another seed has another nonce, so its hash cannot be guessed from a list.
     let text = std::fs::read_to_string(seal::truth_path(beside)).unwrap();
     std::fs::write(seal::truth_path(beside), text.replacen("battery", "buttery", 1)).unwrap();
     let changed = seal::open(beside, &path).unwrap_err().to_string();

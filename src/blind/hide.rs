@@ -170,8 +170,6 @@ const LEAST_SHARE: f64 = 0.005;
 const LIFT_MPS: f64 = 5.0;
 /// Climb at which the vortex ring is stated, m/s.
 const RING_MPS: f64 = -3.5;
-/// Drag of a pixel-like body's side over that from above.
-const SIDE_DRAG: f64 = 0.5;
 
 impl Kind {
     /// Draws how large it is, and everything else about it.
@@ -222,18 +220,19 @@ impl Kind {
                 let lost = |share| Ok(pulse_us(&known, self.effect, share, &at)? / per_thrust);
                 share_for(self.range, &mut magnitude, lost)?
             }
-            "parasitic-drag" => match known_value(&known, "parasitic-drag", "vertical_m2") {
-                Some(vertical_m2) => {
-                    let side = known_value(&known, "parasitic-drag", "horizontal_m2");
-                    also("horizontal_m2", side.unwrap_or_default() * (1.0 + magnitude));
+            "parasitic-drag" => {
+                let had = |parameter| known_value(&known, "parasitic-drag", parameter);
+                if let Some(vertical_m2) = had("vertical_m2") {
+                    let side_m2 = had("horizontal_m2").unwrap_or_default();
+                    also("horizontal_m2", side_m2 * (1.0 + magnitude));
                     vertical_m2 * (1.0 + magnitude)
-                }
-                None => {
+                } else {
+                    // AirSim's law has its drag in the airframe.
                     let [vertical_m2, side_m2] = airsim_drag_m2(&known);
-                    also("horizontal_m2", side_m2.max(SIDE_DRAG * 0.01) * magnitude);
+                    also("horizontal_m2", side_m2 * magnitude);
                     vertical_m2 * magnitude
                 }
-            },
+            }
             "motor-thermal" => {
                 also("time_s", log_between(rng, (60.0, 200.0)));
                 // Warm magnets usually win over warm windings.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::air::AirScales;
 use super::error::BlindError;
-use super::hide::{Hidden, between, kind_of, log_between, unit};
+use super::hide::{Hidden, KINDS, between, kind_of, log_between, unit};
 use super::vehicles::hover_a;
 use crate::base::rng::{Purpose, stream};
 
@@ -28,6 +28,11 @@ const LOCAL: f64 = 0.55;
 pub(super) const INFLOW_SPREAD: (f64, f64) = (0.05, 0.07);
 /// Charge of the batteries when they are staggered.
 const STAGGERED: (f64, f64) = (0.62, 1.0);
+
+/// Time that a full battery carries the drone in hover, s: also the least charged one comes home.
+const ENDURANCE_S: (f64, f64) = (1_500.0, 2_100.0);
+/// Stream of what is hidden when nobody says what.
+const CHOICE: u64 = u64::MAX - 2;
 
 /// Which protocol is flown.
 #[derive(
@@ -143,6 +148,16 @@ pub struct Cell {
 }
 
 impl Cell {
+    /// A full grid that hides one effect of the library, which the seed chooses among those that the
+    /// base takes.
+    pub fn hiding_one(seed: u64, protocol: Protocol, air: AirClass, base: Base) -> Self {
+        let takes = KINDS.iter().filter(|kind| !kind.foreign && kind.bases.contains(&base));
+        let names: Vec<&str> = takes.map(|kind| kind.name).collect();
+        let place = unit(&mut stream(seed, CHOICE, Purpose::Hidden)) * names.len() as f64;
+        let hidden = names.get(place as usize).map(|name| (*name).to_owned());
+        Self { protocol, air, base, hidden: hidden.into_iter().collect(), side: FULL_SIDE }
+    }
+
     /// A short name: `paper-calm-airsim-none`.
     pub fn name(&self) -> String {
         let hidden = if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") };
@@ -254,7 +269,7 @@ fn nuisance(seed: u64, cell: &Cell) -> Result<Nuisance, BlindError> {
     };
     let vehicle = cell.base.known()?;
     let cells = if vehicle.name == "pixel" { 2.0 } else { 3.0 };
-    let endurance_s = between(rng, (1_200.0, 1_800.0));
+    let endurance_s = between(rng, ENDURANCE_S);
     let battery = BatteryTruth {
         cells,
         capacity_ah: hover_a(&vehicle, cells) * endurance_s / 3600.0,

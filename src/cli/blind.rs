@@ -176,12 +176,11 @@ impl BlindArgs {
             BaseWord::Inflow => Base::Inflow,
             BaseWord::Pixel => Base::Pixel,
         });
-        let mut hidden = match &self.effects {
-            Some(sets) => sets.0.clone(),
-            None => {
-                let nothing = std::iter::repeat_n(Vec::new(), NONE_WEIGHT);
-                nothing.chain(KINDS.iter().map(|kind| vec![kind.name.to_owned()])).collect()
-            }
+        let mut hidden = if let Some(sets) = &self.effects {
+            sets.0.clone()
+        } else {
+            let nothing = std::iter::repeat_n(Vec::new(), NONE_WEIGHT);
+            nothing.chain(KINDS.iter().map(|kind| vec![kind.name.to_owned()])).collect()
         };
         if self.pairs {
             let others = KINDS.iter().filter(|kind| !kind.foreign && kind.effect != "rotor-inflow");

@@ -136,7 +136,7 @@ enum Command {
     Analyze(analyze::AnalyzeArgs),
     /// Fly the ladder in every wind and updraft of a study, and correlate what is found with the truth
     Sweep(sweep::SweepArgs),
-    /// Test the search for missing physics: flights that hide some, verdicts, and then the truth
+    /// Test the search for missing physics on flights that hide some
     Blind(blind::BlindArgs),
     /// List the physics that can be flown, or explain one piece
     Effects(effects::EffectsArgs),
