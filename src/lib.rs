@@ -32,6 +32,7 @@
 
 pub mod analysis;
 pub mod base;
+pub mod blind;
 pub mod campaign;
 pub mod check;
 pub mod cli;

@@ -36,6 +36,10 @@ fn json_schemas_are_current() {
         (Format::Changes, "changes"),
         (Format::Preflight, "preflight"),
         (Format::Fly, "fly"),
+        (Format::Verdict, "verdict"),
+        (Format::Blind, "blind"),
+        (Format::BlindFlight, "blind-flight"),
+        (Format::BlindTruth, "blind-truth"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();

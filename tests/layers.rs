@@ -28,6 +28,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("flight", &["base", "vehicle", "mission", "log"]),
     ("analysis", &["base", "vehicle", "mission", "log", "flight"]),
     ("gap", &["base", "vehicle", "mission", "show", "effects", "sim", "log", "flight", "analysis"]),
+    (
+        "blind",
+        &[
+            "base", "vehicle", "mission", "show", "check", "campaign", "effects", "sim", "log",
+            "flight", "analysis", "gap",
+        ],
+    ),
     ("study", &["base", "vehicle", "mission", "show", "sim", "log", "flight", "analysis"]),
     ("report", &["base", "vehicle", "mission", "flight", "analysis", "gap", "study"]),
 ];

@@ -28,7 +28,7 @@ pub mod prefer;
 mod refer;
 pub mod result;
 mod shape;
-mod slots;
+pub mod slots;
 mod split;
 pub mod statistics;
 mod stats;

@@ -71,3 +71,15 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
     });
     (slots.collect(), warnings)
 }
+
+/// Whose each log is: a slot of the plan, nobody's in particular without a plan, or why it is not
+/// used; and what contradicts itself.
+pub fn whose_logs(input: &FlightInput<'_>) -> (Vec<Result<Option<u16>, String>>, Vec<String>) {
+    let (slots, warnings) = match_slots(input);
+    let of = |slot| match slot {
+        SlotMatch::Slot(slot) => Ok(Some(slot)),
+        SlotMatch::Unplanned => Ok(None),
+        SlotMatch::Refused { reason, .. } => Err(reason),
+    };
+    (slots.into_iter().map(of).collect(), warnings)
+}

@@ -21,6 +21,8 @@ pub enum Purpose {
     Link = 6,
     /// Logs that a simulated campaign loses.
     Losses = 7,
+    /// What a blind flight hides.
+    Hidden = 8,
 }
 
 /// The random stream of one drone and purpose. PCG's output is stable across releases.

@@ -170,6 +170,11 @@ pub enum CampaignError {
 pub struct FlightFolder(pub PathBuf);
 
 impl FlightFolder {
+    /// The files of a flight in this folder.
+    pub fn at(folder: &Path) -> Self {
+        Self(folder.to_owned())
+    }
+
     /// The template as resolved.
     pub fn template(&self) -> PathBuf {
         self.0.join("template.toml")

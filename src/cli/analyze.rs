@@ -375,7 +375,7 @@ fn finish(
     })
 }
 
-fn load_plan(path: &Path) -> Result<Plan, CommandError> {
+pub(super) fn load_plan(path: &Path) -> Result<Plan, CommandError> {
     if has_extension(path, "json") {
         return Ok(campaign::read_plan(path)?);
     }

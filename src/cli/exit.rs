@@ -7,8 +7,10 @@ use thiserror::Error;
 use super::load::LoadError;
 use crate::base::causes::with_causes;
 use crate::base::file::FileError;
+use crate::blind::BlindError;
 use crate::campaign::CampaignError;
 use crate::campaign::write::WriteError;
+use crate::gap::GapError;
 use crate::log::LogError;
 use crate::mission::resolve::MissionError;
 use crate::report::ReportError;
@@ -86,6 +88,12 @@ pub enum CommandError {
     /// A study could not be read, flown or evaluated.
     #[error(transparent)]
     Study(Box<StudyError>),
+    /// A blind flight could not be drawn, flown or scored.
+    #[error(transparent)]
+    Blind(Box<BlindError>),
+    /// Measurement and simulation cannot be compared.
+    #[error(transparent)]
+    Gap(#[from] GapError),
     /// The arguments do not fit together.
     #[error("{0}")]
     Usage(String),
@@ -145,6 +153,21 @@ impl From<SimError> for CommandError {
     }
 }
 
+impl From<BlindError> for CommandError {
+    fn from(error: BlindError) -> Self {
+        match error {
+            BlindError::File(error) => Self::File(error),
+            BlindError::Campaign(error) => Self::Campaign(error),
+            BlindError::Mission(error) => error.into(),
+            BlindError::Vehicle(error) => Self::Vehicle(error),
+            BlindError::Effect(error) => Self::Effect(error),
+            BlindError::Sim(error) => error.into(),
+            BlindError::Stopped => Self::Interrupted,
+            other => Self::Blind(Box::new(other)),
+        }
+    }
+}
+
 impl CommandError {
     /// The exit code for this error.
     pub fn exit(&self) -> Exit {
@@ -163,6 +186,18 @@ impl CommandError {
                 StudyError::NoStudy { name } => of_name(name),
                 StudyError::NoReference { .. } => Exit::Nothing,
                 _ => Exit::Usage,
+            },
+            Self::Blind(error) => match &**error {
+                BlindError::Skyb { .. }
+                | BlindError::NoVerdict { .. }
+                | BlindError::Explain { .. }
+                | BlindError::Text { .. } => Exit::Failed,
+                _ => Exit::Usage,
+            },
+            Self::Gap(error) => match error {
+                GapError::NoSimulatedSide | GapError::Effect(_) => Exit::Usage,
+                GapError::Simulation(_) => Exit::Failed,
+                _ => Exit::Nothing,
             },
             Self::Log(LogError::Open { .. })
             | Self::File(_)

@@ -1,6 +1,7 @@
 //! The command line: arguments, one file per subcommand, exit codes.
 
 mod analyze;
+mod blind;
 mod campaign_files;
 mod check;
 mod clock;
@@ -14,6 +15,7 @@ mod flown;
 mod fly;
 mod fly_output;
 mod found;
+mod gap;
 mod inspect;
 mod leaning;
 mod load;
@@ -57,6 +59,7 @@ use exit::{CommandError, Exit};
   updraft physics                                 the real firmware's simulator in our air
   updraft sweep                                   the paper's simulation study, with its figure 2
   updraft analyze my-campaign                     also a folder of logs, or one log
+  updraft gap my-campaign                         which physics the model lacks
   updraft inspect my-campaign/show.skyc
 
 Exit codes: 0 done; 1 failed: a file or folder is not there, or cannot be read or written; 2 wrong
@@ -135,6 +138,10 @@ enum Command {
     Analyze(analyze::AnalyzeArgs),
     /// Fly the ladder in every wind and updraft of a study, and correlate what is found with the truth
     Sweep(sweep::SweepArgs),
+    /// Find where simulation and measurement disagree, name the missing physics, add it
+    Gap(gap::GapArgs),
+    /// Test the search for missing physics on flights that hide some
+    Blind(blind::BlindArgs),
     /// List the physics that can be flown, or explain one piece
     Effects(effects::EffectsArgs),
     /// Say what is in a file
@@ -197,6 +204,8 @@ fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {
         Command::Physics(args) => physics::run(context, &args),
         Command::Analyze(args) => analyze::run(context, &args),
         Command::Sweep(args) => sweep::run(context, &args),
+        Command::Gap(args) => gap::run(context, &args),
+        Command::Blind(args) => blind::run(context, &args),
         Command::Effects(args) => effects::run(context, &args),
         Command::Inspect(args) => inspect::run(context, &args),
         Command::Completions(args) => tools::completions(context, &args, Cli::command()),

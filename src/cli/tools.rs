@@ -9,11 +9,15 @@ use super::exit::{CommandError, Exit};
 use super::fleet::tables::PreflightOutput;
 use super::fly_output::FlyOutput;
 use crate::analysis::result::Analysis;
+use crate::blind::seal::Sealed;
+use crate::blind::series::FlightResult;
+use crate::blind::table::Table;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{CampaignIndex, FlightRecord};
 use crate::fleet::changes::Changes;
 use crate::fleet::logs::manifest::Manifest;
 use crate::fleet::slots::FleetTable;
+use crate::gap::Verdict;
 use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
@@ -63,6 +67,14 @@ pub enum Format {
     Preflight,
     /// what `updraft fly --json` prints
     Fly,
+    /// gap/verdict.json
+    Verdict,
+    /// table.json of `updraft blind`
+    Blind,
+    /// a finished flight of `updraft blind`
+    BlindFlight,
+    /// sealed/truth.json of a blind flight
+    BlindTruth,
 }
 
 impl Format {
@@ -82,6 +94,10 @@ impl Format {
             Self::Changes => schema_for!(Changes),
             Self::Preflight => schema_for!(PreflightOutput),
             Self::Fly => schema_for!(FlyOutput),
+            Self::Verdict => schema_for!(Verdict),
+            Self::Blind => schema_for!(Table),
+            Self::BlindFlight => schema_for!(FlightResult),
+            Self::BlindTruth => schema_for!(Sealed),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;
         text.push('\n');

@@ -111,6 +111,9 @@ pub struct Reading {
     pub compensated: bool,
 }
 
+/// An effect that a flight has beyond its vehicle's file, with its values.
+pub type Extra = (&'static dyn Effect, Values);
+
 #[derive(Clone)]
 struct Part {
     effect: &'static dyn Effect,
@@ -145,11 +148,27 @@ impl Active {
         home_m: Vector3<f64>,
         dt_s: f64,
     ) -> Result<(Self, Airframe), EffectError> {
+        Self::start_with(vehicle, &[], seed, drone, home_m, dt_s)
+    }
+
+    /// The same, with effects that no library lists: they act after the vehicle's own, and their
+    /// values are taken as they are.
+    ///
+    /// # Errors
+    /// As [`Active::start`].
+    pub fn start_with(
+        vehicle: &Vehicle,
+        extra: &[Extra],
+        seed: u64,
+        drone: u16,
+        home_m: Vector3<f64>,
+        dt_s: f64,
+    ) -> Result<(Self, Airframe), EffectError> {
         let reference = Reference::of(vehicle);
         let start = Start { reference: &reference, home_m, dt_s };
         let mut airframe = vehicle.airframe;
         let mut active = Self::default();
-        for (effect, values) in resolved(vehicle)? {
+        for (effect, values) in resolved(vehicle)?.into_iter().chain(extra.iter().copied()) {
             let definition = effect.definition();
             let named = seed ^ hash(definition.name);
             let mut own = Own {

@@ -33,7 +33,7 @@ mod turbulence;
 mod velocity_error;
 mod vortex_ring;
 
-pub use active::{Active, Air, Change, Now, Own, Reading, Start};
+pub use active::{Active, Air, Change, Extra, Now, Own, Reading, Start};
 pub use definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 pub use error::EffectError;
 pub use model::Model;

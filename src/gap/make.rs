@@ -10,6 +10,7 @@ use super::heldout::gap;
 use super::noise::{
     GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SLOPES, WHITE,
 };
+use super::refine::{Parameter, size_errors, size_of};
 use super::regimes::regimes;
 use super::sensor::sensor;
 use super::verdict::{DataUsed, Drones, Noise, SensorChannel, VERDICT_SCHEMA, Verdict};
@@ -114,6 +115,38 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     verdict.summary = summary(&verdict);
     Ok(Explained { verdict, model: model(input.vehicle, &found), found })
+}
+
+/// Fisher z of effects that are known to be there: the change of each size over its error, with the
+/// air, offsets and the other effects free. `input.vehicle` is the true one; `hidden` has effect,
+/// size and by how much that was changed. `None`: the pulse of steady flight does not show it.
+///
+/// # Errors
+/// See [`GapError`].
+pub fn fisher_z(
+    input: &Input<'_>,
+    hidden: &[(&str, &str, f64)],
+    options: &Options,
+) -> Result<Vec<Option<f64>>, GapError> {
+    let plan = input.plan.ok_or(GapError::NoSimulatedSide)?;
+    let exponent = super::compare::thrust_exponent(input.vehicle);
+    let (data, _) = Data::of_plan(plan, input.flown, exponent).split();
+    let simulated = Simulated::Refly(plan);
+    let comparison = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
+    let parameters: Vec<Option<Parameter>> =
+        hidden.iter().map(|(effect, size, _)| size_of(effect, size)).collect();
+    let known: Vec<Parameter> = parameters.iter().flatten().cloned().collect();
+    let vehicle = comparison.vehicle.clone();
+    let errors = size_errors(&comparison, &vehicle, &known, options)?;
+    let mut errors = errors.into_iter();
+    Ok(parameters
+        .iter()
+        .zip(hidden)
+        .map(|(parameter, (_, _, change))| {
+            let se = parameter.as_ref().and_then(|_| errors.next())?;
+            (se > 0.0).then(|| (change / se).abs()).filter(|z| z.is_finite())
+        })
+        .collect())
 }
 
 /// The simulated side for the fitted drones: the same groups.

@@ -32,5 +32,5 @@ pub use compare::Simulated;
 pub use data::{Data, Flown};
 pub use error::GapError;
 pub use explain::{Found, Options, search};
-pub use make::{Explained, Input, explain};
+pub use make::{Explained, Input, explain, fisher_z};
 pub use verdict::Verdict;

@@ -91,6 +91,15 @@ pub fn refine(
             let (low, high) = parameter.bounds;
             let farthest = (0.5 * now.abs()).max(0.05 * (high - low).min(1.0)).max(2.0 * se);
             let by = solution.beta[place].clamp(-farthest, farthest);
+            let next = (now + by).clamp(low, high);
+            moved = moved.max((next - now).abs() / se.max(1e-12));
+            values.push((next, se));
+            let mut other = vehicle.clone();
+            set(&mut other, parameter.effect, parameter.name, next);
+            // A value that the vehicle cannot have stops there.
+            if comparison.scene.pulses(&other).is_ok() {
+                vehicle = other;
+            }
         }
         last = Some(Fit { vehicle: vehicle.clone(), hyper, solution, values });
         if moved < 0.05 && (round >= 2 || !fit_noise) {
@@ -182,6 +191,41 @@ pub fn parameters_of(
         }
     }
     Ok(found)
+}
+
+/// The size of an effect as a parameter; `None`: steady flight does not show it.
+pub fn size_of(effect: &str, size: &str) -> Option<Parameter> {
+    let definition = find(effect)?.definition();
+    let crate::effects::Sought::Shape { .. } = &definition.sought else { return None };
+    let parameter = definition.parameters.iter().find(|known| known.name == size)?;
+    Some(Parameter {
+        effect: definition.name,
+        name: parameter.name,
+        unit: parameter.unit,
+        bounds: (parameter.low, parameter.high),
+        before: None,
+    })
+}
+
+/// Standard errors of parameters at the vehicle's own values, with the noise that the flight shows.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub fn size_errors(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+    parameters: &[Parameter],
+    _options: &super::explain::Options,
+) -> Result<Vec<f64>, GapError> {
+    let patterns = comparison.patterns(vehicle)?;
+    let split = Split::of(&comparison.residual(vehicle, 0.0)?);
+    let slopes = slopes(comparison, vehicle, parameters)?;
+    let problem = Problem::new(&patterns, &split).with(&slopes);
+    let solution = problem.fit(Hyper::default(), Likelihood::Restricted);
+    let covariance = solution.covariance();
+    let first = solution.beta.len() - parameters.len();
+    let se = |index: usize| covariance[(first + index, first + index)].max(0.0).sqrt();
+    Ok((0..parameters.len()).map(se).collect())
 }
 
 /// Fitted values with their intervals, for the verdict.

@@ -21,6 +21,8 @@ pub mod fields_parquet;
 mod figures;
 mod film;
 mod frames;
+pub mod gap_page;
+pub mod gap_terminal;
 mod glance;
 mod law;
 mod notes;

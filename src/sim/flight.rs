@@ -15,6 +15,7 @@ use super::recorder::{LogRecorder, NoLog, Recorder};
 use crate::base::file::write_with;
 use crate::base::frame::ShowFrame;
 use crate::base::time::GpsTime;
+use crate::effects::Extra;
 use crate::show::Trajectory;
 use crate::vehicle::Vehicle;
 
@@ -61,6 +62,16 @@ pub struct Hooks<'a> {
     pub stop: Option<&'a AtomicBool>,
 }
 
+/// What a flight has beyond its setup: the door for flights whose physics the rest of the program is
+/// not to know. The default adds nothing and changes no byte.
+#[derive(Clone, Copy, Default)]
+pub struct Beyond<'a> {
+    /// Effects that need not be in [`crate::effects::LIBRARY`]; they act after the vehicle's own.
+    pub effects: &'a [Extra],
+    /// Steps of the plant (with its effects) in one control step of 2.5 ms; 0 is taken as 1.
+    pub plant_steps: u16,
+}
+
 /// What became of a flight. Times are show times, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FlightSummary {
@@ -97,13 +108,27 @@ pub struct FlightSummary {
 /// # Errors
 /// See [`SimError`].
 pub fn fly<W: Write>(setup: &FlightSetup<'_>, out: W) -> Result<FlightSummary, SimError> {
+    fly_beyond(setup, Beyond::default(), out)
+}
+
+/// [`fly`], with what the flight has beyond its setup.
+///
+/// # Errors
+/// See [`SimError`].
+pub fn fly_beyond<W: Write>(
+    setup: &FlightSetup<'_>,
+    beyond: Beyond<'_>,
+    out: W,
+) -> Result<FlightSummary, SimError> {
     let log_error = |source| SimError::Log { drone: setup.drone, source };
     validate(setup)?;
     let takeoff_s = takeoff_time_s(setup.trajectory, setup.vehicle.autopilot.wpnav_speed_up_mps)
         .ok_or(SimError::NoTakeoff { drone: setup.drone, height_m: p::SHOW_TAKEOFF_ALT })?;
     let mut recorder =
         LogRecorder::new(out, setup, armed_at_us(takeoff_s), false).map_err(log_error)?;
-    let mut summary = fly_with(setup, &mut recorder)?;
+    let mut flight = Flight::beyond(setup, beyond)?;
+    flight.step_until(f64::INFINITY, &mut recorder)?;
+    let mut summary = flight.finish()?;
     summary.log_rows = recorder.finish().map_err(log_error)?;
     Ok(summary)
 }
@@ -113,10 +138,22 @@ pub fn fly<W: Write>(setup: &FlightSetup<'_>, out: W) -> Result<FlightSummary, S
 /// # Errors
 /// See [`SimError`]; `path` is then as it was before.
 pub fn fly_to_file(setup: &FlightSetup<'_>, path: &Path) -> Result<FlightSummary, SimError> {
+    fly_beyond_to_file(setup, Beyond::default(), path)
+}
+
+/// [`fly_to_file`], with what the flight has beyond its setup.
+///
+/// # Errors
+/// As [`fly_to_file`].
+pub fn fly_beyond_to_file(
+    setup: &FlightSetup<'_>,
+    beyond: Beyond<'_>,
+    path: &Path,
+) -> Result<FlightSummary, SimError> {
     // Stands only when the file could not even be opened, and then the file's error is given.
     let mut outcome = Ok(FlightSummary::default());
     let written = write_with(path, |out| {
-        outcome = fly(setup, out);
+        outcome = fly_beyond(setup, beyond, out);
         match &mut outcome {
             Ok(_) => Ok(()),
             // The file's error says more than ours: which path.

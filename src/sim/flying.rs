@@ -11,7 +11,10 @@ use super::autopilot::director::{Abort, Stage};
 use super::autopilot::motors::Spool;
 use super::autopilot::params as p;
 use super::error::SimError;
-use super::flight::{FlightSetup, FlightSummary, STEP_S, STEP_US, armed_at_us, command, validate};
+use super::flight::{
+    Beyond, FlightSetup, FlightSummary, STEP_S, STEP_US, armed_at_us, command, validate,
+};
+use super::plant::rotor::ROTORS;
 use super::plant::{Motion, Plant};
 use super::recorder::{Moment, Recorder};
 use super::sensors::Sensors;
@@ -30,6 +33,8 @@ const LANDING_PATIENCE_S: f64 = 120.0;
 /// One drone's flight, from arming until a moment after disarming, as far as it has been flown.
 pub struct Flight<'a> {
     setup: FlightSetup<'a>,
+    plant_steps: u16,
+    impact_mps2: f64,
     pilot: Autopilot<'a>,
     plant: Plant,
     sensors: Sensors,
@@ -60,12 +65,28 @@ impl<'a> Flight<'a> {
     /// # Errors
     /// See [`SimError`].
     pub fn armed(setup: &FlightSetup<'a>, armed_s: Option<f64>) -> Result<Self, SimError> {
+        Self::of_show(setup, armed_s, Beyond::default())
+    }
+
+    /// A drone that arms by itself, in a flight that goes beyond what the simulator's users ask for.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub(super) fn beyond(setup: &FlightSetup<'a>, beyond: Beyond<'_>) -> Result<Self, SimError> {
+        Self::of_show(setup, None, beyond)
+    }
+
+    fn of_show(
+        setup: &FlightSetup<'a>,
+        armed_s: Option<f64>,
+        beyond: Beyond<'_>,
+    ) -> Result<Self, SimError> {
         validate(setup)?;
         let FlightSetup { trajectory, home_m, vehicle, drone, .. } = setup;
         let pilot =
             Autopilot::new(trajectory, &vehicle.autopilot, *home_m, home_amsl_m(setup), STEP_S);
         let none = SimError::NoTakeoff { drone: *drone, height_m: p::SHOW_TAKEOFF_ALT };
-        Self::begin(setup, armed_s, pilot.ok_or(none)?)
+        Self::begin(setup, armed_s, beyond, pilot.ok_or(none)?)
     }
 
     /// A drone that arms now, at show time 0, in GUIDED: it flies what it is told, not the
@@ -78,22 +99,31 @@ impl<'a> Flight<'a> {
         let FlightSetup { trajectory, home_m, vehicle, .. } = setup;
         let pilot =
             Autopilot::guided(trajectory, &vehicle.autopilot, *home_m, home_amsl_m(setup), STEP_S);
-        Self::begin(setup, Some(0.0), pilot)
+        Self::begin(setup, Some(0.0), Beyond::default(), pilot)
     }
 
     fn begin(
         setup: &FlightSetup<'a>,
         armed_s: Option<f64>,
+        beyond: Beyond<'_>,
         mut pilot: Autopilot<'a>,
     ) -> Result<Self, SimError> {
         let drone = setup.drone;
         if let Some(frame) = &setup.vehicle.airframe.sitl {
             pilot.motors.set_voltage(frame.battery_voltage_v);
         }
-        let (effects, airframe) =
-            Active::start(setup.vehicle, setup.seed, drone, setup.home_m, STEP_S)
-                .map_err(|source| SimError::Effect { drone, source })?;
-        let plant = Plant::with_effects(&airframe, effects, setup.home_m, STEP_S);
+        let plant_steps = beyond.plant_steps.max(1);
+        let plant_s = STEP_S / f64::from(plant_steps);
+        let (effects, airframe) = Active::start_with(
+            setup.vehicle,
+            beyond.effects,
+            setup.seed,
+            drone,
+            setup.home_m,
+            plant_s,
+        )
+        .map_err(|source| SimError::Effect { drone, source })?;
+        let plant = Plant::with_effects(&airframe, effects, setup.home_m, plant_s);
         let sensors = Sensors::new(setup.seed, drone, STEP_S);
         let takeoff_s = pilot.director.takeoff_s;
         let end_s = pilot.director.end_s;
@@ -104,6 +134,8 @@ impl<'a> Flight<'a> {
             .map_or(i64::MIN, |armed_s| ((armed_s * 1e6) as i64).div_euclid(STEP_US) * STEP_US);
         Ok(Self {
             setup: *setup,
+            plant_steps,
+            impact_mps2: 0.0,
             pilot,
             plant,
             sensors,
@@ -158,8 +190,8 @@ impl<'a> Flight<'a> {
             self.look(time_s)?;
         }
         let mut estimate = self.sensors.sense(self.plant.motion());
-        estimate.acceleration_mps2.z += self.plant.impact_mps2();
-        self.plant.sense(&mut estimate.velocity_mps.z);
+        estimate.acceleration_mps2.z += self.impact_mps2;
+        self.plant.sense(STEP_S, &mut estimate.velocity_mps.z);
         let pulses = self.pilot.update(time_s, &estimate);
         self.tally.note(&self.pilot, &self.plant, time_s, self.setup.home_m.z);
         let moment = Moment {
@@ -171,13 +203,28 @@ impl<'a> Flight<'a> {
             around: &self.around,
         };
         recorder.record(&moment).map_err(|source: io::Error| SimError::Log { drone, source })?;
-        self.plant.step(&pulses.map(command), &self.around);
+        let commands = pulses.map(command);
+        self.plant.step(&commands, &self.around);
+        self.impact_mps2 = self.plant.impact_mps2();
+        if self.plant_steps > 1 {
+            self.step_plant_further(&commands);
+        }
         self.step += 1;
         if !self.pilot.director.armed && self.stop_at_s.is_infinite() {
             self.stop_at_s = time_s + TAIL_S;
         }
         self.is_over = time_s >= self.stop_at_s;
         Ok(())
+    }
+
+    /// The plant's further steps within a control step.
+    #[inline(never)]
+    fn step_plant_further(&mut self, commands: &[f64; ROTORS]) {
+        for _ in 1..self.plant_steps {
+            self.plant.step(commands, &self.around);
+            self.impact_mps2 += self.plant.impact_mps2();
+        }
+        self.impact_mps2 /= f64::from(self.plant_steps);
     }
 
     /// What is looked at once per second.

@@ -20,6 +20,9 @@ pub mod strain;
 pub use crate::effects::Reading as BatteryReading;
 pub use air::{Atmosphere, Uniform};
 pub use error::SimError;
-pub use flight::{FlightSetup, FlightSummary, Hooks, fly, fly_to_file, fly_with, fly_without_log};
+pub use flight::{
+    Beyond, FlightSetup, FlightSummary, Hooks, fly, fly_beyond, fly_beyond_to_file, fly_to_file,
+    fly_with, fly_without_log,
+};
 pub use flying::Flight;
 pub use recorded::RecordedFlight;

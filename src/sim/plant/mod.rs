@@ -142,11 +142,12 @@ impl Plant {
         self.effects.battery()
     }
 
-    /// Changes what the autopilot takes for its vertical speed, m/s up, as the effects say.
+    /// Changes what the autopilot takes for its vertical speed, m/s up, as the effects say; `dt_s`
+    /// has passed since it looked last.
     #[inline]
-    pub fn sense(&mut self, climb_mps: &mut f64) {
+    pub fn sense(&mut self, dt_s: f64, climb_mps: &mut f64) {
         if self.effects.acts(Hook::Sense) {
-            self.effects.sense(self.dt_s, climb_mps);
+            self.effects.sense(dt_s, climb_mps);
         }
     }
 

@@ -1,0 +1,142 @@
+//! Flies a blind flight into a folder that looks like any other flight's.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use rayon::prelude::*;
+
+use super::air::BlindAir;
+use super::error::BlindError;
+use super::foreign;
+use super::scenario::{SPACING_M, Scenario};
+use super::vehicles::true_vehicle;
+use crate::base::file::{create_folder, sweep_partial, write_whole};
+use crate::base::time::GpsTime;
+use crate::campaign::{FlightFolder, to_json};
+use crate::effects::Extra;
+use crate::mission::resolve::{Override, ResolvedFlight, resolve};
+use crate::show::quantise::as_flown;
+use crate::show::{Show, ShowDrone};
+use crate::sim::{Beyond, FlightSetup, Hooks, SimError, fly_beyond_to_file};
+
+/// Steps of the plant in one control step: 1.25 ms, where the simulator that the search uses has
+/// 2.5 ms.
+pub const PLANT_STEPS: u16 = 2;
+/// When blind flights start: 2026-06-01 12:00 UTC. Fixed, so that the same seed gives the same bytes.
+const START: GpsTime = GpsTime { week: 2421, tow_ms: 129_618_000 };
+
+/// What became of a blind flight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Flown {
+    /// Logs written.
+    pub logs: usize,
+    /// Their size together, bytes.
+    pub bytes: u64,
+    /// Drones that were lost in flight.
+    pub lost: usize,
+}
+
+/// The plan of a blind flight.
+///
+/// # Errors
+/// When the template cannot be resolved.
+pub fn planned(scenario: &Scenario) -> Result<ResolvedFlight, BlindError> {
+    let cell = &scenario.cell;
+    let side = i64::from(cell.side);
+    let overrides = [
+        Override::new("vehicle", cell.base.vehicle_name()),
+        Override::new("grid.rows", side),
+        Override::new("grid.columns", side),
+        Override::new("grid.spacing_m", SPACING_M),
+    ];
+    let mut mission = resolve(cell.protocol.template(), &overrides)?;
+    if mission.flights.is_empty() {
+        let (what, reason) = ("the plan", "the template has no flight".to_owned());
+        return Err(BlindError::Text { what, reason });
+    }
+    Ok(mission.flights.swap_remove(0))
+}
+
+/// Flies a blind flight: `folder` gets template, the *known* vehicle, plan and the logs that are not
+/// lost, and nothing of the truth. Bytes do not depend on the number of threads. A drone that does
+/// not come home has no log, as in the field.
+///
+/// # Errors
+/// When nothing can be drawn, planned or written, or `stop` is raised.
+pub fn fly(
+    scenario: &Scenario,
+    folder: &Path,
+    stop: Option<&AtomicBool>,
+) -> Result<Flown, BlindError> {
+    let folder = FlightFolder(folder.to_owned());
+    let flight = planned(scenario)?;
+    let plan = &flight.plan;
+    let show = Show::of_plan(plan);
+    create_folder(&folder.logs())?;
+    sweep_partial(&folder.logs())?;
+    let text = |what, reason: String| BlindError::Text { what, reason };
+    let known = scenario.cell.base.known()?;
+    let known = toml::to_string(&known).map_err(|error| text("the vehicle", error.to_string()))?;
+    write_whole(&folder.template(), flight.template_text.as_bytes())?;
+    write_whole(&folder.vehicle(), known.as_bytes())?;
+    let air = BlindAir::new(&scenario.nuisance.air, scenario.seed);
+    let extra = extra(scenario);
+    let count = plan.slots.len();
+    let missing = &scenario.nuisance.missing;
+    let flown: Vec<Option<u64>> = plan
+        .slots
+        .par_iter()
+        .zip(&show.drones)
+        .filter(|(slot, _)| !missing.contains(&slot.slot))
+        .map(|(slot, drone)| {
+            let path = folder.log(slot.slot, count);
+            let drone: ShowDrone =
+                as_flown(drone).map_err(|source| BlindError::Skyb { slot: slot.slot, source })?;
+            let vehicle = true_vehicle(scenario, slot.slot)?;
+            let setup = FlightSetup {
+                vehicle: &vehicle,
+                trajectory: &drone.trajectory,
+                home_m: slot.home_m.into(),
+                frame: plan.site.frame(),
+                atmosphere: &air,
+                seed: scenario.seed,
+                drone: slot.slot,
+                start: START,
+                lights: &drone.lights,
+                full_logs: false,
+                hooks: Hooks { progress: None, stop },
+            };
+            let beyond = Beyond { effects: &extra, plant_steps: PLANT_STEPS };
+            match fly_beyond_to_file(&setup, beyond, &path) {
+                Ok(_) => Ok(std::fs::metadata(&path).ok().map(|found| found.len())),
+                Err(SimError::Stopped { .. }) => Err(BlindError::Stopped),
+                Err(
+                    SimError::NotLanded { .. }
+                    | SimError::NeverBegun { .. }
+                    | SimError::Diverged { .. },
+                ) => Ok(None),
+                Err(error) => Err(error.into()),
+            }
+        })
+        .collect::<Result<_, BlindError>>()?;
+    // The plan last: a folder with a plan is whole.
+    let json = to_json(plan).map_err(|error| text("the plan", error.to_string()))?;
+    write_whole(&folder.plan(), &json)?;
+    Ok(Flown {
+        logs: flown.iter().flatten().count(),
+        bytes: flown.iter().flatten().sum(),
+        lost: flown.iter().filter(|log| log.is_none()).count(),
+    })
+}
+
+/// The hidden effects that no library lists, with their values.
+pub fn extra(scenario: &Scenario) -> Vec<Extra> {
+    let hidden = scenario.hidden.iter().filter(|hidden| hidden.foreign);
+    hidden
+        .filter_map(|hidden| {
+            let effect = foreign::find(&hidden.effect)?;
+            let of = |name: &str| hidden.parameters.get(name).copied();
+            Some((effect, foreign::values(effect.definition(), of)))
+        })
+        .collect()
+}

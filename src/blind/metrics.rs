@@ -1,0 +1,155 @@
+//! What a table measures, with what is demanded of it.
+
+use super::interval::{clopper_pearson, median};
+use super::scenario::{AirClass, Protocol};
+use super::score::{Called, HiddenOutcome, Outcome};
+use super::table::{Demand, Metric};
+
+/// Whether it is named, alone or in its class.
+pub(super) fn is_named(hidden: &HiddenOutcome) -> bool {
+    matches!(hidden.called, Called::Named | Called::InClass)
+}
+
+/// Whether its Fisher z is known and in this range.
+pub(super) fn has_z(hidden: &HiddenOutcome, from: f64, to: f64) -> bool {
+    hidden.z.is_some_and(|z| (from..to).contains(&z.abs()))
+}
+
+/// What is measured, in the order of the table.
+pub(super) fn metrics(outcomes: &[&Outcome]) -> Vec<Metric> {
+    use Demand::{AtLeast, AtMost, UpperAtMost, Within};
+    let least = |bound| AtLeast { bound };
+    let most = |bound| AtMost { bound };
+    let upper = |bound| UpperAtMost { bound };
+    let none: Vec<_> = outcomes.iter().filter(|one| one.hidden.is_empty()).collect();
+    let some: Vec<_> = outcomes.iter().filter(|one| !one.hidden.is_empty()).collect();
+    let hidden: Vec<&HiddenOutcome> = outcomes.iter().flat_map(|one| &one.hidden).collect();
+    let library = |from: f64, to: f64| {
+        hidden.iter().copied().filter(move |one| !one.foreign && has_z(one, from, to))
+    };
+    let foreign = || hidden.iter().copied().filter(|one| one.foreign);
+    let together = |count: usize| {
+        let of = some.iter().filter(move |one| one.hidden.len() == count);
+        of.filter(|one| one.hidden.iter().all(|hidden| has_z(hidden, 6.0, f64::INFINITY)))
+    };
+    let all_named = |one: &Outcome| one.hidden.iter().all(is_named);
+    let errors: Vec<f64> =
+        hidden.iter().filter_map(|one| one.relative_error).map(f64::abs).collect();
+    let shrinks: Vec<f64> = (some.iter().filter(|one| !one.found.is_empty()))
+        .filter_map(|one| one.excess_shrink)
+        .collect();
+    let raw: Vec<f64> = (some.iter().filter(|one| !one.found.is_empty()))
+        .filter_map(|one| one.raw_shrink)
+        .collect();
+    // The paper's own case: AirSim's law against a field flight.
+    let paper_like = some
+        .iter()
+        .filter(|one| (one.cell.protocol, one.cell.air) == (Protocol::Paper, AirClass::Field));
+    let inflows = paper_like.flat_map(|one| &one.hidden).filter(|one| one.kind == "rotor-inflow");
+    let unseen = || {
+        hidden
+            .iter()
+            .filter(|one| !one.foreign && one.said_visible == Some(false) && one.z.is_some())
+    };
+    vec![
+        rate(
+            "false alarms, nothing hidden (upper end)",
+            none.iter().map(|one| one.is_false_alarm()),
+            [upper(0.05), upper(0.025)],
+        ),
+        rate(
+            "false alarms, nothing hidden (observed)",
+            none.iter().map(|one| one.is_false_alarm()),
+            [most(0.05), most(0.01)],
+        ),
+        rate(
+            "named or in class, z >= 6",
+            library(6.0, f64::INFINITY).map(is_named),
+            [least(0.9), least(0.98)],
+        ),
+        rate(
+            "named or in class, z 4 to 6",
+            library(4.0, 6.0).map(is_named),
+            [least(0.4), least(0.75)],
+        ),
+        rate(
+            "named alone, z >= 6, alone in class",
+            library(6.0, f64::INFINITY)
+                .filter(|one| one.single)
+                .map(|one| one.called == Called::Named),
+            [least(0.85), least(0.97)],
+        ),
+        rate(
+            "a wrong single name, any z",
+            some.iter().map(|one| !one.wrong_names.is_empty()),
+            [most(0.03), most(0.005)],
+        ),
+        rate(
+            "unknown recognised, right dependence, z >= 8",
+            foreign()
+                .filter(|one| has_z(one, 8.0, f64::INFINITY))
+                .map(|one| one.called == Called::Named),
+            [least(0.75), least(0.95)],
+        ),
+        rate(
+            "two effects, both named, each z >= 6",
+            together(2).map(|one| all_named(one)),
+            [least(0.75), least(0.93)],
+        ),
+        rate(
+            "three effects, all named, each z >= 6",
+            together(3).map(|one| all_named(one)),
+            [least(0.0), least(0.8)],
+        ),
+        middle("median error of the parameter", &errors, [most(0.1), most(0.03)]),
+        rate(
+            "95 % interval covers",
+            hidden.iter().filter_map(|one| one.covered),
+            [Within { low: 0.90, high: 0.98 }, Within { low: 0.94, high: 0.96 }],
+        ),
+        middle("held-out excess that is gone, median", &shrinks, [least(0.8), least(0.95)]),
+        middle("held-out gap that is gone, median", &raw, [least(0.0), least(0.0)]),
+        rate("flights made worse", some.iter().map(|one| one.made_worse), [most(0.03), most(0.0)]),
+        rate(
+            "said invisible, and z < 4",
+            unseen().map(|one| one.z.is_some_and(|z| z.abs() < 4.0)),
+            [least(0.9), least(0.95)],
+        ),
+        rate(
+            "inflow named, paper's protocol, field air",
+            inflows.map(|one| one.called == Called::Named),
+            [least(0.95), least(1.0)],
+        ),
+    ]
+}
+
+fn rate(
+    name: &str,
+    cases: impl Iterator<Item = bool>,
+    [acceptance, moonshot]: [Demand; 2],
+) -> Metric {
+    let (mut count, mut total) = (0, 0);
+    for case in cases {
+        count += usize::from(case);
+        total += 1;
+    }
+    Metric {
+        name: name.to_owned(),
+        value: (total > 0).then(|| count as f64 / total as f64),
+        interval: (total > 0).then(|| clopper_pearson(count, total)),
+        counts: (count, total),
+        acceptance,
+        moonshot,
+    }
+}
+
+fn middle(name: &str, values: &[f64], [acceptance, moonshot]: [Demand; 2]) -> Metric {
+    Metric {
+        name: name.to_owned(),
+        value: median(values),
+        interval: None,
+        counts: (values.len(), values.len()),
+        acceptance,
+        moonshot,
+    }
+}

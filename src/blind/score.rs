@@ -1,0 +1,248 @@
+//! One verdict against the truth.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::classes::{equivalent, is_single};
+use super::foreign;
+use super::hide::Hidden;
+use super::scenario::{Cell, Scenario};
+use crate::gap::Verdict;
+use crate::gap::verdict::{Finding, Fitted, Interval};
+
+/// The effect of the sensor channel, which is named without any look at the pulse.
+const SENSOR: &str = "velocity-error";
+
+/// What a verdict makes of one hidden effect.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Called {
+    /// It is named, alone. Off-library: it is called unknown, with what it depends on.
+    Named,
+    /// It is in a class that is given, or another of its class is named.
+    InClass,
+    /// Something unknown is reported, but not this. Off-library: it depends on another thing.
+    Unknown,
+    /// Nothing is said of it.
+    Silent,
+}
+
+/// One hidden effect and what the verdict says of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HiddenOutcome {
+    /// What was hidden, as in `--effects`.
+    pub kind: String,
+    /// The effect.
+    pub effect: String,
+    /// Whether no library lists it.
+    pub foreign: bool,
+    /// Whether it is alone in its class.
+    pub single: bool,
+    /// Fisher z under this flight; absent: not known.
+    pub z: Option<f64>,
+    /// What the verdict makes of it.
+    pub called: Called,
+    /// True value of the parameter that says how large it is.
+    pub value: f64,
+    /// The fitted one.
+    pub fitted: Option<f64>,
+    /// Error of the fitted change over the true change, signed.
+    pub relative_error: Option<f64>,
+    /// Whether the 95 % interval covers the truth.
+    pub covered: Option<bool>,
+    /// Whether the verdict says that this flight would have shown it at its true size; absent: it says
+    /// nothing of it.
+    pub said_visible: Option<bool>,
+}
+
+/// One flight's verdict against the truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// The flight's seed.
+    pub seed: u64,
+    /// What kind of flight it was.
+    pub cell: Cell,
+    /// Each hidden effect.
+    pub hidden: Vec<HiddenOutcome>,
+    /// What the verdict found, in words, in its order.
+    pub found: Vec<String>,
+    /// Effects named alone that are not hidden.
+    pub wrong_names: Vec<String>,
+    /// How many of them are of the class of a hidden one.
+    pub wrong_in_class: usize,
+    /// Classes given that have nothing to do with what is hidden.
+    pub wrong_classes: usize,
+    /// Unknowns reported that are no off-library effect.
+    pub wrong_unknowns: usize,
+    /// Share of the held-out gap that is gone.
+    pub raw_shrink: Option<f64>,
+    /// Share of its excess over the floor that is gone.
+    pub excess_shrink: Option<f64>,
+    /// Whether something was found, and the held-out gap is larger for it.
+    pub made_worse: bool,
+}
+
+impl Outcome {
+    /// Whether anything was found where nothing is hidden.
+    pub fn is_false_alarm(&self) -> bool {
+        self.hidden.is_empty() && !self.found.is_empty()
+    }
+}
+
+/// Compares a verdict with the truth; `fisher_z` has the z of each hidden effect under this flight, in
+/// the truth's order (missing ones are not known).
+pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> Outcome {
+    let hidden = truth.hidden.iter().enumerate().map(|(index, hidden)| {
+        let z = fisher_z.get(index).copied().flatten();
+        compare(hidden, verdict, z)
+    });
+    let mut outcome = Outcome {
+        seed: truth.seed,
+        cell: truth.cell.clone(),
+        hidden: hidden.collect(),
+        found: Vec::new(),
+        wrong_names: Vec::new(),
+        wrong_in_class: 0,
+        wrong_classes: 0,
+        wrong_unknowns: 0,
+        raw_shrink: None,
+        excess_shrink: None,
+        made_worse: false,
+    };
+    if verdict.sensor.named {
+        outcome.note_name(truth, SENSOR);
+    }
+    for step in &verdict.steps {
+        match &step.finding {
+            Finding::Name { effect, .. } => outcome.note_name(truth, effect),
+            Finding::Class { effects, .. } => {
+                let fits = |effect: &String| {
+                    library(truth).any(|hidden| equivalent(&hidden.effect, effect))
+                };
+                outcome.wrong_classes += usize::from(!effects.iter().any(fits));
+                outcome.found.push(effects.join(" or "));
+            }
+            Finding::Unknown { depends_on, .. } => {
+                let right = truth.hidden.iter().any(|hidden| accepts(hidden, depends_on));
+                outcome.wrong_unknowns += usize::from(!right);
+                outcome.found.push(format!("unknown, depends on {depends_on}"));
+            }
+        }
+    }
+    if let Some(shrink) = &verdict.gap.drones {
+        let (before, after) = (shrink.before_us.value, shrink.after_us.value);
+        outcome.raw_shrink = (before > 0.0).then(|| 1.0 - after / before);
+        outcome.excess_shrink = Some(shrink.excess_shrink.value);
+        // Without the air, which is the same before and after and only blurs the difference.
+        outcome.made_worse =
+            !outcome.found.is_empty() && shrink.after_without_air_us > shrink.before_without_air_us;
+    }
+    outcome
+}
+
+impl Outcome {
+    fn note_name(&mut self, truth: &Scenario, effect: &str) {
+        self.found.push(effect.to_owned());
+        if library(truth).any(|hidden| hidden.effect == effect) {
+            return;
+        }
+        self.wrong_names.push(effect.to_owned());
+        let near = library(truth).any(|hidden| equivalent(&hidden.effect, effect));
+        self.wrong_in_class += usize::from(near);
+    }
+}
+
+fn library(truth: &Scenario) -> impl Iterator<Item = &Hidden> {
+    truth.hidden.iter().filter(|hidden| !hidden.foreign)
+}
+
+/// Whether a hidden effect is off-library and does depend on this.
+fn accepts(hidden: &Hidden, depends_on: &str) -> bool {
+    hidden.foreign && foreign::depends_on(&hidden.effect).contains(&depends_on)
+}
+
+fn compare(hidden: &Hidden, verdict: &Verdict, z: Option<f64>) -> HiddenOutcome {
+    let called = called(hidden, verdict);
+    let fitted = fitted(hidden, verdict);
+    let value = hidden.value();
+    // What is estimated is the change against the model that was held against the logs.
+    let before = hidden.before.unwrap_or(0.0);
+    let change = value - before;
+    HiddenOutcome {
+        kind: hidden.kind.clone(),
+        effect: hidden.effect.clone(),
+        foreign: hidden.foreign,
+        single: is_single(&hidden.effect),
+        z,
+        called,
+        value,
+        fitted: fitted.map(|fitted| fitted.value),
+        relative_error: fitted
+            .filter(|_| change != 0.0)
+            .map(|fitted| (fitted.value - before) / change - 1.0),
+        covered: fitted.map(|fitted| (fitted.low..=fitted.high).contains(&value)),
+        said_visible: said_visible(hidden, verdict),
+    }
+}
+
+fn called(hidden: &Hidden, verdict: &Verdict) -> Called {
+    let mut best = Called::Silent;
+    if !hidden.foreign && verdict.sensor.named && hidden.effect == SENSOR {
+        return Called::Named;
+    }
+    for step in &verdict.steps {
+        let this = match &step.finding {
+            Finding::Unknown { depends_on, .. } if accepts(hidden, depends_on) => Called::Named,
+            Finding::Unknown { .. } => Called::Unknown,
+            _ if hidden.foreign => Called::Silent,
+            Finding::Name { effect, .. } if *effect == hidden.effect => Called::Named,
+            Finding::Name { .. } | Finding::Class { .. } => {
+                let fits = step.finding.effects().iter().any(|one| equivalent(one, &hidden.effect));
+                if fits { Called::InClass } else { Called::Silent }
+            }
+        };
+        best = best.min(this);
+    }
+    best
+}
+
+/// The fitted value of the parameter that says how large a hidden effect is.
+fn fitted(hidden: &Hidden, verdict: &Verdict) -> Option<Interval> {
+    if hidden.foreign {
+        return None;
+    }
+    let sensor = match hidden.size.as_str() {
+        "bias_mps" => verdict.sensor.bias_mps,
+        "lag_s" => verdict.sensor.lag_s,
+        _ => None,
+    };
+    if hidden.effect == SENSOR && verdict.sensor.named && sensor.is_some() {
+        return sensor;
+    }
+    let of = |parameters: &[Fitted]| {
+        let found = parameters.iter().find(|fitted| fitted.name == hidden.size);
+        found.map(|fitted| fitted.value)
+    };
+    // The last step that has it: later steps fit everything again.
+    verdict.steps.iter().rev().find_map(|step| match &step.finding {
+        Finding::Name { effect, parameters, .. } if *effect == hidden.effect => of(parameters),
+        Finding::Class { effects, parameters } if effects.first() == Some(&hidden.effect) => {
+            of(parameters)
+        }
+        _ => None,
+    })
+}
+
+/// Whether a verdict says that the flight shows a hidden effect at its true size.
+fn said_visible(hidden: &Hidden, verdict: &Verdict) -> Option<bool> {
+    let entry = verdict
+        .detectable
+        .iter()
+        .find(|entry| entry.effect == hidden.effect && entry.parameter == hidden.size)?;
+    let change = (hidden.value() - hidden.before.unwrap_or(0.0)).abs();
+    Some(entry.smallest.is_some_and(|smallest| smallest.abs() <= change))
+}

@@ -1,0 +1,111 @@
+//! The truth, sealed: its hash is published first, and it is opened only when a verdict is there.
+
+use std::path::{Path, PathBuf};
+
+use rand::Rng as _;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+
+use super::error::BlindError;
+use super::scenario::{SCENARIO_SCHEMA, Scenario};
+use crate::base::file::{create_folder, read_whole, write_whole};
+use crate::base::rng::{Purpose, stream};
+use crate::campaign::to_json;
+
+/// Largest truth that is read, bytes.
+const MAX_BYTES: u64 = 4 << 20;
+/// Stream of the nonce: far from those of hidden effects.
+const NONCE: u64 = u64::MAX;
+
+/// What a sealed file holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sealed {
+    /// Random digits, so that the hash cannot be guessed from a likely truth.
+    pub nonce: String,
+    /// The truth.
+    pub truth: Scenario,
+}
+
+/// A truth that was opened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Opened {
+    /// The truth.
+    pub truth: Scenario,
+    /// Its published hash.
+    pub truth_sha256: String,
+    /// Hash of the verdict that was on the disk when it was opened.
+    pub verdict_sha256: String,
+}
+
+/// Folder of the seal beside a flight.
+pub fn folder(beside: &Path) -> PathBuf {
+    beside.join("sealed")
+}
+
+/// The published hash.
+pub fn hash_path(beside: &Path) -> PathBuf {
+    folder(beside).join("SHA256")
+}
+
+/// The sealed truth.
+pub fn truth_path(beside: &Path) -> PathBuf {
+    folder(beside).join("truth.json")
+}
+
+/// Seals a truth: publishes its hash in `sealed/SHA256`, then writes `sealed/truth.json`. Returns the
+/// hash. Done before the flight is flown.
+///
+/// # Errors
+/// When the files cannot be written.
+pub fn seal(beside: &Path, truth: &Scenario) -> Result<String, BlindError> {
+    let mut rng = stream(truth.seed, NONCE, Purpose::Hidden);
+    let nonce = format!("{:016x}{:016x}", rng.next_u64(), rng.next_u64());
+    let sealed = Sealed { nonce, truth: truth.clone() };
+    let bytes = to_json(&sealed)
+        .map_err(|error| BlindError::Text { what: "the truth", reason: error.to_string() })?;
+    let hash = sha256(&bytes);
+    create_folder(&folder(beside))?;
+    write_whole(&hash_path(beside), format!("{hash}  truth.json\n").as_bytes())?;
+    write_whole(&truth_path(beside), &bytes)?;
+    Ok(hash)
+}
+
+/// Opens a seal, now that the verdict is there, and checks that the truth is the one whose hash was
+/// published.
+///
+/// # Errors
+/// [`BlindError::NoVerdict`] when there is no verdict yet, [`BlindError::Tampered`] when the truth was
+/// changed, or unreadable files.
+pub fn open(beside: &Path, verdict: &Path) -> Result<Opened, BlindError> {
+    // First of all: without a verdict nothing of the truth is read.
+    if !std::fs::metadata(verdict).is_ok_and(|found| found.is_file() && found.len() > 0) {
+        let (sealed, verdict) = (folder(beside), verdict.to_owned());
+        return Err(BlindError::NoVerdict { sealed, verdict });
+    }
+    let verdict_sha256 = sha256(&read_whole(verdict, 64 * MAX_BYTES)?);
+    let published = read_whole(&hash_path(beside), MAX_BYTES)?;
+    let published = String::from_utf8_lossy(&published);
+    let published = published.split_whitespace().next().unwrap_or_default().to_owned();
+    let path = truth_path(beside);
+    let bytes = read_whole(&path, MAX_BYTES)?;
+    let found = sha256(&bytes);
+    if found != published {
+        return Err(BlindError::Tampered { path, found, published });
+    }
+    let sealed: Sealed = crate::campaign::read_json(&path)?;
+    if sealed.truth.schema != SCENARIO_SCHEMA {
+        let found = sealed.truth.schema;
+        return Err(BlindError::Schema { path, found, wanted: SCENARIO_SCHEMA });
+    }
+    Ok(Opened { truth: sealed.truth, truth_sha256: found, verdict_sha256 })
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

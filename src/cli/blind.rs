@@ -1,0 +1,268 @@
+//! `updraft blind`: flights that hide physics, what the search makes of them, and then the truth.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::context::Context;
+use super::exit::{CommandError, Exit, with_reasons};
+use super::progress::Progress;
+use super::simulate::made_by;
+use super::words;
+use crate::base::file::write_whole;
+use crate::blind::hide::KINDS;
+use crate::blind::render::{Style, render};
+use crate::blind::series::{self, Place, Settings};
+use crate::blind::table::table;
+use crate::blind::{AirClass, Base, BlindError, Protocol};
+use crate::campaign::to_json;
+
+/// Nothing hidden is this many times as frequent as each thing that is hidden, unless `--effects` says
+/// which: false alarms are what is demanded most of.
+const NONE_WEIGHT: usize = 6;
+/// What is hidden together with `--pairs`, beside the inflow with everything else.
+const PAIRS: &[&[&str]] = &[
+    &["battery", "parasitic-drag"],
+    &["battery", "translational-lift"],
+    &["battery", "thrust-curve"],
+    &["battery", "velocity-bias"],
+    &["motor-thermal", "vortex-ring"],
+    &["blade-flapping", "velocity-lag"],
+];
+const TRIPLES: &[&[&str]] = &[
+    &["rotor-inflow", "battery", "translational-lift"],
+    &["rotor-inflow", "battery", "parasitic-drag"],
+    &["rotor-inflow", "vortex-ring", "velocity-bias"],
+];
+/// The word for nothing.
+const NONE: &str = "none";
+
+/// Which protocols are flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Which {
+    /// The paper's ladder (template `calibration`)
+    Paper,
+    /// The counter-phase ladder (template `calibration-counterphase`), charge and warmth staggered
+    Enhanced,
+    /// One as often as the other
+    Both,
+}
+
+/// Arguments of `updraft blind`.
+#[derive(Debug, Args)]
+#[command(after_long_help = format!("Examples:
+  updraft blind --seed 7 --tuning --flights 20 --grid 3
+  updraft blind --seed 20270101 --flights 3000 -o blind
+  updraft blind --seed 20270102 --protocol paper --effects none --air field --flights 200
+  updraft blind --seed 20270103 --effects battery,rotor-inflow+battery --base airsim --keep
+
+Each flight is drawn from the seed, its truth is sealed (the SHA-256 is published before it is flown),
+and it is flown with physics that the vehicle's file does not have. The search gets template, vehicle,
+plan and logs, as from any campaign. Only when its verdict is on the disk the seal is opened, and the
+two are compared. Finished flights are kept in flights/: the same command goes on where an interrupted
+one stopped. The table is in table.json and table.md. Method and metrics: docs/blind.md.
+
+What can be hidden:
+{}", kinds_text()))]
+pub(super) struct BlindArgs {
+    /// Which protocol is flown
+    #[arg(long, value_enum, default_value_t = Which::Both)]
+    protocol: Which,
+    /// Flights in all; the cells (protocol, air, vehicle, what is hidden) take turns
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    flights: u32,
+    /// Seed of all flights: 1000000 or more for a score; below, with --tuning, for trying things out
+    #[arg(long, value_name = "SEED")]
+    seed: u64,
+    /// What is hidden, separated by commas; NAME+NAME is hidden together, `none` is nothing [default:
+    /// each by itself, and nothing six times as often]
+    #[arg(long, value_name = "NAMES", value_parser = hidden_sets)]
+    effects: Option<Sets>,
+    /// Also pairs and triples
+    #[arg(long)]
+    pairs: bool,
+    /// How much the air moves, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "calm,moderate,field")]
+    air: Vec<AirWord>,
+    /// Known vehicles, separated by commas: AirSim's law, that with rotor inflow, or one like pixel
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "airsim,inflow,pixel")]
+    base: Vec<BaseWord>,
+    /// Drones along each side of the grid: fewer fly faster, and see less
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u16).range(3..=15))]
+    grid: u16,
+    /// Take a seed that is for tuning; the table says so
+    #[arg(long)]
+    tuning: bool,
+    /// Folder of the finished flights and the table
+    #[arg(short, long, value_name = "FOLDER", default_value = "blind")]
+    output: PathBuf,
+    /// Keep each flight with its logs, seal and verdict in work/
+    #[arg(long)]
+    keep: bool,
+    /// What is said in the table's head, such as date and commit
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
+    /// Flights at the same time [default: one per core]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum AirWord {
+    /// A calm dawn: 0.12 m/s
+    Calm,
+    /// 0.36 m/s
+    Moderate,
+    /// As in the paper's field flights: 0.5 m/s
+    Field,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum BaseWord {
+    /// AirSim's law
+    Airsim,
+    /// AirSim's law with rotor inflow
+    Inflow,
+    /// A show drone like pixel
+    Pixel,
+}
+
+/// What is hidden, set by set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Sets(Vec<Vec<String>>);
+
+/// Parser of `--effects`.
+fn hidden_sets(text: &str) -> Result<Sets, String> {
+    let mut sets = Vec::new();
+    for part in text.split(',').map(str::trim) {
+        let names: Vec<String> = match part {
+            NONE => Vec::new(),
+            part => part.split('+').map(|name| name.trim().to_owned()).collect(),
+        };
+        for name in &names {
+            crate::blind::hide::kind_of(name).map_err(|error| error.to_string())?;
+        }
+        sets.push(names);
+    }
+    Ok(Sets(sets))
+}
+
+fn kinds_text() -> String {
+    use std::fmt::Write as _;
+    KINDS.iter().fold(String::new(), |mut text, kind| {
+        let library = if kind.foreign { "  (in no library)" } else { "" };
+        let (low, high) = kind.range;
+        let _ = writeln!(text, "  {:<20} {low} to {high} {}{library}", kind.name, kind.unit);
+        text
+    })
+}
+
+impl BlindArgs {
+    fn settings(&self) -> Settings {
+        let protocols = match self.protocol {
+            Which::Paper => vec![Protocol::Paper],
+            Which::Enhanced => vec![Protocol::Enhanced],
+            Which::Both => vec![Protocol::Paper, Protocol::Enhanced],
+        };
+        let airs = self.air.iter().map(|air| match air {
+            AirWord::Calm => AirClass::Calm,
+            AirWord::Moderate => AirClass::Moderate,
+            AirWord::Field => AirClass::Field,
+        });
+        let bases = self.base.iter().map(|base| match base {
+            BaseWord::Airsim => Base::Airsim,
+            BaseWord::Inflow => Base::Inflow,
+            BaseWord::Pixel => Base::Pixel,
+        });
+        let mut hidden = if let Some(sets) = &self.effects {
+            sets.0.clone()
+        } else {
+            let nothing = std::iter::repeat_n(Vec::new(), NONE_WEIGHT);
+            nothing.chain(KINDS.iter().map(|kind| vec![kind.name.to_owned()])).collect()
+        };
+        if self.pairs {
+            let others = KINDS.iter().filter(|kind| !kind.foreign && kind.effect != "rotor-inflow");
+            // With the inflow hidden too, the base is AirSim's, and that feels no neighbours.
+            let others = others.filter(|kind| kind.bases.contains(&Base::Airsim));
+            hidden.extend(others.map(|kind| vec!["rotor-inflow".to_owned(), kind.name.to_owned()]));
+            let listed = PAIRS.iter().chain(TRIPLES);
+            hidden.extend(listed.map(|set| set.iter().map(|name| (*name).to_owned()).collect()));
+        }
+        Settings {
+            protocols,
+            airs: airs.collect(),
+            bases: bases.collect(),
+            hidden,
+            flights: self.flights as usize,
+            seed: self.seed,
+            side: self.grid,
+            tuning: self.tuning,
+        }
+    }
+}
+
+pub(super) fn run(context: &Context, args: &BlindArgs) -> Result<Exit, CommandError> {
+    let settings = args.settings();
+    settings.check_seed()?;
+    let _lock = context.lock(&args.output)?;
+    let place = Place { folder: args.output.clone(), keep: args.keep };
+    let progress = Progress::new(context, "blind flights", settings.flights as u64);
+    let work = || {
+        series::run(
+            &settings,
+            &place,
+            &made_by(),
+            &super::gap::blind::Searched,
+            context.stop_flag(),
+            &|| {
+                progress.advance();
+            },
+        )
+    };
+    let results = match args.jobs {
+        Some(jobs) => rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(jobs))
+            .build()
+            .map_err(|error| CommandError::Failed(format!("failed to start threads: {error}")))?
+            .install(work),
+        None => work(),
+    };
+    progress.finish();
+    let mut outcomes = Vec::new();
+    let mut lost = Vec::new();
+    for (index, result) in results?.into_iter().enumerate() {
+        match result {
+            Ok(result) => outcomes.push(result.outcome),
+            Err(BlindError::Stopped) => return Err(CommandError::Interrupted),
+            Err(error) => {
+                let reason = with_reasons(&CommandError::from(error));
+                lost.push(format!("flight {index}: {reason}"));
+            }
+        }
+    }
+    for reason in &lost {
+        context.warn(reason);
+    }
+    if outcomes.is_empty() {
+        return Err(CommandError::Nothing("no flight has a verdict".to_owned()));
+    }
+    let table = table(&settings, &outcomes, lost.len(), &made_by());
+    let json = to_json(&table)
+        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
+    let markdown = args.output.join("table.md");
+    write_whole(&args.output.join("table.json"), &json)?;
+    let note = args.note.as_deref();
+    write_whole(&markdown, render(&table, Style::Markdown, note).as_bytes())?;
+    if context.json {
+        context.print_json(&table)?;
+    } else {
+        context.print(&render(&table, Style::Text, note))?;
+    }
+    context.result(&markdown)?;
+    context.say(&format!(
+        "{} scored -> {}",
+        words::count(outcomes.len(), "blind flight"),
+        markdown.display()
+    ));
+    Ok(if lost.is_empty() { Exit::Done } else { Exit::Losses })
+}

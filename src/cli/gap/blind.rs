@@ -1,0 +1,50 @@
+//! The search as the blind benchmark asks for it.
+
+use std::path::Path;
+
+use super::{compare, logs, one_flight};
+use crate::blind::explain::{Cause, Explain};
+use crate::blind::scenario::Scenario;
+use crate::blind::vehicles::true_vehicle;
+use crate::campaign::FlightFolder;
+use crate::gap::{Flown, Input, Options, Verdict, fisher_z};
+use crate::vehicle::library;
+
+/// `updraft gap` on a flight folder.
+pub(in crate::cli) struct Searched;
+
+impl Explain for Searched {
+    fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
+        let found = one_flight(flight, None)?;
+        let vehicle = library::load(&FlightFolder::at(flight).vehicle().display().to_string())?;
+        Ok(compare(&found, None, &vehicle, &Options::default())?.verdict)
+    }
+
+    fn fisher_z(&self, flight: &Path, truth: &Scenario) -> Vec<Option<f64>> {
+        let unknown = || vec![None; truth.hidden.len()];
+        let Ok(found) = one_flight(flight, None) else { return unknown() };
+        let Some(slot) = found.plan.as_ref().and_then(|plan| plan.slots.first()) else {
+            return unknown();
+        };
+        let Ok(vehicle) = true_vehicle(truth, slot.slot) else { return unknown() };
+        let read = logs::read(&found, Path::new(""));
+        let flown: Vec<Flown<'_>> =
+            read.flights.iter().map(|(slot, flight)| Flown { slot: *slot, flight }).collect();
+        let input = Input {
+            vehicle: &vehicle,
+            plan: found.plan.as_ref(),
+            flown: &flown,
+            simulated: None,
+            left_out: Vec::new(),
+        };
+        let hidden: Vec<(&str, &str, f64)> = truth
+            .hidden
+            .iter()
+            .map(|one| {
+                let effect = if one.foreign { "" } else { one.effect.as_str() };
+                (effect, one.size.as_str(), one.value() - one.before.unwrap_or(0.0))
+            })
+            .collect();
+        fisher_z(&input, &hidden, &Options::default()).unwrap_or_else(|_| unknown())
+    }
+}

@@ -1,0 +1,63 @@
+//! The logs of a comparison: whose they are, and the flights in them.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::analysis::FlightInput;
+use crate::analysis::slots::whose_logs;
+use crate::base::causes::with_causes;
+use crate::cli::found::Found;
+use crate::flight::{Flight, FlightOptions};
+
+/// Logs that were read, and why the others were not.
+#[derive(Debug, Default)]
+pub(in crate::cli) struct Read {
+    /// Slot (a running number without a plan) and flight.
+    pub(in crate::cli) flights: Vec<(u16, Flight)>,
+    /// Each other log with its reason.
+    pub(in crate::cli) left_out: Vec<String>,
+}
+
+/// Reads all logs of a flight; a log that cannot be used stops none of the others.
+pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
+    let input = FlightInput {
+        name: &found.name,
+        plan: found.plan.as_ref(),
+        logs: &found.logs,
+        start: found.start,
+        folder: Some(root),
+        ..FlightInput::default()
+    };
+    let (whose, warnings) = whose_logs(&input);
+    let opened: Vec<Result<(u16, Flight), String>> = found
+        .logs
+        .par_iter()
+        .zip(whose)
+        .enumerate()
+        .map(|(index, (log, slot))| {
+            let shown = log.path.strip_prefix(root).unwrap_or(&log.path).display().to_string();
+            let slot = slot.map_err(|reason| format!("{shown}: {reason}"))?;
+            let plan = found.plan.as_ref();
+            let planned = plan.zip(slot).and_then(|(plan, slot)| Some((plan, plan.slot(slot)?)));
+            let options = FlightOptions {
+                start: found.start,
+                segments: planned.map(|(plan, slot)| plan.segments(slot)),
+                ..FlightOptions::default()
+            };
+            let flight =
+                Flight::open(&log.path, options).map_err(|error| with_causes(&error, ": "))?;
+            let number = u16::try_from(index + 1).unwrap_or(u16::MAX);
+            Ok((slot.unwrap_or(number), flight))
+        })
+        .collect();
+    let mut read = Read { left_out: warnings, ..Read::default() };
+    for one in opened {
+        match one {
+            Ok(flight) => read.flights.push(flight),
+            Err(reason) => read.left_out.push(reason),
+        }
+    }
+    read.flights.sort_by_key(|(slot, _)| *slot);
+    read
+}

@@ -1,0 +1,259 @@
+//! `updraft gap`: where simulation and measurement disagree, and which physics is missing.
+
+pub(super) mod blind;
+pub(super) mod logs;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::analyze::load_plan;
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use super::found::{Found, Work, find};
+use super::words;
+use crate::base::file::{create_folder, write_whole};
+use crate::campaign::{self, FlightFolder, to_json};
+use crate::gap::{Explained, Flown, Input, Options, Verdict, explain};
+use crate::mission::plan::Purpose;
+use crate::vehicle::{Vehicle, library};
+
+/// Arguments of `updraft gap`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft gap my-campaign
+  updraft gap my-campaign --vehicle templates/vehicles/airsim-generic-quad.toml -o gap/
+  updraft gap --measured logs/ --simulated sitl-logs/
+  updraft gap --measured logs/ --plan my-campaign/calibration --vehicle pixel
+
+The plan is flown again in the simulator (or the logs of another simulation are taken), and the
+drones' pulses are held against it in steady flight. What is missing is named only when a flight with
+nothing missing would hardly ever show as much; effects that this flight cannot tell apart are named
+together, and what it could not have shown is listed. A quarter of the drones is not fitted: on these
+the gap is taken before and after.
+
+gap/verdict.json has all of it, gap/model.toml is the vehicle with what was found: `simulate
+--vehicle gap/model.toml` flies it. Exit code 3: done, but logs could not be used. Exit code 5: no
+log has steady flight to compare.")]
+pub(super) struct GapArgs {
+    /// Campaign folder
+    #[arg(required_unless_present = "measured", conflicts_with = "measured")]
+    campaign: Option<PathBuf>,
+    /// Logs of the drones: a folder, or one log
+    #[arg(long, value_name = "LOGS")]
+    measured: Option<PathBuf>,
+    /// Logs of somebody else's simulation of the same flight, instead of flying the plan again
+    #[arg(long, value_name = "LOGS")]
+    simulated: Option<PathBuf>,
+    /// Plan that was flown, for --measured: plan.json, a flight's folder, .skyc or .skyb
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
+    /// Flight of the campaign [default: its calibration]
+    #[arg(long, value_name = "NAME")]
+    flight: Option<String>,
+    /// Model to hold against the logs: a vehicle's name or file [default: the planned one]
+    #[arg(long, value_name = "VEHICLE")]
+    vehicle: Option<String>,
+    /// Folder for the verdict, the model and the page [default: CAMPAIGN/gap, else gap]
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+    /// Chance of naming anything in a step when nothing is missing
+    #[arg(long, value_name = "SHARE", default_value_t = 0.005, value_parser = share)]
+    alpha: f64,
+    /// Simulated flights for the threshold of each step
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(20..=5000))]
+    replicates: u16,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 0.2 => Ok(value),
+        _ => Err("a share above 0 and up to 0.2".to_owned()),
+    }
+}
+
+/// Vehicle of logs that nobody planned here: the firmware's own simulator.
+const UNPLANNED_VEHICLE: &str = "arducopter-sitl";
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct GapOutput<'a> {
+    schema: &'static str,
+    model: PathBuf,
+    report: PathBuf,
+    verdict: &'a Verdict,
+}
+
+pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandError> {
+    let options = Options {
+        alpha: args.alpha,
+        replicates: usize::from(args.replicates),
+        seed: args.seed,
+        ..Options::default()
+    };
+    let found = measured(args)?;
+    let vehicle = model_of(args, &found)?;
+    let folder = match (&args.output, &args.campaign) {
+        (Some(folder), _) => folder.clone(),
+        (None, Some(campaign)) => campaign.join("gap"),
+        (None, None) => PathBuf::from("gap"),
+    };
+    let simulated = args.simulated.as_deref().map(|path| one_flight(path, None)).transpose()?;
+    let explained = compare(&found, simulated.as_ref(), &vehicle, &options)?;
+    create_folder(&folder)?;
+    let _lock = context.lock(&folder)?;
+    let page = write(&folder, &explained)?;
+    let verdict = &explained.verdict;
+    for reason in &verdict.data.left_out {
+        context.warn(reason);
+    }
+    if context.json {
+        let model = folder.join(MODEL);
+        let output = GapOutput { schema: "updraft.gap/1", model, report: page.clone(), verdict };
+        context.print_json(&output)?;
+    } else {
+        context.print(&crate::report::gap_terminal::text(verdict))?;
+    }
+    context.result(&page)?;
+    context.say(&format!(
+        "{} compared -> {}",
+        words::count(verdict.data.drones, "drone"),
+        page.display()
+    ));
+    Ok(if verdict.data.left_out.is_empty() { Exit::Done } else { Exit::Losses })
+}
+
+/// File names in the folder of a comparison.
+const VERDICT: &str = "verdict.json";
+const MODEL: &str = "model.toml";
+
+/// Writes verdict, model and page; where the page is.
+fn write(folder: &Path, explained: &Explained) -> Result<PathBuf, CommandError> {
+    let json = to_json(&explained.verdict)
+        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
+    let model = toml::to_string(&explained.model)
+        .map_err(|error| CommandError::Failed(format!("failed to make the model: {error}")))?;
+    write_whole(&folder.join(MODEL), model.as_bytes())?;
+    let page = folder.join("report").join("index.html");
+    create_folder(&folder.join("report"))?;
+    write_whole(&page, crate::report::gap_page::page(&explained.verdict).as_bytes())?;
+    // Last: who finds a verdict finds the others as well.
+    write_whole(&folder.join(VERDICT), &json)?;
+    Ok(page)
+}
+
+/// The measured flight.
+fn measured(args: &GapArgs) -> Result<Found, CommandError> {
+    let plan = args.plan.as_deref().map(load_plan).transpose()?;
+    match (&args.campaign, &args.measured) {
+        (Some(campaign), _) => {
+            if plan.is_some() {
+                return Err(CommandError::Usage(
+                    "a campaign has its own plan; --plan goes with --measured".to_owned(),
+                ));
+            }
+            if !campaign::is_campaign(campaign) {
+                return Err(CommandError::Usage(format!(
+                    "{} is no campaign folder: it has no plan.json and no campaign.json (for logs \
+                     alone: --measured LOGS with --plan or --simulated)",
+                    campaign.display()
+                )));
+            }
+            one_flight(campaign, args.flight.as_deref())
+        }
+        (None, Some(path)) => {
+            let mut found = one_flight(path, args.flight.as_deref())?;
+            if plan.is_some() {
+                found.plan = plan;
+            }
+            Ok(found)
+        }
+        (None, None) => Err(CommandError::Usage("give a campaign or --measured".to_owned())),
+    }
+}
+
+/// The flight of a path that is compared: the one that is named, else the calibration, else the first
+/// with logs.
+fn one_flight(path: &Path, name: Option<&str>) -> Result<Found, CommandError> {
+    let mut work = Work { title: String::new(), root: path.to_owned(), flights: Vec::new() };
+    find(path, None, &mut work)?;
+    let names: Vec<String> = work.flights.iter().map(|flight| flight.name.clone()).collect();
+    let mut flights = work.flights;
+    if let Some(name) = name {
+        flights.retain(|flight| flight.name == name);
+        if flights.is_empty() {
+            return Err(CommandError::Usage(format!(
+                "there is no flight \"{name}\"; flights are {}",
+                names.join(", ")
+            )));
+        }
+    }
+    let calibrates = |flight: &Found| flight.purpose == Some(Purpose::Calibration);
+    let place = flights
+        .iter()
+        .position(|flight| calibrates(flight) && !flight.logs.is_empty())
+        .or_else(|| flights.iter().position(|flight| !flight.logs.is_empty()));
+    place.map(|place| flights.swap_remove(place)).ok_or_else(|| {
+        CommandError::Nothing(format!(
+            "{} holds no logs: fly it (`updraft fly`), or put the drones' .BIN files into the \
+             flight's logs folder",
+            path.display()
+        ))
+    })
+}
+
+/// The model that is held against the logs.
+fn model_of(args: &GapArgs, found: &Found) -> Result<Vehicle, CommandError> {
+    if let Some(name) = &args.vehicle {
+        return Ok(library::load(name)?);
+    }
+    if let Some(campaign) = &args.campaign {
+        let flights = campaign::flights(campaign)?;
+        let of =
+            |folder: &&FlightFolder| folder.read_plan().is_ok_and(|plan| plan.name == found.name);
+        if let Some(folder) = flights.iter().find(of) {
+            return Ok(library::load(&folder.vehicle().display().to_string())?);
+        }
+    }
+    match &found.plan {
+        Some(plan) => Ok(library::load(&plan.vehicle)?),
+        None => Ok(library::load(UNPLANNED_VEHICLE)?),
+    }
+}
+
+/// Reads the logs and compares.
+fn compare(
+    found: &Found,
+    simulated: Option<&Found>,
+    vehicle: &Vehicle,
+    options: &Options,
+) -> Result<Explained, CommandError> {
+    let read = logs::read(found, Path::new(""));
+    let others = simulated.map(|simulated| logs::read(simulated, Path::new("")));
+    let flown: Vec<Flown<'_>> =
+        read.flights.iter().map(|(slot, flight)| Flown { slot: *slot, flight }).collect();
+    let other: Option<Vec<Flown<'_>>> = others.as_ref().map(|others| {
+        others.flights.iter().map(|(slot, flight)| Flown { slot: *slot, flight }).collect()
+    });
+    let mut left_out = read.left_out.clone();
+    left_out.extend(others.iter().flat_map(|others| others.left_out.clone()));
+    if flown.is_empty() {
+        return Err(CommandError::Nothing(format!(
+            "none of the {} can be used:\n  {}",
+            words::count(found.logs.len(), "log"),
+            left_out.join("\n  ")
+        )));
+    }
+    let input = Input {
+        vehicle,
+        plan: found.plan.as_ref(),
+        flown: &flown,
+        simulated: other.as_deref(),
+        left_out,
+    };
+    Ok(explain(&input, options)?)
+}
