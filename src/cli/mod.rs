@@ -14,6 +14,7 @@ mod flown;
 mod fly;
 mod fly_output;
 mod found;
+mod hashes;
 mod inspect;
 mod leaning;
 mod load;

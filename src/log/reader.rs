@@ -150,14 +150,26 @@ impl Log {
     ///
     /// Damage is never an error: what is readable is read, the rest is in the [`ScanStats`].
     pub fn select(&self, wanted: &[Select<'_>]) -> (Vec<Table>, ScanStats) {
-        let mut notes = Notes::new(wanted);
+        self.bring_in();
+        let mut notes = Notes::new(self.bytes(), wanted);
         let scan = scan(self.bytes(), &mut notes);
-        (notes.decode(self.bytes(), &scan.units), scan.stats)
+        (notes.tables(&scan.units), scan.stats)
     }
 
     /// What is in the log: messages, times, firmware, damage.
     pub fn inventory(&self) -> Inventory {
+        self.bring_in();
         inventory::take(self.bytes())
+    }
+
+    /// Asks the system for all pages of a mapped file at once. One by one, as they are touched, they
+    /// cost as much time as everything that is done with them.
+    fn bring_in(&self) {
+        #[cfg(target_os = "linux")]
+        if let Bytes::Mapped(map) = &self.bytes {
+            // Kernels before 5.14 refuse, and then they come one by one.
+            let _ = map.advise(memmap2::Advice::PopulateRead);
+        }
     }
 
     /// Size of the log.
