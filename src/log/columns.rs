@@ -8,14 +8,19 @@ use super::format::Format;
 use super::letter::{Letter, field_text};
 use super::reader::{Column, Select, Table};
 use super::scan::{Units, Visitor};
+use super::window::Window;
 
 /// Messages of one type that are decoded together. At a kilobyte or so of log from one to the next
 /// of a type they lie in a second-level cache.
 const BLOCK: usize = 64;
 
+/// Room for rows beyond those expected.
+const SPARE: f64 = 1.02;
+/// A message with a time is longer than this.
+const LEAST_MESSAGE_BYTES: usize = 12;
+
 /// Takes the messages of a selection.
 pub(super) struct Notes<'a> {
-    bytes: &'a [u8],
     wanted: &'a [Select<'a>],
     /// One per entry of the selection.
     rows: Vec<Rows>,
@@ -27,7 +32,7 @@ pub(super) struct Notes<'a> {
 struct Rows {
     /// Rows that are decoded.
     count: usize,
-    /// Where the next ones start, all of them of the layout `current`.
+    /// Where in the window the next ones start, all of them of the layout `current`.
     pending: Vec<usize>,
     current: usize,
     layouts: Vec<Layout>,
@@ -68,25 +73,25 @@ struct Plan {
 }
 
 impl<'a> Notes<'a> {
-    pub(super) fn new(bytes: &'a [u8], wanted: &'a [Select<'a>]) -> Self {
+    pub(super) fn new(wanted: &'a [Select<'a>]) -> Self {
         let rows = wanted.iter().map(Rows::new).collect();
-        Self { bytes, wanted, rows, plans: (0..256).map(|_| Vec::new()).collect() }
+        Self { wanted, rows, plans: (0..256).map(|_| Vec::new()).collect() }
     }
 
     /// The tables, in the order of the selection.
     pub(super) fn tables(self, units: &Units) -> Vec<Table> {
         let tables = self.wanted.iter().zip(self.rows);
-        tables.map(|(select, rows)| rows.table(select, self.bytes, units)).collect()
+        tables.map(|(select, rows)| rows.table(select, units)).collect()
     }
 }
 
 impl Visitor for Notes<'_> {
-    fn defined(&mut self, id: u8, format: &Format) -> bool {
+    fn defined(&mut self, id: u8, format: &Format, window: Window<'_>) -> bool {
         let mut plans = Vec::new();
         for (table, (select, rows)) in self.wanted.iter().zip(&mut self.rows).enumerate() {
             if select.message == format.name {
                 plans.push(Plan { table, layout: rows.layouts.len() });
-                rows.define(id, Layout::new(select, format), self.bytes);
+                rows.define(id, Layout::new(select, format), window);
             }
         }
         let wanted = !plans.is_empty();
@@ -95,14 +100,20 @@ impl Visitor for Notes<'_> {
     }
 
     #[inline]
-    fn message(&mut self, id: u8, _message: &[u8], start: usize) {
+    fn message(&mut self, id: u8, _message: &[u8], window: Window<'_>, start: usize) {
         for plan in &self.plans[usize::from(id)] {
             let Some(rows) = self.rows.get_mut(plan.table) else { continue };
             if rows.pending.len() == BLOCK || rows.current != plan.layout {
-                rows.decode(self.bytes);
+                rows.decode(window);
                 rows.current = plan.layout;
             }
             rows.pending.push(start);
+        }
+    }
+
+    fn leave(&mut self, window: Window<'_>) {
+        for rows in &mut self.rows {
+            rows.decode(window);
         }
     }
 }
@@ -132,8 +143,8 @@ impl Rows {
 
     /// Adds a layout. A definition counts although none of its messages may come: its columns are
     /// there then.
-    fn define(&mut self, id: u8, layout: Layout, bytes: &[u8]) {
-        self.decode(bytes);
+    fn define(&mut self, id: u8, layout: Layout, window: Window<'_>) {
+        self.decode(window);
         for (column, place) in self.columns.iter_mut().zip(&layout.places) {
             if let (None, Some(place)) = (&column, place) {
                 let values = if place.letter.is_text() {
@@ -149,16 +160,32 @@ impl Rows {
 
     /// Decodes what is pending.
     #[inline(never)]
-    fn decode(&mut self, bytes: &[u8]) {
+    fn decode(&mut self, window: Window<'_>) {
         let Some(layout) = self.layouts.get(self.current) else { return };
+        let (Some(first), Some(last)) = (self.pending.first(), self.pending.last()) else { return };
+        // A type mostly comes as often in the rest of the log as up to here. Memory that turns out
+        // to be too much is never touched.
+        let rows = self.count + self.pending.len();
+        let share = rows as f64 / (window.base + last + 1) as f64;
+        let rest = window.size.saturating_sub(window.base + first);
+        let expected = ((rest as f64 * share * SPARE) as usize).min(rest / LEAST_MESSAGE_BYTES);
         for (column, place) in self.columns.iter_mut().zip(&layout.places) {
             match column.as_mut().map(|found| &mut found.values) {
-                Some(Values::Numbers(numbers)) => match place {
-                    Some(place) => place.letter.column(bytes, &self.pending, place.offset, numbers),
-                    None => numbers.resize(numbers.len() + self.pending.len(), f64::NAN),
-                },
+                Some(Values::Numbers(numbers)) => {
+                    if numbers.capacity() - numbers.len() < self.pending.len() {
+                        numbers.reserve_exact(expected.max(rows / 4 + self.pending.len()));
+                    }
+                    match place {
+                        Some(Place { offset, letter, .. }) => {
+                            letter.column(window.bytes, &self.pending, *offset, numbers);
+                        }
+                        None => numbers.resize(rows, f64::NAN),
+                    }
+                }
                 Some(Values::Texts(texts)) => {
-                    texts.extend(self.pending.iter().map(|start| text(bytes, *start, *place)));
+                    texts.extend(
+                        self.pending.iter().map(|start| text(window.bytes, *start, *place)),
+                    );
                 }
                 None => {}
             }
@@ -167,8 +194,7 @@ impl Rows {
         self.pending.clear();
     }
 
-    fn table(mut self, select: &Select<'_>, bytes: &[u8], units: &Units) -> Table {
-        self.decode(bytes);
+    fn table(self, select: &Select<'_>, units: &Units) -> Table {
         let mut table =
             Table { message: select.message.to_owned(), rows: self.count, ..Table::default() };
         for (column, &field) in self.columns.into_iter().zip(select.fields) {
