@@ -12,8 +12,8 @@ use nalgebra::Vector3;
 use tempfile::TempDir;
 use updraft::analysis::result::Analysis;
 use updraft::analysis::{AnalysisOptions, FlightInput, LogInput, analyze};
+use updraft::base::json::write_json;
 use updraft::base::time::GpsTime;
-use updraft::campaign::to_json;
 use updraft::flight::{Flight, FlightOptions};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve};
@@ -47,7 +47,8 @@ fn flown() -> Campaign {
     let (mut logs, mut bytes) = (Vec::new(), 0);
     for (number, plan) in plans.iter().enumerate() {
         let updraft_mps = number as f64;
-        let flown = plan.slots.iter().zip(&Show::of_plan(plan).drones).map(|(slot, drone)| {
+        let show = Show::of_plan(plan);
+        let flown = plan.slots.iter().zip(&show.drones).map(|(slot, drone)| {
             let path = folder.path().join(format!("{number}-{:03}.BIN", slot.slot));
             let setup = FlightSetup {
                 vehicle: &builtin(&plan.vehicle).expect("a built-in vehicle"),
@@ -77,13 +78,14 @@ fn size(path: &Path) -> u64 {
 
 fn analysed() -> Analysis {
     let Campaign { plans, logs, .. } = &*CAMPAIGN;
-    let input = |(plan, logs)| FlightInput {
-        name: "flight",
-        plan: Some(plan),
-        logs,
-        ..FlightInput::default()
-    };
-    let inputs: Vec<FlightInput<'_>> = plans.iter().zip(logs).map(input).collect();
+    let inputs: Vec<FlightInput<'_>> = (plans.iter().zip(logs))
+        .map(|(plan, logs)| FlightInput {
+            name: "flight",
+            plan: Some(plan),
+            logs,
+            ..FlightInput::default()
+        })
+        .collect();
     analyze("bench", &inputs, &AnalysisOptions::default(), None, &|_, _| {}).expect("results")
 }
 
@@ -115,5 +117,5 @@ fn analysis_to_page(bencher: Bencher<'_, '_>) {
 #[divan::bench(sample_count = 10)]
 fn analysis_to_json(bencher: Bencher<'_, '_>) {
     let analysis = analysed();
-    bencher.bench(|| to_json(&analysis).expect("JSON"));
+    bencher.bench(|| write_json(&mut std::io::sink(), &analysis).expect("JSON"));
 }

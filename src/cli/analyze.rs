@@ -18,9 +18,10 @@ use crate::analysis::battery::Sag;
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, OffsetRule, analyze};
-use crate::base::file::write_whole;
+use crate::base::file::write_with;
+use crate::base::json::write_json;
 use crate::base::time::GpsTime;
-use crate::campaign::{self, to_json};
+use crate::campaign;
 use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
@@ -392,9 +393,8 @@ fn write_report(
 
 /// All numbers, and the field of the map as tables.
 fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<(), CommandError> {
-    let json = to_json(analysis)
-        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-    write_whole(&folder.join("analysis.json"), &json)?;
+    // Streamed: that of a thousand drones has a hundred megabytes.
+    write_with(&folder.join("analysis.json"), |out| write_json(out, analysis))?;
     write_fields(analysis, folder)
 }
 
