@@ -2,6 +2,21 @@
 //!
 //! A synthetic flight of about 20 MB stands for a drone's log; with `UPDRAFT_DATA` naming a folder
 //! of `.BIN` files these are read too.
+//!
+//! Against another reader, the crate `dflog` 0.2 (no dependency of this one: its declared Rust is
+//! newer), in one program outside of this repository, built with `cargo build --release
+//! --ignore-rust-version`, that depends on `dflog` and on `updraft` by path. For a file, in turns, 40
+//! times each, and the least of each one's `CLOCK_PROCESS_CPUTIME_ID`:
+//!
+//! * ours: `Log::open(path)?.select(&WANTED)`, as in `open_and_select_38_columns` here;
+//! * theirs: `dflog::Log::open(path)?`, then `columns::get_columns(&log, message, fields)` for each
+//!   message of `WANTED` that the log defines, with those of its fields that it has.
+//!
+//! Both must give as many values with the same sum. On two cores of an AMD EPYC (virtual machine), a
+//! ladder logged by ArduCopter 4.4.4 (19.6 MB) and a simulated hover with all messages (28.8 MB): 3.5
+//! to 4.2 ms against 10.7 to 12.7 ms and 4.6 to 6.1 ms against 16 to 19.5 ms; 0.28 to 0.33 of the time.
+//! With the messages that a flight is analysed from (13 types, 64 columns) 0.25 to 0.30. Most of the
+//! rest is the system's: reading the file, and memory for the columns.
 
 use std::path::PathBuf;
 

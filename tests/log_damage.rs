@@ -61,14 +61,16 @@ fn whole() -> Vec<u8> {
     bytes
 }
 
+const WANTED: [Select<'static>; 5] = [
+    Select { message: "ATT", fields: &["TimeUS", "Roll", "Yaw", "AEKF"] },
+    Select { message: "RCOU", fields: &["TimeUS", "C1", "C14"] },
+    Select { message: "PSCD", fields: &["TimeUS", "VD"] },
+    Select { message: "MSG", fields: &["Message"] },
+    Select { message: "FMT", fields: &["Name"] },
+];
+
 fn tables(bytes: &[u8]) -> (Vec<Table>, ScanStats) {
-    Log::from_bytes(bytes.to_vec()).select(&[
-        Select { message: "ATT", fields: &["TimeUS", "Roll", "Yaw", "AEKF"] },
-        Select { message: "RCOU", fields: &["TimeUS", "C1", "C14"] },
-        Select { message: "PSCD", fields: &["TimeUS", "VD"] },
-        Select { message: "MSG", fields: &["Message"] },
-        Select { message: "FMT", fields: &["Name"] },
-    ])
+    Log::from_bytes(bytes.to_vec()).select(&WANTED)
 }
 
 /// Reads anything and checks what holds for any bytes; gives the rows of the four messages.
@@ -83,6 +85,38 @@ fn survives(bytes: &[u8]) -> usize {
     let read: u64 = inventory.messages.iter().map(|message| message.bytes).sum();
     assert_eq!(read + stats.bad_bytes + stats.truncated_bytes, bytes.len() as u64, "{stats:?}");
     tables[..4].iter().map(|table| table.rows).sum()
+}
+
+#[test]
+fn a_file_reads_as_its_bytes_do() {
+    let (header, rows) = parts();
+    let mut noise = Noise(5);
+    let folder = tempfile::tempdir().unwrap();
+    for round in 0..40 {
+        // Several times as long as the pieces in which a file is read.
+        let mut bytes = header.clone();
+        while bytes.len() < 400_000 {
+            bytes.extend(&rows[noise.below(rows.len())]);
+        }
+        for _ in 0..round {
+            let at = header.len() + noise.below(bytes.len() - header.len() - 300);
+            bytes.splice(at..at + noise.below(300), noise.bytes(noise.0 as usize % 9));
+        }
+        bytes.truncate(bytes.len() - noise.below(60));
+        let path = folder.path().join("log.BIN");
+        std::fs::write(&path, &bytes).unwrap();
+        let file = Log::open(&path).unwrap();
+        // Somebody puts another log in its place: it is still the one that was opened.
+        if round % 4 == 0 {
+            std::fs::remove_file(&path).unwrap();
+            std::fs::write(&path, whole()).unwrap();
+        }
+        let memory = Log::from_bytes(bytes);
+        assert_eq!(file.inventory(), memory.inventory(), "round {round}");
+        // NaN is not itself; its text is.
+        let [file, memory] = [file, memory].map(|log| format!("{:?}", log.select(&WANTED)));
+        assert_eq!(file, memory, "round {round}");
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! A calibration referred to level flight and to the air density at the ground, for use in another
 //! wind and at another height.
 
+use rayon::prelude::*;
+
 use super::calibrate::{self, FitOptions};
 use super::density::Density;
 use super::offset::OffsetMap;
@@ -33,7 +35,7 @@ pub(super) fn refer_calibration(
     options: &FitOptions,
 ) -> FlightAnalysis {
     let mut referred = calibration.clone();
-    for drone in &mut referred.drones {
+    referred.drones.par_iter_mut().for_each(|drone| {
         for window in &mut drone.windows {
             if let Some(leaning) = leaning {
                 *window = leaning.level_window(window);
@@ -48,7 +50,7 @@ pub(super) fn refer_calibration(
         if drone.laws.is_some() {
             drone.laws = calibrate::calibrate(&drone.windows, options).ok();
         }
-    }
+    });
     referred.flock = calibrate::flock(&referred.drones, options).ok();
     referred
 }

@@ -43,8 +43,9 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
         let slots = copies.into_iter().map(|copy| copy.map_or(SlotMatch::Unplanned, refused));
         return (slots.collect(), Vec::new());
     };
+    // Each log is given back as soon as it was read: they are not in memory together.
     let candidates: Vec<Candidate> = (input.logs.par_iter())
-        .zip(&opened)
+        .zip(opened)
         .zip(&copies)
         .map(|((log, opened), copy)| {
             let identity = opened.as_ref().map(identify).unwrap_or_default();
@@ -56,7 +57,7 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
                 home_deg: identity.home_deg,
                 flew: identity.flew,
                 same_as: *copy,
-                unreadable: opened.as_ref().err().cloned(),
+                unreadable: opened.err(),
             }
         })
         .collect();

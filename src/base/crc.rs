@@ -1,10 +1,8 @@
 //! The CRC-32 that ArduPilot (MAVFTP) and Skybrush (`.skyb`) use.
 
-use std::fs::File;
-use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use super::file::FileError;
+use super::file::{FileError, read_pieces};
 
 /// CRC-32 with the reflected polynomial `0xEDB88320`, initial value 0 and no final XOR.
 ///
@@ -43,22 +41,9 @@ impl ApCrc32 {
 
 /// Size (bytes) and CRC-32 (that of ZIP files) of a file, read in pieces.
 pub fn file_crc32(path: &Path) -> Result<(u64, u32), FileError> {
-    let fail = |source| FileError::new("read", path, source);
-    let mut file = File::open(path).map_err(fail)?;
     let mut hasher = crc32fast::Hasher::new();
-    let mut piece = vec![0; 1 << 18];
-    let mut size = 0;
-    loop {
-        match file.read(&mut piece) {
-            Ok(0) => return Ok((size, hasher.finalize())),
-            Ok(count) => {
-                hasher.update(piece.get(..count).unwrap_or_default());
-                size += count as u64;
-            }
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(fail(error)),
-        }
-    }
+    let size_bytes = read_pieces(path, |piece| hasher.update(piece))?;
+    Ok((size_bytes, hasher.finalize()))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Writing files so that nothing half-written is ever taken for whole.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
@@ -87,6 +87,28 @@ pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FileError> {
         )));
     }
     fs::read(path).map_err(fail)
+}
+
+/// Bytes that are read at a time; they stay in the processor's cache.
+const PIECE_BYTES: usize = 1 << 17;
+
+/// Reads a file through, piece by piece; returns its size in bytes.
+pub fn read_pieces(path: &Path, mut piece: impl FnMut(&[u8])) -> Result<u64, FileError> {
+    let fail = |source| FileError::new("read", path, source);
+    let mut file = File::open(path).map_err(fail)?;
+    let mut buffer = vec![0; PIECE_BYTES];
+    let mut size_bytes = 0;
+    loop {
+        match file.read(&mut buffer) {
+            Ok(0) => return Ok(size_bytes),
+            Ok(count) => {
+                piece(buffer.get(..count).unwrap_or_default());
+                size_bytes += count as u64;
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(fail(error)),
+        }
+    }
 }
 
 /// Removes temporary files that a killed run left in `folder` (not in its subfolders).

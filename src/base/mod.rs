@@ -6,6 +6,7 @@ pub mod crc;
 pub mod estimate;
 pub mod file;
 pub mod frame;
+pub mod json;
 pub mod number;
 pub mod rng;
 pub mod time;

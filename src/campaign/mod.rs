@@ -106,13 +106,22 @@ impl LogRecord {
 
     /// How a file differs from what was taken down, in words; `None`: it is the same.
     pub fn difference(&self, path: &Path) -> Result<Option<String>, FileError> {
+        self.difference_by(path, || file_crc32(path).map(|(_, crc32)| crc32))
+    }
+
+    /// As [`LogRecord::difference`], with the file's CRC-32 from `crc32`, which is asked only if it
+    /// matters.
+    pub fn difference_by(
+        &self,
+        path: &Path,
+        crc32: impl FnOnce() -> Result<u32, FileError>,
+    ) -> Result<Option<String>, FileError> {
         let size = std::fs::metadata(path).map_err(|error| FileError::new("read", path, error))?;
         if size.len() != self.bytes {
             return Ok(Some(format!("it has {} bytes, not {}", size.len(), self.bytes)));
         }
         let Some(recorded) = self.crc32 else { return Ok(None) };
-        let (_, found) = file_crc32(path)?;
-        Ok((found != recorded).then(|| "its bytes were changed".to_owned()))
+        Ok((crc32()? != recorded).then(|| "its bytes were changed".to_owned()))
     }
 }
 

@@ -18,13 +18,15 @@ use crate::analysis::battery::Sag;
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, OffsetRule, analyze};
-use crate::base::file::write_whole;
+use crate::base::file::write_with;
+use crate::base::json::write_json;
 use crate::base::time::GpsTime;
-use crate::campaign::{self, to_json};
+use crate::campaign;
 use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
-use crate::report::{self, terminal_summary};
+use crate::report::{self, Provenance, terminal_summary};
+use crate::study::result::StudyResult;
 use crate::vehicle::library;
 
 /// Width of the terminal summary, columns.
@@ -233,7 +235,7 @@ struct AnalyzeOutput<'a> {
 
 pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, CommandError> {
     let plan = args.plan.as_deref().map(load_plan).transpose()?;
-    let mut work = Work { title: String::new(), root: PathBuf::from("."), flights: Vec::new() };
+    let mut work = Work::new(Path::new("."));
     for path in &args.paths {
         find(path, plan.as_ref(), &mut work)?;
     }
@@ -276,7 +278,7 @@ pub(super) fn analyze_campaign(
     root: &Path,
     options: &AnalyzeOptions,
 ) -> Result<Exit, CommandError> {
-    let mut work = Work { title: String::new(), root: root.to_owned(), flights: Vec::new() };
+    let mut work = Work::new(root);
     find(root, None, &mut work)?;
     finish(context, &work, options, None, Some(root))
 }
@@ -316,11 +318,16 @@ fn finish(
         .collect();
     let total: usize = inputs.iter().map(|input| input.logs.len()).sum();
     let progress = Progress::new(context, "analysing", total as u64);
-    let analysis =
-        analyze(&work.title, &inputs, &options.resolve(), reference.as_ref(), &|_, _| {
-            progress.advance();
-        })
-        .map_err(|error| CommandError::Nothing(error.to_string()))?;
+    // Hashing fills the pauses in which the analysis keeps one processor busy.
+    let (analysis, provenance) = rayon::join(
+        || {
+            analyze(&work.title, &inputs, &options.resolve(), reference.as_ref(), &|_, _| {
+                progress.advance();
+            })
+        },
+        || output.map(|_| provenance(work, options.words())),
+    );
+    let analysis = analysis.map_err(|error| CommandError::Nothing(error.to_string()))?;
     progress.finish();
     context.check_stop()?;
     if !context.json {
@@ -328,19 +335,14 @@ fn finish(
     }
     let nothing = analysis.what_was_found() == Yield::Nothing;
     let mut page = None;
-    if let Some(folder) = output {
-        let json = to_json(&analysis)
-            .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-        let provenance = provenance(work, options.words());
+    if let (Some(folder), Some(provenance)) = (output, &provenance) {
         let study = read_study(context, &work.root);
-        let made = match &study {
-            Some(study) => report::render_with_study(&analysis, study, &provenance)?,
-            None => report::render(&analysis, &provenance)?,
-        };
         let report_folder = folder.join("report");
-        report::write(&made, &report_folder)?;
-        write_whole(&folder.join("analysis.json"), &json)?;
-        write_fields(&analysis, folder)?;
+        let (page_made, numbers_made) = rayon::join(
+            || write_report(&analysis, study.as_ref(), provenance, &report_folder),
+            || write_numbers(&analysis, folder),
+        );
+        page_made.and(numbers_made)?;
         // A page that says that nothing was found is written, but there is nothing to point at.
         page = (!nothing).then(|| report_folder.join(report::PAGE_FILE));
     }
@@ -373,6 +375,27 @@ fn finish(
         Yield::Whole if !lost => Exit::Done,
         Yield::Whole | Yield::Partial => Exit::Losses,
     })
+}
+
+/// The page with its figures.
+fn write_report(
+    analysis: &Analysis,
+    study: Option<&StudyResult>,
+    provenance: &Provenance,
+    folder: &Path,
+) -> Result<(), CommandError> {
+    let made = match study {
+        Some(study) => report::render_with_study(analysis, study, provenance)?,
+        None => report::render(analysis, provenance)?,
+    };
+    Ok(report::write(&made, folder)?)
+}
+
+/// All numbers, and the field of the map as tables.
+fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<(), CommandError> {
+    // Streamed: that of a thousand drones has a hundred megabytes.
+    write_with(&folder.join("analysis.json"), |out| write_json(out, analysis))?;
+    write_fields(analysis, folder)
 }
 
 pub(super) fn load_plan(path: &Path) -> Result<Plan, CommandError> {

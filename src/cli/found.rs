@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::exit::CommandError;
+use super::hashes::Hashes;
 use super::leaning::{lean_table, leaning};
 use super::load::has_extension;
 use crate::analysis::battery::Sag;
@@ -53,6 +56,20 @@ pub(super) struct Work {
     /// Paths in the report are shown relative to this.
     pub(super) root: PathBuf,
     pub(super) flights: Vec<Found>,
+    /// What has been hashed on the way.
+    pub(super) hashes: Hashes,
+}
+
+impl Work {
+    /// Nothing yet, with paths relative to `root`.
+    pub(super) fn new(root: &Path) -> Self {
+        Self {
+            title: String::new(),
+            root: root.to_owned(),
+            flights: Vec::new(),
+            hashes: Hashes::default(),
+        }
+    }
 }
 
 /// Adds what a path holds to the work.
@@ -63,7 +80,7 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
             work.title = campaign::read_json::<CampaignIndex>(&index)?.title;
         }
         for folder in campaign::flights(path)? {
-            let flight = found_flight(&folder)?;
+            let flight = found_flight(&folder, &work.hashes)?;
             if work.title.is_empty() {
                 work.title =
                     flight.plan.as_ref().map_or_else(String::new, |plan| plan.title.clone());
@@ -141,12 +158,12 @@ pub(super) fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, Com
     Ok(shared.indicator)
 }
 
-fn found_flight(folder: &FlightFolder) -> Result<Found, CommandError> {
+fn found_flight(folder: &FlightFolder, hashes: &Hashes) -> Result<Found, CommandError> {
     let plan = folder.read_plan()?;
     let files = if folder.logs().is_dir() { logs_in(&folder.logs())? } else { Vec::new() };
     let mut notes = Vec::new();
     let record = match folder.read_record()? {
-        Some(record) => held_record(folder, record, &files, &mut notes),
+        Some(record) => held_record(folder, record, &files, &mut notes, hashes),
         None => None,
     };
     let logs = files
@@ -193,18 +210,23 @@ fn held_record(
     record: FlightRecord,
     files: &[PathBuf],
     notes: &mut Vec<String>,
+    hashes: &Hashes,
 ) -> Option<FlightRecord> {
+    let path_of = |log: &LogRecord| folder.logs().join(&log.file);
+    let there: Vec<&LogRecord> = record.logs.iter().filter(|log| path_of(log).exists()).collect();
+    let differences: Vec<Result<Option<String>, FileError>> = (there.par_iter())
+        .map(|log| {
+            let path = path_of(log);
+            log.difference_by(&path, || hashes.crc32(&path))
+        })
+        .collect();
     let mut held = 0;
-    for log in &record.logs {
-        let path = folder.logs().join(&log.file);
-        if !path.exists() {
-            continue;
-        }
-        match log.difference(&path) {
+    for (log, difference) in there.into_iter().zip(differences) {
+        match difference {
             Ok(None) => held += 1,
             Ok(Some(how)) => notes.push(format!(
                 "{} is not the log that flight.json speaks of: {how}",
-                path.display()
+                path_of(log).display()
             )),
             // The analysis says why it cannot be read.
             Err(_) => {}

@@ -16,6 +16,7 @@ mod fly;
 mod fly_output;
 mod found;
 mod gap;
+mod hashes;
 mod inspect;
 mod leaning;
 mod load;

@@ -5,13 +5,9 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::found::Work;
-use super::simulate::{made_by, sha256};
-use crate::base::file::read_whole;
+use super::simulate::made_by;
 use crate::campaign::{self, FlightFolder};
 use crate::report::{InputFile, Provenance};
-
-/// Largest file that is hashed, bytes.
-const MOST_BYTES: u64 = 4 << 30;
 
 /// The provenance of an analysis.
 pub(super) fn provenance(work: &Work, settings: Vec<(&'static str, String)>) -> Provenance {
@@ -21,8 +17,8 @@ pub(super) fn provenance(work: &Work, settings: Vec<(&'static str, String)>) -> 
         .par_iter()
         .map(|path| {
             // A log that cannot be read is already named as missing by the analysis.
-            let sha256 = read_whole(path, MOST_BYTES)
-                .map_or_else(|error| format!("not read: {error}"), |bytes| sha256(&bytes));
+            let sha256 = work.hashes.sha256(path);
+            let sha256 = sha256.unwrap_or_else(|error| format!("not read: {error}"));
             let shown = path.strip_prefix(&work.root).unwrap_or(path);
             InputFile { path: shown.display().to_string(), sha256 }
         })

@@ -103,15 +103,16 @@ impl Messages {
     fn select(log: &Log, wanted: &[Select<'_>]) -> Self {
         let (tables, scan) = log.select(wanted);
         let mut messages = Self { scan, ..Self::default() };
-        for table in &tables {
+        for table in tables {
             if table.message == "PARM" {
-                messages.parameters = parameters(table);
+                messages.parameters = parameters(&table);
                 continue;
             }
+            let message = table.message.clone();
             let (rows, dropped) = Rows::from_table(table);
             messages.dropped += dropped;
             if !rows.is_empty() {
-                messages.rows.insert(table.message.clone(), rows);
+                messages.rows.insert(message, rows);
             }
         }
         messages

@@ -22,12 +22,15 @@ pub(super) struct Rows {
 impl Rows {
     /// From a table with a `TimeUS` (or the older `TimeMS`) column; empty without one. Rows whose
     /// time the rows around them contradict are dropped; returns how many.
-    pub(super) fn from_table(table: &Table) -> (Self, usize) {
+    pub(super) fn from_table(table: Table) -> (Self, usize) {
         let times: Vec<f64> = match (table.number("TimeUS"), table.number("TimeMS")) {
             (Some(micro), _) => micro.iter().map(|time| time / 1e6).collect(),
             (None, Some(milli)) => milli.iter().map(|time| time / 1e3).collect(),
             (None, None) => return (Self::default(), 0),
         };
+        if in_order(&times) {
+            return (Self { time_s: times, columns: table.numbers.into_iter().collect() }, 0);
+        }
         let kept = plausible(&times);
         let pick = |column: &[f64]| -> Vec<f64> {
             kept.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
@@ -92,6 +95,13 @@ impl Rows {
     }
 }
 
+/// Whether time never goes back: then every row is credible.
+fn in_order(times: &[f64]) -> bool {
+    times.is_sorted()
+        && times.first().is_none_or(|first| *first >= 0.0)
+        && times.last().is_none_or(|last| last.is_finite())
+}
+
 /// Indices of the rows with credible times. Time runs on, or starts again after a reboot: a row that
 /// jumps while most of the next few rows go on from where time was before has a damaged time.
 fn plausible(times: &[f64]) -> Vec<usize> {
@@ -125,7 +135,7 @@ mod tests {
 
     fn rows(times_us: &[f64]) -> (Rows, usize) {
         let values: Vec<f64> = (0..times_us.len()).map(|index| index as f64).collect();
-        Rows::from_table(&Table {
+        Rows::from_table(Table {
             message: "X".into(),
             rows: times_us.len(),
             numbers: vec![("TimeUS".into(), times_us.to_vec()), ("A".into(), values)],
@@ -148,6 +158,17 @@ mod tests {
         let (rebooted, dropped) = rows(&times);
         assert_eq!(dropped, 0);
         assert_eq!(rebooted.boots(), vec![0..10, 10..20]);
+    }
+
+    #[test]
+    fn rows_in_order_are_those_that_the_votes_would_keep() {
+        let ordered = [0.0, 1e6, 1e6, 2e6, 9e6];
+        assert!(in_order(&ordered));
+        assert_eq!(plausible(&ordered), [0, 1, 2, 3, 4]);
+        for bad in [&[-1.0, 2.0][..], &[2.0, 1.0], &[1.0, f64::NAN], &[1.0, f64::INFINITY]] {
+            assert!(!in_order(bad), "{bad:?}");
+        }
+        assert!(in_order(&[]));
     }
 
     #[test]

@@ -1,14 +1,25 @@
 //! The wanted columns of the wanted messages.
 //!
-//! The walk through the log only notes where wanted messages start. Columns are decoded after it,
-//! one at a time: each into memory of its final size, by a loop made for its letter.
+//! The walk through the log only notes where wanted messages start. As soon as a few of one type
+//! have come they are decoded, column by column, by a loop made for the letter: late enough to make
+//! the loop worth its start, early enough to find the messages still in the processor's cache.
 
 use super::format::Format;
 use super::letter::{Letter, field_text};
 use super::reader::{Column, Select, Table};
 use super::scan::{Units, Visitor};
+use super::window::Window;
 
-/// Notes the messages of a selection.
+/// Messages of one type that are decoded together. At a kilobyte or so of log from one to the next
+/// of a type they lie in a second-level cache.
+const BLOCK: usize = 64;
+
+/// Room for rows beyond those expected.
+const SPARE: f64 = 1.02;
+/// A message with a time is longer than this.
+const LEAST_MESSAGE_BYTES: usize = 12;
+
+/// Takes the messages of a selection.
 pub(super) struct Notes<'a> {
     wanted: &'a [Select<'a>],
     /// One per entry of the selection.
@@ -18,22 +29,32 @@ pub(super) struct Notes<'a> {
 }
 
 /// The messages of one table.
-#[derive(Default)]
 struct Rows {
-    starts: Vec<usize>,
-    /// Stretches of messages of one definition.
-    runs: Vec<Run>,
+    /// Rows that are decoded.
+    count: usize,
+    /// Where in the window the next ones start, all of them of the layout `current`.
+    pending: Vec<usize>,
+    current: usize,
     layouts: Vec<Layout>,
+    /// One per wanted field; `None` until a definition has it.
+    columns: Vec<Option<Found>>,
 }
 
-struct Run {
-    first_row: usize,
-    layout: usize,
+/// A wanted field that the log has.
+struct Found {
+    /// The first type that has it, and which of its fields it is.
+    id: u8,
+    index: usize,
+    values: Values,
+}
+
+enum Values {
+    Numbers(Vec<f64>),
+    Texts(Vec<String>),
 }
 
 /// Where a definition has the wanted fields.
 struct Layout {
-    id: u8,
     /// One per wanted field.
     places: Vec<Option<Place>>,
 }
@@ -53,24 +74,24 @@ struct Plan {
 
 impl<'a> Notes<'a> {
     pub(super) fn new(wanted: &'a [Select<'a>]) -> Self {
-        let rows = wanted.iter().map(|_| Rows::default()).collect();
+        let rows = wanted.iter().map(Rows::new).collect();
         Self { wanted, rows, plans: (0..256).map(|_| Vec::new()).collect() }
     }
 
     /// The tables, in the order of the selection.
-    pub(super) fn decode(&self, bytes: &[u8], units: &Units) -> Vec<Table> {
-        let tables = self.wanted.iter().zip(&self.rows);
-        tables.map(|(select, rows)| rows.decode(select, bytes, units)).collect()
+    pub(super) fn tables(self, units: &Units) -> Vec<Table> {
+        let tables = self.wanted.iter().zip(self.rows);
+        tables.map(|(select, rows)| rows.table(select, units)).collect()
     }
 }
 
 impl Visitor for Notes<'_> {
-    fn defined(&mut self, id: u8, format: &Format) -> bool {
+    fn defined(&mut self, id: u8, format: &Format, window: Window<'_>) -> bool {
         let mut plans = Vec::new();
         for (table, (select, rows)) in self.wanted.iter().zip(&mut self.rows).enumerate() {
             if select.message == format.name {
                 plans.push(Plan { table, layout: rows.layouts.len() });
-                rows.layouts.push(Layout::new(id, select, format));
+                rows.define(id, Layout::new(select, format), window);
             }
         }
         let wanted = !plans.is_empty();
@@ -79,86 +100,124 @@ impl Visitor for Notes<'_> {
     }
 
     #[inline]
-    fn message(&mut self, id: u8, _message: &[u8], start: usize) {
+    fn message(&mut self, id: u8, _message: &[u8], window: Window<'_>, start: usize) {
         for plan in &self.plans[usize::from(id)] {
             let Some(rows) = self.rows.get_mut(plan.table) else { continue };
-            if rows.runs.last().is_none_or(|run| run.layout != plan.layout) {
-                rows.runs.push(Run { first_row: rows.starts.len(), layout: plan.layout });
+            if rows.pending.len() == BLOCK || rows.current != plan.layout {
+                rows.decode(window);
+                rows.current = plan.layout;
             }
-            rows.starts.push(start);
+            rows.pending.push(start);
+        }
+    }
+
+    fn leave(&mut self, window: Window<'_>) {
+        for rows in &mut self.rows {
+            rows.decode(window);
         }
     }
 }
 
 impl Layout {
-    fn new(id: u8, select: &Select<'_>, format: &Format) -> Self {
+    fn new(select: &Select<'_>, format: &Format) -> Self {
         let place = |label: &&str| {
             let (index, field) = format.field(label)?;
             let place = Place { index, offset: field.offset, letter: field.letter };
             // Arrays have no place in a table.
             (field.letter != Letter::Samples).then_some(place)
         };
-        Self { id, places: select.fields.iter().map(place).collect() }
+        Self { places: select.fields.iter().map(place).collect() }
     }
 }
 
 impl Rows {
-    fn decode(&self, select: &Select<'_>, bytes: &[u8], units: &Units) -> Table {
-        let mut table = Table {
-            message: select.message.to_owned(),
-            rows: self.starts.len(),
-            ..Table::default()
-        };
-        for (column, &field) in select.fields.iter().enumerate() {
-            let found = |layout: &Layout| Some((layout.id, (*layout.places.get(column)?)?));
-            // A definition counts although none of its messages came: the column is empty then.
-            let Some((id, place)) = self.layouts.iter().find_map(found) else { continue };
+    fn new(select: &Select<'_>) -> Self {
+        Self {
+            count: 0,
+            pending: Vec::with_capacity(BLOCK),
+            current: 0,
+            layouts: Vec::new(),
+            columns: select.fields.iter().map(|_| None).collect(),
+        }
+    }
+
+    /// Adds a layout. A definition counts although none of its messages may come: its columns are
+    /// there then.
+    fn define(&mut self, id: u8, layout: Layout, window: Window<'_>) {
+        self.decode(window);
+        for (column, place) in self.columns.iter_mut().zip(&layout.places) {
+            if let (None, Some(place)) = (&column, place) {
+                let values = if place.letter.is_text() {
+                    Values::Texts(vec![String::new(); self.count])
+                } else {
+                    Values::Numbers(vec![f64::NAN; self.count])
+                };
+                *column = Some(Found { id, index: place.index, values });
+            }
+        }
+        self.layouts.push(layout);
+    }
+
+    /// Decodes what is pending.
+    #[inline(never)]
+    fn decode(&mut self, window: Window<'_>) {
+        let Some(layout) = self.layouts.get(self.current) else { return };
+        let (Some(first), Some(last)) = (self.pending.first(), self.pending.last()) else { return };
+        // A type mostly comes as often in the rest of the log as up to here. Memory that turns out
+        // to be too much is never touched.
+        let rows = self.count + self.pending.len();
+        let share = rows as f64 / (window.base + last + 1) as f64;
+        let rest = window.size.saturating_sub(window.base + first);
+        let expected = ((rest as f64 * share * SPARE) as usize).min(rest / LEAST_MESSAGE_BYTES);
+        for (column, place) in self.columns.iter_mut().zip(&layout.places) {
+            match column.as_mut().map(|found| &mut found.values) {
+                Some(Values::Numbers(numbers)) => {
+                    if numbers.capacity() - numbers.len() < self.pending.len() {
+                        numbers.reserve_exact(expected.max(rows / 4 + self.pending.len()));
+                    }
+                    match place {
+                        Some(Place { offset, letter, .. }) => {
+                            letter.column(window.bytes, &self.pending, *offset, numbers);
+                        }
+                        None => numbers.resize(rows, f64::NAN),
+                    }
+                }
+                Some(Values::Texts(texts)) => {
+                    texts.extend(
+                        self.pending.iter().map(|start| text(window.bytes, *start, *place)),
+                    );
+                }
+                None => {}
+            }
+        }
+        self.count += self.pending.len();
+        self.pending.clear();
+    }
+
+    fn table(self, select: &Select<'_>, units: &Units) -> Table {
+        let mut table =
+            Table { message: select.message.to_owned(), rows: self.count, ..Table::default() };
+        for (column, &field) in self.columns.into_iter().zip(select.fields) {
+            let Some(Found { id, index, values }) = column else { continue };
             table.columns.push(Column {
                 field: field.to_owned(),
-                unit: units.label(id, place.index).map(str::to_owned),
-                multiplier: units.multiplier(id, place.index),
+                unit: units.label(id, index).map(str::to_owned),
+                multiplier: units.multiplier(id, index),
             });
-            if place.letter.is_text() {
-                table.texts.push((field.to_owned(), self.texts(column, bytes)));
-            } else {
-                table.numbers.push((field.to_owned(), self.numbers(column, bytes)));
+            match values {
+                Values::Numbers(numbers) => table.numbers.push((field.to_owned(), numbers)),
+                Values::Texts(texts) => table.texts.push((field.to_owned(), texts)),
             }
         }
         table
     }
+}
 
-    fn numbers(&self, column: usize, bytes: &[u8]) -> Vec<f64> {
-        let mut numbers = Vec::with_capacity(self.starts.len());
-        for (starts, place) in self.runs(column) {
-            match place {
-                Some(place) => place.letter.column(bytes, starts, place.offset, &mut numbers),
-                None => numbers.resize(numbers.len() + starts.len(), f64::NAN),
-            }
-        }
-        numbers
-    }
-
-    fn texts(&self, column: usize, bytes: &[u8]) -> Vec<String> {
-        let mut texts = Vec::with_capacity(self.starts.len());
-        for (starts, place) in self.runs(column) {
-            texts.extend(starts.iter().map(|start| {
-                let field = place.filter(|place| place.letter.is_text()).and_then(|place| {
-                    let offset = start + place.offset;
-                    bytes.get(offset..offset + place.letter.size())
-                });
-                field.map(field_text).unwrap_or_default()
-            }));
-        }
-        texts
-    }
-
-    /// The stretches of rows with the place of a column in each.
-    fn runs(&self, column: usize) -> impl Iterator<Item = (&[usize], Option<Place>)> {
-        self.runs.iter().enumerate().map(move |(index, run)| {
-            let end = self.runs.get(index + 1).map_or(self.starts.len(), |next| next.first_row);
-            let starts = self.starts.get(run.first_row..end).unwrap_or_default();
-            let layout = self.layouts.get(run.layout);
-            (starts, layout.and_then(|layout| *layout.places.get(column)?))
-        })
-    }
+/// The text of a field; empty where a definition has none there.
+fn text(bytes: &[u8], start: usize, place: Option<Place>) -> String {
+    let field = place.filter(|place| place.letter.is_text()).and_then(|place| {
+        let offset = start + place.offset;
+        bytes.get(offset..offset + place.letter.size())
+    });
+    field.map(field_text).unwrap_or_default()
 }

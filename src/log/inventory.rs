@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::format::{Field, Format};
 use super::letter::field_text;
-use super::scan::{ScanStats, TimeJump, Units, Visitor, scan, time_us};
+use super::scan::{Scan, ScanStats, TimeJump, Units, Visitor, time_us};
+use super::window::Window;
 
 /// Texts of the firmware kept for finding its name.
 const KEPT_TEXTS: usize = 32;
@@ -80,10 +81,8 @@ pub struct FieldInventory {
     pub multiplier: Option<f64>,
 }
 
-/// Takes the inventory of a log's bytes.
-pub(super) fn take(bytes: &[u8]) -> Inventory {
-    let mut count = Count::default();
-    let scan = scan(bytes, &mut count);
+/// The inventory of a log of `size_bytes` whose messages were counted.
+pub(super) fn take(size_bytes: u64, count: &Count, scan: Scan) -> Inventory {
     let firmware = count.firmware();
     let messages = count.messages(&scan.units);
     let spans = || messages.iter().filter(|message| message.name != "PARM");
@@ -91,7 +90,7 @@ pub(super) fn take(bytes: &[u8]) -> Inventory {
     let end_us = spans().filter_map(|message| message.last_us).max();
     let span_us = start_us.zip(end_us).and_then(|(start, end)| end.checked_sub(start));
     Inventory {
-        size_bytes: bytes.len() as u64,
+        size_bytes,
         start_us,
         end_us,
         duration_s: span_us.map(|span_us| span_us as f64 / 1e6),
@@ -130,7 +129,8 @@ impl Tally {
     }
 }
 
-struct Count {
+/// Counts all messages.
+pub(super) struct Count {
     tallies: Vec<Tally>,
     /// The latest tally of each type byte.
     current: [Option<usize>; 256],
@@ -145,7 +145,7 @@ impl Default for Count {
 }
 
 impl Visitor for Count {
-    fn defined(&mut self, id: u8, format: &Format) -> bool {
+    fn defined(&mut self, id: u8, format: &Format, _window: Window<'_>) -> bool {
         let current = &mut self.current[usize::from(id)];
         match current.and_then(|index| self.tallies.get_mut(index)) {
             Some(unused) if unused.count == 0 => *unused = Tally::new(id, format),
@@ -157,7 +157,7 @@ impl Visitor for Count {
         true
     }
 
-    fn message(&mut self, id: u8, message: &[u8], _start: usize) {
+    fn message(&mut self, id: u8, message: &[u8], _window: Window<'_>, _start: usize) {
         let current = self.current[usize::from(id)];
         let Some(tally) = current.and_then(|index| self.tallies.get_mut(index)) else { return };
         tally.count += 1;

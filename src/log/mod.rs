@@ -13,6 +13,7 @@ mod letter;
 pub mod reader;
 mod scan;
 pub mod units;
+mod window;
 pub mod writer;
 
 pub use definition::MessageDef;

@@ -1,7 +1,7 @@
-//! Reading: memory-mapped, one pass, only the wanted columns are decoded.
+//! Reading: one pass, only the wanted columns are decoded.
 
 use std::fmt;
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::path::{Path, PathBuf};
 
 use memmap2::Mmap;
@@ -9,8 +9,8 @@ use thiserror::Error;
 
 use super::columns::Notes;
 use super::format::{FMT_ID, Format};
-use super::inventory::{self, Inventory};
-use super::scan::{ScanStats, scan};
+use super::inventory::{self, Count, Inventory};
+use super::scan::{Scan, ScanStats, Visitor, scan, scan_file};
 use super::writer::MAGIC;
 
 /// A log must start within this many bytes.
@@ -24,7 +24,13 @@ pub struct Log {
 }
 
 enum Bytes {
-    Mapped(Mmap),
+    /// The map serves those who want the bytes themselves; messages are read from the file again,
+    /// which is faster. The file is not held open: thousands of logs may be.
+    Mapped {
+        map: Mmap,
+        path: PathBuf,
+        metadata: Metadata,
+    },
     Held(Vec<u8>),
 }
 
@@ -132,7 +138,8 @@ impl Log {
         let bytes = if metadata.len() == 0 {
             Bytes::Held(Vec::new())
         } else {
-            Bytes::Mapped(map(&file).map_err(fail)?)
+            let map = map(&file).map_err(fail)?;
+            Bytes::Mapped { map, path: path.to_owned(), metadata }
         };
         let log = Self { bytes };
         match log.why_not_a_log() {
@@ -150,14 +157,30 @@ impl Log {
     ///
     /// Damage is never an error: what is readable is read, the rest is in the [`ScanStats`].
     pub fn select(&self, wanted: &[Select<'_>]) -> (Vec<Table>, ScanStats) {
-        let mut notes = Notes::new(wanted);
-        let scan = scan(self.bytes(), &mut notes);
-        (notes.decode(self.bytes(), &scan.units), scan.stats)
+        let (notes, scan) = self.walk(|| Notes::new(wanted));
+        (notes.tables(&scan.units), scan.stats)
     }
 
     /// What is in the log: messages, times, firmware, damage.
     pub fn inventory(&self) -> Inventory {
-        inventory::take(self.bytes())
+        let (count, scan) = self.walk(Count::default);
+        inventory::take(self.size_bytes(), &count, scan)
+    }
+
+    /// Shows all messages to a visitor.
+    fn walk<V: Visitor>(&self, new: impl Fn() -> V) -> (V, Scan) {
+        if let Bytes::Mapped { path, metadata, .. } = &self.bytes
+            && let Some(file) = reopen(path, metadata)
+        {
+            let mut visitor = new();
+            // A file that fails half-way is left to the map.
+            if let Ok(scan) = scan_file(&file, self.bytes().len(), &mut visitor) {
+                return (visitor, scan);
+            }
+        }
+        let mut visitor = new();
+        let scan = scan(self.bytes(), &mut visitor);
+        (visitor, scan)
     }
 
     /// Size of the log.
@@ -168,7 +191,7 @@ impl Log {
     /// The log as it was written.
     pub fn bytes(&self) -> &[u8] {
         match &self.bytes {
-            Bytes::Mapped(map) => map,
+            Bytes::Mapped { map, .. } => map,
             Bytes::Held(bytes) => bytes,
         }
     }
@@ -203,6 +226,21 @@ impl fmt::Debug for Log {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Log").field("size_bytes", &self.size_bytes()).finish()
     }
+}
+
+/// Opens a file again, if it is still the one that it was.
+#[cfg(unix)]
+fn reopen(path: &Path, before: &Metadata) -> Option<File> {
+    use std::os::unix::fs::MetadataExt;
+    let file = File::open(path).ok()?;
+    let now = file.metadata().ok()?;
+    (now.dev() == before.dev() && now.ino() == before.ino()).then_some(file)
+}
+
+/// Where files have no identity there is only the map.
+#[cfg(not(unix))]
+fn reopen(_path: &Path, _before: &Metadata) -> Option<File> {
+    None
 }
 
 #[expect(unsafe_code, reason = "memory-mapping a file has no safe form")]

@@ -1,12 +1,15 @@
 //! The way through a log: message by message, over damage, with the formats that it defines.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, Read};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::format::{FMT_ID, Format};
 use super::letter::field_text;
+use super::window::{Window, Windows};
 use super::writer::MAGIC;
 
 /// Steps of `TimeUS` forward by more than this are jumps.
@@ -48,11 +51,14 @@ pub struct TimeJump {
 /// Receives the messages that it asks for.
 pub(super) trait Visitor {
     /// A type was defined, or defined anew: does the visitor want its messages?
-    fn defined(&mut self, id: u8, format: &Format) -> bool;
+    fn defined(&mut self, id: u8, format: &Format, window: Window<'_>) -> bool;
 
     /// A wanted message, header included, as long as its format says; `start` is its place in the
-    /// log.
-    fn message(&mut self, id: u8, message: &[u8], start: usize);
+    /// window.
+    fn message(&mut self, id: u8, message: &[u8], window: Window<'_>, start: usize);
+
+    /// The window goes: what is wanted of it must be taken now.
+    fn leave(&mut self, _window: Window<'_>) {}
 }
 
 /// What the log says about units.
@@ -133,26 +139,55 @@ struct Walk {
 
 /// Walks through all messages of a log.
 pub(super) fn scan<V: Visitor>(bytes: &[u8], visitor: &mut V) -> Scan {
-    let mut walk = Walk {
-        kinds: [Kind::default(); 256],
-        latest_us: None,
-        scan: Scan {
+    let mut walk = Walk::new(visitor);
+    let window = Window::whole(bytes);
+    walk.run(window, visitor);
+    visitor.leave(window);
+    walk.scan
+}
+
+/// Walks through all messages of the first `size` bytes of a file.
+pub(super) fn scan_file<V: Visitor>(file: &File, size: usize, visitor: &mut V) -> io::Result<Scan> {
+    scan_windows(Windows::new(file, size), visitor)
+}
+
+/// Walks through windows.
+pub(super) fn scan_windows<R: Read, V: Visitor>(
+    mut windows: Windows<R>,
+    visitor: &mut V,
+) -> io::Result<Scan> {
+    let mut walk = Walk::new(visitor);
+    let mut done = 0;
+    loop {
+        let window = windows.advance(done)?;
+        done = walk.run(window, visitor);
+        visitor.leave(window);
+        if window.is_last {
+            return Ok(walk.scan);
+        }
+    }
+}
+
+impl Walk {
+    fn new<V: Visitor>(visitor: &mut V) -> Self {
+        let scan = Scan {
             formats: vec![None; 256],
             units: Units::default(),
             stats: ScanStats::default(),
             jumps: Vec::new(),
             starts: 0,
-        },
-    };
-    walk.define(FMT_ID, Format::of_fmt(), visitor);
-    walk.run(bytes, visitor);
-    walk.scan
-}
+        };
+        let mut walk = Self { kinds: [Kind::default(); 256], latest_us: None, scan };
+        walk.define(FMT_ID, Format::of_fmt(), Window::whole(&[]), visitor);
+        walk
+    }
 
-impl Walk {
-    fn run<V: Visitor>(&mut self, bytes: &[u8], visitor: &mut V) {
+    /// Walks through a window; returns where in it the next one begins.
+    fn run<V: Visitor>(&mut self, window: Window<'_>, visitor: &mut V) -> usize {
+        let (bytes, limit) = (window.bytes, window.limit());
         let mut position = 0;
-        while let Some(rest) = bytes.get(position..)
+        while position < limit
+            && let Some(rest) = bytes.get(position..)
             && let Some(&[first, second, id]) = rest.first_chunk()
         {
             let kind = self.kinds[usize::from(id)];
@@ -163,16 +198,19 @@ impl Walk {
             {
                 let followed = after.starts_with(&MAGIC) || after.is_empty();
                 if followed || self.is_credible(kind, message, after) {
-                    self.accept(kind, id, message, position, visitor);
+                    self.accept(kind, id, message, window, position, visitor);
                     position += length;
                     continue;
                 }
             }
             let skipped = self.garbage(rest);
             if skipped == 0 {
-                return;
+                return bytes.len();
             }
             position += skipped;
+        }
+        if !window.is_last {
+            return position;
         }
         let rest = bytes.get(position..).unwrap_or_default();
         if !rest.is_empty() && MAGIC.starts_with(&rest[..1]) {
@@ -180,6 +218,7 @@ impl Walk {
         } else {
             self.scan.stats.bad_bytes += rest.len() as u64;
         }
+        bytes.len()
     }
 
     /// Whether to believe in a message that no other follows: not if another one starts inside of
@@ -238,6 +277,7 @@ impl Walk {
         kind: Kind,
         id: u8,
         message: &[u8],
+        window: Window<'_>,
         position: usize,
         visitor: &mut V,
     ) {
@@ -247,24 +287,31 @@ impl Walk {
                 Some(latest_us) if now_us.wrapping_sub(latest_us) <= JUMP_AHEAD_US => {
                     self.latest_us = Some(now_us);
                 }
-                _ => self.time_step(now_us, position),
+                _ => self.time_step(now_us, window.base + position),
             }
         }
         if kind.flags & WANTED != 0 {
-            visitor.message(id, message, position);
+            visitor.message(id, message, window, position);
         }
         if kind.flags & (FORMAT | UNITS) != 0 {
-            self.learn(kind, id, message, visitor);
+            self.learn(kind, id, message, window, visitor);
         }
     }
 
     #[cold]
-    fn learn<V: Visitor>(&mut self, kind: Kind, id: u8, message: &[u8], visitor: &mut V) {
+    fn learn<V: Visitor>(
+        &mut self,
+        kind: Kind,
+        id: u8,
+        message: &[u8],
+        window: Window<'_>,
+        visitor: &mut V,
+    ) {
         if kind.flags & FORMAT != 0 {
             match Format::from_row(message) {
                 Some((id, format)) => {
                     self.scan.starts += u64::from(id == FMT_ID);
-                    self.define(id, format, visitor);
+                    self.define(id, format, window, visitor);
                 }
                 None => self.scan.stats.rejected_formats += 1,
             }
@@ -274,12 +321,12 @@ impl Walk {
         }
     }
 
-    fn define<V: Visitor>(&mut self, id: u8, format: Format, visitor: &mut V) {
+    fn define<V: Visitor>(&mut self, id: u8, format: Format, window: Window<'_>, visitor: &mut V) {
         let slot = &mut self.scan.formats[usize::from(id)];
         if slot.as_ref() == Some(&format) {
             return;
         }
-        let mut flags = if visitor.defined(id, &format) { WANTED } else { 0 };
+        let mut flags = if visitor.defined(id, &format, window) { WANTED } else { 0 };
         if id == FMT_ID {
             flags |= FORMAT;
         } else if matches!(format.name.as_str(), "UNIT" | "MULT" | "FMTU") {
