@@ -26,6 +26,7 @@ use super::result::{
     TableRow, Unmeasured, UnusedLog, UpdraftMap,
 };
 use super::slots::{SlotMatch, match_slots};
+use super::starts;
 use super::statistics::{StatisticsOptions, of_map};
 use super::truth;
 use super::updraft::{self, DroneSeries};
@@ -274,7 +275,8 @@ pub fn analyze(
         match analyze_flight(input, options, reference.or(found), &report) {
             Ok(flight) => flights.push(flight),
             Err(error) => {
-                warnings.push(error.to_string());
+                // One warning for each line: what is told and, below it, of which log.
+                warnings.extend(error.to_string().lines().map(|line| line.trim().to_owned()));
                 failure = failure.or(Some(error));
             }
         }
@@ -389,8 +391,19 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
     let mut drones = Vec::new();
     let (mut updrafts, mut seen) = (Vec::new(), Vec::new());
     let mut unmeasured = Vec::new();
-    for One { mut drone, calibration, updraft, hover, truth, .. } in ones {
+    // Without a plan logs may be of any day.
+    let apart = if input.plan.is_some() { starts::apart(&ones) } else { vec![None; ones.len()] };
+    for (One { mut drone, calibration, updraft, hover, truth, .. }, later_s) in
+        ones.into_iter().zip(apart)
+    {
         let (slot, name) = (drone.slot, drone.name.clone());
+        let updraft = match later_s {
+            Some(later_s) => updraft.map(|_| Err(starts::not_in_map(later_s))),
+            None => updraft,
+        };
+        if let (Purpose::Calibration, Some(later_s)) = (purpose, later_s) {
+            warnings.push(starts::in_calibration(&name, later_s));
+        }
         let nothing = |reason| Unmeasured { slot, name: name.clone(), reason };
         match (purpose, calibration, updraft) {
             (Purpose::Calibration, Ok(laws), _) => drone.laws = Some(laws),

@@ -30,6 +30,7 @@ pub mod result;
 mod shape;
 mod slots;
 mod split;
+mod starts;
 pub mod statistics;
 mod stats;
 mod steps;

@@ -233,7 +233,7 @@ struct AnalyzeOutput<'a> {
 
 pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, CommandError> {
     let plan = args.plan.as_deref().map(load_plan).transpose()?;
-    let mut work = Work { title: String::new(), root: PathBuf::from("."), flights: Vec::new() };
+    let mut work = Work { root: PathBuf::from("."), ..Work::default() };
     for path in &args.paths {
         find(path, plan.as_ref(), &mut work)?;
     }
@@ -276,7 +276,7 @@ pub(super) fn analyze_campaign(
     root: &Path,
     options: &AnalyzeOptions,
 ) -> Result<Exit, CommandError> {
-    let mut work = Work { title: String::new(), root: root.to_owned(), flights: Vec::new() };
+    let mut work = Work { root: root.to_owned(), ..Work::default() };
     find(root, None, &mut work)?;
     finish(context, &work, options, None, Some(root))
 }
@@ -316,12 +316,13 @@ fn finish(
         .collect();
     let total: usize = inputs.iter().map(|input| input.logs.len()).sum();
     let progress = Progress::new(context, "analysing", total as u64);
-    let analysis =
+    let mut analysis =
         analyze(&work.title, &inputs, &options.resolve(), reference.as_ref(), &|_, _| {
             progress.advance();
         })
         .map_err(|error| CommandError::Nothing(error.to_string()))?;
     progress.finish();
+    analysis.warnings.extend(work.absent.iter().cloned());
     context.check_stop()?;
     if !context.json {
         context.print(&terminal_summary(&analysis, WIDTH, context.color))?;
@@ -366,6 +367,7 @@ fn finish(
         !(flight.missing.is_empty() && flight.unused.is_empty() && flight.partly_used.is_empty())
     };
     let lost = used < total
+        || !work.absent.is_empty()
         || analysis.flights.iter().any(lossy)
         || analysis.flights.len() < work.flights.len();
     Ok(match analysis.what_was_found() {
