@@ -240,6 +240,12 @@ pub enum AnalysisError {
         /// Why not, one sentence for each.
         reasons: Vec<String>,
     },
+    /// None of several flights can be analysed.
+    #[error("{}", failures.iter().map(Self::to_string).collect::<Vec<_>>().join("\n"))]
+    Every {
+        /// Why not, one for each.
+        failures: Vec<AnalysisError>,
+    },
     /// The campaign has no flights.
     #[error("there is no flight to analyse")]
     NoFlights,
@@ -266,7 +272,7 @@ pub fn analyze(
     let mut before = 0;
     let mut flights: Vec<FlightAnalysis> = Vec::new();
     let mut warnings = Vec::new();
-    let mut failure = None;
+    let mut failures = Vec::new();
     for input in order {
         let found = flights
             .iter()
@@ -277,13 +283,20 @@ pub fn analyze(
             Err(error) => {
                 // One warning for each line: what is told and, below it, of which log.
                 warnings.extend(error.to_string().lines().map(|line| line.trim().to_owned()));
-                failure = failure.or(Some(error));
+                failures.push(error);
             }
         }
         before += input.logs.len();
     }
-    if let (true, Some(error)) = (flights.is_empty(), failure) {
-        return Err(error);
+    if flights.is_empty() {
+        return Err(match failures.pop() {
+            Some(only) if failures.is_empty() => only,
+            Some(last) => {
+                failures.push(last);
+                AnalysisError::Every { failures }
+            }
+            None => AnalysisError::NoFlights,
+        });
     }
     Ok(Analysis {
         schema: ANALYSIS_SCHEMA.to_owned(),

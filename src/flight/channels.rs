@@ -1,6 +1,7 @@
 //! Message rows to channels over board time: names, signs and units of all firmwares.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::Series;
 use super::clean::Rows;
@@ -138,20 +139,26 @@ impl Messages {
         let performed = || {
             performing.and_then(|show| {
                 let stage = show.column("Stage")?;
-                let performs = |boot: &std::ops::Range<usize>| {
+                let performs = |boot: &Range<usize>| {
                     stage.get(boot.clone()).is_some_and(|stages| stages.contains(&4.0))
                 };
                 show.boots().iter().rposition(performs)
             })
         };
         let chosen = wanted.or_else(performed).unwrap_or(count - 1);
-        let span = steady.iter().find_map(|name| {
-            let rows = self.rows(name)?;
-            let boot = rows.boots().get(chosen).cloned().filter(|_| boots(Some(rows)) == count)?;
-            let times = rows.time_s.get(boot)?;
-            Some((*times.first()?, *times.last()?))
-        });
-        for rows in self.rows.values_mut() {
+        let spans: Vec<(f64, f64)> = steady
+            .iter()
+            .find_map(|name| self.rows(name).filter(|rows| rows.boots().len() == count))
+            .map(|rows| {
+                let span = |boot: Range<usize>| {
+                    let times = rows.time_s.get(boot)?;
+                    Some((times.first()? - 10.0, times.last()? + 10.0))
+                };
+                rows.boots().into_iter().filter_map(span).collect()
+            })
+            .unwrap_or_default();
+        let span = spans.get(chosen).copied();
+        for (name, rows) in &mut self.rows {
             let own = rows.boots();
             if own.len() == count {
                 let boot = own.get(chosen).cloned().unwrap_or_default();
@@ -160,8 +167,14 @@ impl Messages {
                 // A sparse message may have no row in some boots; its last rows in the time span
                 // of the chosen boot are the best guess.
                 let times = rows.time_s.clone();
+                let of = |(start, end): (f64, f64), time: &f64| (start..=end).contains(time);
+                let mut own = times.iter().filter(|time| of((start, end), time));
+                let doubtful =
+                    own.any(|time| spans.iter().filter(|span| of(**span, time)).count() > 1);
+                // Whose arming it was must be certain: without any the whole boot counts as armed.
+                let none = doubtful && matches!(name.as_str(), "ARM" | "EV");
                 rows.retain(|index| {
-                    times.get(index).is_some_and(|time| (start - 10.0..=end + 10.0).contains(time))
+                    !none && times.get(index).is_some_and(|time| of((start, end), time))
                 });
             }
         }
