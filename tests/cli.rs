@@ -10,6 +10,8 @@ mod fleet_loaded_support;
 
 #[path = "cli/analyze.rs"]
 mod analyze;
+#[path = "cli/analyze_inputs.rs"]
+mod analyze_inputs;
 #[path = "cli/check.rs"]
 mod check;
 #[cfg(unix)]
@@ -44,3 +46,5 @@ mod orders;
 mod plan;
 #[path = "cli/simulate.rs"]
 mod simulate;
+#[path = "cli/tables.rs"]
+mod tables;

@@ -12,7 +12,7 @@ use super::account::{self, Account};
 use super::aware::{Aware, Measured};
 use super::battery::Sag;
 use super::calibrate::{self, FitOptions, Location, PaperTable, Weights};
-use super::caution::{fit_cautions, tilt_caution, wind_caution};
+use super::caution::{SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
 use super::corrections::Corrections;
 use super::density::Density;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
@@ -28,6 +28,7 @@ use super::result::{
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
 use super::statistics::{StatisticsOptions, of_map};
+use super::track;
 use super::truth;
 use super::updraft::{self, DroneSeries};
 use super::wind::Leaning;
@@ -457,8 +458,14 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         );
     }
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
-    warnings.extend(map.as_ref().and_then(wind_caution));
-    let statistics = map.as_ref().map(|map| of_map(map, &seen, &options.statistics));
+    let from_physics = input.lean_table.is_some() && shared.aware.is_some();
+    warnings.extend(map.as_ref().and_then(|map| wind_caution(map, from_physics)));
+    let moved = map.as_ref().is_some_and(UpdraftMap::is_scan);
+    if moved {
+        warnings.push(SCAN_CAUTION.to_owned());
+    }
+    let statistics =
+        map.as_ref().filter(|_| !moved).map(|map| of_map(map, &seen, &options.statistics));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -514,6 +521,22 @@ fn partial_law(shared: &Shared<'_>, slot: Option<u16>, name: &str) -> Option<Str
     ))
 }
 
+/// Where a drone that moved was at the map's times, in the show frame where its home is known.
+fn track_of(
+    shared: &Shared<'_>,
+    home_m: Option<[f64; 2]>,
+    series: &DroneSeries,
+    times: &[i64],
+) -> Vec<Option<[f64; 3]>> {
+    let Some((plan, home_m)) = shared.input.plan.zip(home_m) else { return Vec::new() };
+    if series.moved_m.is_empty() {
+        return Vec::new();
+    }
+    let frame = plan.site.frame();
+    let places = series.spread(&series.moved_m, times);
+    places.into_iter().map(|moved| Some(track::place_m(&frame, home_m, moved?))).collect()
+}
+
 type NamedUpdraft =
     (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str, Option<TruthSeries>);
 
@@ -534,7 +557,9 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         .map(|(slot, name, position_m, series, mapping, truth)| DroneUpdraft {
             slot,
             name,
-            position_m,
+            // A drone that moved has a track, and no place.
+            position_m: position_m.filter(|_| series.moved_m.is_empty()),
+            track_m: track_of(shared, position_m, &series, &times),
             height_m: series.height_m,
             mapping: mapping.to_owned(),
             mean: series.mean,

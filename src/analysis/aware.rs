@@ -205,7 +205,9 @@ impl<'a> Aware<'a> {
                 );
             }
         }
-        if let Some(per_minute) = Hover::trend_us_per_min(&known_times(&referred)) {
+        // Along a track the air changes as well: only a hover's trend is a drift.
+        let trend = Hover::trend_us_per_min(&known_times(&referred));
+        if let Some(per_minute) = trend.filter(|_| !hover.moves) {
             flag(Quality::Drift, format!("the pulse drifts by {per_minute:+.0} us per minute"));
         }
         measured.quality = quality;

@@ -34,6 +34,7 @@ mod starts;
 pub mod statistics;
 mod stats;
 mod steps;
+mod track;
 mod truth;
 pub mod updraft;
 pub mod wind;
