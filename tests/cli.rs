@@ -44,6 +44,8 @@ mod manners;
 mod orders;
 #[path = "cli/plan.rs"]
 mod plan;
+#[path = "cli/scan.rs"]
+mod scan;
 #[path = "cli/simulate.rs"]
 mod simulate;
 #[path = "cli/tables.rs"]

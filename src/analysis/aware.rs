@@ -30,6 +30,8 @@ const FASTEST_MPS: f64 = 12.0;
 const LEAST_SLOPE: f64 = 0.2;
 /// A signed quadratic must be this much more probable than a line (logarithm).
 const CLEARLY: f64 = 2.0;
+/// Rounds in which the vertical speed through the air is found beside what wind does at it.
+const CLIMB_ROUNDS: usize = 3;
 /// Air further out than the ladder by this is marked, m/s.
 const BEYOND_MPS: f64 = 0.5;
 
@@ -136,22 +138,32 @@ impl<'a> Aware<'a> {
         });
         let slow = Slow::of(flight);
         let pack = pack.filter(|_| slow.is_some());
+        let values = Values { shape: self.zero.shape, law, zero: &self.zero };
         let refer = |second: &Second| {
             let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
-            let raw = Raw {
+            let mut raw = Raw {
                 time_s: second.time_s,
                 pulse_us: second.pulse_us,
                 velocity_mps: second.velocity_mps,
+                climb_mps: second.velocity_mps,
                 lean_deg: second.lean_deg,
                 height_m: second.height_m,
                 resting_v,
             };
-            (self.corrections.refer(&raw, pack.as_ref(), self.slope), raw)
+            let mut one = self.corrections.refer(&raw, pack.as_ref(), self.slope);
+            if self.corrections.lean_table.is_some() {
+                // What wind does depends a little on the air that is looked for.
+                for _ in 0..CLIMB_ROUNDS {
+                    let Some(air_mps) = values.air_mps(one.pulse_us) else { break };
+                    raw.climb_mps = air_mps;
+                    one = self.corrections.refer(&raw, pack.as_ref(), self.slope);
+                }
+            }
+            (one, raw)
         };
         let mut quality = hover.quality.clone();
         let referred: Vec<Option<(Referred, Raw)>> =
             hover.seconds.iter().map(|second| second.as_ref().map(refer)).collect();
-        let values = Values { shape: self.zero.shape, law, zero: &self.zero };
         let sigmas = self.corrections.sigmas(pack.as_ref());
         let mut measured =
             Measured { first_s: hover.first_s, is_own: own.is_some(), ..Measured::default() };

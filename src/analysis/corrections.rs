@@ -64,6 +64,9 @@ pub(super) struct Raw {
     pub(super) time_s: f64,
     pub(super) pulse_us: f64,
     pub(super) velocity_mps: f64,
+    /// Vertical speed through the air, m/s, as far as it is known: what rotors gain in wind depends
+    /// on it.
+    pub(super) climb_mps: f64,
     pub(super) lean_deg: f64,
     pub(super) height_m: f64,
     pub(super) resting_v: Option<f64>,
@@ -75,6 +78,7 @@ impl Raw {
             time_s: f64::midpoint(window.start_s, window.end_s),
             pulse_us: window.pulse_us.mean,
             velocity_mps: window.velocity_mps.mean,
+            climb_mps: window.velocity_mps.mean,
             lean_deg: window.lean_deg,
             height_m: window.height_m,
             resting_v: window.supply.map(|supply| supply.resting_v),
@@ -125,7 +129,7 @@ impl Corrections<'_> {
             velocity_mps += axial;
             pulse_us = level;
         } else if let Some(table) = self.lean_table {
-            let change = table.at(raw.lean_deg, raw.velocity_mps);
+            let change = table.at(raw.lean_deg, raw.climb_mps);
             doubts_us[WIND] = change;
             pulse_us -= change;
         } else {
