@@ -84,7 +84,8 @@ pub(in crate::report) fn figure(
         .filter(|value| usable(*value));
     let y = Axis::around("updraft (m/s)", reach.chain([0.0]), 0.1);
     let ways = all().map(|point| point.way_m).filter(|way| usable(*way));
-    let x = Axis::around("way flown (m)", ways.chain([0.0]), 10.0);
+    let mut x = Axis::around("way flown (m)", ways.chain([0.0]), 10.0);
+    x.min = 0.0;
     let known = all().any(|point| point.truth_mps.is_some());
     let mut sheet = Sheet::new(WIDTH, HEIGHT * chosen.len() as f64);
     for (row, (drone, points)) in chosen.iter().enumerate() {
