@@ -5,6 +5,7 @@
 //! for any bytes does not; being refused with an error is fine.
 
 use std::net::SocketAddr;
+use std::path::Path;
 
 use nalgebra::Vector3;
 use updraft::base::crc::ap_crc32;
@@ -12,6 +13,7 @@ use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::campaign::{parse_plan, to_json};
 use updraft::check::{CheckInput, check};
 use updraft::fleet::slots::{FleetTable, check_table};
+use updraft::flight::table::{Mapping, read_from};
 use updraft::link::frame::{FrameReader, MAX_FRAME, encode};
 use updraft::log::{Log, Select};
 use updraft::mission::Plan;
@@ -48,6 +50,7 @@ pub(crate) const TARGETS: &[Target] = &[
     ("show_status", show_status),
     ("skyb", skyb),
     ("skyc", skyc),
+    ("table", table),
     ("template", template),
 ];
 
@@ -292,6 +295,29 @@ fn checked(show: &Show, plan: &Plan) {
         for drone in &show.drones {
             skyb::write(drone, &skyb::SkybOptions::default()).expect("the check looked at that");
         }
+    }
+}
+
+/// A mapping, a line of `%%`, and a table: what is read has times that go forward and values that
+/// are numbers, and what is not is refused with a reason.
+fn table(bytes: &[u8]) {
+    const BETWEEN: &[u8] = b"\n%%\n";
+    let Some(at) = bytes.windows(BETWEEN.len()).position(|piece| piece == BETWEEN) else { return };
+    let (mapping, rows) = (&bytes[..at], &bytes[at + BETWEEN.len()..]);
+    let mapping = match Mapping::parse(Path::new("fuzz.toml"), mapping) {
+        Ok(mapping) => mapping,
+        Err(error) => return drop(error.to_string()),
+    };
+    let flight = match read_from(rows, Path::new("fuzz.csv"), &mapping) {
+        Ok(flight) => flight,
+        Err(error) => return assert!(!error.to_string().is_empty()),
+    };
+    let always = [&flight.pulse_us, &flight.velocity_up_mps, &flight.height_m, &flight.roll_rad];
+    let sometimes = [&flight.desired_up_mps, &flight.truth_up_mps];
+    for series in always.into_iter().chain(sometimes.into_iter().flatten()) {
+        assert_eq!(series.time_s.len(), series.value.len());
+        assert!(series.time_s.windows(2).all(|pair| pair[0] < pair[1]));
+        assert!(series.time_s.iter().chain(&series.value).all(|value| value.is_finite()));
     }
 }
 

@@ -10,6 +10,8 @@ mod fleet_loaded_support;
 
 #[path = "cli/analyze.rs"]
 mod analyze;
+#[path = "cli/analyze_inputs.rs"]
+mod analyze_inputs;
 #[path = "cli/check.rs"]
 mod check;
 #[cfg(unix)]
@@ -42,5 +44,9 @@ mod manners;
 mod orders;
 #[path = "cli/plan.rs"]
 mod plan;
+#[path = "cli/scan.rs"]
+mod scan;
 #[path = "cli/simulate.rs"]
 mod simulate;
+#[path = "cli/tables.rs"]
+mod tables;

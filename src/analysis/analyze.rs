@@ -12,7 +12,7 @@ use super::account::{self, Account};
 use super::aware::{Aware, Measured};
 use super::battery::Sag;
 use super::calibrate::{self, FitOptions, Location, PaperTable, Weights};
-use super::caution::{fit_cautions, tilt_caution, wind_caution};
+use super::caution::{SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
 use super::corrections::Corrections;
 use super::density::Density;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
@@ -26,7 +26,9 @@ use super::result::{
     TableRow, Unmeasured, UnusedLog, UpdraftMap,
 };
 use super::slots::{SlotMatch, match_slots};
+use super::starts;
 use super::statistics::{StatisticsOptions, of_map};
+use super::track;
 use super::truth;
 use super::updraft::{self, DroneSeries};
 use super::wind::Leaning;
@@ -239,6 +241,12 @@ pub enum AnalysisError {
         /// Why not, one sentence for each.
         reasons: Vec<String>,
     },
+    /// None of several flights can be analysed.
+    #[error("{}", failures.iter().map(Self::to_string).collect::<Vec<_>>().join("\n"))]
+    Every {
+        /// Why not, one for each.
+        failures: Vec<AnalysisError>,
+    },
     /// The campaign has no flights.
     #[error("there is no flight to analyse")]
     NoFlights,
@@ -265,7 +273,7 @@ pub fn analyze(
     let mut before = 0;
     let mut flights: Vec<FlightAnalysis> = Vec::new();
     let mut warnings = Vec::new();
-    let mut failure = None;
+    let mut failures = Vec::new();
     for input in order {
         let found = flights
             .iter()
@@ -274,14 +282,22 @@ pub fn analyze(
         match analyze_flight(input, options, reference.or(found), &report) {
             Ok(flight) => flights.push(flight),
             Err(error) => {
-                warnings.push(error.to_string());
-                failure = failure.or(Some(error));
+                // One warning for each line: what is told and, below it, of which log.
+                warnings.extend(error.to_string().lines().map(|line| line.trim().to_owned()));
+                failures.push(error);
             }
         }
         before += input.logs.len();
     }
-    if let (true, Some(error)) = (flights.is_empty(), failure) {
-        return Err(error);
+    if flights.is_empty() {
+        return Err(match failures.pop() {
+            Some(only) if failures.is_empty() => only,
+            Some(last) => {
+                failures.push(last);
+                AnalysisError::Every { failures }
+            }
+            None => AnalysisError::NoFlights,
+        });
     }
     Ok(Analysis {
         schema: ANALYSIS_SCHEMA.to_owned(),
@@ -389,8 +405,19 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
     let mut drones = Vec::new();
     let (mut updrafts, mut seen) = (Vec::new(), Vec::new());
     let mut unmeasured = Vec::new();
-    for One { mut drone, calibration, updraft, hover, truth, .. } in ones {
+    // Without a plan logs may be of any day.
+    let apart = if input.plan.is_some() { starts::apart(&ones) } else { vec![None; ones.len()] };
+    for (One { mut drone, calibration, updraft, hover, truth, .. }, later_s) in
+        ones.into_iter().zip(apart)
+    {
         let (slot, name) = (drone.slot, drone.name.clone());
+        let updraft = match later_s {
+            Some(later_s) => updraft.map(|_| Err(starts::not_in_map(later_s))),
+            None => updraft,
+        };
+        if let (Purpose::Calibration, Some(later_s)) = (purpose, later_s) {
+            warnings.push(starts::in_calibration(&name, later_s));
+        }
         let nothing = |reason| Unmeasured { slot, name: name.clone(), reason };
         match (purpose, calibration, updraft) {
             (Purpose::Calibration, Ok(laws), _) => drone.laws = Some(laws),
@@ -431,8 +458,14 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         );
     }
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
-    warnings.extend(map.as_ref().and_then(wind_caution));
-    let statistics = map.as_ref().map(|map| of_map(map, &seen, &options.statistics));
+    let from_physics = input.lean_table.is_some() && shared.aware.is_some();
+    warnings.extend(map.as_ref().and_then(|map| wind_caution(map, from_physics)));
+    let moved = map.as_ref().is_some_and(UpdraftMap::is_scan);
+    if moved {
+        warnings.push(SCAN_CAUTION.to_owned());
+    }
+    let statistics =
+        map.as_ref().filter(|_| !moved).map(|map| of_map(map, &seen, &options.statistics));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -488,6 +521,22 @@ fn partial_law(shared: &Shared<'_>, slot: Option<u16>, name: &str) -> Option<Str
     ))
 }
 
+/// Where a drone that moved was at the map's times, in the show frame where its home is known.
+fn track_of(
+    shared: &Shared<'_>,
+    home_m: Option<[f64; 2]>,
+    series: &DroneSeries,
+    times: &[i64],
+) -> Vec<Option<[f64; 3]>> {
+    let Some((plan, home_m)) = shared.input.plan.zip(home_m) else { return Vec::new() };
+    if series.moved_m.is_empty() {
+        return Vec::new();
+    }
+    let frame = plan.site.frame();
+    let places = series.spread(&series.moved_m, times);
+    places.into_iter().map(|moved| Some(track::place_m(&frame, home_m, moved?))).collect()
+}
+
 type NamedUpdraft =
     (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str, Option<TruthSeries>);
 
@@ -508,7 +557,9 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         .map(|(slot, name, position_m, series, mapping, truth)| DroneUpdraft {
             slot,
             name,
-            position_m,
+            // A drone that moved has a track, and no place.
+            position_m: position_m.filter(|_| series.moved_m.is_empty()),
+            track_m: track_of(shared, position_m, &series, &times),
             height_m: series.height_m,
             mapping: mapping.to_owned(),
             mean: series.mean,

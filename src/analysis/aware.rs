@@ -30,6 +30,15 @@ const FASTEST_MPS: f64 = 12.0;
 const LEAST_SLOPE: f64 = 0.2;
 /// A signed quadratic must be this much more probable than a line (logarithm).
 const CLEARLY: f64 = 2.0;
+/// Rounds in which the vertical speed through the air is found beside what wind does at it.
+const CLIMB_ROUNDS: usize = 10;
+/// Part of the way that is gone in each: with all of it, the rounds swing around the answer where wind
+/// doubles the pulse's slope.
+const CLIMB_STEP: f64 = 0.6;
+/// Wind changes the pulse's slope by a factor between these: more is not believed.
+const LEAST_STEEPER: f64 = 0.7;
+/// See [`LEAST_STEEPER`].
+const MOST_STEEPER: f64 = 2.0;
 /// Air further out than the ladder by this is marked, m/s.
 const BEYOND_MPS: f64 = 0.5;
 
@@ -136,22 +145,33 @@ impl<'a> Aware<'a> {
         });
         let slow = Slow::of(flight);
         let pack = pack.filter(|_| slow.is_some());
+        let values = Values { shape: self.zero.shape, law, zero: &self.zero };
         let refer = |second: &Second| {
             let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
-            let raw = Raw {
+            let mut raw = Raw {
                 time_s: second.time_s,
                 pulse_us: second.pulse_us,
                 velocity_mps: second.velocity_mps,
+                climb_mps: second.velocity_mps,
                 lean_deg: second.lean_deg,
                 height_m: second.height_m,
                 resting_v,
             };
-            (self.corrections.refer(&raw, pack.as_ref(), self.slope), raw)
+            let mut one = self.corrections.refer(&raw, pack.as_ref(), self.slope);
+            if self.corrections.lean_table.is_some() {
+                // What wind does depends on the air that is looked for: at 7 m/s the pulse answers
+                // climbs half as strongly again as in still air, or more.
+                for _ in 0..CLIMB_ROUNDS {
+                    let Some(air_mps) = values.air_mps(one.pulse_us) else { break };
+                    raw.climb_mps += CLIMB_STEP * (air_mps - raw.climb_mps);
+                    one = self.corrections.refer(&raw, pack.as_ref(), self.slope);
+                }
+            }
+            (one, raw)
         };
         let mut quality = hover.quality.clone();
         let referred: Vec<Option<(Referred, Raw)>> =
             hover.seconds.iter().map(|second| second.as_ref().map(refer)).collect();
-        let values = Values { shape: self.zero.shape, law, zero: &self.zero };
         let sigmas = self.corrections.sigmas(pack.as_ref());
         let mut measured =
             Measured { first_s: hover.first_s, is_own: own.is_some(), ..Measured::default() };
@@ -168,8 +188,8 @@ impl<'a> Aware<'a> {
             let noise_us = hover.noise_us(values.slope(air_mps)) / RUNNING.sqrt();
             let error = values.error(&one.doubts_us, air_mps, &sigmas);
             let half_us = error.half_us(self.zero.width, noise_us);
-            let interval = values.interval(&one, half_us);
-            let noise = values.interval(&one, NORMAL * noise_us);
+            let interval = values.interval(&one, values.level_us(&one, air_mps, half_us));
+            let noise = values.interval(&one, values.level_us(&one, air_mps, NORMAL * noise_us));
             measured.updraft_mps.push(Some(one.velocity_mps - air_mps));
             measured.interval_mps.push(interval);
             measured.sd_mps.push(noise.map(|[low, high]| (high - low) / (2.0 * NORMAL)));
@@ -205,7 +225,9 @@ impl<'a> Aware<'a> {
                 );
             }
         }
-        if let Some(per_minute) = Hover::trend_us_per_min(&known_times(&referred)) {
+        // Along a track the air changes as well: only a hover's trend is a drift.
+        let trend = Hover::trend_us_per_min(&known_times(&referred));
+        if let Some(per_minute) = trend.filter(|_| !hover.moves) {
             flag(Quality::Drift, format!("the pulse drifts by {per_minute:+.0} us per minute"));
         }
         measured.quality = quality;
@@ -237,6 +259,7 @@ impl<'a> Aware<'a> {
         let half_us = error.half_us(self.zero.width, noise_us);
         let end = |offset: f64| {
             mean(&|(one, air)| {
+                let offset = values.level_us(one, *air, offset);
                 let moved = values.air_mps(one.pulse_us + offset).unwrap_or(*air);
                 one.velocity_mps - moved
             })
@@ -440,6 +463,16 @@ impl Values<'_> {
             own_us2: own_us2.max(0.0),
             doubts_us,
         }
+    }
+
+    /// What a change of the pulse is at level flight without wind, us: where wind makes the pulse
+    /// steeper in the vertical air speed, less.
+    fn level_us(&self, one: &Referred, air_mps: f64, change_us: f64) -> f64 {
+        let slope = self.slope(air_mps);
+        if slope <= 0.0 {
+            return change_us;
+        }
+        change_us / (1.0 + one.steeper / slope).clamp(LEAST_STEEPER, MOST_STEEPER)
     }
 
     fn interval(&self, one: &Referred, half_us: f64) -> Option<[f64; 2]> {

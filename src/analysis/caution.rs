@@ -93,8 +93,13 @@ pub(super) fn tilt_caution(drones: &[DroneAnalysis], options: &AnalysisOptions) 
     ))
 }
 
+/// What a map of drones that moved does not say.
+pub(super) const SCAN_CAUTION: &str = "scan: the drones moved, and each value is the mean of the air \
+    over 10 s of the way. A difference along a track is one of place and of time; no statistics are \
+    made of it";
+
 /// About wind: the drones leaned, and that is corrected for or not.
-pub(super) fn wind_caution(map: &UpdraftMap) -> Option<String> {
+pub(super) fn wind_caution(map: &UpdraftMap, from_physics: bool) -> Option<String> {
     let errors: Vec<f64> = map.drones.iter().map(|drone| drone.systematic_mps).collect();
     let error = mean_sd(&errors).0;
     if error <= WORTH_SAYING_MPS {
@@ -102,15 +107,23 @@ pub(super) fn wind_caution(map: &UpdraftMap) -> Option<String> {
     }
     let tilts: Vec<f64> = map.drones.iter().map(|drone| drone.tilt_deg).collect();
     let tilt = mean_sd(&tilts).0;
-    Some(if map.leaning.is_some() {
+    let when = if map.is_scan() { "on their legs" } else { "in the hover" };
+    Some(if from_physics {
         format!(
-            "wind: the drones leaned {tilt:.1} degrees in the hover. What wind does to a leaning \
+            "wind: the drones leaned {tilt:.1} degrees {when}. What their airspeed does to the pulse \
+             (drag, flow along the rotor axis, translational lift) is corrected by their lean, with \
+             the physics of their vehicle's file; what is left may be {error:.2} m/s, of the same \
+             sign for all drones (stated as the systematic error)"
+        )
+    } else if map.leaning.is_some() {
+        format!(
+            "wind: the drones leaned {tilt:.1} degrees {when}. What wind does to a leaning \
              drone is corrected with the drag of the simulated vehicle; what is left may be \
              {error:.2} m/s, of the same sign for all drones (stated as the systematic error)"
         )
     } else {
         format!(
-            "wind: the drones leaned {tilt:.1} degrees in the hover. Wind along the rotor axis of a \
+            "wind: the drones leaned {tilt:.1} degrees {when}. Wind along the rotor axis of a \
              leaning drone reads as sinking air, and the lift that rotors gain in wind as rising \
              air. Without the drag and the rotors of these drones known nothing is corrected: the \
              map may be off by up to {error:.2} m/s by the first alone, in the same direction for \

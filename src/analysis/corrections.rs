@@ -44,6 +44,8 @@ const UNKNOWN_DENSITY_EXPONENT: f64 = 0.5;
 const DENSITY_SCALE_M: f64 = 10_400.0;
 /// Sensitivity of the pulse to thrust where it is not known (du/dlnT), us.
 const THRUST_US: f64 = 300.0;
+/// Step in which the table's slope by the vertical air speed is taken, m/s.
+const CLIMB_STEP_MPS: f64 = 0.5;
 /// Most that wind does to an unknown small drone at a lean of one degree, us; it grows with the
 /// square of the lean.
 const UNKNOWN_WIND_US: f64 = 1.5;
@@ -64,6 +66,9 @@ pub(super) struct Raw {
     pub(super) time_s: f64,
     pub(super) pulse_us: f64,
     pub(super) velocity_mps: f64,
+    /// Vertical speed through the air, m/s, as far as it is known: what rotors gain in wind depends
+    /// on it.
+    pub(super) climb_mps: f64,
     pub(super) lean_deg: f64,
     pub(super) height_m: f64,
     pub(super) resting_v: Option<f64>,
@@ -75,6 +80,7 @@ impl Raw {
             time_s: f64::midpoint(window.start_s, window.end_s),
             pulse_us: window.pulse_us.mean,
             velocity_mps: window.velocity_mps.mean,
+            climb_mps: window.velocity_mps.mean,
             lean_deg: window.lean_deg,
             height_m: window.height_m,
             resting_v: window.supply.map(|supply| supply.resting_v),
@@ -91,6 +97,8 @@ pub(super) struct Referred {
     pub(super) pulse_us: f64,
     /// Change of the pulse per unit of each doubt, us.
     pub(super) doubts_us: [f64; DOUBTS],
+    /// How much steeper than without wind the logged pulse is in the vertical air speed, us/(m/s).
+    pub(super) steeper: f64,
 }
 
 impl Corrections<'_> {
@@ -118,6 +126,7 @@ impl Corrections<'_> {
         let mut pulse_us = raw.pulse_us;
         let mut velocity_mps = raw.velocity_mps;
         let mut doubts_us = [0.0; DOUBTS];
+        let mut steeper = 0.0;
         if let Some(leaning) = self.leaning {
             let axial = leaning.axial_mps(raw.lean_deg);
             let level = leaning.level_us(pulse_us, raw.lean_deg);
@@ -125,8 +134,11 @@ impl Corrections<'_> {
             velocity_mps += axial;
             pulse_us = level;
         } else if let Some(table) = self.lean_table {
-            let change = table.at(raw.lean_deg, raw.velocity_mps);
-            doubts_us[WIND] = change;
+            let change = table.at(raw.lean_deg, raw.climb_mps);
+            let doubt = table.doubt_at(raw.lean_deg, raw.climb_mps);
+            doubts_us[WIND] = doubt.map_or(change, |doubt| doubt / WIND_SHARE);
+            let at = |step: f64| table.at(raw.lean_deg, raw.climb_mps + step);
+            steeper = (at(CLIMB_STEP_MPS) - at(-CLIMB_STEP_MPS)) / (2.0 * CLIMB_STEP_MPS);
             pulse_us -= change;
         } else {
             // Leaning by drag, the thrust is m g cos(phi); by acceleration, m g / cos(phi). Neither
@@ -153,6 +165,6 @@ impl Corrections<'_> {
             }
             None => doubts_us[DRIFT] = warm.hypot(UNKNOWN_VOLTAGE_US * flown_s / 60.0),
         }
-        Referred { velocity_mps, pulse_us, doubts_us }
+        Referred { velocity_mps, pulse_us, doubts_us, steeper }
     }
 }

@@ -9,11 +9,12 @@ use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats
 use super::statistics::HoverSeen;
 use super::stats::mean_sd;
 use super::steps::steady;
+use super::track;
 use super::updraft::{self, DroneSeries, Lean, RUNNING_S, Running};
 use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
 use crate::flight::{Alignment, Flight, FlightOptions, table};
-use crate::mission::plan::{Purpose, Segment, Slot};
+use crate::mission::plan::{Kind, Purpose, Segment, Slot};
 
 /// What all logs of a flight share.
 pub(super) struct Shared<'a> {
@@ -145,7 +146,19 @@ fn measure(
         .map_law
         .and_then(|law| law_fit(laws, law))
         .ok_or("the calibration has no fit of the law that the map uses")?;
-    let hover = updraft::hover(seen.targets).ok_or("no hover was found in the flight")?;
+    let looked = track::measuring(seen.targets);
+    let hover = *looked.first().ok_or("no hover was found in the flight")?;
+    if looked.iter().any(|target| target.kind == Kind::Horizontal) {
+        let aware = shared.aware.as_ref().ok_or(
+            "the drone moved, and a track is measured with a law that knows its errors: this \
+             calibration allows none, or the paper's way was asked for",
+        )?;
+        let along = track::look(seen.flight, &looked, &shared.options.windows);
+        let measured = aware.measure(seen.flight, &along, slot, name)?;
+        let mapping = if measured.is_own { mapping } else { FLOCK };
+        let systematic_mps = 2.0 * measured.errors.wind_mps;
+        return Ok((track::series(seen.flight, &along, measured, systematic_mps), mapping));
+    }
     if let Some(aware) = &shared.aware {
         let seconds = Hover::of(seen.flight, hover, &shared.options.windows);
         let measured = aware.measure(seen.flight, &seconds, slot, name)?;
@@ -208,7 +221,9 @@ fn find_targets(
         warnings
             .push("times count from take-off: windows may be shifted against the plan".to_owned());
     }
-    windows::contradiction(flight, &targets).map_or(Ok(targets), Err)
+    windows::contradiction(flight, &targets)
+        .or_else(|| track::contradiction(flight, segments))
+        .map_or(Ok(targets), Err)
 }
 
 /// Mapping of a drone that has none of its own: `DroneUpdraft::mapping`.

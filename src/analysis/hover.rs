@@ -42,9 +42,28 @@ pub(super) struct Hover {
     steps: Vec<[f64; 2]>,
     /// What the velocity's mean says against the change of height, m/s.
     pub(super) velocity_bias_mps: f64,
+    /// Several legs and hovers of a drone that moves along a track ([`super::track`]).
+    pub(super) moves: bool,
 }
 
 impl Hover {
+    /// Adds a later stretch of the same flight; the seconds between have no values.
+    pub(super) fn join(&mut self, later: Self) {
+        if self.seconds.is_empty() {
+            (self.start_s, self.first_s) = (later.start_s, later.first_s);
+        }
+        let until = usize::try_from(later.first_s.saturating_sub(self.first_s)).unwrap_or(0);
+        // Stretches in another order than that of time are not joined.
+        if until < self.seconds.len() || until > LONGEST_S as usize {
+            return;
+        }
+        self.seconds.resize(until, None);
+        self.seconds.extend(later.seconds);
+        self.end_s = later.end_s;
+        self.quality.extend(later.quality);
+        self.steps.extend(later.steps);
+    }
+
     /// Looks at a hover of a flight.
     pub(super) fn of(flight: &Flight, target: &Target, options: &WindowOptions) -> Self {
         let (start_s, end_s) = (target.start_s, target.end_s);
@@ -185,6 +204,7 @@ impl Hover {
     /// Why there is not one value.
     pub(super) fn nothing(&self) -> String {
         let length_s = self.end_s - self.start_s;
+        let what = if self.moves { "track" } else { "hover" };
         if length_s < RUNNING_S {
             return format!(
                 "the hover is too short: its window has {length_s:.0} s, the running mean needs \
@@ -198,10 +218,10 @@ impl Hover {
             }
         }
         if reasons.is_empty() {
-            return "the hover's pulses are outside of the law's range".to_owned();
+            return format!("the {what}'s pulses are outside of the law's range");
         }
         format!(
-            "the hover from {:.0} to {:.0} s was rejected: {}",
+            "the {what} from {:.0} to {:.0} s was rejected: {}",
             self.start_s,
             self.end_s,
             reasons.join(", ")

@@ -16,25 +16,37 @@ pub struct LeanTable {
     pub climb_step_mps: f64,
     /// For each lean the changes for each vertical air speed, us.
     pub change_us: Vec<Vec<f64>>,
+    /// Standard errors of the changes from what is not known well about drag and lift, us. They do not
+    /// vanish where lift and the flow along the axis cancel each other. Empty: not known.
+    pub doubt_us: Vec<Vec<f64>>,
 }
 
 impl LeanTable {
     /// Change of the pulse, us, by linear interpolation; at the table's edges beyond them.
     pub fn at(&self, lean_deg: f64, climb_mps: f64) -> f64 {
+        self.of(&self.change_us, lean_deg, climb_mps)
+    }
+
+    /// Standard error of that change, us; `None` where the table does not have it.
+    pub fn doubt_at(&self, lean_deg: f64, climb_mps: f64) -> Option<f64> {
+        (!self.doubt_us.is_empty()).then(|| self.of(&self.doubt_us, lean_deg, climb_mps))
+    }
+
+    fn of(&self, table: &[Vec<f64>], lean_deg: f64, climb_mps: f64) -> f64 {
         let place = |value: f64, first: f64, step: f64, n: usize| {
             let place = ((value - first) / step).clamp(0.0, (n.max(1) - 1) as f64);
             let low = (place as usize).min(n.saturating_sub(2));
             (low, place - low as f64)
         };
-        let (row, down) = place(lean_deg, 0.0, self.lean_step_deg, self.change_us.len());
+        let (row, down) = place(lean_deg, 0.0, self.lean_step_deg, table.len());
         let along = |row: usize| {
-            let Some(row) = self.change_us.get(row) else { return 0.0 };
+            let Some(row) = table.get(row) else { return 0.0 };
             let (column, right) =
                 place(climb_mps, self.first_climb_mps, self.climb_step_mps, row.len());
             let value = |column: usize| row.get(column).copied().unwrap_or(0.0);
             value(column) * (1.0 - right) + value(column + 1) * right
         };
-        let next = (row + 1).min(self.change_us.len().saturating_sub(1));
+        let next = (row + 1).min(table.len().saturating_sub(1));
         along(row) * (1.0 - down) + along(next) * down
     }
 }
@@ -50,11 +62,14 @@ mod tests {
             first_climb_mps: -1.0,
             climb_step_mps: 1.0,
             change_us: vec![vec![0.0; 3], vec![-10.0, -8.0, -6.0]],
+            doubt_us: vec![vec![0.0; 3], vec![4.0; 3]],
         };
         assert_eq!(table.at(0.0, 0.3), 0.0);
         assert_eq!(table.at(1.0, 0.0), -4.0);
         assert_eq!(table.at(2.0, 0.5), -7.0);
         assert_eq!(table.at(9.0, 9.0), -6.0);
+        assert_eq!(table.doubt_at(1.0, 0.3), Some(2.0));
+        assert_eq!(LeanTable::default().doubt_at(1.0, 0.3), None);
         assert_eq!(LeanTable::default().at(3.0, 1.0), 0.0);
     }
 }

@@ -462,6 +462,13 @@ pub struct UpdraftMap {
     pub truth: Option<TruthCheck>,
 }
 
+impl UpdraftMap {
+    /// Whether drones moved along tracks.
+    pub fn is_scan(&self) -> bool {
+        self.drones.iter().any(|drone| !drone.track_m.is_empty())
+    }
+}
+
 /// One drone's estimate of the vertical air speed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DroneUpdraft {
@@ -471,7 +478,11 @@ pub struct DroneUpdraft {
     pub name: String,
     /// Position in the show frame, m (x forward, y left).
     pub position_m: Option<[f64; 2]>,
-    /// Height above home, m.
+    /// Where a drone that moved was at each of [`UpdraftMap::time_s`], show frame, m (x forward, y
+    /// left, z above home); null where its log does not say, empty for a drone that hovered.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub track_m: Vec<Option<[f64; 3]>>,
+    /// Height above home, m; along a track the mean.
     pub height_m: f64,
     /// Mapping used: `own` or `flock`.
     pub mapping: String,

@@ -59,6 +59,7 @@ mod tests {
             slot: Some(1),
             name: String::new(),
             position_m: None,
+            track_m: Vec::new(),
             height_m: 100.0,
             mapping: "own".to_owned(),
             mean: crate::base::estimate::Estimate::new(0.0, 0.1),

@@ -44,6 +44,9 @@ pub struct DroneSeries {
     pub height_m: f64,
     /// Errors, where the calibration tells them.
     pub(super) measured: Option<Measured>,
+    /// Where a drone that moved was at each second: north and east of its home and above it, m;
+    /// empty for a hover.
+    pub(super) moved_m: Vec<Option<[f64; 3]>>,
 }
 
 /// What the lean of a drone does to its estimate.
@@ -129,6 +132,7 @@ pub fn estimate(
         tilt_deg,
         height_m: mean_sd(flight.height_m.between(hover.start_s, hover.end_s)).0,
         measured: None,
+        moved_m: Vec::new(),
     })
 }
 
@@ -148,6 +152,7 @@ pub(super) fn with_errors(
         tilt_deg: lean_deg(mean(&flight.roll_rad), mean(&flight.pitch_rad)),
         height_m: mean(&flight.height_m),
         measured: Some(measured),
+        moved_m: Vec::new(),
     }
 }
 

@@ -122,6 +122,8 @@ const WRONG_MPS: f64 = 0.3;
 const OFFSET_LEGS: usize = 3;
 /// Legs of two ladders whose speeds differ by less are the same, m/s.
 const SAME_LEG_MPS: f64 = 0.1;
+/// Fewest wrong legs that refuse a log when they are half of it.
+const FEWEST_WRONG: usize = 2;
 /// How far the time offsets of a ladder's legs may lie apart and still be one, s.
 const OFFSET_SPREAD_S: f64 = 1.0;
 /// Smallest time offset that is told, s.
@@ -400,6 +402,12 @@ pub fn contradiction(flight: &Flight, targets: &[Target]) -> Option<String> {
         let values = series.between(target.start_s, target.end_s);
         (!values.is_empty()).then(|| mean(values))
     };
+    // A ladder flown instead of a hover goes up and down: on the average it stands still.
+    let busy = |target: &Target| {
+        let values = series.between(target.start_s, target.end_s);
+        let off = values.iter().filter(|v| (**v - target.commanded_mps).abs() > WRONG_MPS).count();
+        target.kind.is_hover() && 2 * off > values.len()
+    };
     let has_legs = targets.iter().any(|target| target.kind.is_leg() && flown(target).is_some());
     let compared: Vec<(&Target, f64)> = targets
         .iter()
@@ -408,9 +416,20 @@ pub fn contradiction(flight: &Flight, targets: &[Target]) -> Option<String> {
         .collect();
     let wrong: Vec<&(&Target, f64)> = compared
         .iter()
-        .filter(|(target, flown)| (flown - target.commanded_mps).abs() > WRONG_MPS)
+        .filter(|(target, flown)| (flown - target.commanded_mps).abs() > WRONG_MPS || busy(target))
         .collect();
-    let (target, flown) = wrong.first().filter(|_| 2 * wrong.len() > compared.len())?;
+    // Half of some legs is no accident either.
+    let too_many = 2 * wrong.len() > compared.len()
+        || (wrong.len() >= FEWEST_WRONG && 2 * wrong.len() == compared.len());
+    let (target, flown) = wrong.first().filter(|_| too_many)?;
+    if busy(target) {
+        return Some(format!(
+            "this log does not belong to the plan: it was to stand still in `{}` from {:.0} to \
+             {:.0} s, and was commanded up and down most of that time; check that the logs are in \
+             the folder of their own flight",
+            target.label, target.start_s, target.end_s,
+        ));
+    }
     Some(format!(
         "this log does not belong to the plan: {} of {} {} were flown at another vertical speed \
          (first: `{}` at {:.0} s, planned {} m/s, flown {flown:.2} m/s); {}",

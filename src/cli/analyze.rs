@@ -327,8 +327,9 @@ fn finish(
         },
         || output.map(|_| provenance(work, options.words())),
     );
-    let analysis = analysis.map_err(|error| CommandError::Nothing(error.to_string()))?;
+    let mut analysis = analysis.map_err(|error| CommandError::Nothing(error.to_string()))?;
     progress.finish();
+    analysis.warnings.extend(work.absent.iter().cloned());
     context.check_stop()?;
     if !context.json {
         context.print(&terminal_summary(&analysis, WIDTH, context.color))?;
@@ -368,6 +369,7 @@ fn finish(
         !(flight.missing.is_empty() && flight.unused.is_empty() && flight.partly_used.is_empty())
     };
     let lost = used < total
+        || !work.absent.is_empty()
         || analysis.flights.iter().any(lossy)
         || analysis.flights.len() < work.flights.len();
     Ok(match analysis.what_was_found() {

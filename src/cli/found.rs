@@ -15,6 +15,7 @@ use crate::analysis::density::Density;
 use crate::analysis::lean_table::LeanTable;
 use crate::analysis::wind::Leaning;
 use crate::analysis::{LogInput, TruthSeries};
+use crate::base::causes::with_causes;
 use crate::base::file::FileError;
 use crate::base::time::GpsTime;
 use crate::campaign::start::StartRecord;
@@ -51,6 +52,7 @@ pub(super) struct Found {
 }
 
 /// What was asked to be analysed.
+#[derive(Default)]
 pub(super) struct Work {
     pub(super) title: String,
     /// Paths in the report are shown relative to this.
@@ -58,17 +60,14 @@ pub(super) struct Work {
     pub(super) flights: Vec<Found>,
     /// What has been hashed on the way.
     pub(super) hashes: Hashes,
+    /// Flights of a campaign that cannot be looked at, one sentence each.
+    pub(super) absent: Vec<String>,
 }
 
 impl Work {
     /// Nothing yet, with paths relative to `root`.
     pub(super) fn new(root: &Path) -> Self {
-        Self {
-            title: String::new(),
-            root: root.to_owned(),
-            flights: Vec::new(),
-            hashes: Hashes::default(),
-        }
+        Self { root: root.to_owned(), ..Self::default() }
     }
 }
 
@@ -79,15 +78,33 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         if index.is_file() && work.title.is_empty() {
             work.title = campaign::read_json::<CampaignIndex>(&index)?.title;
         }
-        for folder in campaign::flights(path)? {
-            let flight = found_flight(&folder, &work.hashes)?;
+        let folders = campaign::flights(path)?;
+        let several = folders.len() > 1;
+        let mut first_error = None;
+        let before = work.flights.len();
+        for folder in folders {
+            let flight = match found_flight(&folder, &work.hashes) {
+                Ok(flight) => flight,
+                // The campaign's other flights can be analysed without this one.
+                Err(error) if several => {
+                    work.absent.push(format!(
+                        "{} is left out: {}",
+                        stem(&folder.0),
+                        with_causes(&error, ": ")
+                    ));
+                    first_error = first_error.or(Some(error));
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
             if work.title.is_empty() {
                 work.title =
                     flight.plan.as_ref().map_or_else(String::new, |plan| plan.title.clone());
             }
             work.flights.push(flight);
         }
-        return Ok(());
+        let nothing = work.flights.len() == before;
+        return first_error.filter(|_| nothing).map_or(Ok(()), Err);
     }
     let logs = if path.is_dir() {
         logs_in(path)?

@@ -38,23 +38,66 @@ const CLIMB_STEP_MPS: f64 = 0.5;
 /// Fastest wind that a lean is explained with, m/s.
 const FASTEST_WIND_MPS: f64 = 40.0;
 
+/// Standard error of the drag that tells the wind from the lean, relative.
+const DRAG_ERROR: f64 = 0.075;
+/// Standard error of the lift that rotors gain in wind, as one of the share lost to the inflow, relative.
+const LIFT_ERROR: f64 = 0.07;
+
 /// What wind does to the pulse of a vehicle by its lean, from the vehicle's own effects (rotor drag,
 /// body drag, translational lift); `None` for vehicles without rotor drag, whose lean says little.
 pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
-    let of = |name: &str, parameter: &str| -> Option<f64> {
-        let effect = crate::effects::find(name)?;
-        vehicle.effects.get(name).filter(|table| table.on)?;
-        let values = crate::effects::select::values_of(effect, vehicle).ok()?;
-        let known = effect.definition().parameters;
-        values.get(known.iter().position(|known| known.name == parameter)?).copied()
+    let ratio = density_ratio(plan.site.ground_amsl_m);
+    let change_us = changes(ratio, vehicle)?;
+    let other = |effect: &str, parameter: &str, error: f64| {
+        let mut vehicle = vehicle.clone();
+        let value = parameter_of(&vehicle, effect, parameter)? * (1.0 + error);
+        let table = vehicle.effects.get_mut(effect)?;
+        table.parameters.insert(parameter.to_owned(), value);
+        changes(ratio, &vehicle)
     };
-    let rotor_drag = of("blade-flapping", "drag_per_weight").filter(|drag| *drag > 0.0)?;
-    let body_m2 = of("parasitic-drag", "horizontal_m2").unwrap_or(0.0);
+    let others: Vec<Vec<Vec<f64>>> = [
+        other("blade-flapping", "drag_per_weight", DRAG_ERROR),
+        other("translational-lift", "inflow_share", LIFT_ERROR),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let at = |table: &[Vec<f64>], row: usize, column: usize| {
+        table.get(row).and_then(|row| row.get(column)).copied().unwrap_or(0.0)
+    };
+    let doubt = |row: usize, column: usize| {
+        let middle = at(&change_us, row, column);
+        others.iter().fold(0.0, |sum: f64, other| sum.hypot(at(other, row, column) - middle))
+    };
+    let doubt_us =
+        (0..LEANS).map(|row| (0..CLIMBS).map(|column| doubt(row, column)).collect()).collect();
+    Some(LeanTable {
+        lean_step_deg: LEAN_STEP_DEG,
+        first_climb_mps: FIRST_CLIMB_MPS,
+        climb_step_mps: CLIMB_STEP_MPS,
+        change_us,
+        doubt_us,
+    })
+}
+
+/// A parameter of an effect that acts in a vehicle.
+fn parameter_of(vehicle: &Vehicle, name: &str, parameter: &str) -> Option<f64> {
+    let effect = crate::effects::find(name)?;
+    vehicle.effects.get(name).filter(|table| table.on)?;
+    let values = crate::effects::select::values_of(effect, vehicle).ok()?;
+    let known = effect.definition().parameters;
+    values.get(known.iter().position(|known| known.name == parameter)?).copied()
+}
+
+/// Change of the pulse by wind, for each lean and vertical air speed of the table, us.
+fn changes(ratio: f64, vehicle: &Vehicle) -> Option<Vec<Vec<f64>>> {
+    let rotor_drag =
+        parameter_of(vehicle, "blade-flapping", "drag_per_weight").filter(|drag| *drag > 0.0)?;
+    let body_m2 = parameter_of(vehicle, "parasitic-drag", "horizontal_m2").unwrap_or(0.0);
     let mut still = vehicle.clone();
     // The voltage is corrected for on its own.
     still.effects.remove("battery");
     let model = Model::of(&still).ok()?;
-    let ratio = density_ratio(plan.site.ground_amsl_m);
     let body = SEA_LEVEL_DENSITY * ratio * body_m2 / 2.0 / (vehicle.airframe.mass_kg * GRAVITY);
     let lean = |wind_mps: f64| {
         let mut phi: f64 = 0.0;
@@ -81,10 +124,5 @@ pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
         let climbs = (0..CLIMBS).map(|step| FIRST_CLIMB_MPS + step as f64 * CLIMB_STEP_MPS);
         climbs.map(|climb| if index == 0 { 0.0 } else { change(tilt_rad, climb) }).collect()
     };
-    Some(LeanTable {
-        lean_step_deg: LEAN_STEP_DEG,
-        first_climb_mps: FIRST_CLIMB_MPS,
-        climb_step_mps: CLIMB_STEP_MPS,
-        change_us: (0..LEANS).map(row).collect(),
-    })
+    Some((0..LEANS).map(row).collect())
 }

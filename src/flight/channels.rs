@@ -1,6 +1,7 @@
 //! Message rows to channels over board time: names, signs and units of all firmwares.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::Series;
 use super::clean::Rows;
@@ -126,9 +127,9 @@ impl Messages {
         self.rows.get(message)
     }
 
-    /// Keeps one boot of a log that holds several: the last one with motor outputs (or the last one
-    /// that performed a show). Returns how many boots the log holds.
-    pub(super) fn keep_one_boot(&mut self) -> usize {
+    /// Keeps one boot of a log that holds several: the `wanted` one, else the last one with motor
+    /// outputs (or the last one that performed a show). Returns how many boots the log holds.
+    pub(super) fn keep_one_boot(&mut self, wanted: Option<usize>) -> usize {
         let steady = ["RCOU", "ATT", "XKF1", "NKF1", "EKF1", "SHOW"];
         let boots = |rows: Option<&Rows>| rows.map_or(0, |rows| rows.boots().len());
         let count = steady.iter().map(|name| boots(self.rows(name))).max().unwrap_or(0);
@@ -136,22 +137,29 @@ impl Messages {
             return count;
         }
         let performing = self.rows("SHOW").filter(|show| show.boots().len() == count);
-        let chosen = performing
-            .and_then(|show| {
+        let performed = || {
+            performing.and_then(|show| {
                 let stage = show.column("Stage")?;
-                let performs = |boot: &std::ops::Range<usize>| {
+                let performs = |boot: &Range<usize>| {
                     stage.get(boot.clone()).is_some_and(|stages| stages.contains(&4.0))
                 };
                 show.boots().iter().rposition(performs)
             })
-            .unwrap_or(count - 1);
-        let span = steady.iter().find_map(|name| {
-            let rows = self.rows(name)?;
-            let boot = rows.boots().get(chosen).cloned().filter(|_| boots(Some(rows)) == count)?;
-            let times = rows.time_s.get(boot)?;
-            Some((*times.first()?, *times.last()?))
-        });
-        for rows in self.rows.values_mut() {
+        };
+        let chosen = wanted.or_else(performed).unwrap_or(count - 1);
+        let spans: Vec<(f64, f64)> = steady
+            .iter()
+            .find_map(|name| self.rows(name).filter(|rows| rows.boots().len() == count))
+            .map(|rows| {
+                let span = |boot: Range<usize>| {
+                    let times = rows.time_s.get(boot)?;
+                    Some((times.first()? - 10.0, times.last()? + 10.0))
+                };
+                rows.boots().into_iter().filter_map(span).collect()
+            })
+            .unwrap_or_default();
+        let span = spans.get(chosen).copied();
+        for (name, rows) in &mut self.rows {
             let own = rows.boots();
             if own.len() == count {
                 let boot = own.get(chosen).cloned().unwrap_or_default();
@@ -160,8 +168,14 @@ impl Messages {
                 // A sparse message may have no row in some boots; its last rows in the time span
                 // of the chosen boot are the best guess.
                 let times = rows.time_s.clone();
+                let of = |(start, end): (f64, f64), time: &f64| (start..=end).contains(time);
+                let mut own = times.iter().filter(|time| of((start, end), time));
+                let doubtful =
+                    own.any(|time| spans.iter().filter(|span| of(**span, time)).count() > 1);
+                // Whose arming it was must be certain: without any the whole boot counts as armed.
+                let none = doubtful && matches!(name.as_str(), "ARM" | "EV");
                 rows.retain(|index| {
-                    times.get(index).is_some_and(|time| (start - 10.0..=end + 10.0).contains(time))
+                    !none && times.get(index).is_some_and(|time| of((start, end), time))
                 });
             }
         }
@@ -183,6 +197,17 @@ impl Messages {
             north: rows.series("PN", |north| north).unwrap_or_default(),
             east: rows.series("PE", |east| east).unwrap_or_default(),
         })
+    }
+
+    /// Columns that the position filter logged without one number among them; `None`: it logged
+    /// nothing, or its columns have numbers.
+    pub(super) fn ekf_without_numbers(&self) -> Option<String> {
+        let (name, rows) =
+            ["XKF1", "NKF1", "EKF1"].iter().find_map(|name| Some((*name, self.rows(name)?)))?;
+        let empty = |column: &&str| rows.series(column, |value| value).is_none();
+        let empty: Vec<String> =
+            ["VD", "PD"].iter().filter(|c| empty(c)).map(|c| format!("{name}.{c}")).collect();
+        (!empty.is_empty()).then(|| empty.join(" and "))
     }
 
     /// The core that most XKF4 rows call primary; core 0 without them.
@@ -279,7 +304,13 @@ impl Messages {
     /// The commands of guided (and show) mode, the profile as planned. The log has them in cm/s, and
     /// show mode logs its velocities times SHOW_VEL_FF_GAIN.
     fn guided(&self) -> Option<(Option<Series>, Option<Series>)> {
-        let gain = self.parameters.get("SHOW_VEL_FF_GAIN").copied().unwrap_or(1.0);
+        let gain = self.parameters.get("SHOW_VEL_FF_GAIN").copied();
+        // The show firmware without its parameters (they are lost, or no numbers): the factor is not
+        // known, and the position controller's own target is better.
+        if gain.is_none() && self.rows("SHOW").is_some() && self.rows("PSCD").is_some() {
+            return None;
+        }
+        let gain = gain.unwrap_or(1.0);
         if !(LEAST_FEED_FORWARD..=10.0).contains(&gain) {
             return None;
         }

@@ -18,18 +18,40 @@ const CUT_OFF_M: f64 = 1.0;
 /// Motors that never exceed their lower limit by this much did not fly, us.
 const IDLE_US: f64 = 20.0;
 
+/// Which flight of a log is meant.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Wanted {
+    /// Boot, from 0; `None`: the last one that performed a show, else the last.
+    pub(super) boot: Option<usize>,
+    /// Flight of that boot, from 0; `None` as above.
+    pub(super) flight: Option<usize>,
+}
+
+/// How many there are to choose from.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Held {
+    /// Boots in the log.
+    pub(super) boots: usize,
+    /// Flights in the boot that was read.
+    pub(super) flights: usize,
+}
+
+/// Reads the wanted flight of a log; `held` becomes what there was to choose from.
 pub(super) fn load(
     log: &Log,
     source: &Path,
     options: FlightOptions<'_>,
+    wanted: Wanted,
+    held: &mut Held,
 ) -> Result<Flight, FlightError> {
     let mut messages = Messages::read(log);
     if messages.is_empty() {
         return Err(FlightError::Empty { source_path: source.to_owned() });
     }
     let mut warnings = scan_warnings(&messages);
-    let boots = messages.keep_one_boot();
-    if boots > 1 {
+    let boots = messages.keep_one_boot(wanted.boot);
+    held.boots = boots;
+    if boots > 1 && wanted.boot.is_none() {
         warnings.push(format!("the log holds {boots} boots of the autopilot; one is analysed"));
     }
     let missing = |what, messages, remedy| FlightError::Missing {
@@ -41,12 +63,13 @@ pub(super) fn load(
     let [pulse, pulse_max, pulse_min] = messages.motors().ok_or_else(|| {
         missing("motor outputs", "RCOU", "set LOG_BITMASK bit 10 (RCOUT, +1024) and fly again")
     })?;
-    let ekf = messages.ekf().ok_or_else(|| {
-        missing(
+    let ekf = messages.ekf().ok_or_else(|| match messages.ekf_without_numbers() {
+        Some(columns) => FlightError::NoNumbers { source_path: source.to_owned(), columns },
+        None => missing(
             "vertical velocity of the position filter",
             "XKF1, NKF1 or EKF1",
             "set LOG_BITMASK bit 1 or 0 (ATTITUDE_MED, +2, or FAST, +1) and fly again",
-        )
+        ),
     })?;
     let attitude = |field: &str| messages.rows("ATT")?.series(field, f64::to_radians);
     let yaw = messages.rows("ATT").and_then(|rows| rows.series("Yaw", |yaw| yaw));
@@ -82,7 +105,13 @@ pub(super) fn load(
     let armed = pick::armed(&messages, &pulse);
     let no_flight =
         |reason: String| FlightError::NoFlight { source_path: source.to_owned(), reason };
-    let (flight, choice) = pick::flight(&armed, &stages, &pulse).ok_or_else(|| {
+    let flights = pick::flights(&armed, &pulse);
+    held.flights = flights.len();
+    let chosen = match wanted.flight {
+        Some(index) => flights.get(index).map(|flight| (*flight, None)),
+        None => pick::flight(&armed, &stages, &pulse),
+    };
+    let (flight, choice) = chosen.ok_or_else(|| {
         no_flight("the motors were never armed for 5 s with outputs logged".into())
     })?;
     warnings.extend(choice);

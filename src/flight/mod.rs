@@ -16,6 +16,7 @@
 
 mod align;
 mod channels;
+mod choose;
 mod clean;
 mod indicator;
 mod load;
@@ -147,6 +148,18 @@ pub enum FlightError {
         /// What to do.
         remedy: &'static str,
     },
+    /// A column that the analysis cannot do without has no number in it.
+    #[error(
+        "{}: {columns} in the log holds not one number: the position filter had failed, or the log \
+         is damaged; fetch the log again, and do not use the drone if it stays so",
+        source_path.display()
+    )]
+    NoNumbers {
+        /// The log file.
+        source_path: PathBuf,
+        /// The columns, as `MESSAGE.FIELD`.
+        columns: String,
+    },
     /// The vehicle never armed or never left the ground.
     #[error("{}: no flight in this log: {reason}", source_path.display())]
     NoFlight {
@@ -176,7 +189,7 @@ pub struct Identity {
 /// Reads only what tells drones apart.
 pub fn identify(log: &Log) -> Identity {
     let mut messages = channels::Messages::read_identity(log);
-    messages.keep_one_boot();
+    messages.keep_one_boot(None);
     let flight = messages.output_times().and_then(|times| {
         let armed = pick::armed(&messages, &times);
         pick::flight(&armed, &pick::stages(&messages), &times)
@@ -209,8 +222,9 @@ impl Flight {
 
     /// Reads one flight of a log.
     ///
-    /// With several flights in the log, the last one that performed a show is read (else the last
-    /// armed one), and [`Flight::warnings`] says so.
+    /// With several flights or boots in the log, the one that flew the plan is read
+    /// ([`FlightOptions::segments`]); without a plan the last one that performed a show, else the
+    /// last armed one. [`Flight::warnings`] says so.
     ///
     /// # Errors
     ///
@@ -220,7 +234,7 @@ impl Flight {
         source: &Path,
         options: FlightOptions<'_>,
     ) -> Result<Self, FlightError> {
-        load::load(log, source, options)
+        choose::load(log, source, options)
     }
 
     /// Opens and reads a log file; see [`Flight::from_log`].

@@ -65,20 +65,22 @@ pub(super) fn armed(messages: &Messages, pulses: &Series) -> Vec<(f64, f64)> {
     intervals
 }
 
+/// The armed intervals that are flights, in time order.
+pub(super) fn flights(armed: &[(f64, f64)], pulses: &Series) -> Vec<(f64, f64)> {
+    let flown = |(start, end): &(f64, f64)| {
+        let times = pulses.times_between(*start, *end);
+        times.first().zip(times.last()).is_some_and(|(a, b)| b - a >= SHORTEST_FLIGHT_S)
+    };
+    armed.iter().copied().filter(flown).collect()
+}
+
 /// The armed interval to analyse, and a warning when there was a choice.
 pub(super) fn flight(
     armed: &[(f64, f64)],
     stages: &[(f64, u8)],
     pulses: &Series,
 ) -> Option<((f64, f64), Option<String>)> {
-    let flown: Vec<(f64, f64)> = armed
-        .iter()
-        .copied()
-        .filter(|(start, end)| {
-            let times = pulses.times_between(*start, *end);
-            times.first().zip(times.last()).is_some_and(|(a, b)| b - a >= SHORTEST_FLIGHT_S)
-        })
-        .collect();
+    let flown = flights(armed, pulses);
     let performs = |(start, end): &&(f64, f64)| {
         stages.iter().any(|(time, stage)| *stage == PERFORMING && (start..=end).contains(&time))
     };

@@ -26,6 +26,8 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ),
     ("hover.toml", include_str!("../../templates/hover.toml")),
     ("campaign.toml", include_str!("../../templates/campaign.toml")),
+    ("scan.toml", include_str!("../../templates/scan.toml")),
+    ("scan-campaign.toml", include_str!("../../templates/scan-campaign.toml")),
 ];
 
 /// One `KEY=VALUE` that replaces a value of a template.

@@ -1,7 +1,9 @@
 //! Fleet tables beside the paper's values, and the words that a page and a terminal share.
 
 use crate::analysis::law::SIGNED_QUADRATIC;
-use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow, UpdraftMap};
+use crate::analysis::result::{
+    Analysis, DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow, UpdraftMap,
+};
 use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 use crate::flight::Alignment;
@@ -150,6 +152,16 @@ pub(super) fn table_heading(flight: &FlightAnalysis) -> String {
 /// Whether a value of the paper stands beside any of the flight's.
 pub(super) fn compared(flight: &FlightAnalysis) -> bool {
     flight.table.iter().any(|row| row.paper.is_some())
+}
+
+/// That laws are all there is; `None` where a flight measured, or nothing was found.
+pub(super) fn no_measurement(analysis: &Analysis) -> Option<&'static str> {
+    let laws = analysis.flights.iter().any(|flight| flight.results() > 0)
+        && analysis.flights.iter().all(|flight| flight.purpose == Purpose::Calibration);
+    laws.then_some(
+        "No measurement flight: these are laws, and no map of the air. With a hover or a scan in the \
+         same campaign, or with --hold analysis.json beside one, they measure it.",
+    )
 }
 
 /// Why a flight gave nothing at all, in plain words; `None` where it gave something.

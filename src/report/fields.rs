@@ -38,7 +38,7 @@ pub struct FieldRow {
     pub slot: Option<u16>,
     /// Label of the drone.
     pub drone: String,
-    /// Place, m: forward and left, if known; up above home.
+    /// Place at that time, m: forward and left, if known; up above home.
     pub x_m: Option<f64>,
     /// To the left, m.
     pub y_m: Option<f64>,
@@ -81,14 +81,21 @@ pub fn any(analysis: &Analysis) -> bool {
 fn row(flight: &str, drone: &DroneUpdraft, index: usize, time_s: f64) -> FieldRow {
     let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
     let interval = drone.interval_mps.get(index).copied().flatten();
+    let place = if drone.track_m.is_empty() {
+        let at = drone.position_m;
+        [at.map(|p| p[0]), at.map(|p| p[1]), Some(drone.height_m)]
+    } else {
+        let at = drone.track_m.get(index).copied().flatten();
+        [0, 1, 2].map(|axis| at.map(|p| p[axis]))
+    };
     FieldRow {
         flight: clean(flight),
         time_s,
         slot: drone.slot,
         drone: clean(&drone.name),
-        x_m: finite(drone.position_m.map(|p| p[0])),
-        y_m: finite(drone.position_m.map(|p| p[1])),
-        z_m: finite(Some(drone.height_m)),
+        x_m: finite(place[0]),
+        y_m: finite(place[1]),
+        z_m: finite(place[2]),
         w_mps: finite(drone.updraft_mps.get(index).copied().flatten()),
         sd_mps: finite(drone.sd_mps.get(index).copied().flatten()),
         low_mps: finite(interval.map(|interval| interval[0])),

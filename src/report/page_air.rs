@@ -7,7 +7,7 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 
 use super::axis::decimals_of;
 use super::colour::diverging;
-use super::figures::{air, averaging, correlation, evolution, map as figure_map};
+use super::figures::{air, averaging, correlation, evolution, map as figure_map, track};
 use super::film::film;
 use super::frames::Frames;
 use super::page::{Gallery, capitalised, flight_key};
@@ -39,6 +39,7 @@ pub(super) fn air_section(
     });
     let more: Vec<Value> = [
         frames.as_ref().and_then(|frames| evolution::figure(flight, &key, frames, wind(flight))),
+        track::figure(flight, &key, map),
         air::figure(flight, &key, map),
     ]
     .into_iter()

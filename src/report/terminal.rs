@@ -8,7 +8,7 @@ use crate::mission::plan::Purpose;
 
 use super::compare::{
     better_words, clock, compared, comparison, drone_laws, drones_of, fleet_air, flock_lines,
-    nothing, scatter_line, table_heading, windows_used,
+    no_measurement, nothing, scatter_line, table_heading, windows_used,
 };
 use super::figures::air::mean_truth;
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
@@ -43,6 +43,10 @@ pub fn terminal_summary(analysis: &Analysis, width: usize, color: bool) -> Strin
     }
     for flight in &analysis.flights {
         out.flight(flight);
+    }
+    if let Some(words) = no_measurement(analysis) {
+        out.line("", "");
+        out.wrapped("", "", words);
     }
     out.list("Warnings", &analysis.warnings.iter().map(|w| clean(w)).collect::<Vec<_>>());
     out.text
@@ -271,12 +275,18 @@ impl Output {
             "",
             "  ",
             &format!(
-                "vertical air speed W*, m/s: mean {}, s.d. between {} {}, from {} to {} ({} law)",
+                "vertical air speed W*, m/s: mean {}, {} ({} law)",
                 signed(air.mean, 3),
-                count(air.n, "drone"),
-                fixed(air.sd, 3),
-                signed(air.lowest, 2),
-                signed(air.highest, 2),
+                match air.n {
+                    1 => "of one drone".to_owned(),
+                    n => format!(
+                        "s.d. between {} {}, from {} to {}",
+                        count(n, "drone"),
+                        fixed(air.sd, 3),
+                        signed(air.lowest, 2),
+                        signed(air.highest, 2)
+                    ),
+                },
                 clean(&map.law),
             ),
         );

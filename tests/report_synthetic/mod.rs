@@ -394,6 +394,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             slot: Some(slot),
             name: format!("Drone {slot}"),
             position_m: Some(position),
+            track_m: Vec::new(),
             height_m: 100.0,
             mapping: if [41].contains(&slot) { "flock" } else { "own" }.to_owned(),
             mean: Estimate::new(mean, 0.028),

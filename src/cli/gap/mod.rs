@@ -179,7 +179,7 @@ fn measured(args: &GapArgs) -> Result<Found, CommandError> {
 /// The flight of a path that is compared: the one that is named, else the calibration, else the first
 /// with logs.
 fn one_flight(path: &Path, name: Option<&str>) -> Result<Found, CommandError> {
-    let mut work = Work { title: String::new(), root: path.to_owned(), flights: Vec::new() };
+    let mut work = Work::new(path);
     find(path, None, &mut work)?;
     let names: Vec<String> = work.flights.iter().map(|flight| flight.name.clone()).collect();
     let mut flights = work.flights;

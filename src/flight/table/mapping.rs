@@ -132,9 +132,13 @@ fn one() -> f64 {
 impl Mapping {
     /// Reads a mapping file; its flights' files become relative to where it is read from.
     pub fn load(path: &Path) -> Result<Self, TableError> {
-        let bytes = read_whole(path, MAX_BYTES)?;
+        Self::parse(path, &read_whole(path, MAX_BYTES)?)
+    }
+
+    /// Takes the bytes of a mapping file for one at `path`.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, TableError> {
         let wrong = |reason: String| TableError::Mapping { path: path.to_owned(), reason };
-        let text = std::str::from_utf8(&bytes).map_err(|error| wrong(error.to_string()))?;
+        let text = std::str::from_utf8(bytes).map_err(|error| wrong(error.to_string()))?;
         let mut mapping: Self = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
         mapping.refusal().map_or(Ok(()), |reason| Err(wrong(reason)))?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -174,7 +178,8 @@ impl Mapping {
             }
         }
         let Steps { wobble_mps, settle_s, shortest_s } = self.steps;
-        if !(wobble_mps > 0.0 && settle_s >= 0.0 && shortest_s >= 1.0) {
+        let finite = [wobble_mps, settle_s, shortest_s].iter().all(|value| value.is_finite());
+        if !(finite && wobble_mps > 0.0 && settle_s >= 0.0 && shortest_s >= 1.0) {
             return Some(
                 "steps: wobble_mps must be above 0, settle_s not below 0, shortest_s 1 or more"
                     .to_owned(),

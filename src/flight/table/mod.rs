@@ -12,7 +12,7 @@ use thiserror::Error;
 use crate::base::file::FileError;
 
 pub use mapping::{Channel, Mapping, Steps, TableFlight, TimeColumn, TimeFormat};
-pub use read::read;
+pub use read::{read, read_from};
 
 /// A table cannot be used.
 #[derive(Debug, Error)]
@@ -64,12 +64,47 @@ pub enum TableError {
         /// What is wrong, with the line.
         reason: String,
     },
+    /// There is not even a header line.
+    #[error("{}: the table is empty: there is no line with the columns' names", path.display())]
+    Empty {
+        /// The table.
+        path: PathBuf,
+    },
+    /// The file is larger than any flight's table.
+    #[error(
+        "{}: the table has {bytes} bytes, and more than {most} are not read; cut it to the flight",
+        path.display()
+    )]
+    Huge {
+        /// The table.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+        /// The limit.
+        most: u64,
+    },
     /// There are too few rows for a flight.
-    #[error("{}: {rows} usable rows are no flight", path.display())]
+    #[error(
+        "{}: {rows} usable rows are no flight{}",
+        path.display(),
+        left_out(*backward)
+    )]
     Short {
         /// The table.
         path: PathBuf,
         /// Rows with a time.
         rows: usize,
+        /// Rows that were left out because their time does not go forward.
+        backward: usize,
     },
+}
+
+fn left_out(backward: usize) -> String {
+    if backward == 0 {
+        return String::new();
+    }
+    format!(
+        " ({backward} more were left out, as their time does not go forward: is the column of \
+         times the right one, and its format?)"
+    )
 }

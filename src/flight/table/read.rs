@@ -1,6 +1,8 @@
 //! Rows of a table to a flight.
 
+use std::cell::Cell;
 use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use super::TableError;
@@ -11,6 +13,12 @@ use crate::flight::{Clock, Flight, Series};
 
 /// Rows that are read at most.
 const MOST_ROWS: usize = 20_000_000;
+/// Largest table, bytes.
+const MOST_BYTES: u64 = 8 << 30;
+/// Longest line, bytes: a quote that is never closed must not take the whole file for one cell.
+const LONGEST_LINE: usize = 1 << 20;
+/// No time is further from its zero, s: thirty thousand years.
+const LATEST_S: f64 = 1e12;
 /// Fewer rows are no flight.
 const FEWEST_ROWS: usize = 20;
 
@@ -51,11 +59,49 @@ impl Wanted<'_> {
 /// # Errors
 /// [`TableError`]: a column is missing, a cell is no number or no time, or there are too few rows.
 pub fn read(path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
-    let file = File::open(path).map_err(|source| FileError::new("open", path, source))?;
-    let mut reader = csv::ReaderBuilder::new().delimiter(mapping.delimiter as u8).from_reader(file);
+    let fail = |source| TableError::File(FileError::new("open", path, source));
+    let file = File::open(path).map_err(fail)?;
+    let bytes = file.metadata().map_err(fail)?.len();
+    if bytes > MOST_BYTES {
+        return Err(TableError::Huge { path: path.to_owned(), bytes, most: MOST_BYTES });
+    }
+    read_from(file, path, mapping)
+}
+
+/// Passes bytes on, and none when too many came since the last row was taken.
+struct Bounded<'a, R> {
+    inner: R,
+    since_row: &'a Cell<usize>,
+}
+
+impl<R: Read> Read for Bounded<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.since_row.get() > LONGEST_LINE {
+            return Err(io::Error::other(format!(
+                "a row of more than {LONGEST_LINE} bytes (is a quote not closed, or the file no \
+                 table?)"
+            )));
+        }
+        let count = self.inner.read(buffer)?;
+        self.since_row.set(self.since_row.get().saturating_add(count));
+        Ok(count)
+    }
+}
+
+/// The same from any bytes; `path` is for messages.
+pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
+    let since_row = Cell::new(0);
+    let bytes = Bounded { inner: bytes, since_row: &since_row };
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(mapping.delimiter as u8)
+        .flexible(true)
+        .from_reader(bytes);
     let broken =
         |error: csv::Error| TableError::Row { path: path.to_owned(), reason: error.to_string() };
     let heads = reader.headers().map_err(broken)?.clone();
+    if heads.iter().all(|head| head.trim().is_empty()) {
+        return Err(TableError::Empty { path: path.to_owned() });
+    }
     let find = |column: &str, channel: &'static str| {
         heads.iter().position(|head| head.trim() == column).ok_or_else(|| TableError::Column {
             path: path.to_owned(),
@@ -76,8 +122,20 @@ pub fn read(path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
     }
     let mut row = csv::StringRecord::new();
     let (mut first, mut last, mut rows, mut backward) = (None, f64::NEG_INFINITY, 0, 0);
+    let mut cut_off: Option<TableError> = None;
     while rows < MOST_ROWS && reader.read_record(&mut row).map_err(broken)? {
+        since_row.set(0);
+        // A row with another number of cells is only forgiven as the last one.
+        if let Some(error) = cut_off {
+            return Err(error);
+        }
         let line = row.position().map_or(0, csv::Position::line);
+        if row.len() != heads.len() {
+            let reason =
+                format!("line {line} has {} cells, the first line {}", row.len(), heads.len());
+            cut_off = Some(TableError::Row { path: path.to_owned(), reason });
+            continue;
+        }
         let cell = |column: &str, reason: String| TableError::Cell {
             path: path.to_owned(),
             line,
@@ -99,9 +157,15 @@ pub fn read(path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
         }
     }
     if rows < FEWEST_ROWS {
-        return Err(TableError::Short { path: path.to_owned(), rows });
+        return Err(TableError::Short { path: path.to_owned(), rows, backward });
     }
     let mut warnings = Vec::new();
+    if cut_off.is_some() {
+        warnings.push("the table's last line is cut off and was left out".to_owned());
+    }
+    if rows == MOST_ROWS {
+        warnings.push(format!("only the first {MOST_ROWS} rows were read"));
+    }
     if backward > 0 {
         warnings.push(format!("{backward} rows whose time does not go forward were left out"));
     }
@@ -128,13 +192,14 @@ pub fn read(path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
 }
 
 fn time_of(text: &str, format: TimeFormat) -> Option<f64> {
-    let number = || text.trim().parse::<f64>().ok().filter(|time| time.is_finite());
-    match format {
-        TimeFormat::S => number(),
-        TimeFormat::Ms => Some(number()? / 1e3),
-        TimeFormat::Us => Some(number()? / 1e6),
-        TimeFormat::Datetime => seconds_of(text),
-    }
+    let number = || text.trim().parse::<f64>().ok();
+    let time_s = match format {
+        TimeFormat::S => number()?,
+        TimeFormat::Ms => number()? / 1e3,
+        TimeFormat::Us => number()? / 1e6,
+        TimeFormat::Datetime => seconds_of(text)?,
+    };
+    (time_s.abs() <= LATEST_S).then_some(time_s)
 }
 
 /// Heights above the first one.

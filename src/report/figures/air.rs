@@ -114,6 +114,9 @@ pub(in crate::report) fn figure(
              mean at its place; on the dashed line they agree.",
         );
     }
+    if map.is_scan() {
+        caption.push_str(" The drones moved: hover and place are their tracks here.");
+    }
     let name = format!("air-{key}");
     let title = format!("Vertical air speed over time, {}", clean(&flight.name));
     Some(Figure { svg: sheet.svg(&name, &title), name, title, caption })

@@ -10,3 +10,4 @@ pub(super) mod laws;
 pub(super) mod map;
 mod plan_view;
 pub(super) mod study;
+pub(super) mod track;

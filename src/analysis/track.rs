@@ -1,0 +1,263 @@
+//! A drone that moves at constant horizontal speed measures the air along its track.
+//!
+//! In the frame of the air, flying at 4 m/s through still air and standing in a wind of 4 m/s are the
+//! same: what drag and translational lift do to the pulse follows from the lean in both, and the
+//! corrections for a hover in wind ([`super::corrections`]) hold for a leg as they are. What differs is
+//! that a mean over 10 s is one over 10 s of the way, and that a change of speed leans a drone too:
+//! seconds with one have no value.
+
+use nalgebra::Vector3;
+
+use super::aware::Measured;
+use super::budget::{Quality, QualityFlag};
+use super::hover::Hover;
+use super::stats::mean_sd;
+use super::updraft::{self, DroneSeries, RUNNING_S};
+use super::windows::{Target, WindowOptions};
+use crate::base::estimate::Estimate;
+use crate::base::frame::ShowFrame;
+use crate::flight::{Flight, Series};
+use crate::mission::plan::{Kind, Segment};
+
+/// A horizontal velocity that differs by more between the halves of a running window is not constant,
+/// m/s: it would need a mean acceleration of 0.1 m/s², which leans a drone by 0.6 degrees.
+const STEADY_MPS: f64 = 0.5;
+/// Positions are not joined over longer silences than this, s.
+const GAP_S: f64 = 1.0;
+/// A log that moved by less than this share of a leg, or by more than its inverse, flew another plan.
+const LEAST_SHARE: f64 = 0.5;
+/// Shorter legs say nothing about that, m.
+const SHORTEST_LEG_M: f64 = 10.0;
+
+/// Where a measurement looks: its longest hover; and if it has horizontal legs, all of them and every
+/// hover that is long enough for a value.
+pub(super) fn measuring(targets: &[Target]) -> Vec<&Target> {
+    let long = |target: &&Target| target.end_s - target.start_s >= RUNNING_S;
+    let moves = |target: &Target| target.kind == Kind::Horizontal;
+    if !targets.iter().any(|target| moves(target) && long(&target)) {
+        return updraft::hover(targets).into_iter().collect();
+    }
+    let looked = |target: &&Target| (moves(target) || target.kind.is_hover()) && long(target);
+    targets.iter().filter(looked).collect()
+}
+
+/// Looks at all legs and hovers of a scan, as at one long hover with nothing between them.
+pub(super) fn look(flight: &Flight, looked: &[&Target], options: &WindowOptions) -> Hover {
+    let mut all = Hover::default();
+    all.moves = true;
+    let mut biases = Vec::new();
+    for target in looked {
+        let mut part = Hover::of(flight, target, options);
+        if target.kind == Kind::Horizontal {
+            drop_unsteady(flight, &mut part);
+        }
+        biases.push(part.velocity_bias_mps);
+        all.join(part);
+    }
+    all.velocity_bias_mps = mean_sd(&biases).0;
+    all
+}
+
+/// Takes the values from the seconds around which the horizontal speed was not constant.
+fn drop_unsteady(flight: &Flight, leg: &mut Hover) {
+    let quarter = RUNNING_S / 4.0;
+    let velocity = |time_s: f64| {
+        let speed = |series: &Series| {
+            let (from, to) = (time_s - quarter, time_s + quarter);
+            Some((series.at(to, GAP_S)? - series.at(from, GAP_S)?) / (2.0 * quarter))
+        };
+        Some((speed(&flight.north_m)?, speed(&flight.east_m)?))
+    };
+    let mut lost: Vec<f64> = Vec::new();
+    for second in &mut leg.seconds {
+        let Some(time_s) = second.map(|second| second.time_s) else { continue };
+        let halves = velocity(time_s - quarter).zip(velocity(time_s + quarter));
+        // Without positions nothing is known against it.
+        let change = halves
+            .map_or(0.0, |(before, after)| f64::hypot(after.0 - before.0, after.1 - before.1));
+        if change > STEADY_MPS {
+            lost.push(time_s);
+            *second = None;
+        }
+    }
+    if let (Some(start_s), Some(end_s)) = (lost.first(), lost.last()) {
+        leg.quality.push(QualityFlag {
+            flag: Quality::Manoeuvre,
+            start_s: *start_s,
+            end_s: *end_s,
+            reason: format!(
+                "its horizontal speed changed: {} s from {start_s:.0} to {end_s:.0} s without values",
+                lost.len()
+            ),
+        });
+    }
+}
+
+/// A scan's values with their errors and places.
+pub(super) fn series(
+    flight: &Flight,
+    looked: &Hover,
+    measured: Measured,
+    systematic_mps: f64,
+) -> DroneSeries {
+    let good = || looked.seconds.iter().flatten();
+    let mean = |values: Vec<f64>| mean_sd(&values).0;
+    let moved_m = (0..looked.seconds.len())
+        .map(|index| moved_neu_m(flight, (looked.first_s + index as i64) as f64))
+        .collect();
+    DroneSeries {
+        first_s: measured.first_s,
+        updraft_mps: measured.updraft_mps.clone(),
+        mean: Estimate::new(measured.mean_mps, measured.errors.total_mps),
+        systematic_mps,
+        // The mean attitude of legs there and back would be level.
+        tilt_deg: mean(good().map(|second| second.lean_deg).collect()),
+        height_m: mean(good().map(|second| second.height_m).collect()),
+        measured: Some(measured),
+        moved_m,
+    }
+}
+
+/// How far the drone is from where it stood at the beginning of its log, m north and east, and its
+/// height above home; `None` where the log does not say.
+fn moved_neu_m(flight: &Flight, time_s: f64) -> Option<[f64; 3]> {
+    let moved = |series: &Series| Some(series.at(time_s, GAP_S)? - series.value.first()?);
+    Some([moved(&flight.north_m)?, moved(&flight.east_m)?, flight.height_m.at(time_s, GAP_S)?])
+}
+
+/// Such a place in the show frame, for a drone whose home is known.
+pub(super) fn place_m(frame: &ShowFrame, home_m: [f64; 2], moved: [f64; 3]) -> [f64; 3] {
+    let show = frame.from_neu(Vector3::new(moved[0], moved[1], moved[2]));
+    [home_m[0] + show.x, home_m[1] + show.y, moved[2]]
+}
+
+/// That a log did not fly the plan's horizontal legs: how far it moved instead.
+pub(super) fn contradiction(flight: &Flight, segments: &[Segment]) -> Option<String> {
+    let way = |segment: &Segment| {
+        let (from, to) = (segment.start_ms as f64 / 1000.0, segment.end_ms as f64 / 1000.0);
+        let moved = |series: &Series| Some(series.at(to, GAP_S)? - series.at(from, GAP_S)?);
+        Some(f64::hypot(moved(&flight.north_m)?, moved(&flight.east_m)?))
+    };
+    let planned = |segment: &Segment| {
+        f64::hypot(segment.to_m[0] - segment.from_m[0], segment.to_m[1] - segment.from_m[1])
+    };
+    let legs: Vec<(&Segment, f64)> = segments
+        .iter()
+        .filter(|segment| segment.kind == Kind::Horizontal && planned(segment) >= SHORTEST_LEG_M)
+        .filter_map(|segment| Some((segment, way(segment)?)))
+        .collect();
+    let wrong: Vec<&(&Segment, f64)> = legs
+        .iter()
+        .filter(|(segment, flown)| {
+            !(LEAST_SHARE..=1.0 / LEAST_SHARE).contains(&(flown / planned(segment)))
+        })
+        .collect();
+    let (segment, flown) = wrong.first().filter(|_| 2 * wrong.len() > legs.len())?;
+    Some(format!(
+        "this log does not belong to the plan: {} of {} horizontal legs were not flown (first: `{}` \
+         at {:.0} s, planned {:.0} m, flown {flown:.0} m); check that the logs are in the folder of \
+         their own flight",
+        wrong.len(),
+        legs.len(),
+        segment.label,
+        segment.start_ms as f64 / 1000.0,
+        planned(segment),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::frame::Geodetic;
+
+    fn target(kind: Kind, start_s: f64, end_s: f64) -> Target {
+        Target { kind, label: String::new(), start_s, end_s, commanded_mps: 0.0 }
+    }
+
+    #[test]
+    fn a_scan_is_its_legs_and_its_long_hovers() {
+        let (leg, hover) = (Kind::Horizontal, Kind::Hover);
+        let targets = [
+            target(hover, 0.0, 30.0),
+            target(leg, 40.0, 70.0),
+            target(hover, 72.0, 76.0),
+            target(leg, 80.0, 85.0),
+            target(Kind::LegUp, 90.0, 120.0),
+        ];
+        let starts = |found: Vec<&Target>| found.iter().map(|one| one.start_s).collect::<Vec<_>>();
+        assert_eq!(starts(measuring(&targets)), [0.0, 40.0]);
+        assert_eq!(starts(measuring(&targets[..1])), [0.0]);
+        // A hop of five seconds makes no scan of a hover.
+        let hop = [target(hover, 0.0, 30.0), target(leg, 31.0, 36.0), target(hover, 40.0, 90.0)];
+        assert_eq!(starts(measuring(&hop)), [40.0]);
+        assert!(measuring(&[]).is_empty());
+    }
+
+    /// East at 4 m/s from 20 s on.
+    fn flown() -> Flight {
+        let time_s: Vec<f64> = (0..800).map(|index| f64::from(index) / 10.0).collect();
+        let series = |value: Vec<f64>| Series { time_s: time_s.clone(), value };
+        let flat = |value: f64| series(vec![value; 800]);
+        Flight {
+            pulse_us: flat(1540.0),
+            pulse_max_us: flat(1540.0),
+            pulse_min_us: flat(1540.0),
+            pulse_limits_us: (1150.0, 1950.0),
+            velocity_up_mps: flat(0.0),
+            height_m: flat(60.0),
+            roll_rad: flat(0.0),
+            pitch_rad: flat(-0.05),
+            north_m: flat(3.0),
+            east_m: series(time_s.iter().map(|t| -2.0 + 4.0 * (t - 20.0).max(0.0)).collect()),
+            ..Flight::default()
+        }
+    }
+
+    #[test]
+    fn a_change_of_speed_costs_the_seconds_around_it() {
+        let flight = flown();
+        let leg = target(Kind::Horizontal, 5.0, 70.0);
+        let found = look(&flight, &[&leg], &WindowOptions::default());
+        let lost: Vec<i64> = (found.first_s..)
+            .zip(&found.seconds)
+            .filter_map(|(time, second)| second.is_none().then_some(time))
+            .collect();
+        assert_eq!((lost.first(), lost.last()), (Some(&16), Some(&24)), "{lost:?}");
+        assert!(found.quality.iter().any(|one| one.reason.starts_with("its horizontal speed")));
+        let steady = target(Kind::Horizontal, 25.0, 70.0);
+        let found = look(&flight, &[&steady], &WindowOptions::default());
+        assert_eq!(found.seconds.iter().flatten().count(), 36);
+    }
+
+    #[test]
+    fn places_count_from_home_in_the_show_frame() {
+        let origin = Geodetic { lat_deg: 47.0, lon_deg: 19.0, amsl_m: 190.0 };
+        let east = ShowFrame { origin, orientation_deg: 90.0 };
+        let moved = moved_neu_m(&flown(), 45.0).unwrap();
+        assert!((moved[0]).abs() < 1e-9 && (moved[1] - 100.0).abs() < 1e-9, "{moved:?}");
+        let place = place_m(&east, [-7.0, 14.0], moved);
+        assert!((place[0] - 93.0).abs() < 1e-9 && (place[1] - 14.0).abs() < 1e-9, "{place:?}");
+        assert_eq!(place[2], 60.0);
+        assert_eq!(moved_neu_m(&flown(), 99.0), None);
+    }
+
+    #[test]
+    fn legs_that_were_not_flown_are_another_plan() {
+        let leg = |start_ms: u64, speed: f64| Segment {
+            kind: Kind::Horizontal,
+            label: format!("{speed} m/s towards 0°"),
+            start_ms,
+            end_ms: start_ms + 20_000,
+            from_m: [0.0, 0.0, 60.0],
+            to_m: [20.0 * speed, 0.0, 60.0],
+            velocity_mps: [speed, 0.0, 0.0],
+            from_velocity_mps: None,
+            window: None,
+        };
+        assert_eq!(contradiction(&flown(), &[leg(25_000, 4.0), leg(45_000, 4.0)]), None);
+        let said = contradiction(&flown(), &[leg(0, 4.0), leg(25_000, 1.0)]).unwrap();
+        assert!(said.contains("2 of 2 horizontal legs were not flown"), "{said}");
+        assert!(said.contains("planned 80 m, flown 0 m"), "{said}");
+        assert_eq!(contradiction(&flown(), &[]), None);
+    }
+}
