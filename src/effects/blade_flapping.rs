@@ -39,7 +39,9 @@ impl Effect for BladeFlapping {
             }],
             hooks: &[Hook::Loads],
             shown: (Signal::Horizontal, 0.0, 8.0),
-            sought: Sought::Shape { size: "drag_per_weight", sizes: &[0.021], shape: None },
+            sought: Sought::No(
+                "told from the lean at known speeds over ground (horizontal legs), not from the pulse",
+            ),
         }
     }
 

@@ -130,6 +130,9 @@ fn prepare(vehicle: &mut Vehicle, name: &str, scene: &Scene) {
         set(vehicle, name, "initial_charge", 1.0);
         // The model's hover is taken for that at the flight's mean voltage.
         set(vehicle, name, "reference_v", scene.resting_v);
+        if let Some(resistance_ohm) = scene.resistance_ohm {
+            set(vehicle, name, "resistance_ohm", resistance_ohm.clamp(0.0, 1.0));
+        }
     }
 }
 

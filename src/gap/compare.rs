@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::bins::BinValues;
+use super::bins::{Bin, BinValues};
 use super::candidates::difference;
 use super::data::Data;
 use super::error::GapError;
@@ -67,21 +67,32 @@ impl Comparison {
         let vehicle = mean_drone(vehicle);
         let amsl_m = amsl_m(plan);
         let law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY * density_ratio(amsl_m));
-        let blown = wind(data, law);
-        let values: Vec<Vec<Option<BinValues>>> = match simulated {
-            Simulated::Given(values) => values.clone(),
-            Simulated::Refly(plan) => fly_groups(data, &vehicle, plan, blown.mean_mps)?,
+        let first = wind(data, law, None).mean_mps;
+        let fly = |wind_mps: [f64; 2]| -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
+            match simulated {
+                Simulated::Given(values) => Ok(values.clone()),
+                Simulated::Refly(plan) => fly_groups(data, &vehicle, plan, wind_mps),
+            }
         };
+        let mut values = fly(first)?;
+        let mut flown_mps = first;
+        let moves = data.groups.iter().any(|group| group.bins.iter().any(Bin::is_horizontal));
+        if moves && matches!(simulated, Simulated::Refly(_)) {
+            // What the legs say of the wind is better than what hovers say by the model's law alone.
+            let whole = data.keep(|group, bin| values[group][bin].is_some());
+            let side = flat(&values);
+            flown_mps = wind(&whole, law, Some((&side, first))).mean_mps;
+            values = fly(flown_mps)?;
+        }
         let has = |group: usize, bin: usize| values[group][bin].is_some();
         let data = data.keep(has);
-        let side: Vec<Vec<BinValues>> =
-            values.into_iter().map(|group| group.into_iter().flatten().collect()).collect();
+        let side = flat(&values);
         if data.groups.iter().map(|group| group.bins.len()).sum::<usize>() < FEWEST_BINS {
             return Err(GapError::NothingCommon);
         }
-        let blown = wind(&data, law);
+        let blown = wind(&data, law, Some((&side, flown_mps)));
         let scene = Scene::measured(&data, &side, &blown, amsl_m);
-        let simulated_scene = scene.simulated(&data, &side, blown.mean_mps);
+        let simulated_scene = scene.simulated(&data, &side, flown_mps);
         let closed = simulated_scene.pulses(&vehicle)?;
         let closure_us = side
             .iter()
@@ -130,7 +141,12 @@ impl Comparison {
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
-    pub fn patterns(&self, vehicle: &Vehicle) -> Result<Vec<GroupPattern>, EffectError> {
+    pub fn patterns(
+        &self,
+        vehicle: &Vehicle,
+        gusts_mps: f64,
+    ) -> Result<Vec<GroupPattern>, EffectError> {
+        let bent = rectified(&self.scene, vehicle, gusts_mps)?;
         let response = self.scene.response(vehicle)?;
         let closed = self.scene.pulses(vehicle)?;
         Ok(self
@@ -156,6 +172,7 @@ impl Comparison {
                     time_s: of.bins.iter().map(super::bins::Bin::middle_s).collect(),
                     height_m: self.scene.signals[group].iter().map(|s| s.height_m).collect(),
                     response: response[group].clone(),
+                    bent_us: bent[group].clone(),
                     slope_us: pulses.iter().map(|pulse| pulse - hover_us).collect(),
                 }
             })
@@ -197,6 +214,11 @@ impl Comparison {
     pub fn change(&self, from: &Vehicle, to: &Vehicle) -> Result<Column, EffectError> {
         Ok(difference(&self.scene.pulses(to)?, &self.scene.pulses(from)?))
     }
+}
+
+/// The bins that are there.
+fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
+    values.iter().map(|group| group.iter().flatten().copied().collect()).collect()
 }
 
 /// Fewest bins of a comparison.

@@ -74,6 +74,8 @@ pub struct Data {
     pub groups: Vec<Group>,
     /// Drones left out, with their reasons.
     pub left_out: Vec<String>,
+    /// Resistance of the batteries as the autopilots found it (median), ohm.
+    pub resistance_ohm: Option<f64>,
 }
 
 impl Data {
@@ -101,6 +103,7 @@ impl Data {
             let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
             data.add(&group.name, bins, values, armed_s);
         }
+        data.resistance_ohm = resistance_ohm(flown);
         let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
         data.count_neighbours(&plan.slots, spacing_m);
         data
@@ -128,6 +131,7 @@ impl Data {
         let armed = flown.iter().filter_map(|one| one.flight.armed_s.first());
         let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
         data.add("all", bins, values, armed_s);
+        data.resistance_ohm = resistance_ohm(flown);
         data
     }
 
@@ -231,6 +235,7 @@ impl Data {
                 .map(|group| group.only(|index| is_held(group, index) == held))
                 .collect(),
             left_out: self.left_out.clone(),
+            resistance_ohm: self.resistance_ohm,
         };
         (part(false), part(true))
     }
@@ -250,6 +255,14 @@ impl Data {
         }
         data
     }
+}
+
+/// The middle one of the resistances that the logs have.
+fn resistance_ohm(flown: &[Flown<'_>]) -> Option<f64> {
+    let mut known: Vec<f64> = flown.iter().filter_map(|one| one.flight.resistance_ohm).collect();
+    known.retain(|ohm| *ohm > 0.0 && *ohm < 1.0);
+    known.sort_by(f64::total_cmp);
+    known.get(known.len() / 2).copied()
 }
 
 /// Fills holes with the group's mean of the bin, moved by the drone's own offset from it.

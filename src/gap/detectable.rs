@@ -21,7 +21,7 @@ const NOTHING_US: f64 = 0.05;
 /// Effects of the vehicle that are not valid.
 pub fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let comparison = &found.comparison;
-    let patterns = comparison.patterns(&found.vehicle)?;
+    let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
     let split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
     let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.hyper);
     let candidates = library(&found.vehicle, &comparison.scene)?;

@@ -9,28 +9,35 @@ use super::gls::Pulses;
 use super::noise::{
     GUST_TIME, GUSTS, GroupPattern, Hyper, LEAST, OFFSETS, OWN, SHARED_TIME, SLOPES, WHITE,
 };
-use super::verdict::{DroneOffset, Drones};
+use super::refine::value_of;
+use super::verdict::{DroneOffset, Drones, Finding, Fitted, Interval, Step};
 use crate::effects::Reference;
+use crate::vehicle::Vehicle;
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 /// Fewest drones from which a correlation is told.
 const FEWEST: usize = 8;
 /// Spread of the hover pulse that is usual, us (the paper's Table II: 6.7).
 const USUAL_US: f64 = 20.0;
 
-/// Offsets and responses of all drones of a comparison against the fleet's model.
+/// Offsets and responses of all drones of a comparison against the fleet's model; and, when they
+/// differ more than `original` says and fleets usually do, that as a finding.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
 pub fn drones(
     all: &Comparison,
     found: &Found,
+    original: &Vehicle,
     is_held: impl Fn(u16) -> bool,
-) -> Result<Drones, GapError> {
-    let patterns = all.patterns(&found.vehicle)?;
+) -> Result<(Drones, Option<Step>), GapError> {
+    let patterns = all.patterns(&found.vehicle, found.gusts_mps)?;
     let residual = all.residual(&found.vehicle, found.gusts_mps)?;
     let mut each = Vec::new();
+    let mut reliability: f64 = 1.0;
     for (index, (group, pattern)) in all.data.groups.iter().zip(&patterns).enumerate() {
         let blup = Blup::new(pattern, &found.hyper);
+        reliability = reliability.min(blup.slope_reliability(pattern));
         let deviations = deviations(&residual, index);
         for (slot, deviation) in group.slots.iter().zip(deviations) {
             let (offset_us, slope) = blup.of(&deviation);
@@ -38,9 +45,10 @@ pub fn drones(
         }
     }
     each.sort_by_key(|drone| drone.slot);
+    let spread = spread(&each, reliability, found, original);
     let correlation = (each.len() >= FEWEST).then(|| correlation(&each));
     let words = words(&each, correlation, found);
-    Ok(Drones { each, correlation, words })
+    Ok((Drones { each, correlation, words }, spread))
 }
 
 fn deviations(residual: &Pulses, group: usize) -> Vec<Vec<f64>> {
@@ -80,11 +88,107 @@ impl Blup {
         Self { map }
     }
 
+    /// What is left of a true slope of 1 in the prediction.
+    fn slope_reliability(&self, pattern: &GroupPattern) -> f64 {
+        (&self.map * DVector::from_column_slice(&pattern.slope_us))[1].clamp(0.0, 1.0)
+    }
+
     fn of(&self, deviation: &[f64]) -> (f64, f64) {
         let found = &self.map * DVector::from_column_slice(deviation);
         (found[0], found[1])
     }
 }
+
+/// Spread of thrust or mass between the drones of a usual fleet, relative (the paper's Table II).
+const USUAL: f64 = 0.023;
+/// Spreads are told from at least so many drones.
+const FEWEST_FOR_SPREAD: usize = 12;
+
+/// A spread between drones beyond the model's and the usual.
+fn spread(
+    each: &[DroneOffset],
+    reliability: f64,
+    found: &Found,
+    original: &Vehicle,
+) -> Option<Step> {
+    if each.len() < FEWEST_FOR_SPREAD {
+        return None;
+    }
+    let count = each.len() as f64;
+    let sensitivity = Reference::of(&found.vehicle).sensitivity_us();
+    let relative: Vec<f64> = each.iter().map(|drone| drone.offset_us / sensitivity).collect();
+    let mean = relative.iter().sum::<f64>() / count;
+    let square = relative.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    let freedom = count - 1.0;
+    let sd = (square / freedom).sqrt();
+    let chi2 = ChiSquared::new(freedom).ok()?;
+    let (low, high) =
+        ((square / chi2.inverse_cdf(0.975)).sqrt(), (square / chi2.inverse_cdf(0.025)).sqrt());
+    let known = |name: &str| value_of(original, name, "sd").unwrap_or(0.0);
+    let (mass, thrust) = (known("mass-spread"), known("thrust-spread"));
+    let expected = mass.hypot(thrust).max(USUAL);
+    if low <= expected {
+        return None;
+    }
+    // Thrust makes the response of a drone follow its offset, mass does not.
+    let slopes = each.iter().map(|drone| drone.slope).sum::<f64>() / count;
+    let cross: f64 = each.iter().zip(&relative).map(|(d, r)| (d.slope - slopes) * (r - mean)).sum();
+    let follows = cross / square;
+    let rest: f64 = each
+        .iter()
+        .zip(&relative)
+        .map(|(d, r)| (d.slope - slopes - follows * (r - mean)).powi(2))
+        .sum();
+    let se = (rest / (count - 2.0) / square).sqrt() / reliability.max(0.05);
+    let follows = follows / reliability.max(0.05);
+    let from_model = |known: f64| (known > 0.0).then_some(known);
+    // The part beyond what the model has of the other kind.
+    let own = |other: f64| (sd * sd - other * other).max(0.0).sqrt();
+    let parameter = |other: f64, before: f64| Fitted {
+        name: "sd".to_owned(),
+        unit: String::new(),
+        value: Interval {
+            value: own(other),
+            low: (low * low - other * other).max(0.0).sqrt(),
+            high: (high * high - other * other).max(0.0).sqrt(),
+        },
+        before: from_model(before),
+    };
+    let finding = if follows - 2.0 * se > 0.25 {
+        Finding::Name {
+            effect: "thrust-spread".to_owned(),
+            parameters: vec![parameter(mass, thrust)],
+            was_there: thrust > 0.0,
+        }
+    } else if follows + 2.0 * se < 0.5 {
+        Finding::Name {
+            effect: "mass-spread".to_owned(),
+            parameters: vec![parameter(thrust, mass)],
+            was_there: mass > 0.0,
+        }
+    } else {
+        Finding::Class {
+            effects: vec!["thrust-spread".to_owned(), "mass-spread".to_owned()],
+            parameters: vec![parameter(mass, thrust)],
+        }
+    };
+    // Log-likelihood of the offsets by their own spread against the expected one.
+    let ratio = (sd / expected).powi(2);
+    let gain_nats = 0.5 * count * (ratio - 1.0 - ratio.ln());
+    Some(Step {
+        finding,
+        gain_nats,
+        threshold_nats: SPREAD_NATS,
+        alpha: 0.025,
+        size_us: sd * sensitivity,
+        rivals: Vec::new(),
+        held_out_us: None,
+        shape: None,
+    })
+}
+
+/// Half a squared z of 1.96.
+const SPREAD_NATS: f64 = 1.92;
 
 fn correlation(each: &[DroneOffset]) -> f64 {
     let count = each.len() as f64;

@@ -98,8 +98,9 @@ pub fn search(
         steps: Vec::new(),
         rest: Rest::default(),
     };
+    let mut refused: Vec<&'static str> = Vec::new();
     for step in 0..=options.most_steps {
-        let patterns = comparison.patterns(&found.vehicle)?;
+        let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         let mut split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         // Gusts that the residual shows bend the model's curve: known physics first.
         let mut free = found.extras.clone();
@@ -107,11 +108,13 @@ pub fn search(
         let with_extras = |split| Problem::new(&patterns, split).with(&free);
         let quick = with_extras(&split).fit(found.hyper, Likelihood::Profile);
         found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
+        let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         // What was named before stays free: its size may change with what comes after.
         let problem = Problem::new(&patterns, &split).with(&free);
         let least = quick.hyper.get(LEAST);
         let mut candidates = library(&found.vehicle, &comparison.scene)?;
+        candidates.retain(|candidate| !refused.contains(&candidate.name));
         let response: Vec<Vec<f64>> = patterns.iter().map(|group| group.response.clone()).collect();
         candidates.extend(of_the_air(&comparison.scene, &response, least));
         let generics = all(&comparison.scene, &comparison.headings());
@@ -207,6 +210,13 @@ pub fn search(
                 // Against the re-flown model: what closed forms leave is small, and taken up here.
                 found.refit(&comparison)?;
             }
+        }
+        if let Some(gone) = found.weakest() {
+            // Explained by what came after it, or a size of nothing.
+            found.drop_effect(gone, vehicle);
+            refused.push(gone);
+            comparison = Comparison::new(data, &found.vehicle, simulated, plan)?;
+            found.refit(&comparison)?;
         }
         found.comparison = comparison.clone();
     }
@@ -317,7 +327,7 @@ fn decide(
     step: usize,
 ) -> Decision {
     let floor = super::search::FLOOR_NATS;
-    let mut limits = Thresholds { library: floor, generic: floor };
+    let mut limits = Thresholds { library: floor, generic: super::search::FREE_FLOOR_NATS };
     let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
     let is_named = |ranked: &&Ranked| {
         // That the shared air drifted is what it does: a rival, never a finding.
@@ -329,7 +339,7 @@ fn decide(
     let free = round.generics.iter().find(|free| free.size_us >= material_us);
     let best_gain = best.map_or(0.0, |best| best.gain);
     let free_gain = free.map_or(0.0, |free| free.gain);
-    if best_gain < floor && free_gain < floor {
+    if best_gain < limits.library && free_gain < limits.generic {
         return nothing(limits);
     }
     let seed = options.seed.wrapping_add(1000 * step as u64);
@@ -393,7 +403,47 @@ pub fn found_value(found: &Found, effect: &str, parameter: &str) -> Option<f64> 
     value_of(&found.vehicle, effect, parameter)
 }
 
+/// A size that is not this many standard errors from what the model had is taken back.
+const KEPT_Z: f64 = 3.0;
+
 impl Found {
+    /// The effect whose size says least, if that is too little.
+    fn weakest(&self) -> Option<&'static str> {
+        let z = |(parameter, (value, se)): (&Parameter, &(f64, f64))| {
+            let change = (value - parameter.before.unwrap_or(0.0)).abs();
+            if *se > 0.0 { change / se } else { 0.0 }
+        };
+        // The first parameter of an effect is its size.
+        let mut seen: Vec<&'static str> = Vec::new();
+        let mut worst: Option<(&'static str, f64)> = None;
+        for (parameter, value) in self.parameters.iter().zip(&self.values) {
+            if seen.contains(&parameter.effect) {
+                continue;
+            }
+            seen.push(parameter.effect);
+            let z = z((parameter, value));
+            if z < KEPT_Z && worst.is_none_or(|(_, least)| z < least) {
+                worst = Some((parameter.effect, z));
+            }
+        }
+        worst.map(|(effect, _)| effect)
+    }
+
+    /// Takes an effect back: the model has it as it was.
+    fn drop_effect(&mut self, effect: &str, original: &Vehicle) {
+        match original.effects.get(effect) {
+            Some(table) => {
+                self.vehicle.effects.insert(effect.to_owned(), table.clone());
+            }
+            None => {
+                self.vehicle.effects.remove(effect);
+            }
+        }
+        self.parameters.retain(|parameter| parameter.effect != effect);
+        self.steps.retain(|step| step.finding.effects().first() != Some(&effect));
+        self.vehicle = super::refly::mean_drone(&self.vehicle);
+    }
+
     /// Fits all sizes and the noise anew; the gusts of that noise bend the model's curve, so twice.
     pub(super) fn refit(&mut self, comparison: &Comparison) -> Result<(), GapError> {
         for _ in 0..REFITS {

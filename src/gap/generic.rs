@@ -67,9 +67,14 @@ pub fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     found.push(Generic {
         depends_on: "climb-time",
         axis: "vertical velocity times time, scaled",
-        columns: vec![Column::Shared(crossed.clone()), Column::Shared(product(f64::abs))],
+        // A product comes with its own mean part.
+        columns: vec![
+            Column::Shared(crossed.clone()),
+            Column::Shared(product(f64::abs)),
+            Column::Shared(climb.clone()),
+        ],
         along: crossed,
-        penalty: 2.0,
+        penalty: 4.0,
     });
     for step in 1..=STEPS {
         let at_s = least(&time) + (most(&time) - least(&time)) * step as f64 / (STEPS + 1) as f64;

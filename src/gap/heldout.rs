@@ -69,7 +69,7 @@ fn of_drones(
     // Free shapes were fitted on the others' bins, which are the same.
     let shapes = shapes(comparison, found)?;
     subtract(&mut end, &shapes);
-    let patterns = comparison.patterns(&found.vehicle)?;
+    let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
     let mut fitted = comparison.residual(&found.vehicle, found.gusts_mps)?;
     subtract(&mut fitted, &shapes);
     let shared = SharedAir::new(&patterns, &found.hyper);
@@ -103,7 +103,7 @@ fn segments(comparison: &Comparison) -> Vec<Vec<usize>> {
 
 /// What the free shapes of a search say in each bin.
 fn shapes(comparison: &Comparison, found: &Found) -> Result<Vec<Vec<f64>>, GapError> {
-    let patterns = comparison.patterns(&found.vehicle)?;
+    let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
     let split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
     let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.hyper);
     let value = |group: usize, bin: usize| {
@@ -331,7 +331,7 @@ fn of_rungs(
         }
     }
     subtract(&mut end, &shapes);
-    let patterns = comparison.patterns(&found.vehicle)?;
+    let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
     let shared = SharedAir::new(&patterns, &found.hyper);
     let air = shared.pulses(&means(&end), &patterns, &found.hyper);
     let counts: Vec<usize> = patterns.iter().map(|group| group.drones).collect();

@@ -1,5 +1,8 @@
 //! The wind, from how the fleet leans.
 
+use nalgebra::{DMatrix, DVector, Matrix4};
+
+use super::bins::BinValues;
 use super::data::Data;
 use super::minimise::minimise;
 use crate::effects::{find, select};
@@ -44,6 +47,12 @@ impl LeanLaw {
         self.linear * speed_mps + self.square * speed_mps * speed_mps
     }
 
+    /// The lean at an air speed, as a vector.
+    fn lean_of(self, air_mps: [f64; 2]) -> [f64; 2] {
+        let speed = air_mps[0].hypot(air_mps[1]).max(1e-9);
+        air_mps.map(|part| self.lean(speed) * part / speed)
+    }
+
     fn slope(self, speed_mps: f64) -> f64 {
         self.linear + 2.0 * self.square * speed_mps
     }
@@ -74,17 +83,41 @@ pub struct Wind {
     pub air_mps: Vec<Vec<[f64; 2]>>,
     /// Lean law that the flight's horizontal legs showed; `None`: it has none, and the model's was
     /// taken.
-    pub measured: Option<LeanLaw>,
+    pub measured: Option<Measured>,
+}
+
+/// A lean law by horizontal legs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// The law.
+    pub law: LeanLaw,
+    /// Standard error of its linear part, rad/(m/s).
+    pub linear_se: f64,
 }
 
 /// Finds the wind. Horizontal legs at known speeds measure the lean law as well.
-pub fn wind(data: &Data, law: LeanLaw) -> Wind {
+///
+/// `flown` is the simulated side with the wind that it was flown in: legs are short, and what a lean
+/// still lacks of its steady value there lacks in the simulator, too.
+pub fn wind(data: &Data, law: LeanLaw, flown: Option<(&[Vec<BinValues>], [f64; 2])>) -> Wind {
     let leans: Vec<Vec<[f64; 2]>> = data
         .groups
         .iter()
-        .map(|group| {
-            let mean = |bin, axis: usize| group.mean(bin, |values| values.lean_rad[axis]);
-            (0..group.bins.len()).map(|bin| [mean(bin, 0), mean(bin, 1)]).collect()
+        .enumerate()
+        .map(|(index, group)| {
+            let lean = |bin: usize| {
+                let mean = |axis: usize| group.mean(bin, |values| values.lean_rad[axis]);
+                let unsettled = flown.and_then(|(side, wind_mps)| {
+                    let values = side.get(index)?.get(bin)?;
+                    let velocity = group.bins[bin].velocity_mps;
+                    let air = [velocity[0] - wind_mps[0], velocity[1] - wind_mps[1]];
+                    let steady = law.lean_of(air);
+                    Some([values.lean_rad[0] - steady[0], values.lean_rad[1] - steady[1]])
+                });
+                let [x, y] = unsettled.unwrap_or_default();
+                [mean(0) - x, mean(1) - y]
+            };
+            (0..group.bins.len()).map(lean).collect()
         })
         .collect();
     let each =
@@ -99,27 +132,21 @@ pub fn wind(data: &Data, law: LeanLaw) -> Wind {
     let mut mean_mps = sum.map(|sum: f64| if count > 0.0 { sum / count } else { 0.0 });
     let mut law = law;
     let mut measured = None;
-    if each().filter(|(bin, _)| bin.is_horizontal()).count() >= 4 {
-        let start =
-            [mean_mps[0], mean_mps[1], law.linear.max(1e-4).ln(), law.square.max(1e-5).ln()];
-        // Leans are in units of a tenth of a degree, so that one unit of the sum matters.
-        let misfit = |at: &[f64; 4]| {
-            let law = LeanLaw { linear: at[2].exp(), square: at[3].exp() };
-            let weak = (at[2] - start[2]).powi(2) + (at[3] - start[3]).powi(2);
-            let miss = |(bin, lean): (&super::bins::Bin, &[f64; 2])| {
-                let air = [bin.velocity_mps[0] - at[0], bin.velocity_mps[1] - at[1]];
-                let speed = air[0].hypot(air[1]).max(1e-9);
-                let wanted = law.lean(speed);
-                let off = |axis: usize| (lean[axis] - wanted * air[axis] / speed) / 0.0017;
-                off(0).powi(2) + off(1).powi(2)
-            };
-            each().map(miss).sum::<f64>() + 0.05 * weak
-        };
-        let (at, _) = minimise(start, misfit);
+    let points: Vec<Point> = each().map(|(bin, lean)| Point::of(bin, *lean)).collect();
+    let moves = points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING;
+    if moves && flown.is_some() {
+        let start = [mean_mps[0], mean_mps[1], law.linear.max(1e-4), law.square.max(1e-5)];
+        // The search moves in numbers near 1.
+        let natural = |at: &[f64; 4]| [at[0], at[1], at[2] * LINEAR_UNIT, at[3] * SQUARE_UNIT];
+        let from = [start[0], start[1], start[2] / LINEAR_UNIT, start[3] / SQUARE_UNIT];
+        let (at, _) = minimise(from, |at| misfit(&points, &natural(at), start));
+        let at = natural(&at);
         mean_mps = [at[0], at[1]];
-        law = LeanLaw { linear: at[2].exp(), square: at[3].exp() };
-        measured = Some(law);
+        law = LeanLaw { linear: at[2], square: at[3] };
+        measured = Some(Measured { law, linear_se: linear_se(&points, &at) });
     }
+    // Without legs the law is the model's word: only a vehicle that states its rotors' drag is believed.
+    let is_believed = measured.is_some() || law.linear > 0.0;
     let air_mps = data
         .groups
         .iter()
@@ -127,11 +154,147 @@ pub fn wind(data: &Data, law: LeanLaw) -> Wind {
         .map(|(group, leans)| {
             let air = |(bin, lean): (&super::bins::Bin, &[f64; 2])| {
                 let steady = [bin.velocity_mps[0] - mean_mps[0], bin.velocity_mps[1] - mean_mps[1]];
-                let tells = law.slope(steady[0].hypot(steady[1])) > LEAST_SLOPE;
+                let tells = is_believed && law.slope(steady[0].hypot(steady[1])) > LEAST_SLOPE;
                 if tells { law.air(*lean) } else { steady }
             };
-            group.bins.iter().zip(leans).map(air).collect()
+            let raw: Vec<[f64; 2]> = group.bins.iter().zip(leans).map(air).collect();
+            smooth(group, &raw)
         })
         .collect();
     Wind { mean_mps, air_mps, measured }
+}
+
+/// Time scales of gusts that are tried, s, and shares of what is scatter.
+const GUST_S: [f64; 3] = [12.0, 25.0, 60.0];
+const SCATTER: [f64; 5] = [0.02, 0.08, 0.2, 0.45, 0.8];
+
+/// The air as it most probably was: a regressor with scatter of its own would be fitted too small.
+/// What the drone flies itself is known and is left out of the smoothing.
+fn smooth(group: &super::data::Group, raw: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let wind = |axis: usize| -> Vec<f64> {
+        let flown = group.bins.iter().zip(raw);
+        smoothed(
+            group,
+            &flown.map(|(bin, air)| bin.velocity_mps[axis] - air[axis]).collect::<Vec<f64>>(),
+        )
+    };
+    let (x, y) = (wind(0), wind(1));
+    group
+        .bins
+        .iter()
+        .zip(x.iter().zip(&y))
+        .map(|(bin, (x, y))| [bin.velocity_mps[0] - x, bin.velocity_mps[1] - y])
+        .collect()
+}
+
+/// Posterior mean of a series that is exponentially correlated with white scatter on top.
+fn smoothed(group: &super::data::Group, values: &[f64]) -> Vec<f64> {
+    let count = values.len();
+    let mean = values.iter().sum::<f64>() / count.max(1) as f64;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count.max(1) as f64;
+    if variance < 1e-6 || count < 4 {
+        return values.to_vec();
+    }
+    let times: Vec<f64> = group.bins.iter().map(super::bins::Bin::middle_s).collect();
+    let rest = DVector::from_iterator(count, values.iter().map(|value| value - mean));
+    let kernel = |tau_s: f64, share: f64| {
+        DMatrix::from_fn(count, count, |a, b| {
+            let near = (-(times[a] - times[b]).abs() / tau_s).exp();
+            variance * ((1.0 - share) * near + if a == b { share } else { 0.0 })
+        })
+    };
+    let mut best: Option<(f64, f64, f64)> = None;
+    for tau_s in GUST_S {
+        for share in SCATTER {
+            let Some(factor) = kernel(tau_s, share).cholesky() else { continue };
+            let log_det: f64 = factor.l_dirty().diagonal().iter().map(|v| v.ln()).sum();
+            let likelihood = -0.5 * rest.dot(&factor.solve(&rest)) - log_det;
+            if best.is_none_or(|(most, ..)| likelihood > most) {
+                best = Some((likelihood, tau_s, share));
+            }
+        }
+    }
+    let Some((_, tau_s, share)) = best else { return values.to_vec() };
+    let whole = kernel(tau_s, share);
+    let Some(factor) = whole.clone().cholesky() else { return values.to_vec() };
+    let mut signal = whole;
+    for index in 0..count {
+        signal[(index, index)] -= variance * share;
+    }
+    (signal * factor.solve(&rest)).iter().map(|value| value + mean).collect()
+}
+
+/// Fewest bins of horizontal flight that measure a lean law.
+const FEWEST_MOVING: usize = 4;
+/// Scatter of a bin's lean: gusts, and legs that are too short to settle, rad.
+const UNIT_RAD: f64 = 0.005;
+/// How far the model's own law is doubted: its quadratic part (a share), its linear part, rad/(m/s).
+const SQUARE_DOUBT: f64 = 0.15;
+const LINEAR_DOUBT: f64 = 0.01;
+/// Gusts move neighbouring bins together: errors are larger than independent bins would say.
+const TOGETHER: f64 = 2.0;
+
+/// The lean in one bin and the velocity over ground.
+struct Point {
+    velocity_mps: [f64; 2],
+    lean_rad: [f64; 2],
+    moves: bool,
+}
+
+impl Point {
+    fn of(bin: &super::bins::Bin, lean_rad: [f64; 2]) -> Self {
+        let [x, y, _] = bin.velocity_mps;
+        Self { velocity_mps: [x, y], lean_rad, moves: bin.is_horizontal() }
+    }
+
+    /// Lean less what the law says, in units.
+    fn off(&self, at: &[f64; 4]) -> [f64; 2] {
+        let law = LeanLaw { linear: at[2], square: at[3] };
+        let air = [self.velocity_mps[0] - at[0], self.velocity_mps[1] - at[1]];
+        let speed = air[0].hypot(air[1]).max(1e-9);
+        let wanted = law.lean(speed);
+        let off = |axis: usize| (self.lean_rad[axis] - wanted * air[axis] / speed) / UNIT_RAD;
+        [off(0), off(1)]
+    }
+}
+
+/// Units of the two parts of the law in the search.
+const LINEAR_UNIT: f64 = 0.01;
+const SQUARE_UNIT: f64 = 0.001;
+
+fn misfit(points: &[Point], at: &[f64; 4], start: [f64; 4]) -> f64 {
+    // A lean never goes against the wind.
+    let negative = at[2].min(0.0) / 1e-4;
+    let square_part = (at[3].max(1e-7) / start[3]).ln() / SQUARE_DOUBT;
+    let linear_part = (at[2] - start[2]) / LINEAR_DOUBT;
+    let weak = square_part.powi(2) + linear_part.powi(2);
+    let square = |point: &Point| point.off(at).iter().map(|off| off * off).sum::<f64>();
+    points.iter().map(square).sum::<f64>() + negative * negative + weak
+}
+
+/// Standard error of the linear part, by the curvature of the misfit at its bottom.
+fn linear_se(points: &[Point], at: &[f64; 4]) -> f64 {
+    let steps = [0.01, 0.01, 1e-5, 1e-6];
+    let slope = |point: &Point, index: usize| {
+        let mut moved = *at;
+        moved[index] += steps[index];
+        let (from, to) = (point.off(at), point.off(&moved));
+        [(to[0] - from[0]) / steps[index], (to[1] - from[1]) / steps[index]]
+    };
+    let mut normal = Matrix4::zeros();
+    let mut square = 0.0;
+    for point in points {
+        let off = point.off(at);
+        square += off[0] * off[0] + off[1] * off[1];
+        let slopes = [0, 1, 2, 3].map(|index| slope(point, index));
+        for row in 0..4 {
+            for column in 0..4 {
+                normal[(row, column)] +=
+                    slopes[row][0] * slopes[column][0] + slopes[row][1] * slopes[column][1];
+            }
+        }
+    }
+    let freedom = (2.0 * points.len() as f64 - 4.0).max(1.0);
+    let covariance = normal.try_inverse().map_or(f64::INFINITY, |inverse| inverse[(2, 2)]);
+    TOGETHER * (covariance * square / freedom).max(0.0).sqrt()
 }

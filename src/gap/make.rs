@@ -13,7 +13,9 @@ use super::noise::{
 use super::refine::{Parameter, size_errors, size_of};
 use super::regimes::regimes;
 use super::sensor::sensor;
-use super::verdict::{DataUsed, Drones, Noise, SensorChannel, VERDICT_SCHEMA, Verdict};
+use super::verdict::{
+    DataUsed, Drones, Finding, Noise, SensorChannel, Step, VERDICT_SCHEMA, Verdict,
+};
 use super::words::summary;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
@@ -92,11 +94,15 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         held_out: held_slots.clone(),
         left_out,
     };
-    let differences = if found.extras.is_empty() {
-        drones(&whole, &found, |slot| held_slots.contains(&slot))?
+    let (differences, spread) = if found.extras.is_empty() {
+        drones(&whole, &found, input.vehicle, |slot| held_slots.contains(&slot))?
     } else {
-        Drones::default()
+        (Drones::default(), None)
     };
+    let mut steps = found.steps.clone();
+    steps.extend(spread);
+    let wind = super::lean_channel::found(&before);
+    steps.extend(super::lean_channel::step(&before, &wind, options.alpha));
     let mut verdict = Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -104,17 +110,20 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         summary: String::new(),
         data: used,
         sensor: channel,
-        steps: found.steps.clone(),
+        steps,
         rest: found.rest.clone(),
         detectable: detectable(&found)?,
         noise: noise(&found.hyper),
+        wind,
         drones: differences,
         gap: shrink,
         regimes: regimes(&before, &whole, &found, options.seed)?,
         cautions: cautions(&data, &found, input),
     };
     verdict.summary = summary(&verdict);
-    Ok(Explained { verdict, model: model(input.vehicle, &found), found })
+    let mut model = model(input.vehicle, &found);
+    add_others(&mut model, &verdict.steps);
+    Ok(Explained { verdict, model, found })
 }
 
 /// Fisher z of effects that are known to be there: the change of each size over its error, with the
@@ -199,6 +208,25 @@ fn model(vehicle: &Vehicle, found: &Found) -> Vehicle {
             format!("{}; {} found in measured flights", vehicle.source, names.join(", "));
     }
     model
+}
+
+/// What is told from other channels than the fleet's pulse: what makes drones differ, by their
+/// offsets; the drag of the rotors, by the lean.
+fn add_others(model: &mut Vehicle, steps: &[Step]) {
+    for step in steps {
+        let effects = step.finding.effects();
+        let (Some(first), Finding::Name { parameters, .. } | Finding::Class { parameters, .. }) =
+            (effects.first(), &step.finding)
+        else {
+            continue;
+        };
+        if let ("blade-flapping", Some(drag)) = (*first, parameters.first()) {
+            super::candidates::set(model, first, "drag_per_weight", drag.value.value.min(0.1));
+        }
+        if let (true, Some(sd)) = (first.ends_with("-spread"), parameters.first()) {
+            super::candidates::set(model, first, "sd", sd.value.value.min(0.1));
+        }
+    }
 }
 
 fn cautions(data: &Data, found: &Found, input: &Input<'_>) -> Vec<String> {

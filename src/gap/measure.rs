@@ -96,9 +96,27 @@ fn lean(flight: &Flight, start_s: f64, end_s: f64, (sin, cos): (f64, f64)) -> Op
         return None;
     }
     let (north, east) = (north / count, east / count);
+    // Accelerating takes lean as well; what is left is the wind's.
+    let (north_mps2, east_mps2) = acceleration(flight, start_s, end_s).unwrap_or_default();
+    let (north, east) = (north - north_mps2 / GRAVITY, east - east_mps2 / GRAVITY);
     // Show x is `orientation` clockwise from north, show y to the left of it.
     Some([cos * north + sin * east, sin * north - cos * east])
 }
+
+/// Mean horizontal acceleration over a bin by the speeds at its ends, north and east, m/s².
+fn acceleration(flight: &Flight, start_s: f64, end_s: f64) -> Option<(f64, f64)> {
+    let half_s = 0.5;
+    let of = |series: &crate::flight::Series| {
+        let speed = |time_s: f64| {
+            let ahead = series.at(time_s + half_s, GAP_S)?;
+            Some((ahead - series.at(time_s - half_s, GAP_S)?) / (2.0 * half_s))
+        };
+        Some((speed(end_s)? - speed(start_s)?) / (end_s - start_s))
+    };
+    Some((of(&flight.north_m)?, of(&flight.east_m)?))
+}
+
+const GRAVITY: f64 = 9.80665;
 
 pub(super) fn mean(values: &[f64]) -> Option<f64> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;

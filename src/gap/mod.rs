@@ -14,6 +14,7 @@ mod generic;
 mod gls;
 mod heldout;
 mod lean;
+mod lean_channel;
 mod make;
 mod measure;
 mod minimise;

@@ -87,6 +87,9 @@ pub struct GroupPattern {
     pub height_m: Vec<f64>,
     /// The model's response to vertical air speed in each bin, us/(m/s).
     pub response: Vec<f64>,
+    /// What gusts do to the mean of a curved response, us, which is as uncertain as it is large;
+    /// empty: nothing.
+    pub bent_us: Vec<f64>,
     /// What a relative error of the response does in each bin, us.
     pub slope_us: Vec<f64>,
 }
@@ -104,7 +107,7 @@ pub struct Whitener {
     pub log_det: f64,
 }
 
-const SHARED_STATES: usize = 2;
+const SHARED_STATES: usize = 3;
 const OWN_STATES: usize = 4;
 /// Heights are taken from here, m, in units of [`ALOFT_M`].
 const MIDDLE_M: f64 = 45.0;
@@ -149,6 +152,7 @@ impl Whitener {
         let mut states = vec![
             State { variance: square(SHARED), time_s },
             State { variance: square(GRADIENT), time_s },
+            State { variance: 1.0, time_s: f64::INFINITY },
         ];
         for group in groups {
             states.extend(own(1.0 / group.drones.max(1) as f64));
@@ -161,6 +165,8 @@ impl Whitener {
                 let response = group.response[*bin].abs() + least;
                 looks_at.push((0, response));
                 looks_at.push((1, response * group.aloft(*bin)));
+                // How far gusts bend the mean is computed, and doubted by as much as it is.
+                looks_at.push((2, group.bent_us.get(*bin).copied().unwrap_or(0.0)));
                 Observation {
                     time_s: group.time_s[*bin],
                     looks_at,

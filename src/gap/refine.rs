@@ -72,7 +72,7 @@ pub fn refine(
     let mut hyper = start;
     let mut last = None;
     for round in 0..ROUNDS {
-        let patterns = comparison.patterns(&vehicle)?;
+        let patterns = comparison.patterns(&vehicle, gusts_mps)?;
         let split = Split::of(&comparison.residual(&vehicle, gusts_mps)?);
         let slopes = slopes(comparison, &vehicle, parameters)?;
         let problem = Problem::new(&patterns, &split).with(extras).with(&slopes);
@@ -217,7 +217,7 @@ pub fn size_errors(
     parameters: &[Parameter],
     _options: &super::explain::Options,
 ) -> Result<Vec<f64>, GapError> {
-    let patterns = comparison.patterns(vehicle)?;
+    let patterns = comparison.patterns(vehicle, 0.0)?;
     let split = Split::of(&comparison.residual(vehicle, 0.0)?);
     let slopes = slopes(comparison, vehicle, parameters)?;
     let problem = Problem::new(&patterns, &split).with(&slopes);

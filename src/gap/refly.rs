@@ -12,6 +12,7 @@ use crate::sim::recorder::{Moment, Recorder};
 use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly_with};
 use crate::vehicle::Vehicle;
 
+const GRAVITY: f64 = 9.80665;
 /// Values are taken at every so many control steps (50 Hz).
 const EVERY: u64 = 8;
 
@@ -70,6 +71,8 @@ struct Sums {
     height_m: f64,
     lean_rad: [f64; 2],
     resting_v: f64,
+    /// First and last time, s, with the horizontal velocity then, m/s.
+    ends: Option<[(f64, [f64; 2]); 2]>,
 }
 
 struct BinRecorder<'a> {
@@ -88,6 +91,7 @@ impl<'a> BinRecorder<'a> {
             height_m: 0.0,
             lean_rad: [0.0; 2],
             resting_v: 0.0,
+            ends: None,
         };
         Self { bins, sums: bins.iter().map(|_| empty()).collect(), home_z_m, at: 0 }
     }
@@ -95,7 +99,11 @@ impl<'a> BinRecorder<'a> {
     fn values(self, thrust_exponent: f64) -> Vec<Option<BinValues>> {
         let value = |sums: Sums| {
             let mean = |sum: f64| sum / sums.count;
-            let lean_rad = sums.lean_rad.map(mean);
+            let accelerated = sums.ends.map_or([0.0; 2], |[first, last]| {
+                let apart_s = (last.0 - first.0).max(0.1);
+                [0, 1].map(|axis| (last.1[axis] - first.1[axis]) / apart_s / GRAVITY)
+            });
+            let lean_rad = [0, 1].map(|axis| mean(sums.lean_rad[axis]) - accelerated[axis]);
             let cos = lean_rad[0].hypot(lean_rad[1]).cos();
             (sums.count > 0.0).then(|| BinValues {
                 pulse_us: 1000.0 + (mean(sums.pulse_us) - 1000.0) * cos.powf(thrust_exponent),
@@ -131,6 +139,10 @@ impl Recorder for BinRecorder<'_> {
         sums.climb_mps += moment.estimate.velocity_mps.z;
         sums.height_m += moment.estimate.position_m.z - self.home_z_m;
         let up = moment.plant.motion().rotation.column(2).into_owned();
+        let velocity = moment.estimate.velocity_mps;
+        let now = (time_s, [velocity.x, velocity.y]);
+        let first = sums.ends.map_or(now, |[first, _]| first);
+        sums.ends = Some([first, now]);
         sums.lean_rad[0] += up.x;
         sums.lean_rad[1] += up.y;
         sums.resting_v += moment.plant.battery().map_or(f64::NAN, |battery| battery.resting_v);

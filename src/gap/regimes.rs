@@ -33,7 +33,7 @@ pub fn regimes(
 ) -> Result<Vec<Regime>, GapError> {
     let start = before.residual(&before.vehicle, found.gusts_mps)?;
     let end = after.residual(&found.vehicle, found.gusts_mps)?;
-    let patterns = after.patterns(&found.vehicle)?;
+    let patterns = after.patterns(&found.vehicle, found.gusts_mps)?;
     let whitener = Whitener::new(&patterns, &found.hyper);
     let draws: Vec<Pulses> = (0..DRAWS)
         .map(|index| {

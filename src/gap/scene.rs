@@ -25,6 +25,8 @@ pub struct Scene {
     pub cells: f64,
     /// Mean voltage at rest, V; 0: not logged.
     pub resting_v: f64,
+    /// Resistance of the batteries as the logs have it, ohm.
+    pub resistance_ohm: Option<f64>,
     neighbours: Vec<Vec<f64>>,
 }
 
@@ -69,11 +71,24 @@ impl Scene {
             let drones = |group: &super::data::Group| -> Vec<Vec<f64>> {
                 group.measured.iter().map(|drone| drone.iter().map(of).collect()).collect()
             };
-            data.groups.iter().map(drones).collect()
+            // Who needs more pulse drains the battery faster: a drone's own decline follows its pulse.
+            // What it started with, and how its group declined, do not.
+            let exogenous = |drones: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+                let bins = drones.first().map_or(0, Vec::len);
+                let count = drones.len().max(1) as f64;
+                let first: Vec<f64> =
+                    drones.iter().map(|d| d.first().copied().unwrap_or(0.0)).collect();
+                let decline: Vec<f64> = (0..bins)
+                    .map(|bin| drones.iter().map(|d| d[bin] - d[0]).sum::<f64>() / count)
+                    .collect();
+                first.iter().map(|f| decline.iter().map(|d| f + d).collect()).collect()
+            };
+            data.groups.iter().map(drones).map(exogenous).collect()
         });
         let resting_v = if logged { volts.iter().sum::<f64>() / volts.len() as f64 } else { 0.0 };
         let neighbours = data.groups.iter().map(|group| group.neighbours.clone()).collect();
-        Self { signals, charge, cells, resting_v, neighbours }
+        let resistance_ohm = data.resistance_ohm;
+        Self { signals, charge, cells, resting_v, resistance_ohm, neighbours }
     }
 
     /// Only some bins, chosen by the places of group and bin.

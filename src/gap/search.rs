@@ -259,6 +259,8 @@ pub struct Thresholds {
 
 /// The least threshold, nats: z = 4 against a single alternative (physics note, section 3.3).
 pub const FLOOR_NATS: f64 = 8.0;
+/// The same for free shapes, of which there are dozens.
+pub const FREE_FLOOR_NATS: f64 = 14.0;
 /// Share of the replicates whose gains tell the tail.
 const TAIL: f64 = 0.25;
 
@@ -290,7 +292,7 @@ pub fn thresholds(
     let tail = |of: fn(&(f64, f64)) -> f64| quantile(gains.iter().map(of).collect(), alpha);
     Thresholds {
         library: tail(|gain| gain.0).max(FLOOR_NATS),
-        generic: tail(|gain| gain.1).max(FLOOR_NATS),
+        generic: tail(|gain| gain.1).max(FREE_FLOOR_NATS),
     }
 }
 

@@ -16,9 +16,10 @@ const TOLD_BIAS_MPS: f64 = 0.1;
 const SHORTEST_S: f64 = 6.0;
 const GAP_S: f64 = 1.0;
 /// Lags that are tried, s.
-const LAGS: usize = 41;
+const LAGS: usize = 51;
 const LAG_STEP_S: f64 = 0.02;
-const FIRST_LAG_S: f64 = -0.2;
+/// Step of the comparison, s.
+const STEP_S: f64 = 0.05;
 
 /// What the velocities of a fleet say. `segments` gives what a slot flew.
 pub fn sensor<'a>(
@@ -98,41 +99,40 @@ fn integral(series: &Series, start_s: f64, end_s: f64) -> Option<f64> {
     Some(points.windows(2).map(area).sum())
 }
 
-/// The time by which V_U is later than the rate of the height, s: the shift with which it matches
-/// best where the command changes.
+/// The time constant of the first-order filter that makes V_U of the rate of the height where the
+/// command changes, s.
 fn lag(flight: &Flight, segments: &[Segment]) -> Option<f64> {
     let changes: Vec<f64> = segments
         .windows(2)
         .filter(|pair| (pair[1].velocity_mps[2] - pair[0].velocity_mps[2]).abs() > 0.8)
         .map(|pair| pair[1].start_ms as f64 / 1000.0)
-        .filter(|time_s| *time_s > 1.0)
+        .filter(|time_s| *time_s > 2.0)
         .collect();
     if changes.len() < 4 {
         return None;
     }
-    let half_s = 0.1;
+    let tracks: Vec<(Vec<f64>, Vec<f64>)> =
+        changes.iter().filter_map(|change| track(flight, *change)).collect();
+    if tracks.len() < 4 {
+        return None;
+    }
     let misfit = |lag_s: f64| {
-        let (mut sum, mut count) = (0.0, 0);
-        for change in &changes {
-            for step in 0..60 {
-                let time_s = change - 1.0 + f64::from(step) * 0.1;
-                let height = |at| flight.height_m.at(at, GAP_S);
-                let (Some(before), Some(after), Some(velocity)) = (
-                    height(time_s - half_s),
-                    height(time_s + half_s),
-                    flight.velocity_up_mps.at(time_s + lag_s, GAP_S),
-                ) else {
-                    continue;
-                };
-                sum += (velocity - (after - before) / (2.0 * half_s)).powi(2);
-                count += 1;
+        let share = STEP_S / (STEP_S + lag_s);
+        let mut sum = 0.0;
+        for (rates, velocities) in &tracks {
+            let mut filtered = rates.first().copied().unwrap_or(0.0);
+            for (index, (rate, velocity)) in rates.iter().zip(velocities).enumerate() {
+                filtered += share * (rate - filtered);
+                // The first second only brings the filter to its state.
+                if index > 20 {
+                    sum += (velocity - filtered).powi(2);
+                }
             }
         }
-        (count > 100).then(|| sum / f64::from(count))
+        sum
     };
-    let tried: Vec<f64> = (0..LAGS).map(|index| FIRST_LAG_S + index as f64 * LAG_STEP_S).collect();
-    let misfits: Option<Vec<f64>> = tried.iter().map(|lag| misfit(*lag)).collect();
-    let misfits = misfits?;
+    let tried: Vec<f64> = (0..LAGS).map(|index| index as f64 * LAG_STEP_S).collect();
+    let misfits: Vec<f64> = tried.iter().map(|lag| misfit(*lag)).collect();
     let best = (0..misfits.len()).min_by(|a, b| misfits[*a].total_cmp(&misfits[*b]))?;
     if best == 0 || best + 1 == misfits.len() {
         return Some(tried[best]);
@@ -142,4 +142,21 @@ fn lag(flight: &Flight, segments: &[Segment]) -> Option<f64> {
     let bend = left - 2.0 * middle + right;
     let by = if bend > 0.0 { 0.5 * (left - right) / bend } else { 0.0 };
     Some(tried[best] + by.clamp(-1.0, 1.0) * LAG_STEP_S)
+}
+
+/// Rate of the height and V_U around a change of the command, 20 a second, both averaged over the
+/// same fifth of a second.
+fn track(flight: &Flight, change_s: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    let half_s = 0.1;
+    let times = (0..140).map(|step| change_s - 2.0 + f64::from(step) * STEP_S);
+    let mut rates = Vec::new();
+    let mut velocities = Vec::new();
+    for time_s in times {
+        let height = |at| flight.height_m.at(at, GAP_S);
+        let velocity = |at| flight.velocity_up_mps.at(at, GAP_S);
+        rates.push((height(time_s + half_s)? - height(time_s - half_s)?) / (2.0 * half_s));
+        let ends = velocity(time_s - half_s)? + velocity(time_s + half_s)?;
+        velocities.push(0.25 * ends + 0.5 * velocity(time_s)?);
+    }
+    Some((rates, velocities))
 }

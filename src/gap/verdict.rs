@@ -31,6 +31,8 @@ pub struct Verdict {
     pub detectable: Vec<Detectable>,
     /// Noise and shared air, as estimated with everything found in the model.
     pub noise: Noise,
+    /// Horizontal air, by how the drones leaned.
+    pub wind: WindFound,
     /// Differences between drones.
     pub drones: Drones,
     /// The gap before and after, on data that was not used for fitting.
@@ -239,6 +241,18 @@ pub struct Noise {
     pub slopes: f64,
     /// Response that is assumed for the air where the model has none, us/(m/s).
     pub least_response: f64,
+}
+
+/// The wind and how the vehicle leans in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WindFound {
+    /// Mean wind, where it blows to, show frame x and y, m/s.
+    pub mean_mps: [f64; 2],
+    /// Lean per air speed that horizontal legs showed, rad/(m/s), with its interval; absent: there
+    /// were none, and the model's law was taken.
+    pub lean_per_mps: Option<Interval>,
+    /// The same of the model, rad/(m/s).
+    pub model_lean_per_mps: f64,
 }
 
 /// Differences between drones.

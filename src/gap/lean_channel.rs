@@ -1,0 +1,60 @@
+//! The lean as a channel of its own: how much a drone leans at known speeds over ground is its rotors'
+//! drag, whatever the pulse says.
+
+use super::compare::Comparison;
+use super::lean::LeanLaw;
+use super::refine::value_of;
+use super::verdict::{Finding, Fitted, Interval, Step, WindFound};
+use crate::base::air::SEA_LEVEL_DENSITY;
+
+/// Half of a 95 % interval in standard errors.
+const HALF: f64 = 2.0;
+/// A lean that differs from the model's by less is not named, rad/(m/s): a tenth of a degree at 1 m/s.
+const MATERIAL: f64 = 0.003;
+/// Standard errors from which a difference is named.
+const NAMED_Z: f64 = 5.0;
+
+/// Wind and lean of a comparison with the model that was planned with.
+pub fn found(before: &Comparison) -> WindFound {
+    let model = LeanLaw::of(&before.vehicle, SEA_LEVEL_DENSITY);
+    WindFound {
+        mean_mps: before.wind.mean_mps,
+        lean_per_mps: before.wind.measured.map(|measured| Interval {
+            value: measured.law.linear,
+            low: measured.law.linear - HALF * measured.linear_se,
+            high: measured.law.linear + HALF * measured.linear_se,
+        }),
+        model_lean_per_mps: model.linear,
+    }
+}
+
+/// Blade flapping that the model lacks, or has with another size.
+pub fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
+    let measured = before.wind.measured?;
+    let apart = measured.law.linear - wind.model_lean_per_mps;
+    let z = apart.abs() / measured.linear_se;
+    if apart.abs() < MATERIAL || z < NAMED_Z || !z.is_finite() {
+        return None;
+    }
+    let known = value_of(&before.vehicle, "blade-flapping", "drag_per_weight");
+    let fitted = Fitted {
+        name: "drag_per_weight".to_owned(),
+        unit: "s/m".to_owned(),
+        value: wind.lean_per_mps?,
+        before: known,
+    };
+    Some(Step {
+        finding: Finding::Name {
+            effect: "blade-flapping".to_owned(),
+            parameters: vec![fitted],
+            was_there: known.is_some(),
+        },
+        gain_nats: 0.5 * z * z,
+        threshold_nats: 0.5 * NAMED_Z * NAMED_Z,
+        alpha,
+        size_us: 0.0,
+        rivals: Vec::new(),
+        held_out_us: None,
+        shape: None,
+    })
+}
