@@ -2,7 +2,7 @@
 
 // example
 use updraft::effects::definition::{Class, Definition, Hook, Parameter, Signal, Values};
-use updraft::effects::{Effect, Own, Reference, Signals, Start};
+use updraft::effects::{Effect, Own, Reference, Signals, Sought, Start};
 use updraft::vehicle::Airframe;
 
 const MASS: usize = 0;
@@ -32,6 +32,7 @@ impl Effect for Payload {
             }],
             hooks: &[Hook::Drone],
             shown: (Signal::Drone, -2.0, 2.0),
+            sought: Sought::No("an example"),
         }
     }
 

@@ -52,7 +52,7 @@ impl Bin {
 }
 
 /// The bins of what a group flies.
-pub fn of_segments(segments: &[Segment]) -> Vec<Bin> {
+pub(super) fn of_segments(segments: &[Segment]) -> Vec<Bin> {
     let steady = |segment: &&Segment| {
         let flown =
             !matches!(segment.kind, Kind::Wait | Kind::Takeoff | Kind::Ramp | Kind::Landing);
@@ -69,7 +69,7 @@ pub fn of_segments(segments: &[Segment]) -> Vec<Bin> {
 }
 
 /// Cuts a steady stretch into bins.
-pub fn cut(
+pub(super) fn cut(
     kind: Kind,
     start_s: f64,
     end_s: f64,

@@ -4,18 +4,16 @@
 use super::gls::Column;
 use super::scene::Scene;
 use crate::effects::{EffectError, LIBRARY, Sought};
-use crate::vehicle::{EffectTable, Vehicle};
+use crate::vehicle::Vehicle;
 
 /// Change of a size that is in the model already, for its derivative.
 const CHANGE: f64 = 0.15;
 
 /// Something that may be missing.
 #[derive(Clone, Debug)]
-pub struct Candidate {
+pub(super) struct Candidate {
     /// Name: the effect's, or that of a motion of the air.
     pub name: &'static str,
-    /// Whether it is an effect of the vehicle that can be added to its model.
-    pub of_vehicle: bool,
     /// Whether the model has it with another size.
     pub was_there: bool,
     /// The parameter that says how large it is, its unit and bounds.
@@ -26,7 +24,7 @@ pub struct Candidate {
 
 /// The parameter of an effect that says how large it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Size {
+pub(super) struct Size {
     /// Its name.
     pub name: &'static str,
     /// Its unit.
@@ -43,7 +41,7 @@ pub struct Size {
 
 /// One form of a candidate: an effect at one size and shape.
 #[derive(Clone, Debug)]
-pub struct Variant {
+pub(super) struct Variant {
     /// The vehicle with it.
     pub vehicle: Option<Vehicle>,
     /// Size of the effect in it.
@@ -56,10 +54,10 @@ pub struct Variant {
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>, EffectError> {
+pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>, EffectError> {
     let base = scene.pulses(vehicle)?;
     let mut found = Vec::new();
-    for effect in LIBRARY.iter().copied() {
+    for effect in LIBRARY {
         let definition = effect.definition();
         let Sought::Shape { size, sizes, shape } = &definition.sought else { continue };
         let Some(parameter) = definition.parameters.iter().find(|known| known.name == *size) else {
@@ -101,7 +99,6 @@ pub fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>, Effec
         let usual = sizes_usual(definition.name, vehicle, parameter.default);
         found.push(Candidate {
             name: definition.name,
-            of_vehicle: true,
             was_there: now != 0.0,
             size: Some(Size {
                 name: parameter.name,
@@ -137,14 +134,14 @@ fn prepare(vehicle: &mut Vehicle, name: &str, scene: &Scene) {
 }
 
 /// Sets a parameter of an effect and switches it on.
-pub fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f64) {
-    let table = vehicle.effects.entry(effect.to_owned()).or_insert_with(EffectTable::default);
+pub(super) fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f64) {
+    let table = vehicle.effects.entry(effect.to_owned()).or_default();
     table.on = true;
     table.parameters.insert(parameter.to_owned(), value);
 }
 
 /// One column less another.
-pub fn difference(a: &Column, b: &Column) -> Column {
+pub(super) fn difference(a: &Column, b: &Column) -> Column {
     match (a, b) {
         (Column::Shared(a), Column::Shared(b)) => Column::Shared(
             a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect(),
@@ -184,7 +181,7 @@ fn own(a: &super::gls::Pulses, add: impl Fn(usize, usize, usize) -> f64) -> supe
 }
 
 /// Motions of the air that an effect may be mistaken for: not the vehicle's, and never added to it.
-pub fn of_the_air(scene: &Scene, response: &[Vec<f64>], least: f64) -> Vec<Candidate> {
+pub(super) fn of_the_air(scene: &Scene, response: &[Vec<f64>], least: f64) -> Vec<Candidate> {
     let last_s = scene.signals.iter().flatten().map(|s| s.time_s).fold(1.0, f64::max);
     let column = |of: &dyn Fn(&crate::effects::Signals) -> f64| {
         let group = |(signals, response): (&Vec<crate::effects::Signals>, &Vec<f64>)| {
@@ -194,7 +191,6 @@ pub fn of_the_air(scene: &Scene, response: &[Vec<f64>], least: f64) -> Vec<Candi
     };
     let air = |name, column| Candidate {
         name,
-        of_vehicle: false,
         was_there: false,
         size: None,
         variants: vec![Variant { vehicle: None, size: 1.0, column }],

@@ -43,7 +43,7 @@ pub struct Comparison {
 }
 
 /// Power of thrust that `u - 1000` goes with at hover.
-pub fn thrust_exponent(vehicle: &Vehicle) -> f64 {
+pub(super) fn thrust_exponent(vehicle: &Vehicle) -> f64 {
     let at = Reference::of(vehicle);
     (at.sensitivity_us() / (at.hover_us() - 1000.0)).clamp(0.2, 1.5)
 }
@@ -169,7 +169,7 @@ impl Comparison {
                 };
                 GroupPattern {
                     drones: of.slots.len(),
-                    time_s: of.bins.iter().map(super::bins::Bin::middle_s).collect(),
+                    time_s: of.bins.iter().map(Bin::middle_s).collect(),
                     height_m: self.scene.signals[group].iter().map(|s| s.height_m).collect(),
                     response: response[group].clone(),
                     bent_us: bent[group].clone(),
@@ -225,7 +225,7 @@ fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
 const FEWEST_BINS: usize = 12;
 
 /// Standard deviation of the vertical air that a noise says a drone meets, m/s.
-pub fn gusts_mps(hyper: &Hyper) -> f64 {
+pub(super) fn gusts_mps(hyper: &Hyper) -> f64 {
     let square = |place| hyper.get(place).powi(2);
     (square(SHARED) + square(GRADIENT) + square(OWN) + square(GUSTS)).sqrt()
 }

@@ -101,7 +101,7 @@ impl Data {
                 .collect();
             let armed = drones.iter().filter_map(|(_, flight)| flight.armed_s.first());
             let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
-            data.add(&group.name, bins, values, armed_s);
+            data.add(&group.name, &bins, values, armed_s);
         }
         data.resistance_ohm = resistance_ohm(flown);
         let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
@@ -130,7 +130,7 @@ impl Data {
             .collect();
         let armed = flown.iter().filter_map(|one| one.flight.armed_s.first());
         let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
-        data.add("all", bins, values, armed_s);
+        data.add("all", &bins, values, armed_s);
         data.resistance_ohm = resistance_ohm(flown);
         data
     }
@@ -158,7 +158,7 @@ impl Data {
     fn add(
         &mut self,
         name: &str,
-        bins: Vec<Bin>,
+        bins: &[Bin],
         drones: Vec<(u16, [f64; 2], Vec<Option<BinValues>>)>,
         armed_s: f64,
     ) {

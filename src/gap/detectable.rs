@@ -19,19 +19,19 @@ const NOTHING_US: f64 = 0.05;
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
+pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let comparison = &found.comparison;
     let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
     let split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
     let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.hyper);
     let candidates = library(&found.vehicle, &comparison.scene)?;
     let drones = comparison.data.counts();
-    let best: Vec<(&Candidate, Option<(White, f64, f64)>)> = candidates
+    let best: Vec<(&Candidate, Option<Trace>)> = candidates
         .iter()
         .map(|candidate| (candidate, strongest(candidate, &solution, &drones)))
         .collect();
     let mut table = Vec::new();
-    for effect in LIBRARY.iter().copied() {
+    for effect in LIBRARY {
         let definition = effect.definition();
         let nothing = |why: &str| Detectable {
             effect: definition.name.to_owned(),
@@ -57,7 +57,7 @@ pub fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
             table.push(nothing("the vehicle cannot have it"));
             continue;
         };
-        let usual_z = per_size * size.usual;
+        let usual_z = per_size * size.usual.abs();
         let smallest = (2.0 * FLOOR_NATS).sqrt() / per_size;
         let like: Vec<String> = best
             .iter()
@@ -66,7 +66,7 @@ pub fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
             .filter(|(_, (other, ..))| solution.likeness(white, other).abs() > SAME)
             .map(|(other, _)| other.name.to_owned())
             .collect();
-        let excited = us * size.usual > NOTHING_US;
+        let excited = us * size.usual.abs() > NOTHING_US;
         let reach = smallest.is_finite() && smallest <= size.high && excited;
         let why = if !excited {
             "this flight does not excite it: its trace is below a twentieth of a microsecond"
@@ -90,13 +90,12 @@ pub fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     Ok(table)
 }
 
+/// A form whitened, its z and its trace (us) per unit of the size.
+type Trace = (White, f64, f64);
+
 /// The form of a candidate that the flight shows best: whitened, its z and its trace (us) per unit of
 /// the size.
-fn strongest(
-    candidate: &Candidate,
-    solution: &Solution,
-    drones: &[usize],
-) -> Option<(White, f64, f64)> {
+fn strongest(candidate: &Candidate, solution: &Solution, drones: &[usize]) -> Option<Trace> {
     let now = candidate.size.map_or(0.0, |size| size.now);
     candidate
         .variants

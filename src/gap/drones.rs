@@ -25,7 +25,7 @@ const USUAL_US: f64 = 20.0;
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub fn drones(
+pub(super) fn drones(
     all: &Comparison,
     found: &Found,
     original: &Vehicle,

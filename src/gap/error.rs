@@ -11,8 +11,8 @@ use crate::sim::SimError;
 pub enum GapError {
     /// No drone has steady flight.
     #[error(
-        "no log has steady flight of the plan to compare{}", 
-        .reasons.iter().take(10).map(|reason| format!("\n  {reason}")).collect::<String>()
+        "no log has steady flight of the plan to compare{}",
+        listed(.reasons)
     )]
     NothingMeasured {
         /// Why each was left out.
@@ -45,4 +45,9 @@ pub enum GapError {
     /// The model is not valid.
     #[error(transparent)]
     Effect(#[from] EffectError),
+}
+
+/// Reasons one below the other; the first ten.
+fn listed(reasons: &[String]) -> String {
+    reasons.iter().take(10).fold(String::new(), |text, reason| text + "\n  " + reason)
 }

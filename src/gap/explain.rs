@@ -1,13 +1,13 @@
 //! The workflow: find, name, add, and again, until nothing passes.
 
-use super::candidates::{Candidate, library, of_the_air};
+use super::candidates::{library, of_the_air};
 use super::compare::{Comparison, Simulated, gusts_mps};
 use super::data::Data;
 use super::error::GapError;
 use super::generic::{Generic, all};
 use super::gls::{Column, Likelihood, Problem, Split};
 use super::noise::{GroupPattern, Hyper, LEAST, WHITE};
-use super::refine::{Parameter, fitted, parameters_of, refine, slopes, value_of};
+use super::refine::{Parameter, fitted, parameters_of, refine, slopes};
 use super::search::{Ranked, RankedGeneric, Round, Sought, Thresholds, round, thresholds};
 use super::verdict::{Finding, Rest, Rival, Shape, Step};
 use crate::mission::plan::Plan;
@@ -172,7 +172,7 @@ pub fn search(
                 }
                 let names: Vec<String> =
                     members.iter().map(|one| candidates[one.candidate].name.to_owned()).collect();
-                let finding = finding(names, &found, candidate.was_there);
+                let finding = finding(names, candidate.was_there);
                 found.steps.push(Step {
                     finding,
                     gain_nats: best.gain,
@@ -181,7 +181,7 @@ pub fn search(
                     size_us: best.size_us,
                     rivals,
                     held_out_us: None,
-                    shape: drawn(&comparison, variant, best.beta),
+                    shape: Some(drawn(&comparison, variant, best.beta)),
                 });
             }
             What::Free(free) => {
@@ -246,19 +246,14 @@ pub(super) fn settle(found: &mut Found) {
     }
 }
 
-fn finding(names: Vec<String>, found: &Found, was_there: bool) -> Finding {
-    let _ = found;
+fn finding(names: Vec<String>, was_there: bool) -> Finding {
     match &names[..] {
         [effect] => Finding::Name { effect: effect.clone(), parameters: Vec::new(), was_there },
         _ => Finding::Class { effects: names, parameters: Vec::new() },
     }
 }
 
-fn drawn(
-    comparison: &Comparison,
-    variant: &super::candidates::Variant,
-    beta: f64,
-) -> Option<Shape> {
+fn drawn(comparison: &Comparison, variant: &super::candidates::Variant, beta: f64) -> Shape {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (group, signals) in comparison.scene.signals.iter().enumerate() {
         for (bin, signal) in signals.iter().enumerate() {
@@ -271,12 +266,12 @@ fn drawn(
         let chunks = points.chunks(size);
         chunks.map(|chunk| chunk.iter().map(of).sum::<f64>() / chunk.len() as f64).collect()
     };
-    Some(Shape {
+    Shape {
         axis: "vertical velocity (m/s)".to_owned(),
         x: mean(|point| point.0),
         us: mean(|point| point.1),
         se_us: Vec::new(),
-    })
+    }
 }
 
 fn rivals(round: &Round, sought: Sought<'_>) -> Vec<Rival> {
@@ -391,16 +386,6 @@ fn left_with(
     let before = with.fit(best.hyper, Likelihood::Profile);
     let both = with.with(&generic.columns).fit(free.hyper, Likelihood::Profile);
     both.log_posterior() - before.log_posterior() - generic.penalty
-}
-
-/// Whether a list of candidates has an effect, for tests and for what may be asked next.
-pub fn has(candidates: &[Candidate], name: &str) -> bool {
-    candidates.iter().any(|candidate| candidate.name == name)
-}
-
-/// A fitted value by effect and parameter.
-pub fn found_value(found: &Found, effect: &str, parameter: &str) -> Option<f64> {
-    value_of(&found.vehicle, effect, parameter)
 }
 
 /// A size that is not this many standard errors from what the model had is taken back.

@@ -7,7 +7,7 @@
 
 /// How one state moves between observations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State {
+pub(super) struct State {
     /// Stationary variance.
     pub variance: f64,
     /// Time scale, s; infinite: constant.
@@ -16,7 +16,7 @@ pub struct State {
 
 /// One observation of the states.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Observation {
+pub(super) struct Observation {
     /// When, s; not decreasing.
     pub time_s: f64,
     /// (state, factor) pairs.
@@ -27,7 +27,7 @@ pub struct Observation {
 
 /// The gains of a filter for a fixed pattern of observations.
 #[derive(Clone, Debug)]
-pub struct Filter {
+pub(super) struct Filter {
     dim: usize,
     steps: Vec<Step>,
     /// Sum of ln of the innovations' variances.
@@ -46,7 +46,7 @@ struct Step {
 
 impl Filter {
     /// Runs the covariances through the observations.
-    pub fn new(states: &[State], observations: &[Observation]) -> Self {
+    pub(super) fn new(states: &[State], observations: &[Observation]) -> Self {
         let dim = states.len();
         let mut covariance = vec![0.0; dim * dim];
         for (index, state) in states.iter().enumerate() {
@@ -98,7 +98,7 @@ impl Filter {
     }
 
     /// A series as independent noise of variance 1, if its covariance is the filter's.
-    pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
+    pub(super) fn whiten(&self, series: &[f64]) -> Vec<f64> {
         let mut state = vec![0.0; self.dim];
         self.steps
             .iter()
@@ -119,7 +119,7 @@ impl Filter {
     }
 
     /// A series with the filter's covariance, from independent noise of variance 1.
-    pub fn colour(&self, noise: &[f64]) -> Vec<f64> {
+    pub(super) fn colour(&self, noise: &[f64]) -> Vec<f64> {
         let mut state = vec![0.0; self.dim];
         self.steps
             .iter()

@@ -6,7 +6,7 @@ use super::verdict::Shape;
 const ENOUGH: f64 = 0.95;
 
 /// A formula in plain text, for example `-12.3 sin(2 pi h / 31 m + 0.4) us`.
-pub fn formula(depends_on: &str, shape: &Shape) -> Option<String> {
+pub(super) fn formula(depends_on: &str, shape: &Shape) -> Option<String> {
     let (x, y) = (&shape.x, &shape.us);
     if x.len() < 5 {
         return None;

@@ -7,7 +7,7 @@ use crate::gap::verdict::Shape;
 
 /// A family of regressors that together make a free shape along one signal.
 #[derive(Clone, Debug)]
-pub struct Generic {
+pub(super) struct Generic {
     /// What it depends on.
     pub depends_on: &'static str,
     /// Label with unit.
@@ -29,7 +29,7 @@ const STEPS: usize = 15;
 const LEAST_SPAN: f64 = 0.05;
 
 /// All free shapes that the flight can show.
-pub fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
+pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     let mut found = Vec::new();
     let along = |of: &dyn Fn(&Signals) -> f64| -> Vec<Vec<f64>> {
         scene.signals.iter().map(|group| group.iter().map(of).collect()).collect()
@@ -179,7 +179,7 @@ const POINTS: usize = 40;
 
 impl Generic {
     /// The shape with these coefficients, by its signal: means in up to forty places.
-    pub fn shape(&self, beta: &[f64]) -> Shape {
+    pub(super) fn shape(&self, beta: &[f64]) -> Shape {
         let mut points: Vec<(f64, f64)> = Vec::new();
         for (group, along) in self.along.iter().enumerate() {
             for (bin, x) in along.iter().enumerate() {

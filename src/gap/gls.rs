@@ -7,7 +7,7 @@ use super::minimise::minimise;
 use super::noise::{GroupPattern, Hyper, Whitener};
 
 /// Values of all drones, by group, drone and bin.
-pub type Pulses = Vec<Vec<Vec<f64>>>;
+pub(super) type Pulses = Vec<Vec<Vec<f64>>>;
 
 /// A regressor.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,11 +66,15 @@ impl Column {
         match self {
             Self::Shared(values) => {
                 for (bins, drones) in values.iter().zip(drones) {
-                    bins.iter().for_each(|value| add(*value, *drones as f64));
+                    for value in bins {
+                        add(*value, *drones as f64);
+                    }
                 }
             }
             Self::Own(values) => {
-                values.iter().flatten().flatten().for_each(|value| add(*value, 1.0))
+                for value in values.iter().flatten().flatten() {
+                    add(*value, 1.0);
+                }
             }
         }
         (squares / count - (sum / count).powi(2)).max(0.0).sqrt()
@@ -85,14 +89,14 @@ fn mean_of(drones: &[Vec<f64>]) -> Vec<f64> {
 
 /// Pulses split into groups' means and drones' deviations.
 #[derive(Clone, Debug)]
-pub struct Split {
+pub(super) struct Split {
     means: Vec<Vec<f64>>,
     deviations: Pulses,
 }
 
 impl Split {
     /// Of pulses by group, drone and bin.
-    pub fn of(pulses: &Pulses) -> Self {
+    pub(super) fn of(pulses: &Pulses) -> Self {
         let means: Vec<Vec<f64>> = pulses.iter().map(|drones| mean_of(drones)).collect();
         let deviations = pulses
             .iter()
@@ -116,7 +120,7 @@ impl Split {
 
 /// Something whitened.
 #[derive(Clone, Debug)]
-pub struct White {
+pub(super) struct White {
     means: Vec<f64>,
     deviations: Vec<f64>,
 }
@@ -142,7 +146,7 @@ impl White {
 
 /// A problem: measured against the model, and the regressors that are in the model already.
 #[derive(Clone, Debug)]
-pub struct Problem<'a> {
+pub(super) struct Problem<'a> {
     /// Patterns of the groups.
     pub groups: &'a [GroupPattern],
     /// What is to be explained.
@@ -153,21 +157,21 @@ pub struct Problem<'a> {
 
 impl<'a> Problem<'a> {
     /// With a common offset.
-    pub fn new(groups: &'a [GroupPattern], pulses: &'a Split) -> Self {
+    pub(super) fn new(groups: &'a [GroupPattern], pulses: &'a Split) -> Self {
         let ones = groups.iter().map(|group| vec![1.0; group.time_s.len()]).collect();
         Self { groups, pulses, columns: vec![Split::of_column(&Column::Shared(ones))] }
     }
 
     /// With further regressors.
     #[must_use]
-    pub fn with<'c>(&self, columns: impl IntoIterator<Item = &'c Column>) -> Self {
+    pub(super) fn with<'c>(&self, columns: impl IntoIterator<Item = &'c Column>) -> Self {
         let mut more = self.clone();
         more.columns.extend(columns.into_iter().map(Split::of_column));
         more
     }
 
     /// At fixed noise.
-    pub fn at(&self, hyper: &Hyper) -> Solution {
+    pub(super) fn at(&self, hyper: &Hyper) -> Solution {
         let whitener = Whitener::new(self.groups, hyper);
         let y = White::of(&whitener, self.pulses);
         let columns: Vec<White> =
@@ -176,7 +180,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Most probable noise from a start, with everything linear at its best.
-    pub fn fit(&self, start: Hyper, likelihood: Likelihood) -> Solution {
+    pub(super) fn fit(&self, start: Hyper, likelihood: Likelihood) -> Solution {
         let objective = |at: &[f64; super::noise::COUNT]| {
             let hyper = Hyper(*at);
             let solution = self.at(&hyper);
@@ -189,7 +193,7 @@ impl<'a> Problem<'a> {
 
 /// Which likelihood the noise is fitted with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Likelihood {
+pub(super) enum Likelihood {
     /// Maximum likelihood: gains of regressors can be compared.
     Profile,
     /// Restricted: knows that regressors were fitted; for intervals.
@@ -198,7 +202,7 @@ pub enum Likelihood {
 
 /// A problem solved at one noise.
 #[derive(Clone, Debug)]
-pub struct Solution {
+pub(super) struct Solution {
     /// The noise.
     pub hyper: Hyper,
     whitener: Whitener,
@@ -215,7 +219,7 @@ pub struct Solution {
 
 /// What a regressor would gain at fixed noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Gain {
+pub(super) struct Gain {
     /// Its coefficient.
     pub beta: f64,
     /// Standard error of it.
@@ -242,7 +246,7 @@ impl Solution {
     }
 
     /// Logarithm of the likelihood, without its constant; −∞ where regressors are collinear.
-    pub fn log_likelihood(&self, likelihood: Likelihood) -> f64 {
+    pub(super) fn log_likelihood(&self, likelihood: Likelihood) -> f64 {
         let Some(factor) = &self.factor else { return f64::NEG_INFINITY };
         let mut twice = self.whitener.log_det + self.chi2;
         if likelihood == Likelihood::Restricted {
@@ -252,18 +256,18 @@ impl Solution {
     }
 
     /// Log-likelihood with the prior of the noise.
-    pub fn log_posterior(&self) -> f64 {
+    pub(super) fn log_posterior(&self) -> f64 {
         self.log_likelihood(Likelihood::Profile) + self.hyper.log_prior()
     }
 
     /// Covariance of the coefficients.
-    pub fn covariance(&self) -> DMatrix<f64> {
+    pub(super) fn covariance(&self) -> DMatrix<f64> {
         let count = self.columns.len();
         self.factor.as_ref().map_or_else(|| DMatrix::zeros(count, count), Cholesky::inverse)
     }
 
     /// What one more regressor would gain, with all others free, at this noise.
-    pub fn gain(&self, column: &Column) -> Gain {
+    pub(super) fn gain(&self, column: &Column) -> Gain {
         let white = self.white(column);
         let Some((information, score)) = self.partial(&white) else { return Gain::default() };
         let beta = score / information;
@@ -271,7 +275,7 @@ impl Solution {
     }
 
     /// What several more regressors would gain together: coefficients and nats.
-    pub fn gain_of_all(&self, columns: &[Column]) -> (Vec<f64>, f64) {
+    pub(super) fn gain_of_all(&self, columns: &[Column]) -> (Vec<f64>, f64) {
         let whites: Vec<White> = columns.iter().map(|column| self.white(column)).collect();
         let count = whites.len();
         let residual = self.residual_of(&self.y);
@@ -286,18 +290,18 @@ impl Solution {
     }
 
     /// A regressor whitened.
-    pub fn white(&self, column: &Column) -> White {
+    pub(super) fn white(&self, column: &Column) -> White {
         White::of(&self.whitener, &Split::of_column(column))
     }
 
     /// Correlation of two regressors with everything in the model partialled out.
-    pub fn likeness(&self, one: &White, other: &White) -> f64 {
+    pub(super) fn likeness(&self, one: &White, other: &White) -> f64 {
         let (one, other) = (self.residual_of(one), self.residual_of(other));
         one.dot(&other) / (one.dot(&one) * other.dot(&other)).sqrt().max(f64::MIN_POSITIVE)
     }
 
     /// Information on a coefficient: over its square root, a size becomes a Fisher z.
-    pub fn information(&self, white: &White) -> f64 {
+    pub(super) fn information(&self, white: &White) -> f64 {
         let part = self.residual_of(white);
         part.dot(&part)
     }
@@ -329,7 +333,7 @@ impl Solution {
     }
 
     /// Pulses of all drones that this noise makes.
-    pub fn simulate(&self, draw: impl FnMut() -> f64) -> Pulses {
+    pub(super) fn simulate(&self, draw: impl FnMut() -> f64) -> Pulses {
         self.whitener.simulate(draw)
     }
 }

@@ -35,7 +35,7 @@ struct Residuals {
 ///
 /// # Errors
 /// See [`GapError`].
-pub fn gap(
+pub(super) fn gap(
     train: &Data,
     held: &Data,
     original: &Vehicle,

@@ -99,7 +99,11 @@ pub struct Measured {
 ///
 /// `flown` is the simulated side with the wind that it was flown in: legs are short, and what a lean
 /// still lacks of its steady value there lacks in the simulator, too.
-pub fn wind(data: &Data, law: LeanLaw, flown: Option<(&[Vec<BinValues>], [f64; 2])>) -> Wind {
+pub(super) fn wind(
+    data: &Data,
+    law: LeanLaw,
+    flown: Option<(&[Vec<BinValues>], [f64; 2])>,
+) -> Wind {
     let leans: Vec<Vec<[f64; 2]>> = data
         .groups
         .iter()

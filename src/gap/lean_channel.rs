@@ -15,7 +15,7 @@ const MATERIAL: f64 = 0.003;
 const NAMED_Z: f64 = 5.0;
 
 /// Wind and lean of a comparison with the model that was planned with.
-pub fn found(before: &Comparison) -> WindFound {
+pub(super) fn found(before: &Comparison) -> WindFound {
     let model = LeanLaw::of(&before.vehicle, SEA_LEVEL_DENSITY);
     WindFound {
         mean_mps: before.wind.mean_mps,
@@ -29,7 +29,7 @@ pub fn found(before: &Comparison) -> WindFound {
 }
 
 /// Blade flapping that the model lacks, or has with another size.
-pub fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
+pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
     let measured = before.wind.measured?;
     let apart = measured.law.linear - wind.model_lean_per_mps;
     let z = apart.abs() / measured.linear_se;

@@ -69,9 +69,8 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         (None, None) => return Err(GapError::NoSimulatedSide),
     };
     let (train, held) = data.split();
-    let train_side = part(&simulated, &data);
-    let mut found = search(&train, input.vehicle, &train_side, input.plan, options)?;
-    let shrink = gap(&train, &held, input.vehicle, &train_side, input.plan, &found, options.seed)?;
+    let mut found = search(&train, input.vehicle, &simulated, input.plan, options)?;
+    let shrink = gap(&train, &held, input.vehicle, &simulated, input.plan, &found, options.seed)?;
     let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
     let whole = Comparison::new(&data, &found.vehicle, &simulated, input.plan)?;
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
@@ -135,7 +134,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
 pub fn fisher_z(
     input: &Input<'_>,
     hidden: &[(&str, &str, f64)],
-    options: &Options,
 ) -> Result<Vec<Option<f64>>, GapError> {
     let plan = input.plan.ok_or(GapError::NoSimulatedSide)?;
     let exponent = super::compare::thrust_exponent(input.vehicle);
@@ -146,7 +144,7 @@ pub fn fisher_z(
         hidden.iter().map(|(effect, size, _)| size_of(effect, size)).collect();
     let known: Vec<Parameter> = parameters.iter().flatten().cloned().collect();
     let vehicle = comparison.vehicle.clone();
-    let errors = size_errors(&comparison, &vehicle, &known, options)?;
+    let errors = size_errors(&comparison, &vehicle, &known)?;
     let mut errors = errors.into_iter();
     Ok(parameters
         .iter()
@@ -156,11 +154,6 @@ pub fn fisher_z(
             (se > 0.0).then(|| (change / se).abs()).filter(|z| z.is_finite())
         })
         .collect())
-}
-
-/// The simulated side for the fitted drones: the same groups.
-fn part<'a>(simulated: &Simulated<'a>, _data: &Data) -> Simulated<'a> {
-    simulated.clone()
 }
 
 fn constant(data: &Data) -> Result<(), GapError> {

@@ -19,7 +19,7 @@ const SATURATED_SHARE: f64 = 0.05;
 ///
 /// `orientation_deg` is the show frame's, clockwise from north to x; `thrust_exponent` the power of
 /// thrust that `u - 1000` goes with.
-pub fn measured(
+pub(super) fn measured(
     flight: &Flight,
     bins: &[Bin],
     orientation_deg: f64,

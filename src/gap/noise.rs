@@ -17,27 +17,27 @@ use super::filter::{Filter, Observation, State};
 pub struct Hyper(pub [f64; COUNT]);
 
 /// Number of parameters.
-pub const COUNT: usize = 10;
+pub(super) const COUNT: usize = 10;
 /// Places in [`Hyper`].
-pub const SHARED: usize = 0;
+pub(super) const SHARED: usize = 0;
 /// Time scale of the shared air.
-pub const SHARED_TIME: usize = 1;
+pub(super) const SHARED_TIME: usize = 1;
 /// Slow own air.
-pub const OWN: usize = 2;
+pub(super) const OWN: usize = 2;
 /// Gusts.
-pub const GUSTS: usize = 3;
+pub(super) const GUSTS: usize = 3;
 /// Time scale of gusts.
-pub const GUST_TIME: usize = 4;
+pub(super) const GUST_TIME: usize = 4;
 /// White noise of a bin, us.
-pub const WHITE: usize = 5;
+pub(super) const WHITE: usize = 5;
 /// Spread of hover pulses, us.
-pub const OFFSETS: usize = 6;
+pub(super) const OFFSETS: usize = 6;
 /// Relative spread of responses.
-pub const SLOPES: usize = 7;
+pub(super) const SLOPES: usize = 7;
 /// Least response to vertical air speed, us/(m/s).
-pub const LEAST: usize = 8;
+pub(super) const LEAST: usize = 8;
 /// How the shared updraft changes with height, m/s per 50 m.
-pub const GRADIENT: usize = 9;
+pub(super) const GRADIENT: usize = 9;
 
 /// Prior of each parameter: median, and a standard deviation as a factor. Wide: they keep the search
 /// where weather and drones can be, and decide only what the flight does not say (a record of a few
@@ -96,7 +96,7 @@ pub struct GroupPattern {
 
 /// The whitening filters of all groups at one set of parameters.
 #[derive(Clone, Debug)]
-pub struct Whitener {
+pub(super) struct Whitener {
     /// Means of all groups together: (group, bin) in the order of time, and their filter.
     order: Vec<(usize, usize)>,
     means: Filter,
@@ -122,7 +122,7 @@ impl GroupPattern {
 
 impl Whitener {
     /// For these groups and this noise.
-    pub fn new(groups: &[GroupPattern], hyper: &Hyper) -> Self {
+    pub(super) fn new(groups: &[GroupPattern], hyper: &Hyper) -> Self {
         let square = |place: usize| hyper.get(place).powi(2);
         let own = |share: f64| {
             [
@@ -196,19 +196,19 @@ impl Whitener {
     }
 
     /// Whitens the groups' means, by group and bin.
-    pub fn means(&self, by_group: &[Vec<f64>]) -> Vec<f64> {
+    pub(super) fn means(&self, by_group: &[Vec<f64>]) -> Vec<f64> {
         let series: Vec<f64> =
             self.order.iter().map(|(group, bin)| by_group[*group][*bin]).collect();
         self.means.whiten(&series)
     }
 
     /// Whitens one drone's deviations from its group's mean.
-    pub fn deviation(&self, group: usize, series: &[f64]) -> Vec<f64> {
+    pub(super) fn deviation(&self, group: usize, series: &[f64]) -> Vec<f64> {
         self.deviations[group].whiten(series)
     }
 
     /// Pulses of all drones that the noise alone makes, by group and drone: from independent noise.
-    pub fn simulate(&self, mut draw: impl FnMut() -> f64) -> Vec<Vec<Vec<f64>>> {
+    pub(super) fn simulate(&self, mut draw: impl FnMut() -> f64) -> Vec<Vec<Vec<f64>>> {
         let noise: Vec<f64> = self.order.iter().map(|_| draw()).collect();
         let series = self.means.colour(&noise);
         let mut means: Vec<Vec<f64>> = self.drones.iter().map(|_| Vec::new()).collect();

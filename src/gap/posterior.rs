@@ -9,7 +9,7 @@ use super::noise::{
 
 /// A linear map from the groups' mean residuals to the shared updraft at the same bins.
 #[derive(Clone, Debug)]
-pub struct SharedAir {
+pub(super) struct SharedAir {
     /// (group, bin) in the order of rows and columns.
     order: Vec<(usize, usize)>,
     map: DMatrix<f64>,
@@ -17,7 +17,7 @@ pub struct SharedAir {
 
 impl SharedAir {
     /// For these groups and this noise.
-    pub fn new(groups: &[GroupPattern], hyper: &Hyper) -> Self {
+    pub(super) fn new(groups: &[GroupPattern], hyper: &Hyper) -> Self {
         let order: Vec<(usize, usize)> = groups
             .iter()
             .enumerate()
@@ -63,7 +63,7 @@ impl SharedAir {
 
     /// What the shared air does to the pulse, by group and bin, us, from the groups' mean residuals;
     /// the response is applied.
-    pub fn pulses(
+    pub(super) fn pulses(
         &self,
         means: &[Vec<f64>],
         groups: &[GroupPattern],

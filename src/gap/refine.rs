@@ -35,19 +35,17 @@ pub struct Parameter {
 
 /// A joint fit.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub(super) struct Fit {
     /// The vehicle with the fitted values.
     pub vehicle: Vehicle,
     /// Its noise (restricted likelihood).
     pub hyper: Hyper,
-    /// The linearised problem at its end.
-    pub solution: Solution,
     /// Value and standard error of each parameter.
     pub values: Vec<(f64, f64)>,
 }
 
 /// A parameter's value in a vehicle.
-pub fn value_of(vehicle: &Vehicle, effect: &str, parameter: &str) -> Option<f64> {
+pub(super) fn value_of(vehicle: &Vehicle, effect: &str, parameter: &str) -> Option<f64> {
     let known = find(effect)?;
     vehicle.effects.get(effect).filter(|table| table.on)?;
     let values = select::values_of(known, vehicle).ok()?;
@@ -59,7 +57,7 @@ pub fn value_of(vehicle: &Vehicle, effect: &str, parameter: &str) -> Option<f64>
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub fn refine(
+pub(super) fn refine(
     comparison: &Comparison,
     vehicle: &Vehicle,
     parameters: &[Parameter],
@@ -101,7 +99,7 @@ pub fn refine(
                 vehicle = other;
             }
         }
-        last = Some(Fit { vehicle: vehicle.clone(), hyper, solution, values });
+        last = Some(Fit { vehicle: vehicle.clone(), hyper, values });
         if moved < 0.05 && (round >= 2 || !fit_noise) {
             break;
         }
@@ -113,7 +111,7 @@ pub fn refine(
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub fn slopes(
+pub(super) fn slopes(
     comparison: &Comparison,
     vehicle: &Vehicle,
     parameters: &[Parameter],
@@ -149,7 +147,7 @@ fn scaled(column: &Column, factor: f64) -> Column {
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub fn parameters_of(
+pub(super) fn parameters_of(
     comparison: &Comparison,
     vehicle: &Vehicle,
     effect: &str,
@@ -194,7 +192,7 @@ pub fn parameters_of(
 }
 
 /// The size of an effect as a parameter; `None`: steady flight does not show it.
-pub fn size_of(effect: &str, size: &str) -> Option<Parameter> {
+pub(super) fn size_of(effect: &str, size: &str) -> Option<Parameter> {
     let definition = find(effect)?.definition();
     let crate::effects::Sought::Shape { .. } = &definition.sought else { return None };
     let parameter = definition.parameters.iter().find(|known| known.name == size)?;
@@ -211,11 +209,10 @@ pub fn size_of(effect: &str, size: &str) -> Option<Parameter> {
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub fn size_errors(
+pub(super) fn size_errors(
     comparison: &Comparison,
     vehicle: &Vehicle,
     parameters: &[Parameter],
-    _options: &super::explain::Options,
 ) -> Result<Vec<f64>, GapError> {
     let patterns = comparison.patterns(vehicle, 0.0)?;
     let split = Split::of(&comparison.residual(vehicle, 0.0)?);
@@ -229,7 +226,7 @@ pub fn size_errors(
 }
 
 /// Fitted values with their intervals, for the verdict.
-pub fn fitted(parameters: &[Parameter], values: &[(f64, f64)]) -> Vec<Fitted> {
+pub(super) fn fitted(parameters: &[Parameter], values: &[(f64, f64)]) -> Vec<Fitted> {
     let one = |(parameter, (value, se)): (&Parameter, &(f64, f64))| {
         let (low, high) = parameter.bounds;
         Fitted {

@@ -17,7 +17,7 @@ const GRAVITY: f64 = 9.80665;
 const EVERY: u64 = 8;
 
 /// The fleet's mean drone: what makes drones differ is off.
-pub fn mean_drone(vehicle: &Vehicle) -> Vehicle {
+pub(super) fn mean_drone(vehicle: &Vehicle) -> Vehicle {
     let mut mean = vehicle.clone();
     for (name, parameter) in
         [("mass-spread", "sd"), ("thrust-spread", "sd"), ("rotor-inflow", "spread")]
@@ -36,7 +36,7 @@ pub fn mean_drone(vehicle: &Vehicle) -> Vehicle {
 ///
 /// # Errors
 /// The flight failed: a vehicle that cannot fly, or effects that are not valid.
-pub fn refly(
+pub(super) fn refly(
     vehicle: &Vehicle,
     plan: &Plan,
     slot: &Slot,

@@ -15,17 +15,22 @@ const CLASSES: usize = 8;
 /// Simulated flights for the standard errors.
 const DRAWS: usize = 60;
 
+/// The class of a group's drone in a bin: label and place on the axis.
+type ClassOf<'a> = Box<dyn Fn(usize, usize, usize) -> Option<(String, f64)> + 'a>;
+/// A class with its bins: group, drone, bin.
+type Class = (String, f64, Vec<(usize, usize, usize)>);
+
 /// One way of holding bins apart: its name and the class of a bin: (label, place on the axis).
 struct Axis<'a> {
     by: &'static str,
-    of: Box<dyn Fn(usize, usize, usize) -> Option<(String, f64)> + 'a>,
+    of: ClassOf<'a>,
 }
 
 /// The residual before and after in each regime; drone means are removed but for the drones' own.
 ///
 /// # Errors
 /// Effects of a vehicle that are not valid.
-pub fn regimes(
+pub(super) fn regimes(
     before: &Comparison,
     after: &Comparison,
     found: &Found,
@@ -47,7 +52,7 @@ pub fn regimes(
     for axis in axes(after) {
         let by_drone = axis.by == "drone" || axis.by == "place";
         let (from, to) = if by_drone { (&start, &end) } else { (&flat_start, &flat_end) };
-        let mut classes: Vec<(String, f64, Vec<(usize, usize, usize)>)> = Vec::new();
+        let mut classes: Vec<Class> = Vec::new();
         for (group, drones) in to.iter().enumerate() {
             for (drone, bins) in drones.iter().enumerate() {
                 for bin in 0..bins.len() {

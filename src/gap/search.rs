@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::candidates::{Candidate, Variant};
 use super::generic::Generic;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
-use super::noise::{GroupPattern, Hyper};
+use super::noise::Hyper;
 use crate::base::rng::{Purpose, stream};
 
 /// Candidates this near to the best by the quick scan are fitted with their own noise, nats.
@@ -19,7 +19,7 @@ const MOST_BETA: f64 = 5.0;
 
 /// One candidate's best form in a round.
 #[derive(Clone, Debug)]
-pub struct Ranked {
+pub(super) struct Ranked {
     /// Place in the list of candidates.
     pub candidate: usize,
     /// Its best form.
@@ -38,7 +38,7 @@ pub struct Ranked {
 
 /// The best free shapes of a round.
 #[derive(Clone, Debug)]
-pub struct RankedGeneric {
+pub(super) struct RankedGeneric {
     /// Place in the list.
     pub generic: usize,
     /// Gain less its penalty, nats.
@@ -53,7 +53,7 @@ pub struct RankedGeneric {
 
 /// What a round found.
 #[derive(Clone, Debug)]
-pub struct Round {
+pub(super) struct Round {
     /// The model so far with its noise.
     pub base: Solution,
     /// Candidates, best first.
@@ -64,19 +64,19 @@ pub struct Round {
 
 impl Round {
     /// Largest gain of an effect that can be named.
-    pub fn best(&self) -> f64 {
+    pub(super) fn best(&self) -> f64 {
         self.library.first().map_or(0.0, |best| best.gain)
     }
 
     /// Largest gain of a free shape.
-    pub fn best_generic(&self) -> f64 {
+    pub(super) fn best_generic(&self) -> f64 {
         self.generics.first().map_or(0.0, |best| best.gain)
     }
 }
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug)]
-pub struct Sought<'a> {
+pub(super) struct Sought<'a> {
     /// Effects and motions of the air.
     pub library: &'a [Candidate],
     /// Free shapes.
@@ -86,7 +86,7 @@ pub struct Sought<'a> {
 }
 
 /// Looks once.
-pub fn round(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>) -> Round {
+pub(super) fn round(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>) -> Round {
     let base = problem.fit(start, Likelihood::Profile);
     let mut library = scan(&base, sought);
     let best = library.first().map_or(0.0, |best| best.gain);
@@ -219,7 +219,7 @@ fn free_shapes(
 }
 
 /// Standard deviation over bins of a sum of regressors, us.
-pub fn spread(columns: &[Column], beta: &[f64], drones: &[usize]) -> f64 {
+pub(super) fn spread(columns: &[Column], beta: &[f64], drones: &[usize]) -> f64 {
     let Some(first) = columns.first() else { return 0.0 };
     let value = |group: usize, drone: usize, bin: usize| {
         columns.iter().zip(beta).map(|(c, b)| b * c.at(group, drone, bin)).sum::<f64>()
@@ -250,7 +250,7 @@ pub fn spread(columns: &[Column], beta: &[f64], drones: &[usize]) -> f64 {
 
 /// Thresholds: gains that flights with nothing to find exceed with a small chance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Thresholds {
+pub(super) struct Thresholds {
     /// For effects of the library, nats.
     pub library: f64,
     /// For free shapes, nats.
@@ -258,15 +258,15 @@ pub struct Thresholds {
 }
 
 /// The least threshold, nats: z = 4 against a single alternative (physics note, section 3.3).
-pub const FLOOR_NATS: f64 = 8.0;
+pub(super) const FLOOR_NATS: f64 = 8.0;
 /// The same for free shapes, of which there are dozens.
-pub const FREE_FLOOR_NATS: f64 = 14.0;
+pub(super) const FREE_FLOOR_NATS: f64 = 14.0;
 /// Share of the replicates whose gains tell the tail.
 const TAIL: f64 = 0.25;
 
 /// Thresholds from flights simulated from the fitted noise with the same pattern: a parametric
 /// bootstrap, the same for any number of threads.
-pub fn thresholds(
+pub(super) fn thresholds(
     problem: &Problem<'_>,
     base: &Solution,
     sought: Sought<'_>,
@@ -308,9 +308,6 @@ fn quantile(mut values: Vec<f64>, alpha: f64) -> f64 {
         values.iter().rev().take(tail).map(|value| value - start).sum::<f64>() / tail as f64;
     start + excess * (share / alpha).ln().max(0.0)
 }
-
-/// Patterns of groups.
-pub type Patterns = Vec<GroupPattern>;
 
 #[cfg(test)]
 mod tests {

@@ -22,7 +22,7 @@ const LAG_STEP_S: f64 = 0.02;
 const STEP_S: f64 = 0.05;
 
 /// What the velocities of a fleet say. `segments` gives what a slot flew.
-pub fn sensor<'a>(
+pub(super) fn sensor<'a>(
     flown: &[Flown<'_>],
     segments: impl Fn(u16) -> Option<&'a [Segment]>,
 ) -> SensorChannel {

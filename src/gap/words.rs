@@ -1,5 +1,7 @@
 //! The verdict in plain words.
 
+use std::fmt::Write as _;
+
 use super::verdict::{Finding, Fitted, Step, Verdict};
 
 /// One finding as a phrase: `rotor-inflow (inflow_share 0.42, 0.39 to 0.45)`.
@@ -80,19 +82,21 @@ pub fn summary(verdict: &Verdict) -> String {
     if verdict.sensor.named {
         let bias = verdict.sensor.bias_mps.map_or(0.0, |bias| bias.value);
         let lag = verdict.sensor.lag_s.map_or(0.0, |lag| lag.value);
-        text.push_str(&format!(
+        let _ = write!(
+            text,
             " The vertical velocity itself is off by {bias:+.3} m/s and late by {lag:.2} s \
              (velocity-error)."
-        ));
+        );
     }
     if let Some(shrink) =
         verdict.gap.drones.or(verdict.gap.rungs).filter(|_| !verdict.steps.is_empty())
     {
-        text.push_str(&format!(
+        let _ = write!(
+            text,
             " On data that was not used for fitting the gap goes from {:.1} to {:.1} us; noise and air \
              alone leave {:.1}.",
             shrink.before_without_air_us, shrink.after_without_air_us, shrink.floor_us
-        ));
+        );
     }
     text
 }

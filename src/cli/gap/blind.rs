@@ -45,6 +45,6 @@ impl Explain for Searched {
                 (effect, one.size.as_str(), one.value() - one.before.unwrap_or(0.0))
             })
             .collect();
-        fisher_z(&input, &hidden, &Options::default()).unwrap_or_else(|_| unknown())
+        fisher_z(&input, &hidden).unwrap_or_else(|_| unknown())
     }
 }
