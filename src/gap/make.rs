@@ -1,5 +1,6 @@
 //! From logs to a verdict and a model.
 
+use super::bins::Bin;
 use super::compare::{Comparison, Simulated};
 use super::data::{Data, Flown};
 use super::detectable::detectable;
@@ -13,7 +14,9 @@ use super::noise::{
 use super::refine::{Parameter, size_errors, size_of};
 use super::regimes::regimes;
 use super::sensor::sensor;
-use super::verdict::{DataUsed, Drones, Noise, SensorChannel, VERDICT_SCHEMA, Verdict};
+use super::verdict::{
+    DataUsed, Drones, Noise, Regime, Rung, SensorChannel, VERDICT_SCHEMA, Verdict,
+};
 use super::words::summary;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
@@ -43,6 +46,9 @@ pub struct Explained {
     /// The search, for what comes after.
     pub found: Found,
 }
+
+/// Climb speeds of one rung of the ladder differ by less, m/s.
+const SAME_SPEED_MPS: f64 = 0.05;
 
 /// A pulse that moves less than this is a constant, us.
 const CONSTANT_US: f64 = 0.02;
@@ -111,8 +117,10 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         drones: differences,
         gap: shrink,
         regimes: regimes(&before, &whole, &found, options.seed)?,
+        ladder: Vec::new(),
         cautions: cautions(&data, &found, input),
     };
+    verdict.ladder = ladder(&whole.data, &verdict.regimes);
     verdict.summary = summary(&verdict);
     Ok(Explained { verdict, model: model(input.vehicle, &found), found })
 }
@@ -173,6 +181,38 @@ fn noise(hyper: &Hyper) -> Noise {
         slopes: hyper.get(SLOPES),
         least_response: hyper.get(LEAST),
     }
+}
+
+/// Measured pulses of each climb speed, and the models' by the residuals of its regime.
+fn ladder(data: &Data, regimes: &[Regime]) -> Vec<Rung> {
+    let pulses = |climb_mps: f64| -> Vec<f64> {
+        let of_rung = |bin: &Bin| {
+            !bin.is_horizontal() && (bin.climb_mps() - climb_mps).abs() < SAME_SPEED_MPS
+        };
+        let drones = data
+            .groups
+            .iter()
+            .flat_map(|group| group.measured.iter().map(move |drone| group.bins.iter().zip(drone)));
+        drones
+            .flatten()
+            .filter(|(bin, _)| of_rung(bin))
+            .map(|(_, values)| values.pulse_us)
+            .collect()
+    };
+    let rungs = regimes.iter().filter(|regime| regime.by == "climb");
+    rungs
+        .filter_map(|rung| {
+            let pulses = pulses(rung.x);
+            let measured_us = pulses.iter().sum::<f64>() / pulses.len() as f64;
+            measured_us.is_finite().then(|| Rung {
+                climb_mps: rung.x,
+                measured_us,
+                before_us: measured_us - rung.before_us.0,
+                after_us: measured_us - rung.after_us,
+                se_us: rung.before_us.1,
+            })
+        })
+        .collect()
 }
 
 /// The vehicle file with what was found; what makes drones differ stays as it was.
