@@ -111,8 +111,11 @@ fn abscissa(by: &str, rows: &[&Regime]) -> Axis {
     };
     let values = rows.iter().flat_map(|row| [row.x - unit, row.x + unit]);
     let mut axis = Axis::around(&regime_axis(by), values, least);
-    if matches!(by, "place" | "drone") {
+    if of_drones(by) {
         axis.step = axis.step.max(1.0);
+    }
+    if by == "voltage" {
+        (axis.min, axis.max) = (axis.min.max(0.0), axis.max.min(1.0));
     }
     axis
 }

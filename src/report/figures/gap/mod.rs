@@ -24,7 +24,7 @@ const OF_95: f64 = 1.96;
 
 /// Words on an axis that come from signals have the unit of the files.
 fn axis_words(text: &str) -> String {
-    super::super::gap_words::micro(text)
+    crate::report::gap_words::micro(text)
 }
 
 /// A point without bars.
@@ -49,7 +49,10 @@ fn residuals(panel: &mut Panel, rows: &[&Regime], bar_width: f64, chance: bool) 
     let before: Vec<(f64, f64)> = rows.iter().map(|row| (row.x, row.before_us.0)).collect();
     let after: Vec<(f64, f64)> = rows.iter().map(|row| (row.x, row.after_us)).collect();
     for (points, (colour, shape)) in [(before, BEFORE), (after, AFTER)] {
-        panel.line(&points, colour, 1.1, "");
+        // Places and drones have no order to follow.
+        if chance {
+            panel.line(&points, colour, 1.1, "");
+        }
         let marks: Vec<Mark> = points.into_iter().map(point).collect();
         panel.marks(&marks, colour, 3.6, shape);
     }
