@@ -19,7 +19,8 @@ fn page(verdict: &Verdict) -> String {
 fn section(html: &str, id: &str) -> String {
     let start = html.find(&format!("<section id=\"{id}\"")).expect(id);
     let rest = &html[start..];
-    let mut text = rest[..rest.find("</section>").expect("its end")].to_owned();
+    let end = rest.find("</section>").expect("its end");
+    let mut text = rest[..end].replace("&#x2f;", "/");
     while let (Some(from), Some(to)) = (text.find("<svg"), text.find("</svg>")) {
         text.replace_range(from..to + "</svg>".len(), "");
     }

@@ -10,7 +10,7 @@ use super::figures::gap::{drones, ladder, map};
 use super::gap_parts::{
     detectables, gap_rows, noise_rows, regime_rows, sensor, step_section, tiles,
 };
-use super::gap_words::{micro, number};
+use super::gap_words::micro;
 use super::page::{Gallery, OPEN_LIMIT};
 use super::text::{clean, count, fixed, reduced, sentence};
 use super::{Provenance, Report, ReportError};
@@ -45,7 +45,9 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
             format!("{} ({}, {})", clean(name), count(*drones, "drone"), count(bins, "steady bin"))
         })
         .collect();
-    let held_out: Vec<String> = verdict.data.held_out.iter().map(u16::to_string).collect();
+    let mut slots = verdict.data.held_out.clone();
+    slots.sort_unstable();
+    let held_out: Vec<String> = slots.iter().map(u16::to_string).collect();
     let inputs: Vec<Value> = provenance
         .inputs
         .iter()
@@ -63,7 +65,7 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         tiles => tiles(verdict),
         cautions => list(&verdict.cautions),
         left_out_open => verdict.data.left_out.len() <= OPEN_LIMIT,
-        left_out => list(&verdict.data.left_out),
+        left_out => verdict.data.left_out.iter().map(|reason| clean(reason)).collect::<Vec<_>>(),
         map,
         regimes => regime_rows(verdict),
         ladder,
@@ -85,7 +87,6 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         logs => verdict.data.logs,
         drones => verdict.data.drones,
         held_out => held_out.join(", "),
-        alpha => verdict.steps.first().map(|step| number(100.0 * step.alpha)),
         schema => clean(&verdict.schema),
         made_by => clean(&verdict.made_by),
         program => clean(&provenance.program),

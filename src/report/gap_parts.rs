@@ -11,8 +11,8 @@ use crate::gap::words::phrase;
 use super::figures::gap::map::ORDER;
 use super::figures::gap::step;
 use super::gap_words::{
-    after_mps, depends_on, interval_to, kind, micro, minus, number, or_none, percent, regime_title,
-    with_unit,
+    after_mps, depends_on, interval_to, kind, micro, minus, number, or_none, per_thousand, percent,
+    regime_title, with_unit,
 };
 use super::page::{Gallery, capitalised};
 use super::text::{NONE, clean, count, fixed, reduced, sentence, signed, unit};
@@ -107,7 +107,7 @@ pub(super) fn step_section(found: &Step, number_of: usize, figures: &mut Gallery
         parameters => parameters,
         gain => fixed(found.gain_nats, 1),
         threshold => fixed(found.threshold_nats, 1),
-        chance => number(1000.0 * found.alpha),
+        chance => per_thousand(found.alpha),
         size => fixed(found.size_us, 1),
         held_out => found.held_out_us.map(|(before, after)| {
             format!("{} → {} µs", fixed(before, 1), fixed(after, 1))

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::gap_parts::first_gap;
-use super::gap_words::{kind, percent};
+use super::gap_words::{kind, per_thousand, percent};
 use super::table::{Align, Column, lines};
 use super::text::{clean, count, fixed, reduced};
 use crate::gap::Verdict;
@@ -92,7 +92,7 @@ fn data(verdict: &Verdict) -> String {
         .enumerate()
         .map(|(index, (name, drones))| {
             let bins = data.bins.get(index).copied().unwrap_or(0);
-            format!("{name} ({}, {})", count(*drones, "drone"), count(bins, "steady bin"))
+            format!("{name} ({}, {})", count(*drones, "drone"), count(bins, "bin"))
         })
         .collect();
     format!(
@@ -111,8 +111,8 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
     page.say(
         "",
         &format!(
-            "  gains {:.1} nats; with nothing missing {} flights of 1,000 pass {:.1}; moves the pulse \
-             by {:.1} us",
+            "  gain {:.1} nats (by chance at most {} flights of 1,000 pass {:.1}); moves the pulse by \
+             {:.1} us",
             step.gain_nats,
             per_thousand(step.alpha),
             step.threshold_nats,
@@ -139,12 +139,6 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
     }
 }
 
-/// A chance as flights of a thousand.
-fn per_thousand(chance: f64) -> String {
-    let flights = 1000.0 * chance;
-    if (flights - flights.round()).abs() < 1e-6 { format!("{flights:.0}") } else { short(flights) }
-}
-
 fn gap(page: &mut Page, verdict: &Verdict) {
     if first_gap(verdict).is_none() {
         return;
@@ -159,7 +153,7 @@ fn gap(page: &mut Page, verdict: &Verdict) {
         column("Gap, rms", Align::Left, 0),
         column("us", Align::Right, 0),
         column("m/s", Align::Right, 2),
-        column("without air, us", Align::Right, 0),
+        column("no air, us", Align::Right, 0),
         column("floor", Align::Right, 1),
         column("chi2", Align::Right, 3),
         column("excess gone", Align::Right, 0),

@@ -41,13 +41,10 @@ pub(super) fn interval_to(interval: Interval, decimals: usize) -> String {
     format!("{value} ({low} to {high})")
 }
 
-/// A share with its interval, per cent.
-pub(super) fn percent(interval: Interval) -> (String, String) {
-    let of = |share: f64| fixed(100.0 * share, if (share - 1.0).abs() < 0.02 { 1 } else { 0 });
-    (
-        format!("{} %", of(interval.value)),
-        format!("{} to {} %", of(interval.low), of(interval.high)),
-    )
+/// A share with its interval, per cent, to the digits that the interval supports.
+pub(super) fn percent(Interval { value, low, high }: Interval) -> (String, String) {
+    let of = |share: f64| fixed(100.0 * share, usize::from(high - low < 0.03));
+    (format!("{} %", of(value)), format!("{} to {} %", of(low), of(high)))
 }
 
 /// A value with its unit.
@@ -123,6 +120,12 @@ pub(super) fn of_regimes(rows: &[&Regime]) -> [[f64; 2]; 2] {
         [rms(&|row| row.before_us.0), rms(&|row| row.before_mps)],
         [rms(&|row| row.after_us), rms(&after_mps)],
     ]
+}
+
+/// A chance as flights of a thousand.
+pub(super) fn per_thousand(chance: f64) -> String {
+    let flights = 1000.0 * chance;
+    if (flights - flights.round()).abs() < 1e-6 { format!("{flights:.0}") } else { short(flights) }
 }
 
 /// An optional interval.

@@ -21,6 +21,8 @@ const LEFT: f64 = 168.0;
 const LONGEST: f64 = 292.0;
 const PITCH: f64 = 24.0;
 const TOP: f64 = 44.0;
+/// Room for a number, pixels.
+const NUMBER: f64 = 40.0;
 
 /// The figure of a step, counted from 1; `None` if there is neither a rival nor a shape.
 pub(in crate::report) fn figure(step: &Step, number: usize) -> Option<Figure> {
@@ -87,6 +89,7 @@ fn bars(step: &Step, number: usize) -> Drawing {
         .filter(|gain| usable(*gain))
         .fold(1.0, f64::max);
     let at = |gain: f64| LEFT + LONGEST * (gain.clamp(0.0, most) / most).sqrt();
+    let line = at(step.threshold_nats);
     let rows = step.rivals.len().min(RIVALS) as f64;
     let bottom = TOP + PITCH * rows + 4.0;
     for tick in ticks(most) {
@@ -114,17 +117,24 @@ fn bars(step: &Step, number: usize) -> Drawing {
             (false, false) => ("#93a1ae", ""),
         };
         drawing.rect([LEFT, y + 2.0, (end - LEFT).max(1.0), PITCH - 8.0], fill, stroke);
+        // Beside the line of the threshold, not on it.
+        let number_at = if end < line + 2.0 && end + NUMBER > line { line } else { end };
         let style = text(12.0, MUTED, Anchor::Start, false);
-        drawing.text([end + 6.0, y + 13.5], &minus(&format!("{:.1}", rival.gain_nats)), style, 0.0);
+        let gain = minus(&format!("{:.1}", rival.gain_nats));
+        drawing.text([number_at + 6.0, y + 13.5], &gain, style, 0.0);
     }
-    let x = at(step.threshold_nats);
     drawing.polyline(
-        &[(x, TOP - 8.0), (x, bottom)],
+        &[(line, TOP - 8.0), (line, bottom)],
         VERMILLION,
         "stroke-width=\"1.6\" stroke-dasharray=\"5 3\"",
     );
     let words = format!("threshold {}", short_gain(step.threshold_nats));
-    drawing.text([x + 4.0, TOP - 12.0], &words, text(12.0, VERMILLION, Anchor::Start, false), 0.0);
+    drawing.text(
+        [line + 4.0, TOP - 12.0],
+        &words,
+        text(12.0, VERMILLION, Anchor::Start, false),
+        0.0,
+    );
     drawing
 }
 
