@@ -4,7 +4,7 @@ mod report_gap_support;
 
 use report_gap_support::{class, named, nothing, provenance, sensor, unknown};
 use updraft::gap::Verdict;
-use updraft::gap::verdict::Finding;
+use updraft::gap::verdict::{Drones, Finding, Gap, SensorChannel};
 use updraft::report::{gap_summary, render_gap};
 
 fn all() -> [Verdict; 5] {
@@ -217,9 +217,9 @@ fn an_empty_verdict_still_has_a_page() {
     verdict.regimes.clear();
     verdict.ladder.clear();
     verdict.detectable.clear();
-    verdict.drones = Default::default();
-    verdict.gap = Default::default();
-    verdict.sensor = Default::default();
+    verdict.drones = Drones::default();
+    verdict.gap = Gap::default();
+    verdict.sensor = SensorChannel::default();
     let html = page(&verdict);
     for words in [
         "no residuals by regime",

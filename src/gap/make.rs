@@ -204,7 +204,7 @@ fn ladder(data: &Data, regimes: &[Regime]) -> Vec<Rung> {
         .filter_map(|rung| {
             let pulses = pulses(rung.x);
             let measured_us = pulses.iter().sum::<f64>() / pulses.len() as f64;
-            measured_us.is_finite().then(|| Rung {
+            measured_us.is_finite().then_some(Rung {
                 climb_mps: rung.x,
                 measured_us,
                 before_us: measured_us - rung.before_us.0,

@@ -142,13 +142,13 @@ fn detectable() -> Vec<Detectable> {
 }
 
 /// What all verdicts share; nothing was found.
-pub fn nothing() -> Verdict {
+pub(crate) fn nothing() -> Verdict {
     let regimes = regimes();
     let each = (1..=8).map(|slot: u16| DroneOffset {
         slot,
         offset_us: 3.0 * f64::from(slot) - 13.0,
         slope: 0.004 * f64::from(slot) - 0.018,
-        held_out: slot % 4 == 0,
+        held_out: slot.is_multiple_of(4),
     });
     let mut verdict = Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
@@ -211,7 +211,7 @@ fn with(steps: Vec<Step>) -> Verdict {
 }
 
 /// One effect by its name.
-pub fn named() -> Verdict {
+pub(crate) fn named() -> Verdict {
     let finding = Finding::Name {
         effect: "rotor-inflow".to_owned(),
         parameters: vec![fitted("inflow_share", "", 0.398, None)],
@@ -227,7 +227,7 @@ pub fn named() -> Verdict {
 }
 
 /// A class of two, and then an effect that the model had with another size.
-pub fn class() -> Verdict {
+pub(crate) fn class() -> Verdict {
     let first = Finding::Class {
         effects: vec!["thrust-curve".to_owned(), "parasitic-drag".to_owned()],
         parameters: vec![fitted("expo", "", 0.31, None)],
@@ -247,7 +247,7 @@ pub fn class() -> Verdict {
 }
 
 /// Something that is not in the library, with a formula; offsets of drones cannot be told then.
-pub fn unknown() -> Verdict {
+pub(crate) fn unknown() -> Verdict {
     let finding = Finding::Unknown {
         depends_on: "height".to_owned(),
         formula: Some("4.00 sin(2 pi h/31.2 + 0.10) us".to_owned()),
@@ -263,7 +263,7 @@ pub fn unknown() -> Verdict {
 }
 
 /// The velocity itself is off; nothing in the pulse.
-pub fn sensor() -> Verdict {
+pub(crate) fn sensor() -> Verdict {
     let mut verdict = nothing();
     verdict.sensor = SensorChannel {
         bias_mps: Some(around(0.112, 0.004)),
@@ -276,7 +276,7 @@ pub fn sensor() -> Verdict {
 }
 
 /// Where a page came from.
-pub fn provenance() -> Provenance {
+pub(crate) fn provenance() -> Provenance {
     Provenance {
         program: "updraft test".to_owned(),
         command: "updraft gap my-campaign".to_owned(),
