@@ -144,6 +144,8 @@ fn steps_say_what_they_are() {
     {
         assert!(three.contains(words), "{words}: {three}");
     }
+    let kept = "What is unknown is not in the model";
+    assert!(page(&unknown()).contains(kept) && !page(&named()).contains(kept));
     assert!(section(&page(&nothing()), "steps").contains("Nothing. What the model leaves"));
     assert!(section(&page(&unknown()), "drones").contains("no offsets of single drones"));
 }
@@ -188,7 +190,7 @@ fn hostile_words_and_numbers_do_no_harm() {
         Finding::Unknown { depends_on: bad.to_owned(), formula: Some(bad.to_owned()) };
     verdict.steps[0].rivals[0].name = bad.to_owned();
     verdict.steps[0].rivals[0].gain_nats = f64::NAN;
-    verdict.steps[0].threshold_nats = f64::INFINITY;
+    verdict.steps[0].threshold_nats = f64::NAN;
     for one in &mut verdict.detectable {
         one.effect = bad.to_owned();
         one.usual = f64::NAN;

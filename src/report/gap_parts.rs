@@ -30,7 +30,10 @@ pub(super) fn tiles(verdict: &Verdict) -> Vec<Value> {
     let mut tiles = vec![tile(
         "drones used",
         data.drones.to_string(),
-        format!("of {}, {} held out", count(data.logs, "log"), data.held_out.len()),
+        match data.held_out.len() {
+            0 => format!("of {}, none held out", count(data.logs, "log")),
+            n => format!("of {}, {n} held out", count(data.logs, "log")),
+        },
     )];
     if let Some((on, shrink)) = first_gap(verdict) {
         tiles.push(tile(
@@ -43,7 +46,7 @@ pub(super) fn tiles(verdict: &Verdict) -> Vec<Value> {
             format!("{} → {} m/s", fixed(shrink.before_mps, 2), fixed(shrink.after_mps, 2)),
         ));
         tiles.push(tile(
-            "without the air that the others saw",
+            "without the shared air",
             format!(
                 "{} → {} µs",
                 fixed(shrink.before_without_air_us, 1),

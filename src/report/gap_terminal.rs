@@ -96,11 +96,14 @@ fn data(verdict: &Verdict) -> String {
         })
         .collect();
     format!(
-        "{} of {} used: {}; {} held out",
+        "{} of {} used: {}; {}",
         data.drones,
         count(data.logs, "log"),
         groups.join(", "),
-        count(data.held_out.len(), "drone")
+        match data.held_out.len() {
+            0 => "none held out from fitting".to_owned(),
+            n => format!("{} held out", count(n, "drone")),
+        }
     )
 }
 

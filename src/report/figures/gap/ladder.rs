@@ -10,8 +10,9 @@ use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{INK, MUTED};
 use crate::report::sheet::Sheet;
+use crate::report::svg::Drawing;
 
-use super::{AFTER, BEFORE, OF_95, legend, residuals};
+use super::{AFTER, BEFORE, KEY_HEIGHT, OF_95, key, of_unknown, residuals};
 
 /// Size of a panel, pixels.
 const PANEL: [f64; 2] = [516.0, 400.0];
@@ -25,9 +26,9 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     }
     let x = Axis::around(CLIMB_LABEL, rows.iter().map(|row| row.x), 1.0);
     let whole = !verdict.ladder.is_empty();
-    let mut sheet = Sheet::new(1040.0, PANEL[1]);
+    let mut sheet = Sheet::new(1040.0, KEY_HEIGHT + PANEL[1]);
     if whole {
-        sheet.place(pulses(verdict, &x).draw(PANEL[0], PANEL[1]), 0.0, 0.0);
+        sheet.place(pulses(verdict, &x).draw(PANEL[0], PANEL[1]), 0.0, KEY_HEIGHT);
     }
     let most = rows
         .iter()
@@ -39,13 +40,14 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 1.0, "5 4");
     let size = if whole { PANEL } else { [1040.0, PANEL[1]] };
     residuals(&mut panel, &rows, (0.3 * size[0] / rows.len() as f64).clamp(4.0, 22.0), true);
-    panel.legend_at(LegendPosition::InsideTopLeft);
-    panel.clear_legend();
-    legend(&mut panel, true);
-    sheet.place(panel.draw(size[0], size[1]), if whole { 522.0 } else { 0.0 }, 0.0);
+    let left = if whole { 522.0 } else { 0.0 };
+    sheet.place(panel.draw(size[0], size[1]), left, KEY_HEIGHT);
+    let mut over = Drawing::overlay();
+    key(&mut over, [left + 68.0, 14.0]);
+    sheet.lay_over(over);
     let name = "gap-ladder".to_owned();
     let title = "The speed ladder with the model before and after".to_owned();
-    let left = if whole {
+    let panels = if whole {
         "(a) Mean pulse of all drones at each commanded speed, measured (with 95 % bars for air and \
          noise) and modelled: dashed before, solid with everything found. A constant that differs \
          from drone to drone is no error of the model and is removed. (b) Measured less modelled. "
@@ -57,9 +59,10 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
         name,
         title,
         caption: format!(
-            "{left}Grey bars: where 95 of 100 flights of a right model would lie. The air that all \
+            "{panels}Grey bars: where 95 of 100 flights of a right model would lie. The air that all \
              drones share moves every rung, as each was flown at its own time; only what leaves the \
-             bars in a pattern is the model's."
+             bars in a pattern is the model's.{}",
+            of_unknown(verdict)
         ),
     })
 }

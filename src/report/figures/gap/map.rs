@@ -1,8 +1,6 @@
 //! The map of disagreement: the residual by climb speed, height, time, wind, lean, charge, place and
 //! drone.
 
-use kuva::plot::legend::LegendPosition;
-
 use crate::gap::Verdict;
 use crate::gap::verdict::Regime;
 use crate::report::Figure;
@@ -14,7 +12,7 @@ use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::fixed;
 
-use super::{OF_95, legend, residuals};
+use super::{KEY_HEIGHT, OF_95, key, of_unknown, residuals};
 
 /// The regimes in the order in which they are shown.
 pub(in crate::report) const ORDER: [&str; 8] =
@@ -23,6 +21,8 @@ pub(in crate::report) const ORDER: [&str; 8] =
 const PANEL: [f64; 2] = [516.0, 246.0];
 /// From one panel to the next, pixels.
 const PITCH: f64 = 522.0;
+/// Where the key begins, pixels.
+const LEFT: f64 = 68.0;
 /// Smallest span of the scale of residuals, us.
 const LEAST_SPAN_US: f64 = 4.0;
 
@@ -38,12 +38,12 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     }
     let shared = scale(shown.iter().filter(|(by, _)| !of_drones(by)).flat_map(|(_, rows)| rows));
     let own = scale(shown.iter().filter(|(by, _)| of_drones(by)).flat_map(|(_, rows)| rows));
-    let height = shown.len().div_ceil(2) as f64 * PANEL[1];
+    let height = KEY_HEIGHT + shown.len().div_ceil(2) as f64 * PANEL[1];
     let mut sheet = Sheet::new(1040.0, height);
     let mut notes = Drawing::overlay();
-    let mut legends = [false; 2];
+    key(&mut notes, [LEFT, 14.0]);
     for (index, (by, rows)) in shown.iter().enumerate() {
-        let at = [(index % 2) as f64 * PITCH, (index / 2) as f64 * PANEL[1]];
+        let at = [(index % 2) as f64 * PITCH, KEY_HEIGHT + (index / 2) as f64 * PANEL[1]];
         let scale = if of_drones(by) { &own } else { &shared };
         let letter = char::from(b'a' + index as u8);
         let x = abscissa(by, rows);
@@ -57,12 +57,6 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
             (0.45 * room / rows.len() as f64).clamp(3.0, 16.0),
             !of_drones(by),
         );
-        if let Some(first) = legends.get_mut(usize::from(of_drones(by))).filter(|done| !**done) {
-            *first = true;
-            panel.legend_at(LegendPosition::InsideTopLeft);
-            panel.clear_legend();
-            legend(&mut panel, !of_drones(by));
-        }
         sheet.place(panel.draw(PANEL[0], PANEL[1]), at[0], at[1]);
         let style = TextStyle { size: 12.0, bold: false, colour: MUTED, anchor: Anchor::End };
         notes.text([at[0] + PANEL[0] - 16.0, at[1] + 17.0], &note(rows), style, 0.0);
@@ -74,15 +68,17 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
         svg: sheet.svg(&name, &title),
         name,
         title,
-        caption: "Mean of measured less modelled pulse in each class: squares before, circles with \
+        caption: format!(
+            "Mean of measured less modelled pulse in each class: squares before, circles with \
                   everything found in the model. Above zero the drones needed more pulse than the \
                   model says. Grey bars: where 95 of 100 flights of a right model would lie, as the \
                   air that all drones share and the noise allow. Each drone's own mean is removed, \
                   except in the panels of places and drones, which have a scale of their own. Above \
                   each panel: root mean square over the classes by their numbers of bins, as a pulse \
                   and as the vertical air speed that would make it. All panels look at the same \
-                  bins: what depends on one of these often shows in others that went along with it."
-            .to_owned(),
+                  bins: what depends on one of these often shows in others that went along with it.{}",
+            of_unknown(verdict)
+        ),
     })
 }
 

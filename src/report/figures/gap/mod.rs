@@ -5,13 +5,14 @@ pub(in crate::report) mod ladder;
 pub(in crate::report) mod map;
 pub(in crate::report) mod step;
 
-use kuva::plot::legend::LegendShape;
 use kuva::plot::scatter::MarkerShape;
 
-use crate::gap::verdict::Regime;
+use crate::gap::Verdict;
+use crate::gap::verdict::{Finding, Regime, Step};
 use crate::report::chart::{Mark, Panel};
-use crate::report::colour::{BLUE, VERMILLION};
+use crate::report::colour::{BLUE, INK, VERMILLION};
 use crate::report::shapes::Shape;
+use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::usable;
 
 /// Marks of the model before and after differ in colour and shape.
@@ -48,21 +49,38 @@ fn residuals(panel: &mut Panel, rows: &[&Regime], bar_width: f64, chance: bool) 
     }
     let before: Vec<(f64, f64)> = rows.iter().map(|row| (row.x, row.before_us.0)).collect();
     let after: Vec<(f64, f64)> = rows.iter().map(|row| (row.x, row.after_us)).collect();
-    for (points, (colour, shape)) in [(before, BEFORE), (after, AFTER)] {
+    // Where both are the same, both are seen.
+    for (points, (colour, shape), size) in [(before, BEFORE, 4.8), (after, AFTER, 3.2)] {
         // Places and drones have no order to follow.
         if chance {
             panel.line(&points, colour, 1.1, "");
         }
         let marks: Vec<Mark> = points.into_iter().map(point).collect();
-        panel.marks(&marks, colour, 3.6, shape);
+        panel.marks(&marks, colour, size, shape);
     }
 }
 
-/// The legend of [`residuals`].
-fn legend(panel: &mut Panel, chance: bool) {
-    panel.entry("before", BEFORE.0, LegendShape::Marker(BEFORE.1), "");
-    panel.entry("after", AFTER.0, LegendShape::Marker(AFTER.1), "");
-    if chance {
-        panel.entry("air and noise (95 %)", CHANCE, LegendShape::Rect, "");
+/// Height of a [`key`], pixels.
+const KEY_HEIGHT: f64 = 28.0;
+
+/// The legend of [`residuals`] in a strip above the panels, where no data is.
+fn key(drawing: &mut Drawing, [x, y]: [f64; 2]) {
+    let entries = [("before", 0.0), ("after", 92.0), ("air and noise alone (95 %)", 172.0)];
+    for (words, shift) in entries {
+        let style = TextStyle { size: 12.5, bold: false, colour: INK, anchor: Anchor::Start };
+        drawing.text([x + shift + 16.0, y + 4.5], words, style, 0.0);
+    }
+    drawing.rect([x - 1.0, y - 5.0, 10.0, 10.0], BEFORE.0, "");
+    drawing.disc([x + 96.0, y], 4.5, AFTER.0, AFTER.0);
+    drawing.rect([x + 171.0, y - 8.0, 10.0, 16.0], CHANCE, "");
+}
+
+/// What captions say of findings that no vehicle file can hold; empty without any.
+fn of_unknown(verdict: &Verdict) -> &'static str {
+    let unknown = |step: &Step| matches!(step.finding, Finding::Unknown { .. });
+    if verdict.steps.iter().any(unknown) {
+        " What is unknown is not in the model: it is still there after."
+    } else {
+        ""
     }
 }

@@ -88,7 +88,9 @@ fn bars(step: &Step, number: usize) -> Drawing {
         .chain([step.threshold_nats, 1.0])
         .filter(|gain| usable(*gain))
         .fold(1.0, f64::max);
-    let at = |gain: f64| LEFT + LONGEST * (gain.clamp(0.0, most) / most).sqrt();
+    let at = |gain: f64| {
+        if gain.is_nan() { LEFT } else { LEFT + LONGEST * (gain.clamp(0.0, most) / most).sqrt() }
+    };
     let line = at(step.threshold_nats);
     let rows = step.rivals.len().min(RIVALS) as f64;
     let bottom = TOP + PITCH * rows + 4.0;
@@ -110,7 +112,7 @@ fn bars(step: &Step, number: usize) -> Drawing {
         };
         let style = text(12.0, INK, Anchor::End, found);
         drawing.text([LEFT - 8.0, y + 13.5], &shortened(&words, 26), style, 0.0);
-        let end = if usable(rival.gain_nats) { at(rival.gain_nats) } else { LEFT };
+        let end = at(rival.gain_nats);
         let (fill, stroke) = match (found, rival.generic) {
             (true, _) => (BLUE, ""),
             (false, true) => (hatch.as_str(), "stroke=\"#b4bcc4\""),
@@ -156,32 +158,30 @@ fn ticks(most: f64) -> Vec<f64> {
     ticks
 }
 
-fn points(shape: &Shape) -> Vec<(f64, f64)> {
-    let both = shape.x.iter().copied().zip(shape.us.iter().copied());
-    both.filter(|(x, us)| usable(*x) && usable(*us)).collect()
+/// (x, us, standard error) of the points that can be drawn; an error that is not known is 0.
+fn points(shape: &Shape) -> Vec<(f64, f64, f64)> {
+    let errors = shape.se_us.iter().copied().chain(std::iter::repeat(0.0));
+    let all = shape.x.iter().copied().zip(shape.us.iter().copied()).zip(errors);
+    all.filter(|((x, us), _)| usable(*x) && usable(*us))
+        .map(|((x, us), se)| (x, us, if usable(se) { se } else { 0.0 }))
+        .collect()
 }
 
 fn curve(shape: &Shape, letter: &str) -> Panel {
     let points = points(shape);
-    let errors: Vec<f64> = (0..points.len())
-        .map(|index| shape.se_us.get(index).copied().filter(|se| usable(*se)).unwrap_or(0.0))
-        .collect();
+    let band: Vec<(f64, f64, f64)> =
+        points.iter().map(|(x, us, se)| (*x, us - OF_95 * se, us + OF_95 * se)).collect();
     let x = Axis::around(&axis_words(&shape.axis), points.iter().map(|point| point.0), 1e-6);
-    let ends =
-        points.iter().zip(&errors).flat_map(|((_, us), se)| [us - OF_95 * se, us + OF_95 * se]);
+    let ends = band.iter().flat_map(|(_, low, high)| [*low, *high]);
     let y = Axis::around("change of the pulse (µs)", ends.chain([0.0]), 0.5);
     let mut panel = Panel::new(&format!("{letter}Shape"), x.clone(), y);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 1.0, "5 4");
-    if errors.iter().any(|se| *se > 0.0) {
-        let band: Vec<(f64, f64, f64)> = points
-            .iter()
-            .zip(&errors)
-            .map(|((x, us), se)| (*x, us - OF_95 * se, us + OF_95 * se))
-            .collect();
+    if points.iter().any(|(_, _, se)| *se > 0.0) {
         panel.band(&band, AFTER.0);
     }
-    panel.line(&points, AFTER.0, 1.2, "");
-    let marks: Vec<Mark> = points.into_iter().map(super::point).collect();
+    let line: Vec<(f64, f64)> = points.iter().map(|(x, us, _)| (*x, *us)).collect();
+    panel.line(&line, AFTER.0, 1.2, "");
+    let marks: Vec<Mark> = line.into_iter().map(super::point).collect();
     panel.marks(&marks, AFTER.0, 3.0, AFTER.1);
     panel
 }
