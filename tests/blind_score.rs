@@ -49,6 +49,7 @@ fn verdict(findings: Vec<Finding>) -> Verdict {
         drones: Drones::default(),
         gap: Gap::default(),
         regimes: Vec::new(),
+        ladder: Vec::new(),
         cautions: Vec::new(),
     }
 }

@@ -36,7 +36,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("study", &["base", "vehicle", "mission", "show", "sim", "log", "flight", "analysis"]),
-    ("report", &["base", "vehicle", "mission", "flight", "analysis", "gap", "study"]),
+    ("report", &["base", "vehicle", "mission", "effects", "flight", "analysis", "gap", "study"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

@@ -6,13 +6,14 @@
 #![cfg(unix)]
 
 mod report_browser_support;
+mod report_gap_support;
 mod report_synthetic;
 
 use std::path::{Path, PathBuf};
 
 use report_browser_support::{Browser, Key, Tab};
 use report_synthetic::{provenance, whole_campaign};
-use updraft::report::{render, write};
+use updraft::report::{render, render_gap, write};
 
 /// Writes the synthetic campaign's report; the page's address and the folder of screenshots.
 fn report(name: &str) -> (String, PathBuf) {
@@ -102,6 +103,37 @@ fn the_report_fits_a_phone_and_respects_less_motion() {
     tab.screenshot(&folder.join("film.png"));
     tab.whole_page(&folder.join("page.png"));
     tab.finish();
+}
+
+#[test]
+fn the_page_of_a_verdict_loads_and_fits_a_phone() {
+    let Some(mut browser) = Browser::start() else { return };
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-browser").join("gap");
+    let made = render_gap(&report_gap_support::class(), &report_gap_support::provenance())
+        .expect("a page");
+    write(&made, &folder).expect("written");
+    let address = format!("file://{}", folder.join("index.html").display());
+    for (name, size) in [("desk", [1280, 900]), ("phone", [420, 844])] {
+        let mut tab = browser.open(&address, size);
+        let wide = tab.number("document.documentElement.scrollWidth");
+        assert!(wide <= f64::from(size[0]) + 1.0, "{name}: the page scrolls sideways: {wide} px");
+        let sections =
+            tab.text("[...document.querySelectorAll('section')].map((s) => s.id).join()");
+        let expected = "map,ladder,steps,gap,sensor,undetectable,drones,noise,method,provenance";
+        assert_eq!(sections, expected);
+        let lost = "[...document.querySelectorAll('nav a')].filter((a) => \
+                    !document.querySelector(a.getAttribute('href'))).length";
+        assert_eq!(tab.number(lost), 0.0, "{name}: a way leads nowhere");
+        let flat = "[...document.querySelectorAll('figure svg')].filter((svg) => \
+                    svg.getBoundingClientRect().height < 100).length";
+        assert_eq!(tab.number(flat), 0.0, "{name}: a figure is empty");
+        assert_eq!(tab.number("document.querySelectorAll('figure svg').length"), 5.0);
+        let ids = "(() => { const ids = [...document.querySelectorAll('[id]')].map((e) => e.id); \
+                   return ids.length - new Set(ids).size; })()";
+        assert_eq!(tab.number(ids), 0.0, "{name}: an id is there twice");
+        tab.whole_page(&folder.join(format!("{name}.png")));
+        tab.finish();
+    }
 }
 
 /// What the other tests rely on.

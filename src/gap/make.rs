@@ -1,5 +1,6 @@
 //! From logs to a verdict and a model.
 
+use super::bins::Bin;
 use super::compare::{Comparison, Simulated};
 use super::data::{Data, Flown};
 use super::detectable::detectable;
@@ -14,7 +15,8 @@ use super::refine::{Parameter, size_errors, size_of};
 use super::regimes::regimes;
 use super::sensor::sensor;
 use super::verdict::{
-    DataUsed, Drones, Finding, Noise, SensorChannel, Step, VERDICT_SCHEMA, Verdict,
+    DataUsed, Drones, Finding, Interval, Noise, Regime, Rung, SensorChannel, Step, VERDICT_SCHEMA,
+    Verdict,
 };
 use super::words::summary;
 use crate::mission::plan::Plan;
@@ -46,6 +48,9 @@ pub struct Explained {
     pub found: Found,
 }
 
+/// Climb speeds of one rung of the ladder differ by less, m/s.
+const SAME_SPEED_MPS: f64 = 0.05;
+
 /// A pulse that moves less than this is a constant, us.
 const CONSTANT_US: f64 = 0.02;
 
@@ -69,7 +74,13 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         (None, None) => return Err(GapError::NoSimulatedSide),
     };
     let (train, held) = data.split();
-    let mut found = search(&train, input.vehicle, &simulated, input.plan, options)?;
+    let channel = match input.plan {
+        Some(plan) => sensor(input.flown, |slot| plan.slot(slot).map(|slot| plan.segments(slot))),
+        None => SensorChannel::default(),
+    };
+    // A sensor that is off is repaired first: the pulse is then compared at the right speeds.
+    let repaired = repaired(input.vehicle, &channel);
+    let mut found = search(&train, &repaired, &simulated, input.plan, options)?;
     let shrink = gap(&train, &held, input.vehicle, &simulated, input.plan, &found, options.seed)?;
     let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
     let whole = Comparison::new(&data, &found.vehicle, &simulated, input.plan)?;
@@ -79,10 +90,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         super::explain::settle(&mut found);
     }
     let held_slots: Vec<u16> = held.groups.iter().flat_map(|group| group.slots.clone()).collect();
-    let channel = match input.plan {
-        Some(plan) => sensor(input.flown, |slot| plan.slot(slot).map(|slot| plan.segments(slot))),
-        None => SensorChannel::default(),
-    };
     let mut left_out = input.left_out.clone();
     left_out.extend(data.left_out.iter().cloned());
     let used = DataUsed {
@@ -117,11 +124,16 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         drones: differences,
         gap: shrink,
         regimes: regimes(&before, &whole, &found, options.seed)?,
+        ladder: Vec::new(),
         cautions: cautions(&data, &found, input),
     };
+    verdict.ladder = ladder(&whole.data, &verdict.regimes);
     verdict.summary = summary(&verdict);
     let mut model = model(input.vehicle, &found);
     add_others(&mut model, &verdict.steps);
+    if verdict.sensor.named {
+        model = self::repaired(&model, &verdict.sensor);
+    }
     Ok(Explained { verdict, model, found })
 }
 
@@ -177,6 +189,38 @@ fn noise(hyper: &Hyper) -> Noise {
     }
 }
 
+/// Measured pulses of each climb speed, and the models' by the residuals of its regime.
+fn ladder(data: &Data, regimes: &[Regime]) -> Vec<Rung> {
+    let pulses = |climb_mps: f64| -> Vec<f64> {
+        let of_rung = |bin: &Bin| {
+            !bin.is_horizontal() && (bin.climb_mps() - climb_mps).abs() < SAME_SPEED_MPS
+        };
+        let drones = data
+            .groups
+            .iter()
+            .flat_map(|group| group.measured.iter().map(move |drone| group.bins.iter().zip(drone)));
+        drones
+            .flatten()
+            .filter(|(bin, _)| of_rung(bin))
+            .map(|(_, values)| values.pulse_us)
+            .collect()
+    };
+    let rungs = regimes.iter().filter(|regime| regime.by == "climb");
+    rungs
+        .filter_map(|rung| {
+            let pulses = pulses(rung.x);
+            let measured_us = pulses.iter().sum::<f64>() / pulses.len() as f64;
+            measured_us.is_finite().then_some(Rung {
+                climb_mps: rung.x,
+                measured_us,
+                before_us: measured_us - rung.before_us.0,
+                after_us: measured_us - rung.after_us,
+                se_us: rung.before_us.1,
+            })
+        })
+        .collect()
+}
+
 /// The vehicle file with what was found; what makes drones differ stays as it was.
 fn model(vehicle: &Vehicle, found: &Found) -> Vehicle {
     let mut model = vehicle.clone();
@@ -201,6 +245,22 @@ fn model(vehicle: &Vehicle, found: &Found) -> Vehicle {
             format!("{}; {} found in measured flights", vehicle.source, names.join(", "));
     }
     model
+}
+
+/// The vehicle with the error of its vertical velocity, where that was named.
+fn repaired(vehicle: &Vehicle, channel: &SensorChannel) -> Vehicle {
+    let mut vehicle = vehicle.clone();
+    if channel.named {
+        let of = |interval: Option<Interval>| interval.map_or(0.0, |interval| interval.value);
+        for (name, value) in [
+            ("bias_mps", of(channel.bias_mps).clamp(-2.0, 2.0)),
+            ("lag_s", of(channel.lag_s).clamp(0.0, 1.0)),
+            ("sd_mps", 0.0),
+        ] {
+            super::candidates::set(&mut vehicle, "velocity-error", name, value);
+        }
+    }
+    vehicle
 }
 
 /// What is told from other channels than the fleet's pulse: what makes drones differ, by their

@@ -39,6 +39,9 @@ pub struct Verdict {
     pub gap: Gap,
     /// Where they disagree: the residual by regime.
     pub regimes: Vec<Regime>,
+    /// The speed ladder: measured pulses and the model's, before and after.
+    #[serde(default)]
+    pub ladder: Vec<Rung>,
     /// What a reader must know, one sentence each.
     pub cautions: Vec<String>,
 }
@@ -328,4 +331,20 @@ pub struct Regime {
     pub before_mps: f64,
     /// Bins in it, over all drones.
     pub bins: usize,
+}
+
+/// One rung of the speed ladder, all drones and passes of it together. The drones' own hover pulses
+/// are no error of a model: the model's pulses are moved so that each drone's mean is the measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rung {
+    /// Commanded climb speed, m/s, up positive.
+    pub climb_mps: f64,
+    /// Mean measured pulse, us.
+    pub measured_us: f64,
+    /// The pulse of the model that was held against the logs, us.
+    pub before_us: f64,
+    /// The pulse of the model with what was found, us.
+    pub after_us: f64,
+    /// What air and noise do to the mean, one standard deviation, us.
+    pub se_us: f64,
 }

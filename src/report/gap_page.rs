@@ -1,12 +1,105 @@
-//! The HTML page of a verdict.
+//! The HTML page of a comparison of measurement and simulation: what goes where; the words and the
+//! look are in `templates/report/`, the tables in `gap_parts`.
 
-use super::text::clean;
+use minijinja::value::Value;
+use minijinja::{Environment, UndefinedBehavior, context};
+
 use crate::gap::Verdict;
 
-/// The page.
-pub fn page(verdict: &Verdict) -> String {
-    format!(
-        "<!doctype html><meta charset=utf-8><pre>{}</pre>",
-        clean(&super::gap_terminal::text(verdict))
-    )
+use super::figures::gap::{drones, ladder, map};
+use super::gap_parts::{
+    detectables, gap_rows, noise_rows, regime_rows, sensor, step_section, tiles,
+};
+use super::gap_words::micro;
+use super::page::{Gallery, OPEN_LIMIT};
+use super::text::{clean, count, fixed, reduced, sentence};
+use super::{Provenance, Report, ReportError};
+
+const PAGE: &str = include_str!("../../templates/report/gap.html");
+const STYLE: &str = include_str!("../../templates/report/style.css");
+
+/// Makes the page and the figures of a verdict.
+///
+/// # Errors
+/// [`ReportError::Page`], a bug of this program.
+pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, ReportError> {
+    let mut figures = Gallery::default();
+    let map = map::figure(verdict).map(|figure| figures.show(figure));
+    let ladder = ladder::figure(verdict).map(|figure| figures.show(figure));
+    let steps: Vec<Value> = verdict
+        .steps
+        .iter()
+        .enumerate()
+        .map(|(index, step)| step_section(step, index + 1, &mut figures))
+        .collect();
+    let scatter = drones::figure(verdict).map(|figure| figures.show(figure));
+    let list =
+        |texts: &[String]| texts.iter().map(|text| micro(&sentence(text))).collect::<Vec<_>>();
+    let groups: Vec<String> = verdict
+        .data
+        .groups
+        .iter()
+        .enumerate()
+        .map(|(index, (name, drones))| {
+            let bins = verdict.data.bins.get(index).copied().unwrap_or(0);
+            format!("{} ({}, {})", clean(name), count(*drones, "drone"), count(bins, "steady bin"))
+        })
+        .collect();
+    let mut slots = verdict.data.held_out.clone();
+    slots.sort_unstable();
+    let held_out: Vec<String> = slots.iter().map(u16::to_string).collect();
+    let inputs: Vec<Value> = provenance
+        .inputs
+        .iter()
+        .map(|input| context! { path => clean(&input.path), sha256 => clean(&input.sha256) })
+        .collect();
+    let rest = &verdict.rest;
+    let mut environment = Environment::new();
+    environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    environment.add_template("gap.html", PAGE)?;
+    let html = environment.get_template("gap.html")?.render(context! {
+        title => format!("Measurement and model: {}", clean(&verdict.vehicle)),
+        style => Value::from_safe_string(STYLE.to_owned()),
+        vehicle => clean(&verdict.vehicle),
+        summary => micro(&verdict.summary),
+        tiles => tiles(verdict),
+        cautions => list(&verdict.cautions),
+        left_out_open => verdict.data.left_out.len() <= OPEN_LIMIT,
+        left_out => verdict.data.left_out.iter().map(|reason| clean(reason)).collect::<Vec<_>>(),
+        map,
+        regimes => regime_rows(verdict),
+        ladder,
+        steps,
+        rest => context! {
+            candidate => clean(&rest.candidate),
+            gain => fixed(rest.gain_nats, 1),
+            threshold => fixed(rest.threshold_nats, 1),
+            chi2 => reduced(rest.reduced_chi2),
+        },
+        gap => gap_rows(verdict),
+        sensor => sensor(verdict),
+        detectables => detectables(verdict),
+        scatter,
+        correlation => verdict.drones.correlation.map(|value| fixed(value, 2)),
+        drone_words => list(&verdict.drones.words),
+        noise => noise_rows(verdict),
+        groups,
+        logs => verdict.data.logs,
+        drones => verdict.data.drones,
+        held_out => held_out.join(", "),
+        schema => clean(&verdict.schema),
+        made_by => clean(&verdict.made_by),
+        program => clean(&provenance.program),
+        command => clean(&provenance.command),
+        seed => provenance.seed.map(|seed| seed.to_string()),
+        settings => provenance
+            .settings
+            .iter()
+            .map(|(what, how)| context! { what => clean(what), how => clean(how) })
+            .collect::<Vec<_>>(),
+        inputs_open => inputs.len() <= OPEN_LIMIT,
+        inputs,
+        kuva => kuva::VERSION,
+    })?;
+    Ok(Report { html, figures: figures.files })
 }

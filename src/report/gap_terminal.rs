@@ -2,147 +2,248 @@
 
 use std::fmt::Write as _;
 
+use super::gap_parts::first_gap;
+use super::gap_words::{kind, per_thousand, percent};
 use super::table::{Align, Column, lines};
-use super::text::clean;
+use super::text::{clean, count, fixed, reduced};
 use crate::gap::Verdict;
-use crate::gap::verdict::{Finding, Shrink};
+use crate::gap::verdict::{Detectable, Finding, Shrink, Step};
 use crate::gap::words::{phrase, short};
 
-/// Width of tables, columns.
-const WIDTH: usize = 100;
+const BOLD: &str = "\u{1b}[1m";
+const DIM: &str = "\u{1b}[2m";
+const YELLOW: &str = "\u{1b}[33m";
+const RESET: &str = "\u{1b}[0m";
+
 /// Rivals that are shown of each step.
 const RIVALS: usize = 4;
 
-/// The verdict: in words, the steps, the gap, and what the flight could not have shown.
-pub fn text(verdict: &Verdict) -> String {
-    let mut text = String::new();
-    let mut line = |content: &str| {
-        let _ = writeln!(text, "{content}");
-    };
-    line(&clean(&verdict.summary));
-    line("");
-    line(&format!(
-        "{} of {} logs in {}; {} steady bins each; {} drones held out",
-        verdict.data.drones,
-        verdict.data.logs,
-        verdict
-            .data
-            .groups
-            .iter()
-            .map(|(name, count)| format!("{} ({count})", clean(name)))
-            .collect::<Vec<_>>()
-            .join(", "),
-        verdict.data.bins.iter().map(usize::to_string).collect::<Vec<_>>().join(" and "),
-        verdict.data.held_out.len()
-    ));
-    for (index, step) in verdict.steps.iter().enumerate() {
-        line("");
-        let what = match &step.finding {
-            Finding::Name { .. } => "named",
-            Finding::Class { .. } => "class",
-            Finding::Unknown { .. } => "unknown",
+/// Lines with their styles.
+struct Page {
+    text: String,
+    width: usize,
+    color: bool,
+}
+
+impl Page {
+    /// A paragraph, broken between words; later lines are indented.
+    fn say(&mut self, style: &str, content: &str, indent: usize) {
+        for line in wrapped(&clean(content), self.width, indent) {
+            self.line(style, &line);
+        }
+    }
+
+    fn line(&mut self, style: &str, line: &str) {
+        let _ = if self.color && !style.is_empty() {
+            writeln!(self.text, "{style}{line}{RESET}")
+        } else {
+            writeln!(self.text, "{line}")
         };
-        line(&format!("Step {} ({what}): {}", index + 1, clean(&phrase(&step.finding))));
-        line(&format!(
-            "  gains {:.1} nats (chance makes {:.1} in {} flights of 1,000); {:.1} us",
-            step.gain_nats,
-            step.threshold_nats,
-            short(step.alpha * 1000.0),
-            step.size_us
-        ));
-        let rivals: Vec<String> = step
-            .rivals
-            .iter()
-            .filter(|rival| !step.finding.effects().contains(&rival.name.as_str()))
-            .take(RIVALS)
-            .map(|rival| {
-                let kind = if rival.generic { "a free shape in " } else { "" };
-                format!("{kind}{} {:.1}", rival.name, rival.gain_nats)
-            })
-            .collect();
-        if !rivals.is_empty() {
-            line(&format!("  next best: {}", rivals.join(", ")));
+    }
+
+    fn table(&mut self, columns: &[Column], rows: &[Vec<String>]) {
+        for (index, row) in lines(columns, rows, self.width).iter().enumerate() {
+            self.line(if index == 0 { DIM } else { "" }, row);
         }
     }
-    line("");
-    line(&format!(
-        "Left: {} would gain {:.1} nats ({:.1} needed); reduced chi2 {:.2}",
-        if verdict.rest.candidate.is_empty() { "nothing" } else { &verdict.rest.candidate },
-        verdict.rest.gain_nats,
-        verdict.rest.threshold_nats,
-        verdict.rest.reduced_chi2
-    ));
-    let shrinks = [("held-out drones", verdict.gap.drones), ("held-out rungs", verdict.gap.rungs)];
-    let rows: Vec<Vec<String>> =
-        shrinks.iter().filter_map(|(name, shrink)| Some(shrink_row(name, (*shrink)?))).collect();
-    if !rows.is_empty() {
-        line("");
-        let columns = [
-            column("Gap (rms)", Align::Left),
-            column("before us", Align::Right),
-            column("after us", Align::Right),
-            column("before, no air", Align::Right),
-            column("after, no air", Align::Right),
-            column("floor us", Align::Right),
-            column("m/s", Align::Right),
-            column("shrink", Align::Right),
-        ];
-        for row in lines(&columns, &rows, WIDTH) {
-            line(&row);
-        }
+}
+
+/// The verdict for a terminal of `width` characters, with ANSI colours if `color`: in words, the
+/// steps, the gap, and what the flight could not have shown.
+pub fn gap_summary(verdict: &Verdict, width: usize, color: bool) -> String {
+    let mut page = Page { text: String::new(), width, color };
+    page.say(BOLD, &verdict.summary, 0);
+    page.say(DIM, &data(verdict), 2);
+    for (index, step) in verdict.steps.iter().enumerate() {
+        say_step(&mut page, index + 1, step);
     }
-    let hidden: Vec<Vec<String>> = verdict
-        .detectable
-        .iter()
-        .filter(|one| !one.would_be_seen)
-        .map(|one| {
-            let unit = if one.unit.is_empty() { String::new() } else { format!(" {}", one.unit) };
-            vec![
-                one.effect.clone(),
-                one.smallest.map_or_else(
-                    || "-".to_owned(),
-                    |smallest| format!("{} {}{unit}", one.parameter, short(smallest)),
-                ),
-                if one.usual == 0.0 { "-".to_owned() } else { short(one.usual) },
-                if one.usual == 0.0 { "-".to_owned() } else { format!("{:.1}", one.usual_z) },
-                if one.why.is_empty() { one.like.join(", ") } else { one.why.clone() },
-            ]
-        })
-        .collect();
-    if !hidden.is_empty() {
-        line("");
-        line("What this flight would not have shown at its usual size:");
-        let columns = [
-            column("effect", Align::Left),
-            column("smallest seen", Align::Left),
-            column("usual", Align::Right),
-            column("z", Align::Right),
-            column("why, or like what", Align::Left),
-        ];
-        for row in lines(&columns, &hidden, WIDTH) {
-            line(&row);
+    page.line("", "");
+    let rest = &verdict.rest;
+    let left = if rest.candidate.is_empty() {
+        "Left: no candidate gains anything".to_owned()
+    } else {
+        format!(
+            "Left: {} would gain {:.1} nats, {:.1} are needed",
+            rest.candidate, rest.gain_nats, rest.threshold_nats
+        )
+    };
+    page.say("", &format!("{left}; reduced chi2 {}", reduced(rest.reduced_chi2)), 2);
+    gap(&mut page, verdict);
+    undetectable(&mut page, &verdict.detectable);
+    if !verdict.data.left_out.is_empty() {
+        page.line("", "");
+        page.say(YELLOW, &format!("Left out ({})", verdict.data.left_out.len()), 0);
+        for reason in verdict.data.left_out.iter().take(20) {
+            page.say("", &format!("  {reason}"), 4);
         }
     }
     for caution in &verdict.cautions {
-        line("");
-        line(&format!("Note: {}", clean(caution)));
+        page.line("", "");
+        page.say(YELLOW, &format!("Note: {caution}"), 6);
     }
-    text
+    page.text
 }
 
-fn column(head: &'static str, align: Align) -> Column {
-    Column { head, align, drop: 0 }
+fn data(verdict: &Verdict) -> String {
+    let data = &verdict.data;
+    let groups: Vec<String> = data
+        .groups
+        .iter()
+        .enumerate()
+        .map(|(index, (name, drones))| {
+            let bins = data.bins.get(index).copied().unwrap_or(0);
+            format!("{name} ({}, {})", count(*drones, "drone"), count(bins, "bin"))
+        })
+        .collect();
+    format!(
+        "{} of {} used: {}; {}",
+        data.drones,
+        count(data.logs, "log"),
+        groups.join(", "),
+        match data.held_out.len() {
+            0 => "none held out from fitting".to_owned(),
+            n => format!("{} held out", count(n, "drone")),
+        }
+    )
 }
 
-fn shrink_row(name: &str, shrink: Shrink) -> Vec<String> {
+fn say_step(page: &mut Page, number: usize, step: &Step) {
+    page.line("", "");
+    let what = kind(&step.finding);
+    page.say(BOLD, &format!("Step {number}, {what}: {}", phrase(&step.finding)), 2);
+    page.say(
+        "",
+        &format!(
+            "  gain {:.1} nats (by chance at most {} flights of 1,000 pass {:.1}); moves the pulse by \
+             {:.1} us",
+            step.gain_nats,
+            per_thousand(step.alpha),
+            step.threshold_nats,
+            step.size_us
+        ),
+        4,
+    );
+    let own = |name: &str| match &step.finding {
+        Finding::Unknown { depends_on, .. } => depends_on == name,
+        other => other.effects().contains(&name),
+    };
+    let rivals: Vec<String> = step
+        .rivals
+        .iter()
+        .filter(|rival| !own(&rival.name))
+        .take(RIVALS)
+        .map(|rival| {
+            let kind = if rival.generic { "any shape in " } else { "" };
+            format!("{kind}{} {:.1}", rival.name, rival.gain_nats)
+        })
+        .collect();
+    if !rivals.is_empty() {
+        page.say(DIM, &format!("  rivals: {}", rivals.join(", ")), 4);
+    }
+}
+
+fn gap(page: &mut Page, verdict: &Verdict) {
+    if first_gap(verdict).is_none() {
+        return;
+    }
+    let shrinks = [("held-out drones", verdict.gap.drones), ("held-out rungs", verdict.gap.rungs)];
+    let named = !verdict.steps.is_empty();
+    let rows: Vec<Vec<String>> = shrinks
+        .iter()
+        .filter_map(|(name, shrink)| Some(shrink_row(name, (*shrink)?, named)))
+        .collect();
+    let columns = [
+        column("Gap, rms", Align::Left, 0),
+        column("us", Align::Right, 0),
+        column("m/s", Align::Right, 2),
+        column("no air, us", Align::Right, 0),
+        column("floor", Align::Right, 1),
+        column("chi2", Align::Right, 3),
+        column("excess gone", Align::Right, 0),
+    ];
+    page.line("", "");
+    page.table(&columns, &rows);
+}
+
+fn shrink_row(name: &str, shrink: Shrink, named: bool) -> Vec<String> {
+    let pair = |before: f64, after: f64, decimals: usize| {
+        format!("{} -> {}", fixed(before, decimals), fixed(after, decimals))
+    };
+    let (gone, range) = percent(shrink.excess_shrink);
     vec![
         name.to_owned(),
-        format!("{:.1}", shrink.before_us.value),
-        format!("{:.1}", shrink.after_us.value),
-        format!("{:.1}", shrink.before_without_air_us),
-        format!("{:.1}", shrink.after_without_air_us),
-        format!("{:.1}", shrink.floor_us),
-        format!("{:.2} to {:.2}", shrink.before_mps, shrink.after_mps),
-        format!("{:.0} %", 100.0 * shrink.excess_shrink.value),
+        pair(shrink.before_us.value, shrink.after_us.value, 1),
+        pair(shrink.before_mps, shrink.after_mps, 2),
+        pair(shrink.before_without_air_us, shrink.after_without_air_us, 1),
+        fixed(shrink.floor_us, 1),
+        format!("{} -> {}", reduced(shrink.chi2.0), reduced(shrink.chi2.1)),
+        if named { format!("{gone} ({range})") } else { "–".to_owned() },
     ]
+}
+
+fn undetectable(page: &mut Page, all: &[Detectable]) {
+    let (sought, other): (Vec<&Detectable>, Vec<&Detectable>) =
+        all.iter().filter(|one| !one.would_be_seen).partition(|one| !one.parameter.is_empty());
+    if !sought.is_empty() {
+        let rows: Vec<Vec<String>> = sought.iter().map(|one| hidden_row(one)).collect();
+        let columns = [
+            column("effect", Align::Left, 0),
+            column("smallest", Align::Right, 0),
+            column("usual", Align::Right, 1),
+            column("z", Align::Right, 2),
+            column("why", Align::Left, 0),
+        ];
+        page.line("", "");
+        page.say(BOLD, "What this flight could not have shown at its usual size", 0);
+        page.table(&columns, &rows);
+    }
+    if !other.is_empty() {
+        let names: Vec<&str> = other.iter().map(|one| one.effect.as_str()).collect();
+        page.line("", "");
+        page.say(DIM, &format!("Not looked for in the pulse: {}", names.join(", ")), 2);
+    }
+}
+
+fn hidden_row(one: &Detectable) -> Vec<String> {
+    let unit = if one.unit.is_empty() { String::new() } else { format!(" {}", clean(&one.unit)) };
+    let why = match (one.why.is_empty(), one.like.is_empty()) {
+        (false, _) => clean(&one.why),
+        (true, true) => "lost in air and noise at this size".to_owned(),
+        (true, false) => format!("looks like {}", clean(&one.like.join(", "))),
+    };
+    vec![
+        clean(&one.effect),
+        one.smallest.map_or_else(|| "none".to_owned(), |s| format!("{}{unit}", short(s))),
+        short(one.usual),
+        format!("{:.1}", one.usual_z.abs()),
+        why,
+    ]
+}
+
+const fn column(head: &'static str, align: Align, drop: u8) -> Column {
+    Column { head, align, drop }
+}
+
+/// Lines of at most `width` characters, broken between words; those after the first are indented.
+fn wrapped(text: &str, width: usize, indent: usize) -> Vec<String> {
+    let first = text.len() - text.trim_start().len();
+    let mut lines = Vec::new();
+    let mut line = " ".repeat(first);
+    let mut empty = true;
+    for word in text.split_whitespace() {
+        // A word that fits no line is cut.
+        let word = super::text::shortened(word, width.saturating_sub(indent.max(first)));
+        let length = line.chars().count() + usize::from(!empty) + word.chars().count();
+        if !empty && length > width {
+            lines.push(std::mem::replace(&mut line, " ".repeat(indent)));
+            empty = true;
+        }
+        if !empty {
+            line.push(' ');
+        }
+        line.push_str(&word);
+        empty = false;
+    }
+    lines.push(line);
+    lines
 }

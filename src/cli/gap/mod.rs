@@ -12,11 +12,13 @@ use super::analyze::load_plan;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::found::{Found, Work, find};
+use super::provenance::provenance;
 use super::words;
 use crate::base::file::{create_folder, write_whole};
 use crate::campaign::{self, FlightFolder, to_json};
 use crate::gap::{Explained, Flown, Input, Options, Verdict, explain};
 use crate::mission::plan::Purpose;
+use crate::report::{self, Provenance};
 use crate::vehicle::{Vehicle, library};
 
 /// Arguments of `updraft gap`.
@@ -76,6 +78,11 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Width of the terminal summary, columns.
+const WIDTH: usize = 100;
+/// Narrower terminals break lines themselves.
+const MIN_WIDTH: usize = 40;
+
 /// Vehicle of logs that nobody planned here: the firmware's own simulator.
 const UNPLANNED_VEHICLE: &str = "arducopter-sitl";
 
@@ -106,7 +113,11 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
     let explained = compare(&found, simulated.as_ref(), &vehicle, &options)?;
     create_folder(&folder)?;
     let _lock = context.lock(&folder)?;
-    let page = write(&folder, &explained)?;
+    let root = args.campaign.as_ref().or(args.measured.as_ref()).cloned().unwrap_or_default();
+    let settings = settings(args, &found, &vehicle);
+    let work = Work { flights: vec![found], ..Work::new(&root) };
+    let provenance = Provenance { seed: Some(args.seed), ..provenance(&work, settings) };
+    let page = write(&folder, &explained, &provenance)?;
     let verdict = &explained.verdict;
     for reason in &verdict.data.left_out {
         context.warn(reason);
@@ -116,7 +127,8 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
         let output = GapOutput { schema: "updraft.gap/1", model, report: page.clone(), verdict };
         context.print_json(&output)?;
     } else {
-        context.print(&crate::report::gap_terminal::text(verdict))?;
+        let width = context.width.map_or(WIDTH, |columns| columns.clamp(MIN_WIDTH, WIDTH));
+        context.print(&report::gap_summary(verdict, width, context.color))?;
     }
     context.result(&page)?;
     context.say(&format!(
@@ -131,19 +143,40 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
 const VERDICT: &str = "verdict.json";
 const MODEL: &str = "model.toml";
 
+/// What was chosen, for the page.
+fn settings(args: &GapArgs, found: &Found, vehicle: &Vehicle) -> Vec<(&'static str, String)> {
+    let mut settings = vec![
+        ("Flight", found.name.clone()),
+        ("Model", format!("{}: {}", vehicle.name, vehicle.source)),
+        ("Chance of naming nothing", format!("{} in each step (--alpha)", args.alpha)),
+        ("Simulated flights for a threshold", format!("{} (--replicates)", args.replicates)),
+    ];
+    if let Some(path) = &args.simulated {
+        settings.push(("Simulated logs", path.display().to_string()));
+    }
+    if let Some(seed) = found.seed {
+        settings.push(("Seed of the flight", format!("{seed}: its logs are simulated")));
+    }
+    settings
+}
+
 /// Writes verdict, model and page; where the page is.
-fn write(folder: &Path, explained: &Explained) -> Result<PathBuf, CommandError> {
+fn write(
+    folder: &Path,
+    explained: &Explained,
+    provenance: &Provenance,
+) -> Result<PathBuf, CommandError> {
     let json = to_json(&explained.verdict)
         .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
     let model = toml::to_string(&explained.model)
         .map_err(|error| CommandError::Failed(format!("failed to make the model: {error}")))?;
     write_whole(&folder.join(MODEL), model.as_bytes())?;
-    let page = folder.join("report").join("index.html");
-    create_folder(&folder.join("report"))?;
-    write_whole(&page, crate::report::gap_page::page(&explained.verdict).as_bytes())?;
+    let made = report::render_gap(&explained.verdict, provenance)?;
+    let pages = folder.join("report");
+    report::write(&made, &pages)?;
     // Last: who finds a verdict finds the others as well.
     write_whole(&folder.join(VERDICT), &json)?;
-    Ok(page)
+    Ok(pages.join(report::PAGE_FILE))
 }
 
 /// The measured flight.

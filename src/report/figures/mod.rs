@@ -1,4 +1,4 @@
-//! The figures, one file each: the paper's Figs. 2 to 6, and what they leave out.
+//! The figures, one file each: the paper's Figs. 2 to 6, what they leave out, and those of `gap`.
 
 pub(super) mod air;
 pub(super) mod averaging;
@@ -6,6 +6,7 @@ pub(super) mod correlation;
 pub(super) mod drone;
 pub(super) mod evolution;
 pub(super) mod fleet;
+pub(super) mod gap;
 pub(super) mod laws;
 pub(super) mod map;
 mod plan_view;

@@ -1,0 +1,129 @@
+//! The map of disagreement: the residual by climb speed, height, time, wind, lean, charge, place and
+//! drone.
+
+use crate::gap::Verdict;
+use crate::gap::verdict::Regime;
+use crate::report::Figure;
+use crate::report::axis::Axis;
+use crate::report::chart::Panel;
+use crate::report::colour::MUTED;
+use crate::report::gap_words::{of_regimes, regime_axis, regime_title};
+use crate::report::sheet::Sheet;
+use crate::report::svg::{Anchor, Drawing, TextStyle};
+use crate::report::text::fixed;
+
+use super::{KEY_HEIGHT, OF_95, key, of_unknown, residuals};
+
+/// The regimes in the order in which they are shown.
+pub(in crate::report) const ORDER: [&str; 8] =
+    ["climb", "height", "time", "wind", "lean", "voltage", "place", "drone"];
+/// Size of a panel, pixels.
+const PANEL: [f64; 2] = [516.0, 246.0];
+/// From one panel to the next, pixels.
+const PITCH: f64 = 522.0;
+/// Where the key begins, pixels.
+const LEFT: f64 = 68.0;
+/// Smallest span of the scale of residuals, us.
+const LEAST_SPAN_US: f64 = 4.0;
+
+/// The panels of all regimes that the verdict has; `None` without any.
+pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
+    let shown: Vec<(&str, Vec<&Regime>)> = ORDER
+        .into_iter()
+        .map(|by| (by, verdict.regimes.iter().filter(|row| row.by == by).collect::<Vec<_>>()))
+        .filter(|(_, rows)| !rows.is_empty())
+        .collect();
+    if shown.is_empty() {
+        return None;
+    }
+    let shared = scale(shown.iter().filter(|(by, _)| !of_drones(by)).flat_map(|(_, rows)| rows));
+    let own = scale(shown.iter().filter(|(by, _)| of_drones(by)).flat_map(|(_, rows)| rows));
+    let height = KEY_HEIGHT + shown.len().div_ceil(2) as f64 * PANEL[1];
+    let mut sheet = Sheet::new(1040.0, height);
+    let mut notes = Drawing::overlay();
+    key(&mut notes, [LEFT, 14.0]);
+    for (index, (by, rows)) in shown.iter().enumerate() {
+        let at = [(index % 2) as f64 * PITCH, KEY_HEIGHT + (index / 2) as f64 * PANEL[1]];
+        let scale = if of_drones(by) { &own } else { &shared };
+        let letter = char::from(b'a' + index as u8);
+        let x = abscissa(by, rows);
+        let zero = [(x.min, 0.0), (x.max, 0.0)];
+        let mut panel = Panel::new(&format!("({letter}) {}", regime_title(by)), x, scale.clone());
+        panel.line(&zero, MUTED, 1.0, "5 4");
+        let room = PANEL[0] - 100.0;
+        residuals(
+            &mut panel,
+            rows,
+            (0.45 * room / rows.len() as f64).clamp(3.0, 16.0),
+            !of_drones(by),
+        );
+        sheet.place(panel.draw(PANEL[0], PANEL[1]), at[0], at[1]);
+        let style = TextStyle { size: 12.0, bold: false, colour: MUTED, anchor: Anchor::End };
+        notes.text([at[0] + PANEL[0] - 16.0, at[1] + 17.0], &note(rows), style, 0.0);
+    }
+    sheet.lay_over(notes);
+    let name = "gap-map".to_owned();
+    let title = "Where measurement and model disagree".to_owned();
+    Some(Figure {
+        svg: sheet.svg(&name, &title),
+        name,
+        title,
+        caption: format!(
+            "Mean of measured less modelled pulse in each class: squares before, circles with \
+                  everything found in the model. Above zero the drones needed more pulse than the \
+                  model says. Grey bars: where 95 of 100 flights of a right model would lie, as the \
+                  air that all drones share and the noise allow. Each drone's own mean is removed, \
+                  except in the panels of places and drones, which have a scale of their own. Above \
+                  each panel: root mean square over the classes by their numbers of bins, as a pulse \
+                  and as the vertical air speed that would make it. All panels look at the same \
+                  bins: what depends on one of these often shows in others that went along with it.{}",
+            of_unknown(verdict)
+        ),
+    })
+}
+
+/// Whether the drones' own means are in it.
+fn of_drones(by: &str) -> bool {
+    matches!(by, "drone" | "place")
+}
+
+/// One scale around zero for all of these.
+fn scale<'a>(rows: impl Iterator<Item = &'a &'a Regime>) -> Axis {
+    let most = rows
+        .flat_map(|row| {
+            let chance = if of_drones(&row.by) { 0.0 } else { OF_95 * row.before_us.1 };
+            [row.before_us.0.abs(), row.after_us.abs(), chance]
+        })
+        .filter(|value| value.is_finite())
+        .fold(LEAST_SPAN_US / 2.0, f64::max);
+    Axis::around("measured − model (µs)", [-most, most].into_iter(), LEAST_SPAN_US)
+}
+
+fn abscissa(by: &str, rows: &[&Regime]) -> Axis {
+    let (least, unit) = match by {
+        "voltage" => (0.1, 0.05),
+        "place" | "drone" => (2.0, 0.5),
+        _ => (1.0, 0.0),
+    };
+    let values = rows.iter().flat_map(|row| [row.x - unit, row.x + unit]);
+    let mut axis = Axis::around(&regime_axis(by), values, least);
+    if of_drones(by) {
+        axis.step = axis.step.max(1.0);
+    }
+    if by == "voltage" {
+        (axis.min, axis.max) = (axis.min.max(0.0), axis.max.min(1.0));
+    }
+    axis
+}
+
+/// Root mean squares before and after, in words.
+fn note(rows: &[&Regime]) -> String {
+    let [before, after] = of_regimes(rows);
+    format!(
+        "rms {} → {} µs ({} → {} m/s)",
+        fixed(before[0], 1),
+        fixed(after[0], 1),
+        fixed(before[1], 2),
+        fixed(after[1], 2)
+    )
+}

@@ -1,0 +1,201 @@
+//! One thing that was found: its gain against its rivals' and the threshold, and its shape.
+
+use std::fmt::Write as _;
+
+use crate::gap::verdict::{Finding, Rival, Shape, Step};
+use crate::report::Figure;
+use crate::report::axis::{Axis, nice_step};
+use crate::report::chart::{Mark, Panel};
+use crate::report::colour::{BLUE, FAINT, INK, MUTED, RULE, VERMILLION};
+use crate::report::gap_words::{depends_on, minus};
+use crate::report::sheet::Sheet;
+use crate::report::svg::{Anchor, Drawing, TextStyle};
+use crate::report::text::{clean, shortened, usable};
+
+use super::{AFTER, OF_95, axis_words};
+
+/// Most rivals that are drawn.
+const RIVALS: usize = 10;
+/// Where bars begin, how long the longest is, how far apart they are, pixels.
+const LEFT: f64 = 168.0;
+const LONGEST: f64 = 292.0;
+const PITCH: f64 = 24.0;
+const TOP: f64 = 44.0;
+/// Room for a number, pixels.
+const NUMBER: f64 = 40.0;
+
+/// The figure of a step, counted from 1; `None` if there is neither a rival nor a shape.
+pub(in crate::report) fn figure(step: &Step, number: usize) -> Option<Figure> {
+    let shape = step.shape.as_ref().filter(|shape| points(shape).len() > 1);
+    if step.rivals.is_empty() && shape.is_none() {
+        return None;
+    }
+    let rivals = step.rivals.len().min(RIVALS);
+    let height = (TOP + PITCH * rivals as f64 + 62.0).max(330.0);
+    let mut sheet = Sheet::new(1040.0, height);
+    let mut left = 0.0;
+    if rivals > 0 {
+        sheet.lay_over(bars(step, number));
+        left = 522.0;
+    }
+    if let Some(shape) = shape {
+        let letter = if rivals > 0 { "(b) " } else { "" };
+        sheet.place(curve(shape, letter).draw(1038.0 - left, height), left, 0.0);
+    }
+    let name = format!("gap-step-{number}");
+    let title = format!("Step {number}: the rivals and the shape");
+    let mut caption = String::new();
+    if rivals > 0 {
+        caption.push_str(
+            "(a) How much better each candidate explains the flight when it is added alone (gain of \
+             log-likelihood; bars go with its square root). Blue: found; grey: other effects; \
+             hatched: free shapes, less their penalty. Beyond the dashed line chance hardly ever \
+             gets. ",
+        );
+    }
+    if shape.is_some() {
+        let _ = write!(
+            caption,
+            "{}What it does to the pulse, by what it is drawn against.",
+            if rivals > 0 { "(b) " } else { "" }
+        );
+    }
+    Some(Figure { svg: sheet.svg(&name, &title), name, title, caption })
+}
+
+/// Whether a rival is what was found.
+fn is_found(step: &Step, rival: &Rival) -> bool {
+    match &step.finding {
+        Finding::Unknown { depends_on, .. } => rival.generic && rival.name == *depends_on,
+        other => !rival.generic && other.effects().contains(&rival.name.as_str()),
+    }
+}
+
+fn bars(step: &Step, number: usize) -> Drawing {
+    let mut drawing = Drawing::overlay();
+    let text = |size, colour, anchor, bold| TextStyle { size, bold, colour, anchor };
+    drawing.text([0.0, 17.0], "(a) Gain", text(14.0, INK, Anchor::Start, true), 0.0);
+    drawing.raw(&format!(
+        "<defs><pattern id=\"gap-hatch-{number}\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" \
+         patternTransform=\"rotate(45)\"><rect width=\"6\" height=\"6\" fill=\"#ffffff\"/><rect \
+         width=\"2.4\" height=\"6\" fill=\"{FAINT}\"/></pattern></defs>"
+    ));
+    let hatch = format!("url(#gap-hatch-{number})");
+    let most = step
+        .rivals
+        .iter()
+        .map(|rival| rival.gain_nats)
+        .chain([step.threshold_nats, 1.0])
+        .filter(|gain| usable(*gain))
+        .fold(1.0, f64::max);
+    let at = |gain: f64| {
+        if gain.is_nan() { LEFT } else { LEFT + LONGEST * (gain.clamp(0.0, most) / most).sqrt() }
+    };
+    let line = at(step.threshold_nats);
+    let rows = step.rivals.len().min(RIVALS) as f64;
+    let bottom = TOP + PITCH * rows + 4.0;
+    for tick in ticks(most) {
+        let x = at(tick);
+        drawing.line([x, TOP - 6.0, x, bottom], RULE);
+        let style = text(12.0, INK, Anchor::Middle, false);
+        drawing.text([x, bottom + 16.0], &short_gain(tick), style, 0.0);
+    }
+    let label = text(13.0, INK, Anchor::Middle, false);
+    drawing.text([LEFT + LONGEST / 2.0, bottom + 38.0], "gain (nats)", label, 0.0);
+    for (index, rival) in step.rivals.iter().take(RIVALS).enumerate() {
+        let y = TOP + PITCH * index as f64;
+        let found = is_found(step, rival);
+        let words = if rival.generic {
+            format!("any shape in {}", depends_on(&rival.name))
+        } else {
+            clean(&rival.name)
+        };
+        let style = text(12.0, INK, Anchor::End, found);
+        drawing.text([LEFT - 8.0, y + 13.5], &shortened(&words, 26), style, 0.0);
+        let end = at(rival.gain_nats);
+        let (fill, stroke) = match (found, rival.generic) {
+            (true, _) => (BLUE, ""),
+            (false, true) => (hatch.as_str(), "stroke=\"#b4bcc4\""),
+            (false, false) => ("#93a1ae", ""),
+        };
+        drawing.rect([LEFT, y + 2.0, (end - LEFT).max(1.0), PITCH - 8.0], fill, stroke);
+        // Beside the line of the threshold, not on it.
+        let number_at = if end < line + 2.0 && end + NUMBER > line { line } else { end };
+        let style = text(12.0, MUTED, Anchor::Start, false);
+        let gain = minus(&format!("{:.1}", rival.gain_nats));
+        drawing.text([number_at + 6.0, y + 13.5], &gain, style, 0.0);
+    }
+    drawing.polyline(
+        &[(line, TOP - 8.0), (line, bottom)],
+        VERMILLION,
+        "stroke-width=\"1.6\" stroke-dasharray=\"5 3\"",
+    );
+    let words = format!("threshold {}", short_gain(step.threshold_nats));
+    drawing.text(
+        [line + 4.0, TOP - 12.0],
+        &words,
+        text(12.0, VERMILLION, Anchor::Start, false),
+        0.0,
+    );
+    drawing
+}
+
+fn short_gain(gain: f64) -> String {
+    if gain.fract() == 0.0 { format!("{gain:.0}") } else { format!("{gain:.1}") }
+}
+
+/// Round gains that are apart on an axis of square roots.
+fn ticks(most: f64) -> Vec<f64> {
+    let mut ticks = vec![0.0];
+    for part in [0.25_f64, 0.5, 0.75, 1.0] {
+        let wanted = most * part * part;
+        let step = nice_step(wanted / 2.0);
+        let tick = (wanted / step).round() * step;
+        if tick <= most && ticks.last().is_none_or(|last| tick > *last) {
+            ticks.push(tick);
+        }
+    }
+    ticks
+}
+
+/// (x, us, standard error) of the points that can be drawn; an error that is not known is 0.
+fn points(shape: &Shape) -> Vec<(f64, f64, f64)> {
+    let errors = shape.se_us.iter().copied().chain(std::iter::repeat(0.0));
+    let all = shape.x.iter().copied().zip(shape.us.iter().copied()).zip(errors);
+    all.filter(|((x, us), _)| usable(*x) && usable(*us))
+        .map(|((x, us), se)| (x, us, if usable(se) { se } else { 0.0 }))
+        .collect()
+}
+
+fn curve(shape: &Shape, letter: &str) -> Panel {
+    let points = points(shape);
+    let band: Vec<(f64, f64, f64)> =
+        points.iter().map(|(x, us, se)| (*x, us - OF_95 * se, us + OF_95 * se)).collect();
+    let x = Axis::around(&axis_words(&shape.axis), points.iter().map(|point| point.0), 1e-6);
+    let ends = band.iter().flat_map(|(_, low, high)| [*low, *high]);
+    let y = Axis::around("change of the pulse (µs)", ends.chain([0.0]), 0.5);
+    let mut panel = Panel::new(&format!("{letter}Shape"), x.clone(), y);
+    panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 1.0, "5 4");
+    if points.iter().any(|(_, _, se)| *se > 0.0) {
+        panel.band(&band, AFTER.0);
+    }
+    let line: Vec<(f64, f64)> = points.iter().map(|(x, us, _)| (*x, *us)).collect();
+    panel.line(&line, AFTER.0, 1.2, "");
+    let marks: Vec<Mark> = line.into_iter().map(super::point).collect();
+    panel.marks(&marks, AFTER.0, 3.0, AFTER.1);
+    panel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_rise() {
+        assert_eq!(ticks(378.0), [0.0, 20.0, 100.0, 200.0]);
+        for most in [1.0, 9.0, 33.3, 5000.0] {
+            let ticks = ticks(most);
+            assert!(ticks.len() > 2 && ticks.windows(2).all(|pair| pair[0] < pair[1]), "{ticks:?}");
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Numbers and names of a verdict as people read them.
+
+use crate::gap::verdict::{Finding, Interval, Regime};
+use crate::gap::words::short;
+
+use super::text::{NONE, clean, fixed, unit, usable};
+
+/// Foreign or generated text with `µs` where files say `us`.
+pub(super) fn micro(text: &str) -> String {
+    let text = clean(text);
+    let mut out = String::with_capacity(text.len());
+    let mut word = String::new();
+    for c in text.chars().chain(std::iter::once('\0')) {
+        if c.is_alphanumeric() {
+            word.push(c);
+            continue;
+        }
+        out.push_str(if word == "us" { "µs" } else { &word });
+        word.clear();
+        if c != '\0' {
+            out.push(c);
+        }
+    }
+    out
+}
+
+/// A true minus sign.
+pub(super) fn minus(number: &str) -> String {
+    number.replace('-', "−")
+}
+
+/// Three significant digits.
+pub(super) fn number(value: f64) -> String {
+    if usable(value) { minus(&short(value)) } else { fixed(value, 0) }
+}
+
+/// A value with its interval: `0.40 (0.39 to 0.41)`.
+pub(super) fn interval_to(interval: Interval, decimals: usize) -> String {
+    let Interval { value, low, high } = interval;
+    let [value, low, high] = [value, low, high].map(|one| fixed(one, decimals));
+    format!("{value} ({low} to {high})")
+}
+
+/// A share with its interval, per cent, to the digits that the interval supports.
+pub(super) fn percent(Interval { value, low, high }: Interval) -> (String, String) {
+    let of = |share: f64| fixed(100.0 * share, usize::from(high - low < 0.03));
+    (format!("{} %", of(value)), format!("{} to {} %", of(low), of(high)))
+}
+
+/// A value with its unit.
+pub(super) fn with_unit(value: f64, of: &str) -> String {
+    let of = unit(of);
+    if of.is_empty() { number(value) } else { format!("{} {of}", number(value)) }
+}
+
+/// One word for what a step found.
+pub(super) fn kind(finding: &Finding) -> &'static str {
+    match finding {
+        Finding::Name { .. } => "named",
+        Finding::Class { .. } => "class",
+        Finding::Unknown { .. } => "unknown",
+    }
+}
+
+/// What a free shape depends on.
+pub(super) fn depends_on(name: &str) -> String {
+    match name {
+        "climb" => "climb speed".to_owned(),
+        "climb-time" => "climb × time".to_owned(),
+        "wind" => "horizontal speed".to_owned(),
+        "voltage" => "charge".to_owned(),
+        "step" => "time, a step".to_owned(),
+        other => clean(other),
+    }
+}
+
+/// What a regime is by.
+pub(super) fn regime_title(by: &str) -> String {
+    match by {
+        "climb" => "Climb speed".to_owned(),
+        "height" => "Height".to_owned(),
+        "time" => "Time".to_owned(),
+        "wind" => "Horizontal speed".to_owned(),
+        "lean" => "Lean".to_owned(),
+        "voltage" => "Charge".to_owned(),
+        "place" => "Place".to_owned(),
+        "drone" => "Drone".to_owned(),
+        other => clean(other),
+    }
+}
+
+/// The axis of a regime, with unit.
+pub(super) fn regime_axis(by: &str) -> String {
+    match by {
+        "climb" => "commanded climb speed (m/s)".to_owned(),
+        "height" => "height above ground (m)".to_owned(),
+        "time" => "time since motor start (s)".to_owned(),
+        "wind" => "horizontal speed relative to the air (m/s)".to_owned(),
+        "lean" => "lean into the wind (°)".to_owned(),
+        "voltage" => "charge of the battery (share)".to_owned(),
+        "place" => "drones next to it in the array".to_owned(),
+        "drone" => "slot".to_owned(),
+        other => clean(other),
+    }
+}
+
+/// The residual after as vertical air speed, by the response that `before` implies.
+pub(super) fn after_mps(row: &Regime) -> f64 {
+    let mps = row.after_us * row.before_mps / row.before_us.0;
+    if mps.is_finite() { mps } else { 0.0 }
+}
+
+/// Root mean squares over classes by their bins: [before, after], each [us, m/s].
+pub(super) fn of_regimes(rows: &[&Regime]) -> [[f64; 2]; 2] {
+    let bins = rows.iter().map(|row| row.bins as f64).sum::<f64>().max(1.0);
+    let rms = |of: &dyn Fn(&Regime) -> f64| {
+        (rows.iter().map(|row| row.bins as f64 * of(row).powi(2)).sum::<f64>() / bins).sqrt()
+    };
+    [
+        [rms(&|row| row.before_us.0), rms(&|row| row.before_mps)],
+        [rms(&|row| row.after_us), rms(&after_mps)],
+    ]
+}
+
+/// A chance as flights of a thousand.
+pub(super) fn per_thousand(chance: f64) -> String {
+    let flights = 1000.0 * chance;
+    if (flights - flights.round()).abs() < 1e-6 { format!("{flights:.0}") } else { short(flights) }
+}
+
+/// An optional interval.
+pub(super) fn or_none(of: Option<Interval>, decimals: usize) -> String {
+    of.map_or_else(|| NONE.to_owned(), |of| interval_to(of, decimals))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn microseconds_have_their_letter_and_words_stay() {
+        assert_eq!(micro("from 52.1 to 5.1 us; thus"), "from 52.1 to 5.1 µs; thus");
+        assert_eq!(micro("0.5 h us"), "0.5 h µs");
+        assert_eq!(micro("us/(m/s) in use"), "µs/(m/s) in use");
+    }
+}
