@@ -46,6 +46,7 @@ fn verdict(findings: Vec<Finding>) -> Verdict {
         rest: Rest::default(),
         detectable: Vec::new(),
         noise: Noise::default(),
+        wind: updraft::gap::verdict::WindFound::default(),
         drones: Drones::default(),
         gap: Gap::default(),
         regimes: Vec::new(),

@@ -151,13 +151,13 @@ pub(crate) fn nothing() -> Verdict {
         held_out: slot.is_multiple_of(4),
     });
     let mut verdict = Verdict {
+        wind: updraft::gap::verdict::WindFound::default(),
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: "updraft test".to_owned(),
         vehicle: "airsim-generic-quad".to_owned(),
         summary: String::new(),
         data: DataUsed {
             logs: 9,
-            wind: updraft::gap::verdict::WindFound::default(),
             drones: 8,
             groups: vec![("even".to_owned(), 4), ("odd".to_owned(), 4)],
             bins: vec![146, 145],
