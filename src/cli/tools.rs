@@ -12,6 +12,7 @@ use crate::analysis::result::Analysis;
 use crate::blind::seal::Sealed;
 use crate::blind::series::FlightResult;
 use crate::blind::table::Table;
+use crate::blind::told::HiddenRun;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{CampaignIndex, FlightRecord};
 use crate::fleet::changes::Changes;
@@ -75,6 +76,8 @@ pub enum Format {
     BlindFlight,
     /// sealed/truth.json of a blind flight
     BlindTruth,
+    /// hidden.json of `updraft run --hide`
+    Hidden,
 }
 
 impl Format {
@@ -98,6 +101,7 @@ impl Format {
             Self::Blind => schema_for!(Table),
             Self::BlindFlight => schema_for!(FlightResult),
             Self::BlindTruth => schema_for!(Sealed),
+            Self::Hidden => schema_for!(HiddenRun),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;
         text.push('\n');
