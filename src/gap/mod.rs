@@ -17,6 +17,7 @@ mod lean;
 mod make;
 mod measure;
 mod minimise;
+pub mod next;
 mod noise;
 mod posterior;
 mod refine;
