@@ -18,6 +18,7 @@ pub mod hide;
 pub mod interval;
 mod metrics;
 pub mod play;
+pub mod rehearse;
 pub mod render;
 pub mod scenario;
 pub mod score;

@@ -19,6 +19,7 @@ use crate::fleet::changes::Changes;
 use crate::fleet::logs::manifest::Manifest;
 use crate::fleet::slots::FleetTable;
 use crate::gap::Verdict;
+use crate::gap::next::Next;
 use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
@@ -76,6 +77,8 @@ pub enum Format {
     BlindFlight,
     /// sealed/truth.json of a blind flight
     BlindTruth,
+    /// gap/next.json
+    Next,
     /// hidden.json of `updraft run --hide`
     Hidden,
 }
@@ -101,6 +104,7 @@ impl Format {
             Self::Blind => schema_for!(Table),
             Self::BlindFlight => schema_for!(FlightResult),
             Self::BlindTruth => schema_for!(Sealed),
+            Self::Next => schema_for!(Next),
             Self::Hidden => schema_for!(HiddenRun),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;

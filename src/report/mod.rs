@@ -25,6 +25,7 @@ pub mod gap_page;
 pub mod gap_terminal;
 mod glance;
 mod law;
+pub mod next_terminal;
 mod notes;
 mod offset_field;
 mod page;

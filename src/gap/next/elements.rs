@@ -58,7 +58,7 @@ pub struct Elements {
     pub heights: bool,
     /// 30 s of hover at 0.4 m.
     pub low_hover: bool,
-    /// Batteries charged in steps from 62 % to 100 %.
+    /// Batteries charged in steps, the least of them to 62 % or what brings it home with the reserve.
     pub charge: bool,
     /// 40 g under every fourth drone.
     pub payload: bool,
@@ -81,8 +81,8 @@ const SLOW: (f64, f64) = (3.0, 12.0);
 const FAST: (f64, f64) = (6.0, 10.0);
 /// Velocity step that turning round at the fast legs' speed takes, m/s.
 const FAST_STEP_MPS: f64 = 6.5;
-/// Charges of a staggered fleet.
-pub(crate) const CHARGES: (f64, f64) = (0.62, 1.0);
+/// Least charge of a staggered fleet.
+const LEAST_CHARGE: f64 = 0.62;
 /// Mass of the payload, kg, and who carries it.
 pub(crate) const PAYLOAD_KG: f64 = 0.04;
 pub(crate) const PAYLOAD_EVERY: usize = 4;
@@ -188,15 +188,15 @@ impl Elements {
         words
     }
 
-    /// What the crew must do.
-    pub fn briefing(self) -> Vec<String> {
+    /// What the crew must do before flying a plan of these elements.
+    pub fn briefing(self, plan: &Plan) -> Vec<String> {
         let mut briefing = Vec::new();
         if self.charge {
-            briefing.push(
-                "Charge the batteries in steps from 62 % to 100 %, evenly over the grid: equal charge \
-                 hides battery sag."
-                    .to_owned(),
-            );
+            briefing.push(format!(
+                "Charge the batteries in steps from {:.0} % to 100 %, evenly over the grid: equal \
+                 charge hides battery sag.",
+                100.0 * lowest_charge(plan)
+            ));
         }
         if self.payload {
             briefing.push(
@@ -218,7 +218,13 @@ impl Elements {
 
     /// The template: `site`, grid and vehicle are those of a plan that was flown. `why` are comment
     /// lines for its head; `vehicle` is the template's word for the vehicle.
-    pub fn template(self, plan: &Plan, vehicle: &str, why: &[String]) -> String {
+    pub fn template(
+        self,
+        plan: &Plan,
+        vehicle: &str,
+        why: &[String],
+        briefing: &[String],
+    ) -> String {
         let mut text = String::new();
         let mut line = |content: &str| {
             let _ = writeln!(text, "{content}");
@@ -231,10 +237,9 @@ impl Elements {
         line("title = \"The flight that would tell\"");
         line("purpose = \"calibration\"");
         line(&format!("vehicle = {}", quoted(vehicle)));
-        let briefing = self.briefing();
         if !briefing.is_empty() {
             line("\nbriefing = [");
-            for sentence in &briefing {
+            for sentence in briefing {
                 line(&format!("    {},", quoted(sentence)));
             }
             line("]");
@@ -349,6 +354,13 @@ impl Elements {
             line(&climb("3.0", "0.5"));
         }
     }
+}
+
+/// Charge of the emptiest battery of a staggered fleet, share of full: it comes home with the reserve.
+pub fn lowest_charge(plan: &Plan) -> f64 {
+    let limits = &plan.limits;
+    let needed = plan.duration_ms as f64 / 1000.0 / limits.endurance_s.max(1.0);
+    (needed + limits.endurance_reserve).clamp(LEAST_CHARGE, 1.0)
 }
 
 /// A TOML string.

@@ -21,7 +21,7 @@ use crate::gap::verdict::{Finding, Noise, Shape, Verdict};
 use crate::mission::plan::{Plan, Slot};
 use crate::vehicle::Vehicle;
 
-use super::elements::{CHARGES, PAYLOAD_EVERY, PAYLOAD_KG};
+use super::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
 
 /// Effects with a smaller trace at their usual size do not matter for the pulse, us: 0.1 m/s.
 const MATTERS_US: f64 = 2.5;
@@ -257,14 +257,15 @@ impl<'a> Scenery<'a> {
                 }
             }
         }
-        let count = plan.slots.len();
+        let (count, lowest) = (plan.slots.len(), lowest_charge(plan));
         let cells = cells(&known.model);
         let endurance_s = known.model.limits.endurance_s.max(1.0);
         let resting_v = |slot: &Slot, bin: &Bin| {
             if !known.has_voltage {
                 return f64::NAN;
             }
-            let full = if charge { charge_of(place(slot).unwrap_or(0), count) } else { 1.0 };
+            let full =
+                if charge { charge_of(place(slot).unwrap_or(0), count, lowest) } else { 1.0 };
             cells * cell_v(full - bin.middle_s().max(0.0) / endurance_s)
         };
         let data = Data::planned(plan, &parts, resting_v);
@@ -490,9 +491,9 @@ fn interpolated(shape: &Shape, x: f64) -> f64 {
     }
 }
 
-/// Charge of the battery of a place in a staggered fleet: evenly spaced, and spread over the grid.
-pub fn charge_of(place: usize, count: usize) -> f64 {
-    let (low, high) = CHARGES;
+/// Charge of the battery of a place in a staggered fleet: evenly spaced from the lowest to full, and spread
+/// over the grid.
+pub fn charge_of(place: usize, count: usize, lowest: f64) -> f64 {
     // A step that has no factor in common with the count visits every rank once.
     let gcd = |mut a: usize, mut b: usize| {
         while b > 0 {
@@ -503,7 +504,7 @@ pub fn charge_of(place: usize, count: usize) -> f64 {
     let around = (count * 5 / 13).max(1);
     let step = (around..around + count.max(1)).find(|step| gcd(*step, count) == 1).unwrap_or(1);
     let rank = place * step % count.max(1);
-    low + (high - low) * rank as f64 / count.saturating_sub(1).max(1) as f64
+    lowest + (1.0 - lowest) * rank as f64 / count.saturating_sub(1).max(1) as f64
 }
 
 /// Cells of the battery that a vehicle has or would have.
