@@ -3,11 +3,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot fly fails")]
 
-#[path = "gap_next_support/mod.rs"]
+#[expect(dead_code, reason = "not everything of the support is needed here")]
 mod gap_next_support;
 
-use std::cell::RefCell;
 use std::path::Path;
+use std::sync::Mutex;
 
 use updraft::blind::explain::Cause;
 use updraft::blind::play::{self, Act, play};
@@ -43,37 +43,37 @@ fn the_truth_is_out_of_reach_until_the_verdict_is_on_the_disk() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     let (truth_path, away) = (seal::truth_path(root), root.join("elsewhere"));
-    let acts = RefCell::new(Vec::new());
+    let acts = Mutex::new(Vec::new());
     // The truth is carried off before the search and brought back when the verdict has been told: who
     // looks sooner finds nothing.
     let search = |flight: &Path| -> Result<Verdict, Cause> {
-        acts.borrow_mut().push("search");
+        acts.lock().unwrap().push("search");
         assert!(flight.join("plan.json").is_file());
         assert!(!flight.join("sealed").exists(), "the search is given nothing of the truth");
         std::fs::rename(&truth_path, &away).unwrap();
         write(flight, &naming("rotor-inflow"));
         Ok(naming("rotor-inflow"))
     };
-    let published = RefCell::new(String::new());
+    let published = Mutex::new(String::new());
     let mut tell = |act: Act<'_>| match act {
         Act::Sealed(hash) => {
-            acts.borrow_mut().push("sealed");
+            acts.lock().unwrap().push("sealed");
             assert!(seal::hash_path(root).is_file() && !play::flight(root).exists());
-            published.borrow_mut().push_str(hash);
+            published.lock().unwrap().push_str(hash);
         }
         Act::Flown(flown) => {
-            acts.borrow_mut().push("flown");
+            acts.lock().unwrap().push("flown");
             assert!(flown.logs > 5 && !play::verdict(root).exists());
         }
         Act::Explained(_) => {
-            acts.borrow_mut().push("explained");
+            acts.lock().unwrap().push("explained");
             assert!(play::verdict(root).is_file());
             std::fs::rename(&away, &truth_path).unwrap();
         }
     };
     let played = play(&truth(), root, &search, None, &mut tell).unwrap();
-    assert_eq!(*acts.borrow(), ["sealed", "flown", "search", "explained"]);
-    assert_eq!(played.opened.truth_sha256, *published.borrow());
+    assert_eq!(*acts.lock().unwrap(), ["sealed", "flown", "search", "explained"]);
+    assert_eq!(played.opened.truth_sha256, *published.lock().unwrap());
     assert_eq!(played.outcome.hidden[0].called, Called::Named);
     let told = HiddenRun::of(&played, "updraft");
     assert!(told.right);
