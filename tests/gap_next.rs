@@ -9,7 +9,7 @@ use updraft::check::{CheckInput, check};
 use updraft::gap::next::predict::{Flight, Known, least, matters, predict, size_z};
 use updraft::gap::next::search::{Aim, search};
 use updraft::gap::next::{Elements, Legs, Order, Question, Sought, ask};
-use updraft::gap::verdict::{Detectable, Finding};
+use updraft::gap::verdict::{Detectable, Finding, Noise};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve, resolve_text};
 use updraft::show::Show;
@@ -18,7 +18,11 @@ use updraft::vehicle::{Vehicle, library};
 const VEHICLE: &str = "airsim-generic-quad";
 
 fn paper() -> Plan {
-    let grid = [Override::new("grid.rows", 4), Override::new("grid.columns", 4)];
+    ladder(4)
+}
+
+fn ladder(side: i64) -> Plan {
+    let grid = [Override::new("grid.rows", side), Override::new("grid.columns", side)];
     resolve("calibration", &grid).unwrap().flights.remove(0).plan
 }
 
@@ -32,19 +36,32 @@ fn with_inflow() -> Vehicle {
 
 /// Inflow is named and in the model.
 fn named() -> Known {
+    with_noise(|_| {})
+}
+
+fn with_noise(change: impl Fn(&mut Noise)) -> Known {
     let finding = Finding::Name {
         effect: "rotor-inflow".to_owned(),
         parameters: vec![fitted("inflow_share", INFLOW)],
         was_there: false,
     };
+    let mut said = verdict(vec![finding]);
+    change(&mut said.noise);
     let base = library::builtin(VEHICLE).unwrap();
-    Known::new(&verdict(vec![finding]), base, with_inflow(), [3.0, 0.0])
+    Known::new(&said, base, with_inflow(), [3.0, 0.0])
 }
 
 fn flown(known: &Known, elements: Elements) -> Flight {
-    let text = elements.template(&paper(), VEHICLE, &[], &[]);
-    let plan = resolve_text("next.toml", &text, &[]).unwrap().flights.remove(0).plan;
-    Flight::new(known, plan).unwrap()
+    flown_by(known, elements, 4)
+}
+
+fn flown_by(known: &Known, elements: Elements, side: i64) -> Flight {
+    Flight::new(known, flown_plan(&ladder(side), elements)).unwrap()
+}
+
+fn flown_plan(present: &Plan, elements: Elements) -> Plan {
+    let text = elements.template(present, VEHICLE, &[], &[]);
+    resolve_text("next.toml", &text, &[]).unwrap().flights.remove(0).plan
 }
 
 fn seen(effect: &str) -> Question {
@@ -87,8 +104,7 @@ fn every_set_of_elements_is_a_template_that_plans_and_passes_the_check() {
 #[test]
 fn the_paper_is_the_paper() {
     let present = paper();
-    let text = Elements::PAPER.template(&present, VEHICLE, &[], &[]);
-    let plan = resolve_text("next.toml", &text, &[]).unwrap().flights.remove(0).plan;
+    let plan = flown_plan(&present, Elements::PAPER);
     let legs = |plan: &Plan| -> Vec<_> {
         let legs = plan.groups[0].segments.iter().filter(|segment| segment.kind.is_leg());
         legs.map(|leg| (leg.start_ms, leg.end_ms, leg.velocity_mps)).collect()
@@ -99,14 +115,20 @@ fn the_paper_is_the_paper() {
 
 #[test]
 fn counter_phase_and_horizontal_legs_gain_what_the_physics_note_says() {
-    let known = named();
-    let paper = flown(&known, Elements::PAPER);
+    // Its fleet, its air, and drones that all respond alike, as in its prototype.
+    let known = with_noise(|noise| {
+        noise.shared_air_s = 40.0;
+        noise.own_air_mps = 0.0;
+        noise.drones_us = 20.0;
+        noise.slopes = 0.0;
+    });
+    let flown = |known: &Known, elements| flown_by(known, elements, 7);
     let full = Elements { low_hover: false, ..Elements::ALL };
-    let enhanced = flown(&known, full);
+    let (paper, enhanced) = (flown(&known, Elements::PAPER), flown(&known, full));
     let z = |flight: &Flight| size_z(&known, flight, false, "rotor-inflow").unwrap();
     let (before, after) = (z(&paper), z(&enhanced));
     // The error of the inflow: 1.80 -> 0.31 us/(m/s), and 1.63 without counter-phase.
-    assert!((3.0..12.0).contains(&(after / before)), "{before} -> {after}");
+    assert!((3.0..8.0).contains(&(after / before)), "{before} -> {after}");
     let together = flown(&known, Elements { counter_phase: false, ..full });
     assert!(z(&together) < 0.5 * after, "{} of {after}", z(&together));
     // Translational lift: 3.2 without horizontal legs, 7.4 with them.
@@ -151,7 +173,11 @@ fn a_class_gets_a_flight_that_separates_it_better() {
     let aim = Aim { z: 5.0, longest_s: 960.0 };
     let choice = search(&known, &present, VEHICLE, &questions, aim).unwrap().unwrap();
     let (before, after) = (least(&was[0]), least(&choice.predicted[0]));
-    assert!(after > 1.5 * before, "{before} -> {after}: {:?}", choice.elements);
+    assert!(after >= aim.z && after > before, "{before} -> {after}: {:?}", choice.elements);
+    // Everything together tells far more than the paper's ladder: the rest was left out for time.
+    let all = Flight::new(&known, flown_plan(&present, Elements::ALL)).unwrap();
+    let most = least(&predict(&known, &all, (true, false), &questions).unwrap()[0]);
+    assert!(most > 1.5 * before, "{before} -> {most}");
     assert!(choice.plan.duration_ms <= 960_000);
     // What is asked for less is answered sooner.
     let modest = Aim { z: 0.5 * after.min(5.0), longest_s: 960.0 };
