@@ -280,6 +280,12 @@ impl<'a> Scenery<'a> {
             .collect();
         let simulated = Simulated::Given(side);
         let comparison = Comparison::new(&data, &known.model, &simulated, Some(plan))?;
+        if std::env::var_os("DEBUGWIND").is_some() {
+            eprintln!("DEBUG wind {:?} law {:?}", comparison.wind.mean_mps, comparison.wind.measured);
+            for (bin, (signals, air)) in comparison.data.groups[0].bins.iter().zip(comparison.scene.signals[0].iter().zip(&comparison.wind.air_mps[0])) {
+                eprintln!("DEBUG {:?} {:?} {air:?} {:.2} {:.4}", bin.kind, bin.velocity_mps, signals.horizontal_mps, signals.tilt_rad);
+            }
+        }
         Ok(Self { known, comparison, heavy })
     }
 

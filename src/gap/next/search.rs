@@ -56,6 +56,13 @@ pub fn search(
 ) -> Result<Option<Choice>, GapError> {
     let mut desk = Desk { known, present, vehicle, questions, flights: BTreeMap::new(), count: 0 };
     let mut at = desk.look(largest(present))?;
+    if at.elements.charge {
+        // Full batteries fall fastest: where time is no rival, that shows the sag better.
+        let full = desk.look(Elements { charge: false, ..at.elements })?;
+        if full.shortfall(aim) < at.shortfall(aim) {
+            at = full;
+        }
+    }
     if at.shortfall(aim) > 0.0 && questions.iter().any(|question| question.kind() == Kind::Class) {
         let loaded = desk.look(Elements { payload: true, ..at.elements })?;
         let adds = |(with, without): (&f64, &f64)| {
