@@ -6,9 +6,9 @@ mod gap_next_support;
 
 use gap_next_support::{INFLOW, climb_class, fitted, verdict};
 use updraft::check::{CheckInput, check};
-use updraft::gap::next::predict::{Flight, Known, least, matters, predict, size_z};
+use updraft::gap::next::predict::{least, matters, predict, size_z};
 use updraft::gap::next::search::{Aim, search};
-use updraft::gap::next::{Elements, Legs, Order, Question, Sought, ask};
+use updraft::gap::next::{Elements, Flight, Known, Legs, Order, Question, Sought, ask};
 use updraft::gap::verdict::{Detectable, Finding, Noise};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve, resolve_text};

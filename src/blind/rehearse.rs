@@ -10,7 +10,7 @@ use super::fly::{Flown, Setting, fly_into};
 use super::vehicles::{KNOWN_THRUST_SPREAD, hover_a, set};
 use crate::gap::Verdict;
 use crate::gap::next::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
-use crate::gap::next::predict::charge_of;
+use crate::gap::next::known::charge_of;
 use crate::gap::next::result::Verified;
 use crate::gap::next::{Elements, Question, Sought};
 use crate::gap::verdict::{Finding, Noise};

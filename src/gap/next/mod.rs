@@ -5,13 +5,16 @@
 //! well enough.
 
 pub mod elements;
+pub mod known;
 pub mod predict;
 pub mod questions;
 pub mod result;
+mod scenery;
 pub mod search;
 
 pub use elements::{Elements, Legs, Order};
-pub use predict::{Known, Predicted, predict};
+pub use known::{Flight, Known};
+pub use predict::{Predicted, predict};
 pub use questions::{Question, Sought, ask};
 pub use result::{NEXT_SCHEMA, Next};
 pub use search::{Aim, search};

@@ -2,48 +2,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::known::{Flight, Known};
 use super::questions::{Question, Sought};
-use crate::effects::battery::cell_v;
-use crate::effects::find;
+use super::scenery::Scenery;
 use crate::gap::GapError;
-use crate::gap::bins::{Bin, BinValues, of_segments};
-use crate::gap::candidates::{Candidate, difference, library, set};
-use crate::gap::compare::{Comparison, Simulated, thrust_exponent};
-use crate::gap::data::{Data, PlannedPart};
+use crate::gap::candidates::{difference, library, set};
 use crate::gap::generic::{Generic, all};
-use crate::gap::gls::{Column, Problem, Solution, Split, White};
-use crate::gap::noise::{
-    GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SLOPES, WHITE,
-};
-use crate::gap::refine::{Parameter, size_of, slopes};
-use crate::gap::refly::{mean_drone, refly};
-use crate::gap::verdict::{Finding, Noise, Shape, Verdict};
-use crate::mission::plan::{Plan, Slot};
+use crate::gap::gls::{Column, Solution, White};
+use crate::gap::refly::mean_drone;
+use crate::gap::verdict::Shape;
 use crate::vehicle::Vehicle;
-
-use super::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
 
 /// Effects with a smaller trace at their usual size do not matter for the pulse, us: 0.1 m/s.
 const MATTERS_US: f64 = 2.5;
-/// Least noise of any kind, in its own unit.
-const LEAST_NOISE: f64 = 1e-3;
-
-/// What is known from the flight before.
-#[derive(Clone, Debug)]
-pub struct Known {
-    /// The vehicle that was held against the logs.
-    pub base: Vehicle,
-    /// The vehicle with what was found.
-    pub model: Vehicle,
-    /// Sizes that were fitted; they stay free.
-    parameters: Vec<Parameter>,
-    /// Noise and air.
-    hyper: Hyper,
-    /// Mean horizontal wind, show frame, m/s.
-    pub wind_mps: [f64; 2],
-    /// Whether the logs have the voltage at rest.
-    pub has_voltage: bool,
-}
 
 /// How well one thing is told from another.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,88 +34,6 @@ pub type Predicted = Vec<Vec<Separation>>;
 pub fn least(separations: &[Separation]) -> f64 {
     let least = separations.iter().map(|one| one.z).fold(f64::INFINITY, f64::min);
     if least.is_finite() { least } else { 0.0 }
-}
-
-/// The noise of a verdict.
-pub fn hyper_of(noise: &Noise) -> Hyper {
-    let mut hyper = Hyper::default();
-    let found = [
-        (SHARED, noise.shared_air_mps),
-        (SHARED_TIME, noise.shared_air_s),
-        (OWN, noise.own_air_mps),
-        (GUSTS, noise.gusts_mps),
-        (GUST_TIME, noise.gusts_s),
-        (WHITE, noise.white_us),
-        (OFFSETS, noise.drones_us),
-        (SLOPES, noise.slopes),
-        (LEAST, noise.least_response),
-    ];
-    for (place, value) in found {
-        hyper.0[place] = value.max(LEAST_NOISE).ln();
-    }
-    hyper
-}
-
-impl Known {
-    /// From a verdict with its two vehicles.
-    pub fn new(verdict: &Verdict, base: Vehicle, model: Vehicle, wind_mps: [f64; 2]) -> Self {
-        let mut parameters = Vec::new();
-        for step in &verdict.steps {
-            let (effect, fitted) = match &step.finding {
-                Finding::Name { effect, parameters, .. } => (Some(effect), parameters),
-                Finding::Class { effects, parameters } => (effects.first(), parameters),
-                Finding::Unknown { .. } => continue,
-            };
-            let Some(effect) = effect else { continue };
-            parameters.extend(fitted.iter().filter_map(|fitted| size_of(effect, &fitted.name)));
-        }
-        // The search says so where it is so.
-        let has_voltage = !verdict.cautions.iter().any(|text| text.contains("BAT.VoltR"));
-        let hyper = hyper_of(&verdict.noise);
-        Self { base, model, parameters, hyper, wind_mps, has_voltage }
-    }
-}
-
-/// A plan flown by the simulator's mean drone: bins and values of each group.
-#[derive(Clone, Debug)]
-pub struct Flight {
-    plan: Plan,
-    groups: Vec<(Vec<Bin>, Vec<Option<BinValues>>)>,
-}
-
-impl Flight {
-    /// Flies a plan.
-    ///
-    /// # Errors
-    /// The model cannot fly it.
-    pub fn new(known: &Known, plan: Plan) -> Result<Self, GapError> {
-        let vehicle = mean_drone(&known.model);
-        let exponent = thrust_exponent(&vehicle);
-        let mut groups = Vec::new();
-        for (index, group) in plan.groups.iter().enumerate() {
-            let bins = of_segments(&group.segments);
-            let mut slots = plan.slots.iter().filter(|slot| usize::from(slot.group) == index);
-            let values = match slots.next() {
-                Some(slot) => refly(&vehicle, &plan, slot, &bins, known.wind_mps, exponent)?,
-                None => Vec::new(),
-            };
-            groups.push((bins, values));
-        }
-        Ok(Self { plan, groups })
-    }
-
-    /// Its plan.
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-}
-
-/// A flight with its noise, ready to be asked.
-struct Scenery<'a> {
-    known: &'a Known,
-    comparison: Comparison,
-    /// Groups that carry the payload.
-    heavy: Vec<bool>,
 }
 
 /// Predicts what a flight will tell.
@@ -230,139 +119,7 @@ impl Question {
     }
 }
 
-impl<'a> Scenery<'a> {
-    fn new(
-        known: &'a Known,
-        flight: &Flight,
-        charge: bool,
-        payload: bool,
-    ) -> Result<Self, GapError> {
-        let plan = &flight.plan;
-        let place = |slot: &Slot| plan.slots.iter().position(|one| one.slot == slot.slot);
-        let carries = |slot: &Slot| {
-            payload && place(slot).is_some_and(|place| place.is_multiple_of(PAYLOAD_EVERY))
-        };
-        let (mut parts, mut heavy) = (Vec::new(), Vec::new());
-        for (index, (bins, values)) in flight.groups.iter().enumerate() {
-            for loaded in [false, true] {
-                let slots: Vec<&Slot> = plan
-                    .slots
-                    .iter()
-                    .filter(|slot| usize::from(slot.group) == index && carries(slot) == loaded)
-                    .collect();
-                if !slots.is_empty() && values.iter().any(Option::is_some) {
-                    let name = plan.groups[index].name.clone();
-                    parts.push(PlannedPart { name, slots, bins, values });
-                    heavy.push(loaded);
-                }
-            }
-        }
-        let (count, lowest) = (plan.slots.len(), lowest_charge(plan));
-        let cells = cells(&known.model);
-        let endurance_s = known.model.limits.endurance_s.max(1.0);
-        let resting_v = |slot: &Slot, bin: &Bin| {
-            if !known.has_voltage {
-                return f64::NAN;
-            }
-            let full =
-                if charge { charge_of(place(slot).unwrap_or(0), count, lowest) } else { 1.0 };
-            cells * cell_v(full - bin.middle_s().max(0.0) / endurance_s)
-        };
-        let data = Data::planned(plan, &parts, resting_v);
-        // The simulated side is what all drones read.
-        let side: Vec<Vec<Option<BinValues>>> = data
-            .groups
-            .iter()
-            .map(|group| {
-                let first = group.measured.first();
-                first.map_or_else(Vec::new, |values| values.iter().copied().map(Some).collect())
-            })
-            .collect();
-        let simulated = Simulated::Given(side);
-        let comparison = Comparison::new(&data, &known.model, &simulated, Some(plan))?;
-        if std::env::var_os("DEBUGWIND").is_some() {
-            eprintln!("DEBUG wind {:?} law {:?}", comparison.wind.mean_mps, comparison.wind.measured);
-            for (bin, (signals, air)) in comparison.data.groups[0].bins.iter().zip(comparison.scene.signals[0].iter().zip(&comparison.wind.air_mps[0])) {
-                eprintln!("DEBUG {:?} {:?} {air:?} {:.2} {:.4}", bin.kind, bin.velocity_mps, signals.horizontal_mps, signals.tilt_rad);
-            }
-        }
-        Ok(Self { known, comparison, heavy })
-    }
-
-    /// The vehicle with the payload.
-    fn loaded(&self, vehicle: &Vehicle) -> Option<Vehicle> {
-        self.heavy.contains(&true).then(|| {
-            let mut loaded = vehicle.clone();
-            loaded.airframe.mass_kg += PAYLOAD_KG;
-            loaded
-        })
-    }
-
-    /// Regressors of each group's own weight.
-    fn merged(&self, light: Column, loaded: Option<Column>) -> Column {
-        let Some(loaded) = loaded else { return light };
-        fn pick<T: Clone>(light: Vec<T>, loaded: &[T], heavy: &[bool]) -> Vec<T> {
-            let both = light.into_iter().zip(loaded).zip(heavy);
-            both.map(|((light, loaded), heavy)| if *heavy { loaded.clone() } else { light })
-                .collect()
-        }
-        match (light, loaded) {
-            (Column::Shared(light), Column::Shared(loaded)) => {
-                Column::Shared(pick(light, &loaded, &self.heavy))
-            }
-            (Column::Own(light), Column::Own(loaded)) => {
-                Column::Own(pick(light, &loaded, &self.heavy))
-            }
-            (light, _) => light,
-        }
-    }
-
-    /// The noise, with all fitted sizes free but those of one effect.
-    fn solution(&self, but: Option<&str>) -> Result<Solution, GapError> {
-        let model = &self.known.model;
-        let patterns = self.comparison.patterns(model)?;
-        let split = Split::of(&self.comparison.residual(model, 0.0)?);
-        let free: Vec<Parameter> = self
-            .known
-            .parameters
-            .iter()
-            .filter(|parameter| Some(parameter.effect) != but)
-            .cloned()
-            .collect();
-        let light = slopes(&self.comparison, model, &free)?;
-        let loaded = match self.loaded(model) {
-            Some(loaded) => Some(slopes(&self.comparison, &loaded, &free)?),
-            None => None,
-        };
-        let columns: Vec<Column> = light
-            .into_iter()
-            .enumerate()
-            .map(|(index, light)| {
-                let loaded = loaded.as_ref().and_then(|loaded| loaded.get(index)).cloned();
-                self.merged(light, loaded)
-            })
-            .collect();
-        Ok(Problem::new(&patterns, &split).with(&columns).at(&self.known.hyper))
-    }
-
-    /// An effect's forms, held against a vehicle.
-    fn candidate(&self, vehicle: &Vehicle, effect: &str) -> Result<Option<Candidate>, GapError> {
-        let find = |vehicle: &Vehicle| -> Result<Option<Candidate>, GapError> {
-            let all = library(vehicle, &self.comparison.scene)?;
-            Ok(all.into_iter().find(|candidate| candidate.name == effect))
-        };
-        let Some(mut light) = find(vehicle)? else { return Ok(None) };
-        if let Some(loaded) = self.loaded(vehicle)
-            && let Some(loaded) = find(&loaded)?
-            && loaded.variants.len() == light.variants.len()
-        {
-            for (light, loaded) in light.variants.iter_mut().zip(loaded.variants) {
-                light.column = self.merged(light.column.clone(), Some(loaded.column));
-            }
-        }
-        Ok(Some(light))
-    }
-
+impl Scenery<'_> {
     fn seen(&self, solution: &Solution, effect: &str) -> Result<Vec<Separation>, GapError> {
         let Some(candidate) = self.candidate(&self.known.model, effect)? else {
             return Ok(Vec::new());
@@ -495,31 +252,4 @@ fn interpolated(shape: &Shape, x: f64) -> f64 {
         (Some((_, y)), _) | (None, Some((_, y))) => *y,
         (None, None) => 0.0,
     }
-}
-
-/// Charge of the battery of a place in a staggered fleet: evenly spaced from the lowest to full, and spread
-/// over the grid.
-pub fn charge_of(place: usize, count: usize, lowest: f64) -> f64 {
-    // A step that has no factor in common with the count visits every rank once.
-    let gcd = |mut a: usize, mut b: usize| {
-        while b > 0 {
-            (a, b) = (b, a % b);
-        }
-        a
-    };
-    let around = (count * 5 / 13).max(1);
-    let step = (around..around + count.max(1)).find(|step| gcd(*step, count) == 1).unwrap_or(1);
-    let rank = place * step % count.max(1);
-    lowest + (1.0 - lowest) * rank as f64 / count.saturating_sub(1).max(1) as f64
-}
-
-/// Cells of the battery that a vehicle has or would have.
-fn cells(vehicle: &Vehicle) -> f64 {
-    let stated = vehicle.effects.get("battery").and_then(|table| table.parameters.get("cells"));
-    let default = || {
-        let parameters = find("battery").map(|effect| effect.definition().parameters)?;
-        let cells = parameters.iter().find(|known| known.name == "cells")?;
-        Some((cells.default)(vehicle))
-    };
-    stated.copied().or_else(default).unwrap_or(1.0).max(1.0)
 }

@@ -7,7 +7,8 @@
 use std::collections::BTreeMap;
 
 use super::elements::{Elements, Legs};
-use super::predict::{Flight, Known, Predicted, least, predict};
+use super::known::{Flight, Known};
+use super::predict::{Predicted, least, predict};
 use super::questions::{Kind, Question};
 use crate::gap::GapError;
 use crate::mission::plan::Plan;
