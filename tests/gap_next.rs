@@ -152,7 +152,7 @@ fn staggered_charge_tells_sag_from_warmth() {
         },
     };
     let z = |charge, known: &Known| {
-        least(&predict(known, &flight, (charge, false), &[apart.clone()]).unwrap()[0])
+        least(&predict(known, &flight, (charge, false), std::slice::from_ref(&apart)).unwrap()[0])
     };
     assert!(z(true, &known) > 1.05 * z(false, &known), "{} {}", z(true, &known), z(false, &known));
     // Where the logs have no voltage at rest, nobody knows who had how much.

@@ -116,6 +116,17 @@ pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandErr
     let was = predict(&known, &present, (false, false), &questions)?;
     let mut next = result(&before, &questions, &choice, &was, args.z);
     next.notes = notes(&questions, &passed_over, &choice, &known);
+    for asked in &next.questions {
+        if asked.kind != Kind::TooSmall && asked.present_z >= args.z {
+            next.notes.push(format!(
+                "the flight that was flown should have told \"{}\" at z {:.1}, and did not: ask for more \
+                 (--z {:.0})",
+                asked.question,
+                asked.present_z,
+                (1.5 * asked.present_z).ceil()
+            ));
+        }
+    }
     let folder = args.output.clone().unwrap_or_else(|| args.campaign.join("gap"));
     crate::base::file::create_folder(&folder)?;
     let _lock = context.lock(&folder)?;

@@ -15,6 +15,8 @@ use crate::vehicle::Vehicle;
 
 /// Effects with a smaller trace at their usual size do not matter for the pulse, us: 0.1 m/s.
 const MATTERS_US: f64 = 2.5;
+/// A new effect of more times its tried form is another effect, as the search has it.
+const MOST_TIMES: f64 = 5.0;
 
 /// How well one thing is told from another.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,26 +158,27 @@ impl Scenery<'_> {
         let mut separations = Vec::new();
         for other in others {
             let Some(rival) = self.candidate(&without, other)? else { continue };
-            // The form of the rival that looks most like it.
-            let likest = rival
+            // The form and size of the rival that looks most like it, of those that it can have.
+            let nearest = rival
                 .variants
                 .iter()
                 .map(|variant| {
                     let white = solution.white(&variant.column);
                     let alike = solution.likeness(&own, &white).clamp(-1.0, 1.0);
-                    (alike, solution.information(&white).max(0.0).sqrt(), variant.size)
+                    let per_time = solution.information(&white).max(0.0).sqrt();
+                    let best = alike * strength / per_time.max(1e-12);
+                    let times = if rival.was_there { best } else { best.clamp(0.0, MOST_TIMES) };
+                    let left = strength * strength - 2.0 * times * alike * strength * per_time
+                        + (times * per_time).powi(2);
+                    (left.max(0.0).sqrt(), times, variant.size)
                 })
-                .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-            let Some((alike, rival_strength, tried)) = likest else { continue };
-            let matched = rival.size.map(|size| {
-                let times = alike * strength / rival_strength.max(1e-12);
-                (size.now + times * (tried - size.now)).clamp(size.low, size.high)
-            });
-            separations.push(Separation {
-                from: other.clone(),
-                z: strength * (1.0 - alike * alike).max(0.0).sqrt(),
-                size: matched,
-            });
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((z, times, tried)) = nearest else { continue };
+            let size = rival
+                .size
+                .filter(|_| times != 0.0)
+                .map(|size| (size.now + times * (tried - size.now)).clamp(size.low, size.high));
+            separations.push(Separation { from: other.clone(), z, size });
         }
         Ok(separations)
     }
@@ -215,12 +218,12 @@ impl Scenery<'_> {
         let mut separations: Vec<Separation> = Vec::new();
         for rival in generics.iter().filter(|generic| generic.depends_on != depends_on) {
             let z = strength * (1.0 - explained(solution, &target, rival)).max(0.0).sqrt();
-            match separations.iter_mut().find(|other| other.from == rival.depends_on) {
-                Some(other) => other.z = other.z.min(z),
-                None => {
-                    let from = rival.depends_on.to_owned();
-                    separations.push(Separation { from, z, size: None });
-                }
+            let same = |other: &&mut Separation| other.from == rival.depends_on;
+            if let Some(other) = separations.iter_mut().find(same) {
+                other.z = other.z.min(z);
+            } else {
+                let from = rival.depends_on.to_owned();
+                separations.push(Separation { from, z, size: None });
             }
         }
         separations

@@ -99,12 +99,12 @@ impl<'a> Scenery<'a> {
 
     /// Regressors of each group's own weight.
     pub(super) fn merged(&self, light: Column, loaded: Option<Column>) -> Column {
-        let Some(loaded) = loaded else { return light };
         fn pick<T: Clone>(light: Vec<T>, loaded: &[T], heavy: &[bool]) -> Vec<T> {
             let both = light.into_iter().zip(loaded).zip(heavy);
             both.map(|((light, loaded), heavy)| if *heavy { loaded.clone() } else { light })
                 .collect()
         }
+        let Some(loaded) = loaded else { return light };
         match (light, loaded) {
             (Column::Shared(light), Column::Shared(loaded)) => {
                 Column::Shared(pick(light, &loaded, &self.heavy))
