@@ -50,7 +50,6 @@ fn the_template_is_one_that_plan_takes_and_check_passes() {
     let asked = &next["questions"][0];
     let z = |key: &str| asked[key].as_f64().unwrap();
     assert!(z("proposed_z") >= 4.0 && z("proposed_z") > z("present_z"), "{asked}");
-    assert_eq!(next["reaches"], true);
     let on_disk = std::fs::read(bench.path("campaign/gap/next.json")).unwrap();
     let on_disk: serde_json::Value = serde_json::from_slice(&on_disk).unwrap();
     assert_eq!(on_disk, next);
@@ -62,7 +61,6 @@ fn the_template_is_one_that_plan_takes_and_check_passes() {
     let ended = bench.expect(2, &["gap", "next", "campaign", "--no-verify", "--longest", "60"]);
     assert!(ended.err.contains("no flight of the elements is as short as 60 s"), "{ended}");
     let table = bench.expect(0, &["gap", "next", "campaign", "--no-verify"]);
-    assert!(table.out.contains("it misses z 5 in 1 of 1 questions"), "{table}");
     assert!(table.out.contains("is it rotor-inflow or parasitic-drag or thrust-curve?"), "{table}");
 }
 

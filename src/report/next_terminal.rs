@@ -13,7 +13,13 @@ const WIDTH: usize = 100;
 pub fn text(next: &Next) -> String {
     let left = |head| Column { head, align: Align::Left, drop: 0 };
     let right = |head| Column { head, align: Align::Right, drop: 0 };
-    let columns = [right("flown: z"), right("proposed: z"), right("flights"), left("question")];
+    let columns = [
+        right("flown: z"),
+        right("proposed: z"),
+        right("wanted"),
+        right("flights"),
+        left("question"),
+    ];
     let mut rows = Vec::new();
     for asked in &next.questions {
         let flights = match (asked.reached, asked.flights_needed) {
@@ -24,6 +30,7 @@ pub fn text(next: &Next) -> String {
         rows.push(vec![
             format!("{:.1}", asked.present_z),
             format!("{:.1}", asked.proposed_z),
+            format!("{:.1}", asked.wanted_z),
             flights,
             clean(&asked.question),
         ]);
@@ -31,6 +38,7 @@ pub fn text(next: &Next) -> String {
             rows.push(vec![
                 format!("{:.1}", told.present_z),
                 format!("{:.1}", told.proposed_z),
+                String::new(),
                 String::new(),
                 format!("  from {}", clean(&told.from)),
             ]);
@@ -56,13 +64,12 @@ pub fn text(next: &Next) -> String {
 fn misses(next: &Next) -> String {
     let missed: Vec<&Asked> = next.questions.iter().filter(|asked| !asked.reached).collect();
     format!(
-        "it misses z {} in {} of {} questions, by {}",
-        next.wanted_z,
+        "it misses what is wanted in {} of {} questions, by z {}",
         missed.len(),
         next.questions.len(),
         missed
             .iter()
-            .map(|asked| format!("{:.1}", next.wanted_z - asked.proposed_z))
+            .map(|asked| format!("{:.1}", asked.wanted_z - asked.proposed_z))
             .collect::<Vec<_>>()
             .join(", ")
     )

@@ -15,7 +15,7 @@ use crate::cli::exit::{CommandError, Exit};
 use crate::cli::simulate::made_by;
 use crate::cli::words;
 use crate::gap::Verdict;
-use crate::gap::next::predict::{Predicted, least, matters, predict};
+use crate::gap::next::predict::{least, matters};
 use crate::gap::next::questions::Kind;
 use crate::gap::next::result::{Asked, Told};
 use crate::gap::next::search::{Aim, Choice, search};
@@ -113,20 +113,8 @@ pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandErr
             "no flight of the elements is as short as {longest_s:.0} s (--longest)"
         ))
     })?;
-    let was = predict(&known, &present, (false, false), &questions)?;
-    let mut next = result(&before, &questions, &choice, &was, args.z);
+    let mut next = result(&before, &questions, &choice, args.z);
     next.notes = notes(&questions, &passed_over, &choice, &known);
-    for asked in &next.questions {
-        if asked.kind != Kind::TooSmall && asked.present_z >= args.z {
-            next.notes.push(format!(
-                "the flight that was flown should have told \"{}\" at z {:.1}, and did not: ask for more \
-                 (--z {:.0})",
-                asked.question,
-                asked.present_z,
-                (1.5 * asked.present_z).ceil()
-            ));
-        }
-    }
     let folder = args.output.clone().unwrap_or_else(|| args.campaign.join("gap"));
     crate::base::file::create_folder(&folder)?;
     let _lock = context.lock(&folder)?;
@@ -259,20 +247,14 @@ fn planned(path: &Path, text: &str) -> Result<ResolvedFlight, CommandError> {
     Ok(mission.flights.swap_remove(0))
 }
 
-fn result(
-    before: &Before,
-    questions: &[Question],
-    choice: &Choice,
-    was: &Predicted,
-    wanted_z: f64,
-) -> Next {
+fn result(before: &Before, questions: &[Question], choice: &Choice, wanted_z: f64) -> Next {
     let asked: Vec<Asked> = questions
         .iter()
-        .zip(was)
-        .zip(&choice.predicted)
-        .map(|((question, was), will)| {
+        .zip(&choice.was)
+        .zip(choice.predicted.iter().zip(&choice.wanted))
+        .map(|((question, was), (will, wanted))| {
             let (present_z, proposed_z) = (least(was), least(will));
-            let needed = (wanted_z / proposed_z.max(1e-9)).powi(2).ceil();
+            let needed = (wanted / proposed_z.max(1e-9)).powi(2).ceil();
             let from = will.iter().map(|told| {
                 let before = was.iter().find(|before| before.from == told.from);
                 Told {
@@ -282,10 +264,11 @@ fn result(
                     proposed_z: told.z,
                 }
             });
-            let reached = proposed_z >= wanted_z;
+            let reached = proposed_z >= *wanted;
             Asked {
                 kind: question.kind(),
                 question: question.words.clone(),
+                wanted_z: *wanted,
                 present_z,
                 proposed_z,
                 reached,

@@ -49,6 +49,9 @@ pub struct Asked {
     pub kind: Kind,
     /// In words.
     pub question: String,
+    /// Fisher z that is wanted: what was asked for, or half as much again as the flight had that should
+    /// have told and did not.
+    pub wanted_z: f64,
     /// Fisher z of the flight that was flown: of the effect, or of the least separation.
     pub present_z: f64,
     /// Of the proposed one.

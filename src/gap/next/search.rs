@@ -18,13 +18,15 @@ use crate::mission::resolve::resolve_text;
 const KEEP: f64 = 0.95;
 /// The payload is worth its trouble when it adds this much.
 const PAYLOAD_ADDS: f64 = 1.05;
+/// What was flown did not tell, whatever its predicted z: the next flight must be this much better.
+const BETTER: f64 = 1.5;
 /// Fast horizontal legs need this, m/s.
 const FAST_MPS: f64 = 6.0;
 
 /// What is wanted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aim {
-    /// Fisher z of every question.
+    /// Fisher z of every question, at least.
     pub z: f64,
     /// Longest flight, s.
     pub longest_s: f64,
@@ -39,6 +41,11 @@ pub struct Choice {
     pub plan: Plan,
     /// What it will tell.
     pub predicted: Predicted,
+    /// What the flight that was flown tells by the same prediction.
+    pub was: Predicted,
+    /// Fisher z that is wanted of each question: the aim's, and for what the flight should have told
+    /// and did not, half as much again as it had.
+    pub wanted: Vec<f64>,
     /// Flights that were looked at.
     pub looked_at: usize,
 }
@@ -55,21 +62,33 @@ pub fn search(
     questions: &[Question],
     aim: Aim,
 ) -> Result<Option<Choice>, GapError> {
+    let flown = Flight::new(known, present.clone())?;
+    let was = predict(known, &flown, (false, false), questions)?;
+    let wanted: Vec<f64> = questions
+        .iter()
+        .zip(&was)
+        .map(|(question, was)| match question.kind() {
+            Kind::TooSmall => aim.z,
+            Kind::Class | Kind::Unknown => aim.z.max(BETTER * least(was)),
+        })
+        .collect();
     let mut desk = Desk { known, present, vehicle, questions, flights: BTreeMap::new(), count: 0 };
     let mut at = desk.look(largest(present))?;
     if at.elements.charge {
         // Full batteries fall fastest: where time is no rival, that shows the sag better.
         let full = desk.look(Elements { charge: false, ..at.elements })?;
-        if full.shortfall(aim) < at.shortfall(aim) {
+        if full.shortfall(&wanted) < at.shortfall(&wanted) {
             at = full;
         }
     }
-    if at.shortfall(aim) > 0.0 && questions.iter().any(|question| question.kind() == Kind::Class) {
+    if at.shortfall(&wanted) > 0.0
+        && questions.iter().any(|question| question.kind() == Kind::Class)
+    {
         let loaded = desk.look(Elements { payload: true, ..at.elements })?;
-        let adds = |(with, without): (&f64, &f64)| {
-            *without < aim.z && *with > PAYLOAD_ADDS * without.max(1e-9)
+        let adds = |((with, without), wanted): ((&f64, &f64), &f64)| {
+            without < wanted && *with > PAYLOAD_ADDS * without.max(1e-9)
         };
-        if loaded.z.iter().zip(&at.z).any(adds) {
+        if loaded.z.iter().zip(&at.z).zip(&wanted).any(adds) {
             at = loaded;
         }
     }
@@ -82,7 +101,7 @@ pub fn search(
             }
             // What is lost for a second saved.
             let price = |one: &Looked| {
-                (one.shortfall(aim) - at.shortfall(aim)) / (at.seconds - one.seconds)
+                (one.shortfall(&wanted) - at.shortfall(&wanted)) / (at.seconds - one.seconds)
             };
             if best.as_ref().is_none_or(|best| price(&other) < price(best)) {
                 best = Some(other);
@@ -93,7 +112,8 @@ pub fn search(
             None => return Ok(None),
         }
     }
-    let goals: Vec<f64> = at.z.iter().map(|z| (KEEP * z).min(aim.z)).collect();
+    let goals: Vec<f64> =
+        at.z.iter().zip(&wanted).map(|(z, wanted)| (KEEP * z).min(*wanted)).collect();
     let mut needed: Vec<Left> = Vec::new();
     loop {
         let mut options = Vec::new();
@@ -161,8 +181,8 @@ struct Looked {
 
 impl Looked {
     /// How much is missing in all, in units of the goal.
-    fn shortfall(&self, aim: Aim) -> f64 {
-        self.z.iter().map(|z| (1.0 - z / aim.z).max(0.0)).sum()
+    fn shortfall(&self, wanted: &[f64]) -> f64 {
+        self.z.iter().zip(wanted).map(|(z, wanted)| (1.0 - z / wanted).max(0.0)).sum()
     }
 }
 
