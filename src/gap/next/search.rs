@@ -140,7 +140,14 @@ pub fn search(
         }
     }
     let plan = desk.flight(at.elements)?.plan().clone();
-    Ok(Some(Choice { elements: at.elements, plan, predicted: at.predicted, looked_at: desk.count }))
+    Ok(Some(Choice {
+        elements: at.elements,
+        plan,
+        predicted: at.predicted,
+        was,
+        wanted,
+        looked_at: desk.count,
+    }))
 }
 
 /// All that this fleet can fly.
