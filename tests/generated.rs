@@ -40,6 +40,8 @@ fn json_schemas_are_current() {
         (Format::Blind, "blind"),
         (Format::BlindFlight, "blind-flight"),
         (Format::BlindTruth, "blind-truth"),
+        (Format::Next, "next"),
+        (Format::Hidden, "hidden"),
     ] {
         let path = root().join(format!("docs/schema/{name}.schema.json"));
         let schema = format.schema().unwrap();

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::air::BlindAir;
+use super::air::{AirScales, BlindAir};
 use super::error::BlindError;
 use super::foreign;
 use super::scenario::{SPACING_M, Scenario};
@@ -14,10 +14,12 @@ use crate::base::file::{create_folder, sweep_partial, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{FlightFolder, to_json};
 use crate::effects::Extra;
+use crate::mission::Plan;
 use crate::mission::resolve::{Override, ResolvedFlight, resolve};
 use crate::show::quantise::as_flown;
 use crate::show::{Show, ShowDrone};
 use crate::sim::{Beyond, FlightSetup, Hooks, SimError, fly_beyond_to_file};
+use crate::vehicle::Vehicle;
 
 /// Steps of the plant in one control step: 1.25 ms, where the simulator that the search uses has
 /// 2.5 ms.
@@ -68,21 +70,53 @@ pub fn fly(
     folder: &Path,
     stop: Option<&AtomicBool>,
 ) -> Result<Flown, BlindError> {
-    let folder = FlightFolder(folder.to_owned());
     let flight = planned(scenario)?;
-    let plan = &flight.plan;
+    let known = scenario.cell.base.known()?;
+    let setting = Setting {
+        plan: &flight.plan,
+        template_text: &flight.template_text,
+        known: &known,
+        air: &scenario.nuisance.air,
+        seed: scenario.seed,
+        extra: &extra(scenario),
+        missing: &scenario.nuisance.missing,
+    };
+    fly_into(folder, &setting, &|slot| true_vehicle(scenario, slot), stop)
+}
+
+/// What a flight is flown with, beside its drones.
+#[derive(Clone, Copy)]
+pub(super) struct Setting<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) template_text: &'a str,
+    /// The vehicle that is handed over.
+    pub(super) known: &'a Vehicle,
+    pub(super) air: &'a AirScales,
+    pub(super) seed: u64,
+    pub(super) extra: &'a [Extra],
+    /// Slots without a log.
+    pub(super) missing: &'a [u16],
+}
+
+/// Flies a plan with a vehicle of its own for each slot.
+pub(super) fn fly_into(
+    folder: &Path,
+    setting: &Setting<'_>,
+    vehicle_of: &(dyn Fn(u16) -> Result<Vehicle, BlindError> + Sync),
+    stop: Option<&AtomicBool>,
+) -> Result<Flown, BlindError> {
+    let folder = FlightFolder(folder.to_owned());
+    let &Setting { plan, seed, missing, .. } = setting;
     let show = Show::of_plan(plan);
     create_folder(&folder.logs())?;
     sweep_partial(&folder.logs())?;
     let text = |what, reason: String| BlindError::Text { what, reason };
-    let known = scenario.cell.base.known()?;
-    let known = toml::to_string(&known).map_err(|error| text("the vehicle", error.to_string()))?;
-    write_whole(&folder.template(), flight.template_text.as_bytes())?;
+    let known =
+        toml::to_string(setting.known).map_err(|error| text("the vehicle", error.to_string()))?;
+    write_whole(&folder.template(), setting.template_text.as_bytes())?;
     write_whole(&folder.vehicle(), known.as_bytes())?;
-    let air = BlindAir::new(&scenario.nuisance.air, scenario.seed);
-    let extra = extra(scenario);
+    let air = BlindAir::new(setting.air, seed);
     let count = plan.slots.len();
-    let missing = &scenario.nuisance.missing;
     let flown: Vec<Option<u64>> = plan
         .slots
         .par_iter()
@@ -92,21 +126,21 @@ pub fn fly(
             let path = folder.log(slot.slot, count);
             let drone: ShowDrone =
                 as_flown(drone).map_err(|source| BlindError::Skyb { slot: slot.slot, source })?;
-            let vehicle = true_vehicle(scenario, slot.slot)?;
+            let vehicle = vehicle_of(slot.slot)?;
             let setup = FlightSetup {
                 vehicle: &vehicle,
                 trajectory: &drone.trajectory,
                 home_m: slot.home_m.into(),
                 frame: plan.site.frame(),
                 atmosphere: &air,
-                seed: scenario.seed,
+                seed,
                 drone: slot.slot,
                 start: START,
                 lights: &drone.lights,
                 full_logs: false,
                 hooks: Hooks { progress: None, stop },
             };
-            let beyond = Beyond { effects: &extra, plant_steps: PLANT_STEPS };
+            let beyond = Beyond { effects: setting.extra, plant_steps: PLANT_STEPS };
             match fly_beyond_to_file(&setup, beyond, &path) {
                 Ok(_) => Ok(std::fs::metadata(&path).ok().map(|found| found.len())),
                 Err(SimError::Stopped { .. }) => Err(BlindError::Stopped),

@@ -17,12 +17,15 @@ pub mod foreign;
 pub mod hide;
 pub mod interval;
 mod metrics;
+pub mod play;
+pub mod rehearse;
 pub mod render;
 pub mod scenario;
 pub mod score;
 pub mod seal;
 pub mod series;
 pub mod table;
+pub mod told;
 pub mod vehicles;
 
 pub use error::BlindError;

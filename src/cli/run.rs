@@ -11,6 +11,7 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::fleet::sim::MOST_DRONES;
 use super::fly::fly_virtual;
+use super::hidden::{self, HideArgs};
 use super::mission_args::MissionArgs;
 use super::plan::{what_for_whom, write};
 use super::simulate::{
@@ -38,6 +39,7 @@ const FIELD_DAY: &str = "field-day";
   updraft run --vehicle airsim-generic-quad --air still -o study-day
   updraft run --grid 3x3 --duration 120 --air still --updraft -0.8 -o small
   updraft run calibration-counterphase -o counterphase
+  updraft run --hide 7 -o hidden                    # an effect is hidden, named, and then revealed
 
 Without a choice of vehicle and air the campaign is flown by the show drone (`pixel`) on a field day:
 turbulent air, light wind, gusts. --air says another air for both flights (`still`: none);
@@ -81,12 +83,17 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "SPEC", value_parser = air_specs)]
     calibration_air: Vec<AirSpecs>,
     #[command(flatten)]
+    hide: HideArgs,
+    #[command(flatten)]
     air: AirArgs,
     #[command(flatten)]
     mission: MissionArgs,
 }
 
 pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandError> {
+    if let Some(seed) = args.hide.seed() {
+        return hidden::run(context, &args.output, args.force, args.hide, &args.mission, seed);
+    }
     let watch = Stopwatch::start();
     let is_field_day = args.is_field_day();
     let mission = args.mission_args().resolve(&args.template)?;

@@ -12,12 +12,14 @@ use crate::analysis::result::Analysis;
 use crate::blind::seal::Sealed;
 use crate::blind::series::FlightResult;
 use crate::blind::table::Table;
+use crate::blind::told::HiddenRun;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{CampaignIndex, FlightRecord};
 use crate::fleet::changes::Changes;
 use crate::fleet::logs::manifest::Manifest;
 use crate::fleet::slots::FleetTable;
 use crate::gap::Verdict;
+use crate::gap::next::Next;
 use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
@@ -75,6 +77,10 @@ pub enum Format {
     BlindFlight,
     /// sealed/truth.json of a blind flight
     BlindTruth,
+    /// gap/next.json
+    Next,
+    /// hidden.json of `updraft run --hide`
+    Hidden,
 }
 
 impl Format {
@@ -98,6 +104,8 @@ impl Format {
             Self::Blind => schema_for!(Table),
             Self::BlindFlight => schema_for!(FlightResult),
             Self::BlindTruth => schema_for!(Sealed),
+            Self::Next => schema_for!(Next),
+            Self::Hidden => schema_for!(HiddenRun),
         };
         let mut text = serde_json::to_string_pretty(&schema)?;
         text.push('\n');

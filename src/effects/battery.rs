@@ -32,7 +32,7 @@ const LEAST: f64 = 0.5;
 pub(super) struct Battery;
 
 /// Open-circuit voltage of a cell, V, at a charge of 0..1.
-pub(super) fn cell_v(charge: f64) -> f64 {
+pub fn cell_v(charge: f64) -> f64 {
     let place = charge.clamp(0.0, 1.0) * 10.0;
     let index = (place as usize).min(9);
     let (low, high) = (CELL_V[index], CELL_V[index + 1]);

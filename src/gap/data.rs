@@ -22,6 +22,19 @@ pub struct Flown<'a> {
     pub flight: &'a Flight,
 }
 
+/// Drones of a flight that is yet to be flown, which fly and weigh the same.
+#[derive(Debug)]
+pub struct PlannedPart<'a> {
+    /// Name of the group.
+    pub name: String,
+    /// Who they are.
+    pub slots: Vec<&'a Slot>,
+    /// Steady bins.
+    pub bins: &'a [Bin],
+    /// What the simulated drone does in each.
+    pub values: &'a [Option<BinValues>],
+}
+
 /// All drones of a command group.
 #[derive(Clone, Debug, Default)]
 pub struct Group {
@@ -132,6 +145,31 @@ impl Data {
         let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
         data.add("all", &bins, values, armed_s);
         data.resistance_ohm = resistance_ohm(flown);
+        data
+    }
+
+    /// A flight that is yet to be flown: all drones of a part of a group read the same simulated values,
+    /// each with its own voltage at rest (by its place in the plan, and bin). Parts are (name, slots, bins,
+    /// values).
+    pub fn planned(
+        plan: &Plan,
+        parts: &[PlannedPart<'_>],
+        resting_v: impl Fn(&Slot, &Bin) -> f64,
+    ) -> Self {
+        let mut data = Self::default();
+        for part in parts {
+            let drone = |slot: &&Slot| {
+                let own = |(bin, values): (&Bin, &Option<BinValues>)| {
+                    values.map(|values| BinValues { resting_v: resting_v(slot, bin), ..values })
+                };
+                let place_m = [slot.home_m[0], slot.home_m[1]];
+                (slot.slot, place_m, part.bins.iter().zip(part.values).map(own).collect())
+            };
+            let drones = part.slots.iter().map(drone).collect();
+            data.add(&part.name, part.bins.to_vec(), drones, 0.0);
+        }
+        let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
+        data.count_neighbours(&plan.slots, spacing_m);
         data
     }
 

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::effects::EffectError;
+use crate::mission::resolve::MissionError;
 use crate::sim::SimError;
 
 /// A comparison of measurement and simulation that cannot be made.
@@ -42,6 +43,9 @@ pub enum GapError {
     /// The model could not be flown.
     #[error("the model's flight failed")]
     Simulation(#[from] SimError),
+    /// The template of a proposed flight is wrong.
+    #[error("the proposed flight cannot be planned for this fleet")]
+    Mission(#[from] Box<MissionError>),
     /// The model is not valid.
     #[error(transparent)]
     Effect(#[from] EffectError),

@@ -18,6 +18,7 @@ mod lean_channel;
 mod make;
 mod measure;
 mod minimise;
+pub mod next;
 mod noise;
 mod posterior;
 mod refine;

@@ -27,6 +27,7 @@ mod gap_terminal;
 mod gap_words;
 mod glance;
 mod law;
+pub mod next_terminal;
 mod notes;
 mod offset_field;
 mod page;

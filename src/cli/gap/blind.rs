@@ -2,22 +2,44 @@
 
 use std::path::Path;
 
-use super::{compare, logs, one_flight};
+use super::{compare, logs, one_flight, write};
+use crate::base::file::create_folder;
 use crate::blind::explain::{Cause, Explain};
 use crate::blind::scenario::Scenario;
 use crate::blind::vehicles::true_vehicle;
 use crate::campaign::FlightFolder;
-use crate::gap::{Flown, Input, Options, Verdict, fisher_z};
+use crate::gap::{Explained, Flown, Input, Options, Verdict, fisher_z};
 use crate::vehicle::library;
+
+/// `updraft gap` on a flight folder, with its files written to `gap/` there.
+pub(in crate::cli) struct Written;
+
+impl Explain for Written {
+    fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
+        let explained = explained(flight)?;
+        let folder = flight.join("gap");
+        create_folder(&folder)?;
+        write(&folder, &explained)?;
+        Ok(explained.verdict)
+    }
+
+    fn fisher_z(&self, flight: &Path, truth: &Scenario) -> Vec<Option<f64>> {
+        Searched.fisher_z(flight, truth)
+    }
+}
+
+fn explained(flight: &Path) -> Result<Explained, Cause> {
+    let found = one_flight(flight, None)?;
+    let vehicle = library::load(&FlightFolder::at(flight).vehicle().display().to_string())?;
+    Ok(compare(&found, None, &vehicle, &Options::default())?)
+}
 
 /// `updraft gap` on a flight folder.
 pub(in crate::cli) struct Searched;
 
 impl Explain for Searched {
     fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
-        let found = one_flight(flight, None)?;
-        let vehicle = library::load(&FlightFolder::at(flight).vehicle().display().to_string())?;
-        Ok(compare(&found, None, &vehicle, &Options::default())?.verdict)
+        Ok(explained(flight)?.verdict)
     }
 
     fn fisher_z(&self, flight: &Path, truth: &Scenario) -> Vec<Option<f64>> {

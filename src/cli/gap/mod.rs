@@ -2,10 +2,11 @@
 
 pub(super) mod blind;
 pub(super) mod logs;
+mod next;
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::analyze::load_plan;
@@ -23,11 +24,13 @@ use crate::vehicle::{Vehicle, library};
 
 /// Arguments of `updraft gap`.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_long_help = "Examples:
   updraft gap my-campaign
   updraft gap my-campaign --vehicle templates/vehicles/airsim-generic-quad.toml -o gap/
   updraft gap --measured logs/ --simulated sitl-logs/
   updraft gap --measured logs/ --plan my-campaign/calibration --vehicle pixel
+  updraft gap next my-campaign                    # what to fly next
 
 The plan is flown again in the simulator (or the logs of another simulation are taken), and the
 drones' pulses are held against it in steady flight. What is missing is named only when a flight with
@@ -39,6 +42,8 @@ gap/verdict.json has all of it, gap/model.toml is the vehicle with what was foun
 --vehicle gap/model.toml` flies it. Exit code 3: done, but logs could not be used. Exit code 5: no
 log has steady flight to compare.")]
 pub(super) struct GapArgs {
+    #[command(subcommand)]
+    command: Option<GapCommand>,
     /// Campaign folder
     #[arg(required_unless_present = "measured", conflicts_with = "measured")]
     campaign: Option<PathBuf>,
@@ -71,6 +76,12 @@ pub(super) struct GapArgs {
     seed: u64,
 }
 
+#[derive(Debug, Subcommand)]
+enum GapCommand {
+    /// Propose the shortest flight that would tell what the verdict left open
+    Next(next::NextArgs),
+}
+
 fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value <= 0.2 => Ok(value),
@@ -96,6 +107,9 @@ struct GapOutput<'a> {
 }
 
 pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandError> {
+    if let Some(GapCommand::Next(args)) = &args.command {
+        return next::run(context, args);
+    }
     let options = Options {
         alpha: args.alpha,
         replicates: usize::from(args.replicates),

@@ -1,0 +1,210 @@
+//! A proposed flight rehearsed: simulated with a known answer, to see whether the search would find it.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use super::air::AirScales;
+use super::error::BlindError;
+use super::explain::Explain;
+use super::fly::{Flown, Setting, fly_into};
+use super::vehicles::{KNOWN_THRUST_SPREAD, hover_a, set};
+use crate::gap::Verdict;
+use crate::gap::next::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
+use crate::gap::next::known::charge_of;
+use crate::gap::next::result::Verified;
+use crate::gap::next::{Elements, Question, Sought};
+use crate::gap::verdict::{Finding, Noise};
+use crate::mission::resolve::ResolvedFlight;
+use crate::vehicle::Vehicle;
+
+/// Time scale and relative strength of the wind's own gusts.
+const WIND_GUST: (f64, f64) = (25.0, 0.15);
+/// Correlation length of the updraft, m.
+const LENGTH_M: f64 = 145.0;
+/// Cells and internal resistance of the batteries that the logs report.
+const CELLS: f64 = 3.0;
+const RESISTANCE_OHM: f64 = 0.03;
+
+/// A flight that is to be rehearsed.
+#[derive(Clone, Copy, Debug)]
+pub struct Rehearsal<'a> {
+    /// Its plan with its template.
+    pub flight: &'a ResolvedFlight,
+    /// What it is made of.
+    pub elements: Elements,
+    /// Noise and air as they were found.
+    pub noise: &'a Noise,
+    /// Mean horizontal wind, show frame, m/s.
+    pub wind_mps: [f64; 2],
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+/// An answer: an effect of some size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// The effect.
+    pub effect: String,
+    /// The parameter that says how large it is.
+    pub parameter: String,
+    /// Its value.
+    pub size: f64,
+    /// The vehicle without it, which is held against the logs.
+    pub without: Vehicle,
+}
+
+/// The possible answers to a question that the simulator can fly. `model` has what was found; sizes are
+/// those that look alike.
+pub fn answers(
+    question: &Question,
+    model: &Vehicle,
+    sizes: &[(String, Option<f64>)],
+) -> Vec<Answer> {
+    let size_of = |effect: &str| {
+        let found = sizes.iter().find(|(name, _)| name == effect || name.is_empty());
+        found.and_then(|(_, size)| *size)
+    };
+    let answer = |effect: &str, size: f64, without: &Vehicle| {
+        Some(Answer {
+            effect: effect.to_owned(),
+            parameter: parameter(effect)?.to_owned(),
+            size,
+            without: without.clone(),
+        })
+    };
+    match &question.sought {
+        Sought::Shape { .. } => Vec::new(),
+        Sought::Seen { effect } => {
+            size_of(effect).and_then(|size| answer(effect, size, model)).into_iter().collect()
+        }
+        Sought::Apart { effects, size } => {
+            let [first, others @ ..] = &effects[..] else { return Vec::new() };
+            let mut without = model.clone();
+            let before = size.as_ref().and_then(|(name, _, before)| Some((name, (*before)?)));
+            match before {
+                Some((name, before)) => set(&mut without, first, name, before),
+                None => {
+                    without.effects.remove(first);
+                }
+            }
+            let own = size.as_ref().and_then(|(_, value, _)| answer(first, *value, &without));
+            let rivals = others.iter().filter_map(|other| answer(other, size_of(other)?, &without));
+            own.into_iter().chain(rivals).collect()
+        }
+    }
+}
+
+/// The parameter that says how large an effect is.
+fn parameter(effect: &str) -> Option<&'static str> {
+    match crate::effects::find(effect)?.definition().sought {
+        crate::effects::Sought::Shape { size, .. } => Some(size),
+        crate::effects::Sought::No(_) => None,
+    }
+}
+
+/// Flies the proposed flight with one answer into `folder`.
+///
+/// # Errors
+/// As [`super::fly::fly`].
+pub fn fly_answer(
+    rehearsal: &Rehearsal<'_>,
+    answer: &Answer,
+    folder: &Path,
+    stop: Option<&AtomicBool>,
+) -> Result<Flown, BlindError> {
+    let plan = &rehearsal.flight.plan;
+    let noise = rehearsal.noise;
+    let wind_mps = rehearsal.wind_mps;
+    let air = AirScales {
+        shared_mps: noise.shared_air_mps,
+        length_m: LENGTH_M,
+        time_s: noise.shared_air_s.max(1.0),
+        local_mps: noise.gusts_mps.hypot(noise.own_air_mps),
+        local_s: noise.gusts_s.max(1.0),
+        wind_mps,
+        wind_gust_mps: WIND_GUST.1 * wind_mps[0].hypot(wind_mps[1]),
+        wind_gust_s: WIND_GUST.0,
+    };
+    let setting = Setting {
+        plan,
+        template_text: &rehearsal.flight.template_text,
+        known: &answer.without,
+        air: &air,
+        seed: rehearsal.seed,
+        extra: &[],
+        missing: &[],
+    };
+    let vehicle_of = |slot: u16| Ok(drone(rehearsal, answer, slot));
+    fly_into(folder, &setting, &vehicle_of, stop)
+}
+
+/// The vehicle of one slot.
+fn drone(rehearsal: &Rehearsal<'_>, answer: &Answer, slot: u16) -> Vehicle {
+    let plan = &rehearsal.flight.plan;
+    let place = plan.slots.iter().position(|one| one.slot == slot).unwrap_or(0);
+    let mut vehicle = answer.without.clone();
+    if !vehicle.effects.contains_key("thrust-spread") {
+        set(&mut vehicle, "thrust-spread", "sd", KNOWN_THRUST_SPREAD);
+    }
+    let charge = if rehearsal.elements.charge {
+        charge_of(place, plan.slots.len(), lowest_charge(plan))
+    } else {
+        1.0
+    };
+    if vehicle.effects.get("battery").is_some_and(|table| table.on) {
+        set(&mut vehicle, "battery", "initial_charge", charge);
+    } else {
+        let capacity_ah = hover_a(&vehicle, CELLS) * plan.limits.endurance_s / 3600.0;
+        let reported = [
+            ("cells", CELLS),
+            ("capacity_ah", capacity_ah),
+            ("resistance_ohm", RESISTANCE_OHM),
+            ("initial_charge", charge),
+            ("compensated", 0.0),
+            // It is reported and does not act, unless it is the answer.
+            ("exponent", 0.0),
+        ];
+        for (name, value) in reported {
+            set(&mut vehicle, "battery", name, value);
+        }
+    }
+    if rehearsal.elements.payload && place.is_multiple_of(PAYLOAD_EVERY) {
+        vehicle.airframe.mass_kg += PAYLOAD_KG;
+    }
+    set(&mut vehicle, &answer.effect, &answer.parameter, answer.size);
+    vehicle
+}
+
+/// Flies one answer, has it explained, and says whether the search told it. The flight's folder is
+/// removed again.
+///
+/// # Errors
+/// As [`fly_answer`]; [`BlindError::Explain`] when the search fails.
+pub fn rehearse(
+    rehearsal: &Rehearsal<'_>,
+    answer: &Answer,
+    folder: &Path,
+    search: &dyn Explain,
+    stop: Option<&AtomicBool>,
+) -> Result<Verified, BlindError> {
+    fly_answer(rehearsal, answer, folder, stop)?;
+    let found = search.explain(folder);
+    // What was made here goes, whatever came of it.
+    let _ = std::fs::remove_dir_all(folder);
+    let verdict =
+        found.map_err(|source| BlindError::Explain { flight: folder.to_owned(), source })?;
+    Ok(told(answer, &verdict))
+}
+
+fn told(answer: &Answer, verdict: &Verdict) -> Verified {
+    let found: Vec<String> = verdict
+        .steps
+        .iter()
+        .map(|step| match &step.finding {
+            Finding::Unknown { depends_on, .. } => format!("unknown, depends on {depends_on}"),
+            finding => finding.effects().join(" or "),
+        })
+        .collect();
+    let told = found.len() == 1 && found[0] == answer.effect;
+    Verified { truth: answer.effect.clone(), size: answer.size, found, told }
+}

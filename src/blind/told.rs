@@ -1,0 +1,186 @@
+//! How a blind flight ended, in plain words and as one object.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::play::Played;
+use super::score::{Called, HiddenOutcome, Outcome};
+use crate::gap::Verdict;
+use crate::gap::verdict::Shrink;
+use crate::gap::words::short;
+
+/// Name and version of the format of `hidden.json`.
+pub const HIDDEN_SCHEMA: &str = "updraft.hidden/1";
+
+/// One flight with something hidden, from the seal to its opening: `hidden.json` of `updraft run --hide`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HiddenRun {
+    /// Format name and version: `updraft.hidden/1`.
+    pub schema: String,
+    /// Program and version.
+    pub made_by: String,
+    /// Logs that the search was given.
+    pub logs: usize,
+    /// SHA-256 of the sealed truth, published before the flight.
+    pub truth_sha256: String,
+    /// SHA-256 of the verdict that was on the disk when the seal was opened.
+    pub verdict_sha256: String,
+    /// The verdict in one or two sentences.
+    pub verdict: String,
+    /// The gap on held-out drones (few drones: held-out rungs), before and after.
+    pub gap: Option<Shrink>,
+    /// What was hidden, in a few words.
+    pub truth: String,
+    /// Whether all that was hidden is named, or in a class that is given, and nothing else is.
+    pub right: bool,
+    /// The comparison in plain words.
+    pub words: Vec<String>,
+    /// The comparison.
+    pub outcome: Outcome,
+}
+
+impl HiddenRun {
+    /// Of a flight that was played.
+    pub fn of(played: &Played, made_by: &str) -> Self {
+        let Played { flown, verdict, opened, outcome } = played;
+        Self {
+            schema: HIDDEN_SCHEMA.to_owned(),
+            made_by: made_by.to_owned(),
+            logs: flown.logs,
+            truth_sha256: opened.truth_sha256.clone(),
+            verdict_sha256: opened.verdict_sha256.clone(),
+            verdict: verdict.summary.clone(),
+            gap: verdict.gap.drones.or(verdict.gap.rungs),
+            truth: opened.truth.words(),
+            right: is_right(outcome),
+            words: words(outcome, verdict),
+            outcome: outcome.clone(),
+        }
+    }
+}
+
+/// Whether everything that is hidden was called by its name or class, and nothing else was named.
+pub fn is_right(outcome: &Outcome) -> bool {
+    let called = |one: &HiddenOutcome| matches!(one.called, Called::Named | Called::InClass);
+    let others = outcome.wrong_names.len() - outcome.wrong_in_class
+        + outcome.wrong_classes
+        + outcome.wrong_unknowns;
+    outcome.hidden.iter().all(called) && others == 0
+}
+
+/// The comparison of verdict and truth, one sentence or two for each thing.
+pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
+    let mut words: Vec<String> =
+        outcome.hidden.iter().map(|one| of_one(one, outcome, verdict)).collect();
+    if outcome.hidden.is_empty() {
+        words.push(if outcome.found.is_empty() {
+            "Right: nothing was hidden, and nothing was named.".to_owned()
+        } else {
+            format!("Wrong: nothing was hidden, and {} was named.", outcome.found.join(" and "))
+        });
+    } else {
+        let in_class = |name: &str| {
+            outcome.hidden.iter().any(|one| super::classes::equivalent(&one.effect, name))
+        };
+        let others: Vec<&str> =
+            outcome.wrong_names.iter().map(String::as_str).filter(|name| !in_class(name)).collect();
+        if !others.is_empty() {
+            words.push(format!(
+                "Wrong: {} was named as well, and it was not hidden.",
+                others.join(" and ")
+            ));
+        }
+        if outcome.wrong_classes > 0 {
+            words.push("Wrong: a class was given that has nothing of what was hidden.".to_owned());
+        }
+        if outcome.wrong_unknowns > 0
+            && outcome.hidden.iter().any(|one| one.called != Called::Unknown)
+        {
+            words.push(
+                "Wrong: something unknown was reported beside, and it was not hidden.".to_owned(),
+            );
+        }
+    }
+    words
+}
+
+fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
+    let what = format!("{} was hidden, at {}", one.effect, short(one.value));
+    let sizes = match (one.fitted, one.covered, one.relative_error) {
+        (Some(fitted), covered, error) => {
+            let off = error.map_or_else(String::new, |error| {
+                format!(", {:+.0} % off in what was changed", 100.0 * error)
+            });
+            let interval = match covered {
+                Some(true) => "; its 95 % interval covers the truth",
+                Some(false) => "; its 95 % interval misses the truth",
+                None => "",
+            };
+            format!(" Found: {}{off}{interval}.", short(fitted))
+        }
+        (None, ..) => String::new(),
+    };
+    match one.called {
+        Called::Named if one.foreign => format!(
+            "Right: {what} (it is in no library), and the verdict calls it unknown and says what it \
+             depends on."
+        ),
+        Called::Named => format!("Right: {what}, and the verdict names it.{sizes}"),
+        Called::InClass => {
+            let among = verdict.steps.iter().any(|step| {
+                let effects = step.finding.effects();
+                effects.len() > 1 && effects.contains(&one.effect.as_str())
+            });
+            if among {
+                format!(
+                    "Right as far as it goes: {what}, and the verdict has it among those that \
+                         this flight cannot separate ({}).{sizes}",
+                    outcome.found.join("; ")
+                )
+            } else {
+                format!(
+                    "Near: {what}, and the verdict names {}, of the same class: this protocol \
+                     cannot tell them apart.",
+                    outcome.found.join(" and ")
+                )
+            }
+        }
+        Called::Unknown => format!(
+            "Not recognised: {what}, and the verdict says no more than that something is missing \
+             ({}).",
+            outcome.found.join("; ")
+        ),
+        Called::Silent => {
+            let why = match (one.said_visible, one.z) {
+                (Some(false), _) => {
+                    " The verdict says itself that this flight does not show so little of it."
+                }
+                (_, Some(z)) if z < 4.0 => " At this size it hardly rises above air and noise.",
+                _ => "",
+            };
+            let z = one.z.map_or_else(String::new, |z| format!(" (z {z:.1})"));
+            let found = if outcome.found.is_empty() {
+                "names nothing".to_owned()
+            } else {
+                format!("names {}", outcome.found.join(" and "))
+            };
+            format!("Missed: {what}{z}, and the verdict {found}.{why}")
+        }
+    }
+}
+
+/// The held-out gap before and after, in words.
+pub fn gap_words(shrink: &Shrink) -> String {
+    format!(
+        "{:.1} -> {:.1} us ({:.2} -> {:.2} m/s of air); without the air that all saw {:.1} -> {:.1}, noise \
+         alone leaves {:.1} us",
+        shrink.before_us.value,
+        shrink.after_us.value,
+        shrink.before_mps,
+        shrink.after_mps,
+        shrink.before_without_air_us,
+        shrink.after_without_air_us,
+        shrink.floor_us
+    )
+}

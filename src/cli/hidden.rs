@@ -1,0 +1,200 @@
+//! `updraft run --hide`: a flight with an effect hidden from the analysis, which names it before the
+//! seal is opened.
+
+use std::path::Path;
+
+use clap::{Args, ValueEnum};
+
+use super::context::Context;
+use super::exit::{CommandError, Exit};
+use super::gap::blind::Written;
+use super::mission_args::MissionArgs;
+use super::simulate::made_by;
+use super::words;
+use crate::base::file::{create_folder, write_whole};
+use crate::blind::play::{self, Act, play};
+use crate::blind::scenario::FULL_SIDE;
+use crate::blind::told::{HiddenRun, gap_words};
+use crate::blind::{AirClass, Base, Cell, Protocol, Scenario, seal};
+use crate::campaign::to_json;
+
+/// File of the comparison.
+const RESULT: &str = "hidden.json";
+/// Sides of the grid that are flown.
+const SIDES: std::ops::RangeInclusive<i64> = 3..=15;
+
+/// Which protocol is flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Which {
+    /// The paper's ladder (template `calibration`)
+    Paper,
+    /// The counter-phase ladder (template `calibration-counterphase`), charge and warmth staggered
+    Enhanced,
+}
+
+/// How much the air moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Day {
+    /// A calm dawn: 0.12 m/s
+    Calm,
+    /// 0.36 m/s
+    Moderate,
+    /// As in the paper's field flights: 0.5 m/s
+    Field,
+}
+
+/// Options of `updraft run --hide`.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Hidden physics")]
+pub(super) struct HideArgs {
+    /// Fly a calibration whose drones have an effect that the analysis is not told of: this seed
+    /// chooses it. It is sealed, the search for missing physics gives its verdict, then the seal is
+    /// opened. Takes --grid NxN and --vehicle airsim-generic-quad or pixel
+    #[arg(
+        long,
+        value_name = "SEED",
+        conflicts_with_all = [
+            "template", "updraft", "lose", "no_study", "direct", "calibration_updraft",
+            "calibration_wind", "calibration_air", "wind", "wind_from", "specs", "truth", "seed",
+            "full_logs", "effects", "drones", "spacing", "origin", "ground", "orientation", "speeds",
+            "leg", "hover", "baseline", "height", "duration", "ramp", "set"
+        ]
+    )]
+    hide: Option<u64>,
+    /// Protocol of the flight with hidden physics [default: enhanced]
+    #[arg(long, value_enum, requires = "hide")]
+    protocol: Option<Which>,
+    /// How much the air moves in it [default: moderate]
+    #[arg(long, value_enum, requires = "hide")]
+    day: Option<Day>,
+}
+
+impl HideArgs {
+    /// The seed, when something is to be hidden.
+    pub(super) fn seed(self) -> Option<u64> {
+        self.hide
+    }
+
+    fn cell(self, seed: u64, mission: &MissionArgs) -> Result<Cell, CommandError> {
+        let protocol = match self.protocol {
+            Some(Which::Paper) => Protocol::Paper,
+            Some(Which::Enhanced) | None => Protocol::Enhanced,
+        };
+        let air = match self.day {
+            Some(Day::Calm) => AirClass::Calm,
+            Some(Day::Moderate) | None => AirClass::Moderate,
+            Some(Day::Field) => AirClass::Field,
+        };
+        let bases = [Base::Airsim, Base::Pixel];
+        let base = match &mission.vehicle {
+            None => Base::Airsim,
+            Some(name) => {
+                let of_name = |base: &Base| base.vehicle_name() == name;
+                bases.into_iter().find(of_name).ok_or_else(|| {
+                    let names = bases.map(Base::vehicle_name);
+                    CommandError::Usage(format!(
+                        "physics can be hidden from {}, not from {name}",
+                        words::list(&names)
+                    ))
+                })?
+            }
+        };
+        let side = match mission.grid {
+            None => FULL_SIDE,
+            Some((rows, columns)) if rows == columns && SIDES.contains(&rows) => {
+                u16::try_from(rows).unwrap_or(FULL_SIDE)
+            }
+            Some((rows, columns)) => {
+                return Err(CommandError::Usage(format!(
+                    "with --hide the grid is square, {}x{} to {}x{}; {rows}x{columns} is not",
+                    SIDES.start(),
+                    SIDES.start(),
+                    SIDES.end(),
+                    SIDES.end()
+                )));
+            }
+        };
+        let mut cell = Cell::hiding_one(seed, protocol, air, base);
+        cell.side = side;
+        Ok(cell)
+    }
+}
+
+/// Seals, flies, explains, opens and compares.
+pub(super) fn run(
+    context: &Context,
+    folder: &Path,
+    force: bool,
+    args: HideArgs,
+    mission: &MissionArgs,
+    seed: u64,
+) -> Result<Exit, CommandError> {
+    let cell = args.cell(seed, mission)?;
+    let truth = Scenario::draw(seed, &cell)?;
+    create_folder(folder)?;
+    let _lock = context.lock(folder)?;
+    make_room(folder, force)?;
+    let mut tell = |act: Act<'_>| {
+        match act {
+        Act::Sealed(hash) => context.say(&format!(
+            "Sealed: an effect that {} does not have, of a size that is usual\n  SHA-256 {hash} -> {}",
+            cell.base.vehicle_name(),
+            seal::truth_path(folder).display()
+        )),
+        Act::Flown(flown) => {
+            let lost = truth.nuisance.missing.len() + flown.lost;
+            let lost = if lost > 0 { format!(" ({lost} lost)") } else { String::new() };
+            context.say(&format!(
+                "Flown: {} in {} air, {}{lost} -> {}",
+                cell.protocol.template(),
+                cell.air.name(),
+                words::count(flown.logs, "log"),
+                play::flight(folder).display()
+            ));
+        }
+        Act::Explained(verdict) => {
+            context.say(&format!("Verdict: {}", verdict.summary));
+            if let Some(shrink) = verdict.gap.drones.or(verdict.gap.rungs) {
+                context.say(&format!("Gap on held-out data: {}", gap_words(&shrink)));
+            }
+            context.say(&format!("  -> {}", play::verdict(folder).display()));
+        }
+    }
+    };
+    let played = play(&truth, folder, &Written, Some(context.stop_flag()), &mut tell)?;
+    context.say(&format!("Seal opened: it hides {}", played.opened.truth.words()));
+    let result = HiddenRun::of(&played, &made_by());
+    let json = to_json(&result)
+        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
+    let path = folder.join(RESULT);
+    write_whole(&path, &json)?;
+    if context.json {
+        context.print_json(&result)?;
+    } else {
+        context.print(&format!("{}\n", result.words.join("\n")))?;
+    }
+    context.result(&path)?;
+    Ok(if played.flown.lost > 0 { Exit::Losses } else { Exit::Done })
+}
+
+/// A flight of another seed is not mixed with this one's.
+fn make_room(folder: &Path, force: bool) -> Result<(), CommandError> {
+    let flight = play::flight(folder);
+    if play::is_played(folder) {
+        if !force {
+            return Err(CommandError::Usage(format!(
+                "{} has a flight with hidden physics; choose another folder with -o, or replace it with \
+                 --force",
+                folder.display()
+            )));
+        }
+        return Ok(play::remove(folder)?);
+    }
+    if flight.exists() {
+        return Err(CommandError::Usage(format!(
+            "{} is there and was not made by `run --hide`; choose another folder with -o",
+            flight.display()
+        )));
+    }
+    Ok(())
+}

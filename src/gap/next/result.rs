@@ -1,0 +1,96 @@
+//! The proposed flight as `gap/next.json` has it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::elements::Elements;
+use super::questions::Kind;
+
+/// Name and version of the format.
+pub const NEXT_SCHEMA: &str = "updraft.next/1";
+
+/// The flight that would tell what a verdict left open: `gap/next.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Next {
+    /// Format name and version: `updraft.next/1`.
+    pub schema: String,
+    /// Program and version.
+    pub made_by: String,
+    /// The flight whose verdict was taken.
+    pub flight: String,
+    /// Fisher z that was asked for.
+    pub wanted_z: f64,
+    /// Length of that flight, s.
+    pub present_s: f64,
+    /// Length of the proposed one, s.
+    pub proposed_s: f64,
+    /// Whether it reaches what was asked for in every question.
+    pub reaches: bool,
+    /// What it is made of.
+    pub elements: Elements,
+    /// Why, an element a line.
+    pub why: Vec<String>,
+    /// What the crew must do.
+    pub briefing: Vec<String>,
+    /// The questions.
+    pub questions: Vec<Asked>,
+    /// Flights whose information was predicted.
+    pub predicted_flights: usize,
+    /// What a reader must know.
+    pub notes: Vec<String>,
+}
+
+/// One question.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Asked {
+    /// What kind of question it is.
+    pub kind: Kind,
+    /// In words.
+    pub question: String,
+    /// Fisher z that is wanted: what was asked for, or half as much again as the flight had that should
+    /// have told and did not.
+    pub wanted_z: f64,
+    /// Fisher z of the flight that was flown: of the effect, or of the least separation.
+    pub present_z: f64,
+    /// Of the proposed one.
+    pub proposed_z: f64,
+    /// Whether that is what was asked for.
+    pub reached: bool,
+    /// How often the proposed flight must be flown to reach it (z adds up in quadrature); absent: it is
+    /// reached at once, or never.
+    pub flights_needed: Option<u32>,
+    /// From what it is told, and how well.
+    pub from: Vec<Told>,
+    /// The proposed flight was simulated with each answer in turn: what the search made of it.
+    pub verified: Vec<Verified>,
+}
+
+/// One separation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Told {
+    /// From what; empty: from nothing.
+    pub from: String,
+    /// Size of it that looks most alike in the proposed flight.
+    pub size: Option<f64>,
+    /// Fisher z of the flight that was flown.
+    pub present_z: f64,
+    /// Of the proposed one.
+    pub proposed_z: f64,
+}
+
+/// One simulated flight with one answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Verified {
+    /// The effect that the simulated drones truly had.
+    pub truth: String,
+    /// Its size.
+    pub size: f64,
+    /// What the search found.
+    pub found: Vec<String>,
+    /// Whether it named just that.
+    pub told: bool,
+}

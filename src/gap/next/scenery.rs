@@ -1,0 +1,168 @@
+//! A flight that is yet to be flown, with its noise, ready to be asked.
+
+use super::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
+use super::known::{Flight, Known, cells, charge_of};
+use crate::effects::battery::cell_v;
+use crate::gap::GapError;
+use crate::gap::bins::{Bin, BinValues};
+use crate::gap::candidates::{Candidate, library};
+use crate::gap::compare::{Comparison, Simulated};
+use crate::gap::data::{Data, PlannedPart};
+use crate::gap::gls::{Column, Problem, Solution, Split};
+use crate::gap::lean::Wind;
+use crate::gap::refine::{Parameter, slopes};
+use crate::gap::scene::Scene;
+use crate::mission::plan::Slot;
+use crate::vehicle::Vehicle;
+
+/// A flight with its noise, ready to be asked.
+pub(super) struct Scenery<'a> {
+    pub(super) known: &'a Known,
+    pub(super) comparison: Comparison,
+    /// Groups that carry the payload.
+    heavy: Vec<bool>,
+}
+
+impl<'a> Scenery<'a> {
+    pub(super) fn new(
+        known: &'a Known,
+        flight: &Flight,
+        charge: bool,
+        payload: bool,
+    ) -> Result<Self, GapError> {
+        let plan = &flight.plan;
+        let place = |slot: &Slot| plan.slots.iter().position(|one| one.slot == slot.slot);
+        let carries = |slot: &Slot| {
+            payload && place(slot).is_some_and(|place| place.is_multiple_of(PAYLOAD_EVERY))
+        };
+        let (mut parts, mut heavy) = (Vec::new(), Vec::new());
+        for (index, (bins, values)) in flight.groups.iter().enumerate() {
+            for loaded in [false, true] {
+                let slots: Vec<&Slot> = plan
+                    .slots
+                    .iter()
+                    .filter(|slot| usize::from(slot.group) == index && carries(slot) == loaded)
+                    .collect();
+                if !slots.is_empty() && values.iter().any(Option::is_some) {
+                    let name = plan.groups[index].name.clone();
+                    parts.push(PlannedPart { name, slots, bins, values });
+                    heavy.push(loaded);
+                }
+            }
+        }
+        let (count, lowest) = (plan.slots.len(), lowest_charge(plan));
+        let cells = cells(&known.model);
+        let endurance_s = known.model.limits.endurance_s.max(1.0);
+        let resting_v = |slot: &Slot, bin: &Bin| {
+            if !known.has_voltage {
+                return f64::NAN;
+            }
+            let full =
+                if charge { charge_of(place(slot).unwrap_or(0), count, lowest) } else { 1.0 };
+            cells * cell_v(full - bin.middle_s().max(0.0) / endurance_s)
+        };
+        let data = Data::planned(plan, &parts, resting_v);
+        // The simulated side is what all drones read.
+        let side: Vec<Vec<Option<BinValues>>> = data
+            .groups
+            .iter()
+            .map(|group| {
+                let first = group.measured.first();
+                first.map_or_else(Vec::new, |values| values.iter().copied().map(Some).collect())
+            })
+            .collect();
+        let simulated = Simulated::Given(side);
+        let mut comparison = Comparison::new(&data, &known.model, &simulated, Some(plan))?;
+        // The wind is known here, and needs no estimate from the leans.
+        let air =
+            |bin: &Bin| [0, 1].map(|axis: usize| bin.velocity_mps[axis] - known.wind_mps[axis]);
+        let groups = &comparison.data.groups;
+        let wind = Wind {
+            mean_mps: known.wind_mps,
+            air_mps: groups.iter().map(|group| group.bins.iter().map(air).collect()).collect(),
+            measured: None,
+        };
+        let amsl_m = plan.site.ground_amsl_m;
+        comparison.scene = Scene::measured(&comparison.data, &comparison.side, &wind, amsl_m);
+        comparison.wind = wind;
+        Ok(Self { known, comparison, heavy })
+    }
+
+    /// The vehicle with the payload.
+    pub(super) fn loaded(&self, vehicle: &Vehicle) -> Option<Vehicle> {
+        self.heavy.contains(&true).then(|| {
+            let mut loaded = vehicle.clone();
+            loaded.airframe.mass_kg += PAYLOAD_KG;
+            loaded
+        })
+    }
+
+    /// Regressors of each group's own weight.
+    pub(super) fn merged(&self, light: Column, loaded: Option<Column>) -> Column {
+        fn pick<T: Clone>(light: Vec<T>, loaded: &[T], heavy: &[bool]) -> Vec<T> {
+            let both = light.into_iter().zip(loaded).zip(heavy);
+            both.map(|((light, loaded), heavy)| if *heavy { loaded.clone() } else { light })
+                .collect()
+        }
+        let Some(loaded) = loaded else { return light };
+        match (light, loaded) {
+            (Column::Shared(light), Column::Shared(loaded)) => {
+                Column::Shared(pick(light, &loaded, &self.heavy))
+            }
+            (Column::Own(light), Column::Own(loaded)) => {
+                Column::Own(pick(light, &loaded, &self.heavy))
+            }
+            (light, _) => light,
+        }
+    }
+
+    /// The noise, with all fitted sizes free but those of one effect.
+    pub(super) fn solution(&self, but: Option<&str>) -> Result<Solution, GapError> {
+        let model = &self.known.model;
+        let patterns = self.comparison.patterns(model)?;
+        let split = Split::of(&self.comparison.residual(model, 0.0)?);
+        let free: Vec<Parameter> = self
+            .known
+            .parameters
+            .iter()
+            .filter(|parameter| Some(parameter.effect) != but)
+            .cloned()
+            .collect();
+        let light = slopes(&self.comparison, model, &free)?;
+        let loaded = match self.loaded(model) {
+            Some(loaded) => Some(slopes(&self.comparison, &loaded, &free)?),
+            None => None,
+        };
+        let columns: Vec<Column> = light
+            .into_iter()
+            .enumerate()
+            .map(|(index, light)| {
+                let loaded = loaded.as_ref().and_then(|loaded| loaded.get(index)).cloned();
+                self.merged(light, loaded)
+            })
+            .collect();
+        Ok(Problem::new(&patterns, &split).with(&columns).at(&self.known.hyper))
+    }
+
+    /// An effect's forms, held against a vehicle.
+    pub(super) fn candidate(
+        &self,
+        vehicle: &Vehicle,
+        effect: &str,
+    ) -> Result<Option<Candidate>, GapError> {
+        let find = |vehicle: &Vehicle| -> Result<Option<Candidate>, GapError> {
+            let all = library(vehicle, &self.comparison.scene)?;
+            Ok(all.into_iter().find(|candidate| candidate.name == effect))
+        };
+        let Some(mut light) = find(vehicle)? else { return Ok(None) };
+        if let Some(loaded) = self.loaded(vehicle)
+            && let Some(loaded) = find(&loaded)?
+            && loaded.variants.len() == light.variants.len()
+        {
+            for (light, loaded) in light.variants.iter_mut().zip(loaded.variants) {
+                light.column = self.merged(light.column.clone(), Some(loaded.column));
+            }
+        }
+        Ok(Some(light))
+    }
+}

@@ -1,0 +1,87 @@
+//! The flight that would tell, as text for a terminal.
+
+use super::table::{Align, Column, lines};
+use super::text::clean;
+use crate::gap::next::Next;
+use crate::gap::next::result::Asked;
+
+/// Width of tables, columns.
+const WIDTH: usize = 100;
+
+/// Questions with what the present and the proposed flight tell, what it is made of, and what was
+/// verified.
+pub fn text(next: &Next) -> String {
+    let left = |head| Column { head, align: Align::Left, drop: 0 };
+    let right = |head| Column { head, align: Align::Right, drop: 0 };
+    let columns = [
+        right("flown: z"),
+        right("proposed: z"),
+        right("wanted"),
+        right("flights"),
+        left("question"),
+    ];
+    let mut rows = Vec::new();
+    for asked in &next.questions {
+        let flights = match (asked.reached, asked.flights_needed) {
+            (true, _) => "1".to_owned(),
+            (false, Some(flights)) => flights.to_string(),
+            (false, None) => "never".to_owned(),
+        };
+        rows.push(vec![
+            format!("{:.1}", asked.present_z),
+            format!("{:.1}", asked.proposed_z),
+            format!("{:.1}", asked.wanted_z),
+            flights,
+            clean(&asked.question),
+        ]);
+        for told in asked.from.iter().filter(|told| !told.from.is_empty()) {
+            rows.push(vec![
+                format!("{:.1}", told.present_z),
+                format!("{:.1}", told.proposed_z),
+                String::new(),
+                String::new(),
+                format!("  from {}", clean(&told.from)),
+            ]);
+        }
+    }
+    let mut out = lines(&columns, &rows, WIDTH);
+    out.push(String::new());
+    out.push(format!(
+        "Flown: {:.0} s. Proposed: {:.0} s{}",
+        next.present_s,
+        next.proposed_s,
+        if next.reaches { String::new() } else { format!("; {}", misses(next)) }
+    ));
+    out.extend(next.why.iter().map(|why| format!("  {why}")));
+    for asked in &next.questions {
+        out.extend(asked.verified.iter().map(verified));
+    }
+    out.extend(next.notes.iter().map(|note| format!("note: {}", clean(note))));
+    out.push(String::new());
+    out.join("\n")
+}
+
+fn misses(next: &Next) -> String {
+    let missed: Vec<&Asked> = next.questions.iter().filter(|asked| !asked.reached).collect();
+    format!(
+        "it misses what is wanted in {} of {} questions, by z {}",
+        missed.len(),
+        next.questions.len(),
+        missed
+            .iter()
+            .map(|asked| format!("{:.1}", asked.wanted_z - asked.proposed_z))
+            .collect::<Vec<_>>()
+            .join(", ")
+    )
+}
+
+fn verified(one: &crate::gap::next::result::Verified) -> String {
+    let found = if one.found.is_empty() { "nothing".to_owned() } else { one.found.join("; then ") };
+    format!(
+        "simulated with {} {}: the search found {} ({})",
+        one.truth,
+        crate::gap::words::short(one.size),
+        found,
+        if one.told { "told" } else { "not told" }
+    )
+}

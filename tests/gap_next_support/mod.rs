@@ -1,0 +1,73 @@
+//! A verdict on a flight, as tests need it.
+
+use updraft::gap::Verdict;
+use updraft::gap::verdict::{
+    DataUsed, Drones, Finding, Fitted, Gap, Interval, Noise, Rest, SensorChannel, Step,
+    VERDICT_SCHEMA,
+};
+
+/// Share of the inflow that the verdicts found: some 20 us/(m/s) on AirSim's quad.
+pub(crate) const INFLOW: f64 = 0.4;
+
+/// A field day's noise (physics note, section 4.4).
+fn noise() -> Noise {
+    Noise {
+        shared_air_mps: 0.42,
+        shared_air_s: 100.0,
+        own_air_mps: 0.1,
+        gusts_mps: 0.28,
+        gusts_s: 8.0,
+        white_us: 1.4,
+        drones_us: 10.0,
+        slopes: 0.05,
+        least_response: 3.0,
+    }
+}
+
+pub(crate) fn fitted(name: &str, value: f64) -> Fitted {
+    Fitted {
+        name: name.to_owned(),
+        unit: String::new(),
+        value: Interval { value, low: 0.9 * value, high: 1.1 * value },
+        before: None,
+    }
+}
+
+/// A verdict that found this.
+pub(crate) fn verdict(findings: Vec<Finding>) -> Verdict {
+    let step = |finding| Step {
+        finding,
+        gain_nats: 50.0,
+        threshold_nats: 8.0,
+        alpha: 0.005,
+        size_us: 20.0,
+        rivals: Vec::new(),
+        held_out_us: None,
+        shape: None,
+    };
+    Verdict {
+        schema: VERDICT_SCHEMA.to_owned(),
+        made_by: "updraft".to_owned(),
+        vehicle: "airsim-generic-quad".to_owned(),
+        summary: String::new(),
+        data: DataUsed::default(),
+        sensor: SensorChannel::default(),
+        steps: findings.into_iter().map(step).collect(),
+        rest: Rest::default(),
+        detectable: Vec::new(),
+        noise: noise(),
+        drones: Drones::default(),
+        gap: Gap::default(),
+        regimes: Vec::new(),
+        cautions: Vec::new(),
+    }
+}
+
+/// The class of everything that bends with climb.
+pub(crate) fn climb_class() -> Finding {
+    let effects = ["rotor-inflow", "parasitic-drag", "thrust-curve"];
+    Finding::Class {
+        effects: effects.map(str::to_owned).to_vec(),
+        parameters: vec![fitted("inflow_share", INFLOW)],
+    }
+}
