@@ -166,7 +166,7 @@ impl Data {
                 (slot.slot, place_m, part.bins.iter().zip(part.values).map(own).collect())
             };
             let drones = part.slots.iter().map(drone).collect();
-            data.add(&part.name, part.bins.to_vec(), drones, 0.0);
+            data.add(&part.name, part.bins, drones, 0.0);
         }
         let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
         data.count_neighbours(&plan.slots, spacing_m);

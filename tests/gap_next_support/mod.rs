@@ -46,6 +46,8 @@ pub(crate) fn verdict(findings: Vec<Finding>) -> Verdict {
         shape: None,
     };
     Verdict {
+        ladder: Vec::new(),
+        wind: updraft::gap::verdict::WindFound::default(),
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: "updraft".to_owned(),
         vehicle: "airsim-generic-quad".to_owned(),

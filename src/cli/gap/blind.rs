@@ -8,6 +8,8 @@ use crate::blind::explain::{Cause, Explain};
 use crate::blind::scenario::Scenario;
 use crate::blind::vehicles::true_vehicle;
 use crate::campaign::FlightFolder;
+use crate::cli::found::{Found, Work};
+use crate::cli::provenance::provenance;
 use crate::gap::{Explained, Flown, Input, Options, Verdict, fisher_z};
 use crate::vehicle::library;
 
@@ -16,10 +18,12 @@ pub(in crate::cli) struct Written;
 
 impl Explain for Written {
     fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
-        let explained = explained(flight)?;
+        let (explained, found) = explained(flight)?;
+        let work = Work { flights: vec![found], ..Work::new(flight) };
+        let provenance = provenance(&work, Vec::new());
         let folder = flight.join("gap");
         create_folder(&folder)?;
-        write(&folder, &explained)?;
+        write(&folder, &explained, &provenance)?;
         Ok(explained.verdict)
     }
 
@@ -28,10 +32,10 @@ impl Explain for Written {
     }
 }
 
-fn explained(flight: &Path) -> Result<Explained, Cause> {
+fn explained(flight: &Path) -> Result<(Explained, Found), Cause> {
     let found = one_flight(flight, None)?;
     let vehicle = library::load(&FlightFolder::at(flight).vehicle().display().to_string())?;
-    Ok(compare(&found, None, &vehicle, &Options::default())?)
+    Ok((compare(&found, None, &vehicle, &Options::default())?, found))
 }
 
 /// `updraft gap` on a flight folder.
@@ -39,7 +43,7 @@ pub(in crate::cli) struct Searched;
 
 impl Explain for Searched {
     fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
-        Ok(explained(flight)?.verdict)
+        Ok(explained(flight)?.0.verdict)
     }
 
     fn fisher_z(&self, flight: &Path, truth: &Scenario) -> Vec<Option<f64>> {

@@ -119,7 +119,7 @@ impl<'a> Scenery<'a> {
     /// The noise, with all fitted sizes free but those of one effect.
     pub(super) fn solution(&self, but: Option<&str>) -> Result<Solution, GapError> {
         let model = &self.known.model;
-        let patterns = self.comparison.patterns(model)?;
+        let patterns = self.comparison.patterns(model, 0.0)?;
         let split = Split::of(&self.comparison.residual(model, 0.0)?);
         let free: Vec<Parameter> = self
             .known
