@@ -21,6 +21,8 @@
 //! * [`flight`]: one drone's log as time series in show time.
 //! * [`analysis`]: windows, calibration laws, updraft estimates.
 //! * [`study`]: the same ladder flown in many airs, as in the paper's simulations.
+//! * [`gap`]: which physics a simulation lacks, by measured logs.
+//! * [`blind`]: flights with hidden physics that test it.
 //! * [`report`]: figures, tables and the HTML page.
 //! * [`campaign`]: names of the files in a campaign folder.
 //!
