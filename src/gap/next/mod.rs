@@ -1,7 +1,7 @@
 //! The flight that would tell: what to fly next, by what the verdict left open.
 //!
-//! [`ask`] takes the questions from a verdict, [`elements`] is what a flight can be made of, [`predict`]
-//! says without flying how well a flight separates, and [`search`] finds the shortest that separates
+//! [`ask`] takes the questions from a verdict, `elements` is what a flight can be made of, `predict`
+//! says without flying how well a flight separates, and `search` finds the shortest that separates
 //! well enough.
 
 pub mod elements;
