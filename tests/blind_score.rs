@@ -14,8 +14,7 @@ use updraft::blind::table::table;
 use updraft::blind::{AirClass, Base, BlindError, Cell, Explain, Protocol, Scenario};
 use updraft::gap::Verdict;
 use updraft::gap::verdict::{
-    DataUsed, Detectable, Drones, Finding, Fitted, Gap, Interval, Noise, Rest, SensorChannel,
-    Shrink, Step, VERDICT_SCHEMA,
+    Detectable, Finding, Fitted, Interval, SensorChannel, Shrink, Step, VERDICT_SCHEMA,
 };
 
 fn truth(base: Base, hidden: &[&str]) -> Scenario {
@@ -39,19 +38,8 @@ fn verdict(findings: Vec<Finding>) -> Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: "test".to_owned(),
         vehicle: "airsim-generic-quad".to_owned(),
-        summary: String::new(),
-        data: DataUsed::default(),
-        sensor: SensorChannel::default(),
         steps: findings.into_iter().map(step).collect(),
-        rest: Rest::default(),
-        detectable: Vec::new(),
-        noise: Noise::default(),
-        wind: updraft::gap::verdict::WindFound::default(),
-        drones: Drones::default(),
-        gap: Gap::default(),
-        regimes: Vec::new(),
-        ladder: Vec::new(),
-        cautions: Vec::new(),
+        ..Verdict::default()
     }
 }
 

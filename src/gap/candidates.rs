@@ -92,7 +92,7 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
                 }
                 // A form that the vehicle cannot have is no candidate.
                 let Ok(pulses) = scene.pulses(&other) else { continue };
-                let column = difference(&pulses, &base);
+                let column = pulses.less(&base);
                 variants.push(Variant { vehicle: Some(other), size: value, column });
             }
         }
@@ -138,46 +138,6 @@ pub(super) fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f
     let table = vehicle.effects.entry(effect.to_owned()).or_default();
     table.on = true;
     table.parameters.insert(parameter.to_owned(), value);
-}
-
-/// One column less another.
-pub(super) fn difference(a: &Column, b: &Column) -> Column {
-    match (a, b) {
-        (Column::Shared(a), Column::Shared(b)) => Column::Shared(
-            a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect(),
-        ),
-        (Column::Own(a), _) => Column::Own(own(a, |group, drone, bin| -b.at(group, drone, bin))),
-        (Column::Shared(_), Column::Own(b)) => {
-            let negative = own(b, |group, drone, bin| -a.at(group, drone, bin));
-            Column::Own(
-                negative
-                    .into_iter()
-                    .map(|drones| {
-                        drones
-                            .into_iter()
-                            .map(|bins: Vec<f64>| bins.into_iter().map(|v| -v).collect())
-                            .collect()
-                    })
-                    .collect(),
-            )
-        }
-    }
-}
-
-fn own(a: &super::gls::Pulses, add: impl Fn(usize, usize, usize) -> f64) -> super::gls::Pulses {
-    a.iter()
-        .enumerate()
-        .map(|(group, drones)| {
-            drones
-                .iter()
-                .enumerate()
-                .map(|(drone, bins)| {
-                    let moved = bins.iter().enumerate();
-                    moved.map(|(bin, value)| value + add(group, drone, bin)).collect()
-                })
-                .collect()
-        })
-        .collect()
 }
 
 /// Motions of the air that an effect may be mistaken for: not the vehicle's, and never added to it.

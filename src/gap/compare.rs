@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 use super::bins::{Bin, BinValues};
-use super::candidates::difference;
 use super::data::Data;
 use super::error::GapError;
 use super::gls::{Column, Pulses};
@@ -212,7 +211,7 @@ impl Comparison {
     /// # Errors
     /// Effects of a vehicle that are not valid.
     pub fn change(&self, from: &Vehicle, to: &Vehicle) -> Result<Column, EffectError> {
-        Ok(difference(&self.scene.pulses(to)?, &self.scene.pulses(from)?))
+        Ok(self.scene.pulses(to)?.less(&self.scene.pulses(from)?))
     }
 }
 

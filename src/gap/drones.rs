@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::compare::Comparison;
 use super::error::GapError;
 use super::explain::Found;
-use super::gls::Pulses;
+use super::gls::Split;
 use super::noise::{
     GUST_TIME, GUSTS, GroupPattern, Hyper, LEAST, OFFSETS, OWN, SHARED_TIME, SLOPES, WHITE,
 };
@@ -32,15 +32,14 @@ pub(super) fn drones(
     is_held: impl Fn(u16) -> bool,
 ) -> Result<(Drones, Option<Step>), GapError> {
     let patterns = all.patterns(&found.vehicle, found.gusts_mps)?;
-    let residual = all.residual(&found.vehicle, found.gusts_mps)?;
+    let residual = Split::of(&all.residual(&found.vehicle, found.gusts_mps)?);
     let mut each = Vec::new();
     let mut reliability: f64 = 1.0;
     for (index, (group, pattern)) in all.data.groups.iter().zip(&patterns).enumerate() {
         let blup = Blup::new(pattern, &found.hyper);
         reliability = reliability.min(blup.slope_reliability(pattern));
-        let deviations = deviations(&residual, index);
-        for (slot, deviation) in group.slots.iter().zip(deviations) {
-            let (offset_us, slope) = blup.of(&deviation);
+        for (slot, deviation) in group.slots.iter().zip(residual.deviations(index)) {
+            let (offset_us, slope) = blup.of(deviation);
             each.push(DroneOffset { slot: *slot, offset_us, slope, held_out: is_held(*slot) });
         }
     }
@@ -49,15 +48,6 @@ pub(super) fn drones(
     let correlation = (each.len() >= FEWEST).then(|| correlation(&each));
     let words = words(&each, correlation, found);
     Ok((Drones { each, correlation, words }, spread))
-}
-
-fn deviations(residual: &Pulses, group: usize) -> Vec<Vec<f64>> {
-    let drones = &residual[group];
-    let count = drones.len().max(1) as f64;
-    let bins = drones.first().map_or(0, Vec::len);
-    let mean: Vec<f64> =
-        (0..bins).map(|bin| drones.iter().map(|drone| drone[bin]).sum::<f64>() / count).collect();
-    drones.iter().map(|d| d.iter().zip(&mean).map(|(a, b)| a - b).collect()).collect()
 }
 
 /// Best linear prediction of a drone's offset and response from its deviations.

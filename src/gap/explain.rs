@@ -1,10 +1,10 @@
 //! The workflow: find, name, add, and again, until nothing passes.
 
-use super::candidates::{library, of_the_air};
+use super::candidates::{Variant, library, of_the_air, set};
 use super::compare::{Comparison, Simulated, gusts_mps};
 use super::data::Data;
 use super::error::GapError;
-use super::generic::{Generic, all};
+use super::generic::{Generic, all, drawn};
 use super::gls::{Column, Likelihood, Problem, Split};
 use super::noise::{GroupPattern, Hyper, LEAST, WHITE};
 use super::refine::{Parameter, fitted, parameters_of, refine, slopes};
@@ -150,12 +150,7 @@ pub fn search(
                     let mut next = changed.clone();
                     if let Some(size) = candidate.size {
                         let start = size.now + best.beta * (variant.size - size.now);
-                        super::candidates::set(
-                            &mut next,
-                            candidate.name,
-                            size.name,
-                            start.clamp(size.low, size.high),
-                        );
+                        set(&mut next, candidate.name, size.name, start.clamp(size.low, size.high));
                     }
                     let known = found.parameters.iter().any(|p| p.effect == candidate.name);
                     if !known {
@@ -181,7 +176,7 @@ pub fn search(
                     size_us: best.size_us,
                     rivals,
                     held_out_us: None,
-                    shape: Some(drawn(&comparison, variant, best.beta)),
+                    shape: Some(along_climb(&comparison, variant, best.beta)),
                 });
             }
             What::Free(free) => {
@@ -253,25 +248,15 @@ fn finding(names: Vec<String>, was_there: bool) -> Finding {
     }
 }
 
-fn drawn(comparison: &Comparison, variant: &super::candidates::Variant, beta: f64) -> Shape {
+/// What one form of an effect does, along the climb.
+fn along_climb(comparison: &Comparison, variant: &Variant, beta: f64) -> Shape {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (group, signals) in comparison.scene.signals.iter().enumerate() {
         for (bin, signal) in signals.iter().enumerate() {
             points.push((signal.climb_mps, beta * variant.column.at(group, 0, bin)));
         }
     }
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let size = points.len().div_ceil(40).max(1);
-    let mean = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
-        let chunks = points.chunks(size);
-        chunks.map(|chunk| chunk.iter().map(of).sum::<f64>() / chunk.len() as f64).collect()
-    };
-    Shape {
-        axis: "vertical velocity (m/s)".to_owned(),
-        x: mean(|point| point.0),
-        us: mean(|point| point.1),
-        se_us: Vec::new(),
-    }
+    drawn("vertical velocity (m/s)", points)
 }
 
 fn rivals(round: &Round, sought: Sought<'_>) -> Vec<Rival> {

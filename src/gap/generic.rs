@@ -1,6 +1,6 @@
 //! Free shapes: what depends on something, though no effect of the library says how.
 
-use super::gls::Column;
+use super::gls::{Column, means_of};
 use super::scene::Scene;
 use crate::effects::Signals;
 use crate::gap::verdict::Shape;
@@ -97,16 +97,11 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
             let group = |drones: &Vec<Vec<f64>>| drones.iter().map(drone).collect();
             Column::Own(charge.iter().map(group).collect())
         });
-        let mean = |drones: &Vec<Vec<f64>>| -> Vec<f64> {
-            let bins = drones.first().map_or(0, Vec::len);
-            let count = drones.len().max(1) as f64;
-            (0..bins).map(|bin| drones.iter().map(|d| d[bin]).sum::<f64>() / count).collect()
-        };
         found.push(Generic {
             depends_on: "voltage",
             axis: "charge by the voltage at rest (share)",
             columns: powers.collect(),
-            along: charge.iter().map(mean).collect(),
+            along: means_of(charge),
             penalty: 4.0,
         });
     }
@@ -174,39 +169,36 @@ fn span(values: &[Vec<f64>]) -> f64 {
     most(values) - least(values)
 }
 
-/// Points of a drawn shape.
-const POINTS: usize = 40;
-
 impl Generic {
-    /// The shape with these coefficients, by its signal: means in up to forty places.
+    /// The shape with these coefficients, by its signal.
     pub(super) fn shape(&self, beta: &[f64]) -> Shape {
+        let means: Vec<Vec<Vec<f64>>> = self.columns.iter().map(Column::means).collect();
         let mut points: Vec<(f64, f64)> = Vec::new();
         for (group, along) in self.along.iter().enumerate() {
             for (bin, x) in along.iter().enumerate() {
-                let value = |column: &Column| match column {
-                    Column::Shared(values) => values[group][bin],
-                    Column::Own(values) => {
-                        let count = values[group].len().max(1) as f64;
-                        values[group].iter().map(|drone| drone[bin]).sum::<f64>() / count
-                    }
-                };
-                let us = self.columns.iter().zip(beta).map(|(c, b)| b * value(c)).sum();
+                let us = means.iter().zip(beta).map(|(mean, b)| b * mean[group][bin]).sum();
                 points.push((*x, us));
             }
         }
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let size = points.len().div_ceil(POINTS).max(1);
-        let mean = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
-            points
-                .chunks(size)
-                .map(|chunk| chunk.iter().map(of).sum::<f64>() / chunk.len() as f64)
-                .collect()
-        };
-        Shape {
-            axis: self.axis.to_owned(),
-            x: mean(|point| point.0),
-            us: mean(|point| point.1),
-            se_us: Vec::new(),
-        }
+        drawn(self.axis, points)
+    }
+}
+
+/// Points of a drawn shape.
+const POINTS: usize = 40;
+
+/// A curve through points: means in up to forty places.
+pub(super) fn drawn(axis: &str, mut points: Vec<(f64, f64)>) -> Shape {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = points.len().div_ceil(POINTS).max(1);
+    let mean = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+        let chunks = points.chunks(size);
+        chunks.map(|chunk| chunk.iter().map(of).sum::<f64>() / chunk.len() as f64).collect()
+    };
+    Shape {
+        axis: axis.to_owned(),
+        x: mean(|point| point.0),
+        us: mean(|point| point.1),
+        se_us: Vec::new(),
     }
 }

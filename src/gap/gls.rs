@@ -19,12 +19,40 @@ pub enum Column {
 }
 
 impl Column {
-    /// Means over each group's drones.
-    fn means(&self) -> Vec<Vec<f64>> {
+    /// Means over each group's drones, by group and bin.
+    pub(super) fn means(&self) -> Vec<Vec<f64>> {
         match self {
             Self::Shared(values) => values.clone(),
-            Self::Own(values) => values.iter().map(|drones| mean_of(drones)).collect(),
+            Self::Own(values) => means_of(values),
         }
+    }
+
+    /// Other values in the same places: by group, drone (0 where all drones share them) and bin.
+    #[must_use]
+    pub(super) fn each(&self, value: impl Fn(usize, usize, usize) -> f64) -> Self {
+        let bins = |group: usize, drone: usize, bins: &[f64]| -> Vec<f64> {
+            (0..bins.len()).map(|bin| value(group, drone, bin)).collect()
+        };
+        match self {
+            Self::Shared(values) => {
+                let groups = values.iter().enumerate();
+                Self::Shared(groups.map(|(group, values)| bins(group, 0, values)).collect())
+            }
+            Self::Own(values) => {
+                let drones = |(group, drones): (usize, &Vec<Vec<f64>>)| {
+                    let each = drones.iter().enumerate();
+                    each.map(|(drone, values)| bins(group, drone, values)).collect()
+                };
+                Self::Own(values.iter().enumerate().map(drones).collect())
+            }
+        }
+    }
+
+    /// This column less another.
+    #[must_use]
+    pub(super) fn less(&self, other: &Self) -> Self {
+        let own = if matches!(self, Self::Own(_)) { self } else { other };
+        own.each(|group, drone, bin| self.at(group, drone, bin) - other.at(group, drone, bin))
     }
 
     /// Only some bins, chosen by the places of group and bin.
@@ -81,10 +109,14 @@ impl Column {
     }
 }
 
-fn mean_of(drones: &[Vec<f64>]) -> Vec<f64> {
-    let count = drones.len() as f64;
-    let bins = drones.first().map_or(0, Vec::len);
-    (0..bins).map(|bin| drones.iter().map(|drone| drone[bin]).sum::<f64>() / count).collect()
+/// Means over each group's drones, by group and bin.
+pub(super) fn means_of(pulses: &Pulses) -> Vec<Vec<f64>> {
+    let mean = |drones: &Vec<Vec<f64>>| -> Vec<f64> {
+        let count = drones.len() as f64;
+        let bins = drones.first().map_or(0, Vec::len);
+        (0..bins).map(|bin| drones.iter().map(|drone| drone[bin]).sum::<f64>() / count).collect()
+    };
+    pulses.iter().map(mean).collect()
 }
 
 /// Pulses split into groups' means and drones' deviations.
@@ -97,7 +129,7 @@ pub(super) struct Split {
 impl Split {
     /// Of pulses by group, drone and bin.
     pub(super) fn of(pulses: &Pulses) -> Self {
-        let means: Vec<Vec<f64>> = pulses.iter().map(|drones| mean_of(drones)).collect();
+        let means = means_of(pulses);
         let deviations = pulses
             .iter()
             .zip(&means)
@@ -108,6 +140,11 @@ impl Split {
             })
             .collect();
         Self { means, deviations }
+    }
+
+    /// Each drone's deviations from the mean of its group.
+    pub(super) fn deviations(&self, group: usize) -> &[Vec<f64>] {
+        self.deviations.get(group).map_or(&[], Vec::as_slice)
     }
 
     fn of_column(column: &Column) -> Self {

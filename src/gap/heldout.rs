@@ -7,7 +7,7 @@ use super::compare::{Comparison, Simulated};
 use super::data::Data;
 use super::error::GapError;
 use super::explain::Found;
-use super::gls::{Column, Problem, Pulses, Split};
+use super::gls::{Column, Problem, Pulses, Split, means_of};
 use super::noise::{GroupPattern, Hyper};
 use super::posterior::SharedAir;
 use super::refine::refine;
@@ -21,69 +21,171 @@ const DRAWS: usize = 1000;
 /// Simulated flights for the floor.
 const FLOORS: usize = 40;
 
-/// What the shrink is made from: residuals of the drones that were held out, before and after, and
-/// those of the fitted ones after.
-struct Residuals {
+/// What the shrink is made from: residuals before and after, by group, drone and bin, of which the
+/// air that the fitted drones saw is taken away.
+struct Residuals<'a> {
     before: Pulses,
     after: Pulses,
-    air: Vec<Vec<f64>>,
-    response: Vec<Vec<f64>>,
+    air: &'a [Vec<f64>],
+    response: &'a [Vec<f64>],
+    segments: &'a [Vec<usize>],
+}
+
+/// A search and what was held against the logs.
+#[derive(Clone, Copy)]
+pub(super) struct Case<'a> {
+    /// The model before.
+    pub original: &'a Vehicle,
+    /// The simulated side.
+    pub simulated: &'a Simulated<'a>,
+    /// The plan, if there is one.
+    pub plan: Option<&'a Plan>,
+    /// What was found.
+    pub found: &'a Found,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+}
+
+impl Case<'_> {
+    /// The gaps: on the drones that were held out, and on rungs of the fitted ones.
+    ///
+    /// # Errors
+    /// See [`GapError`].
+    pub(super) fn gap(&self, train: &Data, held: &Data) -> Result<Gap, GapError> {
+        let fitted = Fitted::of(self.found)?;
+        let drones = (held.drones() > 0).then(|| self.of_drones(held, &fitted)).transpose()?;
+        Ok(Gap { drones, rungs: self.of_rungs(train, &fitted)? })
+    }
+
+    fn against(&self, data: &Data, vehicle: &Vehicle) -> Result<Comparison, GapError> {
+        let comparison = Comparison::new(data, vehicle, self.simulated, self.plan)?;
+        Ok(same_bins(&comparison, &self.found.comparison))
+    }
+
+    fn of_drones(&self, held: &Data, fitted: &Fitted) -> Result<Shrink, GapError> {
+        let (vehicle, gusts_mps) = (&self.found.vehicle, self.found.gusts_mps);
+        let before = self.against(held, self.original)?;
+        let after = self.against(held, vehicle)?;
+        let mut end = after.residual(vehicle, gusts_mps)?;
+        // Free shapes were fitted on the others' bins, which are the same.
+        subtract(&mut end, &fitted.shapes);
+        let mut own = fitted.residual.clone();
+        subtract(&mut own, &fitted.shapes);
+        let residuals = Residuals {
+            before: before.residual(&before.vehicle, gusts_mps)?,
+            after: end,
+            air: &fitted.air(&own, self.found),
+            response: &after.scene.response(vehicle)?,
+            segments: &fitted.segments,
+        };
+        Ok(self.shrink(&residuals, fitted))
+    }
+
+    fn shrink(&self, residuals: &Residuals<'_>, fitted: &Fitted) -> Shrink {
+        let counts: Vec<usize> = residuals.after.iter().map(Vec::len).collect();
+        let Fitted { patterns, shared, .. } = fitted;
+        let floor_us = floor(patterns, &counts, &self.found.hyper, shared, self.seed);
+        shrink(residuals, floor_us, self.seed)
+    }
+
+    /// Rungs held out in rotation: sizes are fitted on the other rungs, the gap is taken on this one.
+    fn of_rungs(&self, train: &Data, fitted: &Fitted) -> Result<Option<Shrink>, GapError> {
+        let Found { comparison, vehicle, gusts_mps, .. } = self.found;
+        let speed = |group: usize, bin: usize| {
+            (comparison.data.groups[group].bins[bin].climb_mps().abs() * 1000.0).round() as i64
+        };
+        let groups = comparison.data.groups.iter().enumerate();
+        let mut speeds: Vec<i64> = groups
+            .flat_map(|(group, of)| (0..of.bins.len()).map(move |bin| (group, bin)))
+            .map(|(group, bin)| speed(group, bin))
+            .filter(|speed| *speed > 0)
+            .collect();
+        speeds.sort_unstable();
+        speeds.dedup();
+        if speeds.len() < 3 {
+            return Ok(None);
+        }
+        let before = self.against(train, self.original)?;
+        let mut end = fitted.residual.clone();
+        if !self.found.parameters.is_empty() {
+            for held in &speeds {
+                self.refit_without(*held, &speed, &mut end)?;
+            }
+        }
+        subtract(&mut end, &fitted.shapes);
+        let air = fitted.air(&end, self.found);
+        let residuals = Residuals {
+            before: before.residual(&before.vehicle, *gusts_mps)?,
+            after: end,
+            air: &air,
+            response: &comparison.scene.response(vehicle)?,
+            segments: &fitted.segments,
+        };
+        Ok(Some(self.shrink(&residuals, fitted)))
+    }
+
+    /// Residuals of one rung by sizes that were fitted without it.
+    fn refit_without(
+        &self,
+        held: i64,
+        speed: &impl Fn(usize, usize) -> i64,
+        end: &mut Pulses,
+    ) -> Result<(), GapError> {
+        let Found { comparison, vehicle, parameters, extras, hyper, gusts_mps, .. } = self.found;
+        let keep = |group, bin| speed(group, bin) != held;
+        let extras: Vec<Column> = extras.iter().map(|extra| extra.only(keep)).collect();
+        let others = comparison.only(keep);
+        let fit = refine(&others, vehicle, parameters, &extras, *hyper, *gusts_mps, false)?;
+        let there = comparison.residual(&fit.vehicle, *gusts_mps)?;
+        for (group, drones) in end.iter_mut().enumerate() {
+            for (drone, values) in drones.iter_mut().enumerate() {
+                for (bin, value) in values.iter_mut().enumerate() {
+                    if speed(group, bin) == held {
+                        *value = there[group][drone][bin];
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The fitted drones with everything found in the model.
+struct Fitted {
+    patterns: Vec<GroupPattern>,
+    residual: Pulses,
+    /// What the free shapes say in each bin.
+    shapes: Vec<Vec<f64>>,
+    shared: SharedAir,
     segments: Vec<Vec<usize>>,
 }
 
-/// Gaps of a search.
-///
-/// # Errors
-/// See [`GapError`].
-pub(super) fn gap(
-    train: &Data,
-    held: &Data,
-    original: &Vehicle,
-    simulated: &Simulated<'_>,
-    plan: Option<&Plan>,
-    found: &Found,
-    seed: u64,
-) -> Result<Gap, GapError> {
-    let drones = if held.drones() == 0 {
-        None
-    } else {
-        Some(of_drones(held, original, simulated, plan, found, seed)?)
-    };
-    let rungs = of_rungs(train, original, simulated, plan, found, seed)?;
-    Ok(Gap { drones, rungs })
-}
+impl Fitted {
+    fn of(found: &Found) -> Result<Self, GapError> {
+        let comparison = &found.comparison;
+        let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
+        let residual = comparison.residual(&found.vehicle, found.gusts_mps)?;
+        let split = Split::of(&residual);
+        let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.hyper);
+        let means: Vec<Vec<Vec<f64>>> = found.extras.iter().map(Column::means).collect();
+        let value = |group: usize, bin: usize| {
+            let parts = means.iter().zip(solution.beta.iter().skip(1));
+            parts.map(|(mean, beta)| beta * mean[group][bin]).sum::<f64>()
+        };
+        let bins = |(group, pattern): (usize, &GroupPattern)| {
+            (0..pattern.time_s.len()).map(|bin| value(group, bin)).collect()
+        };
+        let shapes = patterns.iter().enumerate().map(bins).collect();
+        let shared = SharedAir::new(&patterns, &found.hyper);
+        let of = |group: &super::data::Group| group.bins.iter().map(|bin| bin.segment).collect();
+        let segments = comparison.data.groups.iter().map(of).collect();
+        Ok(Self { patterns, residual, shapes, shared, segments })
+    }
 
-fn of_drones(
-    held: &Data,
-    original: &Vehicle,
-    simulated: &Simulated<'_>,
-    plan: Option<&Plan>,
-    found: &Found,
-    seed: u64,
-) -> Result<Shrink, GapError> {
-    let comparison = &found.comparison;
-    let before = same_bins(&Comparison::new(held, original, simulated, plan)?, comparison);
-    let after = same_bins(&Comparison::new(held, &found.vehicle, simulated, plan)?, comparison);
-    let start = before.residual(&before.vehicle, found.gusts_mps)?;
-    let mut end = after.residual(&found.vehicle, found.gusts_mps)?;
-    // Free shapes were fitted on the others' bins, which are the same.
-    let shapes = shapes(comparison, found)?;
-    subtract(&mut end, &shapes);
-    let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
-    let mut fitted = comparison.residual(&found.vehicle, found.gusts_mps)?;
-    subtract(&mut fitted, &shapes);
-    let shared = SharedAir::new(&patterns, &found.hyper);
-    let air = shared.pulses(&means(&fitted), &patterns, &found.hyper);
-    let residuals = Residuals {
-        before: start,
-        after: end,
-        air,
-        response: after.scene.response(&found.vehicle)?,
-        segments: segments(comparison),
-    };
-    let counts: Vec<usize> = residuals.after.iter().map(Vec::len).collect();
-    let floor_us = floor(&patterns, &counts, &found.hyper, &shared, seed);
-    Ok(shrink(&residuals, floor_us, seed))
+    /// What the shared air does to the pulse, by these residuals of the fitted drones.
+    fn air(&self, residual: &Pulses, found: &Found) -> Vec<Vec<f64>> {
+        self.shared.pulses(&means_of(residual), &self.patterns, &found.hyper)
+    }
 }
 
 /// A comparison with only the bins of another.
@@ -96,49 +198,12 @@ fn same_bins(comparison: &Comparison, other: &Comparison) -> Comparison {
     })
 }
 
-fn segments(comparison: &Comparison) -> Vec<Vec<usize>> {
-    let of = |group: &super::data::Group| group.bins.iter().map(|bin| bin.segment).collect();
-    comparison.data.groups.iter().map(of).collect()
-}
-
-/// What the free shapes of a search say in each bin.
-fn shapes(comparison: &Comparison, found: &Found) -> Result<Vec<Vec<f64>>, GapError> {
-    let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
-    let split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
-    let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.hyper);
-    let value = |group: usize, bin: usize| {
-        let parts = found.extras.iter().zip(solution.beta.iter().skip(1));
-        parts
-            .map(|(column, beta)| match column {
-                Column::Shared(values) => beta * values[group][bin],
-                Column::Own(values) => {
-                    let count = values[group].len().max(1) as f64;
-                    beta * values[group].iter().map(|drone| drone[bin]).sum::<f64>() / count
-                }
-            })
-            .sum::<f64>()
-    };
-    let bins = |(group, pattern): (usize, &GroupPattern)| {
-        (0..pattern.time_s.len()).map(|bin| value(group, bin)).collect()
-    };
-    Ok(patterns.iter().enumerate().map(bins).collect())
-}
-
 fn subtract(pulses: &mut Pulses, shapes: &[Vec<f64>]) {
     for (drones, shape) in pulses.iter_mut().zip(shapes) {
         for drone in drones {
             drone.iter_mut().zip(shape).for_each(|(value, shape)| *value -= shape);
         }
     }
-}
-
-fn means(pulses: &Pulses) -> Vec<Vec<f64>> {
-    let mean = |drones: &Vec<Vec<f64>>| -> Vec<f64> {
-        let bins = drones.first().map_or(0, Vec::len);
-        let count = drones.len().max(1) as f64;
-        (0..bins).map(|bin| drones.iter().map(|drone| drone[bin]).sum::<f64>() / count).collect()
-    };
-    pulses.iter().map(mean).collect()
 }
 
 /// Sums for one block of a drone and a segment: count, squares of four residuals.
@@ -150,7 +215,7 @@ struct Block {
     mps: [f64; 2],
 }
 
-fn shrink(residuals: &Residuals, floor_us: f64, seed: u64) -> Shrink {
+fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
     let mut blocks: Vec<Block> = Vec::new();
     for (group, drones) in residuals.after.iter().enumerate() {
         for (drone, after) in drones.iter().enumerate() {
@@ -260,7 +325,7 @@ fn floor(
             .zip(patterns)
             .map(|(drones, group)| drones.iter().take(group.drones).cloned().collect())
             .collect();
-        let air = shared.pulses(&means(&fitted), patterns, hyper);
+        let air = shared.pulses(&means_of(&fitted), patterns, hyper);
         for ((drones, group), air) in pulses.iter().zip(patterns).zip(&air) {
             for drone in drones.iter().skip(group.drones) {
                 let rest: Vec<f64> = drone.iter().zip(air).map(|(v, a)| v - a).collect();
@@ -271,77 +336,4 @@ fn floor(
         }
     }
     if count > 0.0 { (squares / count).sqrt() } else { 0.0 }
-}
-
-/// Rungs held out in rotation: sizes are fitted on the other rungs, the gap is taken on this one.
-fn of_rungs(
-    train: &Data,
-    original: &Vehicle,
-    simulated: &Simulated<'_>,
-    plan: Option<&Plan>,
-    found: &Found,
-    seed: u64,
-) -> Result<Option<Shrink>, GapError> {
-    let comparison = &found.comparison;
-    let speed = |group: usize, bin: usize| {
-        (comparison.data.groups[group].bins[bin].climb_mps().abs() * 1000.0).round() as i64
-    };
-    let mut speeds: Vec<i64> = comparison
-        .data
-        .groups
-        .iter()
-        .enumerate()
-        .flat_map(|(group, of)| (0..of.bins.len()).map(move |bin| (group, bin)))
-        .map(|(group, bin)| speed(group, bin))
-        .filter(|speed| *speed > 0)
-        .collect();
-    speeds.sort_unstable();
-    speeds.dedup();
-    if speeds.len() < 3 {
-        return Ok(None);
-    }
-    let before = same_bins(&Comparison::new(train, original, simulated, plan)?, comparison);
-    let start = before.residual(&before.vehicle, found.gusts_mps)?;
-    let shapes = shapes(comparison, found)?;
-    let mut end = comparison.residual(&found.vehicle, found.gusts_mps)?;
-    if !found.parameters.is_empty() {
-        for held in &speeds {
-            let others = comparison.only(|group, bin| speed(group, bin) != *held);
-            let keep = |group, bin| speed(group, bin) != *held;
-            let extras: Vec<Column> = found.extras.iter().map(|extra| extra.only(keep)).collect();
-            let fit = refine(
-                &others,
-                &found.vehicle,
-                &found.parameters,
-                &extras,
-                found.hyper,
-                found.gusts_mps,
-                false,
-            )?;
-            let there = comparison.residual(&fit.vehicle, found.gusts_mps)?;
-            for (group, drones) in end.iter_mut().enumerate() {
-                for (drone, values) in drones.iter_mut().enumerate() {
-                    for (bin, value) in values.iter_mut().enumerate() {
-                        if speed(group, bin) == *held {
-                            *value = there[group][drone][bin];
-                        }
-                    }
-                }
-            }
-        }
-    }
-    subtract(&mut end, &shapes);
-    let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
-    let shared = SharedAir::new(&patterns, &found.hyper);
-    let air = shared.pulses(&means(&end), &patterns, &found.hyper);
-    let counts: Vec<usize> = patterns.iter().map(|group| group.drones).collect();
-    let residuals = Residuals {
-        before: start,
-        after: end,
-        air,
-        response: comparison.scene.response(&found.vehicle)?,
-        segments: segments(comparison),
-    };
-    let floor_us = floor(&patterns, &counts, &found.hyper, &shared, seed);
-    Ok(Some(shrink(&residuals, floor_us, seed)))
 }

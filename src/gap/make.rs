@@ -7,7 +7,7 @@ use super::detectable::detectable;
 use super::drones::drones;
 use super::error::GapError;
 use super::explain::{Found, Options, search};
-use super::heldout::gap;
+use super::heldout::Case;
 use super::noise::{
     GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SLOPES, WHITE,
 };
@@ -81,7 +81,14 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     // A sensor that is off is repaired first: the pulse is then compared at the right speeds.
     let repaired = repaired(input.vehicle, &channel);
     let mut found = search(&train, &repaired, &simulated, input.plan, options)?;
-    let shrink = gap(&train, &held, input.vehicle, &simulated, input.plan, &found, options.seed)?;
+    let case = Case {
+        original: input.vehicle,
+        simulated: &simulated,
+        plan: input.plan,
+        found: &found,
+        seed: options.seed,
+    };
+    let shrink = case.gap(&train, &held)?;
     let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
     let whole = Comparison::new(&data, &found.vehicle, &simulated, input.plan)?;
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {

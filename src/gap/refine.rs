@@ -6,7 +6,7 @@ use super::error::GapError;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::Hyper;
 use super::verdict::{Fitted, Interval};
-use crate::effects::{find, select};
+use crate::effects::{Definition, Sought, find, select};
 use crate::vehicle::Vehicle;
 
 /// Rounds of Gauss-Newton; the forms are nearly linear in their sizes.
@@ -127,20 +127,10 @@ pub(super) fn slopes(
         let mut other = vehicle.clone();
         set(&mut other, parameter.effect, parameter.name, now + by);
         let change = comparison.change(vehicle, &other)?;
-        columns.push(scaled(&change, 1.0 / by));
+        let per_unit = 1.0 / by;
+        columns.push(change.each(|group, drone, bin| change.at(group, drone, bin) * per_unit));
     }
     Ok(columns)
-}
-
-fn scaled(column: &Column, factor: f64) -> Column {
-    let bins = |bins: &Vec<f64>| bins.iter().map(|value| value * factor).collect::<Vec<f64>>();
-    match column {
-        Column::Shared(values) => Column::Shared(values.iter().map(bins).collect()),
-        Column::Own(values) => {
-            let drones = |drones: &Vec<Vec<f64>>| drones.iter().map(bins).collect();
-            Column::Own(values.iter().map(drones).collect())
-        }
-    }
 }
 
 /// Parameters of an effect that is named: its size, and its form where the flight tells it.
@@ -156,19 +146,10 @@ pub(super) fn parameters_of(
 ) -> Result<Vec<Parameter>, GapError> {
     let Some(known) = find(effect) else { return Ok(Vec::new()) };
     let definition = known.definition();
-    let crate::effects::Sought::Shape { size, shape, .. } = &definition.sought else {
+    let Sought::Shape { size, shape, .. } = &definition.sought else {
         return Ok(Vec::new());
     };
-    let of = |name: &str| {
-        let parameter = definition.parameters.iter().find(|known| known.name == name)?;
-        Some(Parameter {
-            effect: definition.name,
-            name: parameter.name,
-            unit: parameter.unit,
-            bounds: (parameter.low, parameter.high),
-            before: None,
-        })
-    };
+    let of = |name: &str| parameter(definition, name);
     let mut found: Vec<Parameter> =
         of(size).map(|parameter| Parameter { before, ..parameter }).into_iter().collect();
     if let Some((name, values)) = shape
@@ -194,13 +175,18 @@ pub(super) fn parameters_of(
 /// The size of an effect as a parameter; `None`: steady flight does not show it.
 pub(super) fn size_of(effect: &str, size: &str) -> Option<Parameter> {
     let definition = find(effect)?.definition();
-    let crate::effects::Sought::Shape { .. } = &definition.sought else { return None };
-    let parameter = definition.parameters.iter().find(|known| known.name == size)?;
+    let Sought::Shape { .. } = &definition.sought else { return None };
+    parameter(definition, size)
+}
+
+/// One parameter of an effect, of which nothing is known.
+fn parameter(definition: &Definition, name: &str) -> Option<Parameter> {
+    let known = definition.parameters.iter().find(|known| known.name == name)?;
     Some(Parameter {
         effect: definition.name,
-        name: parameter.name,
-        unit: parameter.unit,
-        bounds: (parameter.low, parameter.high),
+        name: known.name,
+        unit: known.unit,
+        bounds: (known.low, known.high),
         before: None,
     })
 }

@@ -221,30 +221,9 @@ fn free_shapes(
 /// Standard deviation over bins of a sum of regressors, us.
 pub(super) fn spread(columns: &[Column], beta: &[f64], drones: &[usize]) -> f64 {
     let Some(first) = columns.first() else { return 0.0 };
-    let value = |group: usize, drone: usize, bin: usize| {
-        columns.iter().zip(beta).map(|(c, b)| b * c.at(group, drone, bin)).sum::<f64>()
-    };
-    let sum = match first {
-        Column::Shared(values) => Column::Shared(
-            values
-                .iter()
-                .enumerate()
-                .map(|(group, bins)| (0..bins.len()).map(|bin| value(group, 0, bin)).collect())
-                .collect(),
-        ),
-        Column::Own(values) => Column::Own(
-            values
-                .iter()
-                .enumerate()
-                .map(|(group, list)| {
-                    let one = |drone: usize| {
-                        (0..list[drone].len()).map(|bin| value(group, drone, bin)).collect()
-                    };
-                    (0..list.len()).map(one).collect()
-                })
-                .collect(),
-        ),
-    };
+    let sum = first.each(|group, drone, bin| {
+        columns.iter().zip(beta).map(|(c, b)| b * c.at(group, drone, bin)).sum()
+    });
     sum.spread(drones)
 }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub const VERDICT_SCHEMA: &str = "updraft.verdict/1";
 
 /// Where simulation and measurement of one campaign disagree, and what is missing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Verdict {
     /// Format name and version: `updraft.verdict/1`.
     pub schema: String,

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::gap_parts::first_gap;
 use super::gap_words::{kind, per_thousand, percent};
-use super::table::{Align, Column, lines};
+use super::table::{Align, Column, column, lines};
 use super::text::{clean, count, fixed, reduced};
 use crate::gap::Verdict;
 use crate::gap::verdict::{Detectable, Finding, Shrink, Step};
@@ -218,10 +218,6 @@ fn hidden_row(one: &Detectable) -> Vec<String> {
         format!("{:.1}", one.usual_z.abs()),
         why,
     ]
-}
-
-const fn column(head: &'static str, align: Align, drop: u8) -> Column {
-    Column { head, align, drop }
 }
 
 /// Lines of at most `width` characters, broken between words; those after the first are indented.

@@ -1,6 +1,6 @@
 //! The flight that would tell, as text for a terminal.
 
-use super::table::{Align, Column, lines};
+use super::table::{Align, column, lines};
 use super::text::clean;
 use crate::gap::next::Next;
 use crate::gap::next::result::Asked;
@@ -11,8 +11,8 @@ const WIDTH: usize = 100;
 /// Questions with what the present and the proposed flight tell, what it is made of, and what was
 /// verified.
 pub fn text(next: &Next) -> String {
-    let left = |head| Column { head, align: Align::Left, drop: 0 };
-    let right = |head| Column { head, align: Align::Right, drop: 0 };
+    let left = |head| column(head, Align::Left, 0);
+    let right = |head| column(head, Align::Right, 0);
     let columns = [
         right("flown: z"),
         right("proposed: z"),

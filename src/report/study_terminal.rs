@@ -6,7 +6,7 @@ use crate::study::paper;
 use crate::study::result::{ConditionResult, Evaluation, StudyResult, WindowCount};
 
 use super::figures::study::rho;
-use super::table::{Align, Column, lines};
+use super::table::{Align, Column, column, lines};
 use super::text::{NONE, clean, count, estimate, shortened, signed, symbol, unit};
 
 const BOLD: &str = "\u{1b}[1m";
@@ -60,10 +60,6 @@ pub fn study_summary(study: &StudyResult, width: usize, color: bool) -> String {
         }
     }
     text
-}
-
-const fn column(head: &'static str, align: Align, drop: u8) -> Column {
-    Column { head, align, drop }
 }
 
 fn law_table(study: &StudyResult) -> (Vec<Column>, Vec<Vec<String>>) {

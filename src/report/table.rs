@@ -20,6 +20,11 @@ pub(super) struct Column {
     pub(super) drop: u8,
 }
 
+/// A column that goes when room is short, those with the highest `drop` first; 0: never.
+pub(super) const fn column(head: &'static str, align: Align, drop: u8) -> Column {
+    Column { head, align, drop }
+}
+
 /// Lines of a table, heading first, each at most `width` characters: a last
 /// column of words is cut, then columns with the highest `drop` go. Columns that say nothing in any row are left out.
 pub(super) fn lines(columns: &[Column], rows: &[Vec<String>], width: usize) -> Vec<String> {
@@ -84,10 +89,6 @@ pub(super) fn lines(columns: &[Column], rows: &[Vec<String>], width: usize) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn column(head: &'static str, align: Align, drop: u8) -> Column {
-        Column { head, align, drop }
-    }
 
     #[test]
     fn narrow_tables_cut_the_last_column_then_drop_others() {

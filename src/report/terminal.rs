@@ -14,7 +14,7 @@ use super::figures::air::mean_truth;
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
 use super::page::capitalised;
 use super::statistics_lines::statistics_lines;
-use super::table::{Align, Column, lines};
+use super::table::{Align, Column, column, lines};
 use super::text::{NONE, clean, count, fixed, purpose, shortened, signed, usable};
 
 /// The table of drones shows no more; all are in the report.
@@ -392,10 +392,6 @@ impl Output {
             let _ = writeln!(self.text, "{}", line.trim_end());
         }
     }
-}
-
-fn column(head: &'static str, align: Align, drop: u8) -> Column {
-    Column { head, align, drop }
 }
 
 fn style_of(value: f64, largest: f64) -> &'static str {

@@ -1,10 +1,7 @@
 //! A verdict on a flight, as tests need it.
 
 use updraft::gap::Verdict;
-use updraft::gap::verdict::{
-    DataUsed, Drones, Finding, Fitted, Gap, Interval, Noise, Rest, SensorChannel, Step,
-    VERDICT_SCHEMA,
-};
+use updraft::gap::verdict::{Finding, Fitted, Interval, Noise, Step, VERDICT_SCHEMA};
 
 /// Share of the inflow that the verdicts found: some 20 us/(m/s) on AirSim's quad.
 pub(crate) const INFLOW: f64 = 0.4;
@@ -46,22 +43,12 @@ pub(crate) fn verdict(findings: Vec<Finding>) -> Verdict {
         shape: None,
     };
     Verdict {
-        ladder: Vec::new(),
-        wind: updraft::gap::verdict::WindFound::default(),
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: "updraft".to_owned(),
         vehicle: "airsim-generic-quad".to_owned(),
-        summary: String::new(),
-        data: DataUsed::default(),
-        sensor: SensorChannel::default(),
         steps: findings.into_iter().map(step).collect(),
-        rest: Rest::default(),
-        detectable: Vec::new(),
         noise: noise(),
-        drones: Drones::default(),
-        gap: Gap::default(),
-        regimes: Vec::new(),
-        cautions: Vec::new(),
+        ..Verdict::default()
     }
 }
 

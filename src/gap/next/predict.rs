@@ -6,7 +6,7 @@ use super::known::{Flight, Known};
 use super::questions::{Question, Sought};
 use super::scenery::Scenery;
 use crate::gap::GapError;
-use crate::gap::candidates::{difference, library, set};
+use crate::gap::candidates::{library, set};
 use crate::gap::generic::{Generic, all};
 use crate::gap::gls::{Column, Solution, White};
 use crate::gap::refly::mean_drone;
@@ -146,7 +146,7 @@ impl Scenery<'_> {
         let (with, without) = self.with_and_without(first, size);
         let scene = &self.comparison.scene;
         let trace = |with: &Vehicle, without: &Vehicle| -> Result<Column, GapError> {
-            Ok(difference(&scene.pulses(with)?, &scene.pulses(without)?))
+            Ok(scene.pulses(with)?.less(&scene.pulses(without)?))
         };
         let light = trace(&with, &without)?;
         let loaded = match (self.loaded(&with), self.loaded(&without)) {
