@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::analyze::{FlightInput, LogInput};
 use super::drone::One;
+use super::input::{FlightInput, LogInput};
 use super::result::{DroneAnalysis, Missing, PartlyUsedLog, UnusedLog};
 use super::slots::SlotMatch;
 

@@ -1,8 +1,5 @@
 //! One flight of a fleet, and a campaign, from logs to results.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -10,15 +7,14 @@ use thiserror::Error;
 
 use super::account::{self, Account};
 use super::aware::{Aware, Measured};
-use super::battery::Sag;
-use super::calibrate::{self, FitOptions, Location, PaperTable, Weights};
+use super::calibrate::{self, PaperTable};
 use super::caution::{SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
 use super::corrections::Corrections;
-use super::density::Density;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
+use super::input::{FlightInput, LogInput, TruthSeries};
 use super::ladder::mark_partial;
 use super::law::{LINEAR, SIGNED_QUADRATIC};
-use super::lean_table::LeanTable;
+use super::options::{AnalysisOptions, MapLaw};
 use super::prefer::{better_law, describes};
 use super::refer::refer_calibration;
 use super::result::{
@@ -27,194 +23,11 @@ use super::result::{
 };
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
-use super::statistics::{StatisticsOptions, of_map};
+use super::statistics::of_map;
 use super::track;
 use super::truth;
 use super::updraft::{self, DroneSeries};
-use super::wind::Leaning;
-use super::windows::{Tilt, WindowOptions};
-use crate::base::time::GpsTime;
-use crate::flight::Indicator;
-use crate::flight::table::Mapping;
-use crate::mission::plan::{Plan, Purpose};
-
-/// One log of a flight.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LogInput {
-    /// Slot of the plan by somebody's record. Only the home position in the log counts more; without
-    /// a record, the file's number and the system id count.
-    pub slot: Option<u16>,
-    /// The file.
-    pub path: PathBuf,
-    /// What its columns are, if it is a table and no DataFlash log.
-    pub table: Option<Arc<Mapping>>,
-}
-
-/// One flight to analyse.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FlightInput<'a> {
-    /// Short name.
-    pub name: &'a str,
-    /// The plan, if there is one.
-    pub plan: Option<&'a Plan>,
-    /// What the flight was for; `None`: as the plan says, else a calibration if it has a ladder.
-    pub purpose: Option<Purpose>,
-    /// The logs, in the order in which unplanned results are listed.
-    pub logs: &'a [LogInput],
-    /// GPS time of show time 0, for logs without SHOW rows.
-    pub start: Option<GpsTime>,
-    /// The true vertical air speed, when the flight was simulated in uniform air, m/s.
-    pub true_updraft_mps: Option<f64>,
-    /// The true vertical air speed that each slot met, when it was written down.
-    pub truth: Option<&'a BTreeMap<u16, TruthSeries>>,
-    /// Ground height and the vehicle's response to air density; `None`: pulses of the map are not
-    /// corrected for height.
-    pub density: Option<Density>,
-    /// How the vehicle leans in wind, where its drag is known; `None`: the map is not corrected for
-    /// wind, and says how wrong it may be.
-    pub leaning: Option<Leaning>,
-    /// Power of thrust that `u - 1000` goes with, where the vehicle is known: 1 where thrust is linear
-    /// in the pulse.
-    pub thrust_exponent: Option<f64>,
-    /// How the battery acts on the pulse; `None`: it does not.
-    pub sag: Option<Sag>,
-    /// What wind does to the vehicle's pulse, where its physics is known and [`FlightInput::leaning`]
-    /// does not say.
-    pub lean_table: Option<&'a LeanTable>,
-    /// Folder to which log paths are given in results.
-    pub folder: Option<&'a Path>,
-}
-
-impl FlightInput<'_> {
-    /// Without the corrections that are known for pulses alone.
-    fn for_indicator(&self, indicator: Indicator) -> Self {
-        match indicator {
-            Indicator::Pulse => *self,
-            Indicator::RotorSpeed | Indicator::Power => {
-                Self { density: None, leaning: None, sag: None, lean_table: None, ..*self }
-            }
-        }
-    }
-
-    /// A log's path as results give it.
-    pub(super) fn shown(&self, path: &Path) -> String {
-        let inside = self.folder.and_then(|folder| path.strip_prefix(folder).ok());
-        inside.unwrap_or(path).display().to_string()
-    }
-}
-
-/// The vertical air speed that one simulated drone met.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TruthSeries {
-    /// Show time of the first value, s; the others follow each second.
-    pub first_s: i64,
-    /// Mean updraft over the 10 s around each second, m/s, up positive.
-    pub updraft_mps: Vec<f64>,
-}
-
-impl TruthSeries {
-    /// The values at whole seconds of show time; `None` if one is missing.
-    fn at(&self, times_s: &[i64]) -> Option<Vec<f64>> {
-        let value = |time: &i64| {
-            let index = usize::try_from(time.checked_sub(self.first_s)?).ok()?;
-            self.updraft_mps.get(index).copied()
-        };
-        times_s.iter().map(value).collect()
-    }
-}
-
-/// Choices of an analysis.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AnalysisOptions {
-    /// What stands for rotor effort.
-    pub indicator: Indicator,
-    /// How windows are measured.
-    pub windows: WindowOptions,
-    /// Whether the slow offset of the pulse is subtracted before laws are fitted.
-    pub offset: OffsetRule,
-    /// How laws are fitted.
-    pub fit: FitOptions,
-    /// Windows as in the paper, whatever `fit` says of them: medians in simulations and means in the
-    /// field, weighted by the samples' standard deviation.
-    pub paper_windows: bool,
-    /// Law for the map of the air (`linear`, `signed quadratic`); `None`: the one whose calibration
-    /// has the lower reduced chi².
-    pub map_law: Option<MapLaw>,
-    /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
-    /// updraft (simulations), Table II for other fleets (of two drones or more).
-    pub paper: Option<PaperTable>,
-    /// How statistics of a map are made.
-    pub statistics: StatisticsOptions,
-    /// Whether the map's calibration law knows about slow air and the map has errors with their
-    /// origins; else the laws of the tables are inverted, as in the paper.
-    pub air_aware: bool,
-    /// Most points of a trace for figures.
-    pub trace_points: usize,
-}
-
-/// When the slow offset (eq. 5) is subtracted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum OffsetRule {
-    /// As in the paper: in the field, and not in simulations of uniform air.
-    #[default]
-    Field,
-    /// Always.
-    Always,
-    /// Never.
-    Never,
-}
-
-impl OffsetRule {
-    pub(super) fn is_subtracted(self, true_updraft_mps: Option<f64>) -> bool {
-        match self {
-            Self::Field => true_updraft_mps.is_none(),
-            Self::Always => true,
-            Self::Never => false,
-        }
-    }
-}
-
-/// Law for the map of the air.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MapLaw {
-    /// `u = A' V + u0`.
-    Linear,
-    /// `u = A f(V - W) + u0`.
-    SignedQuadratic,
-}
-
-impl Default for AnalysisOptions {
-    fn default() -> Self {
-        Self {
-            indicator: Indicator::default(),
-            windows: WindowOptions::default(),
-            offset: OffsetRule::default(),
-            fit: FitOptions::default(),
-            paper_windows: false,
-            map_law: None,
-            paper: None,
-            statistics: StatisticsOptions::default(),
-            air_aware: true,
-            trace_points: 1200,
-        }
-    }
-}
-
-impl AnalysisOptions {
-    /// The choices for one flight, with what they leave to it decided.
-    fn of_flight(&self, input: &FlightInput<'_>) -> Self {
-        let mut options = self.clone();
-        options.fit.indicator = options.indicator;
-        options.windows.thrust_exponent = options.windows.thrust_exponent.or(input.thrust_exponent);
-        if self.paper_windows {
-            let field = self.offset.is_subtracted(input.true_updraft_mps);
-            options.fit.location = if field { Location::Mean } else { Location::Median };
-            options.fit.weights = Weights::WindowSd;
-            options.windows.tilt = Tilt::Paper;
-        }
-        options
-    }
-}
+use crate::mission::plan::Purpose;
 
 /// Told after each log: (logs done, logs in all).
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);

@@ -5,12 +5,12 @@
 //! through the inverse of the law by quantiles, not by its slope: the signed quadratic has none at
 //! hover, and the ends of an interval stay what they are under any rising function.
 
-use super::analyze::MapLaw;
 use super::battery::{self, Pack, Sag, Slow};
 use super::budget::{BatteryCorrection, CommonError, ErrorBudget, Quality, QualityFlag};
 use super::corrections::{BATTERY, Corrections, DENSITY, DOUBTS, DRIFT, Raw, Referred, WIND};
 use super::drone::same_drone;
 use super::hover::{Hover, Second};
+use super::options::MapLaw;
 use super::result::{DroneAnalysis, FlightAnalysis, WindowStats};
 use super::shape::{PARAMETERS, Shape};
 use super::split::Point;

@@ -1,7 +1,7 @@
 //! What a reader must know before using a flight's numbers, in plain words.
 
-use super::analyze::AnalysisOptions;
 use super::calibrate;
+use super::options::AnalysisOptions;
 use super::prefer::misfit;
 use super::result::{DroneAnalysis, Fit, Laws, UpdraftMap};
 use super::stats::mean_sd;

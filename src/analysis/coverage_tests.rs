@@ -5,7 +5,6 @@
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 
-use super::analyze::MapLaw;
 use super::aware::Aware;
 use super::battery::Sag;
 use super::budget::Supply;
@@ -13,6 +12,7 @@ use super::calibrate::FitOptions;
 use super::corrections::Corrections;
 use super::density::Density;
 use super::hover::Hover;
+use super::options::MapLaw;
 use super::result::{DroneAnalysis, FlightAnalysis, SampleStats, Trace, WindowStats};
 use super::windows::{Target, WindowOptions};
 use crate::base::rng::{Purpose as Stream, stream};

@@ -1,10 +1,11 @@
 //! One log of a flight: windows, laws and (with reference laws) the air.
 
-use super::analyze::{AnalysisOptions, FlightInput, LogInput, MapLaw, TruthSeries};
 use super::aware::Aware;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
 use super::hover::Hover;
+use super::input::{FlightInput, LogInput, TruthSeries};
 use super::offset::OffsetMap;
+use super::options::{AnalysisOptions, MapLaw};
 use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats};
 use super::statistics::HoverSeen;
 use super::stats::mean_sd;

@@ -18,12 +18,14 @@ pub mod density;
 mod drone;
 pub mod fit;
 mod hover;
+mod input;
 mod ladder;
 pub mod law;
 pub mod lean_table;
 mod local;
 mod matching;
 pub mod offset;
+mod options;
 pub mod prefer;
 mod refer;
 pub mod result;
@@ -41,7 +43,6 @@ pub mod wind;
 pub mod windows;
 mod zero;
 
-pub use analyze::{
-    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, OffsetRule, Progress,
-    TruthSeries, analyze, analyze_flight,
-};
+pub use analyze::{AnalysisError, Progress, analyze, analyze_flight};
+pub use input::{FlightInput, LogInput, TruthSeries};
+pub use options::{AnalysisOptions, MapLaw, OffsetRule};

@@ -1,7 +1,7 @@
 //! Which of the two laws describes a calibration, and when the signed quadratic does not.
 
-use super::analyze::MapLaw;
 use super::drone::law_fit;
+use super::options::MapLaw;
 use super::result::{Fit, FlightAnalysis, Laws};
 use super::stats::mean_sd;
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::analyze::FlightInput;
+use super::input::FlightInput;
 use super::matching::{self, Candidate, Matched};
 use crate::base::causes::with_causes;
 use crate::flight::identify;

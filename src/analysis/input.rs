@@ -1,0 +1,99 @@
+//! What an analysis gets: logs, flights, the truth where it is known.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::battery::Sag;
+use super::density::Density;
+use super::lean_table::LeanTable;
+use super::wind::Leaning;
+use crate::base::time::GpsTime;
+use crate::flight::Indicator;
+use crate::flight::table::Mapping;
+use crate::mission::plan::{Plan, Purpose};
+
+/// One log of a flight.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LogInput {
+    /// Slot of the plan by somebody's record. Only the home position in the log counts more; without
+    /// a record, the file's number and the system id count.
+    pub slot: Option<u16>,
+    /// The file.
+    pub path: PathBuf,
+    /// What its columns are, if it is a table and no DataFlash log.
+    pub table: Option<Arc<Mapping>>,
+}
+
+/// One flight to analyse.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlightInput<'a> {
+    /// Short name.
+    pub name: &'a str,
+    /// The plan, if there is one.
+    pub plan: Option<&'a Plan>,
+    /// What the flight was for; `None`: as the plan says, else a calibration if it has a ladder.
+    pub purpose: Option<Purpose>,
+    /// The logs, in the order in which unplanned results are listed.
+    pub logs: &'a [LogInput],
+    /// GPS time of show time 0, for logs without SHOW rows.
+    pub start: Option<GpsTime>,
+    /// The true vertical air speed, when the flight was simulated in uniform air, m/s.
+    pub true_updraft_mps: Option<f64>,
+    /// The true vertical air speed that each slot met, when it was written down.
+    pub truth: Option<&'a BTreeMap<u16, TruthSeries>>,
+    /// Ground height and the vehicle's response to air density; `None`: pulses of the map are not
+    /// corrected for height.
+    pub density: Option<Density>,
+    /// How the vehicle leans in wind, where its drag is known; `None`: the map is not corrected for
+    /// wind, and says how wrong it may be.
+    pub leaning: Option<Leaning>,
+    /// Power of thrust that `u - 1000` goes with, where the vehicle is known: 1 where thrust is linear
+    /// in the pulse.
+    pub thrust_exponent: Option<f64>,
+    /// How the battery acts on the pulse; `None`: it does not.
+    pub sag: Option<Sag>,
+    /// What wind does to the vehicle's pulse, where its physics is known and [`FlightInput::leaning`]
+    /// does not say.
+    pub lean_table: Option<&'a LeanTable>,
+    /// Folder to which log paths are given in results.
+    pub folder: Option<&'a Path>,
+}
+
+impl FlightInput<'_> {
+    /// Without the corrections that are known for pulses alone.
+    pub(super) fn for_indicator(&self, indicator: Indicator) -> Self {
+        match indicator {
+            Indicator::Pulse => *self,
+            Indicator::RotorSpeed | Indicator::Power => {
+                Self { density: None, leaning: None, sag: None, lean_table: None, ..*self }
+            }
+        }
+    }
+
+    /// A log's path as results give it.
+    pub(super) fn shown(&self, path: &Path) -> String {
+        let inside = self.folder.and_then(|folder| path.strip_prefix(folder).ok());
+        inside.unwrap_or(path).display().to_string()
+    }
+}
+
+/// The vertical air speed that one simulated drone met.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TruthSeries {
+    /// Show time of the first value, s; the others follow each second.
+    pub first_s: i64,
+    /// Mean updraft over the 10 s around each second, m/s, up positive.
+    pub updraft_mps: Vec<f64>,
+}
+
+impl TruthSeries {
+    /// The values at whole seconds of show time; `None` if one is missing.
+    pub(super) fn at(&self, times_s: &[i64]) -> Option<Vec<f64>> {
+        let value = |time: &i64| {
+            let index = usize::try_from(time.checked_sub(self.first_s)?).ok()?;
+            self.updraft_mps.get(index).copied()
+        };
+        times_s.iter().map(value).collect()
+    }
+}

@@ -1,0 +1,100 @@
+//! Choices of an analysis.
+
+use super::calibrate::{FitOptions, Location, PaperTable, Weights};
+use super::input::FlightInput;
+use super::statistics::StatisticsOptions;
+use super::windows::{Tilt, WindowOptions};
+use crate::flight::Indicator;
+
+/// Choices of an analysis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnalysisOptions {
+    /// What stands for rotor effort.
+    pub indicator: Indicator,
+    /// How windows are measured.
+    pub windows: WindowOptions,
+    /// Whether the slow offset of the pulse is subtracted before laws are fitted.
+    pub offset: OffsetRule,
+    /// How laws are fitted.
+    pub fit: FitOptions,
+    /// Windows as in the paper, whatever `fit` says of them: medians in simulations and means in the
+    /// field, weighted by the samples' standard deviation.
+    pub paper_windows: bool,
+    /// Law for the map of the air (`linear`, `signed quadratic`); `None`: the one whose calibration
+    /// has the lower reduced chi².
+    pub map_law: Option<MapLaw>,
+    /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
+    /// updraft (simulations), Table II for other fleets (of two drones or more).
+    pub paper: Option<PaperTable>,
+    /// How statistics of a map are made.
+    pub statistics: StatisticsOptions,
+    /// Whether the map's calibration law knows about slow air and the map has errors with their
+    /// origins; else the laws of the tables are inverted, as in the paper.
+    pub air_aware: bool,
+    /// Most points of a trace for figures.
+    pub trace_points: usize,
+}
+
+/// When the slow offset (eq. 5) is subtracted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OffsetRule {
+    /// As in the paper: in the field, and not in simulations of uniform air.
+    #[default]
+    Field,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+impl OffsetRule {
+    pub(super) fn is_subtracted(self, true_updraft_mps: Option<f64>) -> bool {
+        match self {
+            Self::Field => true_updraft_mps.is_none(),
+            Self::Always => true,
+            Self::Never => false,
+        }
+    }
+}
+
+/// Law for the map of the air.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapLaw {
+    /// `u = A' V + u0`.
+    Linear,
+    /// `u = A f(V - W) + u0`.
+    SignedQuadratic,
+}
+
+impl Default for AnalysisOptions {
+    fn default() -> Self {
+        Self {
+            indicator: Indicator::default(),
+            windows: WindowOptions::default(),
+            offset: OffsetRule::default(),
+            fit: FitOptions::default(),
+            paper_windows: false,
+            map_law: None,
+            paper: None,
+            statistics: StatisticsOptions::default(),
+            air_aware: true,
+            trace_points: 1200,
+        }
+    }
+}
+
+impl AnalysisOptions {
+    /// The choices for one flight, with what they leave to it decided.
+    pub(super) fn of_flight(&self, input: &FlightInput<'_>) -> Self {
+        let mut options = self.clone();
+        options.fit.indicator = options.indicator;
+        options.windows.thrust_exponent = options.windows.thrust_exponent.or(input.thrust_exponent);
+        if self.paper_windows {
+            let field = self.offset.is_subtracted(input.true_updraft_mps);
+            options.fit.location = if field { Location::Mean } else { Location::Median };
+            options.fit.weights = Weights::WindowSd;
+            options.windows.tilt = Tilt::Paper;
+        }
+        options
+    }
+}
