@@ -37,7 +37,7 @@ impl Effect for TranslationalLift {
             }],
             hooks: &[Hook::Loads],
             shown: (Signal::Horizontal, 0.0, 8.0),
-            sought: Sought::Shape { size: "inflow_share", sizes: &[0.5], shape: None },
+            sought: Sought::Shape { size: "inflow_share", sizes: &[0.02, 0.5], shape: None },
         }
     }
 

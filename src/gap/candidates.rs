@@ -1,7 +1,8 @@
 //! What may be missing: effects of the library in their closed forms, and motions of the air that
 //! look like them.
 
-use super::gls::Column;
+use super::compare::Comparison;
+use super::gls::{Column, Solution};
 use super::scene::Scene;
 use crate::effects::{EffectError, LIBRARY, Sought};
 use crate::vehicle::Vehicle;
@@ -138,6 +139,82 @@ pub(super) fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f
     let table = vehicle.effects.entry(effect.to_owned()).or_default();
     table.on = true;
     table.parameters.insert(parameter.to_owned(), value);
+}
+
+/// The drag of the rotors: effect and size.
+pub(super) const DRAG: (&str, &str) = ("blade-flapping", "drag_per_weight");
+/// Drag of the rotors that is tried where no horizontal leg tells it, s/m.
+const DRAGS: [f64; 3] = [0.01, 0.02, 0.035];
+
+/// Rotors that drag, seen through the wind: where the flight has no horizontal legs the wind is read
+/// from the lean by the model's law, and a drone with such rotors leans in less wind than that says.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub(super) fn read_otherwise(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+) -> Result<Option<Candidate>, EffectError> {
+    let (effect, parameter) = DRAG;
+    let is_known = vehicle.effects.get(effect).is_some_and(|table| table.on);
+    if is_known || comparison.wind.measured.is_some() {
+        return Ok(None);
+    }
+    let base = comparison.pulses_by_lean(vehicle)?;
+    let mut variants = Vec::new();
+    for size in DRAGS {
+        let mut other = vehicle.clone();
+        set(&mut other, effect, parameter, size);
+        let column = comparison.pulses_by_lean(&other)?.less(&base);
+        variants.push(Variant { vehicle: Some(other), size, column });
+    }
+    let size =
+        Size { name: parameter, unit: "s/m", low: 0.0, high: 0.1, now: 0.0, usual: DRAGS[1] };
+    Ok(Some(Candidate { name: effect, was_there: false, size: Some(size), variants }))
+}
+
+/// Sizes that are tried for the drag that fits best, and their step, s/m.
+const DRAG_STEP: f64 = 0.0025;
+const MOST_DRAG_STEPS: u32 = 24;
+
+/// The drag of the rotors that fits best by the wind that it lets the lean say, with its standard
+/// error, s/m.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub(super) fn drag_by_lean(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+    base: &Solution,
+) -> Result<Option<(f64, f64)>, EffectError> {
+    let without = comparison.pulses_by_lean(vehicle)?;
+    let mut gains = Vec::new();
+    for step in 1..=MOST_DRAG_STEPS {
+        let size = DRAG_STEP * f64::from(step);
+        let mut other = vehicle.clone();
+        set(&mut other, DRAG.0, DRAG.1, size);
+        let gain = base.gain(&comparison.pulses_by_lean(&other)?.less(&without));
+        // Gain of the form as it is, where `gain` has that of its best multiple.
+        let information = 2.0 * gain.nats / gain.beta.powi(2);
+        let as_it_is = (gain.beta - 0.5) * information;
+        if as_it_is.is_finite() {
+            gains.push((size, as_it_is));
+        }
+    }
+    let Some(best) = (0..gains.len()).max_by(|a, b| gains[*a].1.total_cmp(&gains[*b].1)) else {
+        return Ok(None);
+    };
+    let (size, most) = gains[best];
+    let [Some((_, below)), Some((_, above))] =
+        [best.checked_sub(1).and_then(|place| gains.get(place)), gains.get(best + 1)]
+    else {
+        return Ok(Some((size, DRAG_STEP)));
+    };
+    // The parabola through the top.
+    let curvature = 2.0 * most - below - above;
+    let apart = if curvature > 0.0 { 0.5 * (above - below) / curvature } else { 0.0 };
+    let se = if curvature > 0.0 { DRAG_STEP / curvature.sqrt() } else { DRAG_STEP };
+    Ok(Some((size + apart * DRAG_STEP, se)))
 }
 
 /// Motions of the air that an effect may be mistaken for: not the vehicle's, and never added to it.

@@ -37,6 +37,7 @@ pub struct Comparison {
     pub wind: Wind,
     /// What the closed loop does besides the closed form, by group and bin, us.
     closure_us: Vec<Vec<f64>>,
+    amsl_m: f64,
     /// The fleet's mean drone of the model.
     pub vehicle: Vehicle,
 }
@@ -52,6 +53,11 @@ fn amsl_m(plan: Option<&Plan>) -> f64 {
     plan.map_or(0.0, |plan| plan.site.ground_amsl_m)
 }
 
+/// How a vehicle leans in the air at a height.
+fn lean_law(vehicle: &Vehicle, amsl_m: f64) -> LeanLaw {
+    LeanLaw::of(vehicle, SEA_LEVEL_DENSITY * density_ratio(amsl_m))
+}
+
 impl Comparison {
     /// Flies (or takes) the simulated side of a vehicle.
     ///
@@ -65,7 +71,7 @@ impl Comparison {
     ) -> Result<Self, GapError> {
         let vehicle = mean_drone(vehicle);
         let amsl_m = amsl_m(plan);
-        let law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY * density_ratio(amsl_m));
+        let law = lean_law(&vehicle, amsl_m);
         let first = wind(data, law, None).mean_mps;
         let fly = |wind_mps: [f64; 2]| -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
             match simulated {
@@ -102,7 +108,7 @@ impl Comparison {
                 bins.iter().enumerate().map(apart).collect()
             })
             .collect();
-        Ok(Self { data, side, scene, wind: blown, closure_us, vehicle })
+        Ok(Self { data, side, scene, wind: blown, closure_us, amsl_m, vehicle })
     }
 
     /// Measured less simulated pulses of all drones for a vehicle whose closed form is near the
@@ -195,6 +201,7 @@ impl Comparison {
             scene: self.scene.only(&keep),
             wind,
             closure_us: pick(&self.closure_us, &keep),
+            amsl_m: self.amsl_m,
             vehicle: self.vehicle.clone(),
         }
     }
@@ -204,6 +211,15 @@ impl Comparison {
         // Show drones keep their nose along show x.
         let angle = |air: &[f64; 2]| air[1].atan2(air[0]).clamp(-PI, PI);
         self.wind.air_mps.iter().map(|group| group.iter().map(angle).collect()).collect()
+    }
+
+    /// Pulses of a vehicle in the wind that its own law reads from the leans, where no leg tells more.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub fn pulses_by_lean(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
+        let wind = wind(&self.data, lean_law(vehicle, self.amsl_m), None);
+        Scene::measured(&self.data, &self.side, &wind, self.amsl_m).pulses(vehicle)
     }
 
     /// What a change of the vehicle adds to the pulse.

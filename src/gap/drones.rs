@@ -11,7 +11,7 @@ use super::noise::{
 };
 use super::refine::value_of;
 use super::verdict::{DroneOffset, Drones, Finding, Fitted, Interval, Step};
-use crate::effects::Reference;
+use crate::effects::{Model, Reference, Signals};
 use crate::vehicle::Vehicle;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
@@ -144,13 +144,20 @@ fn spread(
         },
         before: from_model(before),
     };
-    let finding = if follows - 2.0 * se > 0.25 {
+    // A share of what the other kind would show is named only if it excludes that kind.
+    let of = |change: fn(&mut Vehicle)| response_follows(&found.vehicle, change);
+    let (by_thrust, by_mass) = (
+        of(|vehicle| vehicle.airframe.thrust_coefficient /= LITTLE),
+        of(|vehicle| vehicle.airframe.mass_kg *= LITTLE),
+    );
+    let off = |wanted: f64| (follows - wanted).abs() / se.hypot(FOLLOWS_DOUBT);
+    let finding = if off(by_mass) > EXCLUDED_Z && off(by_thrust) < off(by_mass) {
         Finding::Name {
             effect: "thrust-spread".to_owned(),
             parameters: vec![parameter(mass, thrust)],
             was_there: thrust > 0.0,
         }
-    } else if follows + 2.0 * se < 0.5 {
+    } else if off(by_thrust) > EXCLUDED_Z && off(by_mass) < off(by_thrust) {
         Finding::Name {
             effect: "mass-spread".to_owned(),
             parameters: vec![parameter(thrust, mass)],
@@ -175,6 +182,33 @@ fn spread(
         held_out_us: None,
         shape: None,
     })
+}
+
+/// A kind of spread that is this many standard errors off is excluded.
+const EXCLUDED_Z: f64 = 3.0;
+/// What a drone's response says of its rotors is not exact: rotors differ in their inflow, too.
+const FOLLOWS_DOUBT: f64 = 0.1;
+/// A little more.
+const LITTLE: f64 = 1.01;
+
+/// By how much a drone's response to climb differs, as a share, over how much its hover pulse does,
+/// as a share of thrust, when something of it is a little off.
+fn response_follows(vehicle: &Vehicle, change: fn(&mut Vehicle)) -> f64 {
+    let mut other = vehicle.clone();
+    change(&mut other);
+    let (Ok(one), Ok(two)) = (Model::of(vehicle), Model::of(&other)) else { return 0.0 };
+    let at = |model: &Model, climb_mps| {
+        model.pulse_us(&Signals { climb_mps, density_ratio: 1.0, ..Signals::default() })
+    };
+    let (mut product, mut square) = (0.0, 0.0);
+    for climb_mps in [-3.5, -2.5, -1.5, 1.5, 2.5, 3.5] {
+        let own = at(&one, climb_mps) - at(&one, 0.0);
+        product += own * (at(&two, climb_mps) - at(&two, 0.0) - own);
+        square += own * own;
+    }
+    let offset = (at(&two, 0.0) - at(&one, 0.0)) / Reference::of(vehicle).sensitivity_us();
+    let follows = product / square / offset;
+    if follows.is_finite() { follows } else { 0.0 }
 }
 
 /// Half a squared z of 1.96.

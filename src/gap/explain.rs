@@ -1,15 +1,16 @@
 //! The workflow: find, name, add, and again, until nothing passes.
 
-use super::candidates::{Variant, library, of_the_air, set};
+use super::candidates::{DRAG, Variant, drag_by_lean, library, of_the_air, read_otherwise, set};
 use super::compare::{Comparison, Simulated, gusts_mps};
 use super::data::Data;
+use super::decide::{What, decide};
 use super::error::GapError;
-use super::generic::{Generic, all, drawn};
+use super::generic::{all, drawn};
 use super::gls::{Column, Likelihood, Problem, Split};
 use super::noise::{GroupPattern, Hyper, LEAST, WHITE};
 use super::refine::{Parameter, fitted, parameters_of, refine, slopes};
-use super::search::{Ranked, RankedGeneric, Round, Sought, Thresholds, round, thresholds};
-use super::verdict::{Finding, Rest, Rival, Shape, Step};
+use super::search::{Round, Sought, round};
+use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
@@ -32,14 +33,6 @@ impl Default for Options {
     }
 }
 
-/// Rivals within so many nats explain as well.
-const CLASS_NATS: f64 = 4.0;
-/// Rivals must leave a similar trace: correlation with everything else partialled out.
-const ALIKE: f64 = 0.6;
-/// A free shape is another thing than the best effect when it gains this much more.
-const FREE_BETTER: f64 = 1.25;
-/// And when this share of its gain is left with the effect in the model.
-const FREE_LEFT: f64 = 0.35;
 /// Effects smaller than this are not named in the field, us: 0.1 m/s.
 const MATERIAL_US: f64 = 2.5;
 
@@ -114,6 +107,7 @@ pub fn search(
         let problem = Problem::new(&patterns, &split).with(&free);
         let least = quick.hyper.get(LEAST);
         let mut candidates = library(&found.vehicle, &comparison.scene)?;
+        candidates.extend(read_otherwise(&comparison, &found.vehicle)?);
         candidates.retain(|candidate| !refused.contains(&candidate.name));
         let response: Vec<Vec<f64>> = patterns.iter().map(|group| group.response.clone()).collect();
         candidates.extend(of_the_air(&comparison.scene, &response, least));
@@ -144,6 +138,7 @@ pub fn search(
                 let candidate = &candidates[best.candidate];
                 let variant = &candidate.variants[best.variant];
                 let rivals = rivals(&round, sought);
+                let mut by_lean = None;
                 if let Some(changed) = &variant.vehicle {
                     let before =
                         candidate.was_there.then(|| candidate.size.map(|size| size.now)).flatten();
@@ -151,6 +146,13 @@ pub fn search(
                     if let Some(size) = candidate.size {
                         let start = size.now + best.beta * (variant.size - size.now);
                         set(&mut next, candidate.name, size.name, start.clamp(size.low, size.high));
+                    }
+                    if candidate.name == DRAG.0
+                        && let Some((drag, se)) =
+                            drag_by_lean(&comparison, &found.vehicle, &round.base)?
+                    {
+                        set(&mut next, DRAG.0, DRAG.1, drag);
+                        by_lean = Some(lean_parameter(drag, se));
                     }
                     let known = found.parameters.iter().any(|p| p.effect == candidate.name);
                     if !known {
@@ -167,7 +169,7 @@ pub fn search(
                 }
                 let names: Vec<String> =
                     members.iter().map(|one| candidates[one.candidate].name.to_owned()).collect();
-                let finding = finding(names, candidate.was_there);
+                let finding = finding(names, candidate.was_there, by_lean);
                 found.steps.push(Step {
                     finding,
                     gain_nats: best.gain,
@@ -206,7 +208,7 @@ pub fn search(
                 found.refit(&comparison)?;
             }
         }
-        if let Some(gone) = found.weakest() {
+        if let Some(gone) = found.weakest(&comparison, vehicle)? {
             // Explained by what came after it, or a size of nothing.
             found.drop_effect(gone, vehicle);
             refused.push(gone);
@@ -223,30 +225,50 @@ pub fn search(
 pub(super) fn settle(found: &mut Found) {
     let Found { steps, parameters, values, .. } = found;
     for step in steps {
-        let of = |effect: &str| -> Vec<super::verdict::Fitted> {
+        let of = |effect: &str| -> Vec<Fitted> {
             let all = parameters.iter().zip(values.iter());
             let own = all.filter(|(parameter, _)| parameter.effect == effect);
             let (parameters, values): (Vec<_>, Vec<_>) = own.map(|(p, v)| (p.clone(), *v)).unzip();
             fitted(&parameters, &values)
         };
-        match &mut step.finding {
-            Finding::Name { effect, parameters, .. } => *parameters = of(effect),
+        let (effect, stated) = match &mut step.finding {
+            Finding::Name { effect, parameters, .. } => (effect.clone(), parameters),
             Finding::Class { effects, parameters } => {
-                if let Some(first) = effects.first() {
-                    *parameters = of(first);
-                }
+                (effects.first().cloned().unwrap_or_default(), parameters)
             }
-            Finding::Unknown { .. } => {}
+            Finding::Unknown { .. } => continue,
+        };
+        // What another channel said stays.
+        if effect != DRAG.0 {
+            *stated = of(&effect);
         }
     }
 }
 
-fn finding(names: Vec<String>, was_there: bool) -> Finding {
+fn finding(names: Vec<String>, was_there: bool, known: Option<Fitted>) -> Finding {
+    let parameters = known.into_iter().collect();
     match &names[..] {
-        [effect] => Finding::Name { effect: effect.clone(), parameters: Vec::new(), was_there },
-        _ => Finding::Class { effects: names, parameters: Vec::new() },
+        [effect] => Finding::Name { effect: effect.clone(), parameters, was_there },
+        _ => Finding::Class { effects: names, parameters },
     }
 }
+
+/// The drag of the rotors as a fitted parameter.
+fn lean_parameter(drag: f64, se: f64) -> Fitted {
+    Fitted {
+        name: DRAG.1.to_owned(),
+        unit: "s/m".to_owned(),
+        value: Interval {
+            value: drag,
+            low: (drag - LEAN_DOUBT.hypot(2.0 * se)).max(0.0),
+            high: drag + LEAN_DOUBT.hypot(2.0 * se),
+        },
+        before: None,
+    }
+}
+
+/// What a lean says of the rotors' drag depends on the body's, which is known to some tenths, s/m.
+const LEAN_DOUBT: f64 = 0.005;
 
 /// What one form of an effect does, along the climb.
 fn along_climb(comparison: &Comparison, variant: &Variant, beta: f64) -> Shape {
@@ -286,132 +308,60 @@ fn best_name(round: &Round, sought: Sought<'_>) -> String {
     }
 }
 
-enum What {
-    Nothing,
-    /// Best first; more than one: a class.
-    Effects(Vec<Ranked>),
-    Free(RankedGeneric),
-}
-
-struct Decision {
-    what: What,
-    thresholds: Thresholds,
-}
-
-fn decide(
-    problem: &Problem<'_>,
-    round: &Round,
-    sought: Sought<'_>,
-    material_us: f64,
-    options: &Options,
-    step: usize,
-) -> Decision {
-    let floor = super::search::FLOOR_NATS;
-    let mut limits = Thresholds { library: floor, generic: super::search::FREE_FLOOR_NATS };
-    let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
-    let is_named = |ranked: &&Ranked| {
-        // That the shared air drifted is what it does: a rival, never a finding.
-        sought.library[ranked.candidate].name != "updraft-drift"
-            && ranked.fitted
-            && ranked.size_us >= material_us
-    };
-    let best = round.library.iter().find(is_named);
-    let free = round.generics.iter().find(|free| free.size_us >= material_us);
-    let best_gain = best.map_or(0.0, |best| best.gain);
-    let free_gain = free.map_or(0.0, |free| free.gain);
-    if best_gain < limits.library && free_gain < limits.generic {
-        return nothing(limits);
-    }
-    let seed = options.seed.wrapping_add(1000 * step as u64);
-    // Far above any threshold there is nothing to find out about it.
-    if best_gain.max(free_gain) < SURE_NATS {
-        limits = thresholds(problem, &round.base, sought, options.replicates, options.alpha, seed);
-    }
-    if let Some(free) =
-        free.filter(|free| free.gain > limits.generic && free.gain > FREE_BETTER * best_gain)
-    {
-        let left = match best.filter(|best| best.gain > limits.library) {
-            None => free.gain,
-            Some(best) => left_with(problem, sought, best, free),
-        };
-        if left > limits.generic.max(FREE_LEFT * free.gain) {
-            return Decision { what: What::Free(free.clone()), thresholds: limits };
+/// A vehicle with one effect as it was.
+fn taken_back(vehicle: &Vehicle, effect: &str, original: &Vehicle) -> Vehicle {
+    let mut vehicle = vehicle.clone();
+    match original.effects.get(effect) {
+        Some(table) => {
+            vehicle.effects.insert(effect.to_owned(), table.clone());
+        }
+        None => {
+            vehicle.effects.remove(effect);
         }
     }
-    let Some(best) = best.filter(|best| best.gain > limits.library) else {
-        return nothing(limits);
-    };
-    let column =
-        |ranked: &Ranked| &sought.library[ranked.candidate].variants[ranked.variant].column;
-    let at = problem.at(&best.hyper);
-    let own = at.white(column(best));
-    let alike = |ranked: &&Ranked| {
-        ranked.candidate != best.candidate
-            && ranked.gain > best.gain - CLASS_NATS
-            && at.likeness(&own, &at.white(column(ranked))).abs() > ALIKE
-    };
-    let mut members = vec![best.clone()];
-    members.extend(round.library.iter().filter(alike).cloned());
-    Decision { what: What::Effects(members), thresholds: limits }
+    super::refly::mean_drone(&vehicle)
 }
 
-/// Gains above this need no threshold, nats.
-const SURE_NATS: f64 = 40.0;
-
-/// What a free shape still gains with an effect in the model, nats.
-fn left_with(
-    problem: &Problem<'_>,
-    sought: Sought<'_>,
-    best: &Ranked,
-    free: &RankedGeneric,
-) -> f64 {
-    let column = &sought.library[best.candidate].variants[best.variant].column;
-    let generic: &Generic = &sought.generics[free.generic];
-    let with = problem.with([column]);
-    let before = with.fit(best.hyper, Likelihood::Profile);
-    let both = with.with(&generic.columns).fit(free.hyper, Likelihood::Profile);
-    both.log_posterior() - before.log_posterior() - generic.penalty
-}
-
-/// A size that is not this many standard errors from what the model had is taken back.
+/// An effect whose trace has a smaller Fisher z is taken back.
 const KEPT_Z: f64 = 3.0;
 
 impl Found {
-    /// The effect whose size says least, if that is too little.
-    fn weakest(&self) -> Option<&'static str> {
-        let z = |(parameter, (value, se)): (&Parameter, &(f64, f64))| {
-            let change = (value - parameter.before.unwrap_or(0.0)).abs();
-            if *se > 0.0 { change / se } else { 0.0 }
-        };
-        // The first parameter of an effect is its size.
-        let mut seen: Vec<&'static str> = Vec::new();
+    /// The effect whose trace says least, if that is too little. By its trace and not by the error of
+    /// its size: an effect may begin with a jump (translational lift saves power at any share).
+    fn weakest(
+        &self,
+        comparison: &Comparison,
+        original: &Vehicle,
+    ) -> Result<Option<&'static str>, GapError> {
+        if self.parameters.is_empty() {
+            return Ok(None);
+        }
+        let patterns = comparison.patterns(&self.vehicle, self.gusts_mps)?;
+        let split = Split::of(&comparison.residual(&self.vehicle, self.gusts_mps)?);
         let mut worst: Option<(&'static str, f64)> = None;
-        for (parameter, value) in self.parameters.iter().zip(&self.values) {
-            if seen.contains(&parameter.effect) {
-                continue;
-            }
-            seen.push(parameter.effect);
-            let z = z((parameter, value));
+        let mut effects: Vec<&'static str> = self.parameters.iter().map(|p| p.effect).collect();
+        effects.dedup();
+        for effect in effects {
+            let others: Vec<Parameter> =
+                self.parameters.iter().filter(|p| p.effect != effect).cloned().collect();
+            let slopes = slopes(comparison, &self.vehicle, &others)?;
+            let problem = Problem::new(&patterns, &split).with(&self.extras).with(&slopes);
+            let solution = problem.at(&self.hyper);
+            let without = taken_back(&self.vehicle, effect, original);
+            let trace = comparison.change(&without, &self.vehicle)?;
+            let z = solution.information(&solution.white(&trace)).sqrt();
             if z < KEPT_Z && worst.is_none_or(|(_, least)| z < least) {
-                worst = Some((parameter.effect, z));
+                worst = Some((effect, z));
             }
         }
-        worst.map(|(effect, _)| effect)
+        Ok(worst.map(|(effect, _)| effect))
     }
 
     /// Takes an effect back: the model has it as it was.
     fn drop_effect(&mut self, effect: &str, original: &Vehicle) {
-        match original.effects.get(effect) {
-            Some(table) => {
-                self.vehicle.effects.insert(effect.to_owned(), table.clone());
-            }
-            None => {
-                self.vehicle.effects.remove(effect);
-            }
-        }
+        self.vehicle = taken_back(&self.vehicle, effect, original);
         self.parameters.retain(|parameter| parameter.effect != effect);
         self.steps.retain(|step| step.finding.effects().first() != Some(&effect));
-        self.vehicle = super::refly::mean_drone(&self.vehicle);
     }
 
     /// Fits all sizes and the noise anew; the gusts of that noise bend the model's curve, so twice.

@@ -78,8 +78,13 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         Some(plan) => sensor(input.flown, |slot| plan.slot(slot).map(|slot| plan.segments(slot))),
         None => SensorChannel::default(),
     };
-    // A sensor that is off is repaired first: the pulse is then compared at the right speeds.
-    let repaired = repaired(input.vehicle, &channel);
+    // A sensor that is off is repaired first: the pulse is then compared at the right speeds. So is a
+    // lean that is off: the pulse is then compared in the right wind, at the right tilt.
+    let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
+    let wind = super::lean_channel::found(&before);
+    let leans = super::lean_channel::step(&before, &wind, options.alpha);
+    let mut repaired = repaired(input.vehicle, &channel);
+    add_others(&mut repaired, leans.as_slice());
     let mut found = search(&train, &repaired, &simulated, input.plan, options)?;
     let case = Case {
         original: input.vehicle,
@@ -89,7 +94,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         seed: options.seed,
     };
     let shrink = case.gap(&train, &held)?;
-    let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
     let whole = Comparison::new(&data, &found.vehicle, &simulated, input.plan)?;
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
         // The sizes that go into the model are those of all drones.
@@ -114,8 +118,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     let mut steps = found.steps.clone();
     steps.extend(spread);
-    let wind = super::lean_channel::found(&before);
-    steps.extend(super::lean_channel::step(&before, &wind, options.alpha));
+    steps.extend(leans);
     let mut verdict = Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),

@@ -4,6 +4,7 @@ mod bins;
 mod candidates;
 mod compare;
 pub mod data;
+mod decide;
 mod detectable;
 mod drones;
 mod error;

@@ -15,6 +15,10 @@ const TOLD_BIAS_MPS: f64 = 0.1;
 /// Steady stretches shorter than this tell no rate, s.
 const SHORTEST_S: f64 = 6.0;
 const GAP_S: f64 = 1.0;
+/// What all drones' biases have in common besides: heights and velocities of one filter, m/s.
+const BIAS_DOUBT_MPS: f64 = 0.001;
+/// The same of lags: logs at 10 to 25 Hz and delays of the filter, s.
+const LAG_DOUBT_S: f64 = 0.002;
 /// Lags that are tried, s.
 const LAGS: usize = 51;
 const LAG_STEP_S: f64 = 0.02;
@@ -36,8 +40,8 @@ pub(super) fn sensor<'a>(
         lags.extend(lag(one.flight, segments));
     }
     let values: Vec<f64> = biases.iter().map(|(_, bias)| *bias).collect();
-    let bias_mps = interval(&values);
-    let lag_s = interval(&lags);
+    let bias_mps = interval(&values, BIAS_DOUBT_MPS);
+    let lag_s = interval(&lags, LAG_DOUBT_S);
     let beyond = |found: Option<Interval>, limit: f64| {
         found
             .is_some_and(|found| found.value.abs() > limit && (found.low > 0.0 || found.high < 0.0))
@@ -49,8 +53,8 @@ pub(super) fn sensor<'a>(
     SensorChannel { bias_mps, lag_s, biased_drones, named }
 }
 
-/// Mean with the interval that the drones' scatter gives.
-fn interval(values: &[f64]) -> Option<Interval> {
+/// Mean with the interval that the drones' scatter and a doubt they share give.
+fn interval(values: &[f64], doubt: f64) -> Option<Interval> {
     let count = values.len() as f64;
     if values.is_empty() {
         return None;
@@ -59,7 +63,7 @@ fn interval(values: &[f64]) -> Option<Interval> {
     let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
     let se = if values.len() > 1 { (square / (count - 1.0) / count).sqrt() } else { f64::NAN };
     // One drone has no scatter: what a filter's velocity is usually off by.
-    let se = if se.is_finite() { se } else { 0.02 };
+    let se = if se.is_finite() { se.hypot(doubt) } else { 0.02 };
     Some(Interval { value: mean, low: mean - 2.1 * se, high: mean + 2.1 * se })
 }
 

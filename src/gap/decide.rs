@@ -1,0 +1,119 @@
+//! What a round's gains mean: nothing, an effect, a class, or a free shape.
+
+use super::explain::Options;
+use super::generic::Generic;
+use super::gls::{Likelihood, Problem};
+use super::search::{
+    FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, thresholds,
+};
+
+/// Rivals within so many nats explain as well.
+const CLASS_NATS: f64 = 4.0;
+/// Rivals must leave a similar trace: correlation with everything else partialled out.
+const ALIKE: f64 = 0.6;
+/// A free shape is another thing than the best effect when it gains this much more.
+const FREE_BETTER: f64 = 1.25;
+/// And when this share of its gain is left with the effect in the model.
+const FREE_LEFT: f64 = 0.35;
+
+/// An effect this near to a size that matters is named before a free shape that looks like it.
+const NEARLY: f64 = 0.6;
+
+/// What is to be done.
+pub(super) enum What {
+    /// The search has ended.
+    Nothing,
+    /// Best first; more than one: a class.
+    Effects(Vec<Ranked>),
+    /// No effect that is known.
+    Free(RankedGeneric),
+}
+
+/// A decision with the thresholds that it was taken by.
+pub(super) struct Decision {
+    /// What is to be done.
+    pub what: What,
+    /// Gains that chance does not reach.
+    pub thresholds: Thresholds,
+}
+
+/// Decides what a round found; `material_us` is the smallest effect that matters.
+pub(super) fn decide(
+    problem: &Problem<'_>,
+    round: &Round,
+    sought: Sought<'_>,
+    material_us: f64,
+    options: &Options,
+    step: usize,
+) -> Decision {
+    let floor = FLOOR_NATS;
+    let mut limits = Thresholds { library: floor, generic: FREE_FLOOR_NATS };
+    let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
+    let free = round.generics.iter().find(|free| free.size_us >= material_us);
+    let is_named = |ranked: &&Ranked| {
+        // A known effect that explains more than a free shape of a size that matters is named first.
+        let matters = ranked.size_us >= material_us
+            || (ranked.size_us >= NEARLY * material_us
+                && free.is_some_and(|free| ranked.gain > free.gain));
+        let candidate = &sought.library[ranked.candidate];
+        // That the shared air drifted is what it does: a rival, never a finding. That it grew with
+        // height is no lack of the vehicle: it must say as much as a free shape.
+        let is_effect = candidate.size.is_some() || ranked.gain > FREE_FLOOR_NATS;
+        candidate.name != "updraft-drift" && is_effect && ranked.fitted && matters
+    };
+    let best = round.library.iter().find(is_named);
+    let best_gain = best.map_or(0.0, |best| best.gain);
+    let free_gain = free.map_or(0.0, |free| free.gain);
+    if best_gain < limits.library && free_gain < limits.generic {
+        return nothing(limits);
+    }
+    let seed = options.seed.wrapping_add(1000 * step as u64);
+    // Far above any threshold there is nothing to find out about it.
+    if best_gain.max(free_gain) < SURE_NATS {
+        limits = thresholds(problem, &round.base, sought, options.replicates, options.alpha, seed);
+    }
+    if let Some(free) =
+        free.filter(|free| free.gain > limits.generic && free.gain > FREE_BETTER * best_gain)
+    {
+        let left = match best.filter(|best| best.gain > limits.library) {
+            None => free.gain,
+            Some(best) => left_with(problem, sought, best, free),
+        };
+        if left > limits.generic.max(FREE_LEFT * free.gain) {
+            return Decision { what: What::Free(free.clone()), thresholds: limits };
+        }
+    }
+    let Some(best) = best.filter(|best| best.gain > limits.library) else {
+        return nothing(limits);
+    };
+    let column =
+        |ranked: &Ranked| &sought.library[ranked.candidate].variants[ranked.variant].column;
+    let at = problem.at(&best.hyper);
+    let own = at.white(column(best));
+    let alike = |ranked: &&Ranked| {
+        ranked.candidate != best.candidate
+            && ranked.gain > best.gain - CLASS_NATS
+            && at.likeness(&own, &at.white(column(ranked))).abs() > ALIKE
+    };
+    let mut members = vec![best.clone()];
+    members.extend(round.library.iter().filter(alike).cloned());
+    Decision { what: What::Effects(members), thresholds: limits }
+}
+
+/// Gains above this need no threshold, nats.
+const SURE_NATS: f64 = 40.0;
+
+/// What a free shape still gains with an effect in the model, nats.
+fn left_with(
+    problem: &Problem<'_>,
+    sought: Sought<'_>,
+    best: &Ranked,
+    free: &RankedGeneric,
+) -> f64 {
+    let column = &sought.library[best.candidate].variants[best.variant].column;
+    let generic: &Generic = &sought.generics[free.generic];
+    let with = problem.with([column]);
+    let before = with.fit(best.hyper, Likelihood::Profile);
+    let both = with.with(&generic.columns).fit(free.hyper, Likelihood::Profile);
+    both.log_posterior() - before.log_posterior() - generic.penalty
+}
