@@ -2,14 +2,13 @@
 
 use crate::analysis::law::SIGNED_QUADRATIC;
 use crate::analysis::result::{
-    Analysis, DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow, UpdraftMap,
+    Analysis, DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow,
 };
 use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 use crate::flight::Alignment;
 use crate::mission::plan::Purpose;
 
-use super::figures::air::{deviation, mean, mean_truth};
 use super::law;
 use super::text::{
     NONE, clean, count, estimate, fixed, parameter, reduced, rejection, signed, symbol, unit,
@@ -319,40 +318,6 @@ pub(super) fn clock(drone: &DroneAnalysis) -> &'static str {
         Alignment::Plan => "plan",
         Alignment::Takeoff => "take-off",
     }
-}
-
-/// What the map says about the fleet as a whole.
-pub(super) struct FleetAir {
-    /// Mean of the drones' means, m/s, and their standard deviation between drones.
-    pub(super) mean: f64,
-    pub(super) sd: f64,
-    pub(super) lowest: f64,
-    pub(super) highest: f64,
-    /// Mean standard error and mean systematic error of one drone, m/s.
-    pub(super) se: f64,
-    pub(super) systematic: f64,
-    /// Root mean square of estimate minus truth over drones, m/s.
-    pub(super) rms_error: Option<f64>,
-    pub(super) n: usize,
-}
-
-/// Summary of a map; `None` without a usable estimate.
-pub(super) fn fleet_air(map: &UpdraftMap) -> Option<FleetAir> {
-    let means = map.drones.iter().map(|drone| drone.mean.value).filter(|&w| usable(w));
-    let squares = map.drones.iter().filter_map(|drone| {
-        let error = drone.mean.value - mean_truth(drone)?;
-        usable(error).then_some(error * error)
-    });
-    Some(FleetAir {
-        mean: mean(means.clone())?,
-        sd: deviation(means.clone()).unwrap_or(0.0),
-        lowest: means.clone().fold(f64::INFINITY, f64::min),
-        highest: means.clone().fold(f64::NEG_INFINITY, f64::max),
-        se: mean(map.drones.iter().map(|drone| drone.mean.se)).unwrap_or(0.0),
-        systematic: mean(map.drones.iter().map(|drone| drone.systematic_mps)).unwrap_or(0.0),
-        rms_error: mean(squares).map(f64::sqrt),
-        n: means.count(),
-    })
 }
 
 /// `45 of 49 drones`, or `12 drones` when none is missing.

@@ -5,6 +5,7 @@ use minijinja::value::Value;
 
 use crate::analysis::result::{CommonError, DroneUpdraft, ErrorBudget, UpdraftMap};
 
+use super::fleet_air::fleet_air;
 use super::text::{NONE, clean, count, fixed, shortened, signed, usable};
 
 /// Most rows of the table of quality.
@@ -47,15 +48,20 @@ const KINDS: [Kind; 7] = [
 pub(super) fn section(map: &UpdraftMap) -> Value {
     let truth = map.truth.filter(|truth| truth.values > 0 && usable(truth.rms_mps)).map(|truth| {
         let percent = |share: f64| fixed(100.0 * share, 1);
+        let of_means = fleet_air(map).and_then(|air| air.rms_error);
         format!(
-            "Estimate and truth: over {} of {}, W* − W has a root mean square of {} m/s and a mean \
-             of {} m/s ({} m/s without that mean); {} % of the true values lie inside their 95 % \
-             intervals, and so do the true means of {} % of the drones.",
+            "Estimate and truth: over {} (running means of 10 s) of {}, W* − W has a root mean square \
+             of {} m/s and a mean of {} m/s ({} m/s without that mean){}; {} % of the true values lie \
+             inside their 95 % intervals, and so do the true means of {} % of the drones.",
             count(truth.values, "value"),
             count(truth.drones, "drone"),
             fixed(truth.rms_mps, 3),
             signed(truth.bias_mps, 3),
             fixed(truth.rms_without_bias_mps, 3),
+            of_means.map_or_else(String::new, |rms| format!(
+                "; that of means over the hover has {} m/s",
+                fixed(rms, 3)
+            )),
             percent(truth.inside_share),
             percent(truth.means_inside_share),
         )

@@ -9,8 +9,9 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 
-use super::compare::{better_words, drones_of, flags, fleet_air, nothing};
+use super::compare::{better_words, drones_of, flags, nothing};
 use super::figures::air;
+use super::fleet_air::fleet_air;
 use super::law;
 use super::page::capitalised;
 use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable, value_of};
@@ -51,16 +52,17 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
     }
     for flight in &analysis.flights {
         let Some(air) = flight.map.as_ref().and_then(fleet_air) else { continue };
-        let systematic = if air.systematic > 0.005 {
-            format!(", ± {} systematic", fixed(air.systematic, 2))
-        } else {
-            String::new()
-        };
-        let note = format!("± {} m/s between drones{systematic}", fixed(air.sd, 2));
+        let spread = air.spread_words().map_or_else(String::new, |spread| format!("; {spread}"));
+        let note = format!("{}{spread}", air.error.words());
         tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
         if let Some(rms) = air.rms_error {
-            let note = format!("m/s, {}", count(air.n, "drone"));
-            tile(fixed(rms, 3), "rms error of the map".to_owned(), note);
+            // Of values over 10 s it is another number, which the text below the map tells.
+            let note = format!("m/s, of the mean of {}", if air.n == 1 {
+                "the drone".to_owned()
+            } else {
+                format!("each of {}", count(air.n, "drone"))
+            });
+            tile(fixed(rms, 3), "rms error of means over the hover".to_owned(), note);
         }
     }
     tiles
@@ -159,12 +161,16 @@ pub(super) fn verdict(analysis: &Analysis) -> Vec<String> {
                 let _ = write!(text, ", {words}");
             }
             if let Some(air) = flight.map.as_ref().and_then(fleet_air) {
-                let _ = write!(
-                    text,
-                    ", vertical air speed from {} to {} m/s over the grid",
-                    signed(air.lowest, 2),
-                    signed(air.highest, 2),
-                );
+                let _ = if air.n == 1 {
+                    write!(text, ", vertical air speed {} m/s", signed(air.mean, 2))
+                } else {
+                    write!(
+                        text,
+                        ", vertical air speed from {} to {} m/s over the grid",
+                        signed(air.lowest, 2),
+                        signed(air.highest, 2),
+                    )
+                };
             }
             let noted = flight.drones.iter().filter(|drone| !flags(drone).is_empty()).count();
             if noted > 0 {
