@@ -433,9 +433,9 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         law_reason: law_reason(shared),
         wind: match (shared.input.leaning, shared.input.lean_table) {
             (Some(_), _) => Some(WindCorrection::Drag),
-            (None, table) => table
-                .filter(|_| shared.aware.is_some())
-                .map(|_| WindCorrection::Physics),
+            (None, table) => {
+                table.filter(|_| shared.aware.is_some()).map(|_| WindCorrection::Physics)
+            }
         },
         leaning: shared.input.leaning,
         density: shared.input.density,

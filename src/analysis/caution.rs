@@ -35,9 +35,9 @@ pub(super) fn fit_cautions(
              their errors are not known well, or not at all"
         )
     });
-    let misfit = flock.and_then(misfit).or_else(|| {
-        flock.and_then(|laws| vertex_caution(laws, drones, true_updraft_mps))
-    });
+    let misfit = flock
+        .and_then(misfit)
+        .or_else(|| flock.and_then(|laws| vertex_caution(laws, drones, true_updraft_mps)));
     few.into_iter().chain(misfit).chain(lean_caution(drones, leaning)).collect()
 }
 

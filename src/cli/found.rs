@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::exit::CommandError;
 use super::hashes::Hashes;
-use super::true_scales::true_scales;
 use super::leaning::{lean_table, leaning};
 use super::load::has_extension;
+use super::true_scales::true_scales;
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
 use crate::analysis::lean_table::LeanTable;

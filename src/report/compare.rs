@@ -1,9 +1,6 @@
 //! Fleet tables beside the paper's values, and the words that a page and a terminal share.
 
-use crate::analysis::law::SIGNED_QUADRATIC;
-use crate::analysis::result::{
-    Analysis, DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow,
-};
+use crate::analysis::result::{Analysis, DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow};
 use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 use crate::flight::Alignment;
@@ -38,7 +35,10 @@ pub(super) struct Comparison {
 /// The row in words.
 pub(super) fn comparison(row: &TableRow) -> Comparison {
     let paper = row.paper.filter(|paper| usable(paper.value));
-    let gap = paper.map(|paper| row.mean - paper.value).filter(|gap| usable(*gap));
+    let gap = paper
+        .filter(|_| row.not_compared.is_none())
+        .map(|paper| row.mean - paper.value)
+        .filter(|gap| usable(*gap));
     let in_errors = paper
         .filter(|paper| usable(paper.se) && paper.se > 0.0)
         .and_then(|paper| gap.map(|gap| gap / paper.se));
@@ -139,13 +139,25 @@ pub(super) fn table_heading(flight: &FlightAnalysis) -> String {
         Some("II") => " beside the paper's Table II (its drones in the field)",
         _ => "",
     };
-    let told = |law: &str| flight.table.iter().any(|row| row.law == law && row.paper.is_some());
-    let not = if table.is_empty() || told(SIGNED_QUADRATIC) {
-        ""
-    } else {
-        "; the signed quadratic is not compared, as it does not describe this flight"
+    format!("Fitted parameters{}", if compared(flight) { table } else { "" })
+}
+
+/// Which rows are not compared with the paper's values beside them, and why, one sentence for each
+/// reason.
+pub(super) fn not_compared_lines(flight: &FlightAnalysis) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for row in flight.table.iter().filter(|row| row.paper.is_some()) {
+        let Some(reason) = row.not_compared.as_deref() else { continue };
+        let name = format!("{} of the {} law", symbol(&row.parameter), clean(&row.law));
+        match reasons.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, rows)) => rows.push(name),
+            None => reasons.push((reason, vec![name])),
+        }
+    }
+    let line = |(reason, rows): (&str, Vec<String>)| {
+        format!("Not compared: {}: {}.", rows.join(", "), clean(reason))
     };
-    format!("Fitted parameters{}{not}", if compared(flight) { table } else { "" })
+    reasons.into_iter().map(line).collect()
 }
 
 /// Whether a value of the paper stands beside any of the flight's.
@@ -221,9 +233,15 @@ pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
     } else {
         ("", "the windows' own errors are so small that")
     };
+    let note = match law::vertex_mps(flight) {
+        Some(_) if better == MapLaw::SignedQuadratic => {
+            "; its W* is the vertex of a parabola, no air"
+        }
+        _ => "",
+    };
     Some(format!(
         "the {name} law fits better ({against}{of}, before scatter is added: {errors} neither law is \
-         exact to within them)"
+         exact to within them{note})"
     ))
 }
 

@@ -100,6 +100,7 @@ fn budget(map: &UpdraftMap) -> Option<Value> {
     Some(context! {
         rows,
         drones => drones.len(),
+        fleet => drones.len() > 1,
         half_width => half_width.map(|common| fixed(common.half_width_mps, 2)),
     })
 }
@@ -129,13 +130,20 @@ fn coverage(map: &UpdraftMap) -> String {
     let present: usize =
         map.drones.iter().map(|drone| drone.updraft_mps.iter().flatten().count()).sum();
     let own = map.drones.iter().filter(|drone| drone.mapping == "own").count();
+    let by = match (map.drones.len(), own) {
+        (1, 1) => "It is measured by its own calibration law".to_owned(),
+        (1, _) => {
+            "It is measured by the law of the calibration flight, not by one of its own".to_owned()
+        }
+        (n, own) => format!(
+            "{own} through their own calibration law, {} through that of the fleet's average",
+            n - own
+        ),
+    };
     format!(
-        "{} in {} common seconds; {} % of the values are there. {} through their own mapping, {} \
-         through the flock's.",
+        "{} in {} common seconds; {} % of the values are there. {by}.",
         count(map.drones.len(), "drone"),
         map.time_s.len(),
         fixed(100.0 * present as f64 / cells.max(1) as f64, 1),
-        own,
-        map.drones.len() - own,
     )
 }

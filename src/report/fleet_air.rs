@@ -78,7 +78,8 @@ impl MeanError {
 impl FleetAir {
     /// `0.15 m/s between 42 drones`; absent for one drone.
     pub(super) fn spread_words(&self) -> Option<String> {
-        (self.n > 1).then(|| format!("{} m/s between {}", fixed(self.sd, 2), count(self.n, "drone")))
+        (self.n > 1)
+            .then(|| format!("{} m/s between {}", fixed(self.sd, 2), count(self.n, "drone")))
     }
 }
 

@@ -18,6 +18,9 @@ use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable
 
 /// More flights than this are summed up at the top of the page.
 const SUMMED_FLIGHTS: usize = 3;
+/// Label of a W* that is none.
+const VERTEX: &str = "vertex of the fitted parabola, no air speed";
+
 /// The numbers at a glance.
 pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
     let mut tiles = Vec::new();
@@ -57,11 +60,14 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
         tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
         if let Some(rms) = air.rms_error {
             // Of values over 10 s it is another number, which the text below the map tells.
-            let note = format!("m/s, of the mean of {}", if air.n == 1 {
-                "the drone".to_owned()
-            } else {
-                format!("each of {}", count(air.n, "drone"))
-            });
+            let note = format!(
+                "m/s, of the mean of {}",
+                if air.n == 1 {
+                    "the drone".to_owned()
+                } else {
+                    format!("each of {}", count(air.n, "drone"))
+                }
+            );
             tile(fixed(rms, 3), "rms error of means over the hover".to_owned(), note);
         }
     }
@@ -104,6 +110,7 @@ fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
         ("linear", "A'", "A′, linear law"),
     ];
     let laws = law::flight_laws(flight);
+    let vertex = law::vertex_mps(flight).is_some();
     // The numbers of the law that describes the flight; the other one's would only mislead.
     let better = match laws.and_then(prefer::better_of) {
         Some(MapLaw::Linear) => "linear",
@@ -128,6 +135,7 @@ fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
                 parameter(fit, name).map(|found| (found.estimate, unit(&found.unit)))
             };
             let (of, unit) = row.or_else(own)?;
+            let label = if vertex && name == "W" { VERTEX } else { label };
             usable(of.value).then(|| (label.to_owned(), of, unit))
         })
         .collect()

@@ -46,6 +46,13 @@ pub(super) fn air_section(
     .flatten()
     .map(|figure| figures.show(figure))
     .collect();
+    let no_map = if map.is_scan() {
+        Some("The drones moved: what they measured is shown along their tracks.")
+    } else if map.drones.iter().all(|drone| drone.position_m.is_none()) {
+        Some("Where the drones stood is not known, so that there is no map of the ground.")
+    } else {
+        Some("No drone gave an estimate of the vertical air speed.")
+    };
     let statistics = flight.statistics.as_ref().map(|found| {
         let correlations = correlation::figure(flight, &key, found).map(|f| figures.show(f));
         let averaging = found
@@ -56,7 +63,7 @@ pub(super) fn air_section(
         context! { correlations, averaging, ..scales::section(found) }
     });
     Some(
-        context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), mean, film => shown, more, statistics, errors => errors::section(map) },
+        context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), law_reason => map.law_reason.as_deref().map(clean), no_map, mean, film => shown, more, statistics, errors => errors::section(map) },
     )
 }
 

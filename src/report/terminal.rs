@@ -7,8 +7,8 @@ use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
 use super::compare::{
-    better_words, clock, compared, comparison, drone_laws, drones_of, flock_lines,
-    no_measurement, nothing, scatter_line, table_heading, windows_used,
+    better_words, clock, compared, comparison, drone_laws, drones_of, flock_lines, no_measurement,
+    not_compared_lines, nothing, scatter_line, table_heading, windows_used,
 };
 use super::figures::air::mean_truth;
 use super::fleet_air::fleet_air;
@@ -192,6 +192,9 @@ impl Output {
         self.line("", "");
         self.wrapped(DIM, "  ", &table_heading(flight));
         self.table(&columns, &rows);
+        for line in not_compared_lines(flight) {
+            self.wrapped(DIM, "  ", &line);
+        }
     }
 
     fn flock(&mut self, flight: &FlightAnalysis) {
@@ -292,6 +295,9 @@ impl Output {
                 clean(&map.law),
             ),
         );
+        if let Some(reason) = &map.law_reason {
+            self.wrapped(DIM, "  ", &format!("Law of the map: {}.", clean(reason)));
+        }
         let systematic = if air.systematic > 0.005 {
             format!(
                 "; systematic, from wind on the leaning drones: {} m/s",

@@ -62,9 +62,9 @@ impl MeanLean {
         let [forward, right] = self.forward_right;
         let size = forward.hypot(right);
         match drag {
-            LeanDrag::Faces(_) => self.forward_right.map(|tangent| {
-                drag.speed_mps(tangent.abs()).unwrap_or(0.0).copysign(tangent)
-            }),
+            LeanDrag::Faces(_) => self
+                .forward_right
+                .map(|tangent| drag.speed_mps(tangent.abs()).unwrap_or(0.0).copysign(tangent)),
             // A rotor's drag points along the wind, whichever side the wind comes from.
             LeanDrag::Table(_) if size > 0.0 => {
                 let speed = drag.speed_mps(size).unwrap_or(f64::NAN);
@@ -124,10 +124,7 @@ pub fn tilt_wind(leans: &[MeanLean], drag: LeanDrag<'_>) -> Option<TiltWind> {
         || " from a direction that is not known (the logs have no heading)".to_owned(),
         |from| format!(" from {from:.0} degrees"),
     );
-    let words = match (
-        speed_mps,
-        drag.speed_mps(TRIM_DEG.to_radians().tan()),
-    ) {
+    let words = match (speed_mps, drag.speed_mps(TRIM_DEG.to_radians().tan())) {
         (Some(speed), Some(trim)) => format!(
             "wind {speed} m/s{from}, from a mean lean of {} degrees and {} (a trim error of \
              {TRIM_DEG} degrees alone would read as {} m/s in calm air)",
@@ -168,7 +165,8 @@ mod tests {
     fn a_lean_with_known_drag_is_a_wind() {
         // AirSim's stock quad leans by 3.92 degrees in 10 m/s.
         let forward = 3.92_f64.to_radians().tan();
-        let wind = tilt_wind(&fleet([forward, 0.0], |_| Some(350.0)), LeanDrag::Faces(38.2)).unwrap();
+        let wind =
+            tilt_wind(&fleet([forward, 0.0], |_| Some(350.0)), LeanDrag::Faces(38.2)).unwrap();
         let speed = wind.speed_mps.unwrap();
         assert!((speed.value - 10.0).abs() < 0.05 && speed.se < 1e-9, "{speed}");
         assert!((wind.from_deg.unwrap() - 350.0).abs() < 1e-9);

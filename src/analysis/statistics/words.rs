@@ -44,26 +44,30 @@ pub(super) fn fill(statistics: &mut FieldStatistics) {
     };
     if let Some(space) = &mut statistics.space {
         let both = determined(&space.along_x) && determined(&space.along_y);
-        space.words = space.all.lambda_m.as_ref().filter(|_| length_known).map_or_else(String::new, |scale| {
-            bias(
-                scale,
-                "m",
-                &format!(
-                    "a true length of {{}} m reads as {{}} m with this grid of {} m \
+        space.words = space.all.lambda_m.as_ref().filter(|_| length_known).map_or_else(
+            String::new,
+            |scale| {
+                bias(
+                    scale,
+                    "m",
+                    &format!(
+                        "a true length of {{}} m reads as {{}} m with this grid of {} m \
                 and this record of {} s",
-                    digits(record.extent_m),
-                    digits(record.length_s)
-                ),
-            )
-        });
+                        digits(record.extent_m),
+                        digits(record.length_s)
+                    ),
+                )
+            },
+        );
         if let Some(anisotropy) = &mut space.anisotropy {
             let times = format!(
                 "the length along y is {:.2} times that along x (the paper: 2.08)",
                 anisotropy.ratio
             );
             anisotropy.words = match anisotropy.p_value {
-                _ if !both => "the lengths along x and y are not both determined, and not compared"
-                    .to_owned(),
+                _ if !both => {
+                    "the lengths along x and y are not both determined, and not compared".to_owned()
+                }
                 Some(p) if p < SIGNIFICANT => format!(
                     "{times}; only {} of flights in isotropic air differ as much: significant",
                     percent(p)
