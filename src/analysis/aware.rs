@@ -94,11 +94,19 @@ impl<'a> Aware<'a> {
     /// Why that law, in one phrase.
     pub(super) fn law_reason(&self) -> String {
         let Some([line, square]) = self.evidence else { return ASKED_FOR.to_owned() };
+        let taken = match self.zero.shape {
+            Shape::Line => {
+                "a line that may bend, as the calibration's windows do not make the signed \
+                quadratic clearly more probable"
+            }
+            Shape::SignedQuadratic => {
+                "the signed quadratic, as the calibration's windows make it \
+                clearly more probable than a line that may bend"
+            }
+        };
         format!(
-            "the signed quadratic is taken where the calibration's windows make it clearly more \
-             probable than a line that may bend (logarithms of the evidence: line {line:.1}, signed \
-             quadratic {square:.1}, which must be {CLEARLY} higher); the chi2 of the tables is for a \
-             line without a bend"
+            "{taken} (logarithms of the evidence: line {line:.1}, signed quadratic {square:.1}, which \
+             must be {CLEARLY} higher); the chi2 of the tables is for a line without a bend"
         )
     }
 

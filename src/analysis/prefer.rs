@@ -206,4 +206,35 @@ mod tests {
         assert!(w.abs() > LARGEST_CALIBRATION_W_MPS, "{w}");
         assert!(misfit(&bent).unwrap().contains("not moving air"), "{w}");
     }
+
+    #[test]
+    fn a_w_beyond_the_ladder_is_a_vertex_and_no_air() {
+        let leg = |commanded_mps: f64| -> crate::analysis::result::WindowStats {
+            let stats = serde_json::json!({"median": 0.0, "mean": 0.0, "sd": 0.0, "n": 1});
+            serde_json::from_value(serde_json::json!({
+                "kind": "leg_up", "label": "", "start_s": 0.0, "end_s": 1.0,
+                "commanded_mps": commanded_mps, "height_m": 50.0, "velocity_mps": stats,
+                "pulse_us": stats, "pulse_phi_us": stats, "tilt_deg": stats,
+                "offset_us": null, "rejected": []
+            }))
+            .unwrap()
+        };
+        let drone: DroneAnalysis = serde_json::from_value(serde_json::json!({
+            "slot": 1, "name": "", "source": "", "home_m": null,
+            "clock": crate::flight::Clock { method: crate::flight::Alignment::Plan, ..Default::default() },
+            "windows": [leg(-3.5), leg(3.5)], "laws": null, "trace": crate::analysis::result::Trace::default(),
+            "warnings": []
+        }))
+        .unwrap();
+        let drones = [drone];
+        // A line with a weak bend: one flank of a parabola whose vertex is far below the ladder.
+        let bent = laws(|v| 1546.5 + 26.4 * v + 3.0 * v * v);
+        let w = vertex_mps(&bent, &drones, None).unwrap();
+        assert!(w < -3.15, "{w}");
+        let words = vertex_caution(&bent, &drones, None).unwrap();
+        assert!(words.contains("no air speed") && words.contains("-3.5 to +3.5 m/s"), "{words}");
+        assert_eq!(vertex_mps(&bent, &drones, Some(w)), None, "the air is known to be as fast");
+        let windy = laws(|v| 1598.6 + 8.14 * (v - 1.5) * (v - 1.5).abs());
+        assert_eq!(vertex_mps(&windy, &drones, None), None, "air that moved");
+    }
 }

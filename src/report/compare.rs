@@ -145,17 +145,17 @@ pub(super) fn table_heading(flight: &FlightAnalysis) -> String {
 /// Which rows are not compared with the paper's values beside them, and why, one sentence for each
 /// reason.
 pub(super) fn not_compared_lines(flight: &FlightAnalysis) -> Vec<String> {
-    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    let mut reasons: Vec<((&str, &str), Vec<String>)> = Vec::new();
     for row in flight.table.iter().filter(|row| row.paper.is_some()) {
         let Some(reason) = row.not_compared.as_deref() else { continue };
-        let name = format!("{} of the {} law", symbol(&row.parameter), clean(&row.law));
-        match reasons.iter_mut().find(|(known, _)| *known == reason) {
+        let (of, name) = ((row.law.as_str(), reason), symbol(&row.parameter));
+        match reasons.iter_mut().find(|(known, _)| *known == of) {
             Some((_, rows)) => rows.push(name),
-            None => reasons.push((reason, vec![name])),
+            None => reasons.push((of, vec![name])),
         }
     }
-    let line = |(reason, rows): (&str, Vec<String>)| {
-        format!("Not compared: {}: {}.", rows.join(", "), clean(reason))
+    let line = |((law, reason), rows): ((&str, &str), Vec<String>)| {
+        format!("Not compared: {} of the {} law: {}.", rows.join(", "), clean(law), clean(reason))
     };
     reasons.into_iter().map(line).collect()
 }

@@ -67,11 +67,11 @@ impl MeanError {
     }
 
     /// `± 0.30 m/s standard error (95 %: ± 0.60)`.
-    pub(super) fn words(self) -> String {
+    pub(super) fn words(self, decimals: usize) -> String {
         let interval = self
             .half_width
-            .map_or_else(String::new, |half| format!(" (95 %: ± {})", fixed(half, 2)));
-        format!("± {} m/s standard error{interval}", fixed(self.se, 2))
+            .map_or_else(String::new, |half| format!(" (95 %: ± {})", fixed(half, decimals)));
+        format!("± {} m/s standard error{interval}", fixed(self.se, decimals))
     }
 }
 
@@ -101,4 +101,61 @@ pub(super) fn fleet_air(map: &UpdraftMap) -> Option<FleetAir> {
         rms_error: mean(squares).map(f64::sqrt),
         n: means.count(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::result::{CommonError, ErrorBudget};
+    use crate::base::estimate::Estimate;
+
+    fn map(drones: usize, common: Option<CommonError>) -> UpdraftMap {
+        let own = serde_json::json!({
+            "law": "linear", "time_s": [], "drones": [], "truth": null
+        });
+        let mut map: UpdraftMap = serde_json::from_value(own).unwrap();
+        map.common = common;
+        map.drones = (0..drones)
+            .map(|index| DroneUpdraft {
+                slot: None,
+                name: String::new(),
+                position_m: None,
+                track_m: Vec::new(),
+                height_m: 100.0,
+                mapping: "own".to_owned(),
+                mean: Estimate::new(0.1 * index as f64, 0.5),
+                mean_interval_mps: Some([-1.0, 1.2]),
+                errors: ErrorBudget { window_mps: 0.3, law_mps: 0.4, ..ErrorBudget::default() },
+                systematic_mps: 0.0,
+                tilt_deg: 0.0,
+                updraft_mps: Vec::new(),
+                sd_mps: Vec::new(),
+                interval_mps: Vec::new(),
+                quality: Vec::new(),
+                truth_mps: None,
+            })
+            .collect();
+        map
+    }
+
+    #[test]
+    fn what_the_fleet_shares_is_in_the_error_of_its_mean_and_does_not_average_out() {
+        let common = CommonError { se_mps: 0.3, half_width_mps: 0.6, ..CommonError::default() };
+        let air = fleet_air(&map(25, Some(common))).unwrap();
+        // Each drone's own 0.5 m/s over the root of 25.
+        assert!((air.error.se - 0.3_f64.hypot(0.1)).abs() < 1e-12, "{:?}", air.error);
+        assert!((air.error.half_width.unwrap() - 0.6_f64.hypot(0.196)).abs() < 1e-12);
+        assert_eq!(air.error.words(2), "± 0.32 m/s standard error (95 %: ± 0.63)");
+        assert_eq!(air.spread_words().unwrap(), "0.74 m/s between 25 drones");
+        // Nothing known of what is shared: averaging is not taken to help.
+        assert_eq!(fleet_air(&map(25, None)).unwrap().error.se, 0.5);
+    }
+
+    #[test]
+    fn one_drone_has_its_own_error_and_no_spread() {
+        let common = CommonError { se_mps: 0.3, half_width_mps: 0.6, ..CommonError::default() };
+        let air = fleet_air(&map(1, Some(common))).unwrap();
+        assert_eq!(air.error, MeanError { se: 0.5, half_width: Some(1.1) });
+        assert_eq!(air.spread_words(), None);
+    }
 }

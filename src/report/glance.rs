@@ -56,7 +56,7 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
     for flight in &analysis.flights {
         let Some(air) = flight.map.as_ref().and_then(fleet_air) else { continue };
         let spread = air.spread_words().map_or_else(String::new, |spread| format!("; {spread}"));
-        let note = format!("{}{spread}", air.error.words());
+        let note = format!("{}{spread}", air.error.words(2)).replace("95 %", "95\u{a0}%");
         tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
         if let Some(rms) = air.rms_error {
             // Of values over 10 s it is another number, which the text below the map tells.

@@ -14,6 +14,9 @@ use super::page::{Gallery, capitalised, flight_key};
 use super::text::{clean, fixed, signed, usable};
 use super::{errors, scales};
 
+/// Wind that is shown, m/s.
+const LEAST_WIND_MPS: f64 = 0.05;
+
 /// The maps of a flight, which the page shows first: they are what the fleet was flown for.
 pub(super) fn air_section(
     analysis: &Analysis,
@@ -74,7 +77,9 @@ fn wind(flight: &FlightAnalysis) -> Option<[f64; 2]> {
     // Clockwise from forward, as seen from above.
     let to_rad = (from_deg + 180.0 - flight.orientation_deg?).to_radians();
     let (sin, cos) = to_rad.sin_cos();
-    (usable(speed) && usable(to_rad)).then_some([speed * cos, -speed * sin])
+    // Slower than that is no wind, and has no arrow.
+    (usable(speed) && speed >= LEAST_WIND_MPS && usable(to_rad))
+        .then_some([speed * cos, -speed * sin])
 }
 
 /// A colour bar of the page: its gradient and the numbers below it.

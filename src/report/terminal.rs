@@ -281,7 +281,7 @@ impl Output {
             &format!(
                 "vertical air speed W*, m/s: mean {} {}, {} ({} law)",
                 signed(air.mean, 3),
-                air.error.words(),
+                air.error.words(3),
                 match air.n {
                     1 => "of one drone".to_owned(),
                     n => format!(

@@ -505,3 +505,28 @@ pub struct Reached {
     /// Length of the average, s.
     pub averaging_s: f64,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(value: f64, fit_se: Option<f64>, [low, high]: [f64; 2]) -> Scale {
+        let interval_95 = Some(Interval { low, high });
+        Scale { value, fit_se, interval_95, ..Scale::default() }.judged()
+    }
+
+    #[test]
+    fn a_scale_without_meaning_is_told_from_a_vague_one() {
+        let bound = |scale: Scale| (scale.undetermined, scale.bound());
+        assert_eq!(bound(judged(74.4, Some(2.4), [41.8, 136.0])), (None, None));
+        assert_eq!(bound(judged(74.4, None, [20.0, 1_900.0])), (None, None), "vague");
+        let long = bound(judged(1_495.0, None, [1_495.0, 1_276_479.0]));
+        assert_eq!(long, (Some(Undetermined::Longer), Some(("longer than", 1_495.0))));
+        let short = bound(judged(2.0, None, [1e-9, 3.0]));
+        assert_eq!(short, (Some(Undetermined::Shorter), Some(("shorter than", 3.0))));
+        let nothing = bound(judged(60.3, None, [1.2, 3_631.0]));
+        assert_eq!(nothing, (Some(Undetermined::Unknown), None));
+        let no_fit = bound(judged(0.74, Some(168.0), [0.5, 2.0]));
+        assert_eq!(no_fit, (Some(Undetermined::Unknown), None));
+    }
+}

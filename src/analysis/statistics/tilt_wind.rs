@@ -50,7 +50,10 @@ impl LeanDrag<'_> {
     /// In words, what the speed rests on.
     fn words(self) -> &'static str {
         match self {
-            Self::Table(_) => "the drag of rotors and body in the vehicle's own physics",
+            Self::Table(_) => {
+                "the drag of rotors and body in the vehicle's own physics, which is known to some 8 % (the \
+                 ± is the spread of the drones alone)"
+            }
             _ => "the vehicle's drag",
         }
     }

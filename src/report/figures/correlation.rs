@@ -91,13 +91,9 @@ fn correlation_axis(statistics: &FieldStatistics) -> Axis {
         time.mean.iter().zip(&time.sd_between_drones).flat_map(|(c, sd)| [c - sd, c + sd])
     });
     let low = of_pairs.flatten().chain(of_time).filter(|c| usable(*c)).fold(0.0, f64::min);
-    let min = if low < -0.5 {
-        -1.0
-    } else if low < -0.02 {
-        -0.5
-    } else {
-        0.0
-    };
+    // Always with room below zero, where the legends are: near drones correlate, so that nothing is
+    // drawn there.
+    let min = if low < -0.5 { -1.0 } else { -0.5 };
     let step = if min < -0.5 { 0.5 } else { 0.25 };
     Axis { label: "correlation".to_owned(), min, max: 1.0, step }
 }
@@ -110,11 +106,7 @@ fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, symbol: &str)
     let last = of.classes.iter().map(|class| class.distance_m).filter(|r| usable(*r));
     x.max = x.max.min(1.06 * last.fold(1.0, f64::max));
     let mut panel = Panel::new(title, x.clone(), y.clone());
-    panel.legend_at(if y.min < -0.4 {
-        LegendPosition::InsideBottomLeft
-    } else {
-        LegendPosition::InsideTopRight
-    });
+    panel.legend_at(LegendPosition::InsideBottomLeft);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 0.8, "");
     if of.classes.len() > MOST_VIOLINS {
         band(&mut panel, &of.classes);

@@ -67,9 +67,11 @@ pub(in crate::report) fn figure(analysis: &Analysis) -> Option<Figure> {
     }
     let drones: usize = flights.iter().map(|flight| flight.drones.len()).sum();
     let colouring = if flights.len() == 1 {
-        "The solid line is the signed-quadratic law, the dashed line the linear law, both fitted to \
-         the flock."
-            .to_owned()
+        format!(
+            "The solid line is the signed-quadratic law, the dashed line the linear law, both fitted \
+             to {}.",
+            if drones == 1 { "its windows" } else { "the flock" }
+        )
     } else {
         "Colour tells the flights apart; dashed lines are the signed-quadratic law of each."
             .to_owned()
