@@ -13,11 +13,10 @@ pub(super) fn statistics_lines(flight: &FlightAnalysis) -> Vec<String> {
         .into_iter()
         .flatten()
         .collect();
-    if !lines.is_empty() {
-        lines.extend(statistics.true_air.as_ref().map(true_air_words));
-    } else {
+    if lines.is_empty() {
         return statistics.absent.first().map(|reason| clean(reason)).into_iter().collect();
     }
+    lines.extend(statistics.true_air.as_ref().map(true_air_words));
     lines
 }
 
