@@ -287,6 +287,7 @@ fn numbers_that_are_none_do_no_harm() {
                 mean_se: bad,
                 n: 3,
                 paper: Some(Estimate::new(bad, bad)),
+                not_compared: None,
             });
             for (index, drone) in flight.drones.iter_mut().enumerate() {
                 for window in &mut drone.windows {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::account::{self, Account};
-use super::aware::{Aware, Measured};
+use super::aware::{ASKED_FOR, Aware, Measured};
 use super::calibrate::{self, PaperTable};
 use super::caution::{SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
 use super::corrections::Corrections;
@@ -15,18 +15,21 @@ use super::input::{FlightInput, LogInput, TruthSeries};
 use super::ladder::mark_partial;
 use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::options::{AnalysisOptions, MapLaw};
-use super::prefer::{better_law, describes};
+use super::prefer::{better_law, chosen, describes, vertex_mps};
 use super::refer::refer_calibration;
 use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
-    TableRow, Unmeasured, UnusedLog, UpdraftMap,
+    TableRow, Unmeasured, UnusedLog, UpdraftMap, WindCorrection,
 };
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
 use super::statistics::of_map;
+use super::statistics::result::FieldStatistics;
+use super::statistics::tilt_wind::LeanDrag;
 use super::track;
 use super::truth;
 use super::updraft::{self, DroneSeries};
+use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
 /// Told after each log: (logs done, logs in all).
@@ -259,9 +262,15 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         paper = paper_table(shared, &drones);
         table = calibrate::table(&drones, paper, &options.fit);
         if let Some(laws) = &flock {
-            compare_what_fits(&mut table, laws);
+            let vertex = vertex_mps(laws, &drones, input.true_updraft_mps).is_some();
+            compare_what_fits(&mut table, laws, vertex);
         }
-        warnings.extend(fit_cautions(flock.as_ref(), &drones, input.leaning));
+        warnings.extend(fit_cautions(
+            flock.as_ref(),
+            &drones,
+            input.leaning,
+            input.true_updraft_mps,
+        ));
         warnings.extend(tilt_caution(&drones, options));
     } else if shared.reference.is_none() {
         warnings.push(
@@ -271,14 +280,20 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         );
     }
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
-    let from_physics = input.lean_table.is_some() && shared.aware.is_some();
-    warnings.extend(map.as_ref().and_then(|map| wind_caution(map, from_physics)));
+    warnings.extend(map.as_ref().and_then(wind_caution));
     let moved = map.as_ref().is_some_and(UpdraftMap::is_scan);
     if moved {
         warnings.push(SCAN_CAUTION.to_owned());
     }
-    let statistics =
-        map.as_ref().filter(|_| !moved).map(|map| of_map(map, &seen, &options.statistics));
+    let drag = match (input.leaning, input.lean_table) {
+        (Some(leaning), _) => LeanDrag::Faces(leaning.drag_speed_mps),
+        (None, Some(table)) => LeanDrag::Table(table),
+        (None, None) => LeanDrag::Unknown,
+    };
+    let statistics = map.as_ref().filter(|_| !moved).map(|map| FieldStatistics {
+        true_air: input.true_air.cloned(),
+        ..of_map(map, &seen, &options.statistics, drag)
+    });
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -306,20 +321,27 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
 fn paper_table(shared: &Shared<'_>, drones: &[DroneAnalysis]) -> Option<PaperTable> {
     let counted = |drone: &&DroneAnalysis| drone.laws.is_some() && drone.partial_ladder.is_none();
     let is_fleet = drones.iter().filter(counted).count() > 1;
+    // The paper's numbers are pulse widths.
+    let pulses = shared.options.indicator == Indicator::Pulse;
     let paper = shared.options.paper.unwrap_or(match shared.input.true_updraft_mps {
         Some(_) => PaperTable::Simulation,
         None => PaperTable::Field,
     });
-    (is_fleet || paper == PaperTable::Simulation).then_some(paper)
+    (pulses && (is_fleet || paper == PaperTable::Simulation)).then_some(paper)
 }
 
-/// Takes the paper's values from the rows of a law that does not describe the flight: its parameters
-/// mean nothing there.
-fn compare_what_fits(table: &mut [TableRow], flock: &Laws) {
-    for row in table {
+/// Says which rows are not to be compared with the paper's: those of a law that does not describe the
+/// flight, whose parameters mean nothing there.
+fn compare_what_fits(table: &mut [TableRow], flock: &Laws, vertex: bool) {
+    for row in table.iter_mut().filter(|row| row.paper.is_some()) {
         let law = if row.law == LINEAR { MapLaw::Linear } else { MapLaw::SignedQuadratic };
         if !describes(flock, law) {
-            row.paper = None;
+            row.not_compared = Some("this law does not describe this flight".to_owned());
+        } else if vertex && row.law == SIGNED_QUADRATIC {
+            row.not_compared = Some(
+                "here this law is one flank of a parabola: its A, u0 and W* are no rotor's and no air's"
+                    .to_owned(),
+            );
         }
     }
 }
@@ -348,6 +370,15 @@ fn track_of(
     let frame = plan.site.frame();
     let places = series.spread(&series.moved_m, times);
     places.into_iter().map(|moved| Some(track::place_m(&frame, home_m, moved?))).collect()
+}
+
+/// Why the map's law was taken.
+fn law_reason(shared: &Shared<'_>) -> Option<String> {
+    if shared.options.map_law.is_some() {
+        return Some(ASKED_FOR.to_owned());
+    }
+    let aware = shared.aware.as_ref().map(Aware::law_reason);
+    aware.or_else(|| shared.map_reference.map(|reference| chosen(reference).1))
 }
 
 type NamedUpdraft =
@@ -399,6 +430,13 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             _ => LINEAR,
         }
         .to_owned(),
+        law_reason: law_reason(shared),
+        wind: match (shared.input.leaning, shared.input.lean_table) {
+            (Some(_), _) => Some(WindCorrection::Drag),
+            (None, table) => {
+                table.filter(|_| shared.aware.is_some()).map(|_| WindCorrection::Physics)
+            }
+        },
         leaning: shared.input.leaning,
         density: shared.input.density,
         flock: shared.map_reference.and_then(|reference| reference.flock.clone()),

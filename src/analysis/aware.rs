@@ -30,6 +30,8 @@ const FASTEST_MPS: f64 = 12.0;
 const LEAST_SLOPE: f64 = 0.2;
 /// A signed quadratic must be this much more probable than a line (logarithm).
 const CLEARLY: f64 = 2.0;
+/// Why a law that was not chosen here is the map's.
+pub(super) const ASKED_FOR: &str = "as asked for";
 /// Rounds in which the vertical speed through the air is found beside what wind does at it.
 const CLIMB_ROUNDS: usize = 10;
 /// Part of the way that is gone in each: with all of it, the rounds swing around the answer where wind
@@ -49,6 +51,8 @@ pub(super) struct Aware<'a> {
     pub(super) zero: Zero,
     pub(super) battery: Option<BatteryCorrection>,
     slope: f64,
+    /// Logarithms of the evidence for a line and for a signed quadratic, where they were compared.
+    evidence: Option<[f64; 2]>,
 }
 
 /// What one drone's hover gave.
@@ -87,6 +91,25 @@ impl<'a> Aware<'a> {
         }
     }
 
+    /// Why that law, in one phrase.
+    pub(super) fn law_reason(&self) -> String {
+        let Some([line, square]) = self.evidence else { return ASKED_FOR.to_owned() };
+        let taken = match self.zero.shape {
+            Shape::Line => {
+                "a line that may bend, as the calibration's windows do not make the signed \
+                quadratic clearly more probable"
+            }
+            Shape::SignedQuadratic => {
+                "the signed quadratic, as the calibration's windows make it \
+                clearly more probable than a line that may bend"
+            }
+        };
+        format!(
+            "{taken} (logarithms of the evidence: line {line:.1}, signed quadratic {square:.1}, which \
+             must be {CLEARLY} higher); the chi2 of the tables is for a line without a bend"
+        )
+    }
+
     /// Fits the calibration for the map, with the law that the windows speak for unless one is
     /// given; `None` if they do not allow a fit.
     pub(super) fn new(
@@ -107,6 +130,7 @@ impl<'a> Aware<'a> {
         let mut packs = reference.drones.iter().filter_map(|drone| pack_of(drone, battery));
         let sigmas = corrections.sigmas(packs.next().as_ref());
         let points_of = |hovers| points(reference, &corrections, battery, slope, hovers);
+        let mut compared = None;
         let shape = match law {
             Some(MapLaw::Linear) => Shape::Line,
             Some(MapLaw::SignedQuadratic) => Shape::SignedQuadratic,
@@ -119,12 +143,13 @@ impl<'a> Aware<'a> {
                         .map_or(f64::NEG_INFINITY, |fleet| fleet.evidence())
                 };
                 let (line, square) = (evidence(Shape::Line), evidence(Shape::SignedQuadratic));
+                compared = Some([line, square]);
                 if square > line + CLEARLY { Shape::SignedQuadratic } else { Shape::Line }
             }
         };
         let points = points_of(shape == Shape::Line);
         let zero = Fleet::new(&points, reference.drones.len(), shape, &sigmas)?.laws();
-        Some(Self { reference, corrections, zero, battery, slope })
+        Some(Self { reference, corrections, zero, battery, slope, evidence: compared })
     }
 
     /// The air over one drone's hover. `Err`: why there is not one value.

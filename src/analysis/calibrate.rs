@@ -346,6 +346,10 @@ impl PaperTable {
     }
 }
 
+/// Why a chi² of other weights is not compared.
+const OTHER_CHI2: &str = "the paper weighs windows by the spread of their samples, which is no error of \
+    a mean; ours (without --paper) is over their standard errors";
+
 /// Name of the law with A and u0 held, in tables.
 pub const SIGNED_QUADRATIC_HELD: &str = "signed quadratic, A and u0 held";
 
@@ -360,8 +364,8 @@ pub const ADDED_SCATTER: &str = "sigma_added";
 /// part of the ladder ([`DroneAnalysis::partial_ladder`]) do not count. Without `paper`, nothing is
 /// compared.
 ///
-/// The paper's chi² counts the samples' standard deviation as the error of a window: it stands beside
-/// ours only when the weights are the same ([`Weights::WindowSd`]).
+/// The paper's chi² counts the samples' standard deviation as the error of a window: it is compared
+/// with ours only when the weights are the same ([`Weights::WindowSd`]).
 pub fn table(
     drones: &[DroneAnalysis],
     paper: Option<PaperTable>,
@@ -392,8 +396,8 @@ pub fn table(
         let reduced: Vec<f64> = fits.iter().filter_map(|fit| fit.chi2_reduced).collect();
         if !reduced.is_empty() {
             let row = row(name, "chi2_nu", "", &reduced, &[], paper);
-            let same = weights == Weights::WindowSd;
-            rows.push(TableRow { paper: row.paper.filter(|_| same), ..row });
+            let other = row.paper.is_some() && weights != Weights::WindowSd;
+            rows.push(TableRow { not_compared: other.then(|| OTHER_CHI2.to_owned()), ..row });
         }
     }
     let added: Vec<f64> = whole().filter_map(|drone| drone.laws.as_ref()?.sigma_added_us).collect();
@@ -421,5 +425,6 @@ fn row(
         mean_se: mean_sd(errors).0,
         n: values.len(),
         paper: paper.and_then(|paper| paper.value(law, parameter)),
+        not_compared: None,
     }
 }

@@ -2,8 +2,8 @@
 
 use super::calibrate;
 use super::options::AnalysisOptions;
-use super::prefer::misfit;
-use super::result::{DroneAnalysis, Fit, Laws, UpdraftMap};
+use super::prefer::{misfit, vertex_caution};
+use super::result::{DroneAnalysis, Fit, Laws, UpdraftMap, WindCorrection};
 use super::stats::mean_sd;
 use super::wind::{Leaning, axial_of};
 use super::windows::Tilt;
@@ -20,6 +20,7 @@ pub(super) fn fit_cautions(
     flock: Option<&Laws>,
     drones: &[DroneAnalysis],
     leaning: Option<Leaning>,
+    true_updraft_mps: Option<f64>,
 ) -> Vec<String> {
     if drones.iter().all(|drone| drone.laws.is_none()) {
         return vec![
@@ -34,7 +35,9 @@ pub(super) fn fit_cautions(
              their errors are not known well, or not at all"
         )
     });
-    let misfit = flock.and_then(misfit);
+    let misfit = flock
+        .and_then(misfit)
+        .or_else(|| flock.and_then(|laws| vertex_caution(laws, drones, true_updraft_mps)));
     few.into_iter().chain(misfit).chain(lean_caution(drones, leaning)).collect()
 }
 
@@ -99,7 +102,7 @@ pub(super) const SCAN_CAUTION: &str = "scan: the drones moved, and each value is
     made of it";
 
 /// About wind: the drones leaned, and that is corrected for or not.
-pub(super) fn wind_caution(map: &UpdraftMap, from_physics: bool) -> Option<String> {
+pub(super) fn wind_caution(map: &UpdraftMap) -> Option<String> {
     let errors: Vec<f64> = map.drones.iter().map(|drone| drone.systematic_mps).collect();
     let error = mean_sd(&errors).0;
     if error <= WORTH_SAYING_MPS {
@@ -108,14 +111,14 @@ pub(super) fn wind_caution(map: &UpdraftMap, from_physics: bool) -> Option<Strin
     let tilts: Vec<f64> = map.drones.iter().map(|drone| drone.tilt_deg).collect();
     let tilt = mean_sd(&tilts).0;
     let when = if map.is_scan() { "on their legs" } else { "in the hover" };
-    Some(if from_physics {
+    Some(if map.wind == Some(WindCorrection::Physics) {
         format!(
             "wind: the drones leaned {tilt:.1} degrees {when}. What their airspeed does to the pulse \
              (drag, flow along the rotor axis, translational lift) is corrected by their lean, with \
              the physics of their vehicle's file; what is left may be {error:.2} m/s, of the same \
              sign for all drones (stated as the systematic error)"
         )
-    } else if map.leaning.is_some() {
+    } else if map.wind == Some(WindCorrection::Drag) {
         format!(
             "wind: the drones leaned {tilt:.1} degrees {when}. What wind does to a leaning \
              drone is corrected with the drag of the simulated vehicle; what is left may be \

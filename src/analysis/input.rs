@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::battery::Sag;
 use super::density::Density;
 use super::lean_table::LeanTable;
+use super::statistics::result::TrueAir;
 use super::wind::Leaning;
 use crate::base::time::GpsTime;
 use crate::flight::Indicator;
@@ -56,6 +57,8 @@ pub struct FlightInput<'a> {
     /// What wind does to the vehicle's pulse, where its physics is known and [`FlightInput::leaning`]
     /// does not say.
     pub lean_table: Option<&'a LeanTable>,
+    /// The scales of the air that the flight was simulated in, where it has any.
+    pub true_air: Option<&'a TrueAir>,
     /// Folder to which log paths are given in results.
     pub folder: Option<&'a Path>,
 }

@@ -372,11 +372,11 @@ fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
         return Ok(Minima { best, others: Vec::new(), warning: Some(warning) });
     }
     let best = minima.remove(0);
-    let warning = edge.filter(|(chi2, _)| *chi2 < best.chi2).map(|(chi2, at)| {
+    // Without the numbers, which differ from drone to drone: a fleet is told once.
+    let warning = edge.filter(|(chi2, _)| *chi2 < best.chi2).map(|_| {
         format!(
-            "chi2 falls from {:.3} at the minimum to {chi2:.3} at the edge of the range, W = {:.0} \
-             m/s: the points do not have the signed-quadratic shape (compare the linear law)",
-            best.chi2, at[2]
+            "the signed quadratic fits better still with a W beyond the searched ±{W_LIMIT_MPS} m/s, \
+             as one flank of a parabola: the windows do not have its shape, and W* is no air speed"
         )
     });
     Ok(Minima { best, others: minima, warning })

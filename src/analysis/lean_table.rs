@@ -16,6 +16,8 @@ pub struct LeanTable {
     pub climb_step_mps: f64,
     /// For each lean the changes for each vertical air speed, us.
     pub change_us: Vec<Vec<f64>>,
+    /// Wind that each lean is held against, m/s. Empty: not known.
+    pub wind_mps: Vec<f64>,
     /// Standard errors of the changes from what is not known well about drag and lift, us. They do not
     /// vanish where lift and the flow along the axis cancel each other. Empty: not known.
     pub doubt_us: Vec<Vec<f64>>,
@@ -30,6 +32,15 @@ impl LeanTable {
     /// Standard error of that change, us; `None` where the table does not have it.
     pub fn doubt_at(&self, lean_deg: f64, climb_mps: f64) -> Option<f64> {
         (!self.doubt_us.is_empty()).then(|| self.of(&self.doubt_us, lean_deg, climb_mps))
+    }
+
+    /// Wind that a lean is held against, m/s, by linear interpolation; `None` where the table does not
+    /// have it, or ends before.
+    pub fn wind_at(&self, lean_deg: f64) -> Option<f64> {
+        let place = lean_deg / self.lean_step_deg;
+        let low = place.max(0.0).floor();
+        let (from, to) = (self.wind_mps.get(low as usize)?, self.wind_mps.get(low as usize + 1)?);
+        Some(from + (to - from) * (place - low))
     }
 
     fn of(&self, table: &[Vec<f64>], lean_deg: f64, climb_mps: f64) -> f64 {
@@ -62,8 +73,11 @@ mod tests {
             first_climb_mps: -1.0,
             climb_step_mps: 1.0,
             change_us: vec![vec![0.0; 3], vec![-10.0, -8.0, -6.0]],
+            wind_mps: vec![0.0, 3.0],
             doubt_us: vec![vec![0.0; 3], vec![4.0; 3]],
         };
+        assert_eq!(table.wind_at(0.5), Some(0.75));
+        assert_eq!(table.wind_at(2.5), None, "further than the table");
         assert_eq!(table.at(0.0, 0.3), 0.0);
         assert_eq!(table.at(1.0, 0.0), -4.0);
         assert_eq!(table.at(2.0, 0.5), -7.0);

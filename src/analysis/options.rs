@@ -20,8 +20,9 @@ pub struct AnalysisOptions {
     /// Windows as in the paper, whatever `fit` says of them: medians in simulations and means in the
     /// field, weighted by the samples' standard deviation.
     pub paper_windows: bool,
-    /// Law for the map of the air (`linear`, `signed quadratic`); `None`: the one whose calibration
-    /// has the lower reduced chi².
+    /// Law for the map of the air (`linear`, `signed quadratic`); `None`: the line, which may bend,
+    /// unless the calibration's windows make the signed quadratic clearly more probable (without
+    /// [`AnalysisOptions::air_aware`]: the one of lower reduced chi²).
     pub map_law: Option<MapLaw>,
     /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
     /// updraft (simulations), Table II for other fleets (of two drones or more).

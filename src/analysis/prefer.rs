@@ -2,11 +2,16 @@
 
 use super::drone::law_fit;
 use super::options::MapLaw;
-use super::result::{Fit, FlightAnalysis, Laws};
+use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws};
 use super::stats::mean_sd;
 
 /// Largest W of a calibration's signed quadratic that may be the air's, m/s.
 const LARGEST_CALIBRATION_W_MPS: f64 = 0.5;
+/// Fastest vertical air that a calibration is flown in, as a mean over minutes, m/s.
+const FASTEST_AIR_MPS: f64 = 3.0;
+/// Beyond this share of the ladder's highest and lowest speed, only one flank of the signed quadratic
+/// holds windows.
+const EDGE: f64 = 0.9;
 /// A reduced chi² this many times the other law's is clearly worse.
 const CLEARLY: f64 = 1.5;
 
@@ -15,6 +20,11 @@ const CLEARLY: f64 = 1.5;
 /// A signed quadratic that needs a strong W is a parabola's flank standing in for another curve, not
 /// air that moved: its inverse is off by that W, and the line is taken.
 pub fn better_law(reference: &FlightAnalysis) -> MapLaw {
+    chosen(reference).0
+}
+
+/// [`better_law`], and why in one phrase.
+pub(super) fn chosen(reference: &FlightAnalysis) -> (MapLaw, String) {
     let own = match reference.drones.as_slice() {
         [drone] => drone.laws.as_ref(),
         _ => None,
@@ -33,10 +43,68 @@ pub fn better_law(reference: &FlightAnalysis) -> MapLaw {
         (!values.is_empty()).then(|| mean_sd(&values).0)
     };
     match (reduced(MapLaw::Linear), reduced(MapLaw::SignedQuadratic)) {
-        (Some(linear), Some(quadratic)) if calm && quadratic < linear => MapLaw::SignedQuadratic,
-        (None, Some(_)) => MapLaw::SignedQuadratic,
-        _ => MapLaw::Linear,
+        (Some(linear), Some(quadratic)) => {
+            let chi2 = format!(
+                "mean chi2/nu of the drones' fits: {linear:.2} with the line, {quadratic:.2} with the \
+                 signed quadratic"
+            );
+            match (quadratic < linear, calm) {
+                (true, true) => (MapLaw::SignedQuadratic, chi2),
+                (true, false) => (
+                    MapLaw::Linear,
+                    format!("{chi2}, but its W* is that of a parabola's flank and no air"),
+                ),
+                (false, _) => (MapLaw::Linear, chi2),
+            }
+        }
+        (None, Some(_)) => (MapLaw::SignedQuadratic, "there is no line".to_owned()),
+        _ => (MapLaw::Linear, "there is no signed quadratic to compare with".to_owned()),
     }
+}
+
+/// W of the signed quadratic where it is the vertex of a parabola that stands in for a bent line, and
+/// no speed of air: at or beyond the ends of the ladder's speeds, or faster than air moves over a
+/// whole calibration. `None` where it may be air, or is known to be.
+pub fn vertex_mps(
+    laws: &Laws,
+    drones: &[DroneAnalysis],
+    true_updraft_mps: Option<f64>,
+) -> Option<f64> {
+    let w = laws.signed_quadratic.as_ref().and_then(w_mps)?;
+    if true_updraft_mps.is_some_and(|truth| (w - truth).abs() <= LARGEST_CALIBRATION_W_MPS) {
+        return None;
+    }
+    let [low, high] = speeds_mps(drones)?;
+    (w >= EDGE * high || w <= EDGE * low || w.abs() > FASTEST_AIR_MPS).then_some(w)
+}
+
+/// Lowest and highest commanded speed of the usable legs, m/s.
+fn speeds_mps(drones: &[DroneAnalysis]) -> Option<[f64; 2]> {
+    let legs = drones
+        .iter()
+        .flat_map(|drone| &drone.windows)
+        .filter(|window| window.kind.is_leg() && window.rejected.is_empty())
+        .map(|window| window.commanded_mps);
+    legs.fold(None, |ends, speed| {
+        let [low, high] = ends.unwrap_or([0.0; 2]);
+        Some([f64::min(low, speed), f64::max(high, speed)])
+    })
+}
+
+/// In plain words, that W* is no air ([`vertex_mps`]).
+pub(super) fn vertex_caution(
+    laws: &Laws,
+    drones: &[DroneAnalysis],
+    true_updraft_mps: Option<f64>,
+) -> Option<String> {
+    let w = vertex_mps(laws, drones, true_updraft_mps)?;
+    let [low, high] = speeds_mps(drones)?;
+    let place = if (low..=high).contains(&w) { "at the edge of" } else { "outside of" };
+    Some(format!(
+        "The signed quadratic's W* of {w:+.2} m/s is the vertex of a parabola and no air speed: it \
+         lies {place} the ladder's {low:+.1} to {high:+.1} m/s, so that the windows are on one flank, \
+         which stands in for a line that bends. A, u0 and W* describe that bend alone"
+    ))
 }
 
 /// The law that describes one set of windows better.
@@ -137,5 +205,36 @@ mod tests {
         let w = w_mps(bent.signed_quadratic.as_ref().unwrap()).unwrap();
         assert!(w.abs() > LARGEST_CALIBRATION_W_MPS, "{w}");
         assert!(misfit(&bent).unwrap().contains("not moving air"), "{w}");
+    }
+
+    #[test]
+    fn a_w_beyond_the_ladder_is_a_vertex_and_no_air() {
+        let leg = |commanded_mps: f64| -> crate::analysis::result::WindowStats {
+            let stats = serde_json::json!({"median": 0.0, "mean": 0.0, "sd": 0.0, "n": 1});
+            serde_json::from_value(serde_json::json!({
+                "kind": "leg_up", "label": "", "start_s": 0.0, "end_s": 1.0,
+                "commanded_mps": commanded_mps, "height_m": 50.0, "velocity_mps": stats,
+                "pulse_us": stats, "pulse_phi_us": stats, "tilt_deg": stats,
+                "offset_us": null, "rejected": []
+            }))
+            .unwrap()
+        };
+        let drone: DroneAnalysis = serde_json::from_value(serde_json::json!({
+            "slot": 1, "name": "", "source": "", "home_m": null,
+            "clock": crate::flight::Clock { method: crate::flight::Alignment::Plan, ..Default::default() },
+            "windows": [leg(-3.5), leg(3.5)], "laws": null, "trace": crate::analysis::result::Trace::default(),
+            "warnings": []
+        }))
+        .unwrap();
+        let drones = [drone];
+        // A line with a weak bend: one flank of a parabola whose vertex is far below the ladder.
+        let bent = laws(|v| 1546.5 + 26.4 * v + 3.0 * v * v);
+        let w = vertex_mps(&bent, &drones, None).unwrap();
+        assert!(w < -3.15, "{w}");
+        let words = vertex_caution(&bent, &drones, None).unwrap();
+        assert!(words.contains("no air speed") && words.contains("-3.5 to +3.5 m/s"), "{words}");
+        assert_eq!(vertex_mps(&bent, &drones, Some(w)), None, "the air is known to be as fast");
+        let windy = laws(|v| 1598.6 + 8.14 * (v - 1.5) * (v - 1.5).abs());
+        assert_eq!(vertex_mps(&windy, &drones, None), None, "air that moved");
     }
 }

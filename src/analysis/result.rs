@@ -414,6 +414,9 @@ pub struct TableRow {
     pub n: usize,
     /// The paper's value and error where it has one.
     pub paper: Option<Estimate>,
+    /// Why the two are not to be compared; absent: they are, where the paper has a value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_compared: Option<String>,
 }
 
 /// Thinned traces of one drone, for figures.
@@ -434,7 +437,14 @@ pub struct Trace {
 pub struct UpdraftMap {
     /// Law used for the inversion: `linear` or `signed quadratic`.
     pub law: String,
-    /// How the wind on the leaning drones was corrected for; absent: it was not.
+    /// Why that law; absent: not told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law_reason: Option<String>,
+    /// By what the wind on the leaning drones was corrected for; absent: it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wind: Option<WindCorrection>,
+    /// How the drones lean in wind, where that is the drag of their box alone
+    /// ([`WindCorrection::Drag`]).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub leaning: Option<Leaning>,
     /// Density that pulses were referred to before the inversion; absent: not corrected for height.
@@ -460,6 +470,17 @@ pub struct UpdraftMap {
     /// Comparison with the true air, when it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthCheck>,
+}
+
+/// By what the wind on leaning drones was corrected for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WindCorrection {
+    /// The drag of the simulated vehicle's box: the wind's part along the rotor axis.
+    Drag,
+    /// The physics of the vehicle's file: rotor drag, body drag, flow along the axis, translational
+    /// lift, by the lean.
+    Physics,
 }
 
 impl UpdraftMap {

@@ -115,7 +115,8 @@ struct Uncorrected {
 /// Law for the map of the air.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum LawChoice {
-    /// The one that fits the calibration better
+    /// A line that may bend, unless the calibration's windows make the signed quadratic clearly more
+    /// probable (with --paper: the law of lower chi2)
     #[default]
     Auto,
     /// u = A' V + u0
@@ -312,6 +313,7 @@ fn finish(
             sag: flight
                 .sag
                 .map(|sag| if options.without.no_battery { Sag::UNCORRECTED } else { sag }),
+            true_air: flight.true_air.as_ref(),
             lean_table: flight.lean_table.as_ref().filter(|_| !options.without.no_wind),
             folder: Some(&work.root),
         })

@@ -10,9 +10,11 @@ use super::exit::CommandError;
 use super::hashes::Hashes;
 use super::leaning::{lean_table, leaning};
 use super::load::has_extension;
+use super::true_scales::true_scales;
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
 use crate::analysis::lean_table::LeanTable;
+use crate::analysis::statistics::result::TrueAir;
 use crate::analysis::wind::Leaning;
 use crate::analysis::{LogInput, TruthSeries};
 use crate::base::causes::with_causes;
@@ -47,6 +49,7 @@ pub(super) struct Found {
     pub(super) thrust_exponent: Option<f64>,
     pub(super) sag: Option<Sag>,
     pub(super) lean_table: Option<LeanTable>,
+    pub(super) true_air: Option<TrueAir>,
     /// What is doubtful about the files, one sentence each.
     pub(super) notes: Vec<String>,
 }
@@ -130,6 +133,7 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         thrust_exponent: None,
         sag: Some(if plan.is_some() { Sag::default() } else { Sag::UNKNOWN }),
         lean_table: None,
+        true_air: None,
         notes: Vec::new(),
     });
     Ok(())
@@ -169,6 +173,7 @@ pub(super) fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, Com
             thrust_exponent: None,
             sag: None,
             lean_table: None,
+            true_air: None,
             notes: Vec::new(),
         }
     }));
@@ -215,6 +220,7 @@ fn found_flight(folder: &FlightFolder, hashes: &Hashes) -> Result<Found, Command
             .map(|record| record.air_mps[2]),
         truth,
         start,
+        true_air: record.as_ref().and_then(|record| true_scales(&record.air)),
         seed: record.map(|record| record.seed),
         notes,
     })

@@ -47,13 +47,13 @@ const LIFT_ERROR: f64 = 0.07;
 /// body drag, translational lift); `None` for vehicles without rotor drag, whose lean says little.
 pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
     let ratio = density_ratio(plan.site.ground_amsl_m);
-    let change_us = changes(ratio, vehicle)?;
+    let (change_us, wind_mps) = changes(ratio, vehicle)?;
     let other = |effect: &str, parameter: &str, error: f64| {
         let mut vehicle = vehicle.clone();
         let value = parameter_of(&vehicle, effect, parameter)? * (1.0 + error);
         let table = vehicle.effects.get_mut(effect)?;
         table.parameters.insert(parameter.to_owned(), value);
-        changes(ratio, &vehicle)
+        changes(ratio, &vehicle).map(|(change_us, _)| change_us)
     };
     let others: Vec<Vec<Vec<f64>>> = [
         other("blade-flapping", "drag_per_weight", DRAG_ERROR),
@@ -76,6 +76,7 @@ pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
         first_climb_mps: FIRST_CLIMB_MPS,
         climb_step_mps: CLIMB_STEP_MPS,
         change_us,
+        wind_mps,
         doubt_us,
     })
 }
@@ -89,8 +90,9 @@ fn parameter_of(vehicle: &Vehicle, name: &str, parameter: &str) -> Option<f64> {
     values.get(known.iter().position(|known| known.name == parameter)?).copied()
 }
 
-/// Change of the pulse by wind, for each lean and vertical air speed of the table, us.
-fn changes(ratio: f64, vehicle: &Vehicle) -> Option<Vec<Vec<f64>>> {
+/// Change of the pulse by wind, for each lean and vertical air speed of the table, us, and the wind of
+/// each lean, m/s.
+fn changes(ratio: f64, vehicle: &Vehicle) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
     let rotor_drag =
         parameter_of(vehicle, "blade-flapping", "drag_per_weight").filter(|drag| *drag > 0.0)?;
     let body_m2 = parameter_of(vehicle, "parasitic-drag", "horizontal_m2").unwrap_or(0.0);
@@ -124,5 +126,7 @@ fn changes(ratio: f64, vehicle: &Vehicle) -> Option<Vec<Vec<f64>>> {
         let climbs = (0..CLIMBS).map(|step| FIRST_CLIMB_MPS + step as f64 * CLIMB_STEP_MPS);
         climbs.map(|climb| if index == 0 { 0.0 } else { change(tilt_rad, climb) }).collect()
     };
-    Some((0..LEANS).map(row).collect())
+    let of_lean = |index: usize| wind((index as f64 * LEAN_STEP_DEG).to_radians());
+    let winds = (0..LEANS).map(|index| if index == 0 { 0.0 } else { of_lean(index) }).collect();
+    Some(((0..LEANS).map(row).collect(), winds))
 }

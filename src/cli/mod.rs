@@ -33,6 +33,7 @@ mod simulate;
 mod sweep;
 mod timetable;
 pub mod tools;
+mod true_scales;
 mod words;
 
 use std::io::Write as _;

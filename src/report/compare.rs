@@ -1,15 +1,11 @@
 //! Fleet tables beside the paper's values, and the words that a page and a terminal share.
 
-use crate::analysis::law::SIGNED_QUADRATIC;
-use crate::analysis::result::{
-    Analysis, DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow, UpdraftMap,
-};
+use crate::analysis::result::{Analysis, DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow};
 use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 use crate::flight::Alignment;
 use crate::mission::plan::Purpose;
 
-use super::figures::air::{deviation, mean, mean_truth};
 use super::law;
 use super::text::{
     NONE, clean, count, estimate, fixed, parameter, reduced, rejection, signed, symbol, unit,
@@ -39,7 +35,10 @@ pub(super) struct Comparison {
 /// The row in words.
 pub(super) fn comparison(row: &TableRow) -> Comparison {
     let paper = row.paper.filter(|paper| usable(paper.value));
-    let gap = paper.map(|paper| row.mean - paper.value).filter(|gap| usable(*gap));
+    let gap = paper
+        .filter(|_| row.not_compared.is_none())
+        .map(|paper| row.mean - paper.value)
+        .filter(|gap| usable(*gap));
     let in_errors = paper
         .filter(|paper| usable(paper.se) && paper.se > 0.0)
         .and_then(|paper| gap.map(|gap| gap / paper.se));
@@ -140,13 +139,25 @@ pub(super) fn table_heading(flight: &FlightAnalysis) -> String {
         Some("II") => " beside the paper's Table II (its drones in the field)",
         _ => "",
     };
-    let told = |law: &str| flight.table.iter().any(|row| row.law == law && row.paper.is_some());
-    let not = if table.is_empty() || told(SIGNED_QUADRATIC) {
-        ""
-    } else {
-        "; the signed quadratic is not compared, as it does not describe this flight"
+    format!("Fitted parameters{}", if compared(flight) { table } else { "" })
+}
+
+/// Which rows are not compared with the paper's values beside them, and why, one sentence for each
+/// reason.
+pub(super) fn not_compared_lines(flight: &FlightAnalysis) -> Vec<String> {
+    let mut reasons: Vec<((&str, &str), Vec<String>)> = Vec::new();
+    for row in flight.table.iter().filter(|row| row.paper.is_some()) {
+        let Some(reason) = row.not_compared.as_deref() else { continue };
+        let (of, name) = ((row.law.as_str(), reason), symbol(&row.parameter));
+        match reasons.iter_mut().find(|(known, _)| *known == of) {
+            Some((_, rows)) => rows.push(name),
+            None => reasons.push((of, vec![name])),
+        }
+    }
+    let line = |((law, reason), rows): ((&str, &str), Vec<String>)| {
+        format!("Not compared: {} of the {} law: {}.", rows.join(", "), clean(law), clean(reason))
     };
-    format!("Fitted parameters{}{not}", if compared(flight) { table } else { "" })
+    reasons.into_iter().map(line).collect()
 }
 
 /// Whether a value of the paper stands beside any of the flight's.
@@ -222,9 +233,15 @@ pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
     } else {
         ("", "the windows' own errors are so small that")
     };
+    let note = match law::vertex_mps(flight) {
+        Some(_) if better == MapLaw::SignedQuadratic => {
+            "; its W* is the vertex of a parabola, no air"
+        }
+        _ => "",
+    };
     Some(format!(
         "the {name} law fits better ({against}{of}, before scatter is added: {errors} neither law is \
-         exact to within them)"
+         exact to within them{note})"
     ))
 }
 
@@ -319,40 +336,6 @@ pub(super) fn clock(drone: &DroneAnalysis) -> &'static str {
         Alignment::Plan => "plan",
         Alignment::Takeoff => "take-off",
     }
-}
-
-/// What the map says about the fleet as a whole.
-pub(super) struct FleetAir {
-    /// Mean of the drones' means, m/s, and their standard deviation between drones.
-    pub(super) mean: f64,
-    pub(super) sd: f64,
-    pub(super) lowest: f64,
-    pub(super) highest: f64,
-    /// Mean standard error and mean systematic error of one drone, m/s.
-    pub(super) se: f64,
-    pub(super) systematic: f64,
-    /// Root mean square of estimate minus truth over drones, m/s.
-    pub(super) rms_error: Option<f64>,
-    pub(super) n: usize,
-}
-
-/// Summary of a map; `None` without a usable estimate.
-pub(super) fn fleet_air(map: &UpdraftMap) -> Option<FleetAir> {
-    let means = map.drones.iter().map(|drone| drone.mean.value).filter(|&w| usable(w));
-    let squares = map.drones.iter().filter_map(|drone| {
-        let error = drone.mean.value - mean_truth(drone)?;
-        usable(error).then_some(error * error)
-    });
-    Some(FleetAir {
-        mean: mean(means.clone())?,
-        sd: deviation(means.clone()).unwrap_or(0.0),
-        lowest: means.clone().fold(f64::INFINITY, f64::min),
-        highest: means.clone().fold(f64::NEG_INFINITY, f64::max),
-        se: mean(map.drones.iter().map(|drone| drone.mean.se)).unwrap_or(0.0),
-        systematic: mean(map.drones.iter().map(|drone| drone.systematic_mps)).unwrap_or(0.0),
-        rms_error: mean(squares).map(f64::sqrt),
-        n: means.count(),
-    })
 }
 
 /// `45 of 49 drones`, or `12 drones` when none is missing.

@@ -7,6 +7,8 @@ use crate::analysis::result::FlightAnalysis;
 
 use super::compare::{clock, drone_laws, flags, windows_used};
 use super::figures::air::mean_truth;
+use super::law;
+use super::notes::shared_flags;
 use super::text::{NONE, clean, estimate, fixed, shortened, unit, usable};
 
 /// Headings and rows of the table of drones; columns that no drone fills are left out.
@@ -21,7 +23,14 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("mapping", false),
         (&*format!("A ({effort}/(m/s)²)"), true),
         (&*format!("u₀ ({effort})"), true),
-        ("fitted W* (m/s)", true),
+        (
+            if law::vertex_mps(flight).is_some() {
+                "vertex, no air (m/s)"
+            } else {
+                "fitted W* (m/s)"
+            },
+            true,
+        ),
         ("χ²/ν", true),
         (&*format!("A′ ({effort}/(m/s))"), true),
         (&*format!("u₀ linear ({effort})"), true),
@@ -30,6 +39,7 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
         ("windows", true),
         ("clock", false),
     ];
+    let shared = shared_flags(flight);
     let rows: Vec<(Vec<String>, String)> = flight
         .drones
         .iter()
@@ -58,7 +68,8 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 if drone.windows.is_empty() { none() } else { windows_used(drone) },
                 clock(drone).to_owned(),
             ];
-            (cells, flags(drone).join("; "))
+            let own = flags(drone).into_iter().filter(|flag| !shared.contains(flag));
+            (cells, own.collect::<Vec<_>>().join("; "))
         })
         .collect();
     let filled: Vec<bool> = (0..heads.len())

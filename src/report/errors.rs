@@ -5,6 +5,7 @@ use minijinja::value::Value;
 
 use crate::analysis::result::{CommonError, DroneUpdraft, ErrorBudget, UpdraftMap};
 
+use super::fleet_air::fleet_air;
 use super::text::{NONE, clean, count, fixed, shortened, signed, usable};
 
 /// Most rows of the table of quality.
@@ -47,15 +48,20 @@ const KINDS: [Kind; 7] = [
 pub(super) fn section(map: &UpdraftMap) -> Value {
     let truth = map.truth.filter(|truth| truth.values > 0 && usable(truth.rms_mps)).map(|truth| {
         let percent = |share: f64| fixed(100.0 * share, 1);
+        let of_means = fleet_air(map).and_then(|air| air.rms_error);
         format!(
-            "Estimate and truth: over {} of {}, W* − W has a root mean square of {} m/s and a mean \
-             of {} m/s ({} m/s without that mean); {} % of the true values lie inside their 95 % \
-             intervals, and so do the true means of {} % of the drones.",
+            "Estimate and truth: over {} (running means of 10 s) of {}, W* − W has a root mean square \
+             of {} m/s and a mean of {} m/s ({} m/s without that mean){}; {} % of the true values lie \
+             inside their 95 % intervals, and so do the true means of {} % of the drones.",
             count(truth.values, "value"),
             count(truth.drones, "drone"),
             fixed(truth.rms_mps, 3),
             signed(truth.bias_mps, 3),
             fixed(truth.rms_without_bias_mps, 3),
+            of_means.map_or_else(String::new, |rms| format!(
+                "; that of means over the hover has {} m/s",
+                fixed(rms, 3)
+            )),
             percent(truth.inside_share),
             percent(truth.means_inside_share),
         )
@@ -94,6 +100,7 @@ fn budget(map: &UpdraftMap) -> Option<Value> {
     Some(context! {
         rows,
         drones => drones.len(),
+        fleet => drones.len() > 1,
         half_width => half_width.map(|common| fixed(common.half_width_mps, 2)),
     })
 }
@@ -123,13 +130,20 @@ fn coverage(map: &UpdraftMap) -> String {
     let present: usize =
         map.drones.iter().map(|drone| drone.updraft_mps.iter().flatten().count()).sum();
     let own = map.drones.iter().filter(|drone| drone.mapping == "own").count();
+    let by = match (map.drones.len(), own) {
+        (1, 1) => "It is measured by its own calibration law".to_owned(),
+        (1, _) => {
+            "It is measured by the law of the calibration flight, not by one of its own".to_owned()
+        }
+        (n, own) => format!(
+            "{own} through their own calibration law, {} through that of the fleet's average",
+            n - own
+        ),
+    };
     format!(
-        "{} in {} common seconds; {} % of the values are there. {} through their own mapping, {} \
-         through the flock's.",
+        "{} in {} common seconds; {} % of the values are there. {by}.",
         count(map.drones.len(), "drone"),
         map.time_s.len(),
         fixed(100.0 * present as f64 / cells.max(1) as f64, 1),
-        own,
-        map.drones.len() - own,
     )
 }

@@ -9,14 +9,18 @@ use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::analysis::{MapLaw, prefer};
 use crate::base::estimate::Estimate;
 
-use super::compare::{better_words, drones_of, flags, fleet_air, nothing};
+use super::compare::{better_words, drones_of, flags, nothing};
 use super::figures::air;
+use super::fleet_air::fleet_air;
 use super::law;
 use super::page::capitalised;
 use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable, value_of};
 
 /// More flights than this are summed up at the top of the page.
 const SUMMED_FLIGHTS: usize = 3;
+/// Label of a W* that is none.
+const VERTEX: &str = "vertex of the fitted parabola, no air speed";
+
 /// The numbers at a glance.
 pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
     let mut tiles = Vec::new();
@@ -51,16 +55,20 @@ pub(super) fn tiles(analysis: &Analysis) -> Vec<Value> {
     }
     for flight in &analysis.flights {
         let Some(air) = flight.map.as_ref().and_then(fleet_air) else { continue };
-        let systematic = if air.systematic > 0.005 {
-            format!(", ± {} systematic", fixed(air.systematic, 2))
-        } else {
-            String::new()
-        };
-        let note = format!("± {} m/s between drones{systematic}", fixed(air.sd, 2));
+        let spread = air.spread_words().map_or_else(String::new, |spread| format!("; {spread}"));
+        let note = format!("{}{spread}", air.error.words(2)).replace("95 %", "95\u{a0}%");
         tile(signed(air.mean, 2), format!("mean updraft, {}", clean(&flight.name)), note);
         if let Some(rms) = air.rms_error {
-            let note = format!("m/s, {}", count(air.n, "drone"));
-            tile(fixed(rms, 3), "rms error of the map".to_owned(), note);
+            // Of values over 10 s it is another number, which the text below the map tells.
+            let note = format!(
+                "m/s, of the mean of {}",
+                if air.n == 1 {
+                    "the drone".to_owned()
+                } else {
+                    format!("each of {}", count(air.n, "drone"))
+                }
+            );
+            tile(fixed(rms, 3), "rms error of means over the hover".to_owned(), note);
         }
     }
     tiles
@@ -102,6 +110,7 @@ fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
         ("linear", "A'", "A′, linear law"),
     ];
     let laws = law::flight_laws(flight);
+    let vertex = law::vertex_mps(flight).is_some();
     // The numbers of the law that describes the flight; the other one's would only mislead.
     let better = match laws.and_then(prefer::better_of) {
         Some(MapLaw::Linear) => "linear",
@@ -126,6 +135,7 @@ fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
                 parameter(fit, name).map(|found| (found.estimate, unit(&found.unit)))
             };
             let (of, unit) = row.or_else(own)?;
+            let label = if vertex && name == "W" { VERTEX } else { label };
             usable(of.value).then(|| (label.to_owned(), of, unit))
         })
         .collect()
@@ -159,12 +169,16 @@ pub(super) fn verdict(analysis: &Analysis) -> Vec<String> {
                 let _ = write!(text, ", {words}");
             }
             if let Some(air) = flight.map.as_ref().and_then(fleet_air) {
-                let _ = write!(
-                    text,
-                    ", vertical air speed from {} to {} m/s over the grid",
-                    signed(air.lowest, 2),
-                    signed(air.highest, 2),
-                );
+                let _ = if air.n == 1 {
+                    write!(text, ", vertical air speed {} m/s", signed(air.mean, 2))
+                } else {
+                    write!(
+                        text,
+                        ", vertical air speed from {} to {} m/s over the grid",
+                        signed(air.lowest, 2),
+                        signed(air.highest, 2),
+                    )
+                };
             }
             let noted = flight.drones.iter().filter(|drone| !flags(drone).is_empty()).count();
             if noted > 0 {

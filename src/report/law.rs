@@ -1,5 +1,6 @@
 //! Fitted laws as curves, and windows as points.
 
+use crate::analysis::prefer;
 use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, WindowStats};
 
 use super::axis::Axis;
@@ -36,6 +37,11 @@ pub(super) fn flight_laws(flight: &FlightAnalysis) -> Option<&Laws> {
         [drone] => drone.laws.as_ref(),
         _ => None,
     })
+}
+
+/// W* of the flight's signed quadratic where it is the vertex of a parabola and no air, m/s.
+pub(super) fn vertex_mps(flight: &FlightAnalysis) -> Option<f64> {
+    prefer::vertex_mps(flight_laws(flight)?, &flight.drones, flight.true_updraft_mps)
 }
 
 /// Points (V_U, u) of `u = A f(V - W) + u0` over a velocity axis; empty if a parameter is missing.

@@ -20,6 +20,7 @@ pub mod fields;
 pub mod fields_parquet;
 mod figures;
 mod film;
+mod fleet_air;
 mod frames;
 mod gap_page;
 mod gap_parts;

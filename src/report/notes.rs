@@ -1,5 +1,7 @@
 //! What is doubtful about drones, with equal remarks told once.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::analysis::result::{FlightAnalysis, PartlyUsedLog};
 
 use super::compare::flags;
@@ -40,6 +42,28 @@ pub(super) fn note_lines(flight: &FlightAnalysis) -> Vec<String> {
         let told = log.map(|log| clean(&log.reason)).unwrap_or_default();
         let new = flags(drone).into_iter().filter(move |flag| !told.contains(flag.as_str()));
         new.map(move |flag| (of.clone(), flag))
+    }))
+}
+
+/// A remark on so many drones or more is told once below their table, not in each row.
+const SHARED_BY: usize = 4;
+
+/// The remarks that so many drones share.
+pub(super) fn shared_flags(flight: &FlightAnalysis) -> BTreeSet<String> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for flag in flight.drones.iter().flat_map(flags) {
+        *counts.entry(flag).or_default() += 1;
+    }
+    counts.into_iter().filter(|(_, n)| *n >= SHARED_BY).map(|(flag, _)| flag).collect()
+}
+
+/// The remarks on many drones, each once with its drones.
+pub(super) fn shared_notes(flight: &FlightAnalysis) -> Vec<String> {
+    let shared = shared_flags(flight);
+    grouped(flight.drones.iter().flat_map(|drone| {
+        let of = who(drone.slot, &drone.name);
+        let told = flags(drone).into_iter().filter(|flag| shared.contains(flag));
+        told.map(move |flag| (of.clone(), flag)).collect::<Vec<_>>()
     }))
 }
 

@@ -36,8 +36,9 @@ pub(super) fn render(
         .enumerate()
         .filter_map(|(index, flight)| air_section(analysis, flight, index, &mut figures))
         .collect();
-    let study = study.map(|study| study_section(study, &mut figures));
+    // In the order of the page: a figure is numbered as it is shown.
     let laws = figure_laws::figure(analysis).map(|figure| figures.show(figure));
+    let study = study.map(|study| study_section(study, &mut figures));
     let flights: Vec<Value> = analysis
         .flights
         .iter()

@@ -14,6 +14,9 @@ use super::page::{Gallery, capitalised, flight_key};
 use super::text::{clean, fixed, signed, usable};
 use super::{errors, scales};
 
+/// Wind that is shown, m/s.
+const LEAST_WIND_MPS: f64 = 0.05;
+
 /// The maps of a flight, which the page shows first: they are what the fleet was flown for.
 pub(super) fn air_section(
     analysis: &Analysis,
@@ -46,6 +49,13 @@ pub(super) fn air_section(
     .flatten()
     .map(|figure| figures.show(figure))
     .collect();
+    let no_map = if map.is_scan() {
+        Some("The drones moved: what they measured is shown along their tracks.")
+    } else if map.drones.iter().all(|drone| drone.position_m.is_none()) {
+        Some("Where the drones stood is not known, so that there is no map of the ground.")
+    } else {
+        Some("No drone gave an estimate of the vertical air speed.")
+    };
     let statistics = flight.statistics.as_ref().map(|found| {
         let correlations = correlation::figure(flight, &key, found).map(|f| figures.show(f));
         let averaging = found
@@ -56,7 +66,7 @@ pub(super) fn air_section(
         context! { correlations, averaging, ..scales::section(found) }
     });
     Some(
-        context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), mean, film => shown, more, statistics, errors => errors::section(map) },
+        context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), law_reason => map.law_reason.as_deref().map(clean), no_map, mean, film => shown, more, statistics, errors => errors::section(map) },
     )
 }
 
@@ -67,7 +77,9 @@ fn wind(flight: &FlightAnalysis) -> Option<[f64; 2]> {
     // Clockwise from forward, as seen from above.
     let to_rad = (from_deg + 180.0 - flight.orientation_deg?).to_radians();
     let (sin, cos) = to_rad.sin_cos();
-    (usable(speed) && usable(to_rad)).then_some([speed * cos, -speed * sin])
+    // Slower than that is no wind, and has no arrow.
+    (usable(speed) && speed >= LEAST_WIND_MPS && usable(to_rad))
+        .then_some([speed * cos, -speed * sin])
 }
 
 /// A colour bar of the page: its gradient and the numbers below it.

@@ -4,18 +4,21 @@ use minijinja::context;
 use minijinja::value::Value;
 use rayon::prelude::*;
 
-use crate::analysis::result::{Analysis, FlightAnalysis};
+use crate::analysis::result::{Analysis, FlightAnalysis, WindCorrection};
 use crate::mission::plan::Purpose;
 
 use super::Figure;
 use super::compare::{
-    compared, comparison, drones_of, fit_line, flock_lines, nothing, scatter_line, table_heading,
+    compared, comparison, drones_of, fit_line, flock_lines, not_compared_lines, nothing,
+    scatter_line, table_heading,
 };
 use super::drone_table::drone_table;
 use super::figures::drone::{Axes, drawable};
 use super::figures::{drone as figure_drone, fleet};
 use super::law;
-use super::notes::{logs_used, partly_used_lines, unused_lines, without_result_lines};
+use super::notes::{
+    logs_used, partly_used_lines, shared_notes, unused_lines, without_result_lines,
+};
 use super::page::{Gallery, OPEN_LIMIT, capitalised, flight_key};
 use super::text::{clean, kind, purpose, signed};
 
@@ -32,18 +35,24 @@ pub(super) fn flight_section(
     figures: &mut Gallery,
 ) -> Value {
     let key = flight_key(analysis, index);
-    let drones = drone_gallery(flight, &key, figures);
+    let gallery = drone_gallery(flight, &key, figures);
     let names: Vec<Option<String>> = (0..flight.drones.len())
         .map(|index| {
             let drone = flight.drones.get(index).filter(|drone| drawable(drone))?;
             let name = figure_drone::name(&key, index, drone);
-            figures.files.iter().any(|(known, _)| *known == name).then_some(name)
+            let shown = gallery.as_ref().is_some_and(|gallery| gallery.shown.name == name);
+            (shown || figures.files.iter().any(|(known, _)| *known == name)).then_some(name)
         })
         .collect();
     let fleet = (flight.purpose == Purpose::Calibration)
         .then(|| fleet::figure(analysis, flight, &key, &names))
         .flatten()
         .map(|figure| figures.show_linked(figure));
+    // Numbered after the fleet, below which it stands.
+    let drones = gallery.map(|gallery| {
+        let Gallery3 { shown, choices, left_out, undrawn } = gallery;
+        context! { shown => figures.show(shown), choices, left_out, undrawn }
+    });
     let map_law = flight.map.as_ref().map(|map| clean(&map.law));
     let table: Vec<Value> = flight
         .table
@@ -94,7 +103,13 @@ pub(super) fn flight_section(
         table_heading => table_heading(flight),
         scatter => law::flight_laws(flight).and_then(scatter_line),
         cautions => flight.warnings.iter().map(|w| clean(w)).collect::<Vec<_>>(),
-        leaning => flight.map.as_ref().is_some_and(|map| map.leaning.is_some()),
+        wind => flight.map.as_ref().and_then(|map| map.wind).map_or("", |wind| match wind {
+            WindCorrection::Drag => "drag",
+            WindCorrection::Physics => "physics",
+        }),
+        law_reason => flight.map.as_ref().and_then(|map| map.law_reason.as_deref()).map(clean),
+        not_compared => not_compared_lines(flight),
+        shared_notes => shared_notes(flight),
         logs => logs_used(flight),
         without_result_open => without_result.len() <= 2 * OPEN_LIMIT,
         without_result,
@@ -105,8 +120,17 @@ pub(super) fn flight_section(
     }
 }
 
-/// Figure 3 for every drone of a calibration, the first with laws shown first.
-fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> Option<Value> {
+/// The drawings of the paper's Fig. 3, one of which is shown first.
+struct Gallery3 {
+    shown: Figure,
+    choices: Vec<Value>,
+    left_out: usize,
+    undrawn: usize,
+}
+
+/// Figure 3 for every drone of a calibration, the first with laws shown first; that one is not
+/// numbered yet.
+fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> Option<Gallery3> {
     let moving = |drone| law::moving(drone).next().is_some();
     let wanted: Vec<usize> = (0..flight.drones.len())
         .filter(|&index| flight.drones.get(index).is_some_and(drawable))
@@ -152,12 +176,12 @@ fn drone_gallery(flight: &FlightAnalysis, key: &str, figures: &mut Gallery) -> O
             left_out += 1;
         }
         if is_first {
-            shown = Some(figures.show(figure));
+            shown = Some(figure);
         } else {
             figures.files.push((figure.name, figure.svg));
         }
     }
-    Some(context! { shown => shown?, choices, left_out, undrawn })
+    Some(Gallery3 { shown: shown?, choices, left_out, undrawn })
 }
 
 /// How many windows of each kind all drones have: `14 up × …` as words.

@@ -1,20 +1,22 @@
-//! The statistics of a hover in at most three lines, beside the paper's values.
+//! The statistics of a hover in at most four lines, beside the paper's values.
 
 use crate::analysis::result::FlightAnalysis;
 use crate::analysis::statistics::result::{FieldStatistics, Scale};
 
+use super::scales::{not_determined, true_air_words};
 use super::text::clean;
 
 /// Length, time scale, and the two directions; or why there is nothing of the kind.
 pub(super) fn statistics_lines(flight: &FlightAnalysis) -> Vec<String> {
     let Some(statistics) = &flight.statistics else { return Vec::new() };
-    let lines: Vec<String> = [length(statistics), time(statistics), directions(statistics)]
+    let mut lines: Vec<String> = [length(statistics), time(statistics), directions(statistics)]
         .into_iter()
         .flatten()
         .collect();
     if lines.is_empty() {
         return statistics.absent.first().map(|reason| clean(reason)).into_iter().collect();
     }
+    lines.extend(statistics.true_air.as_ref().map(true_air_words));
     lines
 }
 
@@ -41,8 +43,13 @@ fn directions(statistics: &FieldStatistics) -> Option<String> {
     let space = statistics.space.as_ref()?;
     let along_x = space.along_x.as_ref()?.lambda_m.as_ref()?;
     let along_y = space.along_y.as_ref()?.lambda_m.as_ref()?;
-    let differ =
-        space.anisotropy.as_ref().and_then(|found| found.p_value).map_or_else(String::new, |p| {
+    let determined = [along_x, along_y].iter().all(|scale| scale.undetermined.is_none());
+    let differ = space
+        .anisotropy
+        .as_ref()
+        .and_then(|found| found.p_value)
+        .filter(|_| determined)
+        .map_or_else(String::new, |p| {
             let significant = if p < 0.05 { "significant" } else { "not significant" };
             format!("; the difference is {significant} (p = {p:.2})")
         });
@@ -64,6 +71,9 @@ fn with_paper(scale: &Scale, unit: &str) -> String {
 }
 
 fn value(scale: &Scale, unit: &str) -> String {
+    if let Some(words) = not_determined(scale, unit) {
+        return words;
+    }
     let digits = |value: f64| {
         let decimals = usize::from(value.abs() < 100.0);
         format!("{value:.decimals$}")

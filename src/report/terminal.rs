@@ -7,10 +7,11 @@ use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
 use super::compare::{
-    better_words, clock, compared, comparison, drone_laws, drones_of, fleet_air, flock_lines,
-    no_measurement, nothing, scatter_line, table_heading, windows_used,
+    better_words, clock, compared, comparison, drone_laws, drones_of, flock_lines, no_measurement,
+    not_compared_lines, nothing, scatter_line, table_heading, windows_used,
 };
 use super::figures::air::mean_truth;
+use super::fleet_air::fleet_air;
 use super::notes::{logs_used, note_lines, partly_used_lines, unused_lines, without_result_lines};
 use super::page::capitalised;
 use super::statistics_lines::statistics_lines;
@@ -191,6 +192,9 @@ impl Output {
         self.line("", "");
         self.wrapped(DIM, "  ", &table_heading(flight));
         self.table(&columns, &rows);
+        for line in not_compared_lines(flight) {
+            self.wrapped(DIM, "  ", &line);
+        }
     }
 
     fn flock(&mut self, flight: &FlightAnalysis) {
@@ -275,8 +279,9 @@ impl Output {
             "",
             "  ",
             &format!(
-                "vertical air speed W*, m/s: mean {}, {} ({} law)",
+                "vertical air speed W*, m/s: mean {} {}, {} ({} law)",
                 signed(air.mean, 3),
+                air.error.words(3),
                 match air.n {
                     1 => "of one drone".to_owned(),
                     n => format!(
@@ -290,6 +295,9 @@ impl Output {
                 clean(&map.law),
             ),
         );
+        if let Some(reason) = &map.law_reason {
+            self.wrapped(DIM, "  ", &format!("Law of the map: {}.", clean(reason)));
+        }
         let systematic = if air.systematic > 0.005 {
             format!(
                 "; systematic, from wind on the leaning drones: {} m/s",
@@ -324,15 +332,19 @@ impl Output {
                 "",
                 "  ",
                 &format!(
-                    "against the truth: rms error {} m/s (answering zero: {}), bias {}, rms without \
-                     it {}; {} % of {} values and {} % of {} means inside of their 95 % intervals",
+                    "against the truth: rms error of the 10 s values {} m/s{} (answering zero: {}), bias \
+                     {}, rms without it {}; {} % of {} values and {} % of {} means inside of their 95 % \
+                     intervals",
                     fixed(truth.rms_mps, 3),
+                    air.rms_error.map_or_else(String::new, |rms| {
+                        format!(", of the drones' means {}", fixed(rms, 3))
+                    }),
                     fixed(truth.zero_rms_mps, 3),
                     signed(truth.bias_mps, 3),
                     fixed(truth.rms_without_bias_mps, 3),
-                    fixed(100.0 * truth.inside_share, 0),
+                    fixed(100.0 * truth.inside_share, 1),
                     truth.values,
-                    fixed(100.0 * truth.means_inside_share, 0),
+                    fixed(100.0 * truth.means_inside_share, 1),
                     truth.drones,
                 ),
             );
@@ -341,7 +353,7 @@ impl Output {
             self.line(
                 "",
                 &format!(
-                    "  rms error against the truth: {} m/s ({})",
+                    "  rms error of means against the truth: {} m/s ({})",
                     fixed(rms, 3),
                     count(known, "drone")
                 ),

@@ -111,6 +111,15 @@ pub(super) fn unit(unit: &str) -> String {
     }
 }
 
+/// What stands for rotor effort, in words.
+pub(super) fn effort_name(indicator: Indicator) -> &'static str {
+    match indicator {
+        Indicator::Pulse => "pulse width",
+        Indicator::RotorSpeed => "rotor speed",
+        Indicator::Power => "electrical power",
+    }
+}
+
 /// Axis label of rotor effort: `tilt-corrected pulse width uφ (µs)`.
 pub(super) fn effort_label(indicator: Indicator) -> String {
     let name = match indicator {

@@ -337,6 +337,7 @@ fn table(drones: &[DroneAnalysis]) -> Vec<TableRow> {
             mean_se: estimates.iter().map(|e| e.se).sum::<f64>() / n,
             n: estimates.len(),
             paper,
+            not_compared: None,
         }
     };
     let paper = |value, se| Some(Estimate::new(value, se));
@@ -457,6 +458,8 @@ pub(crate) fn hover() -> FlightAnalysis {
         paper_table: None,
         map: Some(UpdraftMap {
             law: "signed quadratic".to_owned(),
+            law_reason: None,
+            wind: None,
             leaning: None,
             density: None,
             flock: None,

@@ -92,6 +92,7 @@ fn statistics() -> FieldStatistics {
             flights: 400,
         }),
         paper: Some(Estimate::new(paper, se)),
+        undetermined: None,
     };
     let along = |columns: f64, lambda_m: Scale| DistanceCorrelation {
         classes: (1..=6).map(|k| class(7.0 * f64::from(k), columns / f64::from(k))).collect(),
@@ -181,6 +182,7 @@ fn statistics() -> FieldStatistics {
             reached: Vec::new(),
             words: "A baseline of 100 s repeats best.".to_owned(),
         }),
+        true_air: None,
         absent: vec!["Nothing was left out but this sentence.".to_owned()],
     }
 }

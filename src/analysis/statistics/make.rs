@@ -9,7 +9,7 @@ use super::likelihood::{Fitted, Unknown};
 use super::paper;
 use super::result::{
     Anisotropy, DistanceCorrelation, FieldModel, FieldStatistics, HalfRecord, Interval, NuggetFit,
-    Reads, Scale, Simulated, SpaceCorrelation, TimeCorrelation, Treatment, Variant,
+    Reads, Scale, Simulated, SpaceCorrelation, TimeCorrelation, Treatment, Undetermined, Variant,
 };
 use super::simulate::{FieldScales, Simulator};
 use super::space::{Class, described, length, medians, points, quantile};
@@ -177,7 +177,7 @@ impl Flights<'_> {
         let sorted = self.sorted(of);
         let mut scale = Scale { value, fit_se, ..Scale::default() };
         if sorted.is_empty() {
-            return scale;
+            return scale.judged();
         }
         let at = |share: f64| quantile(&sorted, share);
         let truth = truth.unwrap_or_else(|| at(0.5));
@@ -190,7 +190,7 @@ impl Flights<'_> {
             range_90: Interval { low: at(0.05), high: at(0.95) },
             flights: sorted.len(),
         });
-        scale
+        scale.judged()
     }
 
     fn truth(&self, of: impl Fn(&Fitted) -> f64) -> Option<f64> {
@@ -351,6 +351,15 @@ fn field_model(
                 .to_owned(),
         );
     }
+    let at_end = |mut scale: Scale, at_end: bool, middle: f64| {
+        if at_end {
+            let long = scale.value > middle;
+            scale.undetermined =
+                Some(if long { Undetermined::Longer } else { Undetermined::Shorter });
+        }
+        scale
+    };
+    let record = field.record();
     let blocks = estimators.blocks.as_ref();
     let drones = blocks.map_or(0, |blocks| blocks.drones.len());
     if drones < field.drones() {
@@ -361,8 +370,8 @@ fn field_model(
     }
     FieldModel {
         sd_mps: scale(&|model| model.sd_mps),
-        lambda_m: scale(&|model| model.lambda_m),
-        tau_s: scale(&|model| model.tau_s),
+        lambda_m: at_end(scale(&|model| model.lambda_m), model.length_at_end, record.extent_m),
+        tau_s: at_end(scale(&|model| model.tau_s), model.time_at_end, record.length_s / 2.0),
         nugget_mps: scale(&|model| model.noise_mps),
         log_likelihood: model.log_likelihood,
         drones,
@@ -381,6 +390,8 @@ fn variants(field: &Field, measured: &Estimates, guess: (f64, f64)) -> Vec<Varia
         t0_s: one.t0_s,
         likelihood_lambda_m: one.model.map(|model| model.lambda_m),
         likelihood_tau_s: one.model.map(|model| model.tau_s),
+        likelihood_lambda_at_end: one.model.is_some_and(|model| model.length_at_end),
+        likelihood_tau_at_end: one.model.is_some_and(|model| model.time_at_end),
     };
     let treated: Vec<Variant> =
         [Treatment::Detrended, Treatment::CommonRemoved, Treatment::DetrendedCommonRemoved]

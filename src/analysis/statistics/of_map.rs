@@ -4,7 +4,7 @@ use super::averaging::{Seconds, averaging};
 use super::field::FieldInput;
 use super::make::{StatisticsOptions, field_statistics};
 use super::result::FieldStatistics;
-use super::tilt_wind::{MeanLean, tilt_wind};
+use super::tilt_wind::{LeanDrag, MeanLean, tilt_wind};
 use crate::analysis::result::{Laws, UpdraftMap};
 use crate::analysis::updraft::{self, RUNNING_S};
 use crate::analysis::windows::{Corrected, Target};
@@ -82,6 +82,7 @@ pub(in crate::analysis) fn of_map(
     map: &UpdraftMap,
     seen: &[HoverSeen],
     options: &StatisticsOptions,
+    drag: LeanDrag<'_>,
 ) -> FieldStatistics {
     let input = FieldInput {
         places_m: map.drones.iter().map(|one| one.position_m.unwrap_or([f64::NAN; 2])).collect(),
@@ -122,7 +123,7 @@ pub(in crate::analysis) fn of_map(
             heading_deg: seen.heading_deg,
         })
         .collect();
-    statistics.wind = tilt_wind(&leans, map.leaning.map(|leaning| leaning.drag_speed_mps));
+    statistics.wind = tilt_wind(&leans, drag);
     statistics
 }
 

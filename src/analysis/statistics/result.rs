@@ -39,9 +39,49 @@ pub struct FieldStatistics {
     /// How long an average must be.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaging: Option<Averaging>,
+    /// The air that a simulated flight was flown in; absent: not known, or without scales.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub true_air: Option<TrueAir>,
     /// What could not be said, one sentence each with the reason.
     #[serde(default)]
     pub absent: Vec<String>,
+}
+
+/// The scales of the air that a simulated flight was flown in.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TrueAir {
+    /// The random field with exponential correlations; absent: there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<TrueField>,
+    /// Gusts on top of it.
+    #[serde(default)]
+    pub gusts: Vec<TrueGusts>,
+}
+
+/// A random field: `sd² exp(-r / lambda) exp(-|dt| / tau)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TrueField {
+    /// Standard deviation, m/s.
+    pub sd_mps: f64,
+    /// Correlation length along x of the show frame (1/e), m.
+    pub lambda_m: f64,
+    /// The same along y, m.
+    pub lambda_y_m: f64,
+    /// Correlation time in the moving air (1/e), s.
+    pub tau_s: f64,
+    /// Wind that carries the field past the drones, m/s.
+    pub wind_mps: f64,
+}
+
+/// Gusts with a length of their own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TrueGusts {
+    /// Their spectrum.
+    pub spectrum: String,
+    /// Standard deviation of each axis, m/s.
+    pub sd_mps: f64,
+    /// Integral length, m.
+    pub length_m: f64,
 }
 
 /// The data that the statistics are made of.
@@ -91,6 +131,52 @@ pub struct Scale {
     /// The paper's value and the error that it gives.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paper: Option<Estimate>,
+    /// Set where the numbers above mean nothing: grid and record do not determine the scale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub undetermined: Option<Undetermined>,
+}
+
+/// How little is known of a scale.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Undetermined {
+    /// Only that it is longer than the lower end of its interval, if it has one.
+    Longer,
+    /// Only that it is shorter than the upper end of its interval, if it has one.
+    Shorter,
+    /// Nothing.
+    Unknown,
+}
+
+/// An interval over more than this factor determines nothing.
+const WIDEST: f64 = 100.0;
+/// A lower end this close below the estimate bounds it.
+const BOUNDED: f64 = 10.0;
+
+impl Scale {
+    /// Marks an estimate whose curve fit or interval says that it means nothing.
+    pub(super) fn judged(mut self) -> Self {
+        let no_fit = self.fit_se.is_some_and(|se| se.is_nan() || se >= self.value.abs());
+        let wide = self.interval_95.filter(|of| of.low <= 0.0 || of.high > WIDEST * of.low);
+        self.undetermined = match wide {
+            _ if no_fit => Some(Undetermined::Unknown),
+            Some(of) if of.low > 0.0 && self.value < BOUNDED * of.low => Some(Undetermined::Longer),
+            Some(of) if self.value > of.high / BOUNDED => Some(Undetermined::Shorter),
+            Some(_) => Some(Undetermined::Unknown),
+            None => None,
+        };
+        self
+    }
+
+    /// What bounds an undetermined scale: the words before it, and the bound.
+    pub fn bound(&self) -> Option<(&'static str, f64)> {
+        let ends = self.interval_95;
+        match self.undetermined? {
+            Undetermined::Longer => Some(("longer than", ends.map_or(self.value, |of| of.low))),
+            Undetermined::Shorter => Some(("shorter than", ends.map_or(self.value, |of| of.high))),
+            Undetermined::Unknown => None,
+        }
+    }
 }
 
 /// What an estimator reads in simulated flights of the same drones and the same length.
@@ -316,6 +402,12 @@ pub struct Variant {
     /// Time of maximum likelihood, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub likelihood_tau_s: Option<f64>,
+    /// The length ran into the end of the searched range.
+    #[serde(default)]
+    pub likelihood_lambda_at_end: bool,
+    /// The time ran into the end of the searched range.
+    #[serde(default)]
+    pub likelihood_tau_at_end: bool,
 }
 
 /// Simulated flights: fields of the model of maximum likelihood at the same places and seconds, with
@@ -333,8 +425,8 @@ pub struct Simulated {
 /// Horizontal wind that the drones lean against.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TiltWind {
-    /// Wind at which the drag of the vehicle is its weight, m/s; absent: its drag is not known, and
-    /// only leans are given.
+    /// Wind at which the drag of the vehicle's box is its weight, m/s; absent: the wind follows from
+    /// its rotors' drag as well, or its drag is not known and only leans are given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drag_speed_mps: Option<f64>,
     /// Mean speed over the fleet, m/s, with the standard error from the spread of the drones.
@@ -412,4 +504,29 @@ pub struct Reached {
     pub deviation_mps: f64,
     /// Length of the average, s.
     pub averaging_s: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(value: f64, fit_se: Option<f64>, [low, high]: [f64; 2]) -> Scale {
+        let interval_95 = Some(Interval { low, high });
+        Scale { value, fit_se, interval_95, ..Scale::default() }.judged()
+    }
+
+    #[test]
+    fn a_scale_without_meaning_is_told_from_a_vague_one() {
+        let bound = |scale: Scale| (scale.undetermined, scale.bound());
+        assert_eq!(bound(judged(74.4, Some(2.4), [41.8, 136.0])), (None, None));
+        assert_eq!(bound(judged(74.4, None, [20.0, 1_900.0])), (None, None), "vague");
+        let long = bound(judged(1_495.0, None, [1_495.0, 1_276_479.0]));
+        assert_eq!(long, (Some(Undetermined::Longer), Some(("longer than", 1_495.0))));
+        let short = bound(judged(2.0, None, [1e-9, 3.0]));
+        assert_eq!(short, (Some(Undetermined::Shorter), Some(("shorter than", 3.0))));
+        let nothing = bound(judged(60.3, None, [1.2, 3_631.0]));
+        assert_eq!(nothing, (Some(Undetermined::Unknown), None));
+        let no_fit = bound(judged(0.74, Some(168.0), [0.5, 2.0]));
+        assert_eq!(no_fit, (Some(Undetermined::Unknown), None));
+    }
 }

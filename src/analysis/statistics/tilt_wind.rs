@@ -2,6 +2,7 @@
 
 use super::result::{DroneWind, TiltWind};
 use super::words::digits;
+use crate::analysis::lean_table::LeanTable;
 use crate::base::estimate::Estimate;
 
 /// A lean that is no wind: trim of the accelerometers, a centre of mass off the middle, degrees.
@@ -24,20 +25,65 @@ pub struct MeanLean {
     pub heading_deg: Option<f64>,
 }
 
-impl MeanLean {
-    /// The wind that it leans against along its own axes, m/s: the drag on each pair of faces grows
-    /// with the square of the flow onto them. Without drag, the lean itself.
-    fn flow(&self, drag_speed_mps: Option<f64>) -> [f64; 2] {
-        self.forward_right.map(|tangent| match drag_speed_mps {
-            Some(drag) => drag * tangent.abs().min(STEEPEST).sqrt().copysign(tangent),
-            None => tangent,
-        })
+/// What tells the wind from a lean.
+#[derive(Clone, Copy, Debug)]
+pub enum LeanDrag<'a> {
+    /// The drag on each pair of faces grows with the square of the flow onto them: wind onto one side,
+    /// m/s, at which the vehicle would lean by 45 degrees.
+    Faces(f64),
+    /// The vehicle's own table of leans.
+    Table(&'a LeanTable),
+    /// Nothing: the drag is not known.
+    Unknown,
+}
+
+impl LeanDrag<'_> {
+    /// The wind of a lean along one axis, m/s.
+    fn speed_mps(self, tangent: f64) -> Option<f64> {
+        match self {
+            Self::Faces(drag) => Some(drag * tangent.min(STEEPEST).sqrt()),
+            Self::Table(table) => table.wind_at(tangent.atan().to_degrees()),
+            Self::Unknown => None,
+        }
+    }
+
+    /// In words, what the speed rests on.
+    fn words(self) -> &'static str {
+        match self {
+            Self::Table(_) => {
+                "the drag of rotors and body in the vehicle's own physics, which is known to some 8 % (the \
+                 ± is the spread of the drones alone)"
+            }
+            _ => "the vehicle's drag",
+        }
     }
 }
 
-/// The wind on drones that hold their place; `drag_speed_mps` is the wind onto one of its sides at
-/// which the vehicle would lean by 45 degrees.
-pub fn tilt_wind(leans: &[MeanLean], drag_speed_mps: Option<f64>) -> Option<TiltWind> {
+impl MeanLean {
+    /// The wind that it leans against along its own axes, m/s; without drag, the lean itself.
+    fn flow(&self, drag: LeanDrag<'_>) -> [f64; 2] {
+        let [forward, right] = self.forward_right;
+        let size = forward.hypot(right);
+        match drag {
+            LeanDrag::Faces(_) => self
+                .forward_right
+                .map(|tangent| drag.speed_mps(tangent.abs()).unwrap_or(0.0).copysign(tangent)),
+            // A rotor's drag points along the wind, whichever side the wind comes from.
+            LeanDrag::Table(_) if size > 0.0 => {
+                let speed = drag.speed_mps(size).unwrap_or(f64::NAN);
+                [speed * forward / size, speed * right / size]
+            }
+            LeanDrag::Table(_) | LeanDrag::Unknown => self.forward_right,
+        }
+    }
+}
+
+/// The wind on drones that hold their place. A lean beyond the end of a vehicle's table is told as a
+/// lean alone.
+pub fn tilt_wind(leans: &[MeanLean], drag: LeanDrag<'_>) -> Option<TiltWind> {
+    let steep = leans.iter().any(|lean| lean.flow(drag).iter().any(|flow| flow.is_nan()));
+    let drag = if steep { LeanDrag::Unknown } else { drag };
+    let known_speed = !matches!(drag, LeanDrag::Unknown);
     let count = leans.len() as f64;
     if leans.is_empty() {
         return None;
@@ -46,14 +92,14 @@ pub fn tilt_wind(leans: &[MeanLean], drag_speed_mps: Option<f64>) -> Option<Tilt
     let drones: Vec<DroneWind> = leans
         .iter()
         .map(|lean| {
-            let flow = lean.flow(drag_speed_mps);
+            let flow = lean.flow(drag);
             let bearing = flow[1].atan2(flow[0]).to_degrees();
             DroneWind {
                 slot: lean.slot,
                 name: lean.name.clone(),
                 lean_deg: lean.lean_deg,
                 from_deg: lean.heading_deg.map(|heading| (heading + bearing).rem_euclid(360.0)),
-                speed_mps: drag_speed_mps.map(|_| size(flow)),
+                speed_mps: known_speed.then(|| size(flow)),
             }
         })
         .collect();
@@ -62,8 +108,8 @@ pub fn tilt_wind(leans: &[MeanLean], drag_speed_mps: Option<f64>) -> Option<Tilt
     for (lean, drone) in leans.iter().zip(&drones) {
         if let Some(from) = drone.from_deg {
             let (sin, cos) = from.to_radians().sin_cos();
-            north += size(lean.flow(drag_speed_mps)) * cos;
-            east += size(lean.flow(drag_speed_mps)) * sin;
+            north += size(lean.flow(drag)) * cos;
+            east += size(lean.flow(drag)) * sin;
             known += 1.0;
         }
     }
@@ -73,7 +119,7 @@ pub fn tilt_wind(leans: &[MeanLean], drag_speed_mps: Option<f64>) -> Option<Tilt
     let mean = speeds.iter().sum::<f64>() / count;
     let variance =
         speeds.iter().map(|speed| (speed - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    let speed_mps = drag_speed_mps.map(|_| {
+    let speed_mps = known_speed.then(|| {
         let speed = if known > 0.0 { north.hypot(east) / known } else { mean };
         Estimate::new(speed, (variance / count).sqrt())
     });
@@ -81,14 +127,12 @@ pub fn tilt_wind(leans: &[MeanLean], drag_speed_mps: Option<f64>) -> Option<Tilt
         || " from a direction that is not known (the logs have no heading)".to_owned(),
         |from| format!(" from {from:.0} degrees"),
     );
-    let words = match (
-        speed_mps,
-        drag_speed_mps.map(|drag| drag * TRIM_DEG.to_radians().tan().sqrt()),
-    ) {
+    let words = match (speed_mps, drag.speed_mps(TRIM_DEG.to_radians().tan())) {
         (Some(speed), Some(trim)) => format!(
-            "wind {speed} m/s{from}, from a mean lean of {} degrees and the vehicle's drag (a trim error \
-             of {TRIM_DEG} degrees alone would read as {} m/s in calm air)",
+            "wind {speed} m/s{from}, from a mean lean of {} degrees and {} (a trim error of \
+             {TRIM_DEG} degrees alone would read as {} m/s in calm air)",
             digits(lean_deg),
+            drag.words(),
             digits(trim)
         ),
         _ => format!(
@@ -96,6 +140,10 @@ pub fn tilt_wind(leans: &[MeanLean], drag_speed_mps: Option<f64>) -> Option<Tilt
              vehicle's drag is not known",
             digits(lean_deg)
         ),
+    };
+    let drag_speed_mps = match drag {
+        LeanDrag::Faces(speed_mps) => Some(speed_mps),
+        _ => None,
     };
     Some(TiltWind { drag_speed_mps, speed_mps, from_deg, lean_deg, drones, words })
 }
@@ -120,7 +168,8 @@ mod tests {
     fn a_lean_with_known_drag_is_a_wind() {
         // AirSim's stock quad leans by 3.92 degrees in 10 m/s.
         let forward = 3.92_f64.to_radians().tan();
-        let wind = tilt_wind(&fleet([forward, 0.0], |_| Some(350.0)), Some(38.2)).unwrap();
+        let wind =
+            tilt_wind(&fleet([forward, 0.0], |_| Some(350.0)), LeanDrag::Faces(38.2)).unwrap();
         let speed = wind.speed_mps.unwrap();
         assert!((speed.value - 10.0).abs() < 0.05 && speed.se < 1e-9, "{speed}");
         assert!((wind.from_deg.unwrap() - 350.0).abs() < 1e-9);
@@ -131,7 +180,7 @@ mod tests {
     fn wind_on_a_corner_is_the_wind_on_its_sides() {
         let tangent = |mps: f64| (mps / 38.2_f64).powi(2);
         let corner = fleet([tangent(8.0), -tangent(6.0)], |_| Some(20.0));
-        let wind = tilt_wind(&corner, Some(38.2)).unwrap();
+        let wind = tilt_wind(&corner, LeanDrag::Faces(38.2)).unwrap();
         assert!((wind.speed_mps.unwrap().value - 10.0).abs() < 1e-9);
         assert!((wind.from_deg.unwrap() - (360.0 + 20.0 - 36.8699)).abs() < 1e-3);
     }
@@ -139,16 +188,34 @@ mod tests {
     #[test]
     fn without_drag_only_the_lean_is_told() {
         let forward = 2_f64.to_radians().tan();
-        let wind = tilt_wind(&fleet([forward, 0.0], |_| None), None).unwrap();
+        let wind = tilt_wind(&fleet([forward, 0.0], |_| None), LeanDrag::Unknown).unwrap();
         assert_eq!((wind.speed_mps, wind.from_deg), (None, None));
         insta::assert_snapshot!(wind.words);
-        assert!(tilt_wind(&[], None).is_none());
+        assert!(tilt_wind(&[], LeanDrag::Unknown).is_none());
+    }
+
+    #[test]
+    fn a_vehicles_own_table_tells_the_wind_and_its_end_is_no_wind() {
+        let table = LeanTable {
+            lean_step_deg: 1.0,
+            wind_mps: vec![0.0, 1.5, 3.0, 4.4],
+            ..LeanTable::default()
+        };
+        // As much of the lean to each side as of the wind.
+        let of_lean = |deg: f64| [deg.to_radians().tan() * 0.6, deg.to_radians().tan() * 0.8];
+        let leaning = fleet(of_lean(2.0), |_| Some(270.0));
+        let wind = tilt_wind(&leaning, LeanDrag::Table(&table)).unwrap();
+        assert!((wind.speed_mps.unwrap().value - 3.0).abs() < 1e-9, "{:?}", wind.speed_mps);
+        assert!((wind.from_deg.unwrap() - (270.0 + 53.1301)).abs() < 1e-3);
+        assert!(wind.words.contains("the drag of rotors and body"), "{}", wind.words);
+        let steep = tilt_wind(&fleet(of_lean(9.0), |_| None), LeanDrag::Table(&table)).unwrap();
+        assert_eq!(steep.speed_mps, None, "beyond the table");
     }
 
     #[test]
     fn leans_to_all_sides_are_no_wind() {
         let around = fleet([0.02, 0.0], |slot| Some(f64::from(slot) * 90.0));
-        let wind = tilt_wind(&around, Some(38.2)).unwrap();
+        let wind = tilt_wind(&around, LeanDrag::Faces(38.2)).unwrap();
         assert!(wind.speed_mps.unwrap().value < 1e-3, "{:?}", wind.speed_mps);
     }
 }

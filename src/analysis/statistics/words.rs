@@ -1,7 +1,7 @@
 //! The sentences of the statistics.
 
 use super::likelihood::Fitted;
-use super::result::{FieldRecord, FieldStatistics, Scale};
+use super::result::{DistanceCorrelation, FieldRecord, FieldStatistics, Scale};
 
 /// A half record whose t0 is below this share of the whole's says that the length makes t0.
 const HALVES: f64 = 0.65;
@@ -19,34 +19,55 @@ pub(super) fn simulated(flights: usize, model: &Fitted, record: &FieldRecord) ->
         record.drones,
         record.length_s,
         model.sd_mps,
-        digits(model.lambda_m),
-        digits(model.tau_s),
+        end(model.lambda_m, model.length_at_end),
+        end(model.tau_s, model.time_at_end),
         model.noise_mps
     )
+}
+
+/// A scale, or that it is only the end of the range that was searched.
+fn end(value: f64, at_end: bool) -> String {
+    let text = digits(value);
+    if at_end { format!("{text} (the end of the searched range)") } else { text }
 }
 
 /// Fills in all sentences that follow from the numbers.
 pub(super) fn fill(statistics: &mut FieldStatistics) {
     let record = statistics.record.clone();
+    // What is said of air with scales that are not determined is said of no air.
+    let model = statistics.likelihood.as_ref();
+    let length_known = model.is_none_or(|model| model.lambda_m.undetermined.is_none());
+    let time_known = model.is_none_or(|model| model.tau_s.undetermined.is_none());
+    let determined = |one: &Option<DistanceCorrelation>| {
+        let scale = one.as_ref().and_then(|one| one.lambda_m.as_ref());
+        scale.is_some_and(|scale| scale.undetermined.is_none())
+    };
     if let Some(space) = &mut statistics.space {
-        space.words = space.all.lambda_m.as_ref().map_or_else(String::new, |scale| {
-            bias(
-                scale,
-                "m",
-                &format!(
-                    "a true length of {{}} m reads as {{}} m with this grid of {} m \
+        let both = determined(&space.along_x) && determined(&space.along_y);
+        space.words = space.all.lambda_m.as_ref().filter(|_| length_known).map_or_else(
+            String::new,
+            |scale| {
+                bias(
+                    scale,
+                    "m",
+                    &format!(
+                        "a true length of {{}} m reads as {{}} m with this grid of {} m \
                 and this record of {} s",
-                    digits(record.extent_m),
-                    digits(record.length_s)
-                ),
-            )
-        });
+                        digits(record.extent_m),
+                        digits(record.length_s)
+                    ),
+                )
+            },
+        );
         if let Some(anisotropy) = &mut space.anisotropy {
             let times = format!(
                 "the length along y is {:.2} times that along x (the paper: 2.08)",
                 anisotropy.ratio
             );
             anisotropy.words = match anisotropy.p_value {
+                _ if !both => {
+                    "the lengths along x and y are not both determined, and not compared".to_owned()
+                }
                 Some(p) if p < SIGNIFICANT => format!(
                     "{times}; only {} of flights in isotropic air differ as much: significant",
                     percent(p)
@@ -61,7 +82,7 @@ pub(super) fn fill(statistics: &mut FieldStatistics) {
     }
     if let Some(time) = &mut statistics.time {
         let tau = statistics.likelihood.as_ref().map(|model| model.tau_s.value);
-        if let Some((line, tau)) = time.line.as_ref().zip(tau) {
+        if let Some((line, tau)) = time.line.as_ref().zip(tau).filter(|_| time_known) {
             time.words = line.t0_s.reads.map_or_else(String::new, |reads| format!(
                 "air that forgets in {} s (1/e) gives a t0 of {} s in the median of records of {} s, \
                  {} to {} s in 90 of 100",

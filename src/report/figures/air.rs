@@ -81,7 +81,9 @@ pub(in crate::report) fn figure(
         instants.iter().flat_map(|i| [i.mean - i.sd, i.mean + i.sd, i.truth.unwrap_or(i.mean)]);
     let time = Axis::time(instants.iter().map(|instant| instant.time_s));
     let y = Axis::around("updraft W* (m/s, up positive)", reach.chain([0.0]), 0.1);
-    let mut panel = Panel::new("(a) Fleet mean over time", time, y);
+    let single = map.drones.len() == 1;
+    let name = if single { "(a) Over time" } else { "(a) Fleet mean over time" };
+    let mut panel = Panel::new(name, time, y);
     panel.legend_at(LegendPosition::InsideTopRight);
     panel.clear_legend();
     let band: Vec<(f64, f64, f64)> =
@@ -89,23 +91,41 @@ pub(in crate::report) fn figure(
     panel.band(&band, BLUE);
     let line: Vec<(f64, f64)> = instants.iter().map(|i| (i.time_s, i.mean)).collect();
     panel.line(&line, BLUE, 1.8, "");
-    panel.entry("mean of the drones", BLUE, LegendShape::Line, "");
+    panel.entry(
+        if single { "estimate" } else { "mean of the drones" },
+        BLUE,
+        LegendShape::Line,
+        "",
+    );
     let truth: Vec<(f64, f64)> =
         instants.iter().map(|i| (i.time_s, i.truth.unwrap_or(f64::NAN))).collect();
     let known = truth.iter().any(|point| point.1.is_finite());
     if known {
         panel.line(&truth, VERMILLION, 1.4, "6 4");
-        panel.entry("true mean", VERMILLION, LegendShape::Line, "6 4");
+        panel.entry(
+            if single { "truth" } else { "true mean" },
+            VERMILLION,
+            LegendShape::Line,
+            "6 4",
+        );
     }
     let side = truth_panel(map);
     let mut sheet = Sheet::new(1040.0, 380.0);
     let wide = if side.is_some() { 620.0 } else { 1040.0 };
     sheet.place(panel.draw(wide, 380.0), 0.0, 0.0);
-    let mut caption = "(a) The mean of all drones' running 10 s estimates; the band is one \
-                       standard deviation between drones."
-        .to_owned();
+    let mut caption = if single {
+        "(a) Running 10 s estimates.".to_owned()
+    } else {
+        "(a) The mean of all drones' running 10 s estimates; the band is one standard deviation \
+         between drones."
+            .to_owned()
+    };
     if known {
-        caption.push_str(" Dashed: the true mean in the simulated air.");
+        caption.push_str(if single {
+            " Dashed: the true air beside it."
+        } else {
+            " Dashed: the mean of the true air at the same drones."
+        });
     }
     if let Some(side) = side {
         sheet.place(side.draw(410.0, 380.0), 630.0, 0.0);

@@ -10,7 +10,7 @@ use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
 use crate::report::colour::{BLUE, INK, MUTED, VERMILLION};
-use crate::report::scales::{interval, paper_form};
+use crate::report::scales::{interval, not_determined, paper_form};
 use crate::report::shapes::Shape;
 use crate::report::sheet::Sheet;
 use crate::report::text::{clean, estimate, usable};
@@ -61,12 +61,13 @@ pub(in crate::report) fn figure(
         sheet.place(panel.draw(PANEL[0], PANEL[1]), column * 522.0, row * PANEL[1]);
     }
     let name = format!("fig6-{key}");
-    let title = format!("Correlations of the vertical air speed, {}", clean(&flight.name));
+    let title =
+        format!("Correlations of the vertical air speed, {} (paper's Fig. 6)", clean(&flight.name));
     Some(Figure {
         svg: sheet.svg(&name, &title),
         name,
         title,
-        caption: "The paper's Fig. 6. (a), (c), (d) Correlation of every pair of drones, gathered by \
+        caption: "(a), (c), (d) Correlation of every pair of drones, gathered by \
                   nominal distance: the shape is their distribution, lines are the lowest, the \
                   highest and (wide) the median, the short dark bar is the mean; dashed red: exp(−r/λ) fitted \
                   to the medians; dotted grey: the paper's. (b) Autocorrelation, mean of the drones \
@@ -90,13 +91,9 @@ fn correlation_axis(statistics: &FieldStatistics) -> Axis {
         time.mean.iter().zip(&time.sd_between_drones).flat_map(|(c, sd)| [c - sd, c + sd])
     });
     let low = of_pairs.flatten().chain(of_time).filter(|c| usable(*c)).fold(0.0, f64::min);
-    let min = if low < -0.5 {
-        -1.0
-    } else if low < -0.02 {
-        -0.5
-    } else {
-        0.0
-    };
+    // Always with room below zero, where the legends are: near drones correlate, so that nothing is
+    // drawn there.
+    let min = if low < -0.5 { -1.0 } else { -0.5 };
     let step = if min < -0.5 { 0.5 } else { 0.25 };
     Axis { label: "correlation".to_owned(), min, max: 1.0, step }
 }
@@ -109,11 +106,7 @@ fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, symbol: &str)
     let last = of.classes.iter().map(|class| class.distance_m).filter(|r| usable(*r));
     x.max = x.max.min(1.06 * last.fold(1.0, f64::max));
     let mut panel = Panel::new(title, x.clone(), y.clone());
-    panel.legend_at(if y.min < -0.4 {
-        LegendPosition::InsideBottomLeft
-    } else {
-        LegendPosition::InsideTopRight
-    });
+    panel.legend_at(LegendPosition::InsideBottomLeft);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 0.8, "");
     if of.classes.len() > MOST_VIOLINS {
         band(&mut panel, &of.classes);
@@ -139,9 +132,12 @@ fn distance_panel(title: &str, of: &DistanceCorrelation, y: &Axis, symbol: &str)
 
 /// The legend of a scale: the paper's form, the honest interval, the paper's value.
 fn scale_entries(panel: &mut Panel, symbol: &str, scale: &Scale, unit: &str) {
-    let text = format!("{symbol} = {} {unit} (curve fit)", paper_form(scale));
+    let text = match not_determined(scale, unit) {
+        Some(words) => format!("{symbol} {words}"),
+        None => format!("{symbol} = {} {unit} (curve fit)", paper_form(scale)),
+    };
     panel.entry(&text, VERMILLION, LegendShape::Line, "6 4");
-    if let Some(honest) = scale.interval_95 {
+    if let Some(honest) = scale.interval_95.filter(|_| scale.undetermined.is_none()) {
         let text = format!("95 %: {} {unit}", interval(honest));
         panel.entry(&text, "#ffffff", LegendShape::Line, "");
     }

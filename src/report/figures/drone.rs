@@ -88,10 +88,14 @@ impl Axes {
                 traces().flat_map(|trace| trace.height_m.iter().copied()),
                 10.0,
             ),
-            law_velocity: Axis::around(VELOCITY_LABEL, marks().map(|mark| mark.x), 1.0),
+            law_velocity: Axis::around(
+                VELOCITY_LABEL,
+                marks().flat_map(|mark| [mark.x - mark.x_error, mark.x + mark.x_error]),
+                1.0,
+            ),
             law_pulse: Axis::around(
                 &effort_label(flight.indicator),
-                marks().map(|mark| mark.y),
+                marks().flat_map(|mark| [mark.y - mark.y_error, mark.y + mark.y_error]),
                 10.0,
             ),
             velocity_limit,
@@ -145,7 +149,7 @@ pub(in crate::report) fn figure(
     bars(&mut over, axes, offset.is_some());
     sheet.lay_over(over);
     let name = name(key, index, drone);
-    let title = format!("Calibration of {}", clean(&drone.name));
+    let title = format!("Calibration of {} (paper's Fig. 3)", clean(&drone.name));
     let offset_words = if offset.is_some() {
         "(c) The slow offset that is subtracted, over time and height, from the hovers (circles); \
          hatched: not between hovers, the nearest hover's stands in; the line is the flight."
@@ -157,7 +161,7 @@ pub(in crate::report) fn figure(
         name,
         title,
         caption: format!(
-            "The paper's Fig. 3. (a) Vertical velocity and (b) tilt-corrected \
+            "(a) Vertical velocity and (b) tilt-corrected \
              rotor effort without the offset, u* (green). Bars are the windows, over the time that each takes, \
              coloured by value; windows that were rejected are grey. {offset_words} (d) The windows \
              as points, coloured by time, error bars one standard deviation of the samples, with \

@@ -83,7 +83,8 @@ pub(in crate::report) fn figure(
     colour_bar(&mut drawing, bar, frames.limit_mps, "W (m/s, up positive)");
     scale_bar(&mut drawing, &Projection::new(&places, [0.0; 2], [PANEL, PANEL], 0.3)?, height);
     let name = format!("fig5-{key}");
-    let title = format!("Evolution of the vertical air speed, {}", clean(&flight.name));
+    let title =
+        format!("Evolution of the vertical air speed, {} (paper's Fig. 5)", clean(&flight.name));
     let truth = if frames.truth_known {
         " Below each row: the true air at the same drones and times."
     } else {
@@ -95,7 +96,7 @@ pub(in crate::report) fn figure(
         name,
         title,
         caption: format!(
-            "The paper's Fig. 5: the grid from above (forward is up), at the show times above the \
+            "The grid from above (forward is up), at the show times above the \
              panels: {} s apart in the first row, {} s in the second, which goes on from the third \
              panel of the first. Running 10 s estimates, linear between the drones (Delaunay \
              triangles), nothing outside of their hull. One scale for all panels, white is still \

@@ -11,8 +11,11 @@ use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
 use crate::report::colour::{BLUE, INK, MUTED, VERMILLION, sequential};
 use crate::report::law;
+use crate::report::page::capitalised;
 use crate::report::sheet::Sheet;
-use crate::report::text::{clean, count, effort_label, parameter, shortened, signed, usable};
+use crate::report::text::{
+    clean, count, effort_label, effort_name, parameter, shortened, signed, usable,
+};
 
 /// Label of the pulse-width axis.
 pub(in crate::report) const PULSE_LABEL: &str = "tilt-corrected pulse width uφ (µs)";
@@ -38,7 +41,9 @@ pub(in crate::report) fn figure(analysis: &Analysis) -> Option<Figure> {
     }
     let v = Axis::around(VELOCITY_LABEL, windows().map(|window| law::mark(window).x), 1.0);
     let effort = flights.first().map_or_else(String::new, |flight| effort_label(flight.indicator));
-    let u = Axis::around(&effort, windows().map(|window| law::mark(window).y), 10.0);
+    // With the error bars: none is cut at the frame.
+    let reach = windows().map(law::mark).flat_map(|m| [m.y - m.y_error, m.y + m.y_error]);
+    let u = Axis::around(&effort, reach, 10.0);
     let mut panel = Panel::new("(a) Windows and fitted laws", v.clone(), u);
 
     let colours = flight_colours(&flights);
@@ -62,21 +67,24 @@ pub(in crate::report) fn figure(analysis: &Analysis) -> Option<Figure> {
     }
     let drones: usize = flights.iter().map(|flight| flight.drones.len()).sum();
     let colouring = if flights.len() == 1 {
-        "The solid line is the signed-quadratic law, the dashed line the linear law, both fitted to \
-         the flock."
-            .to_owned()
+        format!(
+            "The solid line is the signed-quadratic law, the dashed line the linear law, both fitted \
+             to {}.",
+            if drones == 1 { "its windows" } else { "the flock" }
+        )
     } else {
         "Colour tells the flights apart; dashed lines are the signed-quadratic law of each."
             .to_owned()
     };
     let name = "fig2-laws".to_owned();
-    let title = "Rotor pulse width against vertical velocity".to_owned();
+    let effort = flights.first().map_or("pulse width", |flight| effort_name(flight.indicator));
+    let title = format!("{} against vertical velocity", capitalised(effort));
     Some(Figure {
         svg: sheet.svg(&name, &title),
         name,
         title,
         caption: format!(
-            "(a) Each point is one of {} of {}: the median of the pulse width against the median \
+            "(a) Each point is one of {} of {}: the median of the {effort} against the median \
              of the vertical velocity; bars are one standard deviation of the samples. {colouring} \
              {side_caption}",
             count(total, "moving window"),
@@ -191,6 +199,10 @@ fn by_drone(flights: &[&FlightAnalysis]) -> (Option<Panel>, String) {
     let [flight] = flights else {
         return (None, String::new());
     };
+    if law::vertex_mps(flight).is_some() {
+        // W* is the vertex of a parabola there, and no updraft.
+        return (None, String::new());
+    }
     let marks: Vec<Mark> = updrafts(flight)
         .map(|(index, slot, w)| Mark {
             x: slot.map_or(index as f64 + 1.0, f64::from),

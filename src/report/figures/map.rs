@@ -57,6 +57,9 @@ pub(in crate::report) fn mean_map(
     axes(&mut drawing, &projection);
     if truth_known {
         let aside = Projection::new(&positions, [100.0 + width, top], room, 0.5)?;
+        for (slot, home) in &empty {
+            empty_cell(&mut drawing, *slot, aside.cell(*home), with_text);
+        }
         for (drone, truth) in map.drones.iter().zip(&truths) {
             if let (Some(place), Some(truth)) = (position(drone), truth) {
                 true_cell(&mut drawing, drone, *truth, aside.cell(place), limit, decimals);

@@ -139,7 +139,8 @@ fn still(study: &StudyResult) -> Option<Figure> {
     sheet.cover([70.0, 33.0, 350.0, 242.0]);
     sheet.place(inset(&coloured).draw(350.0, 250.0), 68.0, 24.0);
     let name = FIG2.to_owned();
-    let title = "Pulse width against vertical velocity in still air, by updraft".to_owned();
+    let title = "Pulse width against vertical velocity in still air, by updraft (paper's Fig. 2)"
+        .to_owned();
     let rho = study
         .paper_way
         .conditions
@@ -152,7 +153,7 @@ fn still(study: &StudyResult) -> Option<Figure> {
         name,
         title,
         caption: format!(
-            "The paper's Fig. 2. Each point is the median of one moving window; bars are one \
+            "Each point is the median of one moving window; bars are one \
              standard deviation of the samples; colour is the true updraft. Dotted lines are the \
              signed-quadratic law with A and u₀ held and W* fitted to each flight. {} \
              (crosses). Inset: the fitted updraft W* (horizontal) and the true one W (vertical); \
@@ -230,7 +231,7 @@ fn winds(study: &StudyResult) -> Option<Figure> {
         name,
         title,
         caption: format!(
-            "Points, colours, lines and crosses as in Fig. 2, with A and u₀ still those of still \
+            "Points, colours, lines and crosses as in the figure for still air, with A and u₀ still those of still \
              air.{}",
             if left_out > 0 {
                 format!(" {} not drawn.", count(left_out, "wind"))

@@ -191,13 +191,13 @@ impl AirSpec {
     }
 
     /// The value of a key, if it was given.
-    fn given(&self, name: &str) -> Option<f64> {
+    pub fn given(&self, name: &str) -> Option<f64> {
         let index = self.kind.keys.iter().position(|key| key.name == name)?;
         *self.values.get(index)?
     }
 
     /// The value of a key, or its default; zero for keys that have neither.
-    fn value(&self, name: &str) -> f64 {
+    pub fn value(&self, name: &str) -> f64 {
         let default = match self.kind.key(name).map(|key| key.default) {
             Some(Preset::Value(value)) => value,
             _ => 0.0,
