@@ -9,6 +9,7 @@ use super::account::{self, Account};
 use super::aware::{Aware, Measured};
 use super::calibrate::{self, PaperTable};
 use super::caution::{SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
+use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
 use super::input::{FlightInput, LogInput, TruthSeries};
@@ -161,6 +162,7 @@ pub fn analyze_flight(
         leaning: input.leaning,
         lean_table: input.lean_table,
         has_battery: input.sag.is_some(),
+        unknown_share: 0.0,
     };
     let aware = reference
         .filter(|_| options.air_aware && planned_purpose != Some(Purpose::Calibration))
@@ -273,6 +275,9 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
     let from_physics = input.lean_table.is_some() && shared.aware.is_some();
     warnings.extend(map.as_ref().and_then(|map| wind_caution(map, from_physics)));
+    let calibration = shared.aware.as_ref().zip(shared.reference).map(|(_, found)| found);
+    let battery = calibration.zip(map.as_ref()).filter(|_| input.sag.is_some());
+    warnings.extend(battery.and_then(|(found, map)| battery_caution(map, found)));
     let moved = map.as_ref().is_some_and(UpdraftMap::is_scan);
     if moved {
         warnings.push(SCAN_CAUTION.to_owned());
