@@ -98,8 +98,7 @@ impl<'a> Aware<'a> {
         let battery = sag.and_then(|sag| battery::correction(reference, sag));
         let unknown_share =
             battery.map_or(0.0, |battery| battery::unknown_share(reference, battery));
-        let corrections =
-            Corrections { has_battery: sag.is_some(), unknown_share, ..corrections };
+        let corrections = Corrections { has_battery: sag.is_some(), unknown_share, ..corrections };
         let slopes: Vec<f64> = reference
             .drones
             .iter()

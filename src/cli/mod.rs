@@ -23,6 +23,7 @@ mod leaning;
 mod load;
 mod logs;
 mod mission_args;
+mod outcome;
 mod physics;
 mod plan;
 mod progress;
@@ -33,6 +34,7 @@ mod simulate;
 mod sweep;
 mod timetable;
 pub mod tools;
+mod twice;
 mod words;
 
 use std::io::Write as _;
