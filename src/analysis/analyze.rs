@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::account::{self, Account};
 use super::aware::{Aware, Measured};
 use super::calibrate::{self, PaperTable};
-use super::caution::{SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
+use super::caution::{PLAIN_CAUTION, SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
 use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
@@ -306,6 +306,9 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
     let calibration = shared.aware.as_ref().zip(shared.reference).map(|(_, found)| found);
     let battery = calibration.zip(map.as_ref()).filter(|_| input.sag.is_some());
     warnings.extend(battery.and_then(|(found, map)| battery_caution(map, found)));
+    if map.is_some() && shared.aware.is_none() {
+        warnings.push(PLAIN_CAUTION.to_owned());
+    }
     let moved = map.as_ref().is_some_and(UpdraftMap::is_scan);
     if moved {
         warnings.push(SCAN_CAUTION.to_owned());
