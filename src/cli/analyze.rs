@@ -14,7 +14,7 @@ use super::load::{has_extension, load_shows};
 use super::outcome::{nothing_found, problems};
 use super::progress::Progress;
 use super::provenance::provenance;
-use super::{twice, words};
+use super::{held, twice, words};
 use crate::analysis::battery::Sag;
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
@@ -297,6 +297,14 @@ fn finish(
     for note in work.flights.iter().flat_map(|flight| &flight.notes) {
         context.warn(note);
     }
+    let resolved = options.resolve();
+    let doubts = hold
+        .zip(reference.as_ref())
+        .and_then(|(path, reference)| held::doubts(path, reference, resolved.indicator, work));
+    // Tables and quiet runs say it with the other warnings.
+    if let Some(doubts) = doubts.as_ref().filter(|_| context.json && !context.quiet) {
+        context.warn(doubts);
+    }
     let inputs: Vec<_> = work
         .flights
         .iter()
@@ -323,7 +331,7 @@ fn finish(
     // Hashing fills the pauses in which the analysis keeps one processor busy.
     let (analysis, provenance) = rayon::join(
         || {
-            analyze(&work.title, &inputs, &options.resolve(), reference.as_ref(), &|_, _| {
+            analyze(&work.title, &inputs, &resolved, reference.as_ref(), &|_, _| {
                 progress.advance();
             })
         },
@@ -332,6 +340,7 @@ fn finish(
     let mut analysis = analysis.map_err(|error| CommandError::Nothing(error.to_string()))?;
     progress.finish();
     analysis.warnings.extend(work.absent.iter().cloned());
+    analysis.warnings.extend(doubts);
     context.check_stop()?;
     if !context.json {
         context.print(&terminal_summary(&analysis, WIDTH, context.color))?;
@@ -356,8 +365,8 @@ fn finish(
             analysis: &analysis,
         })?;
     }
-    // Where no table is printed, what is wrong would go unsaid.
-    if context.quiet && !nothing {
+    // Where neither tables nor the object are printed, what is wrong would go unsaid.
+    if context.quiet && !context.json && !nothing {
         problems(&analysis).iter().for_each(|problem| context.warn(problem));
     }
     if let Some(page) = &page {

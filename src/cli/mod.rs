@@ -17,6 +17,7 @@ mod fly_output;
 mod found;
 mod gap;
 mod hashes;
+mod held;
 mod hidden;
 mod inspect;
 mod leaning;
