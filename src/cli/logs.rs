@@ -266,10 +266,11 @@ fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
 fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     has_slots(&plan, args.slots.as_ref())?;
-    if args.connect.connect.is_empty() && !args.dry_run && simulated::all_home(&folder, &plan)? {
+    let asks_drones = args.dry_run || args.again || !args.connect.is_default();
+    if !asks_drones && simulated::all_home(&folder, &plan)? {
         context.say(&format!(
-            "The {} of {} were simulated and are home: there are no drones to ask (`updraft logs \
-             verify` checks them; real drones: --connect)",
+            "The {} of {} were simulated and are home: no drone was asked (`updraft logs verify` \
+             checks them; --again, or another --connect, asks drones)",
             words::count(plan.slots.len(), "log"),
             plan.name
         ));

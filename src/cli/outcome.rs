@@ -46,16 +46,25 @@ fn lost(flight: &FlightAnalysis) -> Vec<String> {
 /// those who do not see the tables.
 pub(super) fn nothing_found(analysis: &Analysis, reasons: bool) -> CommandError {
     let has = |purpose| analysis.flights.iter().any(|flight| flight.purpose == purpose);
-    let remedy = if !has(Purpose::Calibration) {
-        "a map of the air needs laws: analyse the calibration flight together with this one \
-         (updraft analyze CALIBRATION HOVER), or take the laws of another analysis of these drones \
-         (--hold analysis.json)"
-    } else if has(Purpose::Measurement) {
-        "neither the calibration nor the measurement can be used: put right what is named, or fetch \
-         the logs again (updraft logs pull)"
-    } else {
-        "the calibration cannot be used: put right what is named, fetch the logs again (updraft logs \
-         pull), or give the plan that they flew (--plan)"
+    let remedy = match (has(Purpose::Calibration), has(Purpose::Measurement)) {
+        // A flight that failed is a warning of the whole.
+        (false, _) if analysis.warnings.is_empty() => {
+            "a map of the air needs laws: analyse the calibration flight together with this one \
+             (updraft analyze CALIBRATION HOVER), or take the laws of another analysis of these \
+             drones (--hold analysis.json)"
+        }
+        (false, _) => {
+            "the calibration cannot be used: put right what is named of it, or take the laws of \
+             another analysis of these drones (--hold analysis.json)"
+        }
+        (true, true) => {
+            "neither the calibration nor the measurement can be used: put right what is named, or \
+             fetch the logs again (updraft logs pull)"
+        }
+        (true, false) => {
+            "the calibration cannot be used: put right what is named, fetch the logs again (updraft \
+             logs pull), or give the plan that they flew (--plan)"
+        }
     };
     let mut text = format!("nothing found: no law and no value of the air; {remedy}");
     if reasons {

@@ -69,6 +69,12 @@ fn repeated<'a>(logs: &[(&Found, &'a Path)]) -> Option<(&'a Path, &'a Path)> {
 }
 
 fn same_log(one: &Path, other: &Path, how: &str) -> CommandError {
+    if one == other {
+        return CommandError::Usage(format!(
+            "{} is in two of the folders and logs that were given: give it once",
+            one.display()
+        ));
+    }
     CommandError::Usage(format!(
         "{} and {} {how}: a log counts once; give each flight once, or take the copy away",
         one.display(),

@@ -16,10 +16,13 @@ fn analyze(bench: &Bench, code: i32) -> Ended {
 /// The lines that speak of one thing, without the breaks of the terminal.
 fn about(ended: &Ended, word: &str) -> String {
     let mut found: Vec<String> = Vec::new();
+    let mut is_open = false;
     for line in ended.out.lines() {
+        is_open &= !line.trim().is_empty();
         if line.trim_start().starts_with("- ") {
             found.push(line.trim().to_owned());
-        } else if let Some(last) = found.last_mut().filter(|_| line.starts_with("  ")) {
+            is_open = true;
+        } else if let Some(last) = found.last_mut().filter(|_| is_open) {
             last.push(' ');
             last.push_str(line.trim());
         }
@@ -75,11 +78,16 @@ fn values_that_cannot_be_are_not_called_missing() {
 #[test]
 fn a_clock_that_jumps_is_called_one() {
     let bench = campaign();
-    patch(&bench.path(HOVER), "RCOU", "TimeUS", |row, field| {
-        if row > 400 {
-            field.copy_from_slice(&9_223_372_036_854_775_807_u64.to_le_bytes());
+    let jump = |from: usize| {
+        move |row: usize, field: &mut [u8]| {
+            if row >= from {
+                field.copy_from_slice(&9_223_372_036_854_775_807_u64.to_le_bytes());
+            }
         }
-    });
+    };
+    patch(&bench.path(HOVER), "RCOU", "TimeUS", jump(400));
+    // The disarming lies behind the jump.
+    patch(&bench.path(HOVER), "ARM", "TimeUS", jump(1));
     let told = bench.run(&["analyze", "campaign", "--no-report"]);
     assert!(!told.out.contains("922337"), "{told}");
     assert_snapshot!(about(&told, "clock jumps"));
