@@ -365,9 +365,9 @@ fn finish(
             analysis: &analysis,
         })?;
     }
-    // Where neither tables nor the object are printed, what is wrong would go unsaid.
+    // Where neither tables nor the object are printed, what is lost would go unsaid.
     if context.quiet && !context.json && !nothing {
-        problems(&analysis).iter().for_each(|problem| context.warn(problem));
+        problems(&analysis, false).iter().for_each(|problem| context.warn(problem));
     }
     if let Some(page) = &page {
         context.result(page)?;

@@ -7,13 +7,14 @@ use crate::mission::plan::Purpose;
 /// Reasons that an error lists.
 const LISTED: usize = 12;
 
-/// Everything that is lost or doubtful: one line each, with the flight's name.
-pub(super) fn problems(analysis: &Analysis) -> Vec<String> {
+/// Everything that is lost: one line each, with the flight's name. `cautions`: also what must be known
+/// before numbers are used.
+pub(super) fn problems(analysis: &Analysis, cautions: bool) -> Vec<String> {
     let of_flight = |flight: &FlightAnalysis| {
         let name = flight.name.clone();
         let lost = lost(flight);
         lost.into_iter()
-            .chain(flight.warnings.iter().cloned())
+            .chain(flight.warnings.iter().filter(|_| cautions).cloned())
             .map(move |problem| format!("{name}: {problem}"))
             .collect::<Vec<_>>()
     };
@@ -68,7 +69,7 @@ pub(super) fn nothing_found(analysis: &Analysis, reasons: bool) -> CommandError 
     };
     let mut text = format!("nothing found: no law and no value of the air; {remedy}");
     if reasons {
-        let problems = problems(analysis);
+        let problems = problems(analysis, true);
         for problem in problems.iter().take(LISTED) {
             text.push_str(BECAUSE);
             text.push_str(problem);
