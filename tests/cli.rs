@@ -12,6 +12,10 @@ mod fleet_loaded_support;
 mod analyze;
 #[path = "cli/analyze_inputs.rs"]
 mod analyze_inputs;
+#[path = "cli/analyze_messages.rs"]
+mod analyze_messages;
+#[path = "cli/analyze_unplanned.rs"]
+mod analyze_unplanned;
 #[path = "cli/check.rs"]
 mod check;
 #[cfg(unix)]

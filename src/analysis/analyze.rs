@@ -8,11 +8,12 @@ use thiserror::Error;
 use super::account::{self, Account};
 use super::aware::{ASKED_FOR, Aware, Measured};
 use super::calibrate::{self, PaperTable};
-use super::caution::{SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
+use super::caution::{PLAIN_CAUTION, SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
+use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
 use super::drone::{FLOCK, One, Shared, one, same_drone};
 use super::input::{FlightInput, LogInput, TruthSeries};
-use super::ladder::mark_partial;
+use super::ladder::{is_ladder, mark_partial, no_ladder, rungs};
 use super::law::{LINEAR, SIGNED_QUADRATIC};
 use super::options::{AnalysisOptions, MapLaw};
 use super::prefer::{better_law, chosen, describes, vertex_mps};
@@ -80,23 +81,31 @@ pub fn analyze(
     if inputs.is_empty() {
         return Err(AnalysisError::NoFlights);
     }
-    let is_measurement = |input: &FlightInput<'_>| {
-        input.purpose.or(input.plan.map(|plan| plan.purpose)) == Some(Purpose::Measurement)
-    };
+    let purpose = |input: &FlightInput<'_>| input.purpose.or(input.plan.map(|plan| plan.purpose));
     let mut order: Vec<&FlightInput<'_>> = inputs.iter().collect();
-    order.sort_by_key(|input| is_measurement(input));
+    order.sort_by_key(|input| match purpose(input) {
+        Some(Purpose::Calibration) => 0,
+        None => 1,
+        Some(Purpose::Measurement) => 2,
+    });
     let total: usize = inputs.iter().map(|input| input.logs.len()).sum();
     let mut before = 0;
     let mut flights: Vec<FlightAnalysis> = Vec::new();
     let mut warnings = Vec::new();
     let mut failures = Vec::new();
+    // Flights without a plan that turned out to measure, before a calibration was found.
+    let mut early: Vec<(usize, &FlightInput<'_>)> = Vec::new();
     for input in order {
-        let found = flights
-            .iter()
-            .find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some());
+        let laws = reference.or(calibration_of(&flights));
         let report = |done: usize, _: usize| progress(before + done, total);
-        match analyze_flight(input, options, reference.or(found), &report) {
-            Ok(flight) => flights.push(flight),
+        match analyze_flight(input, options, laws, &report) {
+            Ok(flight) => {
+                let measured = flight.purpose == Purpose::Measurement;
+                if laws.is_none() && measured && purpose(input).is_none() {
+                    early.push((flights.len(), input));
+                }
+                flights.push(flight);
+            }
             Err(error) => {
                 // One warning for each line: what is told and, below it, of which log.
                 warnings.extend(error.to_string().lines().map(|line| line.trim().to_owned()));
@@ -104,6 +113,15 @@ pub fn analyze(
             }
         }
         before += input.logs.len();
+    }
+    if let Some(laws) = calibration_of(&flights).cloned() {
+        for (index, input) in early {
+            // They could be analysed without laws: with them they can be as well.
+            if let Ok(flight) = analyze_flight(input, options, Some(&laws), &|_, _| {}) {
+                flights[index] = flight;
+            }
+        }
+        flights.sort_by_key(|flight| flight.purpose == Purpose::Measurement);
     }
     if flights.is_empty() {
         return Err(match failures.pop() {
@@ -122,6 +140,11 @@ pub fn analyze(
         flights,
         warnings,
     })
+}
+
+/// The first flight that gave laws for others.
+fn calibration_of(flights: &[FlightAnalysis]) -> Option<&FlightAnalysis> {
+    flights.iter().find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some())
 }
 
 /// Reasons one below the other; the first ones of many.
@@ -164,6 +187,7 @@ pub fn analyze_flight(
         leaning: input.leaning,
         lean_table: input.lean_table,
         has_battery: input.sag.is_some(),
+        unknown_share: 0.0,
     };
     let aware = reference
         .filter(|_| options.air_aware && planned_purpose != Some(Purpose::Calibration))
@@ -212,8 +236,10 @@ const LISTED: usize = 20;
 fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> FlightAnalysis {
     let Shared { input, options, .. } = shared;
     let Account { ones, unused, partly_used } = account;
-    let any_laws = ones.iter().any(|one| one.calibration.is_ok());
-    let purpose = shared.planned_purpose.unwrap_or(if any_laws {
+    let with_laws = ones.iter().filter(|one| one.calibration.is_ok());
+    let climbed: Vec<(usize, usize)> =
+        with_laws.map(|one| rungs(&one.drone, &options.fit)).collect();
+    let purpose = shared.planned_purpose.unwrap_or(if climbed.iter().copied().any(is_ladder) {
         Purpose::Calibration
     } else {
         Purpose::Measurement
@@ -274,13 +300,23 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         warnings.extend(tilt_caution(&drones, options));
     } else if shared.reference.is_none() {
         warnings.push(
-            "no calibration was given: the air cannot be measured without laws (analyse a \
-             calibration flight together with this one)"
+            "no calibration was given: the air cannot be measured without laws. Analyse the \
+             calibration flight together with this one (updraft analyze CALIBRATION HOVER), or take \
+             the laws of an analysis of these drones (--hold analysis.json). Until then there are \
+             only the flight's windows and its traces"
                 .to_owned(),
         );
+        let most = climbed.iter().copied().max_by_key(|(up, down)| up + down);
+        warnings.extend(most.filter(|_| shared.planned_purpose.is_none()).map(no_ladder));
     }
     let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
     warnings.extend(map.as_ref().and_then(wind_caution));
+    let calibration = shared.aware.as_ref().zip(shared.reference).map(|(_, found)| found);
+    let battery = calibration.zip(map.as_ref()).filter(|_| input.sag.is_some());
+    warnings.extend(battery.and_then(|(found, map)| battery_caution(map, found)));
+    if map.is_some() && shared.aware.is_none() {
+        warnings.push(PLAIN_CAUTION.to_owned());
+    }
     let moved = map.as_ref().is_some_and(UpdraftMap::is_scan);
     if moved {
         warnings.push(SCAN_CAUTION.to_owned());

@@ -118,8 +118,10 @@ impl<'a> Aware<'a> {
         sag: Option<Sag>,
         law: Option<MapLaw>,
     ) -> Option<Self> {
-        let corrections = Corrections { has_battery: sag.is_some(), ..corrections };
         let battery = sag.and_then(|sag| battery::correction(reference, sag));
+        let unknown_share =
+            battery.map_or(0.0, |battery| battery::unknown_share(reference, battery));
+        let corrections = Corrections { has_battery: sag.is_some(), unknown_share, ..corrections };
         let slopes: Vec<f64> = reference
             .drones
             .iter()
@@ -236,8 +238,21 @@ impl<'a> Aware<'a> {
                 format!("{count} s of faster air than the ladder's {low:+.1} to {high:+.1} m/s"),
             );
         }
-        if self.corrections.has_battery && pack.is_none() {
-            flag(Quality::NoVoltage, "no battery voltage in the log: not corrected".to_owned());
+        let without = |one: &&(Referred, Raw)| pack.is_none() || one.1.resting_v.is_none();
+        let uncorrected = referred.iter().flatten().filter(without).count();
+        if self.corrections.has_battery && uncorrected > 0 {
+            flag(
+                Quality::NoVoltage,
+                match (self.battery, uncorrected < known.len()) {
+                    (None, _) => {
+                        "no battery voltage in the calibration's logs: not corrected".to_owned()
+                    }
+                    (_, true) => {
+                        format!("no battery voltage in {uncorrected} s: these are not corrected")
+                    }
+                    (_, false) => "no battery voltage in the log: not corrected".to_owned(),
+                },
+            );
         }
         if let Some(pack) = &pack {
             let volts = referred.iter().flatten().filter_map(|(_, raw)| raw.resting_v);

@@ -25,6 +25,8 @@ const SMOOTH_S: f64 = 10.0;
 const LEAST: f64 = 0.5;
 /// A pack that falls below this share of its calibration's voltage is nearly empty.
 pub(super) const LOW_SHARE: f64 = 0.88;
+/// Least that packs of a fleet differ by, as a share of the voltage: they are not charged alike.
+const LEAST_UNKNOWN: f64 = 0.01;
 
 /// How much of a fall of voltage reaches the pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -160,6 +162,25 @@ pub(super) fn correction(calibration: &FlightAnalysis, sag: Sag) -> Option<Batte
         })
         .collect();
     (!volts.is_empty()).then(|| BatteryCorrection { reference_v: mean_sd(&volts).0, ..reference })
+}
+
+/// Share of `u - 1000` that a pack of unknown voltage may have changed against the reference voltage:
+/// a standard error. Nothing is known of it but that it is one of the fleet's, anywhere between the
+/// fullest and the emptiest that the calibration saw; the error is the farther of these two from the
+/// reference, and never less than [`LEAST_UNKNOWN`].
+pub(super) fn unknown_share(calibration: &FlightAnalysis, correction: BatteryCorrection) -> f64 {
+    let farthest = calibration
+        .drones
+        .iter()
+        .flat_map(|drone| {
+            let pack = Pack::of(&of_hovers(&drone.windows), correction);
+            let supplies = drone.windows.iter().filter_map(|window| window.supply);
+            supplies.filter_map(move |supply| Some(pack?.volts(supply.resting_v)))
+        })
+        .map(|volts| (volts / correction.reference_v).ln().abs())
+        .filter(|fall| fall.is_finite())
+        .fold(LEAST_UNKNOWN, f64::max);
+    farthest * correction.exponent.hypot(correction.exponent_se)
 }
 
 #[cfg(test)]

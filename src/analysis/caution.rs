@@ -12,6 +12,9 @@ use crate::base::estimate::Estimate;
 /// A systematic error above this is worth a sentence, m/s.
 const WORTH_SAYING_MPS: f64 = 0.05;
 
+/// A change of u0 below this reads as zero, us (or the indicator's unit).
+const WORTH_SAYING_US: f64 = 0.05;
+
 /// A law from fewer windows is warned about.
 const FEWEST_WINDOWS: usize = 4;
 
@@ -80,7 +83,10 @@ pub(super) fn tilt_caution(drones: &[DroneAnalysis], options: &AnalysisOptions) 
     let mean = |values: Vec<f64>| mean_sd(&values).0;
     let slope = mean(estimates(0).iter().map(|estimate| estimate.value).collect());
     let error = mean(estimates(1).iter().map(|estimate| estimate.se).collect());
-    if changes.is_empty() || change.abs() <= error || slope.abs() < f64::EPSILON {
+    if changes.is_empty()
+        || change.abs() <= error.max(WORTH_SAYING_US)
+        || slope.abs() < f64::EPSILON
+    {
         return None;
     }
     let unit = options.indicator.unit();
@@ -95,6 +101,12 @@ pub(super) fn tilt_caution(drones: &[DroneAnalysis], options: &AnalysisOptions) 
         -change / slope
     ))
 }
+
+/// What a map that inverts the laws of the tables does not say.
+pub(super) const PLAIN_CAUTION: &str = "errors: this map inverts the laws of the tables, as the \
+    paper does. Its standard errors are those of the hover's windows and of the law's parameters: what \
+    slow air during the calibration, battery and density shift for all drones alike has no error in \
+    this method, and the truth may lie further off than is stated";
 
 /// What a map of drones that moved does not say.
 pub(super) const SCAN_CAUTION: &str = "scan: the drones moved, and each value is the mean of the air \

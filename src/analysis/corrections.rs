@@ -58,6 +58,9 @@ pub(super) struct Corrections<'a> {
     pub(super) lean_table: Option<&'a LeanTable>,
     /// Whether a battery acts on the pulse.
     pub(super) has_battery: bool,
+    /// Share of `u - 1000` that a pack whose voltage is not known may have changed, where the law is
+    /// referred to a voltage: standard error ([`super::battery::unknown_share`]).
+    pub(super) unknown_share: f64,
 }
 
 /// A stretch of flight as logged.
@@ -163,7 +166,11 @@ impl Corrections<'_> {
                 doubts_us[BATTERY] = per_exponent;
                 doubts_us[DRIFT] = warm;
             }
-            None => doubts_us[DRIFT] = warm.hypot(UNKNOWN_VOLTAGE_US * flown_s / 60.0),
+            None => {
+                let level = (pulse_us - NO_THRUST_US) * self.unknown_share;
+                let drift = UNKNOWN_VOLTAGE_US * flown_s / 60.0;
+                doubts_us[DRIFT] = warm.hypot(drift).hypot(level);
+            }
         }
         Referred { velocity_mps, pulse_us, doubts_us, steeper }
     }

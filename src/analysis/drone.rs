@@ -73,6 +73,8 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         Some(mapping) if flight.desired_up_mps.is_none() => steady(&flight, &mapping.steps),
         _ => find_targets(&flight, slot.map(|(_, segments)| segments), &mut warnings)?,
     };
+    let elsewhere = elsewhere(&flight, &targets);
+    warnings.extend(elsewhere.clone());
     let corrected = windows::correct_tilt(&flight, &options.windows);
     let mut stats = windows::measure(&flight, &corrected, &targets, &options.windows);
     let offset = options
@@ -90,8 +92,10 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let hold = options.fit.hold.or_else(|| Hold::from_laws(reference.map(|(laws, _, _)| laws)?));
     let calibration = calibrate::calibrate(&stats, &FitOptions { hold, ..options.fit });
     let seen = Seen { flight: &flight, corrected: &corrected, targets: &targets, windows: &stats };
-    let updraft =
-        shared.map_reference.map(|reference| measure(shared, &seen, reference, number, &name));
+    let updraft = shared.map_reference.map(|reference| match &elsewhere {
+        Some(reason) => Err(reason.clone()),
+        None => measure(shared, &seen, reference, number, &name),
+    });
     let source = input.shown(&log.path);
     let drone = DroneAnalysis {
         slot: number,
@@ -110,6 +114,21 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
     let hover = HoverSeen::of(&flight, &corrected, &targets);
     let truth = true_air(&flight, &targets);
     Ok(One { drone, losses, skipped_bytes, calibration, updraft, hover, truth })
+}
+
+/// That none of the windows lies in the time that the log speaks of.
+fn elsewhere(flight: &Flight, targets: &[Target]) -> Option<String> {
+    let (from, to) = flight.velocity_up_mps.span()?;
+    let (first, last) = (targets.first()?, targets.last()?);
+    let apart = targets.iter().all(|target| target.end_s < from || target.start_s > to);
+    apart.then(|| {
+        format!(
+            "its log runs from {from:.0} to {to:.0} s of show time, and the plan's windows lie between \
+             {:.0} and {:.0} s: the drone's clock jumped or was set wrong, or the log is of another \
+             start; nothing of the plan is in it",
+            first.start_s, last.end_s
+        )
+    })
 }
 
 /// The true air over the hover as the map sees it: means over the 10 s around each second.

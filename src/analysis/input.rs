@@ -33,7 +33,8 @@ pub struct FlightInput<'a> {
     pub name: &'a str,
     /// The plan, if there is one.
     pub plan: Option<&'a Plan>,
-    /// What the flight was for; `None`: as the plan says, else a calibration if it has a ladder.
+    /// What the flight was for; `None`: as the plan says, else a calibration if it has a ladder
+    /// (climbs at three speeds or more, and descents), else a measurement.
     pub purpose: Option<Purpose>,
     /// The logs, in the order in which unplanned results are listed.
     pub logs: &'a [LogInput],

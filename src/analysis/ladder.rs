@@ -52,6 +52,39 @@ impl Ladder {
     }
 }
 
+/// Climbs at fewer speeds, or descents at fewer, are no ladder: take-off and landing have one or two.
+const FEWEST_RUNGS: usize = 3;
+/// Speeds closer than this are one rung, m/s.
+const SAME_RUNG_MPS: f64 = 0.15;
+
+/// At how many speeds a drone has usable climbs, and at how many descents.
+pub(super) fn rungs(drone: &DroneAnalysis, options: &FitOptions) -> (usize, usize) {
+    let distinct = |sign: f64| {
+        let legs = drone.windows.iter().filter(|w| w.kind.is_leg() && is_used(w, options));
+        let mut speeds: Vec<f64> =
+            legs.map(|window| sign * window.commanded_mps).filter(|speed| *speed > 0.0).collect();
+        speeds.sort_by(f64::total_cmp);
+        speeds.dedup_by(|next, kept| *next - *kept < SAME_RUNG_MPS);
+        speeds.len()
+    };
+    (distinct(1.0), distinct(-1.0))
+}
+
+/// Whether a flight without a plan is a calibration: climbs at three speeds or more, and descents.
+pub(super) fn is_ladder((up, down): (usize, usize)) -> bool {
+    up >= FEWEST_RUNGS && down >= FEWEST_RUNGS
+}
+
+/// That a flight with some climbs is not taken for a calibration: the most rungs that a drone has.
+pub(super) fn no_ladder((up, down): (usize, usize)) -> String {
+    format!(
+        "without a plan a flight is a calibration only if it climbs at {FEWEST_RUNGS} speeds or more \
+         and sinks at {FEWEST_RUNGS} or more: this one has steady climbs at {up} and descents at \
+         {down} (take-off and landing?), and is taken for a measurement. If it is a calibration, give \
+         its plan (--plan)"
+    )
+}
+
 /// The ladder of most of the drones: the middle one in legs and in span (the greater of two).
 fn of_fleet(mut ladders: Vec<Ladder>) -> Option<Ladder> {
     let middle = ladders.len() / 2;

@@ -11,6 +11,7 @@ pub mod battery;
 pub mod budget;
 pub mod calibrate;
 mod caution;
+mod caution_battery;
 mod corrections;
 #[cfg(test)]
 mod coverage_tests;

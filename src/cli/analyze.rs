@@ -11,9 +11,10 @@ use super::exit::{CommandError, Exit};
 use super::fields::{read_study, write_fields};
 use super::found::{Found, Work, find, find_tables, stem};
 use super::load::{has_extension, load_shows};
+use super::outcome::{nothing_found, problems};
 use super::progress::Progress;
 use super::provenance::provenance;
-use super::words;
+use super::{held, twice, words};
 use crate::analysis::battery::Sag;
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
 use crate::analysis::windows::Tilt;
@@ -240,6 +241,7 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
     for path in &args.paths {
         find(path, plan.as_ref(), &mut work)?;
     }
+    twice::refuse(&args.paths, &work)?;
     name_apart(&mut work.flights, &args.paths);
     let mut options = args.options.clone();
     if let Some(mapping) = &args.csv {
@@ -296,6 +298,14 @@ fn finish(
     for note in work.flights.iter().flat_map(|flight| &flight.notes) {
         context.warn(note);
     }
+    let resolved = options.resolve();
+    let doubts = hold
+        .zip(reference.as_ref())
+        .and_then(|(path, reference)| held::doubts(path, reference, resolved.indicator, work));
+    // Tables and quiet runs say it with the other warnings.
+    if let Some(doubts) = doubts.as_ref().filter(|_| context.json && !context.quiet) {
+        context.warn(doubts);
+    }
     let inputs: Vec<_> = work
         .flights
         .iter()
@@ -323,7 +333,7 @@ fn finish(
     // Hashing fills the pauses in which the analysis keeps one processor busy.
     let (analysis, provenance) = rayon::join(
         || {
-            analyze(&work.title, &inputs, &options.resolve(), reference.as_ref(), &|_, _| {
+            analyze(&work.title, &inputs, &resolved, reference.as_ref(), &|_, _| {
                 progress.advance();
             })
         },
@@ -332,6 +342,7 @@ fn finish(
     let mut analysis = analysis.map_err(|error| CommandError::Nothing(error.to_string()))?;
     progress.finish();
     analysis.warnings.extend(work.absent.iter().cloned());
+    analysis.warnings.extend(doubts);
     context.check_stop()?;
     if !context.json {
         context.print(&terminal_summary(&analysis, WIDTH, context.color))?;
@@ -349,12 +360,16 @@ fn finish(
         // A page that says that nothing was found is written, but there is nothing to point at.
         page = (!nothing).then(|| report_folder.join(report::PAGE_FILE));
     }
-    if context.json {
+    if context.json && !nothing {
         context.print_json(&AnalyzeOutput {
             schema: "updraft.analyze/1",
             report: page.clone(),
             analysis: &analysis,
         })?;
+    }
+    // Where neither tables nor the object are printed, what is lost would go unsaid.
+    if context.quiet && !context.json && !nothing {
+        problems(&analysis, false).iter().for_each(|problem| context.warn(problem));
     }
     if let Some(page) = &page {
         context.result(page)?;
@@ -375,7 +390,9 @@ fn finish(
         || analysis.flights.iter().any(lossy)
         || analysis.flights.len() < work.flights.len();
     Ok(match analysis.what_was_found() {
-        Yield::Nothing => Exit::Nothing,
+        Yield::Nothing => {
+            return Err(nothing_found(&analysis, context.quiet || context.json));
+        }
         Yield::Whole if !lost => Exit::Done,
         Yield::Whole | Yield::Partial => Exit::Losses,
     })
@@ -435,7 +452,16 @@ fn name_apart(flights: &mut [Found], paths: &[PathBuf]) {
     if paths.len() < 2 || flights.len() != paths.len() {
         return;
     }
-    for (flight, path) in flights.iter_mut().zip(paths) {
-        flight.name = stem(path);
+    let mut names: Vec<String> = paths.iter().map(|path| stem(path)).collect();
+    let mut distinct = names.clone();
+    distinct.sort();
+    distinct.dedup();
+    // `calibration/logs` and `hover/logs`: the flight's folder has the name.
+    if distinct.len() < names.len() {
+        let above = |path: &PathBuf| path.parent().map_or_else(|| stem(path), stem);
+        names = paths.iter().map(above).collect();
+    }
+    for (flight, name) in flights.iter_mut().zip(names) {
+        flight.name = name;
     }
 }

@@ -19,7 +19,7 @@ use crate::study::StudyError;
 use crate::vehicle::VehicleError;
 
 /// What stands between an error and its reason.
-const BECAUSE: &str = "\n  because: ";
+pub(super) const BECAUSE: &str = "\n  because: ";
 
 /// How a command ended. One rule for every command: what is not there or cannot be read or written
 /// is 1, what is there but wrong is 2, what is right but empty is 5. The numbers are documented in the README and do not change.

@@ -151,6 +151,10 @@ pub(super) fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, Com
         TableError::File(error) => CommandError::File(error),
         error => CommandError::Usage(error.to_string()),
     })?;
+    // A file that is named itself must be there.
+    for file in mapping.flights.iter().flat_map(|flight| &flight.files) {
+        std::fs::metadata(file).map_err(|error| FileError::new("read", file, error))?;
+    }
     work.title.clone_from(&mapping.title);
     let shared = Arc::new(mapping);
     work.flights.extend(shared.flights.iter().map(|flight| {

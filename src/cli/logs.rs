@@ -2,6 +2,7 @@
 
 mod dry;
 mod listing;
+mod simulated;
 mod who;
 
 use std::collections::BTreeMap;
@@ -57,7 +58,8 @@ enum LogsCommand {
     List(ListArgs),
     /// Bring logs home
     Pull(PullArgs),
-    /// Check logs against their manifest: size, SHA-256, and whether they are logs
+    /// Check logs against their manifest (simulated ones: their record): size, checksum, and whether
+    /// they are logs
     Verify(VerifyArgs),
     /// Take logs from SD cards; whose they are, they say themselves
     Import(ImportArgs),
@@ -264,6 +266,16 @@ fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
 fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     has_slots(&plan, args.slots.as_ref())?;
+    let asks_drones = args.dry_run || args.again || !args.connect.is_default();
+    if !asks_drones && simulated::all_home(&folder, &plan)? {
+        context.say(&format!(
+            "The {} of {} were simulated and are home: no drone was asked (`updraft logs verify` \
+             checks them; --again, or another --connect, asks drones)",
+            words::count(plan.slots.len(), "log"),
+            plan.name
+        ));
+        return end_pull(context, args, &plan, Vec::<Brought>::new(), &[]);
+    }
     let target = args.connect.target()?;
     if args.dry_run {
         let lines = dry::lines(&folder, &plan, args);
@@ -357,7 +369,15 @@ fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
     let mut rows = Vec::new();
     for folder in campaign::flights(&args.campaign)? {
         let plan = folder.read_plan()?;
-        for checked in verify(&folder.logs())? {
+        let came = verify(&folder.logs())?;
+        if came.is_empty() {
+            rows.extend(simulated::verify(&folder)?.into_iter().map(|(file, faults)| VerifyRow {
+                flight: plan.name.clone(),
+                file,
+                faults,
+            }));
+        }
+        for checked in came {
             rows.push(VerifyRow {
                 flight: plan.name.clone(),
                 file: checked.entry.file.clone(),
@@ -367,7 +387,9 @@ fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
     }
     if rows.is_empty() {
         return Err(CommandError::Nothing(
-            "no log has come with a manifest yet: `updraft logs pull` or `import`".to_owned(),
+            "there are no logs yet: no manifest of logs that came (`updraft logs pull` or `import`), \
+             and no record of simulated ones (`updraft simulate`)"
+                .to_owned(),
         ));
     }
     let bad = rows.iter().filter(|row| !row.faults.is_empty()).count();

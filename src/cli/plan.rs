@@ -186,7 +186,8 @@ fn refuse_occupied(
     }
     if folder.record().exists() || folder.logs().is_dir() {
         return Err(CommandError::Usage(format!(
-            "{} holds the logs of another plan; choose another folder",
+            "{} holds the logs of another plan, which are never overwritten; choose another folder, \
+             or move its logs folder away and give --force",
             folder.0.display()
         )));
     }

@@ -41,8 +41,9 @@ const FIELD_DAY: &str = "field-day";
   updraft run calibration-counterphase -o counterphase
   updraft run --hide 7 -o hidden                    # an effect is hidden, named, and then revealed
 
-Without a choice of vehicle and air the campaign is flown by the show drone (`pixel`) on a field day:
-turbulent air, light wind, gusts. --air says another air for both flights (`still`: none);
+Without a choice of vehicle the paper's campaign (`campaign`) is flown by the show drone (`pixel`), any
+other template by the vehicle that it names (the built-in ones: airsim-generic-quad). Without a choice
+of air it is a field day: turbulent air, light wind, gusts. --air says another air for both flights (`still`: none);
 --calibration-air, --calibration-wind and --calibration-updraft say one for the calibration. --wind and
 --updraft are uniform and of the measurement. What the air truly did is kept beside the logs and
 compared with. The paper's simulation study is flown into study/, for Fig. 2 and Table I.

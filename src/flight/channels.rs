@@ -68,6 +68,8 @@ pub(super) struct Messages {
     pub(super) scan: ScanStats,
     /// Rows whose time was impossible.
     pub(super) dropped: usize,
+    /// Boot that was kept, from 0.
+    pub(super) boot: usize,
 }
 
 impl Messages {
@@ -147,6 +149,7 @@ impl Messages {
             })
         };
         let chosen = wanted.or_else(performed).unwrap_or(count - 1);
+        self.boot = chosen;
         let spans: Vec<(f64, f64)> = steady
             .iter()
             .find_map(|name| self.rows(name).filter(|rows| rows.boots().len() == count))
@@ -208,6 +211,11 @@ impl Messages {
         let empty: Vec<String> =
             ["VD", "PD"].iter().filter(|c| empty(c)).map(|c| format!("{name}.{c}")).collect();
         (!empty.is_empty()).then(|| empty.join(" and "))
+    }
+
+    /// The newest position filter that logged anything.
+    pub(super) fn ekf_name(&self) -> Option<&'static str> {
+        ["XKF1", "NKF1", "EKF1"].into_iter().find(|name| self.rows(name).is_some())
     }
 
     /// The core that most XKF4 rows call primary; core 0 without them.

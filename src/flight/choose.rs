@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::align::planned_up_mps;
-use super::load::{Held, Wanted, load as load_one};
+use super::load::{Held, Wanted, load as load_one, ordinal};
 use super::{Flight, FlightError, FlightOptions};
 use crate::log::Log;
 use crate::mission::plan::Segment;
@@ -37,6 +37,7 @@ pub(super) fn load(
         return usual;
     }
     let mut best: Option<(f64, Flight)> = None;
+    let mut which = String::new();
     let mut looked_at = 0;
     for boot in 0..held.boots.max(1) {
         // How many flights a boot holds is known when its first one has been read.
@@ -53,17 +54,26 @@ pub(super) fn load(
             // Without a plan the later one counts.
             let off = options.segments.map_or(0.0, |segments| difference_mps(&flight, segments));
             if best.as_ref().is_none_or(|(lowest, _)| off <= *lowest) {
+                which = if held.boots > 1 {
+                    ordinal(boot, held.boots)
+                } else {
+                    ordinal(index - 1, flights)
+                };
                 best = Some((off, flight));
             }
         }
     }
     match (best, options.segments) {
         (Some((off, mut flight)), Some(_)) if off < SAME_MPS => {
-            flight.warnings.push(format!("{}; the one that flew the plan is analysed", of(held)));
+            flight
+                .warnings
+                .push(format!("{}; the one that flew the plan is analysed: the {which}", of(held)));
             Ok(flight)
         }
         (Some((_, mut flight)), _) if usual.is_err() => {
-            flight.warnings.push(format!("{}; one that can be read is analysed", of(held)));
+            flight
+                .warnings
+                .push(format!("{}; one that can be read is analysed: the {which}", of(held)));
             Ok(flight)
         }
         _ => usual,

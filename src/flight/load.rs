@@ -11,6 +11,8 @@ use crate::log::{Log, ScanStats};
 const MARGIN_S: f64 = 2.0;
 /// A silence in a channel longer than this is worth a warning, s.
 const GAP_S: f64 = 1.0;
+/// No flight has a silence longer than this, s: the clock jumped.
+const LONGEST_FLIGHT_S: f64 = 6.0 * 3600.0;
 /// A vehicle that never rises above this did not fly, m.
 const LEAST_HEIGHT_M: f64 = 0.5;
 /// A log that ends higher than this with its motors running was cut off, m.
@@ -32,6 +34,8 @@ pub(super) struct Wanted {
 pub(super) struct Held {
     /// Boots in the log.
     pub(super) boots: usize,
+    /// The one that was read, from 0.
+    pub(super) boot: usize,
     /// Flights in the boot that was read.
     pub(super) flights: usize,
 }
@@ -50,9 +54,12 @@ pub(super) fn load(
     }
     let mut warnings = scan_warnings(&messages);
     let boots = messages.keep_one_boot(wanted.boot);
-    held.boots = boots;
+    (held.boots, held.boot) = (boots, messages.boot);
     if boots > 1 && wanted.boot.is_none() {
-        warnings.push(format!("the log holds {boots} boots of the autopilot; one is analysed"));
+        warnings.push(format!(
+            "the log holds {boots} boots of the autopilot; the {} is analysed",
+            ordinal(messages.boot, boots)
+        ));
     }
     let missing = |what, messages, remedy| FlightError::Missing {
         source_path: source.to_owned(),
@@ -60,11 +67,23 @@ pub(super) fn load(
         messages,
         remedy,
     };
+    let senseless = |columns: String, range: &'static str| FlightError::OutOfRange {
+        source_path: source.to_owned(),
+        columns,
+        range,
+    };
     let [pulse, pulse_max, pulse_min] = messages.motors().ok_or_else(|| {
+        if messages.rows("RCOU").is_some() {
+            return senseless("RCOU".to_owned(), "a motor's pulse of 500 to 2500 us");
+        }
         missing("motor outputs", "RCOU", "set LOG_BITMASK bit 10 (RCOUT, +1024) and fly again")
     })?;
     let ekf = messages.ekf().ok_or_else(|| match messages.ekf_without_numbers() {
         Some(columns) => FlightError::NoNumbers { source_path: source.to_owned(), columns },
+        None if messages.ekf_name().is_some() => senseless(
+            format!("{}.VD", messages.ekf_name().unwrap_or_default()),
+            "a vertical velocity below 100 m/s",
+        ),
         None => missing(
             "vertical velocity of the position filter",
             "XKF1, NKF1 or EKF1",
@@ -164,11 +183,17 @@ pub(super) fn load(
     {
         let (from, to) = series.span().unwrap_or_default();
         let gap = series.longest_gap_s(flight.0.max(from), flight.1.min(to));
-        if gap > GAP_S {
+        if gap > LONGEST_FLIGHT_S {
+            warnings.push(format!(
+                "{name}: the log's clock jumps by more than {:.0} hours in the flight: times behind \
+                 the jump are not to be trusted",
+                LONGEST_FLIGHT_S / 3600.0
+            ));
+        } else if gap > GAP_S {
             warnings.push(format!("{name}: no data for {gap:.1} s of the flight"));
         }
-        if to + GAP_S < flight.1 {
-            let lost = flight.1 - to;
+        let lost = flight.1 - to;
+        if lost > GAP_S && lost <= LONGEST_FLIGHT_S {
             warnings.push(format!("{name}: the log ends {lost:.1} s before the flight does"));
         }
     }
@@ -206,6 +231,15 @@ pub(super) fn load(
         clock,
         warnings,
     })
+}
+
+/// `first of 2` as people say it.
+pub(super) fn ordinal(index: usize, count: usize) -> String {
+    match (index, count) {
+        (0, _) => "first".to_owned(),
+        (index, count) if index + 1 == count => format!("last (number {count})"),
+        (index, _) => format!("number {}", index + 1),
+    }
 }
 
 /// How high the vehicle was at the end of its log, if it was still armed then, m.

@@ -160,6 +160,20 @@ pub enum FlightError {
         /// The columns, as `MESSAGE.FIELD`.
         columns: String,
     },
+    /// The values of a message that the analysis cannot do without are all impossible.
+    #[error(
+        "{}: {columns} in the log holds no value that can be one ({range}): the log is damaged; \
+         fetch it again",
+        source_path.display()
+    )]
+    OutOfRange {
+        /// The log file.
+        source_path: PathBuf,
+        /// The message or column.
+        columns: String,
+        /// What would be believed, for people.
+        range: &'static str,
+    },
     /// The vehicle never armed or never left the ground.
     #[error("{}: no flight in this log: {reason}", source_path.display())]
     NoFlight {

@@ -4,7 +4,7 @@
 use super::compare::Comparison;
 use super::gls::{Column, Solution};
 use super::scene::Scene;
-use crate::effects::{EffectError, LIBRARY, Sought};
+use crate::effects::{EffectError, LIBRARY, Reference, Sought};
 use crate::vehicle::Vehicle;
 
 /// Change of a size that is in the model already, for its derivative.
@@ -126,11 +126,14 @@ fn prepare(vehicle: &mut Vehicle, name: &str, scene: &Scene) {
     if name == "battery" && is_new && scene.resting_v > 0.0 {
         set(vehicle, name, "cells", scene.cells);
         set(vehicle, name, "initial_charge", 1.0);
-        // The model's hover is taken for that at the flight's mean voltage.
-        set(vehicle, name, "reference_v", scene.resting_v);
-        if let Some(resistance_ohm) = scene.resistance_ohm {
-            set(vehicle, name, "resistance_ohm", resistance_ohm.clamp(0.0, 1.0));
+        let resistance_ohm = scene.resistance_ohm.unwrap_or(0.0).clamp(0.0, 1.0);
+        if scene.resistance_ohm.is_some() {
+            set(vehicle, name, "resistance_ohm", resistance_ohm);
         }
+        // The model's hover is taken for that at the flight's mean voltage, under load.
+        let amps = Reference::of(vehicle).hover_w() / scene.resting_v;
+        let loaded_v = (scene.resting_v - amps * resistance_ohm).max(0.5 * scene.resting_v);
+        set(vehicle, name, "reference_v", loaded_v);
     }
 }
 

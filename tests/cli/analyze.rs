@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use insta::assert_snapshot;
+
 use crate::support::{Bench, contents};
 
 #[test]
@@ -110,10 +112,14 @@ fn nothing_found_is_no_success() {
     assert!(analysed.out.contains("No calibration"), "{analysed}");
     // The page says so too, but it is not offered as something to read.
     assert!(!analysed.err.contains("index.html"), "{analysed}");
-    assert!(analysed.err.ends_with(": nothing found\n"), "{analysed}");
+    assert!(analysed.err.contains(": nothing found\nerror: nothing found: no law"), "{analysed}");
     assert_eq!(bench.expect(5, &["analyze", "campaign", "--quiet"]).out, "");
-    let json = bench.expect(5, &["analyze", "campaign", "--json"]).json("updraft.analyze/1");
-    assert!(json["report"].is_null());
+    let failed = bench.expect(5, &["analyze", "campaign", "--json"]);
+    assert_eq!(failed.out, "", "as of every command that fails");
+    let error: serde_json::Value =
+        serde_json::from_str(failed.err.lines().last().unwrap()).unwrap();
+    assert_eq!((&error["schema"], &error["exit"]), (&"updraft.error/1".into(), &5.into()));
+    assert_snapshot!(serde_json::to_string_pretty(&error).unwrap());
     let page = fs::read_to_string(bench.path("campaign/report/index.html")).unwrap();
     assert!(page.contains("No calibration") && !page.contains("<svg"), "no empty figures");
 }

@@ -138,7 +138,7 @@ fn a_wrong_table_is_refused_with_its_line() {
 fn a_table_that_is_missing_or_too_large() {
     let bench = Bench::new();
     fs::write(bench.path("mapping.toml"), MAPPING).unwrap();
-    let missing = bench.expect(5, &["analyze", "--csv", "mapping.toml", "--no-report"]);
+    let missing = bench.expect(1, &["analyze", "--csv", "mapping.toml", "--no-report"]);
     // A file with a hole: its size is all that is looked at.
     let huge = fs::File::create(bench.path("ladder.csv")).unwrap();
     huge.set_len((8 << 30) + 1).unwrap();
@@ -171,4 +171,19 @@ fn what_can_be_read_is_read_and_the_rest_is_told() {
     assert!(ended.out.contains("A\u{2032} = 30.0"), "{ended}");
     let notes = ended.out.split("Notes on drones").nth(1).unwrap_or_default();
     assert_snapshot!(notes.split("\n\n").next().unwrap_or_default().trim_end());
+}
+
+#[test]
+fn rows_without_numbers_are_counted() {
+    let bench = Bench::new();
+    let mut rows = table();
+    for row in &mut rows[100..150] {
+        let mut cells: Vec<&str> = row.split(',').collect();
+        cells[1] = "NaN";
+        *row = cells.join(",");
+    }
+    let ended = analyze(&bench, 0, MAPPING, &rows);
+    let from = ended.out.find("effort: ").unwrap_or_else(|| panic!("{ended}"));
+    let told: Vec<&str> = ended.out[from..].lines().take(2).map(str::trim).collect();
+    assert_snapshot!(told.join(" "));
 }

@@ -13,6 +13,9 @@ use crate::link::clock::Clock as _;
 use crate::link::signing::Key;
 use crate::link::station::{Setup, Station};
 
+/// Where drones are listened for without a choice.
+const DEFAULT_LINK: &str = "udpin:0.0.0.0:14550";
+
 /// How drones are reached.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Links")]
@@ -23,7 +26,7 @@ pub(in crate::cli) struct ConnectArgs {
     ///
     /// 1@udpin:... puts a link into network 1: system ids are one byte, and the same id in another
     /// network is another drone.
-    #[arg(long, value_name = "LINK", default_value = "udpin:0.0.0.0:14550")]
+    #[arg(long, value_name = "LINK", default_value = DEFAULT_LINK)]
     pub(in crate::cli) connect: Vec<String>,
     /// File with the signing key: everything is signed, and what is not signed with it is refused
     #[arg(long, value_name = "FILE")]
@@ -53,6 +56,11 @@ pub(in crate::cli) enum Target {
 }
 
 impl ConnectArgs {
+    /// Whether nothing was chosen.
+    pub(in crate::cli) fn is_default(&self) -> bool {
+        self.connect == [DEFAULT_LINK]
+    }
+
     /// What the words mean.
     pub(in crate::cli) fn target(&self) -> Result<Target, CommandError> {
         let usage = |text: String| CommandError::Usage(text);

@@ -28,6 +28,8 @@ struct Wanted<'a> {
     /// Number and name of each column.
     columns: Vec<(usize, &'a str)>,
     series: Series,
+    /// Rows that are no measurement.
+    left_out: usize,
 }
 
 impl Wanted<'_> {
@@ -37,6 +39,7 @@ impl Wanted<'_> {
         for (index, name) in &self.columns {
             let cell = row.get(*index).unwrap_or_default().trim();
             if cell.is_empty() {
+                self.left_out += 1;
                 return Ok(());
             }
             let value: f64 = cell
@@ -49,6 +52,8 @@ impl Wanted<'_> {
         if value.is_finite() {
             self.series.time_s.push(time_s);
             self.series.value.push(value);
+        } else {
+            self.left_out += 1;
         }
         Ok(())
     }
@@ -118,7 +123,8 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
             .iter()
             .map(|column| Ok((find(column, name)?, column.as_str())))
             .collect();
-        wanted.push((name, Wanted { channel, columns: columns?, series: Series::default() }));
+        let (columns, series) = (columns?, Series::default());
+        wanted.push((name, Wanted { channel, columns, series, left_out: 0 }));
     }
     let mut row = csv::StringRecord::new();
     let (mut first, mut last, mut rows, mut backward) = (None, f64::NEG_INFINITY, 0, 0);
@@ -169,6 +175,7 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
     if backward > 0 {
         warnings.push(format!("{backward} rows whose time does not go forward were left out"));
     }
+    warnings.extend(wanted.iter().filter_map(|(name, one)| holes(name, one)));
     let mut flight = Flight {
         source: path.to_owned(),
         indicator: mapping.indicator,
@@ -189,6 +196,21 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
         }
     }
     Ok(flight)
+}
+
+/// That cells of a channel are no measurement: how many, and the longest time without one.
+fn holes(name: &str, one: &Wanted<'_>) -> Option<String> {
+    let (from, to) = one.series.span().unwrap_or_default();
+    let gap_s = one.series.longest_gap_s(from, to);
+    (one.left_out > 0).then(|| {
+        let columns: Vec<&str> = one.columns.iter().map(|(_, name)| *name).collect();
+        format!(
+            "{name}: {} rows without a number in \"{}\" were left out (longest stretch {gap_s:.1} s): \
+             they have no value",
+            one.left_out,
+            columns.join("\", \"")
+        )
+    })
 }
 
 fn time_of(text: &str, format: TimeFormat) -> Option<f64> {

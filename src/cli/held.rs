@@ -1,0 +1,123 @@
+//! Laws of another analysis (`--hold`): whether they are those of these drones.
+//!
+//! A law is a drone's own: its mass, rotors and controllers are in it. Laws of another fleet give a
+//! map as well, which is wrong by as much as the fleets differ. Nothing refuses them (a drone may
+//! stand for its like), but what speaks against them is said.
+
+use std::path::Path;
+
+use super::found::{Found, Work};
+use crate::analysis::result::FlightAnalysis;
+use crate::campaign::{self, FlightFolder};
+use crate::flight::Indicator;
+use crate::mission::Plan;
+use crate::mission::plan::Purpose;
+
+/// Homes of one slot further apart are of two grids, m.
+const SAME_HOME_M: f64 = 0.5;
+/// Grounds whose heights differ by more have other air: 1 % of its density, m.
+const SAME_GROUND_M: f64 = 100.0;
+
+/// What speaks against the laws of `reference`, read from `path`: one sentence, or nothing.
+pub(super) fn doubts(
+    path: &Path,
+    reference: &FlightAnalysis,
+    indicator: Indicator,
+    work: &Work,
+) -> Option<String> {
+    let calibrated = calibrated_in(path);
+    let mut reasons: Vec<String> = Vec::new();
+    if reference.indicator != indicator {
+        reasons.push(format!(
+            "its laws are of the {}, and here the {} is analysed",
+            reference.indicator.words(),
+            indicator.words()
+        ));
+    }
+    for flight in work.flights.iter().filter(|one| one.purpose != Some(Purpose::Calibration)) {
+        let Some(plan) = &flight.plan else { continue };
+        reasons.extend(other_slots(reference, plan));
+        if let Some((planned, seed)) = &calibrated {
+            reasons.extend(other_campaign(planned, *seed, plan, flight));
+        }
+    }
+    reasons.dedup();
+    (!reasons.is_empty()).then(|| {
+        format!(
+            "{}: the laws seem to be those of other drones: {}. A law is a drone's own; with another \
+             fleet's the map is wrong by as much as the fleets differ, which no error here says. Hold \
+             the laws of a calibration of these drones",
+            path.display(),
+            reasons.join("; ")
+        )
+    })
+}
+
+/// The plan and the seed of the calibration in the campaign that an analysis lies in.
+fn calibrated_in(path: &Path) -> Option<(Plan, Option<u64>)> {
+    let root = path.parent()?;
+    let folders = campaign::is_campaign(root).then(|| campaign::flights(root).ok())??;
+    let of_folder = |folder: &FlightFolder| {
+        let plan = folder.read_plan().ok()?;
+        let seed = folder.read_record().ok().flatten().map(|record| record.seed);
+        (plan.purpose == Purpose::Calibration).then_some((plan, seed))
+    };
+    folders.iter().find_map(of_folder)
+}
+
+/// That the laws' drones have other slots or stood elsewhere.
+fn other_slots(reference: &FlightAnalysis, plan: &Plan) -> Vec<String> {
+    let home_of = |slot: u16| {
+        let drone = reference.drones.iter().find(|drone| drone.slot == Some(slot));
+        drone.and_then(|drone| drone.home_m)
+    };
+    let known = reference.drones.iter().any(|drone| drone.slot.is_some());
+    let apart = |slot: &&crate::mission::plan::Slot| {
+        home_of(slot.slot).is_some_and(|home| {
+            (home[0] - slot.home_m[0]).hypot(home[1] - slot.home_m[1]) > SAME_HOME_M
+        })
+    };
+    let moved = plan.slots.iter().filter(apart).count();
+    let fleet = reference.drones.len() + reference.missing.len();
+    let mut reasons = Vec::new();
+    if known && fleet != plan.slots.len() {
+        reasons.push(format!(
+            "they are {fleet} drones, and {} has {}",
+            plan.name,
+            plan.slots.len()
+        ));
+    }
+    if moved > 0 {
+        reasons.push(format!("{moved} of the slots of {} have other homes there", plan.name));
+    }
+    reasons
+}
+
+/// That the campaign of the laws was of another vehicle, place or simulated fleet.
+fn other_campaign(planned: &Plan, seed: Option<u64>, plan: &Plan, flight: &Found) -> Vec<String> {
+    let mut reasons = Vec::new();
+    if planned.vehicle != plan.vehicle {
+        reasons.push(format!(
+            "they flew {}, and {} flew {}",
+            planned.vehicle, plan.name, plan.vehicle
+        ));
+    }
+    if let (Some(there), Some(here)) = (seed, flight.seed)
+        && there != here
+    {
+        reasons.push(format!(
+            "they were simulated with seed {there}, and {} with seed {here}: other drones",
+            plan.name
+        ));
+    }
+    let higher_m = plan.site.ground_amsl_m - planned.site.ground_amsl_m;
+    if higher_m.abs() > SAME_GROUND_M {
+        let word = if higher_m > 0.0 { "higher" } else { "lower" };
+        reasons.push(format!(
+            "the ground of {} is {:.0} m {word}, and its air has another density",
+            plan.name,
+            higher_m.abs()
+        ));
+    }
+    reasons
+}

@@ -1,0 +1,82 @@
+//! What was lost in an analysis, as lines for standard error: where nobody sees the tables.
+
+use super::exit::{BECAUSE, CommandError};
+use crate::analysis::result::{Analysis, FlightAnalysis, Unmeasured};
+use crate::mission::plan::Purpose;
+
+/// Reasons that an error lists.
+const LISTED: usize = 12;
+
+/// Everything that is lost: one line each, with the flight's name. `cautions`: also what must be known
+/// before numbers are used.
+pub(super) fn problems(analysis: &Analysis, cautions: bool) -> Vec<String> {
+    let of_flight = |flight: &FlightAnalysis| {
+        let name = flight.name.clone();
+        let lost = lost(flight);
+        lost.into_iter()
+            .chain(flight.warnings.iter().filter(|_| cautions).cloned())
+            .map(move |problem| format!("{name}: {problem}"))
+            .collect::<Vec<_>>()
+    };
+    let flights = analysis.flights.iter().flat_map(of_flight);
+    analysis.warnings.iter().cloned().chain(flights).collect()
+}
+
+/// Drones and logs of a flight that gave nothing, or not everything.
+fn lost(flight: &FlightAnalysis) -> Vec<String> {
+    let who = |drone: &Unmeasured| match drone.slot {
+        Some(slot) => format!("slot {slot}"),
+        None => drone.name.clone(),
+    };
+    let missing = flight.missing.iter().map(|one| format!("slot {}: {}", one.slot, one.reason));
+    // A missing drone's reason is that of its log.
+    let told = |slot: Option<u16>| flight.missing.iter().any(|one| Some(one.slot) == slot);
+    let unused = flight.unused.iter().filter(|log| !told(log.slot));
+    let unused = unused.map(|log| format!("not used: {}", log.sentence()));
+    let partly = flight.partly_used.iter().map(|log| format!("{}: {}", log.source, log.reason));
+    let what = match flight.purpose {
+        Purpose::Calibration => "no law",
+        Purpose::Measurement => "no value of the map",
+    };
+    let unmeasured =
+        flight.unmeasured.iter().map(|one| format!("{}: {what}: {}", who(one), one.reason));
+    missing.chain(unused).chain(partly).chain(unmeasured).collect()
+}
+
+/// The error of an analysis without one law and one value, with what to do. `reasons`: also why, for
+/// those who do not see the tables.
+pub(super) fn nothing_found(analysis: &Analysis, reasons: bool) -> CommandError {
+    let has = |purpose| analysis.flights.iter().any(|flight| flight.purpose == purpose);
+    let remedy = match (has(Purpose::Calibration), has(Purpose::Measurement)) {
+        // A flight that failed is a warning of the whole.
+        (false, _) if analysis.warnings.is_empty() => {
+            "a map of the air needs laws: analyse the calibration flight together with this one \
+             (updraft analyze CALIBRATION HOVER), or take the laws of another analysis of these \
+             drones (--hold analysis.json)"
+        }
+        (false, _) => {
+            "the calibration cannot be used: put right what is named of it, or take the laws of \
+             another analysis of these drones (--hold analysis.json)"
+        }
+        (true, true) => {
+            "neither the calibration nor the measurement can be used: put right what is named, or \
+             fetch the logs again (updraft logs pull)"
+        }
+        (true, false) => {
+            "the calibration cannot be used: put right what is named, fetch the logs again (updraft \
+             logs pull), or give the plan that they flew (--plan)"
+        }
+    };
+    let mut text = format!("nothing found: no law and no value of the air; {remedy}");
+    if reasons {
+        let problems = problems(analysis, true);
+        for problem in problems.iter().take(LISTED) {
+            text.push_str(BECAUSE);
+            text.push_str(problem);
+        }
+        if problems.len() > LISTED {
+            text.push_str(&format!("{BECAUSE}and {} more", problems.len() - LISTED));
+        }
+    }
+    CommandError::Nothing(text)
+}
