@@ -183,19 +183,14 @@ pub(super) fn load(
     {
         let (from, to) = series.span().unwrap_or_default();
         let gap = series.longest_gap_s(flight.0.max(from), flight.1.min(to));
-        if gap > LONGEST_FLIGHT_S {
-            warnings.push(format!(
-                "{name}: the log's clock jumps by more than {:.0} hours in the flight: times behind \
-                 the jump are not to be trusted",
-                LONGEST_FLIGHT_S / 3600.0
-            ));
-        } else if gap > GAP_S {
-            warnings.push(format!("{name}: no data for {gap:.1} s of the flight"));
-        }
         let lost = flight.1 - to;
-        if lost > GAP_S && lost <= LONGEST_FLIGHT_S {
-            warnings.push(format!("{name}: the log ends {lost:.1} s before the flight does"));
-        }
+        let told = [
+            (gap, format!("no data for {gap:.1} s of the flight")),
+            (lost, format!("the log ends {lost:.1} s before the flight does")),
+        ];
+        warnings.extend(told.into_iter().filter_map(|(silent_s, words)| {
+            silence(silent_s, words).map(|words| format!("{name}: {words}"))
+        }));
     }
     let (voltage_v, current_a) = messages.battery();
     let (resting_v, resistance_ohm) = messages.resting();
@@ -299,4 +294,29 @@ fn ground_height_m(height: &Series, armed_s: f64) -> f64 {
     let mut first = height.between(armed_s - 1.0, armed_s + 1.0).to_vec();
     first.sort_by(f64::total_cmp);
     first.get(first.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// What a silence is called; `None`: it is too short to speak of.
+fn silence(silent_s: f64, words: String) -> Option<String> {
+    if silent_s > LONGEST_FLIGHT_S {
+        return Some(format!(
+            "the log's clock jumps by more than {:.0} hours in the flight: times behind the jump are \
+             not to be trusted",
+            LONGEST_FLIGHT_S / 3600.0
+        ));
+    }
+    (silent_s > GAP_S).then_some(words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_jumps_is_no_gap() {
+        let words = |silent_s| silence(silent_s, "a gap".to_owned()).unwrap_or_default();
+        assert_eq!(words(0.5 * GAP_S), "");
+        assert_eq!(words(2.0 * GAP_S), "a gap");
+        assert!(words(9.2e12).contains("clock jumps"), "{}", words(9.2e12));
+    }
 }

@@ -76,24 +76,6 @@ fn values_that_cannot_be_are_not_called_missing() {
 }
 
 #[test]
-fn a_clock_that_jumps_is_called_one() {
-    let bench = campaign();
-    let jump = |from: usize| {
-        move |row: usize, field: &mut [u8]| {
-            if row >= from {
-                field.copy_from_slice(&9_223_372_036_854_775_807_u64.to_le_bytes());
-            }
-        }
-    };
-    patch(&bench.path(HOVER), "RCOU", "TimeUS", jump(400));
-    // The disarming lies behind the jump.
-    patch(&bench.path(HOVER), "ARM", "TimeUS", jump(1));
-    let told = bench.run(&["analyze", "campaign", "--no-report"]);
-    assert!(!told.out.contains("922337"), "{told}");
-    assert_snapshot!(about(&told, "clock jumps"));
-}
-
-#[test]
 fn a_log_an_hour_off_in_all_its_clocks_says_so() {
     let bench = campaign();
     let later = |_: usize, field: &mut [u8]| {
