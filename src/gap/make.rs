@@ -133,6 +133,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         wind,
         drones: differences,
         gap: shrink,
+        map: None,
         regimes: regimes(&before, &whole, &found, options.seed)?,
         ladder: Vec::new(),
         cautions: cautions(&data, &found, input),

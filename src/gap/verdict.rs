@@ -37,6 +37,10 @@ pub struct Verdict {
     pub drones: Drones,
     /// The gap before and after, on data that was not used for fitting.
     pub gap: Gap,
+    /// The error of the map of the air by the model before and after, in a measurement flight of the
+    /// campaign whose true air is known.
+    #[serde(default)]
+    pub map: Option<MapGain>,
     /// Where they disagree: the residual by regime.
     pub regimes: Vec<Regime>,
     /// The speed ladder: measured pulses and the model's, before and after.
@@ -312,6 +316,34 @@ pub struct Shrink {
     pub chi2: (f64, f64),
     /// Share of the excess over the floor that is gone, with its 95 % interval.
     pub excess_shrink: Interval,
+}
+
+/// The error of the map of the air by the model before and after.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MapGain {
+    /// The measurement flight.
+    pub flight: String,
+    /// Drones that have a truth.
+    pub drones: usize,
+    /// Values: running means of 10 s, about every 3 s.
+    pub values: usize,
+    /// What answering zero would be wrong by: the root mean square of the true air, m/s.
+    pub zero_mps: f64,
+    /// By the model that was held against the logs.
+    pub before: MapError,
+    /// With what was found.
+    pub after: MapError,
+}
+
+/// Errors of a map of the vertical air speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MapError {
+    /// Root mean square, m/s.
+    pub rms_mps: f64,
+    /// Mean, m/s: what all drones have in common over the flight.
+    pub bias_mps: f64,
+    /// Root mean square without the mean, m/s.
+    pub without_bias_mps: f64,
 }
 
 /// The residual of one regime.

@@ -10,7 +10,7 @@ use super::figures::gap::{drones, ladder, map};
 use super::gap_parts::{
     detectables, gap_rows, noise_rows, regime_rows, sensor, step_section, tiles,
 };
-use super::gap_words::micro;
+use super::gap_words::{map_words, micro};
 use super::page::{Gallery, OPEN_LIMIT};
 use super::text::{clean, count, fixed, reduced, sentence};
 use super::{Provenance, Report, ReportError};
@@ -77,6 +77,7 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
             chi2 => reduced(rest.reduced_chi2),
         },
         gap => gap_rows(verdict),
+        air_map => verdict.map.as_ref().map(map_words),
         sensor => sensor(verdict),
         detectables => detectables(verdict),
         scatter,

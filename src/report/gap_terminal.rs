@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::gap_parts::first_gap;
-use super::gap_words::{kind, per_thousand, percent};
+use super::gap_words::{kind, map_words, per_thousand, percent};
 use super::table::{Align, Column, column, lines};
 use super::text::{clean, count, fixed, reduced};
 use crate::gap::Verdict;
@@ -163,6 +163,9 @@ fn gap(page: &mut Page, verdict: &Verdict) {
     ];
     page.line("", "");
     page.table(&columns, &rows);
+    if let Some(map) = &verdict.map {
+        page.line("", &map_words(map));
+    }
 }
 
 fn shrink_row(name: &str, shrink: Shrink, named: bool) -> Vec<String> {

@@ -1,9 +1,9 @@
 //! Numbers and names of a verdict as people read them.
 
-use crate::gap::verdict::{Finding, Interval, Regime};
+use crate::gap::verdict::{Finding, Interval, MapGain, Regime};
 use crate::gap::words::short;
 
-use super::text::{NONE, clean, fixed, unit, usable};
+use super::text::{NONE, clean, count, fixed, unit, usable};
 
 /// Foreign or generated text with `µs` where files say `us`.
 pub(super) fn micro(text: &str) -> String {
@@ -45,6 +45,25 @@ pub(super) fn interval_to(interval: Interval, decimals: usize) -> String {
 pub(super) fn percent(Interval { value, low, high }: Interval) -> (String, String) {
     let of = |share: f64| fixed(100.0 * share, usize::from(high - low < 0.03));
     (format!("{} %", of(value)), format!("{} to {} %", of(low), of(high)))
+}
+
+/// What the findings do to the map of the air, where its truth is known.
+pub(super) fn map_words(map: &MapGain) -> String {
+    let signed = |value: f64| format!("{}{}", if value < 0.0 { "" } else { "+" }, fixed(value, 2));
+    format!(
+        "The map of the air of {} by the model, against the truth ({}, running means of 10 s): rms \
+         error {} m/s before, {} m/s after (answering zero: {}); what all drones have in common {} \
+         before, {} after; the rest {} and {}",
+        clean(&map.flight),
+        count(map.drones, "drone"),
+        fixed(map.before.rms_mps, 2),
+        fixed(map.after.rms_mps, 2),
+        fixed(map.zero_mps, 2),
+        signed(map.before.bias_mps),
+        signed(map.after.bias_mps),
+        fixed(map.before.without_bias_mps, 2),
+        fixed(map.after.without_bias_mps, 2),
+    )
 }
 
 /// A value with its unit.

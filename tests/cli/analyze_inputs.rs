@@ -233,9 +233,7 @@ fn of_two_boots_the_one_that_flew_the_plan_is_taken() {
         let told = told.join(" ");
         let words = "the log holds 2 boots of the autopilot; the ";
         // In one of the two flights it is the one that is taken without being asked.
-        for which in
-            ["one that flew the plan is analysed: the first", "last (number 2) is analysed"]
-        {
+        for which in ["one that flew the plan is analysed: the", "last (number 2) is analysed"] {
             assert!(told.contains(&format!("{words}{which}")), "{which}: {told}");
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{compare, logs, one_flight, write};
+use super::{Both, compare, logs, one_flight, write};
 use crate::base::file::create_folder;
 use crate::blind::explain::{Cause, Explain};
 use crate::blind::scenario::Scenario;
@@ -35,7 +35,9 @@ impl Explain for Written {
 fn explained(flight: &Path) -> Result<(Explained, Found), Cause> {
     let found = one_flight(flight, None)?;
     let vehicle = library::load(&FlightFolder::at(flight).vehicle().display().to_string())?;
-    Ok((compare(&found, None, &vehicle, &Options::default())?, found))
+    let both = Both { measured: &found, simulated: None, hover: None };
+    let explained = compare(&both, &vehicle, &Options::default())?;
+    Ok((explained, found))
 }
 
 /// `updraft gap` on a flight folder.

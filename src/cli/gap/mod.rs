@@ -15,9 +15,10 @@ use super::exit::{CommandError, Exit};
 use super::found::{Found, Work, find};
 use super::provenance::provenance;
 use super::words;
+use crate::analysis::TruthSeries;
 use crate::base::file::{create_folder, write_whole};
 use crate::campaign::{self, FlightFolder, to_json};
-use crate::gap::{Explained, Flown, Input, Options, Verdict, explain};
+use crate::gap::{Explained, Flown, Input, Measured, Options, Verdict, explain, map_gain};
 use crate::mission::plan::Purpose;
 use crate::report::{self, Provenance};
 use crate::vehicle::{Vehicle, library};
@@ -124,7 +125,9 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
         (None, None) => PathBuf::from("gap"),
     };
     let simulated = args.simulated.as_deref().map(|path| one_flight(path, None)).transpose()?;
-    let explained = compare(&found, simulated.as_ref(), &vehicle, &options)?;
+    let hover = args.campaign.as_deref().map(known_air).transpose()?.flatten();
+    let both = Both { measured: &found, simulated: simulated.as_ref(), hover: hover.as_ref() };
+    let explained = compare(&both, &vehicle, &options)?;
     create_folder(&folder)?;
     let _lock = context.lock(&folder)?;
     let root = args.campaign.as_ref().or(args.measured.as_ref()).cloned().unwrap_or_default();
@@ -253,6 +256,34 @@ fn one_flight(path: &Path, name: Option<&str>) -> Result<Found, CommandError> {
     })
 }
 
+/// The first measurement flight of a campaign whose true air is known (simulated ones).
+fn known_air(campaign: &Path) -> Result<Option<Found>, CommandError> {
+    let mut work = Work::new(campaign);
+    find(campaign, None, &mut work)?;
+    Ok(work.flights.into_iter().find_map(|mut flight| {
+        let is_measurement = flight.purpose == Some(Purpose::Measurement);
+        if !is_measurement || flight.logs.is_empty() {
+            return None;
+        }
+        if let Some(updraft_mps) = flight.true_updraft_mps.filter(|_| flight.truth.is_empty()) {
+            let plan = flight.plan.as_ref()?;
+            let ends = plan.groups.iter().flat_map(|group| &group.segments).map(|s| s.end_ms);
+            let seconds = ends.max().unwrap_or(0) as usize / 1000 + 60;
+            let same = TruthSeries { first_s: 0, updraft_mps: vec![updraft_mps; seconds] };
+            flight.truth = plan.slots.iter().map(|slot| (slot.slot, same.clone())).collect();
+        }
+        (!flight.truth.is_empty()).then_some(flight)
+    }))
+}
+
+/// The flights of a comparison.
+struct Both<'a> {
+    measured: &'a Found,
+    simulated: Option<&'a Found>,
+    /// A measurement flight whose true air is known.
+    hover: Option<&'a Found>,
+}
+
 /// The model that is held against the logs.
 fn model_of(args: &GapArgs, found: &Found) -> Result<Vehicle, CommandError> {
     if let Some(name) = &args.vehicle {
@@ -274,11 +305,11 @@ fn model_of(args: &GapArgs, found: &Found) -> Result<Vehicle, CommandError> {
 
 /// Reads the logs and compares.
 fn compare(
-    found: &Found,
-    simulated: Option<&Found>,
+    both: &Both<'_>,
     vehicle: &Vehicle,
     options: &Options,
 ) -> Result<Explained, CommandError> {
+    let Both { measured: found, simulated, hover } = *both;
     let read = logs::read(found, Path::new(""));
     let others = simulated.map(|simulated| logs::read(simulated, Path::new("")));
     let flown: Vec<Flown<'_>> =
@@ -302,5 +333,13 @@ fn compare(
         simulated: other.as_deref(),
         left_out,
     };
-    Ok(explain(&input, options)?)
+    let mut explained = explain(&input, options)?;
+    if let Some((hover, plan)) = hover.and_then(|hover| Some((hover, hover.plan.as_ref()?))) {
+        let read = logs::read(hover, Path::new(""));
+        let flown: Vec<Flown<'_>> =
+            read.flights.iter().map(|(slot, flight)| Flown { slot: *slot, flight }).collect();
+        let measured = Measured { name: &hover.name, plan, flown: &flown, truth: &hover.truth };
+        explained.verdict.map = map_gain(&input, &explained, &measured)?;
+    }
+    Ok(explained)
 }

@@ -1,0 +1,196 @@
+//! What naming is for: the error of the map of the air, by the model before and after.
+//!
+//! The law of the model is inverted in a measurement flight whose true air is known. What one drone's
+//! rotors differ by is its mean residual in the calibration's hovers, as the paper's baseline (eq. 5).
+
+use std::collections::BTreeMap;
+
+use super::compare::{Comparison, Simulated};
+use super::data::{Data, Flown};
+use super::error::GapError;
+use super::make::{Explained, Input};
+use super::scene::Scene;
+use super::verdict::{MapError, MapGain};
+use crate::analysis::TruthSeries;
+use crate::effects::{Model, Signals};
+use crate::mission::plan::Plan;
+use crate::vehicle::Vehicle;
+
+/// A measurement flight whose true air is known.
+#[derive(Debug)]
+pub struct Measured<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What was flown.
+    pub plan: &'a Plan,
+    /// The logs.
+    pub flown: &'a [Flown<'a>],
+    /// The true vertical air speed of each slot.
+    pub truth: &'a BTreeMap<u16, TruthSeries>,
+}
+
+/// Half of the running mean that estimates and truth are compared in, s.
+const HALF_S: f64 = 5.0;
+/// Vertical air that is looked for, m/s.
+const FASTEST_MPS: f64 = 10.0;
+/// Halvings of that.
+const HALVINGS: usize = 40;
+
+/// The error of the map before and after what was found; `None`: no drone has both flights and a
+/// truth.
+///
+/// # Errors
+/// See [`GapError`].
+pub fn map_gain(
+    input: &Input<'_>,
+    explained: &Explained,
+    measured: &Measured<'_>,
+) -> Result<Option<MapGain>, GapError> {
+    let Some(plan) = input.plan else { return Ok(None) };
+    let exponent = super::compare::thrust_exponent(input.vehicle);
+    let ladder = Data::of_plan(plan, input.flown, exponent);
+    let hover = Data::of_plan(measured.plan, measured.flown, exponent);
+    if ladder.drones() == 0 || hover.drones() == 0 {
+        return Ok(None);
+    }
+    let gusts_mps = explained.found.gusts_mps;
+    let errors = |vehicle: &Vehicle| -> Result<(Vec<f64>, Vec<f64>), GapError> {
+        let calibration = Comparison::new(&ladder, vehicle, &Simulated::Refly(plan), Some(plan))?;
+        let offsets_us = offsets(&calibration, gusts_mps)?;
+        let flight = Simulated::Refly(measured.plan);
+        let comparison = Comparison::new(&hover, vehicle, &flight, Some(measured.plan))?;
+        errors_of(&comparison, gusts_mps, &offsets_us, measured.truth)
+    };
+    let (before, zero) = errors(input.vehicle)?;
+    let (after, _) = errors(&explained.found.vehicle)?;
+    let drones = hover
+        .groups
+        .iter()
+        .flat_map(|group| &group.slots)
+        .filter(|slot| measured.truth.contains_key(slot))
+        .count();
+    Ok((!before.is_empty() && !after.is_empty()).then(|| MapGain {
+        flight: measured.name.to_owned(),
+        drones,
+        values: after.len(),
+        zero_mps: rms(&zero),
+        before: summed(&before),
+        after: summed(&after),
+    }))
+}
+
+/// Each drone's mean residual in the hovers of its calibration, us.
+fn offsets(calibration: &Comparison, gusts_mps: f64) -> Result<BTreeMap<u16, f64>, GapError> {
+    let residual = calibration.residual(&calibration.vehicle, gusts_mps)?;
+    let mut offsets_us = BTreeMap::new();
+    for (group, drones) in calibration.data.groups.iter().zip(&residual) {
+        for (slot, values) in group.slots.iter().zip(drones) {
+            let hovers = group.bins.iter().zip(values).filter(|(bin, _)| bin.kind.is_hover());
+            let (sum, count) = hovers.fold((0.0, 0.0), |(s, n), (_, value)| (s + value, n + 1.0));
+            if count > 0.0 {
+                offsets_us.insert(*slot, sum / count);
+            }
+        }
+    }
+    Ok(offsets_us)
+}
+
+/// Errors of the running means of the estimates, and the truth itself, m/s.
+fn errors_of(
+    comparison: &Comparison,
+    gusts_mps: f64,
+    offsets_us: &BTreeMap<u16, f64>,
+    truth: &BTreeMap<u16, TruthSeries>,
+) -> Result<(Vec<f64>, Vec<f64>), GapError> {
+    let model = Model::of(&comparison.vehicle)?;
+    let residual = comparison.residual(&comparison.vehicle, gusts_mps)?;
+    let Comparison { data, scene: Scene { signals, .. }, .. } = comparison;
+    let (mut errors, mut truths) = (Vec::new(), Vec::new());
+    for ((group, signals), drones) in data.groups.iter().zip(signals).zip(&residual) {
+        for (slot, values) in group.slots.iter().zip(drones) {
+            let (Some(offset_us), Some(truth)) = (offsets_us.get(slot), truth.get(slot)) else {
+                continue;
+            };
+            let updraft_mps: Vec<f64> = signals
+                .iter()
+                .zip(values)
+                .map(|(signals, value)| inverted(&model, signals, value - offset_us))
+                .collect();
+            for (bin, middle) in group.bins.iter().enumerate() {
+                let near = |other: &usize| {
+                    (group.bins[*other].middle_s() - middle.middle_s()).abs() < HALF_S
+                };
+                let near: Vec<usize> = (0..group.bins.len()).filter(near).collect();
+                let mean = near.iter().map(|other| updraft_mps[*other]).sum::<f64>()
+                    / near.len().max(1) as f64;
+                if group.bins[bin].kind.is_hover()
+                    && let Some(true_mps) = at(truth, middle.middle_s())
+                {
+                    errors.push(mean - true_mps);
+                    truths.push(true_mps);
+                }
+            }
+        }
+    }
+    Ok((errors, truths))
+}
+
+/// The true running mean at a time.
+fn at(truth: &TruthSeries, time_s: f64) -> Option<f64> {
+    let index = usize::try_from((time_s.round() as i64).checked_sub(truth.first_s)?).ok()?;
+    truth.updraft_mps.get(index).copied().filter(|value| value.is_finite())
+}
+
+/// The updraft in which the model asks for so much more pulse, m/s.
+fn inverted(model: &Model, signals: &Signals, more_us: f64) -> f64 {
+    let pulse_us = |updraft_mps: f64| {
+        model.pulse_us(&Signals { climb_mps: signals.climb_mps - updraft_mps, ..*signals })
+    };
+    let wanted_us = pulse_us(0.0) + more_us;
+    let (mut low, mut high) = (-FASTEST_MPS, FASTEST_MPS);
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(low, high);
+        // More updraft, less pulse.
+        if pulse_us(middle) > wanted_us { low = middle } else { high = middle }
+    }
+    f64::midpoint(low, high)
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+fn summed(errors: &[f64]) -> MapError {
+    let bias_mps = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+    let rms_mps = rms(errors);
+    let without_bias_mps = (rms_mps * rms_mps - bias_mps * bias_mps).max(0.0).sqrt();
+    MapError { rms_mps, bias_mps, without_bias_mps }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicle::library;
+
+    #[test]
+    fn a_pulse_is_inverted_to_the_air_that_made_it() {
+        let mut vehicle = library::builtin("airsim-generic-quad").unwrap();
+        super::super::candidates::set(&mut vehicle, "rotor-inflow", "inflow_share", 0.3);
+        let model = Model::of(&vehicle).unwrap();
+        let signals = Signals::default();
+        for updraft_mps in [-2.0, -0.3, 0.0, 0.7, 3.0] {
+            let blown = Signals { climb_mps: -updraft_mps, ..signals };
+            let more_us = model.pulse_us(&blown) - model.pulse_us(&signals);
+            let found = inverted(&model, &signals, more_us);
+            assert!((found - updraft_mps).abs() < 1e-6, "{updraft_mps}: {found}");
+        }
+    }
+
+    #[test]
+    fn errors_are_split_into_bias_and_rest() {
+        let error = summed(&[1.0, 3.0]);
+        assert!((error.bias_mps - 2.0).abs() < 1e-12);
+        assert!((error.rms_mps - 5.0_f64.sqrt()).abs() < 1e-12);
+        assert!((error.without_bias_mps - 1.0).abs() < 1e-12);
+    }
+}
