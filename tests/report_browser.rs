@@ -69,11 +69,11 @@ fn the_report_works_in_a_browser() {
     let title = "document.querySelector('.gallery figure svg title').textContent";
     tab.click_on("a[data-drone$='drone-17']");
     assert!(tab.text(chosen).ends_with("-drone-17"), "{}", tab.text(chosen));
-    assert_eq!(tab.text(title), "Calibration of Drone 17");
+    assert_eq!(tab.text(title), "Calibration of Drone 17 (paper's Fig. 3)");
     tab.run("document.querySelector(\"a[data-drone$='drone-30']\").focus()");
     tab.press(Key::Enter);
     tab.wait_for("document.querySelector('.gallery select').value.endsWith('-drone-30')");
-    assert_eq!(tab.text(title), "Calibration of Drone 30");
+    assert_eq!(tab.text(title), "Calibration of Drone 30 (paper's Fig. 3)");
     // The page scrolls there, smoothly.
     let top = "document.querySelector('.gallery').getBoundingClientRect().top";
     tab.wait_for(&format!("{top} > -5 && {top} < 400"));

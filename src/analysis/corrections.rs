@@ -159,18 +159,15 @@ impl Corrections<'_> {
         doubts_us[DENSITY] = (pulse_us - NO_THRUST_US) * log_density;
         let flown_s = raw.time_s.max(0.0);
         let warm = WARM_UP_US * (1.0 - (-flown_s / WARM_UP_S).exp());
-        match pack.zip(raw.resting_v) {
-            Some((pack, resting_v)) => {
-                let (referred, per_exponent) = pack.refer(pulse_us, resting_v);
-                pulse_us = referred;
-                doubts_us[BATTERY] = per_exponent;
-                doubts_us[DRIFT] = warm;
-            }
-            None => {
-                let level = (pulse_us - NO_THRUST_US) * self.unknown_share;
-                let drift = UNKNOWN_VOLTAGE_US * flown_s / 60.0;
-                doubts_us[DRIFT] = warm.hypot(drift).hypot(level);
-            }
+        if let Some((pack, resting_v)) = pack.zip(raw.resting_v) {
+            let (referred, per_exponent) = pack.refer(pulse_us, resting_v);
+            pulse_us = referred;
+            doubts_us[BATTERY] = per_exponent;
+            doubts_us[DRIFT] = warm;
+        } else {
+            let level = (pulse_us - NO_THRUST_US) * self.unknown_share;
+            let drift = UNKNOWN_VOLTAGE_US * flown_s / 60.0;
+            doubts_us[DRIFT] = warm.hypot(drift).hypot(level);
         }
         Referred { velocity_mps, pulse_us, doubts_us, steeper }
     }

@@ -369,7 +369,9 @@ fn finish(
     }
     // Where neither tables nor the object are printed, what is lost would go unsaid.
     if context.quiet && !context.json && !nothing {
-        problems(&analysis, false).iter().for_each(|problem| context.warn(problem));
+        for problem in problems(&analysis, false) {
+            context.warn(&problem);
+        }
     }
     if let Some(page) = &page {
         context.result(page)?;

@@ -75,7 +75,10 @@ pub(super) fn nothing_found(analysis: &Analysis, reasons: bool) -> CommandError 
             text.push_str(problem);
         }
         if problems.len() > LISTED {
-            text.push_str(&format!("{BECAUSE}and {} more", problems.len() - LISTED));
+            text.push_str(BECAUSE);
+            text += "and ";
+            text += &(problems.len() - LISTED).to_string();
+            text += " more";
         }
     }
     CommandError::Nothing(text)

@@ -164,7 +164,7 @@ fn gap(page: &mut Page, verdict: &Verdict) {
     page.line("", "");
     page.table(&columns, &rows);
     if let Some(map) = &verdict.map {
-        page.line("", &map_words(map));
+        page.say("", &map_words(map), 2);
     }
 }
 

@@ -4,8 +4,8 @@
 
 use updraft::gap::Verdict;
 use updraft::gap::verdict::{
-    DataUsed, Detectable, DroneOffset, Drones, Finding, Fitted, Gap, Interval, Noise, Regime, Rest,
-    Rival, Rung, SensorChannel, Shape, Shrink, Step, VERDICT_SCHEMA,
+    DataUsed, Detectable, DroneOffset, Drones, Finding, Fitted, Gap, Interval, MapError, MapGain,
+    Noise, Regime, Rest, Rival, Rung, SensorChannel, Shape, Shrink, Step, VERDICT_SCHEMA,
 };
 use updraft::gap::words::summary;
 use updraft::report::Provenance;
@@ -151,6 +151,14 @@ pub(crate) fn nothing() -> Verdict {
         held_out: slot.is_multiple_of(4),
     });
     let mut verdict = Verdict {
+        map: Some(MapGain {
+            flight: "hover".to_owned(),
+            drones: 7,
+            values: 1200,
+            zero_mps: 0.42,
+            before: MapError { rms_mps: 0.61, bias_mps: -0.5, without_bias_mps: 0.35 },
+            after: MapError { rms_mps: 0.21, bias_mps: 0.15, without_bias_mps: 0.15 },
+        }),
         wind: updraft::gap::verdict::WindFound::default(),
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: "updraft test".to_owned(),
