@@ -21,6 +21,8 @@ mod measure;
 mod minimise;
 pub mod next;
 mod noise;
+#[cfg(test)]
+mod null_flights;
 mod posterior;
 mod refine;
 mod refly;
