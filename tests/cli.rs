@@ -29,6 +29,8 @@ mod fleet_refusals;
 #[cfg(unix)]
 #[path = "cli/fleet_upload.rs"]
 mod fleet_upload;
+#[path = "cli/gap.rs"]
+mod gap;
 #[path = "cli/guided.rs"]
 mod guided;
 #[path = "cli/help.rs"]

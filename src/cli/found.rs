@@ -117,7 +117,10 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         vec![path.to_owned()]
     };
     if logs.is_empty() {
-        return Err(CommandError::Nothing(format!("{} holds no .BIN logs", path.display())));
+        return Err(CommandError::Nothing(format!(
+            "{} holds no .BIN logs: give a campaign, or the folder in which they are",
+            path.display()
+        )));
     }
     work.flights.push(Found {
         name: stem(path),

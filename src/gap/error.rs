@@ -27,8 +27,9 @@ pub enum GapError {
     NothingCommon,
     /// The pulse never changes.
     #[error(
-        "the pulse is the same ({value_us:.1} us) in all of the flight: the logs hold a constant, \
-         not motor outputs"
+        "the pulse is the same ({value_us:.1} us) in all of the flight: RCOU in the logs holds a \
+         constant, not what the motors were told; log the outputs that they hang on (SERVOn_FUNCTION \
+         33 to 40)"
     )]
     ConstantPulse {
         /// Its value, us.

@@ -23,6 +23,8 @@ pub(super) struct Generic {
 
 /// Wavelengths of height that are tried, m.
 const WAVES_M: [f64; 7] = [10.0, 15.0, 20.0, 28.0, 40.0, 56.0, 80.0];
+/// Air speed from which a direction alone may count, m/s.
+const KNEE_MPS: f64 = 1.5;
 /// Instants at which a step is tried.
 const STEPS: usize = 15;
 /// A signal that moves less than this share of its scale says nothing.
@@ -105,23 +107,34 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
             penalty: 4.0,
         });
     }
-    // A direction that does not change is an offset.
-    let turns = |of: fn(f64) -> f64| {
-        let value = |(angle, signals): (&f64, &Signals)| of(*angle) * signals.horizontal_mps;
-        let group = |(angles, signals): (&Vec<f64>, &Vec<Signals>)| {
-            angles.iter().zip(signals).map(value).collect()
+    // A direction that does not change is an offset. Its effect may grow with the speed of the air or be
+    // there at any.
+    for knee_mps in [f64::INFINITY, KNEE_MPS] {
+        let turns = |of: fn(f64) -> f64| {
+            let value = |(angle, signals): (&f64, &Signals)| {
+                let speed_mps = signals.horizontal_mps;
+                let grown = if knee_mps.is_finite() {
+                    knee_mps * speed_mps / speed_mps.hypot(knee_mps)
+                } else {
+                    speed_mps
+                };
+                of(*angle) * grown
+            };
+            let group = |(angles, signals): (&Vec<f64>, &Vec<Signals>)| {
+                angles.iter().zip(signals).map(value).collect()
+            };
+            headings.iter().zip(&scene.signals).map(group).collect::<Vec<Vec<f64>>>()
         };
-        headings.iter().zip(&scene.signals).map(group).collect::<Vec<Vec<f64>>>()
-    };
-    let (ahead, aside) = (turns(f64::cos), turns(f64::sin));
-    if span(&ahead).max(span(&aside)) > 1.5 {
-        found.push(Generic {
-            depends_on: "heading",
-            axis: "direction of the air from the nose (rad)",
-            columns: vec![Column::Shared(ahead), Column::Shared(aside)],
-            along: headings.to_vec(),
-            penalty: 2.0,
-        });
+        let (ahead, aside) = (turns(f64::cos), turns(f64::sin));
+        if span(&ahead).max(span(&aside)) > 1.5 {
+            found.push(Generic {
+                depends_on: "heading",
+                axis: "direction of the air from the nose (rad)",
+                columns: vec![Column::Shared(ahead), Column::Shared(aside)],
+                along: headings.to_vec(),
+                penalty: 2.0 + 2.0_f64.ln(),
+            });
+        }
     }
     found
 }

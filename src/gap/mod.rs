@@ -22,6 +22,8 @@ mod measure;
 mod minimise;
 pub mod next;
 mod noise;
+#[cfg(test)]
+mod null_flights;
 mod posterior;
 mod refine;
 mod refly;

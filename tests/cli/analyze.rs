@@ -95,7 +95,8 @@ fn nothing_to_work_on() {
     assert_eq!(planned.err.matches("error").count(), 1, "{planned}");
     fs::create_dir(bench.path("empty")).unwrap();
     let empty = bench.expect(5, &["analyze", "empty"]);
-    assert_eq!(empty.err, "error: empty holds no .BIN logs\n");
+    let words = "empty holds no .BIN logs: give a campaign, or the folder in which they are";
+    assert_eq!(empty.err, format!("error: {words}\n"));
     assert_eq!(contents(&bench.path("campaign")), before);
     let missing = bench.run(&["analyze", "not-there"]);
     assert!(matches!(missing.code, Some(1 | 2 | 5)), "{missing}");

@@ -17,7 +17,8 @@ use super::provenance::provenance;
 use super::words;
 use crate::analysis::TruthSeries;
 use crate::base::file::{create_folder, write_whole};
-use crate::campaign::{self, FlightFolder, to_json};
+use crate::campaign::{self, CampaignError, FlightFolder, to_json};
+use crate::effects::select::resolved;
 use crate::gap::{Explained, Flown, Input, Measured, Options, Verdict, explain, map_gain};
 use crate::mission::plan::Purpose;
 use crate::report::{self, Provenance};
@@ -119,11 +120,22 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
     };
     let found = measured(args)?;
     let vehicle = model_of(args, &found)?;
+    // Before anything is flown: what is wrong with the model is the file's fault, not the flight's.
+    resolved(&vehicle).map_err(|error| {
+        let file = args.vehicle.as_ref().unwrap_or(&vehicle.name);
+        CommandError::Usage(format!("the model {file} cannot be used: {error}"))
+    })?;
     let folder = match (&args.output, &args.campaign) {
         (Some(folder), _) => folder.clone(),
         (None, Some(campaign)) => campaign.join("gap"),
         (None, None) => PathBuf::from("gap"),
     };
+    if folder.exists() && !folder.is_dir() {
+        return Err(CommandError::Failed(format!(
+            "{} is a file: --output must name a folder",
+            folder.display()
+        )));
+    }
     let simulated = args.simulated.as_deref().map(|path| one_flight(path, None)).transpose()?;
     let hover = args.campaign.as_deref().map(known_air).transpose()?.flatten();
     let both = Both { measured: &found, simulated: simulated.as_ref(), hover: hover.as_ref() };
@@ -206,13 +218,7 @@ fn measured(args: &GapArgs) -> Result<Found, CommandError> {
                     "a campaign has its own plan; --plan goes with --measured".to_owned(),
                 ));
             }
-            if !campaign::is_campaign(campaign) {
-                return Err(CommandError::Usage(format!(
-                    "{} is no campaign folder: it has no plan.json and no campaign.json (for logs \
-                     alone: --measured LOGS with --plan or --simulated)",
-                    campaign.display()
-                )));
-            }
+            is_campaign(campaign)?;
             one_flight(campaign, args.flight.as_deref())
         }
         (None, Some(path)) => {
@@ -223,6 +229,19 @@ fn measured(args: &GapArgs) -> Result<Found, CommandError> {
             Ok(found)
         }
         (None, None) => Err(CommandError::Usage("give a campaign or --measured".to_owned())),
+    }
+}
+
+/// That there is a campaign to compare; if not, what to do with what is there instead.
+fn is_campaign(campaign: &Path) -> Result<(), CommandError> {
+    match campaign::flights(campaign) {
+        Ok(_) => Ok(()),
+        Err(CampaignError::NoPlan { path }) => Err(CommandError::Nothing(format!(
+            "{} is no campaign folder: it has no plan.json and no campaign.json (for logs alone: \
+             --measured LOGS with --plan or --simulated)",
+            path.display()
+        ))),
+        Err(error) => Err(error.into()),
     }
 }
 
@@ -319,12 +338,20 @@ fn compare(
     });
     let mut left_out = read.left_out.clone();
     left_out.extend(others.iter().flat_map(|others| others.left_out.clone()));
+    let unusable = |logs: &str, reasons: &[String]| {
+        CommandError::Nothing(format!(
+            "none of the {logs} can be used:\n  {}",
+            reasons.join("\n  ")
+        ))
+    };
     if flown.is_empty() {
-        return Err(CommandError::Nothing(format!(
-            "none of the {} can be used:\n  {}",
-            words::count(found.logs.len(), "log"),
-            left_out.join("\n  ")
-        )));
+        return Err(unusable(&words::count(found.logs.len(), "log"), &left_out));
+    }
+    if let (Some(simulated), Some(others)) = (simulated, &others)
+        && others.flights.is_empty()
+    {
+        let logs = words::count(simulated.logs.len(), "simulated log");
+        return Err(unusable(&logs, &others.left_out));
     }
     let input = Input {
         vehicle,

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::blind::Searched;
 use super::{MODEL, VERDICT};
-use crate::base::file::write_whole;
+use crate::base::file::{FileError, write_whole};
 use crate::blind::rehearse::{Rehearsal, answers, rehearse};
 use crate::campaign::{self, FlightFolder, read_json, to_json};
 use crate::cli::check::{Origin, checked, is_safe};
@@ -178,6 +178,8 @@ impl Before {
         let campaign = &args.campaign;
         let place = campaign.join("gap").join(VERDICT);
         if !place.is_file() {
+            // A folder that is not there is another matter than one that was not compared.
+            std::fs::metadata(campaign).map_err(|error| FileError::new("read", campaign, error))?;
             return Err(CommandError::Nothing(format!(
                 "{} has no gap/{VERDICT}: compare it first (`updraft gap {}`)",
                 campaign.display(),
