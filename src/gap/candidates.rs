@@ -3,8 +3,9 @@
 
 use super::compare::Comparison;
 use super::gls::{Column, Solution};
+use super::refine::value_of;
 use super::scene::Scene;
-use crate::effects::{EffectError, LIBRARY, Reference, Sought};
+use crate::effects::{EffectError, LIBRARY, Sought};
 use crate::vehicle::Vehicle;
 
 /// Change of a size that is in the model already, for its derivative.
@@ -120,20 +121,26 @@ fn sizes_usual(name: &str, vehicle: &Vehicle, default: fn(&Vehicle) -> f64) -> f
     if name == "thrust-curve" { 0.5 } else { default(vehicle) }
 }
 
+/// Nominal voltage of a cell, V.
+const NOMINAL_V: f64 = 3.85;
+/// A voltage per cell that is so far from it is of another number of cells, V.
+const OTHER_V: f64 = 0.4;
+
 /// Sets what the logs say of an effect that is to be tried.
 fn prepare(vehicle: &mut Vehicle, name: &str, scene: &Scene) {
     let is_new = !vehicle.effects.get(name).is_some_and(|table| table.on);
     if name == "battery" && is_new && scene.resting_v > 0.0 {
         set(vehicle, name, "cells", scene.cells);
         set(vehicle, name, "initial_charge", 1.0);
-        let resistance_ohm = scene.resistance_ohm.unwrap_or(0.0).clamp(0.0, 1.0);
-        if scene.resistance_ohm.is_some() {
-            set(vehicle, name, "resistance_ohm", resistance_ohm);
+        if let Some(resistance_ohm) = scene.resistance_ohm {
+            set(vehicle, name, "resistance_ohm", resistance_ohm.clamp(0.0, 1.0));
         }
-        // The model's hover is taken for that at the flight's mean voltage, under load.
-        let amps = Reference::of(vehicle).hover_w() / scene.resting_v;
-        let loaded_v = (scene.resting_v - amps * resistance_ohm).max(0.5 * scene.resting_v);
-        set(vehicle, name, "reference_v", loaded_v);
+        // The model's hover is stated for its own nominal voltage, unless its battery is another.
+        if value_of(vehicle, name, "reference_v")
+            .is_none_or(|volts| (volts / scene.cells - NOMINAL_V).abs() > OTHER_V)
+        {
+            set(vehicle, name, "reference_v", scene.cells * NOMINAL_V);
+        }
     }
 }
 
