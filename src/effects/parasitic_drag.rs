@@ -57,7 +57,7 @@ impl Effect for ParasiticDrag {
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Climb, -3.5, 3.5),
-            sought: Sought::Shape { size: "vertical_m2", sizes: &[0.02], shape: None },
+            sought: Sought::Shape { size: "vertical_m2", sizes: &[0.02, 0.1], shape: None },
         }
     }
 

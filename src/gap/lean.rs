@@ -233,7 +233,7 @@ const FEWEST_MOVING: usize = 4;
 /// Scatter of a bin's lean: gusts, and legs that are too short to settle, rad.
 const UNIT_RAD: f64 = 0.005;
 /// How far the model's own law is doubted: its quadratic part (a share), its linear part, rad/(m/s).
-const SQUARE_DOUBT: f64 = 0.15;
+const SQUARE_DOUBT: f64 = 0.4;
 const LINEAR_DOUBT: f64 = 0.01;
 /// Gusts move neighbouring bins together: errors are larger than independent bins would say.
 const TOGETHER: f64 = 2.0;
