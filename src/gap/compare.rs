@@ -213,13 +213,49 @@ impl Comparison {
         self.wind.air_mps.iter().map(|group| group.iter().map(angle).collect()).collect()
     }
 
-    /// Pulses of a vehicle in the wind that its own law reads from the leans, where no leg tells more.
+    /// Pulses of a vehicle in the wind that its own law reads from the leans, where no leg tells more;
+    /// with the gusts of that wind where the law is believed so far, or in its mean alone.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
-    pub fn pulses_by_lean(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
-        let wind = wind(&self.data, lean_law(vehicle, self.amsl_m), None);
+    pub fn pulses_by_lean(
+        &self,
+        vehicle: &Vehicle,
+        with_gusts: bool,
+    ) -> Result<Column, EffectError> {
+        let mut wind = wind(&self.data, lean_law(vehicle, self.amsl_m), None);
+        if !with_gusts {
+            let steady =
+                |bin: &Bin| [0, 1].map(|axis| bin.velocity_mps[axis] - wind.mean_mps[axis]);
+            let groups = self.data.groups.iter();
+            wind.air_mps = groups.map(|group| group.bins.iter().map(steady).collect()).collect();
+        }
         Scene::measured(&self.data, &self.side, &wind, self.amsl_m).pulses(vehicle)
+    }
+
+    /// What one standard error of the wind does to the pulse, along either axis of the show.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub fn wind_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
+        let base = self.scene.pulses(vehicle)?;
+        let mut doubts = Vec::new();
+        for axis in 0..2 {
+            let mut scene = self.scene.clone();
+            for (signals, air) in scene.signals.iter_mut().zip(&self.wind.air_mps) {
+                for (signals, air) in signals.iter_mut().zip(air) {
+                    let mut air = *air;
+                    air[axis] -= self.wind.mean_se_mps[axis];
+                    signals.horizontal_mps = air[0].hypot(air[1]);
+                }
+            }
+            let doubt = scene.pulses(vehicle)?.less(&base);
+            // Where the model does not feel wind there is nothing to doubt.
+            if doubt.spread(&self.data.counts()) > LEAST_DOUBT_US {
+                doubts.push(doubt);
+            }
+        }
+        Ok(doubts)
     }
 
     /// What a change of the vehicle adds to the pulse.
@@ -236,6 +272,8 @@ fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
     values.iter().map(|group| group.iter().flatten().copied().collect()).collect()
 }
 
+/// Doubts of a smaller effect are left out, us.
+const LEAST_DOUBT_US: f64 = 1e-3;
 /// Fewest bins of a comparison.
 const FEWEST_BINS: usize = 12;
 

@@ -98,13 +98,14 @@ pub fn search(
         // Gusts that the residual shows bend the model's curve: known physics first.
         let mut free = found.extras.clone();
         free.extend(slopes(&comparison, &found.vehicle, &found.parameters)?);
-        let with_extras = |split| Problem::new(&patterns, split).with(&free);
+        let doubts = comparison.wind_doubts(&found.vehicle)?;
+        let with_extras = |split| Problem::new(&patterns, split).doubting(&doubts).with(&free);
         let quick = with_extras(&split).fit(found.hyper, Likelihood::Profile);
         found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         // What was named before stays free: its size may change with what comes after.
-        let problem = Problem::new(&patterns, &split).with(&free);
+        let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&free);
         let least = quick.hyper.get(LEAST);
         let mut candidates = library(&found.vehicle, &comparison.scene)?;
         candidates.extend(read_otherwise(&comparison, &found.vehicle)?);
@@ -345,7 +346,10 @@ impl Found {
             let others: Vec<Parameter> =
                 self.parameters.iter().filter(|p| p.effect != effect).cloned().collect();
             let slopes = slopes(comparison, &self.vehicle, &others)?;
-            let problem = Problem::new(&patterns, &split).with(&self.extras).with(&slopes);
+            let problem = Problem::new(&patterns, &split)
+                .doubting(&comparison.wind_doubts(&self.vehicle)?)
+                .with(&self.extras)
+                .with(&slopes);
             let solution = problem.at(&self.hyper);
             let without = taken_back(&self.vehicle, effect, original);
             let trace = comparison.change(&without, &self.vehicle)?;

@@ -124,6 +124,8 @@ pub(super) fn means_of(pulses: &Pulses) -> Vec<Vec<f64>> {
 pub(super) struct Split {
     means: Vec<Vec<f64>>,
     deviations: Pulses,
+    /// Whether its coefficient is known to be 0 within 1.
+    is_doubt: bool,
 }
 
 impl Split {
@@ -139,7 +141,7 @@ impl Split {
                 drones.iter().map(from_mean).collect()
             })
             .collect();
-        Self { means, deviations }
+        Self { means, deviations, is_doubt: false }
     }
 
     /// Each drone's deviations from the mean of its group.
@@ -149,7 +151,9 @@ impl Split {
 
     fn of_column(column: &Column) -> Self {
         match column {
-            Column::Shared(_) => Self { means: column.means(), deviations: Vec::new() },
+            Column::Shared(_) => {
+                Self { means: column.means(), deviations: Vec::new(), is_doubt: false }
+            }
             Column::Own(values) => Self::of(values),
         }
     }
@@ -160,6 +164,8 @@ impl Split {
 pub(super) struct White {
     means: Vec<f64>,
     deviations: Vec<f64>,
+    /// What is known of coefficients, as observations of their own: the place is the regressor's.
+    known: Vec<f64>,
 }
 
 impl White {
@@ -172,12 +178,14 @@ impl White {
                 drones.iter().flat_map(move |drone| whitener.deviation(group, drone))
             })
             .collect();
-        Self { means: whitener.means(&split.means), deviations }
+        Self { means: whitener.means(&split.means), deviations, known: Vec::new() }
     }
 
     fn dot(&self, other: &Self) -> f64 {
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        product(&self.means, &other.means) + product(&self.deviations, &other.deviations)
+        product(&self.means, &other.means)
+            + product(&self.deviations, &other.deviations)
+            + product(&self.known, &other.known)
     }
 }
 
@@ -207,12 +215,28 @@ impl<'a> Problem<'a> {
         more
     }
 
+    /// With what is not known exactly: regressors of one standard deviation each.
+    #[must_use]
+    pub(super) fn doubting<'c>(&self, columns: impl IntoIterator<Item = &'c Column>) -> Self {
+        let mut more = self.clone();
+        let doubts = columns.into_iter().map(Split::of_column);
+        more.columns.extend(doubts.map(|column| Split { is_doubt: true, ..column }));
+        more
+    }
+
     /// At fixed noise.
     pub(super) fn at(&self, hyper: &Hyper) -> Solution {
         let whitener = Whitener::new(self.groups, hyper);
         let y = White::of(&whitener, self.pulses);
-        let columns: Vec<White> =
-            self.columns.iter().map(|column| White::of(&whitener, column)).collect();
+        let white = |(place, column): (usize, &Split)| {
+            let mut white = White::of(&whitener, column);
+            if column.is_doubt {
+                white.known = vec![0.0; place];
+                white.known.push(1.0);
+            }
+            white
+        };
+        let columns: Vec<White> = self.columns.iter().enumerate().map(white).collect();
         Solution::new(whitener, y, columns, *hyper)
     }
 
@@ -358,7 +382,11 @@ impl Solution {
         if rest.deviations.is_empty() && self.columns.iter().any(|c| !c.deviations.is_empty()) {
             rest.deviations = vec![0.0; self.y.deviations.len()];
         }
+        rest.known.resize(self.columns.len(), 0.0);
         for (column, beta) in self.columns.iter().zip(beta.iter()) {
+            for (value, part) in rest.known.iter_mut().zip(&column.known) {
+                *value -= beta * part;
+            }
             for (value, part) in rest.means.iter_mut().zip(&column.means) {
                 *value -= beta * part;
             }

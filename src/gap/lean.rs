@@ -79,6 +79,8 @@ impl LeanLaw {
 pub struct Wind {
     /// Mean wind, show frame, towards, m/s.
     pub mean_mps: [f64; 2],
+    /// Its standard errors, m/s.
+    pub mean_se_mps: [f64; 2],
     /// Air speed of each group's drones in each bin, show frame, m/s.
     pub air_mps: Vec<Vec<[f64; 2]>>,
     /// Lean law that the flight's horizontal legs showed; `None`: it has none, and the model's was
@@ -165,8 +167,17 @@ pub(super) fn wind(
             smooth(group, &raw)
         })
         .collect();
-    Wind { mean_mps, air_mps, measured }
+    let share = if measured.is_some() { LEGS_DOUBT } else { LAW_DOUBT };
+    let speed_mps = mean_mps[0].hypot(mean_mps[1]);
+    let mean_se_mps = [LEAST_DOUBT_MPS.hypot(share * speed_mps); 2];
+    Wind { mean_mps, mean_se_mps, air_mps, measured }
 }
+
+/// What the wind that leans say is wrong by: the least, m/s, ...
+const LEAST_DOUBT_MPS: f64 = 0.1;
+/// ... and as a share of it, by a law that legs measured, or by the model's alone.
+const LEGS_DOUBT: f64 = 0.08;
+const LAW_DOUBT: f64 = 0.3;
 
 /// Time scales of gusts that are tried, s, and shares of what is scatter.
 const GUST_S: [f64; 3] = [12.0, 25.0, 60.0];
@@ -233,7 +244,7 @@ const FEWEST_MOVING: usize = 4;
 /// Scatter of a bin's lean: gusts, and legs that are too short to settle, rad.
 const UNIT_RAD: f64 = 0.005;
 /// How far the model's own law is doubted: its quadratic part (a share), its linear part, rad/(m/s).
-const SQUARE_DOUBT: f64 = 0.4;
+const SQUARE_DOUBT: f64 = 0.15;
 const LINEAR_DOUBT: f64 = 0.01;
 /// Gusts move neighbouring bins together: errors are larger than independent bins would say.
 const TOGETHER: f64 = 2.0;

@@ -73,7 +73,8 @@ pub(super) fn refine(
         let patterns = comparison.patterns(&vehicle, gusts_mps)?;
         let split = Split::of(&comparison.residual(&vehicle, gusts_mps)?);
         let slopes = slopes(comparison, &vehicle, parameters)?;
-        let problem = Problem::new(&patterns, &split).with(extras).with(&slopes);
+        let doubts = comparison.wind_doubts(&vehicle)?;
+        let problem = Problem::new(&patterns, &split).doubting(&doubts).with(extras).with(&slopes);
         let is_fitted = fit_noise && (round == 0 || round == 2);
         let solution =
             if is_fitted { problem.fit(hyper, Likelihood::Restricted) } else { problem.at(&hyper) };
@@ -203,7 +204,8 @@ pub(super) fn size_errors(
     let patterns = comparison.patterns(vehicle, 0.0)?;
     let split = Split::of(&comparison.residual(vehicle, 0.0)?);
     let slopes = slopes(comparison, vehicle, parameters)?;
-    let problem = Problem::new(&patterns, &split).with(&slopes);
+    let doubts = comparison.wind_doubts(vehicle)?;
+    let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&slopes);
     let solution = problem.fit(Hyper::default(), Likelihood::Restricted);
     let covariance = solution.covariance();
     let first = solution.beta.len() - parameters.len();

@@ -92,8 +92,9 @@ fn what_the_flown_vehicle_had_and_the_model_lacks_is_named() {
     let args = ["simulate", "campaign", "--vehicle", "true.toml", "--force", "--quiet"];
     bench.expect(0, &args);
     let ended = bench.expect(0, &["gap", "campaign", "--vehicle", "base.toml", "--json"]);
-    let first = &ended.json("updraft.gap/1")["verdict"]["steps"][0]["finding"];
-    assert_eq!(first["effect"], "rotor-inflow", "{ended}");
+    // Four drones for a minute: stronger drag may explain it as well, and then both are named.
+    let summary = ended.json("updraft.gap/1")["verdict"]["summary"].to_string();
+    assert!(summary.contains("rotor-inflow (inflow_share 0.40"), "{ended}");
     // The model that it leads to flies as the logs say.
     let again = bench.expect(0, &["gap", "campaign", "--vehicle", "campaign/gap/model.toml"]);
     assert!(again.out.to_lowercase().contains("nothing is missing"), "{again}");
