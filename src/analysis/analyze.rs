@@ -164,7 +164,7 @@ fn listed(reasons: &[String]) -> String {
 /// ([`FlightAnalysis::unused`]) and does not stop the others.
 ///
 /// `reference` is a calibration whose laws measure the air and hold A and u0 (unless
-/// [`FitOptions::hold`] gives them): each drone's own laws, else its flock mapping.
+/// `FitOptions::hold` gives them): each drone's own laws, else its flock mapping.
 pub fn analyze_flight(
     input: &FlightInput<'_>,
     options: &AnalysisOptions,
