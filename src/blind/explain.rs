@@ -2,8 +2,12 @@
 
 use std::path::Path;
 
+use super::foreign;
+use super::hide::Hidden;
 use super::scenario::Scenario;
-use crate::gap::Verdict;
+use crate::effects::Reference;
+use crate::gap::{SteadyPulse, There, Verdict};
+use crate::vehicle::Vehicle;
 
 /// Why a search has no verdict.
 pub type Cause = Box<dyn std::error::Error + Send + Sync>;
@@ -31,4 +35,26 @@ where
     fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
         self(flight)
     }
+}
+
+/// What is hidden, for the question how difficult it was to find; `vehicle` is the true one.
+pub fn there<'a>(truth: &'a Scenario, vehicle: &Vehicle) -> Vec<There<'a>> {
+    let foreign = |hidden: &Hidden| -> Option<SteadyPulse<'a>> {
+        let effect = foreign::find(&hidden.effect)?;
+        let of = |name: &str| hidden.parameters.get(name).copied();
+        let values = foreign::values(effect.definition(), of);
+        let at = Reference::of(vehicle);
+        Some(Box::new(move |signals, heading_rad| {
+            foreign::steady_us(effect, &values, &at, signals, heading_rad)
+        }))
+    };
+    let one = |hidden: &'a Hidden| match foreign(hidden).filter(|_| hidden.foreign) {
+        Some(pulse_us) => There::Pulse(pulse_us),
+        None => There::Effect {
+            effect: &hidden.effect,
+            size: &hidden.size,
+            change: truth.fleet_value(hidden) - hidden.before.unwrap_or(0.0),
+        },
+    };
+    truth.hidden.iter().map(one).collect()
 }

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::error::BlindError;
 use super::scenario::{Base, Protocol};
-use super::vehicles::{known_value, set};
+use super::vehicles::set;
 use crate::base::rng::{Purpose, stream};
-use crate::effects::select::values_of;
+use crate::effects::select::{value_of, values_of};
 use crate::effects::{Reference, Signals, find};
 use crate::vehicle::Vehicle;
 
@@ -221,7 +221,7 @@ impl Kind {
                 share_for(self.range, &mut magnitude, lost)?
             }
             "parasitic-drag" => {
-                let had = |parameter| known_value(&known, "parasitic-drag", parameter);
+                let had = |parameter| value_of(&known, "parasitic-drag", parameter);
                 if let Some(vertical_m2) = had("vertical_m2") {
                     let side_m2 = had("horizontal_m2").unwrap_or_default();
                     also("horizontal_m2", side_m2 * (1.0 + magnitude));
@@ -279,7 +279,7 @@ impl Kind {
             foreign: self.foreign,
             parameters,
             size: self.size.to_owned(),
-            before: known_value(&known, self.effect, self.size),
+            before: value_of(&known, self.effect, self.size),
             words: format!("{magnitude:.3} {}", self.unit),
         };
         Ok(hidden)

@@ -238,6 +238,21 @@ impl Scenario {
         self.cell.side * self.cell.side
     }
 
+    /// True value of the parameter that says how large something hidden is, in the mean over the fleet: a
+    /// drone whose motors were warm at take-off drifts no more.
+    pub fn fleet_value(&self, hidden: &Hidden) -> f64 {
+        if hidden.effect != "motor-thermal" {
+            return hidden.value();
+        }
+        let warm = self.nuisance.warm.len() as f64 / f64::from(self.slots().max(1));
+        hidden.value() * (1.0 - warm)
+    }
+
+    /// A slot whose motors were cold at take-off, if there is one.
+    pub fn cold_slot(&self) -> Option<u16> {
+        (1..=self.slots()).find(|slot| !self.nuisance.warm.contains(slot))
+    }
+
     /// What is hidden, in a few words.
     pub fn words(&self) -> String {
         if self.hidden.is_empty() {

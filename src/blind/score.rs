@@ -13,6 +13,10 @@ use crate::gap::verdict::{Finding, Fitted, Interval};
 /// The effect of the sensor channel, which is named without any look at the pulse.
 const SENSOR: &str = "velocity-error";
 
+/// A gap that grows by less is the same: a bias of the velocity shifts a straight response as a whole, and
+/// its repair leaves the gap as it was but for rounding.
+const WORSE: f64 = 1.01;
+
 /// What a verdict makes of one hidden effect.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
@@ -98,7 +102,7 @@ impl Outcome {
 pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> Outcome {
     let hidden = truth.hidden.iter().enumerate().map(|(index, hidden)| {
         let z = fisher_z.get(index).copied().flatten();
-        compare(hidden, verdict, z)
+        compare(hidden, truth.fleet_value(hidden), verdict, z)
     });
     let mut outcome = Outcome {
         seed: truth.seed,
@@ -138,8 +142,8 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
         outcome.raw_shrink = (before > 0.0).then(|| 1.0 - after / before);
         outcome.excess_shrink = Some(shrink.excess_shrink.value);
         // Without the air, which is the same before and after and only blurs the difference.
-        outcome.made_worse =
-            !outcome.found.is_empty() && shrink.after_without_air_us > shrink.before_without_air_us;
+        outcome.made_worse = !outcome.found.is_empty()
+            && shrink.after_without_air_us > WORSE * shrink.before_without_air_us;
     }
     outcome
 }
@@ -165,10 +169,9 @@ fn accepts(hidden: &Hidden, depends_on: &str) -> bool {
     hidden.foreign && foreign::depends_on(&hidden.effect).contains(&depends_on)
 }
 
-fn compare(hidden: &Hidden, verdict: &Verdict, z: Option<f64>) -> HiddenOutcome {
+fn compare(hidden: &Hidden, value: f64, verdict: &Verdict, z: Option<f64>) -> HiddenOutcome {
     let called = called(hidden, verdict);
     let fitted = fitted(hidden, verdict);
-    let value = hidden.value();
     // What is estimated is the change against the model that was held against the logs.
     let before = hidden.before.unwrap_or(0.0);
     let change = value - before;
@@ -185,7 +188,7 @@ fn compare(hidden: &Hidden, verdict: &Verdict, z: Option<f64>) -> HiddenOutcome 
             .filter(|_| change != 0.0)
             .map(|fitted| (fitted.value - before) / change - 1.0),
         covered: fitted.map(|fitted| (fitted.low..=fitted.high).contains(&value)),
-        said_visible: said_visible(hidden, verdict),
+        said_visible: said_visible(hidden, value, verdict),
     }
 }
 
@@ -238,11 +241,11 @@ fn fitted(hidden: &Hidden, verdict: &Verdict) -> Option<Interval> {
 }
 
 /// Whether a verdict says that the flight shows a hidden effect at its true size.
-fn said_visible(hidden: &Hidden, verdict: &Verdict) -> Option<bool> {
+fn said_visible(hidden: &Hidden, value: f64, verdict: &Verdict) -> Option<bool> {
     let entry = verdict
         .detectable
         .iter()
         .find(|entry| entry.effect == hidden.effect && entry.parameter == hidden.size)?;
-    let change = (hidden.value() - hidden.before.unwrap_or(0.0)).abs();
+    let change = (value - hidden.before.unwrap_or(0.0)).abs();
     Some(entry.smallest.is_some_and(|smallest| smallest.abs() <= change))
 }

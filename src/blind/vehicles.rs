@@ -1,11 +1,9 @@
 //! The vehicles of a blind flight: the known one that the search is given, and the true one.
 
-use std::collections::BTreeMap;
-
 use super::error::BlindError;
 use super::scenario::{Base, Scenario};
-use crate::effects::{Reference, find};
-use crate::vehicle::{EffectTable, Vehicle, library};
+use crate::effects::Reference;
+use crate::vehicle::{Vehicle, library};
 
 /// Spread of thrust between drones that the known vehicle states.
 pub(super) const KNOWN_THRUST_SPREAD: f64 = 0.016;
@@ -93,15 +91,4 @@ pub fn true_vehicle(scenario: &Scenario, slot: u16) -> Result<Vehicle, BlindErro
 /// Power of the battery in hover over its nominal voltage, A.
 pub(super) fn hover_a(vehicle: &Vehicle, cells: f64) -> f64 {
     Reference::of(vehicle).hover_w() / (cells * 3.85)
-}
-
-/// Value of a parameter in a vehicle's file; absent: the effect is off there.
-pub(super) fn known_value(vehicle: &Vehicle, effect: &str, parameter: &str) -> Option<f64> {
-    let table: &EffectTable = vehicle.effects.get(effect).filter(|table| table.on)?;
-    let stated: &BTreeMap<String, f64> = &table.parameters;
-    stated.get(parameter).copied().or_else(|| {
-        let definition = find(effect)?.definition();
-        let known = definition.parameters.iter().find(|known| known.name == parameter)?;
-        Some((known.default)(vehicle))
-    })
 }

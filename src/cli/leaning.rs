@@ -5,6 +5,7 @@ use crate::analysis::lean_table::LeanTable;
 use crate::analysis::wind::Leaning;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::campaign::FlightRecord;
+use crate::effects::select::value_of;
 use crate::effects::{Model, Signals};
 use crate::mission::Plan;
 use crate::sim::plant::GRAVITY;
@@ -50,7 +51,7 @@ pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
     let (change_us, wind_mps) = changes(ratio, vehicle)?;
     let other = |effect: &str, parameter: &str, error: f64| {
         let mut vehicle = vehicle.clone();
-        let value = parameter_of(&vehicle, effect, parameter)? * (1.0 + error);
+        let value = value_of(&vehicle, effect, parameter)? * (1.0 + error);
         let table = vehicle.effects.get_mut(effect)?;
         table.parameters.insert(parameter.to_owned(), value);
         changes(ratio, &vehicle).map(|(change_us, _)| change_us)
@@ -81,21 +82,12 @@ pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
     })
 }
 
-/// A parameter of an effect that acts in a vehicle.
-fn parameter_of(vehicle: &Vehicle, name: &str, parameter: &str) -> Option<f64> {
-    let effect = crate::effects::find(name)?;
-    vehicle.effects.get(name).filter(|table| table.on)?;
-    let values = crate::effects::select::values_of(effect, vehicle).ok()?;
-    let known = effect.definition().parameters;
-    values.get(known.iter().position(|known| known.name == parameter)?).copied()
-}
-
 /// Change of the pulse by wind, for each lean and vertical air speed of the table, us, and the wind of
 /// each lean, m/s.
 fn changes(ratio: f64, vehicle: &Vehicle) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
     let rotor_drag =
-        parameter_of(vehicle, "blade-flapping", "drag_per_weight").filter(|drag| *drag > 0.0)?;
-    let body_m2 = parameter_of(vehicle, "parasitic-drag", "horizontal_m2").unwrap_or(0.0);
+        value_of(vehicle, "blade-flapping", "drag_per_weight").filter(|drag| *drag > 0.0)?;
+    let body_m2 = value_of(vehicle, "parasitic-drag", "horizontal_m2").unwrap_or(0.0);
     let mut still = vehicle.clone();
     // The voltage is corrected for on its own.
     still.effects.remove("battery");

@@ -87,7 +87,7 @@ impl Effect for GroundEffect {
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Height, 0.1, 3.0),
-            sought: Sought::Shape { size: "radius_m", sizes: &[0.08], shape: None },
+            sought: Sought::Shape { size: "radius_m", sizes: &[0.08, 0.2], shape: None },
         }
     }
 

@@ -24,6 +24,14 @@ pub fn resolved(vehicle: &Vehicle) -> Result<Vec<(&'static dyn Effect, Values)>,
     Ok(found)
 }
 
+/// Value of one parameter of an effect that a vehicle has; `None`: it is off, or not valid.
+pub fn value_of(vehicle: &Vehicle, effect: &str, parameter: &str) -> Option<f64> {
+    let known = find(effect)?;
+    vehicle.effects.get(effect).filter(|table| table.on)?;
+    let place = known.definition().parameters.iter().position(|one| one.name == parameter)?;
+    values_of(known, vehicle).ok()?.get(place).copied()
+}
+
 /// Parameters of an effect for a vehicle: its file's, else the defaults.
 ///
 /// # Errors

@@ -3,8 +3,8 @@
 
 use super::compare::Comparison;
 use super::gls::{Column, Solution};
-use super::refine::value_of;
 use super::scene::Scene;
+use crate::effects::select::value_of;
 use crate::effects::{EffectError, LIBRARY, Sought};
 use crate::vehicle::Vehicle;
 
@@ -170,13 +170,12 @@ pub(super) fn read_otherwise(
     if is_known || comparison.wind.measured.is_some() {
         return Ok(None);
     }
-    // By the mean wind alone: else the gusts that one law reads and the other does not would decide.
-    let base = comparison.pulses_by_lean(vehicle, false)?;
+    let base = comparison.pulses_by_lean(vehicle, true)?;
     let mut variants = Vec::new();
     for size in DRAGS {
         let mut other = vehicle.clone();
         set(&mut other, effect, parameter, size);
-        let column = comparison.pulses_by_lean(&other, false)?.less(&base);
+        let column = comparison.pulses_by_lean(&other, true)?.less(&base);
         variants.push(Variant { vehicle: Some(other), size, column });
     }
     let size =

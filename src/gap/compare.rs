@@ -154,6 +154,9 @@ impl Comparison {
         let bent = rectified(&self.scene, vehicle, gusts_mps)?;
         let response = self.scene.response(vehicle)?;
         let closed = self.scene.pulses(vehicle)?;
+        let sides =
+            [self.by_wind(vehicle, 0, SIDE_STEP_MPS)?, self.by_wind(vehicle, 1, SIDE_STEP_MPS)?]
+                .map(|column| column.means());
         Ok(self
             .data
             .groups
@@ -178,6 +181,11 @@ impl Comparison {
                     height_m: self.scene.signals[group].iter().map(|s| s.height_m).collect(),
                     response: response[group].clone(),
                     bent_us: bent[group].clone(),
+                    side_response: (0..of.bins.len())
+                        .map(|bin| {
+                            [0, 1].map(|axis: usize| sides[axis][group][bin] / SIDE_STEP_MPS)
+                        })
+                        .collect(),
                     slope_us: pulses.iter().map(|pulse| pulse - hover_us).collect(),
                 }
             })
@@ -238,24 +246,28 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub fn wind_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
-        let base = self.scene.pulses(vehicle)?;
         let mut doubts = Vec::new();
         for axis in 0..2 {
-            let mut scene = self.scene.clone();
-            for (signals, air) in scene.signals.iter_mut().zip(&self.wind.air_mps) {
-                for (signals, air) in signals.iter_mut().zip(air) {
-                    let mut air = *air;
-                    air[axis] -= self.wind.mean_se_mps[axis];
-                    signals.horizontal_mps = air[0].hypot(air[1]);
-                }
-            }
-            let doubt = scene.pulses(vehicle)?.less(&base);
+            let doubt = self.by_wind(vehicle, axis, self.wind.mean_se_mps[axis])?;
             // Where the model does not feel wind there is nothing to doubt.
             if doubt.spread(&self.data.counts()) > LEAST_DOUBT_US {
                 doubts.push(doubt);
             }
         }
         Ok(doubts)
+    }
+
+    /// What more wind along an axis of the show does to the pulse, us.
+    fn by_wind(&self, vehicle: &Vehicle, axis: usize, by_mps: f64) -> Result<Column, EffectError> {
+        let mut scene = self.scene.clone();
+        for (signals, air) in scene.signals.iter_mut().zip(&self.wind.air_mps) {
+            for (signals, air) in signals.iter_mut().zip(air) {
+                let mut air = *air;
+                air[axis] -= by_mps;
+                signals.horizontal_mps = air[0].hypot(air[1]);
+            }
+        }
+        Ok(scene.pulses(vehicle)?.less(&self.scene.pulses(vehicle)?))
     }
 
     /// What a change of the vehicle adds to the pulse.
@@ -274,6 +286,8 @@ fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
 
 /// Doubts of a smaller effect are left out, us.
 const LEAST_DOUBT_US: f64 = 1e-3;
+/// Change of the wind for the response to it, m/s.
+const SIDE_STEP_MPS: f64 = 0.25;
 /// Fewest bins of a comparison.
 const FEWEST_BINS: usize = 12;
 

@@ -15,7 +15,7 @@ const ALIKE: f64 = 0.6;
 /// A free shape is another thing than the best effect when it gains this much more.
 const FREE_BETTER: f64 = 1.25;
 /// And when this share of its gain is left with the effect in the model.
-const FREE_LEFT: f64 = 0.35;
+const FREE_LEFT: f64 = 0.25;
 
 /// An effect this near to a size that matters is named before a free shape that looks like it.
 const NEARLY: f64 = 0.6;
@@ -50,12 +50,17 @@ pub(super) fn decide(
     let floor = FLOOR_NATS;
     let mut limits = Thresholds { library: floor, generic: FREE_FLOOR_NATS };
     let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
-    let free = round.generics.iter().find(|free| free.size_us >= material_us);
+    let free = round.generics.iter().find(|free| {
+        free.size_us >= material_us
+            || (free.range_us >= material_us && free.gain > 2.0 * FREE_FLOOR_NATS)
+    });
     let is_named = |ranked: &&Ranked| {
         // A known effect that explains more than a free shape of a size that matters is named first.
         let matters = ranked.size_us >= material_us
             || (ranked.size_us >= NEARLY * material_us
-                && free.is_some_and(|free| ranked.gain > free.gain));
+                && free.is_some_and(|free| ranked.gain > free.gain))
+            // What is short, or plain in calm air, matters by what it does where it is largest.
+            || (ranked.range_us >= material_us && ranked.gain > FREE_FLOOR_NATS);
         let candidate = &sought.library[ranked.candidate];
         // That the shared air drifted is what it does: a rival, never a finding. That it grew with
         // height is no lack of the vehicle: it must say as much as a free shape.
@@ -82,7 +87,7 @@ pub(super) fn decide(
             None => free.gain,
             Some(best) => left_with(problem, sought, best, free),
         };
-        if left > limits.generic.max(FREE_LEFT * free.gain) {
+        if left > FLOOR_NATS.max(FREE_LEFT * free.gain) {
             return Decision { what: What::Free(free.clone()), thresholds: limits };
         }
     }

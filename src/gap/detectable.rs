@@ -4,6 +4,7 @@ use super::candidates::{Candidate, library};
 use super::error::GapError;
 use super::explain::Found;
 use super::gls::{Problem, Solution, Split, White};
+use super::refine::doubts;
 use super::search::FLOOR_NATS;
 use super::verdict::Detectable;
 use crate::effects::{LIBRARY, Sought};
@@ -23,7 +24,9 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let comparison = &found.comparison;
     let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
     let split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
-    let solution = Problem::new(&patterns, &split).with(&found.extras).at(&found.hyper);
+    let doubts = doubts(comparison, &found.vehicle, &found.parameters)?;
+    let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&found.extras);
+    let solution = problem.at(&found.hyper);
     let candidates = library(&found.vehicle, &comparison.scene)?;
     let drones = comparison.data.counts();
     let best: Vec<(&Candidate, Option<Trace>)> = candidates

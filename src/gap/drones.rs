@@ -9,8 +9,8 @@ use super::gls::Split;
 use super::noise::{
     GUST_TIME, GUSTS, GroupPattern, Hyper, LEAST, OFFSETS, OWN, SHARED_TIME, SLOPES, WHITE,
 };
-use super::refine::value_of;
 use super::verdict::{DroneOffset, Drones, Finding, Fitted, Interval, Step};
+use crate::effects::select::value_of;
 use crate::effects::{Model, Reference, Signals};
 use crate::vehicle::Vehicle;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};

@@ -8,7 +8,7 @@ use super::error::GapError;
 use super::generic::{all, drawn};
 use super::gls::{Column, Likelihood, Problem, Split};
 use super::noise::{GroupPattern, Hyper, LEAST, WHITE};
-use super::refine::{Parameter, fitted, parameters_of, refine, slopes};
+use super::refine::{Parameter, doubts, fitted, parameters_of, refine, slopes};
 use super::search::{Round, Sought, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::mission::plan::Plan;
@@ -98,9 +98,11 @@ pub fn search(
         // Gusts that the residual shows bend the model's curve: known physics first.
         let mut free = found.extras.clone();
         free.extend(slopes(&comparison, &found.vehicle, &found.parameters)?);
-        let doubts = comparison.wind_doubts(&found.vehicle)?;
-        let with_extras = |split| Problem::new(&patterns, split).doubting(&doubts).with(&free);
-        let quick = with_extras(&split).fit(found.hyper, Likelihood::Profile);
+        let doubts = doubts(&comparison, &found.vehicle, &found.parameters)?;
+        let quick = Problem::new(&patterns, &split)
+            .doubting(&doubts)
+            .with(&free)
+            .fit(found.hyper, Likelihood::Profile);
         found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
@@ -339,6 +341,7 @@ impl Found {
         }
         let patterns = comparison.patterns(&self.vehicle, self.gusts_mps)?;
         let split = Split::of(&comparison.residual(&self.vehicle, self.gusts_mps)?);
+        let doubts = doubts(comparison, &self.vehicle, &self.parameters)?;
         let mut worst: Option<(&'static str, f64)> = None;
         let mut effects: Vec<&'static str> = self.parameters.iter().map(|p| p.effect).collect();
         effects.dedup();
@@ -346,10 +349,8 @@ impl Found {
             let others: Vec<Parameter> =
                 self.parameters.iter().filter(|p| p.effect != effect).cloned().collect();
             let slopes = slopes(comparison, &self.vehicle, &others)?;
-            let problem = Problem::new(&patterns, &split)
-                .doubting(&comparison.wind_doubts(&self.vehicle)?)
-                .with(&self.extras)
-                .with(&slopes);
+            let problem =
+                Problem::new(&patterns, &split).doubting(&doubts).with(&self.extras).with(&slopes);
             let solution = problem.at(&self.hyper);
             let without = taken_back(&self.vehicle, effect, original);
             let trace = comparison.change(&without, &self.vehicle)?;

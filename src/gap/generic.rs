@@ -26,7 +26,7 @@ const WAVES_M: [f64; 7] = [10.0, 15.0, 20.0, 28.0, 40.0, 56.0, 80.0];
 /// Air speed from which a direction alone may count, m/s.
 const KNEE_MPS: f64 = 1.5;
 /// Instants at which a step is tried.
-const STEPS: usize = 15;
+const STEPS: usize = 47;
 /// A signal that moves less than this share of its scale says nothing.
 const LEAST_SPAN: f64 = 0.05;
 
@@ -60,23 +60,18 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     }
     let middle = f64::midpoint(least(&time), most(&time));
     let half = (most(&time) - least(&time)).max(1.0) / 2.0;
-    let product = |of: fn(f64) -> f64| {
-        let value = |(climb, time): (&f64, &f64)| of(*climb) * (time - middle) / half;
-        let group = |(c, t): (&Vec<f64>, &Vec<f64>)| c.iter().zip(t).map(value).collect();
-        climb.iter().zip(&time).map(group).collect::<Vec<Vec<f64>>>()
+    let product = |(climb, time): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+        climb.iter().zip(time).map(|(climb, time)| climb * (time - middle) / half).collect()
     };
-    let crossed = product(|v| v);
+    let crossed: Vec<Vec<f64>> = climb.iter().zip(&time).map(product).collect();
     found.push(Generic {
         depends_on: "climb-time",
         axis: "vertical velocity times time, scaled",
-        // A product comes with its own mean part.
-        columns: vec![
-            Column::Shared(crossed.clone()),
-            Column::Shared(product(f64::abs)),
-            Column::Shared(climb.clone()),
-        ],
+        // A product comes with its own mean part. What goes with the size of the climb and time is what a
+        // drift of the air does.
+        columns: vec![Column::Shared(crossed.clone()), Column::Shared(climb.clone())],
         along: crossed,
-        penalty: 4.0,
+        penalty: 2.0,
     });
     for step in 1..=STEPS {
         let at_s = least(&time) + (most(&time) - least(&time)) * step as f64 / (STEPS + 1) as f64;

@@ -83,6 +83,19 @@ impl Column {
         }
     }
 
+    /// Largest less smallest value.
+    pub fn range(&self) -> f64 {
+        let of = |values: &mut dyn Iterator<Item = &f64>| {
+            let (low, high) =
+                values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            (high - low).max(0.0)
+        };
+        match self {
+            Self::Shared(values) => of(&mut values.iter().flatten()),
+            Self::Own(values) => of(&mut values.iter().flatten().flatten()),
+        }
+    }
+
     /// Standard deviation over all bins and drones.
     pub fn spread(&self, drones: &[usize]) -> f64 {
         let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);

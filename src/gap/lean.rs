@@ -5,52 +5,58 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 use super::bins::BinValues;
 use super::data::Data;
 use super::minimise::minimise;
-use crate::effects::{find, select};
+use crate::effects::select::value_of;
 use crate::sim::plant::drag::Drag;
 use crate::vehicle::Vehicle;
 
 const GRAVITY: f64 = 9.80665;
 /// Below this slope of the lean a bin's own lean says less than the flight's mean wind, rad/(m/s).
 const LEAST_SLOPE: f64 = 0.004;
+/// Rounds of the air speed by a lean.
+const ROUNDS: usize = 12;
 /// Fastest wind that is believed, m/s.
 const FASTEST_MPS: f64 = 25.0;
 
-/// How a vehicle leans at a horizontal air speed: `a v + b v²`, rad.
+/// How a vehicle leans at a horizontal air speed v while it climbs at V:
+/// `a v + b v ((1 - s) v + s sqrt(v² + V²))`, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeanLaw {
-    /// Linear part (blade flapping), rad/(m/s).
+    /// Linear part (blade flapping, a), rad/(m/s).
     pub linear: f64,
-    /// Quadratic part (body drag), rad/(m/s)².
+    /// Quadratic part (drag, b), rad/(m/s)².
     pub square: f64,
+    /// Share of the drag that is a body's in one piece (s), which meets more air the faster it climbs. The
+    /// faces of a box do not.
+    pub body_share: f64,
 }
 
 impl LeanLaw {
     /// What the vehicle's model says at an air density, kg/m³.
     pub fn of(vehicle: &Vehicle, density: f64) -> Self {
-        let of = |name: &str, parameter: &str| -> Option<f64> {
-            let effect = find(name)?;
-            vehicle.effects.get(name).filter(|table| table.on)?;
-            let values = select::values_of(effect, vehicle).ok()?;
-            let known = effect.definition().parameters;
-            values.get(known.iter().position(|known| known.name == parameter)?).copied()
-        };
         let factor = Drag::new(&vehicle.airframe).factor_m2();
         let box_m2 = (factor.x * factor.y).sqrt();
-        let body_m2 = of("parasitic-drag", "horizontal_m2").unwrap_or(0.0) / 2.0;
+        let body_m2 = value_of(vehicle, "parasitic-drag", "horizontal_m2").unwrap_or(0.0) / 2.0;
         Self {
-            linear: of("blade-flapping", "drag_per_weight").unwrap_or(0.0),
+            linear: value_of(vehicle, "blade-flapping", "drag_per_weight").unwrap_or(0.0),
             square: density * (box_m2 + body_m2) / (vehicle.airframe.mass_kg * GRAVITY),
+            body_share: body_m2 / (box_m2 + body_m2).max(1e-9),
         }
     }
 
-    fn lean(self, speed_mps: f64) -> f64 {
-        self.linear * speed_mps + self.square * speed_mps * speed_mps
+    /// What a body in one piece meets beyond the horizontal air speed, m/s.
+    fn more_mps(self, speed_mps: f64, climb_mps: f64) -> f64 {
+        self.body_share * (speed_mps.hypot(climb_mps) - speed_mps)
+    }
+
+    fn lean(self, speed_mps: f64, climb_mps: f64) -> f64 {
+        let met_mps = speed_mps + self.more_mps(speed_mps, climb_mps);
+        self.linear * speed_mps + self.square * speed_mps * met_mps
     }
 
     /// The lean at an air speed, as a vector.
-    fn lean_of(self, air_mps: [f64; 2]) -> [f64; 2] {
+    fn lean_of(self, air_mps: [f64; 2], climb_mps: f64) -> [f64; 2] {
         let speed = air_mps[0].hypot(air_mps[1]).max(1e-9);
-        air_mps.map(|part| self.lean(speed) * part / speed)
+        air_mps.map(|part| self.lean(speed, climb_mps) * part / speed)
     }
 
     fn slope(self, speed_mps: f64) -> f64 {
@@ -58,17 +64,24 @@ impl LeanLaw {
     }
 
     /// Air speed over ground-fixed axes by the lean of the thrust axis, m/s.
-    fn air(self, lean_rad: [f64; 2]) -> [f64; 2] {
+    fn air(self, lean_rad: [f64; 2], climb_mps: f64) -> [f64; 2] {
         let lean = lean_rad[0].hypot(lean_rad[1]);
         if lean < 1e-9 {
             return [0.0; 2];
         }
-        let speed = if self.square > 1e-12 {
-            ((self.linear * self.linear + 4.0 * self.square * lean).sqrt() - self.linear)
-                / (2.0 * self.square)
-        } else {
-            lean / self.linear.max(1e-6)
-        };
+        // What the climb adds is taken from the speed of the round before.
+        let mut speed = 0.0;
+        for _ in 0..ROUNDS {
+            let linear = self.linear + self.square * self.more_mps(speed, climb_mps);
+            speed = if self.square > 1e-12 {
+                ((linear * linear + 4.0 * self.square * lean).sqrt() - linear) / (2.0 * self.square)
+            } else {
+                lean / linear.max(1e-6)
+            };
+            if self.body_share * climb_mps == 0.0 {
+                break;
+            }
+        }
         let speed = speed.min(FASTEST_MPS);
         [lean_rad[0] / lean * speed, lean_rad[1] / lean * speed]
     }
@@ -117,7 +130,7 @@ pub(super) fn wind(
                     let values = side.get(index)?.get(bin)?;
                     let velocity = group.bins[bin].velocity_mps;
                     let air = [velocity[0] - wind_mps[0], velocity[1] - wind_mps[1]];
-                    let steady = law.lean_of(air);
+                    let steady = law.lean_of(air, velocity[2]);
                     Some([values.lean_rad[0] - steady[0], values.lean_rad[1] - steady[1]])
                 });
                 let [x, y] = unsettled.unwrap_or_default();
@@ -129,8 +142,8 @@ pub(super) fn wind(
     let each =
         || data.groups.iter().zip(&leans).flat_map(|(group, leans)| group.bins.iter().zip(leans));
     let (mut sum, mut count) = ([0.0; 2], 0.0);
-    for (_, lean) in each().filter(|(bin, _)| !bin.is_horizontal()) {
-        let air = law.air(*lean);
+    for (bin, lean) in each().filter(|(bin, _)| !bin.is_horizontal()) {
+        let air = law.air(*lean, bin.climb_mps());
         sum[0] -= air[0];
         sum[1] -= air[1];
         count += 1.0;
@@ -138,7 +151,8 @@ pub(super) fn wind(
     let mut mean_mps = sum.map(|sum: f64| if count > 0.0 { sum / count } else { 0.0 });
     let mut law = law;
     let mut measured = None;
-    let points: Vec<Point> = each().map(|(bin, lean)| Point::of(bin, *lean)).collect();
+    let body_share = law.body_share;
+    let points: Vec<Point> = each().map(|(bin, lean)| Point::of(bin, *lean, body_share)).collect();
     let moves = points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING;
     if moves && flown.is_some() {
         let start = [mean_mps[0], mean_mps[1], law.linear.max(1e-4), law.square.max(1e-5)];
@@ -148,11 +162,9 @@ pub(super) fn wind(
         let (at, _) = minimise(from, |at| misfit(&points, &natural(at), start));
         let at = natural(&at);
         mean_mps = [at[0], at[1]];
-        law = LeanLaw { linear: at[2], square: at[3] };
+        law = LeanLaw { linear: at[2], square: at[3], ..law };
         measured = Some(Measured { law, linear_se: linear_se(&points, &at) });
     }
-    // Without legs the law is the model's word: only a vehicle that states its rotors' drag is believed.
-    let is_believed = measured.is_some() || law.linear > 0.0;
     let air_mps = data
         .groups
         .iter()
@@ -160,8 +172,8 @@ pub(super) fn wind(
         .map(|(group, leans)| {
             let air = |(bin, lean): (&super::bins::Bin, &[f64; 2])| {
                 let steady = [bin.velocity_mps[0] - mean_mps[0], bin.velocity_mps[1] - mean_mps[1]];
-                let tells = is_believed && law.slope(steady[0].hypot(steady[1])) > LEAST_SLOPE;
-                if tells { law.air(*lean) } else { steady }
+                let tells = law.slope(steady[0].hypot(steady[1])) > LEAST_SLOPE;
+                if tells { law.air(*lean, bin.climb_mps()) } else { steady }
             };
             let raw: Vec<[f64; 2]> = group.bins.iter().zip(leans).map(air).collect();
             smooth(group, &raw)
@@ -252,22 +264,25 @@ const TOGETHER: f64 = 2.0;
 /// The lean in one bin and the velocity over ground.
 struct Point {
     velocity_mps: [f64; 2],
+    climb_mps: f64,
     lean_rad: [f64; 2],
     moves: bool,
+    body_share: f64,
 }
 
 impl Point {
-    fn of(bin: &super::bins::Bin, lean_rad: [f64; 2]) -> Self {
-        let [x, y, _] = bin.velocity_mps;
-        Self { velocity_mps: [x, y], lean_rad, moves: bin.is_horizontal() }
+    fn of(bin: &super::bins::Bin, lean_rad: [f64; 2], body_share: f64) -> Self {
+        let [x, y, climb_mps] = bin.velocity_mps;
+        let moves = bin.is_horizontal();
+        Self { velocity_mps: [x, y], climb_mps, lean_rad, moves, body_share }
     }
 
     /// Lean less what the law says, in units.
     fn off(&self, at: &[f64; 4]) -> [f64; 2] {
-        let law = LeanLaw { linear: at[2], square: at[3] };
+        let law = LeanLaw { linear: at[2], square: at[3], body_share: self.body_share };
         let air = [self.velocity_mps[0] - at[0], self.velocity_mps[1] - at[1]];
         let speed = air[0].hypot(air[1]).max(1e-9);
-        let wanted = law.lean(speed);
+        let wanted = law.lean(speed, self.climb_mps);
         let off = |axis: usize| (self.lean_rad[axis] - wanted * air[axis] / speed) / UNIT_RAD;
         [off(0), off(1)]
     }

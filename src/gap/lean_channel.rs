@@ -1,11 +1,12 @@
 //! The lean as a channel of its own: how much a drone leans at known speeds over ground is its rotors'
 //! drag, whatever the pulse says.
 
+use super::candidates::DRAG;
 use super::compare::Comparison;
 use super::lean::LeanLaw;
-use super::refine::value_of;
 use super::verdict::{Finding, Fitted, Interval, Step, WindFound};
 use crate::base::air::SEA_LEVEL_DENSITY;
+use crate::effects::select::value_of;
 
 /// Half of a 95 % interval in standard errors.
 const HALF: f64 = 2.0;
@@ -36,16 +37,16 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
     if apart.abs() < MATERIAL || z < NAMED_Z || !z.is_finite() {
         return None;
     }
-    let known = value_of(&before.vehicle, "blade-flapping", "drag_per_weight");
+    let known = value_of(&before.vehicle, DRAG.0, DRAG.1);
     let fitted = Fitted {
-        name: "drag_per_weight".to_owned(),
+        name: DRAG.1.to_owned(),
         unit: "s/m".to_owned(),
         value: wind.lean_per_mps?,
         before: known,
     };
     Some(Step {
         finding: Finding::Name {
-            effect: "blade-flapping".to_owned(),
+            effect: DRAG.0.to_owned(),
             parameters: vec![fitted],
             was_there: known.is_some(),
         },

@@ -1,6 +1,7 @@
 //! From logs to a verdict and a model.
 
 use super::bins::Bin;
+use super::candidates::DRAG;
 use super::compare::{Comparison, Simulated};
 use super::data::{Data, Flown};
 use super::detectable::detectable;
@@ -9,9 +10,9 @@ use super::error::GapError;
 use super::explain::{Found, Options, search};
 use super::heldout::Case;
 use super::noise::{
-    GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SLOPES, WHITE,
+    GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SIDE_GUSTS,
+    SLOPES, WHITE,
 };
-use super::refine::{Parameter, size_errors, size_of};
 use super::regimes::regimes;
 use super::sensor::sensor;
 use super::verdict::{
@@ -148,37 +149,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     Ok(Explained { verdict, model, found })
 }
 
-/// Fisher z of effects that are known to be there: the change of each size over its error, with the
-/// air, offsets and the other effects free. `input.vehicle` is the true one; `hidden` has effect,
-/// size and by how much that was changed. `None`: the pulse of steady flight does not show it.
-///
-/// # Errors
-/// See [`GapError`].
-pub fn fisher_z(
-    input: &Input<'_>,
-    hidden: &[(&str, &str, f64)],
-) -> Result<Vec<Option<f64>>, GapError> {
-    let plan = input.plan.ok_or(GapError::NoSimulatedSide)?;
-    let exponent = super::compare::thrust_exponent(input.vehicle);
-    let (data, _) = Data::of_plan(plan, input.flown, exponent).split();
-    let simulated = Simulated::Refly(plan);
-    let comparison = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
-    let parameters: Vec<Option<Parameter>> =
-        hidden.iter().map(|(effect, size, _)| size_of(effect, size)).collect();
-    let known: Vec<Parameter> = parameters.iter().flatten().cloned().collect();
-    let vehicle = comparison.vehicle.clone();
-    let errors = size_errors(&comparison, &vehicle, &known)?;
-    let mut errors = errors.into_iter();
-    Ok(parameters
-        .iter()
-        .zip(hidden)
-        .map(|(parameter, (_, _, change))| {
-            let se = parameter.as_ref().and_then(|_| errors.next())?;
-            (se > 0.0).then(|| (change / se).abs()).filter(|z| z.is_finite())
-        })
-        .collect())
-}
-
 fn constant(data: &Data) -> Result<(), GapError> {
     let pulses = || data.groups.iter().flat_map(|group| &group.measured).flatten();
     let low = pulses().map(|values| values.pulse_us).fold(f64::INFINITY, f64::min);
@@ -197,6 +167,8 @@ fn noise(hyper: &Hyper) -> Noise {
         drones_us: hyper.get(OFFSETS),
         slopes: hyper.get(SLOPES),
         least_response: hyper.get(LEAST),
+        gradient_mps: hyper.get(GRADIENT),
+        side_gusts_mps: hyper.get(SIDE_GUSTS),
     }
 }
 
@@ -284,8 +256,8 @@ fn add_others(model: &mut Vehicle, steps: &[Step]) {
         else {
             continue;
         };
-        if let ("blade-flapping", Some(drag)) = (*first, parameters.first()) {
-            super::candidates::set(model, first, "drag_per_weight", drag.value.value.min(0.1));
+        if let (true, Some(drag)) = (*first == DRAG.0, parameters.first()) {
+            super::candidates::set(model, first, DRAG.1, drag.value.value.min(0.1));
         }
         if let (true, Some(sd)) = (first.ends_with("-spread"), parameters.first()) {
             super::candidates::set(model, first, "sd", sd.value.value.min(0.1));

@@ -6,6 +6,7 @@ mod compare;
 pub mod data;
 mod decide;
 mod detectable;
+mod difficulty;
 mod drones;
 mod error;
 mod explain;
@@ -36,8 +37,11 @@ pub mod words;
 
 pub use compare::Simulated;
 pub use data::{Data, Flown};
+pub use difficulty::{SteadyPulse, There, fisher_z};
 pub use error::GapError;
 pub use explain::{Found, Options, search};
-pub use make::{Explained, Input, explain, fisher_z};
+pub use make::{Explained, Input, explain};
 pub use map_gain::{Measured, map_gain};
 pub use verdict::Verdict;
+
+pub use bins::BinValues as BV;

@@ -3,11 +3,11 @@
 //! The data model of the physics note, section 3.2: drone i in bin k of its group reads
 //!
 //! ```text
-//! y = mean + a_i + b_i r_k + (S_k + s0) (W(t_k) + X_i(t_k) + g_i(t_k)) + e
+//! y = mean + a_i + b_i r_k + (S_k + s0) (W(t_k) + X_i(t_k) + g_i(t_k)) + H_k h(t_k) + e
 //! ```
 //!
 //! with W the updraft that all share (it may change with height), X a slow updraft of the drone's own place, g its gusts, a its hover pulse, b its relative response, S the model's response to vertical air speed and s0 what it
-//! is at least. Within a command group the likelihood splits exactly into the group's mean and the
+//! is at least, h the horizontal gusts that are not known and H the model's response to them. Within a command group the likelihood splits exactly into the group's mean and the
 //! deviations of its drones; both are whitened by filters.
 
 use super::filter::{Filter, Observation, State};
@@ -17,7 +17,7 @@ use super::filter::{Filter, Observation, State};
 pub struct Hyper(pub [f64; COUNT]);
 
 /// Number of parameters.
-pub(super) const COUNT: usize = 10;
+pub(super) const COUNT: usize = 11;
 /// Places in [`Hyper`].
 pub(super) const SHARED: usize = 0;
 /// Time scale of the shared air.
@@ -38,6 +38,10 @@ pub(super) const SLOPES: usize = 7;
 pub(super) const LEAST: usize = 8;
 /// How the shared updraft changes with height, m/s per 50 m.
 pub(super) const GRADIENT: usize = 9;
+/// Horizontal gusts beyond those that the leans show, each axis, m/s.
+pub(super) const SIDE_GUSTS: usize = 10;
+/// Their time scale, s: gusts of the size of a fleet that drift over it.
+const SIDE_GUSTS_S: f64 = 25.0;
 
 /// Prior of each parameter: median, and a standard deviation as a factor. Wide: they keep the search
 /// where weather and drones can be, and decide only what the flight does not say (a record of a few
@@ -53,6 +57,7 @@ const PRIOR: [(f64, f64); COUNT] = [
     (0.05, 2.0),
     (3.0, 2.5),
     (0.08, 2.0),
+    (0.3, 2.0),
 ];
 
 impl Default for Hyper {
@@ -90,6 +95,8 @@ pub struct GroupPattern {
     /// What gusts do to the mean of a curved response, us, which is as uncertain as it is large;
     /// empty: nothing.
     pub bent_us: Vec<f64>,
+    /// The model's response to horizontal air speed along either axis of the show, us/(m/s); empty: none.
+    pub side_response: Vec<[f64; 2]>,
     /// What a relative error of the response does in each bin, us.
     pub slope_us: Vec<f64>,
 }
@@ -107,7 +114,7 @@ pub(super) struct Whitener {
     pub log_det: f64,
 }
 
-const SHARED_STATES: usize = 3;
+const SHARED_STATES: usize = 6;
 const OWN_STATES: usize = 4;
 /// Heights are taken from here, m, in units of [`ALOFT_M`].
 const MIDDLE_M: f64 = 45.0;
@@ -117,6 +124,17 @@ impl GroupPattern {
     /// Height of a bin in units of the gradient.
     pub fn aloft(&self, bin: usize) -> f64 {
         (self.height_m[bin] - MIDDLE_M) / ALOFT_M
+    }
+
+    /// Covariance of two bins by the horizontal gusts that the fleet shares, us².
+    pub(super) fn side_gusts(&self, bin: usize, other: &Self, at: usize, hyper: &Hyper) -> f64 {
+        let of = |group: &Self, bin: usize| -> [f64; 2] {
+            group.side_response.get(bin).copied().unwrap_or_default()
+        };
+        let (a, b) = (of(self, bin), of(other, at));
+        let apart_s = (self.time_s[bin] - other.time_s[at]).abs();
+        let gusts = hyper.get(SIDE_GUSTS).powi(2) * (-apart_s / SIDE_GUSTS_S).exp();
+        gusts * (a[0] * b[0] + a[1] * b[1])
     }
 }
 
@@ -149,10 +167,17 @@ impl Whitener {
             .collect();
         order.sort_by(|a, b| groups[a.0].time_s[a.1].total_cmp(&groups[b.0].time_s[b.1]));
         let time_s = hyper.get(SHARED_TIME);
+        // The square of a normal air varies by sqrt 2 of its mean and is forgotten twice as fast: what all
+        // drones share of it bends all their means by the same.
+        let shared_share =
+            square(SHARED) / (square(SHARED) + square(OWN) + square(GUSTS)).max(f64::MIN_POSITIVE);
         let mut states = vec![
             State { variance: square(SHARED), time_s },
             State { variance: square(GRADIENT), time_s },
             State { variance: 1.0, time_s: f64::INFINITY },
+            State { variance: square(SIDE_GUSTS), time_s: SIDE_GUSTS_S },
+            State { variance: square(SIDE_GUSTS), time_s: SIDE_GUSTS_S },
+            State { variance: 2.0 * shared_share.powi(2), time_s: time_s / 2.0 },
         ];
         for group in groups {
             states.extend(own(1.0 / group.drones.max(1) as f64));
@@ -167,6 +192,10 @@ impl Whitener {
                 looks_at.push((1, response * group.aloft(*bin)));
                 // How far gusts bend the mean is computed, and doubted by as much as it is.
                 looks_at.push((2, group.bent_us.get(*bin).copied().unwrap_or(0.0)));
+                let [x, y] = group.side_response.get(*bin).copied().unwrap_or_default();
+                looks_at.push((3, x));
+                looks_at.push((4, y));
+                looks_at.push((5, group.bent_us.get(*bin).copied().unwrap_or(0.0)));
                 Observation {
                     time_s: group.time_s[*bin],
                     looks_at,

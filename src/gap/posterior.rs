@@ -36,6 +36,7 @@ impl SharedAir {
         let covariance = DMatrix::from_fn(count, count, |row, column| {
             let (a, b) = (order[row], order[column]);
             let mut sum = response(a) * response(b) * shared(a, b);
+            sum += groups[a.0].side_gusts(a.1, &groups[b.0], b.1, hyper);
             if a.0 == b.0 {
                 let apart_s = (time(a) - time(b)).abs();
                 let share = 1.0 / groups[a.0].drones.max(1) as f64;

@@ -6,7 +6,8 @@ use super::error::GapError;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::Hyper;
 use super::verdict::{Fitted, Interval};
-use crate::effects::{Definition, Sought, find, select};
+use crate::effects::select::value_of;
+use crate::effects::{Definition, Sought, find};
 use crate::vehicle::Vehicle;
 
 /// Rounds of Gauss-Newton; the forms are nearly linear in their sizes.
@@ -44,15 +45,6 @@ pub(super) struct Fit {
     pub values: Vec<(f64, f64)>,
 }
 
-/// A parameter's value in a vehicle.
-pub(super) fn value_of(vehicle: &Vehicle, effect: &str, parameter: &str) -> Option<f64> {
-    let known = find(effect)?;
-    vehicle.effects.get(effect).filter(|table| table.on)?;
-    let values = select::values_of(known, vehicle).ok()?;
-    let place = known.definition().parameters.iter().position(|p| p.name == parameter)?;
-    values.get(place).copied()
-}
-
 /// Fits the parameters jointly, from the values that the vehicle has, with further regressors free.
 ///
 /// # Errors
@@ -73,7 +65,7 @@ pub(super) fn refine(
         let patterns = comparison.patterns(&vehicle, gusts_mps)?;
         let split = Split::of(&comparison.residual(&vehicle, gusts_mps)?);
         let slopes = slopes(comparison, &vehicle, parameters)?;
-        let doubts = comparison.wind_doubts(&vehicle)?;
+        let doubts = doubts(comparison, &vehicle, parameters)?;
         let problem = Problem::new(&patterns, &split).doubting(&doubts).with(extras).with(&slopes);
         let is_fitted = fit_noise && (round == 0 || round == 2);
         let solution =
@@ -106,6 +98,46 @@ pub(super) fn refine(
         }
     }
     last.ok_or(GapError::NothingCommon)
+}
+
+/// What is not known exactly, as regressors of one standard deviation each: the wind, and the forms of
+/// effects of which only the size is fitted.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub(super) fn doubts(
+    comparison: &Comparison,
+    vehicle: &Vehicle,
+    parameters: &[Parameter],
+) -> Result<Vec<Column>, GapError> {
+    let mut doubts = comparison.wind_doubts(vehicle)?;
+    for fitted in parameters.iter().filter(|fitted| fitted.before.is_none()) {
+        let Some((form, sd)) = form_of(fitted) else { continue };
+        let is_fitted = |one: &Parameter| (one.effect, one.name) == (form.effect, form.name);
+        if parameters.iter().any(is_fitted) {
+            continue;
+        }
+        let slopes = slopes(comparison, vehicle, &[form])?;
+        doubts.extend(slopes.iter().map(|slope| slope.each(|g, d, b| sd * slope.at(g, d, b))));
+    }
+    Ok(doubts)
+}
+
+/// The form of an effect whose size this is, with what it is not known by: half the range that is tried.
+fn form_of(size: &Parameter) -> Option<(Parameter, f64)> {
+    let definition = find(size.effect)?.definition();
+    let Sought::Shape { size: name, shape: Some((form, values)), .. } = &definition.sought else {
+        return None;
+    };
+    if *name != size.name {
+        return None;
+    }
+    let (low, high) = range(values);
+    Some((parameter(definition, form)?, (high - low) / 2.0))
+}
+
+fn range(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
 }
 
 /// Derivatives of the model's pulse by each parameter.
@@ -163,9 +195,8 @@ pub(super) fn parameters_of(
             let (size, form) = (base.white(size), base.white(form));
             let alike = base.likeness(&size, &form);
             let information = base.information(&form) * (1.0 - alike * alike).max(0.0);
-            let range = values.iter().copied().fold(0.0, f64::max)
-                - values.iter().copied().fold(f64::INFINITY, f64::min);
-            if information.sqrt() * range > FORM_Z {
+            let (low, high) = range(values);
+            if information.sqrt() * (high - low) > FORM_Z {
                 found.push(parameter);
             }
         }
@@ -192,7 +223,8 @@ fn parameter(definition: &Definition, name: &str) -> Option<Parameter> {
     })
 }
 
-/// Standard errors of parameters at the vehicle's own values, with the noise that the flight shows.
+/// Standard errors of parameters at the vehicle's own values, and of the coefficients of further
+/// regressors, with the noise that the flight shows.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
@@ -200,17 +232,19 @@ pub(super) fn size_errors(
     comparison: &Comparison,
     vehicle: &Vehicle,
     parameters: &[Parameter],
-) -> Result<Vec<f64>, GapError> {
+    extras: &[Column],
+) -> Result<(Vec<f64>, Vec<f64>), GapError> {
     let patterns = comparison.patterns(vehicle, 0.0)?;
     let split = Split::of(&comparison.residual(vehicle, 0.0)?);
     let slopes = slopes(comparison, vehicle, parameters)?;
-    let doubts = comparison.wind_doubts(vehicle)?;
-    let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&slopes);
+    let doubts = doubts(comparison, vehicle, parameters)?;
+    let problem = Problem::new(&patterns, &split).doubting(&doubts).with(extras).with(&slopes);
     let solution = problem.fit(Hyper::default(), Likelihood::Restricted);
     let covariance = solution.covariance();
-    let first = solution.beta.len() - parameters.len();
-    let se = |index: usize| covariance[(first + index, first + index)].max(0.0).sqrt();
-    Ok((0..parameters.len()).map(se).collect())
+    let sizes = solution.beta.len() - parameters.len();
+    let se = |place: usize| covariance[(place, place)].max(0.0).sqrt();
+    let of = |first: usize, count: usize| (first..first + count).map(se).collect();
+    Ok((of(sizes, parameters.len()), of(sizes - extras.len(), extras.len())))
 }
 
 /// Fitted values with their intervals, for the verdict.

@@ -8,13 +8,11 @@ use super::bins::{Bin, BinValues};
 use crate::base::time::GpsTime;
 use crate::mission::plan::{Plan, Slot};
 use crate::show::Trajectory;
-use crate::sim::recorder::{Moment, Recorder};
+use crate::sim::recorder::{Moment, Recorder, STEPS_10_HZ};
 use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly_with};
 use crate::vehicle::Vehicle;
 
 const GRAVITY: f64 = 9.80665;
-/// Values are taken at every so many control steps (50 Hz).
-const EVERY: u64 = 8;
 
 /// The fleet's mean drone: what makes drones differ is off.
 pub(super) fn mean_drone(vehicle: &Vehicle) -> Vehicle {
@@ -119,7 +117,9 @@ impl<'a> BinRecorder<'a> {
 
 impl Recorder for BinRecorder<'_> {
     fn record(&mut self, moment: &Moment<'_>) -> io::Result<()> {
-        if !moment.step.is_multiple_of(EVERY) {
+        // When a log has its rows: a show's target moves ten times a second, too, and the pulse follows in
+        // a ripple of the same period, of which a log always shows the same place.
+        if !moment.step.is_multiple_of(STEPS_10_HZ) {
             return Ok(());
         }
         let time_s = moment.time_us as f64 * 1e-6;

@@ -30,6 +30,8 @@ pub(super) struct Ranked {
     pub beta: f64,
     /// What it does to the pulse: standard deviation over bins, us.
     pub size_us: f64,
+    /// The same: largest less smallest, us.
+    pub range_us: f64,
     /// Noise with it in the model.
     pub hyper: Hyper,
     /// Whether the noise was fitted anew.
@@ -47,6 +49,8 @@ pub(super) struct RankedGeneric {
     pub beta: Vec<f64>,
     /// Standard deviation over bins, us.
     pub size_us: f64,
+    /// The same: largest less smallest, us.
+    pub range_us: f64,
     /// Noise with it in the model.
     pub hyper: Hyper,
 }
@@ -130,6 +134,7 @@ fn scan(base: &Solution, sought: Sought<'_>) -> Vec<Ranked> {
                         gain: gain.nats,
                         beta: gain.beta,
                         size_us: gain.beta.abs() * variant.column.spread(sought.drones),
+                        range_us: gain.beta.abs() * variant.column.range(),
                         hyper: base.hyper,
                         fitted: false,
                     })
@@ -161,6 +166,7 @@ fn refit(
         gain,
         beta,
         size_us: beta.abs() * variant.column.spread(sought.drones),
+        range_us: beta.abs() * variant.column.range(),
         hyper: with.hyper,
         fitted: true,
         ..ranked.clone()
@@ -177,7 +183,9 @@ fn free_shapes(
     for (index, generic) in sought.generics.iter().enumerate() {
         let (beta, nats) = base.gain_of_all(&generic.columns);
         let gain = nats - generic.penalty;
-        let found = RankedGeneric { generic: index, gain, beta, size_us: 0.0, hyper: base.hyper };
+        let hyper = base.hyper;
+        let found =
+            RankedGeneric { generic: index, gain, beta, size_us: 0.0, range_us: 0.0, hyper };
         let same =
             |other: &RankedGeneric| sought.generics[other.generic].depends_on == generic.depends_on;
         match best.iter_mut().find(|other| same(other)) {
@@ -212,19 +220,20 @@ fn free_shapes(
     best.splice(..refitted.len(), refitted);
     for found in &mut best {
         let generic = &sought.generics[found.generic];
-        found.size_us = spread(&generic.columns, &found.beta, sought.drones);
+        if let Some(trace) = sum(&generic.columns, &found.beta) {
+            found.size_us = trace.spread(sought.drones);
+            found.range_us = trace.range();
+        }
     }
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     best
 }
 
-/// Standard deviation over bins of a sum of regressors, us.
-pub(super) fn spread(columns: &[Column], beta: &[f64], drones: &[usize]) -> f64 {
-    let Some(first) = columns.first() else { return 0.0 };
-    let sum = first.each(|group, drone, bin| {
+/// A sum of regressors, us.
+fn sum(columns: &[Column], beta: &[f64]) -> Option<Column> {
+    Some(columns.first()?.each(|group, drone, bin| {
         columns.iter().zip(beta).map(|(c, b)| b * c.at(group, drone, bin)).sum()
-    });
-    sum.spread(drones)
+    }))
 }
 
 /// Thresholds: gains that flights with nothing to find exceed with a small chance.

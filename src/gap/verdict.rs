@@ -248,6 +248,12 @@ pub struct Noise {
     pub slopes: f64,
     /// Response that is assumed for the air where the model has none, us/(m/s).
     pub least_response: f64,
+    /// How the shared updraft changes with height, m/s per 50 m.
+    #[serde(default)]
+    pub gradient_mps: f64,
+    /// Horizontal gusts beyond those that the leans show, m/s along either axis.
+    #[serde(default)]
+    pub side_gusts_mps: f64,
 }
 
 /// The wind and how the vehicle leans in it.

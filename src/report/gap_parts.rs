@@ -291,6 +291,16 @@ pub(super) fn noise_rows(verdict: &Verdict) -> Vec<Value> {
             with_unit(noise.least_response, "us/(m/s)"),
             "assumed on top of the model's own",
         ),
+        (
+            "change of the shared updraft over 50 m of height",
+            with_unit(noise.gradient_mps, "m/s"),
+            "standard deviation",
+        ),
+        (
+            "horizontal gusts that the leans do not show",
+            with_unit(noise.side_gusts_mps, "m/s"),
+            "standard deviation along either axis",
+        ),
     ];
     rows.into_iter().map(|(what, value, note)| context! { what, value, note }).collect()
 }

@@ -8,7 +8,7 @@ mod heading;
 mod height_wave;
 mod step;
 
-use crate::effects::{Definition, Effect, Values};
+use crate::effects::{Definition, Effect, Reference, Signals, Values};
 
 /// All of them.
 pub const FOREIGN: &[&dyn Effect] =
@@ -28,6 +28,20 @@ pub fn depends_on(name: &str) -> &'static [&'static str] {
         "heading" => &["heading"],
         _ => &[],
     }
+}
+
+/// What an effect adds to the pulse of steady flight, with the air from a direction against the nose, rad,
+/// us.
+pub fn steady_us(
+    effect: &dyn Effect,
+    values: &Values,
+    at: &Reference,
+    signals: &Signals,
+    heading_rad: f64,
+) -> f64 {
+    let ahead_us = effect.pulse_us(at, values, signals);
+    // The closed form has the air straight from ahead.
+    if effect.definition().name == "heading" { ahead_us * heading_rad.cos() } else { ahead_us }
 }
 
 /// Places in [`crate::effects::Own::state`] that all of them share: change of the pulse now (us) and

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Both, compare, logs, one_flight, write};
 use crate::base::file::create_folder;
-use crate::blind::explain::{Cause, Explain};
+use crate::blind::explain::{Cause, Explain, there};
 use crate::blind::scenario::Scenario;
 use crate::blind::vehicles::true_vehicle;
 use crate::campaign::FlightFolder;
@@ -51,10 +51,8 @@ impl Explain for Searched {
     fn fisher_z(&self, flight: &Path, truth: &Scenario) -> Vec<Option<f64>> {
         let unknown = || vec![None; truth.hidden.len()];
         let Ok(found) = one_flight(flight, None) else { return unknown() };
-        let Some(slot) = found.plan.as_ref().and_then(|plan| plan.slots.first()) else {
-            return unknown();
-        };
-        let Ok(vehicle) = true_vehicle(truth, slot.slot) else { return unknown() };
+        let Some(slot) = truth.cold_slot() else { return unknown() };
+        let Ok(vehicle) = true_vehicle(truth, slot) else { return unknown() };
         let read = logs::read(&found, Path::new(""));
         let flown: Vec<Flown<'_>> =
             read.flights.iter().map(|(slot, flight)| Flown { slot: *slot, flight }).collect();
@@ -65,14 +63,7 @@ impl Explain for Searched {
             simulated: None,
             left_out: Vec::new(),
         };
-        let hidden: Vec<(&str, &str, f64)> = truth
-            .hidden
-            .iter()
-            .map(|one| {
-                let effect = if one.foreign { "" } else { one.effect.as_str() };
-                (effect, one.size.as_str(), one.value() - one.before.unwrap_or(0.0))
-            })
-            .collect();
+        let hidden = there(truth, &vehicle);
         fisher_z(&input, &hidden).unwrap_or_else(|_| unknown())
     }
 }

@@ -6,7 +6,8 @@ use crate::gap::GapError;
 use crate::gap::bins::{Bin, BinValues, of_segments};
 use crate::gap::compare::thrust_exponent;
 use crate::gap::noise::{
-    GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SLOPES, WHITE,
+    GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SIDE_GUSTS,
+    SLOPES, WHITE,
 };
 use crate::gap::refine::{Parameter, size_of};
 use crate::gap::refly::{mean_drone, refly};
@@ -47,6 +48,8 @@ fn hyper_of(noise: &Noise) -> Hyper {
         (OFFSETS, noise.drones_us),
         (SLOPES, noise.slopes),
         (LEAST, noise.least_response),
+        (GRADIENT, noise.gradient_mps),
+        (SIDE_GUSTS, noise.side_gusts_mps),
     ];
     for (place, value) in found {
         hyper.0[place] = value.max(LEAST_NOISE).ln();

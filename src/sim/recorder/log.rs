@@ -14,7 +14,8 @@ use crate::sim::flight::{FlightSetup, STEP_S, STEP_US};
 
 /// Steps between rows at 25 Hz and at 10 Hz.
 const STEPS_25_HZ: u64 = 16;
-const STEPS_10_HZ: u64 = 40;
+/// Control steps between two of the rows that a log has ten times a second.
+pub const STEPS_10_HZ: u64 = 40;
 
 /// Writes a DataFlash log as the show firmware does.
 pub struct LogRecorder<'a, W: Write> {

@@ -21,7 +21,7 @@ use super::air::Surroundings;
 use super::autopilot::Autopilot;
 use super::plant::Plant;
 use super::sensors::Estimate;
-pub use log::LogRecorder;
+pub use log::{LogRecorder, STEPS_10_HZ};
 
 /// Everything there is to know about one control step, before the body moves.
 #[derive(Clone, Copy)]
