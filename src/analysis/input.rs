@@ -92,12 +92,14 @@ pub struct TruthSeries {
 }
 
 impl TruthSeries {
+    /// The value at a whole second of show time, m/s, up positive; `None`: the series does not reach it.
+    pub fn at_second(&self, time_s: i64) -> Option<f64> {
+        let index = usize::try_from(time_s.checked_sub(self.first_s)?).ok()?;
+        self.updraft_mps.get(index).copied()
+    }
+
     /// The values at whole seconds of show time; `None` if one is missing.
     pub(super) fn at(&self, times_s: &[i64]) -> Option<Vec<f64>> {
-        let value = |time: &i64| {
-            let index = usize::try_from(time.checked_sub(self.first_s)?).ok()?;
-            self.updraft_mps.get(index).copied()
-        };
-        times_s.iter().map(value).collect()
+        times_s.iter().map(|time_s| self.at_second(*time_s)).collect()
     }
 }
