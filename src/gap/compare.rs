@@ -245,7 +245,7 @@ impl Comparison {
             for (signals, air) in scene.signals.iter_mut().zip(&self.wind.air_mps) {
                 for (signals, air) in signals.iter_mut().zip(air) {
                     let mut air = *air;
-                    air[axis] -= self.wind.mean_se_mps[axis];
+                    air[axis] -= self.wind.mean_se_mps;
                     signals.horizontal_mps = air[0].hypot(air[1]);
                 }
             }
