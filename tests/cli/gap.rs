@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use insta::assert_snapshot;
 
-use crate::analyze_inputs::patch;
+use crate::analyze_inputs::{fly, patch};
 use crate::support::{Bench, contents};
 
 /// A ladder of two rungs.
@@ -138,6 +138,19 @@ fn a_simulated_side_must_be_there_and_be_of_the_flight() {
     assert_snapshot!(refused(&bench, 5, &["campaign", "--simulated", "empty"]));
     fs::write(bench.path("empty/01.BIN"), b"no log").unwrap();
     assert_snapshot!(refused(&bench, 5, &["campaign", "--simulated", "empty"]));
+}
+
+#[test]
+fn a_hover_that_is_compared_is_not_its_own_map() {
+    let bench = Bench::new();
+    fly(&bench, "campaign", "1x2");
+    let told = |flight: &str| {
+        let ended = bench.expect(0, &["gap", "campaign", "--flight", flight, "--json"]);
+        let map = ended.json("updraft.gap/1")["verdict"]["map"]["flight"].clone();
+        (map.as_str().map(str::to_owned), ended.err.contains("the error of the map is not told"))
+    };
+    assert_eq!(told("calibration"), (Some("hover".to_owned()), false));
+    assert_eq!(told("hover"), (None, true));
 }
 
 #[test]
