@@ -178,7 +178,6 @@ pub fn search(
                     alpha: options.alpha,
                     size_us: best.size_us,
                     rivals,
-                    held_out_us: None,
                     shape: Some(along_climb(&comparison, variant, best.beta)),
                 });
             }
@@ -197,7 +196,6 @@ pub fn search(
                     alpha: options.alpha,
                     size_us: free.size_us,
                     rivals: rivals(&round, sought),
-                    held_out_us: None,
                     shape: Some(shape),
                 });
             }
