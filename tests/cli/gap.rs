@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use insta::assert_snapshot;
 
-use crate::analyze_inputs::{fly, patch};
+use crate::analyze_inputs::patch;
 use crate::support::{Bench, contents};
 
 /// A ladder of two rungs.
@@ -143,7 +143,9 @@ fn a_simulated_side_must_be_there_and_be_of_the_flight() {
 #[test]
 fn a_hover_that_is_compared_is_not_its_own_map() {
     let bench = Bench::new();
-    fly(&bench, "campaign", "1x2");
+    let run = ["run", "--direct", "--no-study", "--quiet", "--air", "still", "-o", "campaign"];
+    let small = ["--grid", "1x2", "--duration", "40", "--height", "30", "--speeds", "1,2"];
+    bench.expect(0, &[&run[..], &small, &["--leg", "15", "--hover", "15"]].concat());
     let told = |flight: &str| {
         let ended = bench.expect(0, &["gap", "campaign", "--flight", flight, "--json"]);
         let map = ended.json("updraft.gap/1")["verdict"]["map"]["flight"].clone();
