@@ -31,7 +31,6 @@ fn verdict(findings: Vec<Finding>) -> Verdict {
         alpha: 0.01,
         size_us: 10.0,
         rivals: Vec::new(),
-        held_out_us: None,
         shape: None,
     };
     Verdict {

@@ -1,5 +1,7 @@
 //! What a reader must know where a battery's voltage was not logged.
 
+use std::fmt::Write as _;
+
 use super::battery;
 use super::budget::Quality;
 use super::result::{DroneAnalysis, DroneUpdraft, FlightAnalysis, UpdraftMap};
@@ -61,9 +63,7 @@ fn listed<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
     let more = names.len().saturating_sub(NAMED);
     let mut text = names.take(NAMED).collect::<Vec<_>>().join(", ");
     if more > 0 {
-        text += " and ";
-        text += &more.to_string();
-        text += " more";
+        let _ = write!(text, " and {more} more");
     }
     text
 }

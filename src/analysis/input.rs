@@ -92,12 +92,28 @@ pub struct TruthSeries {
 }
 
 impl TruthSeries {
+    /// The value at a whole second of show time, m/s, up positive; `None`: the series does not reach it.
+    pub fn at_second(&self, time_s: i64) -> Option<f64> {
+        let index = usize::try_from(time_s.checked_sub(self.first_s)?).ok()?;
+        self.updraft_mps.get(index).copied()
+    }
+
     /// The values at whole seconds of show time; `None` if one is missing.
     pub(super) fn at(&self, times_s: &[i64]) -> Option<Vec<f64>> {
-        let value = |time: &i64| {
-            let index = usize::try_from(time.checked_sub(self.first_s)?).ok()?;
-            self.updraft_mps.get(index).copied()
-        };
-        times_s.iter().map(value).collect()
+        times_s.iter().map(|time_s| self.at_second(*time_s)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_series_of_true_air_ends_where_it_ends() {
+        let truth = TruthSeries { first_s: -1, updraft_mps: vec![0.1, 0.2, 0.3] };
+        let values = [-2, -1, 0, 1, 2, i64::MIN].map(|time_s| truth.at_second(time_s));
+        assert_eq!(values, [None, Some(0.1), Some(0.2), Some(0.3), None, None]);
+        assert_eq!(truth.at(&[0, 1]), Some(vec![0.2, 0.3]));
+        assert_eq!(truth.at(&[1, 2]), None);
     }
 }

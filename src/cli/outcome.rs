@@ -1,5 +1,7 @@
 //! What was lost in an analysis, as lines for standard error: where nobody sees the tables.
 
+use std::fmt::Write as _;
+
 use super::exit::{BECAUSE, CommandError};
 use crate::analysis::result::{Analysis, FlightAnalysis, Unmeasured};
 use crate::mission::plan::Purpose;
@@ -75,10 +77,7 @@ pub(super) fn nothing_found(analysis: &Analysis, reasons: bool) -> CommandError 
             text.push_str(problem);
         }
         if problems.len() > LISTED {
-            text.push_str(BECAUSE);
-            text += "and ";
-            text += &(problems.len() - LISTED).to_string();
-            text += " more";
+            let _ = write!(text, "{BECAUSE}and {} more", problems.len() - LISTED);
         }
     }
     CommandError::Nothing(text)

@@ -37,6 +37,9 @@ const MOTORS: &[&str] = &[
 ];
 const EKF: &[&str] = &["TimeUS", "TimeMS", "C", "VN", "VE", "VD", "PN", "PE", "PD"];
 
+/// Messages of position filters, newest first.
+const FILTERS: [&str; 3] = ["XKF1", "NKF1", "EKF1"];
+
 /// The messages that a flight is read from.
 const WANTED: &[Select<'static>] = &[
     Select { message: "XKF1", fields: EKF },
@@ -187,8 +190,7 @@ impl Messages {
 
     /// Velocity up, height, north and east of the EKF: primary core of the newest filter present.
     pub(super) fn ekf(&self) -> Option<Ekf> {
-        let rows = ["XKF1", "NKF1", "EKF1"].iter().find_map(|name| self.rows(name))?;
-        let mut rows = rows.clone();
+        let mut rows = self.rows(self.ekf_name()?)?.clone();
         let primary = self.primary_core();
         if let Some(cores) = rows.column("C").map(<[f64]>::to_vec) {
             let core = if cores.contains(&primary) { primary } else { 0.0 };
@@ -205,8 +207,8 @@ impl Messages {
     /// Columns that the position filter logged without one number among them; `None`: it logged
     /// nothing, or its columns have numbers.
     pub(super) fn ekf_without_numbers(&self) -> Option<String> {
-        let (name, rows) =
-            ["XKF1", "NKF1", "EKF1"].iter().find_map(|name| Some((*name, self.rows(name)?)))?;
+        let name = self.ekf_name()?;
+        let rows = self.rows(name)?;
         let empty = |column: &&str| rows.series(column, |value| value).is_none();
         let empty: Vec<String> =
             ["VD", "PD"].iter().filter(|c| empty(c)).map(|c| format!("{name}.{c}")).collect();
@@ -215,7 +217,7 @@ impl Messages {
 
     /// The newest position filter that logged anything.
     pub(super) fn ekf_name(&self) -> Option<&'static str> {
-        ["XKF1", "NKF1", "EKF1"].into_iter().find(|name| self.rows(name).is_some())
+        FILTERS.into_iter().find(|name| self.rows(name).is_some())
     }
 
     /// The core that most XKF4 rows call primary; core 0 without them.

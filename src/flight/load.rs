@@ -78,12 +78,11 @@ pub(super) fn load(
         }
         missing("motor outputs", "RCOU", "set LOG_BITMASK bit 10 (RCOUT, +1024) and fly again")
     })?;
-    let ekf = messages.ekf().ok_or_else(|| match messages.ekf_without_numbers() {
-        Some(columns) => FlightError::NoNumbers { source_path: source.to_owned(), columns },
-        None if messages.ekf_name().is_some() => senseless(
-            format!("{}.VD", messages.ekf_name().unwrap_or_default()),
-            "a vertical velocity below 100 m/s",
-        ),
+    let ekf = messages.ekf().ok_or_else(|| match messages.ekf_name() {
+        Some(name) => match messages.ekf_without_numbers() {
+            Some(columns) => FlightError::NoNumbers { source_path: source.to_owned(), columns },
+            None => senseless(format!("{name}.VD"), "a vertical velocity below 100 m/s"),
+        },
         None => missing(
             "vertical velocity of the position filter",
             "XKF1, NKF1 or EKF1",
@@ -228,7 +227,7 @@ pub(super) fn load(
     })
 }
 
-/// `first of 2` as people say it.
+/// Which of so many, from 0, as people say it: `first`, `number 2`, `last (number 3)`.
 pub(super) fn ordinal(index: usize, count: usize) -> String {
     match (index, count) {
         (0, _) => "first".to_owned(),

@@ -248,7 +248,7 @@ impl Comparison {
     pub fn wind_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
         let mut doubts = Vec::new();
         for axis in 0..2 {
-            let doubt = self.by_wind(vehicle, axis, self.wind.mean_se_mps[axis])?;
+            let doubt = self.by_wind(vehicle, axis, self.wind.mean_se_mps)?;
             // Where the model does not feel wind there is nothing to doubt.
             if doubt.spread(&self.data.counts()) > LEAST_DOUBT_US {
                 doubts.push(doubt);

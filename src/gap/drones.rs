@@ -179,7 +179,6 @@ fn spread(
         alpha: 0.025,
         size_us: sd * sensitivity,
         rivals: Vec::new(),
-        held_out_us: None,
         shape: None,
     })
 }

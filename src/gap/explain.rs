@@ -180,7 +180,6 @@ pub fn search(
                     alpha: options.alpha,
                     size_us: best.size_us,
                     rivals,
-                    held_out_us: None,
                     shape: Some(along_climb(&comparison, variant, best.beta)),
                 });
             }
@@ -199,7 +198,6 @@ pub fn search(
                     alpha: options.alpha,
                     size_us: free.size_us,
                     rivals: rivals(&round, sought),
-                    held_out_us: None,
                     shape: Some(shape),
                 });
             }

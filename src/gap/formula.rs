@@ -97,7 +97,7 @@ mod tests {
     fn shape(of: impl Fn(f64) -> f64) -> Shape {
         let x: Vec<f64> = (0..40).map(|index| f64::from(index) * 2.0).collect();
         let us = x.iter().map(|x| of(*x)).collect();
-        Shape { axis: String::new(), x, us, se_us: Vec::new() }
+        Shape { axis: String::new(), x, us }
     }
 
     #[test]

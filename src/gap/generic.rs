@@ -25,6 +25,10 @@ pub(super) struct Generic {
 const WAVES_M: [f64; 7] = [10.0, 15.0, 20.0, 28.0, 40.0, 56.0, 80.0];
 /// Air speed from which a direction alone may count, m/s.
 const KNEE_MPS: f64 = 1.5;
+/// How the effect of a direction depends on the air speed, m/s: it grows with it, or hardly any more
+/// above the knee.
+const GROWTHS: [fn(f64) -> f64; 2] =
+    [|speed_mps| speed_mps, |speed_mps| KNEE_MPS * speed_mps / speed_mps.hypot(KNEE_MPS)];
 /// Instants at which a step is tried.
 const STEPS: usize = 47;
 /// A signal that moves less than this share of its scale says nothing.
@@ -102,19 +106,11 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
             penalty: 4.0,
         });
     }
-    // A direction that does not change is an offset. Its effect may grow with the speed of the air or be
-    // there at any.
-    for knee_mps in [f64::INFINITY, KNEE_MPS] {
+    // A direction that does not change is an offset.
+    for grown in GROWTHS {
         let turns = |of: fn(f64) -> f64| {
-            let value = |(angle, signals): (&f64, &Signals)| {
-                let speed_mps = signals.horizontal_mps;
-                let grown = if knee_mps.is_finite() {
-                    knee_mps * speed_mps / speed_mps.hypot(knee_mps)
-                } else {
-                    speed_mps
-                };
-                of(*angle) * grown
-            };
+            let value =
+                |(angle, signals): (&f64, &Signals)| of(*angle) * grown(signals.horizontal_mps);
             let group = |(angles, signals): (&Vec<f64>, &Vec<Signals>)| {
                 angles.iter().zip(signals).map(value).collect()
             };
@@ -127,7 +123,7 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
                 axis: "direction of the air from the nose (rad)",
                 columns: vec![Column::Shared(ahead), Column::Shared(aside)],
                 along: headings.to_vec(),
-                penalty: 2.0 + 2.0_f64.ln(),
+                penalty: 2.0 + (GROWTHS.len() as f64).ln(),
             });
         }
     }
@@ -203,10 +199,5 @@ pub(super) fn drawn(axis: &str, mut points: Vec<(f64, f64)>) -> Shape {
         let chunks = points.chunks(size);
         chunks.map(|chunk| chunk.iter().map(of).sum::<f64>() / chunk.len() as f64).collect()
     };
-    Shape {
-        axis: axis.to_owned(),
-        x: mean(|point| point.0),
-        us: mean(|point| point.1),
-        se_us: Vec::new(),
-    }
+    Shape { axis: axis.to_owned(), x: mean(|point| point.0), us: mean(|point| point.1) }
 }

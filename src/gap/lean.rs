@@ -92,8 +92,8 @@ impl LeanLaw {
 pub struct Wind {
     /// Mean wind, show frame, towards, m/s.
     pub mean_mps: [f64; 2],
-    /// Its standard errors, m/s.
-    pub mean_se_mps: [f64; 2],
+    /// Its standard error along either axis, m/s.
+    pub mean_se_mps: f64,
     /// Air speed of each group's drones in each bin, show frame, m/s.
     pub air_mps: Vec<Vec<[f64; 2]>>,
     /// Lean law that the flight's horizontal legs showed; `None`: it has none, and the model's was
@@ -181,7 +181,7 @@ pub(super) fn wind(
         .collect();
     let share = if measured.is_some() { LEGS_DOUBT } else { LAW_DOUBT };
     let speed_mps = mean_mps[0].hypot(mean_mps[1]);
-    let mean_se_mps = [LEAST_DOUBT_MPS.hypot(share * speed_mps); 2];
+    let mean_se_mps = LEAST_DOUBT_MPS.hypot(share * speed_mps);
     Wind { mean_mps, mean_se_mps, air_mps, measured }
 }
 

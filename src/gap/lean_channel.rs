@@ -55,7 +55,6 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         alpha,
         size_us: 0.0,
         rivals: Vec::new(),
-        held_out_us: None,
         shape: None,
     })
 }

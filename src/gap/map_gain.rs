@@ -123,8 +123,9 @@ fn errors_of(
                 let near: Vec<usize> = (0..group.bins.len()).filter(near).collect();
                 let mean = near.iter().map(|other| updraft_mps[*other]).sum::<f64>()
                     / near.len().max(1) as f64;
+                let true_mps = truth.at_second(middle.middle_s().round() as i64);
                 if group.bins[bin].kind.is_hover()
-                    && let Some(true_mps) = at(truth, middle.middle_s())
+                    && let Some(true_mps) = true_mps.filter(|value| value.is_finite())
                 {
                     errors.push(mean - true_mps);
                     truths.push(true_mps);
@@ -133,12 +134,6 @@ fn errors_of(
         }
     }
     Ok((errors, truths))
-}
-
-/// The true running mean at a time.
-fn at(truth: &TruthSeries, time_s: f64) -> Option<f64> {
-    let index = usize::try_from((time_s.round() as i64).checked_sub(truth.first_s)?).ok()?;
-    truth.updraft_mps.get(index).copied().filter(|value| value.is_finite())
 }
 
 /// The updraft in which the model asks for so much more pulse, m/s.

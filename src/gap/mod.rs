@@ -43,5 +43,3 @@ pub use explain::{Found, Options, search};
 pub use make::{Explained, Input, explain};
 pub use map_gain::{Measured, map_gain};
 pub use verdict::Verdict;
-
-pub use bins::BinValues as BV;

@@ -106,9 +106,7 @@ pub struct Step {
     pub size_us: f64,
     /// Other candidates and their gains, best first.
     pub rivals: Vec<Rival>,
-    /// Held-out gap before and after this step, us (drone means and shared air removed).
-    pub held_out_us: Option<(f64, f64)>,
-    /// Shape that was found, for drawing: what it depends on, and (x, us) with the standard error.
+    /// Shape that was found, for drawing.
     pub shape: Option<Shape>,
 }
 
@@ -177,7 +175,7 @@ pub struct Rival {
     pub gain_nats: f64,
 }
 
-/// A curve with its standard error.
+/// What was found, along what it depends on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Shape {
     /// What it is drawn against, with unit.
@@ -186,8 +184,6 @@ pub struct Shape {
     pub x: Vec<f64>,
     /// Change of the pulse, us.
     pub us: Vec<f64>,
-    /// Its standard error, us.
-    pub se_us: Vec<f64>,
 }
 
 /// The end of the search.

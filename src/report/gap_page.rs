@@ -1,22 +1,22 @@
 //! The HTML page of a comparison of measurement and simulation: what goes where; the words and the
 //! look are in `templates/report/`, the tables in `gap_parts`.
 
+use minijinja::context;
 use minijinja::value::Value;
-use minijinja::{Environment, UndefinedBehavior, context};
 
 use crate::gap::Verdict;
 
 use super::figures::gap::{drones, ladder, map};
+use super::fill::{OPEN_LIMIT, common, fill};
 use super::gap_parts::{
     detectables, gap_rows, noise_rows, regime_rows, sensor, step_section, tiles,
 };
 use super::gap_words::{map_words, micro};
-use super::page::{Gallery, OPEN_LIMIT};
+use super::page::Gallery;
 use super::text::{clean, count, fixed, reduced, sentence};
 use super::{Provenance, Report, ReportError};
 
 const PAGE: &str = include_str!("../../templates/report/gap.html");
-const STYLE: &str = include_str!("../../templates/report/style.css");
 
 /// Makes the page and the figures of a verdict.
 ///
@@ -48,18 +48,9 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
     let mut slots = verdict.data.held_out.clone();
     slots.sort_unstable();
     let held_out: Vec<String> = slots.iter().map(u16::to_string).collect();
-    let inputs: Vec<Value> = provenance
-        .inputs
-        .iter()
-        .map(|input| context! { path => clean(&input.path), sha256 => clean(&input.sha256) })
-        .collect();
     let rest = &verdict.rest;
-    let mut environment = Environment::new();
-    environment.set_undefined_behavior(UndefinedBehavior::Strict);
-    environment.add_template("gap.html", PAGE)?;
-    let html = environment.get_template("gap.html")?.render(context! {
+    let values = context! {
         title => format!("Measurement and model: {}", clean(&verdict.vehicle)),
-        style => Value::from_safe_string(STYLE.to_owned()),
         vehicle => clean(&verdict.vehicle),
         summary => micro(&verdict.summary),
         tiles => tiles(verdict),
@@ -90,17 +81,9 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         held_out => held_out.join(", "),
         schema => clean(&verdict.schema),
         made_by => clean(&verdict.made_by),
-        program => clean(&provenance.program),
-        command => clean(&provenance.command),
         seed => provenance.seed.map(|seed| seed.to_string()),
-        settings => provenance
-            .settings
-            .iter()
-            .map(|(what, how)| context! { what => clean(what), how => clean(how) })
-            .collect::<Vec<_>>(),
-        inputs_open => inputs.len() <= OPEN_LIMIT,
-        inputs,
-        kuva => kuva::VERSION,
-    })?;
+        ..common(provenance),
+    };
+    let html = fill("gap.html", PAGE, values)?;
     Ok(Report { html, figures: figures.files })
 }

@@ -112,9 +112,6 @@ pub(super) fn step_section(found: &Step, number_of: usize, figures: &mut Gallery
         threshold => fixed(found.threshold_nats, 1),
         chance => per_thousand(found.alpha),
         size => fixed(found.size_us, 1),
-        held_out => found.held_out_us.map(|(before, after)| {
-            format!("{} → {} µs", fixed(before, 1), fixed(after, 1))
-        }),
         figure,
     }
 }

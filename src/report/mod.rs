@@ -19,6 +19,7 @@ pub mod fields;
 #[cfg(feature = "parquet")]
 pub mod fields_parquet;
 mod figures;
+mod fill;
 mod film;
 mod fleet_air;
 mod frames;

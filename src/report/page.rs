@@ -1,12 +1,13 @@
 //! The HTML page: what goes where; the words and the look are in `templates/report/`.
 
+use minijinja::context;
 use minijinja::value::Value;
-use minijinja::{Environment, UndefinedBehavior, context};
 
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::study::result::StudyResult;
 
 use super::figures::{laws as figure_laws, study as figure_study};
+use super::fill::{OPEN_LIMIT, common, fill};
 use super::page_air::air_section;
 use super::page_flight::flight_section;
 use super::study_page::law_table;
@@ -14,14 +15,10 @@ use super::text::{clean, slug};
 use super::{FIGURES_FOLDER, Figure, Provenance, Report, ReportError, glance};
 
 const PAGE: &str = include_str!("../../templates/report/report.html");
-const STYLE: &str = include_str!("../../templates/report/style.css");
 const SCRIPTS: [&str; 2] = [
     include_str!("../../templates/report/script.js"),
     include_str!("../../templates/report/film.js"),
 ];
-
-/// Lists that are longer than this start folded.
-pub(super) const OPEN_LIMIT: usize = 6;
 
 /// Makes the page and the figures.
 pub(super) fn render(
@@ -46,33 +43,14 @@ pub(super) fn render(
         .map(|(index, flight)| flight_section(analysis, flight, index, &mut figures))
         .collect();
     let warnings: Vec<String> = analysis.warnings.iter().map(|w| clean(w)).collect();
-    let inputs: Vec<Value> = provenance
-        .inputs
-        .iter()
-        .map(|input| context! { path => clean(&input.path), sha256 => clean(&input.sha256) })
-        .collect();
-
-    let mut environment = Environment::new();
-    environment.set_undefined_behavior(UndefinedBehavior::Strict);
-    environment.add_template("report.html", PAGE)?;
     let title = clean(&analysis.title);
-    let html = environment.get_template("report.html")?.render(context! {
+    let values = context! {
         title => if title.trim().is_empty() { "Updraft report".to_owned() } else { title },
-        style => Value::from_safe_string(STYLE.to_owned()),
         script => Value::from_safe_string(SCRIPTS.concat()),
         made_by => clean(&analysis.made_by),
         schema => clean(&analysis.schema),
-        program => clean(&provenance.program),
-        command => clean(&provenance.command),
         seed => provenance.seed.map(|seed| seed.to_string()),
         made_at => clean(&provenance.made_at),
-        settings => provenance
-            .settings
-            .iter()
-            .map(|(what, how)| context! { what => clean(what), how => clean(how) })
-            .collect::<Vec<_>>(),
-        inputs_open => inputs.len() <= OPEN_LIMIT,
-        inputs,
         verdict => glance::verdict(analysis),
         tiles => glance::tiles(analysis),
         warnings_open => warnings.len() <= OPEN_LIMIT,
@@ -81,8 +59,9 @@ pub(super) fn render(
         laws,
         study,
         flights,
-        kuva => kuva::VERSION,
-    })?;
+        ..common(provenance),
+    };
+    let html = fill("report.html", PAGE, values)?;
     Ok(Report { html, figures: figures.files })
 }
 

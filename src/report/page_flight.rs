@@ -15,11 +15,12 @@ use super::compare::{
 use super::drone_table::drone_table;
 use super::figures::drone::{Axes, drawable};
 use super::figures::{drone as figure_drone, fleet};
+use super::fill::OPEN_LIMIT;
 use super::law;
 use super::notes::{
     logs_used, partly_used_lines, shared_notes, unused_lines, without_result_lines,
 };
-use super::page::{Gallery, OPEN_LIMIT, capitalised, flight_key};
+use super::page::{Gallery, capitalised, flight_key};
 use super::text::{clean, kind, purpose, signed};
 
 /// Bytes of drawings of single drones that the page carries; further drones are only in files.

@@ -1,18 +1,18 @@
 //! The HTML page of a study.
 
+use minijinja::context;
 use minijinja::value::Value;
-use minijinja::{Environment, UndefinedBehavior, context};
 
 use crate::study::paper;
 use crate::study::result::StudyResult;
 
 use super::figures::study::{self as figure_study, rho};
+use super::fill::{common, fill};
 use super::study_terminal::{ConditionWords, range_rows, windows};
 use super::text::{NONE, clean, count, estimate, symbol, unit};
 use super::{Provenance, Report, ReportError};
 
 const PAGE: &str = include_str!("../../templates/report/study.html");
-const STYLE: &str = include_str!("../../templates/report/style.css");
 
 /// Makes the page and the figures of a study.
 ///
@@ -38,12 +38,8 @@ pub fn render_study(study: &StudyResult, provenance: &Provenance) -> Result<Repo
         .iter()
         .map(|lost| context! { name => clean(&lost.name), reason => clean(&lost.reason) })
         .collect();
-    let mut environment = Environment::new();
-    environment.set_undefined_behavior(UndefinedBehavior::Strict);
-    environment.add_template("study.html", PAGE)?;
-    let html = environment.get_template("study.html")?.render(context! {
+    let values = context! {
         title => clean(&study.title),
-        style => Value::from_safe_string(STYLE.to_owned()),
         verdict => verdict(study),
         tiles => tiles(study),
         figures => shown,
@@ -56,11 +52,10 @@ pub fn render_study(study: &StudyResult, provenance: &Provenance) -> Result<Repo
         vehicle => clean(&study.vehicle),
         ground => study.ground_amsl_m.to_string(),
         seed => study.seed.to_string(),
-        program => clean(&provenance.program),
-        command => clean(&provenance.command),
         schema => clean(&study.schema),
-        kuva => kuva::VERSION,
-    })?;
+        ..common(provenance),
+    };
+    let html = fill("study.html", PAGE, values)?;
     let files = figures.into_iter().map(|figure| (figure.name, figure.svg)).collect();
     Ok(Report { html, figures: files })
 }

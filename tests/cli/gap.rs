@@ -141,6 +141,21 @@ fn a_simulated_side_must_be_there_and_be_of_the_flight() {
 }
 
 #[test]
+fn a_hover_that_is_compared_is_not_its_own_map() {
+    let bench = Bench::new();
+    let run = ["run", "--direct", "--no-study", "--quiet", "--air", "still", "-o", "campaign"];
+    let small = ["--grid", "1x2", "--duration", "40", "--height", "30", "--speeds", "1,2"];
+    bench.expect(0, &[&run[..], &small, &["--leg", "15", "--hover", "15"]].concat());
+    let told = |flight: &str| {
+        let ended = bench.expect(0, &["gap", "campaign", "--flight", flight, "--json"]);
+        let map = ended.json("updraft.gap/1")["verdict"]["map"]["flight"].clone();
+        (map.as_str().map(str::to_owned), ended.err.contains("the error of the map is not told"))
+    };
+    assert_eq!(told("calibration"), (Some("hover".to_owned()), false));
+    assert_eq!(told("hover"), (None, true));
+}
+
+#[test]
 fn logs_of_a_constant_are_refused() {
     let bench = campaign();
     for slot in 1..=4 {

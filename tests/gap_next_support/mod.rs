@@ -39,7 +39,6 @@ pub(crate) fn verdict(findings: Vec<Finding>) -> Verdict {
         alpha: 0.005,
         size_us: 20.0,
         rivals: Vec::new(),
-        held_out_us: None,
         shape: None,
     };
     Verdict {

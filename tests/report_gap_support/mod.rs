@@ -33,13 +33,7 @@ fn step(finding: Finding, gain_nats: f64, rivals: Vec<Rival>) -> Step {
         alpha: 0.005,
         size_us: 18.3,
         rivals,
-        held_out_us: None,
-        shape: Some(Shape {
-            axis: "vertical velocity (m/s)".to_owned(),
-            se_us: vec![0.8; x.len()],
-            x,
-            us,
-        }),
+        shape: Some(Shape { axis: "vertical velocity (m/s)".to_owned(), x, us }),
     }
 }
 

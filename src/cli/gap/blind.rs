@@ -33,7 +33,7 @@ impl Explain for Written {
 }
 
 fn explained(flight: &Path) -> Result<(Explained, Found), Cause> {
-    let found = one_flight(flight, None)?;
+    let (found, _) = one_flight(flight, None)?;
     let vehicle = library::load(&FlightFolder::at(flight).vehicle().display().to_string())?;
     let both = Both { measured: &found, simulated: None, hover: None };
     let explained = compare(&both, &vehicle, &Options::default())?;
@@ -50,7 +50,7 @@ impl Explain for Searched {
 
     fn fisher_z(&self, flight: &Path, truth: &Scenario) -> Vec<Option<f64>> {
         let unknown = || vec![None; truth.hidden.len()];
-        let Ok(found) = one_flight(flight, None) else { return unknown() };
+        let Ok((found, _)) = one_flight(flight, None) else { return unknown() };
         let Some(slot) = truth.cold_slot() else { return unknown() };
         let Ok(vehicle) = true_vehicle(truth, slot) else { return unknown() };
         let read = logs::read(&found, Path::new(""));

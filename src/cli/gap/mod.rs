@@ -118,7 +118,7 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
         seed: args.seed,
         ..Options::default()
     };
-    let found = measured(args)?;
+    let (found, others) = measured(args)?;
     let vehicle = model_of(args, &found)?;
     // Before anything is flown: what is wrong with the model is the file's fault, not the flight's.
     resolved(&vehicle).map_err(|error| {
@@ -137,7 +137,15 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
         )));
     }
     let simulated = args.simulated.as_deref().map(|path| one_flight(path, None)).transpose()?;
-    let hover = args.campaign.as_deref().map(known_air).transpose()?.flatten();
+    let simulated = simulated.map(|(flight, _)| flight);
+    let hover = args.campaign.as_ref().and_then(|_| known_air(others));
+    if args.campaign.is_some() && hover.is_none() && knows_air(&found) {
+        context.say(&format!(
+            "the error of the map is not told: {} is the flight that is compared, and the campaign \
+             has no other measurement flight whose true air is known",
+            found.name
+        ));
+    }
     let both = Both { measured: &found, simulated: simulated.as_ref(), hover: hover.as_ref() };
     let explained = compare(&both, &vehicle, &options)?;
     create_folder(&folder)?;
@@ -208,8 +216,8 @@ fn write(
     Ok(pages.join(report::PAGE_FILE))
 }
 
-/// The measured flight.
-fn measured(args: &GapArgs) -> Result<Found, CommandError> {
+/// The measured flight, and the others that are there.
+fn measured(args: &GapArgs) -> Result<(Found, Vec<Found>), CommandError> {
     let plan = args.plan.as_deref().map(load_plan).transpose()?;
     match (&args.campaign, &args.measured) {
         (Some(campaign), _) => {
@@ -222,11 +230,11 @@ fn measured(args: &GapArgs) -> Result<Found, CommandError> {
             one_flight(campaign, args.flight.as_deref())
         }
         (None, Some(path)) => {
-            let mut found = one_flight(path, args.flight.as_deref())?;
+            let (mut found, others) = one_flight(path, args.flight.as_deref())?;
             if plan.is_some() {
                 found.plan = plan;
             }
-            Ok(found)
+            Ok((found, others))
         }
         (None, None) => Err(CommandError::Usage("give a campaign or --measured".to_owned())),
     }
@@ -245,54 +253,59 @@ fn is_campaign(campaign: &Path) -> Result<(), CommandError> {
     }
 }
 
-/// The flight of a path that is compared: the one that is named, else the calibration, else the first
-/// with logs.
-fn one_flight(path: &Path, name: Option<&str>) -> Result<Found, CommandError> {
+/// The flight of a path that is compared, and the others in their order. It is the one that is named,
+/// else the calibration, else the first with logs.
+fn one_flight(path: &Path, name: Option<&str>) -> Result<(Found, Vec<Found>), CommandError> {
     let mut work = Work::new(path);
     find(path, None, &mut work)?;
-    let names: Vec<String> = work.flights.iter().map(|flight| flight.name.clone()).collect();
     let mut flights = work.flights;
-    if let Some(name) = name {
-        flights.retain(|flight| flight.name == name);
-        if flights.is_empty() {
-            return Err(CommandError::Usage(format!(
-                "there is no flight \"{name}\"; flights are {}",
-                names.join(", ")
-            )));
-        }
+    let is_meant = |flight: &Found| name.is_none_or(|name| flight.name == name);
+    if let Some(name) = name
+        && !flights.iter().any(is_meant)
+    {
+        let names: Vec<&str> = flights.iter().map(|flight| flight.name.as_str()).collect();
+        return Err(CommandError::Usage(format!(
+            "there is no flight \"{name}\"; flights are {}",
+            names.join(", ")
+        )));
     }
+    let is_usable = |flight: &Found| is_meant(flight) && !flight.logs.is_empty();
     let calibrates = |flight: &Found| flight.purpose == Some(Purpose::Calibration);
     let place = flights
         .iter()
-        .position(|flight| calibrates(flight) && !flight.logs.is_empty())
-        .or_else(|| flights.iter().position(|flight| !flight.logs.is_empty()));
-    place.map(|place| flights.swap_remove(place)).ok_or_else(|| {
+        .position(|flight| calibrates(flight) && is_usable(flight))
+        .or_else(|| flights.iter().position(is_usable));
+    let flight = place.map(|place| flights.remove(place)).ok_or_else(|| {
         CommandError::Nothing(format!(
             "{} holds no logs: fly it (`updraft fly`), or put the drones' .BIN files into the \
              flight's logs folder",
             path.display()
         ))
-    })
+    })?;
+    Ok((flight, flights))
 }
 
-/// The first measurement flight of a campaign whose true air is known (simulated ones).
-fn known_air(campaign: &Path) -> Result<Option<Found>, CommandError> {
-    let mut work = Work::new(campaign);
-    find(campaign, None, &mut work)?;
-    Ok(work.flights.into_iter().find_map(|mut flight| {
-        let is_measurement = flight.purpose == Some(Purpose::Measurement);
-        if !is_measurement || flight.logs.is_empty() {
-            return None;
-        }
-        if let Some(updraft_mps) = flight.true_updraft_mps.filter(|_| flight.truth.is_empty()) {
-            let plan = flight.plan.as_ref()?;
-            let ends = plan.groups.iter().flat_map(|group| &group.segments).map(|s| s.end_ms);
-            let seconds = ends.max().unwrap_or(0) as usize / 1000 + 60;
-            let same = TruthSeries { first_s: 0, updraft_mps: vec![updraft_mps; seconds] };
-            flight.truth = plan.slots.iter().map(|slot| (slot.slot, same.clone())).collect();
-        }
-        (!flight.truth.is_empty()).then_some(flight)
-    }))
+/// Whether it is a measurement flight whose true air is known (simulated ones).
+fn knows_air(flight: &Found) -> bool {
+    let has_slots = || flight.plan.as_ref().is_some_and(|plan| !plan.slots.is_empty());
+    let is_uniform = flight.true_updraft_mps.is_some() && has_slots();
+    flight.purpose == Some(Purpose::Measurement)
+        && !flight.logs.is_empty()
+        && (is_uniform || !flight.truth.is_empty())
+}
+
+/// The first of these flights whose true air is known, with that air for each slot.
+fn known_air(flights: Vec<Found>) -> Option<Found> {
+    let mut flight = flights.into_iter().find(knows_air)?;
+    if flight.truth.is_empty()
+        && let (Some(updraft_mps), Some(plan)) = (flight.true_updraft_mps, &flight.plan)
+    {
+        let ends = plan.groups.iter().flat_map(|group| &group.segments).map(|s| s.end_ms);
+        let seconds = ends.max().unwrap_or(0) as usize / 1000 + 60;
+        let same = TruthSeries { first_s: 0, updraft_mps: vec![updraft_mps; seconds] };
+        flight.truth = plan.slots.iter().map(|slot| (slot.slot, same.clone())).collect();
+    }
+    Some(flight)
 }
 
 /// The flights of a comparison.

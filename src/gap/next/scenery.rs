@@ -79,7 +79,7 @@ impl<'a> Scenery<'a> {
         let groups = &comparison.data.groups;
         let wind = Wind {
             mean_mps: known.wind_mps,
-            mean_se_mps: [0.0; 2],
+            mean_se_mps: 0.0,
             air_mps: groups.iter().map(|group| group.bins.iter().map(air).collect()).collect(),
             measured: None,
         };

@@ -12,7 +12,7 @@ use crate::report::sheet::Sheet;
 use crate::report::svg::{Anchor, Drawing, TextStyle};
 use crate::report::text::{clean, shortened, usable};
 
-use super::{AFTER, OF_95, axis_words};
+use super::{AFTER, axis_words};
 
 /// Most rivals that are drawn.
 const RIVALS: usize = 10;
@@ -158,30 +158,21 @@ fn ticks(most: f64) -> Vec<f64> {
     ticks
 }
 
-/// (x, us, standard error) of the points that can be drawn; an error that is not known is 0.
-fn points(shape: &Shape) -> Vec<(f64, f64, f64)> {
-    let errors = shape.se_us.iter().copied().chain(std::iter::repeat(0.0));
-    let all = shape.x.iter().copied().zip(shape.us.iter().copied()).zip(errors);
-    all.filter(|((x, us), _)| usable(*x) && usable(*us))
-        .map(|((x, us), se)| (x, us, if usable(se) { se } else { 0.0 }))
-        .collect()
+/// (x, us) of the points that can be drawn.
+fn points(shape: &Shape) -> Vec<(f64, f64)> {
+    let all = shape.x.iter().copied().zip(shape.us.iter().copied());
+    all.filter(|(x, us)| usable(*x) && usable(*us)).collect()
 }
 
 fn curve(shape: &Shape, letter: &str) -> Panel {
     let points = points(shape);
-    let band: Vec<(f64, f64, f64)> =
-        points.iter().map(|(x, us, se)| (*x, us - OF_95 * se, us + OF_95 * se)).collect();
     let x = Axis::around(&axis_words(&shape.axis), points.iter().map(|point| point.0), 1e-6);
-    let ends = band.iter().flat_map(|(_, low, high)| [*low, *high]);
-    let y = Axis::around("change of the pulse (µs)", ends.chain([0.0]), 0.5);
+    let changes = points.iter().map(|point| point.1);
+    let y = Axis::around("change of the pulse (µs)", changes.chain([0.0]), 0.5);
     let mut panel = Panel::new(&format!("{letter}Shape"), x.clone(), y);
     panel.line(&[(x.min, 0.0), (x.max, 0.0)], MUTED, 1.0, "5 4");
-    if points.iter().any(|(_, _, se)| *se > 0.0) {
-        panel.band(&band, AFTER.0);
-    }
-    let line: Vec<(f64, f64)> = points.iter().map(|(x, us, _)| (*x, *us)).collect();
-    panel.line(&line, AFTER.0, 1.2, "");
-    let marks: Vec<Mark> = line.into_iter().map(super::point).collect();
+    panel.line(&points, AFTER.0, 1.2, "");
+    let marks: Vec<Mark> = points.into_iter().map(super::point).collect();
     panel.marks(&marks, AFTER.0, 3.0, AFTER.1);
     panel
 }
