@@ -52,13 +52,15 @@ pub(super) fn decide(
     let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
     let free = round.generics.iter().find(|free| {
         free.size_us >= material_us
-            || (free.range_us >= material_us && free.gain > 2.0 * FREE_FLOOR_NATS)
+            || (free.range_us >= material_us
+                && free.gain > FREE_BETTER * FREE_FLOOR_NATS
+                && sought.generics[free.generic].is_shared())
     });
     let is_named = |ranked: &&Ranked| {
         // A known effect that explains more than a free shape of a size that matters is named first.
         let matters = ranked.size_us >= material_us
             || (ranked.size_us >= NEARLY * material_us
-                && free.is_some_and(|free| ranked.gain > free.gain))
+                && free.is_some_and(|free| free.gain > FLOOR_NATS && ranked.gain > free.gain))
             // What is short, or plain in calm air, matters by what it does where it is largest.
             || (ranked.range_us >= material_us && ranked.gain > FREE_FLOOR_NATS);
         let candidate = &sought.library[ranked.candidate];

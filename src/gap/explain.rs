@@ -8,7 +8,7 @@ use super::error::GapError;
 use super::generic::{all, drawn};
 use super::gls::{Column, Likelihood, Problem, Split};
 use super::noise::{GroupPattern, Hyper, LEAST, WHITE};
-use super::refine::{Parameter, doubts, fitted, parameters_of, refine, slopes};
+use super::refine::{Parameter, doubts, fitted, half_interval, parameters_of, refine, slopes};
 use super::search::{Round, Sought, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::mission::plan::Plan;
@@ -224,13 +224,14 @@ pub fn search(
 
 /// Takes the last joint fit into the steps.
 pub(super) fn settle(found: &mut Found) {
+    let half = half_interval(&found.comparison, &found.hyper);
     let Found { steps, parameters, values, .. } = found;
     for step in steps {
         let of = |effect: &str| -> Vec<Fitted> {
             let all = parameters.iter().zip(values.iter());
             let own = all.filter(|(parameter, _)| parameter.effect == effect);
             let (parameters, values): (Vec<_>, Vec<_>) = own.map(|(p, v)| (p.clone(), *v)).unzip();
-            fitted(&parameters, &values)
+            fitted(&parameters, &values, half)
         };
         let (effect, stated) = match &mut step.finding {
             Finding::Name { effect, parameters, .. } => (effect.clone(), parameters),

@@ -174,6 +174,12 @@ fn span(values: &[Vec<f64>]) -> f64 {
 }
 
 impl Generic {
+    /// Whether all drones of a group have the same. Drones that drift each by its own are not in the noise,
+    /// and a regressor of each one's own finds some of it by chance.
+    pub(super) fn is_shared(&self) -> bool {
+        self.columns.iter().all(|column| matches!(column, Column::Shared(_)))
+    }
+
     /// The shape with these coefficients, by its signal.
     pub(super) fn shape(&self, beta: &[f64]) -> Shape {
         let means: Vec<Vec<Vec<f64>>> = self.columns.iter().map(Column::means).collect();

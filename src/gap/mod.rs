@@ -17,6 +17,7 @@ mod gls;
 mod heldout;
 mod lean;
 mod lean_channel;
+mod lean_fit;
 mod make;
 mod map_gain;
 mod measure;

@@ -1,10 +1,13 @@
 //! Sizes of what was named: a joint fit of all parameters in the noise's own metric.
 
+use statrs::distribution::{ContinuousCDF as _, StudentsT};
+
+use super::bins::Bin;
 use super::candidates::set;
 use super::compare::Comparison;
 use super::error::GapError;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
-use super::noise::Hyper;
+use super::noise::{Hyper, SHARED_TIME};
 use super::verdict::{Fitted, Interval};
 use crate::effects::select::value_of;
 use crate::effects::{Definition, Sought, find};
@@ -16,8 +19,13 @@ const ROUNDS: usize = 8;
 const STEP: f64 = 0.02;
 /// A second parameter (the form) is fitted when its own z is at least this.
 const FORM_Z: f64 = 4.0;
-/// Factor of a 95 % interval: the noise is estimated too, from few time scales.
+/// Share of a change that its form is not known by: what closed forms, curves of charge and mean drones leave
+/// out, whatever the noise (standard deviation over blind flights of high z).
+const FORM_SHARE: f64 = 0.03;
+/// Least factor of a 95 % interval.
 const INTERVAL: f64 = 2.1;
+/// Fewest time scales that a noise is believed to be estimated from.
+const FEWEST_SCALES: f64 = 3.0;
 
 /// One fitted parameter of the model.
 #[derive(Clone, Debug, PartialEq)]
@@ -247,17 +255,32 @@ pub(super) fn size_errors(
     Ok((of(sizes, parameters.len()), of(sizes - extras.len(), extras.len())))
 }
 
-/// Fitted values with their intervals, for the verdict.
-pub(super) fn fitted(parameters: &[Parameter], values: &[(f64, f64)]) -> Vec<Fitted> {
+/// Standard errors in half of a 95 % interval: the strength of the shared air is estimated from as many
+/// pieces as its time scale goes into the flight, so Student's law with so many degrees of freedom.
+pub(super) fn half_interval(comparison: &Comparison, hyper: &Hyper) -> f64 {
+    let times = || comparison.data.groups.iter().flat_map(|group| &group.bins).map(Bin::middle_s);
+    let first = times().fold(f64::INFINITY, f64::min);
+    let last = times().fold(f64::NEG_INFINITY, f64::max);
+    let scales = ((last - first) / hyper.get(SHARED_TIME)).max(FEWEST_SCALES);
+    StudentsT::new(0.0, 1.0, scales).map_or(INTERVAL, |law| law.inverse_cdf(0.975).max(INTERVAL))
+}
+
+/// Fitted values with their intervals of so many standard errors to each side, for the verdict.
+pub(super) fn fitted(
+    parameters: &[Parameter],
+    values: &[(f64, f64)],
+    half_interval: f64,
+) -> Vec<Fitted> {
     let one = |(parameter, (value, se)): (&Parameter, &(f64, f64))| {
         let (low, high) = parameter.bounds;
+        let se = se.hypot(FORM_SHARE * (value - parameter.before.unwrap_or(0.0)));
         Fitted {
             name: parameter.name.to_owned(),
             unit: parameter.unit.to_owned(),
             value: Interval {
                 value: *value,
-                low: (value - INTERVAL * se).max(low),
-                high: (value + INTERVAL * se).min(high),
+                low: (value - half_interval * se).max(low),
+                high: (value + half_interval * se).min(high),
             },
             before: parameter.before,
         }

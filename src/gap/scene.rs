@@ -1,6 +1,7 @@
 //! What closed forms look at in each bin, and the pulses that a model asks for there.
 
 use super::bins::BinValues;
+use super::compare::thrust_exponent;
 use super::data::Data;
 use super::gls::Column;
 use super::lean::Wind;
@@ -11,6 +12,11 @@ use crate::vehicle::Vehicle;
 
 /// Open-circuit voltage above which there must be another cell, V.
 const FULL_CELL_V: f64 = 4.25;
+
+/// Bins that tell what a battery started with.
+const EARLY_BINS: usize = 12;
+/// Pulse without thrust, us.
+const IDLE_US: f64 = 1000.0;
 
 /// Steady signals of a comparison: what was flown and what the logs say of wind and battery. None of
 /// them follows the pulse: terminal voltage, current and measured acceleration do and are never used
@@ -76,12 +82,18 @@ impl Scene {
             let exogenous = |drones: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
                 let bins = drones.first().map_or(0, Vec::len);
                 let count = drones.len().max(1) as f64;
-                let first: Vec<f64> =
-                    drones.iter().map(|d| d.first().copied().unwrap_or(0.0)).collect();
                 let decline: Vec<f64> = (0..bins)
                     .map(|bin| drones.iter().map(|d| d[bin] - d[0]).sum::<f64>() / count)
                     .collect();
-                first.iter().map(|f| decline.iter().map(|d| f + d).collect()).collect()
+                // By some bins: the scatter of one voltage is worth some percent of charge.
+                let first = |drone: &Vec<f64>| {
+                    let early = drone.iter().zip(&decline).take(EARLY_BINS);
+                    let (sum, count) =
+                        early.fold((0.0, 0.0), |(s, c), (now, less)| (s + now - less, c + 1.0));
+                    if count > 0.0 { sum / count } else { 0.0 }
+                };
+                let from = |first: f64| decline.iter().map(|less| first + less).collect();
+                drones.iter().map(|drone| from(first(drone))).collect()
             };
             data.groups.iter().map(drones).map(exogenous).collect()
         });
@@ -130,12 +142,13 @@ impl Scene {
         scene
     }
 
-    /// Pulses that a vehicle's model asks for, us.
+    /// Pulses that a vehicle's model asks for, brought to level, us.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
         let model = Model::of(vehicle)?;
+        let exponent = thrust_exponent(vehicle);
         let battery = Battery::of(vehicle)?;
         let is_on = |name: &str| vehicle.effects.get(name).is_some_and(|table| table.on);
         let hover_ah_per_s = battery.as_ref().map_or(0.0, |battery| battery.hover_ah_per_s);
@@ -144,7 +157,9 @@ impl Scene {
                 (Some(battery), Some(charge)) => (battery.initial - charge) * battery.capacity_ah,
                 _ => hover_ah_per_s * signals.time_s.max(0.0),
             };
-            model.pulse_us(&Signals { charge_used_ah, neighbours, ..*signals })
+            let pulse_us = model.pulse_us(&Signals { charge_used_ah, neighbours, ..*signals });
+            // As both sides of the comparison are: brought to level by their own lean.
+            IDLE_US + (pulse_us - IDLE_US) * signals.tilt_rad.cos().powf(exponent)
         };
         let own = (battery.is_some() && self.charge.is_some()) || is_on("neighbour-downwash");
         if !own {

@@ -1,0 +1,194 @@
+//! How a vehicle leans, measured by horizontal legs at known speeds over ground: most probable law and
+//! mean wind, with gusts that the whole fleet shares.
+
+use nalgebra::SMatrix;
+
+use super::bins::Bin;
+use super::filter::{Filter, Observation, State};
+use super::lean::LeanLaw;
+use super::minimise::minimise;
+
+/// How far the model's own law is doubted: its quadratic part (a share), its linear part, rad/(m/s).
+const SQUARE_DOUBT: f64 = 0.15;
+const LINEAR_DOUBT: f64 = 0.03;
+/// Linear parts of small rotors, rad/(m/s).
+const USUAL_LINEAR: [f64; 2] = [0.01, 0.03];
+/// Gusts: usual size, m/s, with its doubt as a factor, and their time scale, s.
+const GUST_MPS: f64 = 0.5;
+const GUST_FACTOR: f64 = 2.5;
+const GUST_S: f64 = 25.0;
+/// Scatter of a group's mean lean in a bin, rad, with its doubt as a factor.
+const SCATTER_RAD: f64 = 0.002;
+const SCATTER_FACTOR: f64 = 2.0;
+/// What the lean still lacks of its steady value on legs that are too short to settle, beyond what the
+/// simulator lacks there, rad.
+const UNSETTLED_RAD: f64 = 0.004;
+/// A law whose linear part is negative costs one nat per so much, rad/(m/s): a lean never goes against the
+/// wind.
+const NEGATIVE: f64 = 1e-4;
+/// The search moves in numbers near 1: mean wind (two), the law's linear and quadratic parts, and the
+/// logarithms of gusts and scatter.
+const COUNT: usize = 6;
+const UNITS: [f64; COUNT] = [1.0, 1.0, 0.01, 0.001, 1.0, 1.0];
+const LINEAR: usize = 2;
+const SQUARE: usize = 3;
+/// Step of the second differences, in units.
+const STEP: f64 = 0.02;
+
+/// The mean lean of a group in one bin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Point {
+    time_s: f64,
+    velocity_mps: [f64; 3],
+    lean_rad: [f64; 2],
+    /// Whether the bin is horizontal flight.
+    pub moves: bool,
+}
+
+impl Point {
+    pub(super) fn of(bin: &Bin, lean_rad: [f64; 2]) -> Self {
+        Self {
+            time_s: bin.middle_s(),
+            velocity_mps: bin.velocity_mps,
+            lean_rad,
+            moves: bin.is_horizontal(),
+        }
+    }
+}
+
+/// A law and a mean wind by legs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fitted {
+    /// The law.
+    pub law: LeanLaw,
+    /// Standard error of its linear part, rad/(m/s).
+    pub linear_se: f64,
+    /// Mean wind, show frame, m/s.
+    pub mean_mps: [f64; 2],
+    /// Standard error of it along either axis, m/s.
+    pub mean_se_mps: f64,
+}
+
+/// Fits the law from the model's. The search starts from the model's own linear part and from what small
+/// rotors usually have: with too small a one the wind begins far too strong.
+pub(super) fn fit(mut points: Vec<Point>, model: LeanLaw) -> Fitted {
+    points.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let linear = model.linear.max(1e-4);
+    let square = model.square.max(1e-5);
+    let objective =
+        |at: &[f64; COUNT]| misfit(&points, &Candidate::of(at, model), [linear, square]);
+    let mut best: Option<([f64; COUNT], f64)> = None;
+    for from in [linear, USUAL_LINEAR[0], USUAL_LINEAR[1]] {
+        let [x, y] = hovering_wind(&points, LeanLaw { linear: from, ..model });
+        let natural = [x, y, from, square, GUST_MPS.ln(), SCATTER_RAD.ln()];
+        let mut start = [0.0; COUNT];
+        for (place, value) in start.iter_mut().enumerate() {
+            *value = natural[place] / UNITS[place];
+        }
+        let (at, value) = minimise(start, objective);
+        if best.is_none_or(|(_, least)| value < least) {
+            best = Some((at, value));
+        }
+    }
+    let at = best.map_or([0.0; COUNT], |(at, _)| at);
+    let found = Candidate::of(&at, model);
+    let errors = standard_errors(&at, objective);
+    Fitted {
+        law: found.law,
+        linear_se: errors[LINEAR],
+        mean_mps: found.mean_mps,
+        mean_se_mps: errors[0].hypot(errors[1]) / std::f64::consts::SQRT_2,
+    }
+}
+
+/// Mean wind that a law reads from the leans in hover and in vertical flight, m/s.
+pub(super) fn hovering_wind(points: &[Point], law: LeanLaw) -> [f64; 2] {
+    let (mut sum, mut count) = ([0.0; 2], 0.0);
+    for point in points.iter().filter(|point| !point.moves) {
+        let air = law.air(point.lean_rad, point.velocity_mps[2]);
+        sum[0] -= air[0];
+        sum[1] -= air[1];
+        count += 1.0;
+    }
+    sum.map(|sum: f64| if count > 0.0 { sum / count } else { 0.0 })
+}
+
+/// What is fitted, in natural units.
+struct Candidate {
+    mean_mps: [f64; 2],
+    law: LeanLaw,
+    gust_mps: f64,
+    scatter_rad: f64,
+}
+
+impl Candidate {
+    fn of(at: &[f64; COUNT], model: LeanLaw) -> Self {
+        Self {
+            mean_mps: [at[0], at[1]],
+            law: LeanLaw {
+                linear: at[LINEAR] * UNITS[LINEAR],
+                square: at[SQUARE] * UNITS[SQUARE],
+                ..model
+            },
+            gust_mps: at[4].exp(),
+            scatter_rad: at[5].exp(),
+        }
+    }
+}
+
+/// Minus the logarithm of the posterior density, without its constant: each lean is the law's in the mean
+/// wind, and gusts change it by the law's slopes there. (The other way round, from leans to the wind, a law
+/// without a linear part has no slope where a lean is small.)
+fn misfit(points: &[Point], of: &Candidate, [linear, square_part]: [f64; 2]) -> f64 {
+    let gust = State { variance: of.gust_mps * of.gust_mps, time_s: GUST_S };
+    let mut seen = Vec::with_capacity(2 * points.len());
+    let mut off = Vec::with_capacity(2 * points.len());
+    for point in points {
+        let [vx, vy, climb_mps] = point.velocity_mps;
+        let air = [vx - of.mean_mps[0], vy - of.mean_mps[1]];
+        let wanted = of.law.lean(air, climb_mps);
+        let slopes = of.law.slopes(air, climb_mps);
+        let scatter = of.scatter_rad.hypot(if point.moves { UNSETTLED_RAD } else { 0.0 });
+        for axis in 0..2 {
+            seen.push(Observation {
+                time_s: point.time_s,
+                looks_at: (0..2).map(|gust| (gust, -slopes[(axis, gust)])).collect(),
+                noise: scatter * scatter,
+            });
+            off.push(point.lean_rad[axis] - wanted[axis]);
+        }
+    }
+    let filter = Filter::new(&[gust, gust], &seen);
+    let square = |value: f64| value * value;
+    let chi2: f64 = filter.whiten(&off).into_iter().map(square).sum();
+    let known = square((of.law.square.max(1e-7) / square_part).ln() / SQUARE_DOUBT)
+        + square((of.law.linear - linear) / LINEAR_DOUBT)
+        + square((of.gust_mps / GUST_MPS).ln() / GUST_FACTOR.ln())
+        + square((of.scatter_rad / SCATTER_RAD).ln() / SCATTER_FACTOR.ln())
+        + 2.0 * square(of.law.linear.min(0.0) / NEGATIVE);
+    0.5 * (filter.log_det + chi2 + known)
+}
+
+/// Standard errors in natural units, by the curvature at the bottom; infinite where it has none.
+fn standard_errors(at: &[f64; COUNT], objective: impl Fn(&[f64; COUNT]) -> f64) -> [f64; COUNT] {
+    let moved = |a: usize, by_a: f64, b: usize, by_b: f64| {
+        let mut place = *at;
+        place[a] += by_a;
+        place[b] += by_b;
+        objective(&place)
+    };
+    let curvature = SMatrix::<f64, COUNT, COUNT>::from_fn(|a, b| {
+        (moved(a, STEP, b, STEP) - moved(a, STEP, b, -STEP) - moved(a, -STEP, b, STEP)
+            + moved(a, -STEP, b, -STEP))
+            / (4.0 * STEP * STEP)
+    });
+    let inverse = curvature.try_inverse();
+    let mut errors = [f64::INFINITY; COUNT];
+    for (place, error) in errors.iter_mut().enumerate() {
+        let variance = inverse.map_or(f64::INFINITY, |inverse| inverse[(place, place)]);
+        if variance > 0.0 {
+            *error = UNITS[place] * variance.sqrt();
+        }
+    }
+    errors
+}
