@@ -291,10 +291,15 @@ const SIDE_STEP_MPS: f64 = 0.25;
 /// Fewest bins of a comparison.
 const FEWEST_BINS: usize = 12;
 
+/// The air that all drones share is believed up to so many times what each has for itself: what the model
+/// lacks is shared, too.
+const MOST_SHARED: f64 = 2.5;
+
 /// Standard deviation of the vertical air that a noise says a drone meets, m/s.
 pub(super) fn gusts_mps(hyper: &Hyper) -> f64 {
-    let square = |place| hyper.get(place).powi(2);
-    (square(SHARED) + square(GRADIENT) + square(OWN) + square(GUSTS)).sqrt()
+    let own_mps = hyper.get(OWN).hypot(hyper.get(GUSTS));
+    let shared_mps = hyper.get(SHARED).hypot(hyper.get(GRADIENT));
+    own_mps.hypot(shared_mps.min(MOST_SHARED * own_mps))
 }
 
 fn fly_groups(

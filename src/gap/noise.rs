@@ -60,6 +60,12 @@ const PRIOR: [(f64, f64); COUNT] = [
     (0.3, 2.0),
 ];
 
+/// What is of the air, how far above its prior's median it may be, in its standard deviations, and by how
+/// much steeper the prior is beyond.
+const OF_THE_AIR: [usize; 7] = [SHARED, SHARED_TIME, OWN, GUSTS, LEAST, GRADIENT, SIDE_GUSTS];
+const STORM: f64 = 2.5;
+const WALL: f64 = 3.0;
+
 impl Default for Hyper {
     fn default() -> Self {
         Self(PRIOR.map(|(median, _)| f64::ln(median)))
@@ -77,7 +83,14 @@ impl Hyper {
         let square = |(value, (median, factor)): (&f64, &(f64, f64))| {
             ((value - median.ln()) / factor.ln()).powi(2)
         };
-        -0.5 * self.0.iter().zip(&PRIOR).map(square).sum::<f64>()
+        // Weather ends somewhere: what is no air at all must not be taken for a storm that wanders for hours.
+        let storm = |place: &usize| {
+            let (median, factor) = PRIOR[*place];
+            let beyond = (self.0[*place] - median.ln()) / factor.ln() - STORM;
+            (WALL * beyond.max(0.0)).powi(2)
+        };
+        let storms: f64 = OF_THE_AIR.iter().map(storm).sum();
+        -0.5 * (self.0.iter().zip(&PRIOR).map(square).sum::<f64>() + storms)
     }
 }
 

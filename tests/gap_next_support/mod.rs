@@ -18,6 +18,8 @@ fn noise() -> Noise {
         drones_us: 10.0,
         slopes: 0.05,
         least_response: 3.0,
+        gradient_mps: 0.06,
+        side_gusts_mps: 0.2,
     }
 }
 

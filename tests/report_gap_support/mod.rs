@@ -190,6 +190,8 @@ pub(crate) fn nothing() -> Verdict {
             drones_us: 8.4,
             slopes: 0.016,
             least_response: 2.8,
+            gradient_mps: 0.06,
+            side_gusts_mps: 0.2,
         },
         drones: Drones {
             each: each.collect(),
