@@ -114,6 +114,7 @@ fn explained(fleet: &Fleet) -> Explained {
         plan: Some(&fleet.plan),
         flown: &flown,
         simulated: None,
+        table: None,
         left_out: Vec::new(),
     };
     explain(&input, &Options::default()).unwrap()

@@ -36,7 +36,7 @@ mod split;
 mod starts;
 pub mod statistics;
 mod stats;
-mod steps;
+pub mod steps;
 mod track;
 mod truth;
 pub mod updraft;

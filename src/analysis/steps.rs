@@ -18,7 +18,7 @@ const LONGEST_S: f64 = 1e6;
 
 /// Stretches over which the velocity, averaged over 1 s, stays near its mean: each is a window, less
 /// the controller's transient.
-pub(super) fn steady(flight: &Flight, steps: &Steps) -> Vec<Target> {
+pub fn steady(flight: &Flight, steps: &Steps) -> Vec<Target> {
     let mut targets = Vec::new();
     let mut run: Vec<(f64, f64)> = Vec::new();
     for (time_s, velocity_mps) in smoothed(&flight.velocity_up_mps) {

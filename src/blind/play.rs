@@ -90,7 +90,7 @@ pub fn play(
         .explain(&place)
         .map_err(|source| BlindError::Explain { flight: place.clone(), source })?;
     tell(Act::Explained(&found));
-    let opened = seal::open(folder, &verdict(folder))?;
+    let opened = seal::open(folder, &verdict(folder), Some(&hash))?;
     let fisher_z = search.fisher_z(&place, &opened.truth);
     let outcome = score(&opened.truth, &found, &fisher_z);
     Ok(Played { flown, verdict: found, opened, outcome })

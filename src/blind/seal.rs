@@ -73,12 +73,12 @@ pub fn seal(beside: &Path, truth: &Scenario) -> Result<String, BlindError> {
 }
 
 /// Opens a seal, now that the verdict is there, and checks that the truth is the one whose hash was
-/// published.
+/// published: `told`, if that is still known, else what stands in the file.
 ///
 /// # Errors
 /// [`BlindError::NoVerdict`] when there is no verdict yet, [`BlindError::Tampered`] when the truth was
 /// changed, or unreadable files.
-pub fn open(beside: &Path, verdict: &Path) -> Result<Opened, BlindError> {
+pub fn open(beside: &Path, verdict: &Path, told: Option<&str>) -> Result<Opened, BlindError> {
     // First of all: without a verdict nothing of the truth is read.
     if !std::fs::metadata(verdict).is_ok_and(|found| found.is_file() && found.len() > 0) {
         let (sealed, verdict) = (folder(beside), verdict.to_owned());
@@ -87,7 +87,8 @@ pub fn open(beside: &Path, verdict: &Path) -> Result<Opened, BlindError> {
     let verdict_sha256 = sha256(&read_whole(verdict, 64 * MAX_BYTES)?);
     let published = read_whole(&hash_path(beside), MAX_BYTES)?;
     let published = String::from_utf8_lossy(&published);
-    let published = published.split_whitespace().next().unwrap_or_default().to_owned();
+    let published = published.split_whitespace().next().unwrap_or_default();
+    let published = told.unwrap_or(published).to_owned();
     let path = truth_path(beside);
     let bytes = read_whole(&path, MAX_BYTES)?;
     let found = sha256(&bytes);

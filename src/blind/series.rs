@@ -261,7 +261,7 @@ fn one(
     let work = place.work(index);
     remove(&work)?;
     create_folder(&work)?;
-    seal::seal(&work, truth)?;
+    let hash = seal::seal(&work, truth)?;
     let flight = work.join("flight");
     fly(truth, &flight, Some(stop))?;
     let verdict = explain
@@ -269,7 +269,7 @@ fn one(
         .map_err(|source| BlindError::Explain { flight: flight.clone(), source })?;
     let verdict_path = work.join("verdict.json");
     write_whole(&verdict_path, &json(&verdict)?)?;
-    let opened = seal::open(&work, &verdict_path)?;
+    let opened = seal::open(&work, &verdict_path, Some(&hash))?;
     let fisher_z = explain.fisher_z(&flight, &opened.truth);
     let result = FlightResult {
         schema: RESULT_SCHEMA.to_owned(),

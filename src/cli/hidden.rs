@@ -181,7 +181,8 @@ pub(super) fn run(
 fn make_room(folder: &Path, force: bool) -> Result<(), CommandError> {
     let flight = play::flight(folder);
     if play::is_played(folder) {
-        if !force {
+        // What was interrupted before its verdict is flown again: the same seed gives the same flight.
+        if !force && play::verdict(folder).exists() {
             return Err(CommandError::Usage(format!(
                 "{} has a flight with hidden physics; choose another folder with -o, or replace it with \
                  --force",

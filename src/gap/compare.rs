@@ -22,6 +22,8 @@ pub enum Simulated<'a> {
     Refly(&'a Plan),
     /// Somebody else's simulation: its bins by group.
     Given(Vec<Vec<Option<BinValues>>>),
+    /// The model's closed forms at the climb that was flown: nobody has a plan that could be flown again.
+    Closed,
 }
 
 /// Both sides in the same bins, for one state of the model.
@@ -77,6 +79,7 @@ impl Comparison {
             match simulated {
                 Simulated::Given(values) => Ok(values.clone()),
                 Simulated::Refly(plan) => fly_groups(data, &vehicle, plan, wind_mps),
+                Simulated::Closed => Ok(data.as_flown()),
             }
         };
         let mut values = fly(first)?;
@@ -91,7 +94,7 @@ impl Comparison {
         }
         let has = |group: usize, bin: usize| values[group][bin].is_some();
         let data = data.keep(has);
-        let side = flat(&values);
+        let mut side = flat(&values);
         if data.groups.iter().map(|group| group.bins.len()).sum::<usize>() < FEWEST_BINS {
             return Err(GapError::NothingCommon);
         }
@@ -99,6 +102,13 @@ impl Comparison {
         let scene = Scene::measured(&data, &side, &blown, amsl_m);
         let simulated_scene = scene.simulated(&data, &side, flown_mps);
         let closed = simulated_scene.pulses(&vehicle)?;
+        if matches!(simulated, Simulated::Closed) {
+            for (group, bins) in side.iter_mut().enumerate() {
+                for (bin, values) in bins.iter_mut().enumerate() {
+                    values.pulse_us = closed.at(group, 0, bin);
+                }
+            }
+        }
         let closure_us = side
             .iter()
             .enumerate()
@@ -268,6 +278,23 @@ impl Comparison {
             }
         }
         Ok(scene.pulses(vehicle)?.less(&self.scene.pulses(vehicle)?))
+    }
+
+    /// Distance of the mean leans of both sides in hover and in vertical flight, rad.
+    pub fn apart_rad(&self) -> f64 {
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        for (group, side) in self.data.groups.iter().zip(&self.side) {
+            for (bin, values) in side.iter().enumerate() {
+                if group.bins[bin].is_horizontal() {
+                    continue;
+                }
+                count += 1.0;
+                for axis in 0..2 {
+                    sum[axis] += group.mean(bin, |one| one.lean_rad[axis]) - values.lean_rad[axis];
+                }
+            }
+        }
+        sum[0].hypot(sum[1]) / f64::max(count, 1.0)
     }
 
     /// What a change of the vehicle adds to the pulse.

@@ -2,8 +2,11 @@
 
 use super::bins::{Bin, BinValues, cut, of_segments};
 use super::measure::measured;
+use super::scene::IDLE_US;
+use crate::analysis::steps::steady;
 use crate::analysis::windows::inferred;
 use crate::flight::Flight;
+use crate::flight::table::Steps;
 use crate::mission::plan::{Plan, Slot};
 
 /// A bin is kept when this share of the drones has it.
@@ -122,12 +125,16 @@ impl Data {
         data
     }
 
-    /// Drones without a plan: bins from the first log's own commands.
-    pub fn of_logs(flown: &[Flown<'_>], thrust_exponent: f64) -> Self {
+    /// Drones without a plan: bins from the first log's own commands, or, of a table that has none, from
+    /// its velocity.
+    pub fn of_logs(flown: &[Flown<'_>], steps: Option<&Steps>, thrust_exponent: f64) -> Self {
         let mut data = Self::default();
         let bins: Vec<Bin> = flown
             .iter()
-            .map(|one| inferred(one.flight))
+            .map(|one| match steps {
+                Some(steps) if one.flight.desired_up_mps.is_none() => steady(one.flight, steps),
+                _ => inferred(one.flight),
+            })
             .find(|targets| !targets.is_empty())
             .unwrap_or_default()
             .iter()
@@ -252,6 +259,37 @@ impl Data {
         }
     }
 
+    /// What the drones did in each bin, in the mean of their group.
+    pub(super) fn as_flown(&self) -> Vec<Vec<Option<BinValues>>> {
+        let bin =
+            |group: &Group, bin: usize| average(group.measured.iter().map(|drone| &drone[bin]));
+        let bins = |group: &Group| (0..group.bins.len()).map(|place| bin(group, place)).collect();
+        self.groups.iter().map(bins).collect()
+    }
+
+    /// Without the drones whose pulse is a constant: these are named, and the constant of the last is given.
+    pub(super) fn drop_constant(&mut self, thrust_exponent: f64) -> Option<f64> {
+        let mut last = None;
+        for group in &mut self.groups {
+            let constants: Vec<Option<f64>> = group
+                .measured
+                .iter()
+                .map(|drone| constant_us(drone.iter(), thrust_exponent))
+                .collect();
+            for (slot, constant) in group.slots.iter().zip(&constants) {
+                if let Some(us) = constant {
+                    last = Some(*us);
+                    self.left_out.push(format!(
+                        "slot {slot}: its pulse is {us:.0} us in the whole flight: no rotor flies so"
+                    ));
+                }
+            }
+            *group = group.only(|index| constants[index].is_none());
+        }
+        self.groups.retain(|group| !group.slots.is_empty());
+        last
+    }
+
     /// Drones in all.
     pub fn drones(&self) -> usize {
         self.groups.iter().map(|group| group.slots.len()).sum()
@@ -262,15 +300,17 @@ impl Data {
         self.groups.iter().map(|group| group.slots.len()).collect()
     }
 
-    /// Those that are fitted, and those that are held out: every fourth drone of each group of at
-    /// least eight.
+    /// Those that are fitted, and those that are held out: every fourth drone of each group, where there are
+    /// eight drones and four in each group: each part has all groups.
     pub fn split(&self) -> (Self, Self) {
-        let is_held = |group: &Group, index: usize| group.slots.len() >= 8 && index % 4 == 2;
+        let holds = self.drones() >= FEWEST_TO_HOLD
+            && self.groups.iter().all(|group| group.slots.len() >= FEWEST_IN_GROUP);
+        let is_held = |index: usize| holds && index % 4 == 2;
         let part = |held: bool| Self {
             groups: self
                 .groups
                 .iter()
-                .map(|group| group.only(|index| is_held(group, index) == held))
+                .map(|group| group.only(|index| is_held(index) == held))
                 .collect(),
             left_out: self.left_out.clone(),
             resistance_ohm: self.resistance_ohm,
@@ -293,6 +333,30 @@ impl Data {
         }
         data
     }
+}
+
+/// Fewest drones of which some are held out, and fewest of each group.
+const FEWEST_TO_HOLD: usize = 8;
+const FEWEST_IN_GROUP: usize = 4;
+
+/// A pulse that moves less than this is a constant, us.
+const CONSTANT_US: f64 = 0.02;
+
+/// The constant, if a drone's motors always had the same pulse; what was taken off for its lean is put
+/// back.
+pub(super) fn constant_us<'a>(
+    values: impl Iterator<Item = &'a BinValues>,
+    thrust_exponent: f64,
+) -> Option<f64> {
+    let raw = |values: &BinValues| {
+        let cos = values.lean_rad[0].hypot(values.lean_rad[1]).cos();
+        IDLE_US + (values.pulse_us - IDLE_US) / cos.powf(thrust_exponent)
+    };
+    let (mut low, mut high, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0);
+    for us in values.map(raw) {
+        (low, high, count) = (low.min(us), high.max(us), count + 1);
+    }
+    (count > 2 && high - low < CONSTANT_US).then_some(low)
 }
 
 /// The middle one of the resistances that the logs have.

@@ -3,7 +3,7 @@
 use super::candidates::DRAG;
 use super::explain::Options;
 use super::generic::Generic;
-use super::gls::{Likelihood, Problem};
+use super::gls::{Column, Likelihood, Problem};
 use super::search::{
     FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, thresholds,
 };
@@ -62,7 +62,9 @@ pub(super) fn decide(
             || (ranked.size_us >= NEARLY * material_us
                 && free.is_some_and(|free| free.gain > FLOOR_NATS && ranked.gain > free.gain))
             // What is short, or plain in calm air, matters by what it does where it is largest.
-            || (ranked.range_us >= material_us && ranked.gain > FREE_FLOOR_NATS);
+            || (ranked.range_us >= material_us
+                && ranked.gain > FREE_FLOOR_NATS
+                && matches!(form(sought, ranked), Column::Shared(_)));
         let candidate = &sought.library[ranked.candidate];
         // That the shared air drifted is what it does: a rival, never a finding. That it grew with
         // height is no lack of the vehicle: it must say as much as a free shape.
@@ -96,8 +98,7 @@ pub(super) fn decide(
     let Some(best) = best.filter(|best| best.gain > limits.library) else {
         return nothing(limits);
     };
-    let column =
-        |ranked: &Ranked| &sought.library[ranked.candidate].variants[ranked.variant].column;
+    let column = |ranked: &Ranked| form(sought, ranked);
     let at = problem.at(&best.hyper);
     let own = at.white(column(best));
     let alike = |ranked: &&Ranked| {
@@ -113,6 +114,11 @@ pub(super) fn decide(
 /// Gains above this need no threshold, nats.
 const SURE_NATS: f64 = 40.0;
 
+/// What an effect in its best form adds to the pulse.
+fn form<'a>(sought: Sought<'a>, ranked: &Ranked) -> &'a Column {
+    &sought.library[ranked.candidate].variants[ranked.variant].column
+}
+
 /// What a free shape still gains with an effect in the model, nats.
 fn left_with(
     problem: &Problem<'_>,
@@ -120,7 +126,7 @@ fn left_with(
     best: &Ranked,
     free: &RankedGeneric,
 ) -> f64 {
-    let column = &sought.library[best.candidate].variants[best.variant].column;
+    let column = form(sought, best);
     let generic: &Generic = &sought.generics[free.generic];
     let with = problem.with([column]);
     let before = with.fit(best.hyper, Likelihood::Profile);

@@ -35,6 +35,15 @@ pub enum GapError {
         /// Its value, us.
         value_us: f64,
     },
+    /// The pulse of somebody else's simulation never changes.
+    #[error(
+        "the simulated pulse is the same ({value_us:.1} us) in all of the flight: its logs hold a \
+         constant, not what the motors were told"
+    )]
+    ConstantSimulated {
+        /// Its value, us.
+        value_us: f64,
+    },
     /// Neither a plan nor logs of a simulation.
     #[error(
         "there is no simulated side: give the plan that was flown (--plan), so that it can be flown \

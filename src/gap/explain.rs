@@ -202,7 +202,7 @@ pub fn search(
                 });
             }
         }
-        if matches!(simulated, Simulated::Refly(_)) {
+        if !matches!(simulated, Simulated::Given(_)) {
             comparison = Comparison::new(data, &found.vehicle, simulated, plan)?;
             if !found.parameters.is_empty() {
                 // Against the re-flown model: what closed forms leave is small, and taken up here.

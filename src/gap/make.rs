@@ -3,7 +3,7 @@
 use super::bins::Bin;
 use super::candidates::DRAG;
 use super::compare::{Comparison, Simulated};
-use super::data::{Data, Flown};
+use super::data::{Data, Flown, constant_us};
 use super::detectable::detectable;
 use super::drones::drones;
 use super::error::GapError;
@@ -20,6 +20,8 @@ use super::verdict::{
     Verdict,
 };
 use super::words::summary;
+use crate::effects::select::value_of;
+use crate::flight::table::Steps;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
@@ -34,6 +36,9 @@ pub struct Input<'a> {
     pub flown: &'a [Flown<'a>],
     /// Logs of somebody else's simulation; without them the plan is flown again.
     pub simulated: Option<&'a [Flown<'a>]>,
+    /// How steady flight is found in tables, which have neither plan nor commands: they are held against the
+    /// model's closed forms at the climb that was flown.
+    pub table: Option<&'a Steps>,
     /// Logs that could not be used, with their reasons.
     pub left_out: Vec<String>,
 }
@@ -49,11 +54,11 @@ pub struct Explained {
     pub found: Found,
 }
 
+/// Sides whose leans are further apart flew in different wind, degrees.
+const OTHER_WIND_DEG: f64 = 0.5;
+
 /// Climb speeds of one rung of the ladder differ by less, m/s.
 const SAME_SPEED_MPS: f64 = 0.05;
-
-/// A pulse that moves less than this is a constant, us.
-const CONSTANT_US: f64 = 0.02;
 
 /// Compares, names, adds and shows.
 ///
@@ -61,17 +66,27 @@ const CONSTANT_US: f64 = 0.02;
 /// See [`GapError`].
 pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapError> {
     let exponent = super::compare::thrust_exponent(input.vehicle);
-    let data = match input.plan {
+    let mut data = match input.plan {
         Some(plan) => Data::of_plan(plan, input.flown, exponent),
-        None => Data::of_logs(input.flown, exponent),
+        None => Data::of_logs(input.flown, input.table, exponent),
     };
     if data.drones() == 0 {
         return Err(GapError::NothingMeasured { reasons: data.left_out });
     }
-    constant(&data)?;
+    let constant = data.drop_constant(exponent);
+    if let (0, Some(value_us)) = (data.drones(), constant) {
+        return Err(GapError::ConstantPulse { value_us });
+    }
     let simulated = match (input.simulated, input.plan) {
-        (Some(flown), _) => Simulated::Given(data.averaged(flown, exponent)),
+        (Some(flown), _) => {
+            let values = data.averaged(flown, exponent);
+            if let Some(value_us) = constant_us(values.iter().flatten().flatten(), exponent) {
+                return Err(GapError::ConstantSimulated { value_us });
+            }
+            Simulated::Given(values)
+        }
         (None, Some(plan)) => Simulated::Refly(plan),
+        (None, None) if input.table.is_some() => Simulated::Closed,
         (None, None) => return Err(GapError::NoSimulatedSide),
     };
     let (train, held) = data.split();
@@ -147,13 +162,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         model = self::repaired(&model, &verdict.sensor);
     }
     Ok(Explained { verdict, model, found })
-}
-
-fn constant(data: &Data) -> Result<(), GapError> {
-    let pulses = || data.groups.iter().flat_map(|group| &group.measured).flatten();
-    let low = pulses().map(|values| values.pulse_us).fold(f64::INFINITY, f64::min);
-    let high = pulses().map(|values| values.pulse_us).fold(f64::NEG_INFINITY, f64::max);
-    if high - low < CONSTANT_US { Err(GapError::ConstantPulse { value_us: low }) } else { Ok(()) }
 }
 
 fn noise(hyper: &Hyper) -> Noise {
@@ -286,7 +294,35 @@ fn cautions(data: &Data, found: &Found, input: &Input<'_>) -> Vec<String> {
             plan.slots.len()
         ));
     }
-    if data.groups.len() == 1 && input.simulated.is_none() {
+    for parameter in &found.parameters {
+        let value = value_of(&found.vehicle, parameter.effect, parameter.name);
+        let (low, high) = parameter.bounds;
+        if value.is_some_and(|value| value <= low || value >= high) {
+            cautions.push(format!(
+                "{}.{} is at its bound: the effect as it is named does not fit, and the model with it may \
+                 be worse elsewhere",
+                parameter.effect, parameter.name
+            ));
+        }
+    }
+    if input.simulated.is_some() {
+        let lean_deg = found.comparison.apart_rad().to_degrees();
+        if lean_deg > OTHER_WIND_DEG {
+            cautions.push(format!(
+                "the drones lean by {lean_deg:.1} degrees more or less than the simulated ones in hover and \
+                 vertical flight: the two sides flew in different wind, and what wind does is mixed with \
+                 what the simulation lacks"
+            ));
+        }
+    }
+    if input.table.is_some() {
+        cautions.push(
+            "tables have no plan that could be flown again: the model's side is its closed forms at the \
+             climb that was flown"
+                .to_owned(),
+        );
+    }
+    if data.groups.len() == 1 && input.plan.is_some() && input.simulated.is_none() {
         cautions.push(
             "all drones climb at the same time: what depends on climb speed is mixed with the \
              shared air (calibration-counterphase tells them apart)"

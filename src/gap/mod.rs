@@ -33,6 +33,7 @@ mod regimes;
 mod scene;
 mod search;
 mod sensor;
+mod table;
 pub mod verdict;
 pub mod words;
 
@@ -43,4 +44,5 @@ pub use error::GapError;
 pub use explain::{Found, Options, search};
 pub use make::{Explained, Input, explain};
 pub use map_gain::{Measured, map_gain};
+pub use table::{aloft, as_pulses, lossless};
 pub use verdict::Verdict;

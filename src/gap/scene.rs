@@ -16,7 +16,7 @@ const FULL_CELL_V: f64 = 4.25;
 /// Bins that tell what a battery started with.
 const EARLY_BINS: usize = 12;
 /// Pulse without thrust, us.
-const IDLE_US: f64 = 1000.0;
+pub(super) const IDLE_US: f64 = 1000.0;
 
 /// Steady signals of a comparison: what was flown and what the logs say of wind and battery. None of
 /// them follows the pulse: terminal voltage, current and measured acceleration do and are never used

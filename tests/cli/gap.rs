@@ -155,18 +155,90 @@ fn a_hover_that_is_compared_is_not_its_own_map() {
     assert_eq!(told("hover"), (None, true));
 }
 
-#[test]
-fn logs_of_a_constant_are_refused() {
-    let bench = campaign();
-    for slot in 1..=4 {
-        let log = bench.path(&format!("campaign/logs/{slot:02}.BIN"));
+/// Has these logs say the same pulse throughout.
+fn hold(bench: &Bench, folder: &str, slots: std::ops::RangeInclusive<u16>) {
+    for slot in slots {
+        let log = bench.path(&format!("{folder}/{slot:02}.BIN"));
         for channel in ["C1", "C2", "C3", "C4"] {
             patch(&log, "RCOU", channel, |_, field| {
                 field.copy_from_slice(&1500_u16.to_le_bytes());
             });
         }
     }
+}
+
+#[test]
+fn logs_of_a_constant_are_refused() {
+    let bench = campaign();
+    fs::create_dir(bench.path("other")).unwrap();
+    for slot in 1..=4 {
+        let name = format!("{slot:02}.BIN");
+        fs::copy(bench.path("campaign/logs").join(&name), bench.path("other").join(&name)).unwrap();
+    }
+    hold(&bench, "campaign/logs", 1..=1);
+    assert_snapshot!(said(&bench, 3, &["campaign"]));
+    hold(&bench, "other", 1..=4);
+    assert_snapshot!(refused(&bench, 5, &["campaign", "--simulated", "other"]));
+    hold(&bench, "campaign/logs", 2..=4);
     assert_snapshot!(refused(&bench, 5, &["campaign"]));
+}
+
+#[test]
+fn a_half_fleet_that_lost_a_log_is_compared() {
+    let bench = Bench::new();
+    let plan = ["plan", "calibration-counterphase", "--grid", "3x5", "--quiet", "-o", "campaign"];
+    bench.expect(0, &[&plan[..], &SMALL].concat());
+    bench.expect(0, &["simulate", "campaign", "--quiet"]);
+    fs::remove_file(bench.path("campaign/logs/02.BIN")).unwrap();
+    let ended = bench.expect(0, &["gap", "campaign", "--json"]);
+    let data = &ended.json("updraft.gap/1")["verdict"]["data"];
+    assert_eq!(data["drones"], 14);
+    assert!(data["held_out"].as_array().is_some_and(|held| held.len() == 3), "{data}");
+}
+
+#[test]
+fn tables_are_held_against_the_closed_forms() {
+    let bench = Bench::new();
+    // A ladder in rotor speeds: 5400 in hover and 87 per m/s of climb, as the vehicle has it.
+    const CLIMBS_MPS: [f64; 7] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0];
+    let mut rows = "time,speed,up,height,roll,pitch\n".to_owned();
+    let mut height_m = 30.0;
+    for step in 0..7 * 100 {
+        let climb_mps = CLIMBS_MPS[step / 100];
+        height_m += 0.2 * climb_mps;
+        let speed_rpm = 5400.0 + 87.0 * climb_mps + (step % 7) as f64;
+        let time_s = step as f64 / 5.0;
+        let _ = writeln!(rows, "{time_s},{speed_rpm},{climb_mps},{height_m:.2},0.01,-0.01");
+    }
+    fs::write(bench.path("ladder.csv"), rows).unwrap();
+    let column = |name: &str, column: &str| format!("\n[{name}]\ncolumns = [\"{column}\"]\n");
+    let mapping = [
+        "schema = \"updraft.csv/1\"\ntitle = \"A ladder\"\nindicator = \"rotor_speed\"\n\
+         [time]\ncolumn = \"time\"\n"
+            .to_owned(),
+        column("effort", "speed"),
+        column("velocity_up", "up"),
+        column("height", "height"),
+        column("roll", "roll"),
+        column("pitch", "pitch"),
+        "[[flights]]\nname = \"ladder\"\npurpose = \"calibration\"\nfiles = [\"ladder.csv\"]\n"
+            .to_owned(),
+    ];
+    fs::write(bench.path("ladder.toml"), mapping.concat()).unwrap();
+    let args = ["gap", "--csv", "ladder.toml", "--vehicle", "phantom4", "--json"];
+    let ended = bench.expect(0, &args);
+    let verdict = &ended.json("updraft.gap/1")["verdict"];
+    // The table is a straight line, the vehicle's law nearly one.
+    let rungs = verdict["ladder"].as_array().unwrap();
+    assert_eq!(rungs.len(), CLIMBS_MPS.len());
+    for rung in rungs {
+        let off_us = rung["measured_us"].as_f64().unwrap() - rung["before_us"].as_f64().unwrap();
+        assert!(off_us.abs() < 5.0, "{rung}");
+    }
+    let text = fs::read_to_string(bench.path("gap/model.toml")).unwrap();
+    assert!(text.contains("resistance_ohm = 0.15"), "the vehicle's own motors: {text}");
+    assert_snapshot!(said(&bench, 0, &["--csv", "ladder.toml", "--vehicle", "phantom4"]));
+    assert_snapshot!(refused(&bench, 1, &["--csv", "nothing-here.toml"]));
 }
 
 #[test]

@@ -61,6 +61,7 @@ impl Explain for Searched {
             plan: found.plan.as_ref(),
             flown: &flown,
             simulated: None,
+            table: None,
             left_out: Vec::new(),
         };
         let hidden = there(truth, &vehicle);

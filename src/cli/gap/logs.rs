@@ -8,7 +8,7 @@ use crate::analysis::FlightInput;
 use crate::analysis::slots::whose_logs;
 use crate::base::causes::with_causes;
 use crate::cli::found::Found;
-use crate::flight::{Flight, FlightOptions};
+use crate::flight::{Flight, FlightOptions, Indicator, table};
 
 /// Logs that were read, and why the others were not.
 #[derive(Debug, Default)]
@@ -21,6 +21,9 @@ pub(in crate::cli) struct Read {
 
 /// Reads all logs of a flight; a log that cannot be used stops none of the others.
 pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
+    if found.logs.iter().any(|log| log.table.is_some()) {
+        return tables(found);
+    }
     let input = FlightInput {
         name: &found.name,
         plan: found.plan.as_ref(),
@@ -59,5 +62,23 @@ pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
         }
     }
     read.flights.sort_by_key(|(slot, _)| *slot);
+    read
+}
+
+/// Reads the tables of a flight, numbered in their order.
+fn tables(found: &Found) -> Read {
+    let mut read = Read::default();
+    for (index, log) in found.logs.iter().enumerate() {
+        let Some(mapping) = &log.table else { continue };
+        let number = u16::try_from(index + 1).unwrap_or(u16::MAX);
+        let shown = log.path.display();
+        match table::read(&log.path, mapping) {
+            Ok(flight) if flight.indicator == Indicator::Power => read.left_out.push(format!(
+                "{shown}: electrical power is no pulse; give pulses or rotor speeds"
+            )),
+            Ok(flight) => read.flights.push((number, flight)),
+            Err(error) => read.left_out.push(format!("{shown}: {}", with_causes(&error, ": "))),
+        }
+    }
     read
 }

@@ -12,14 +12,18 @@ use serde::Serialize;
 use super::analyze::load_plan;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::found::{Found, Work, find};
+use super::found::{Found, Work, find, find_tables};
 use super::provenance::provenance;
 use super::words;
 use crate::analysis::TruthSeries;
 use crate::base::file::{create_folder, write_whole};
 use crate::campaign::{self, CampaignError, FlightFolder, to_json};
 use crate::effects::select::resolved;
-use crate::gap::{Explained, Flown, Input, Measured, Options, Verdict, explain, map_gain};
+use crate::flight::{Flight, Indicator};
+use crate::gap::{
+    Explained, Flown, Input, Measured, Options, Verdict, aloft, as_pulses, explain, lossless,
+    map_gain,
+};
 use crate::mission::plan::Purpose;
 use crate::report::{self, Provenance};
 use crate::vehicle::{Vehicle, library};
@@ -32,6 +36,7 @@ use crate::vehicle::{Vehicle, library};
   updraft gap my-campaign --vehicle templates/vehicles/airsim-generic-quad.toml -o gap/
   updraft gap --measured logs/ --simulated sitl-logs/
   updraft gap --measured logs/ --plan my-campaign/calibration --vehicle pixel
+  updraft gap --csv phantom4-mast.toml --vehicle phantom4 --flight hover
   updraft gap next my-campaign                    # what to fly next
 
 The plan is flown again in the simulator (or the logs of another simulation are taken), and the
@@ -47,11 +52,14 @@ pub(super) struct GapArgs {
     #[command(subcommand)]
     command: Option<GapCommand>,
     /// Campaign folder
-    #[arg(required_unless_present = "measured", conflicts_with = "measured")]
+    #[arg(required_unless_present_any = ["measured", "csv"], conflicts_with_all = ["measured", "csv"])]
     campaign: Option<PathBuf>,
     /// Logs of the drones: a folder, or one log
     #[arg(long, value_name = "LOGS")]
     measured: Option<PathBuf>,
+    /// Tables instead of logs: a mapping file says which columns are what (docs/csv.md)
+    #[arg(long, value_name = "MAPPING.toml", conflicts_with_all = ["measured", "simulated", "plan"])]
+    csv: Option<PathBuf>,
     /// Logs of somebody else's simulation of the same flight, instead of flying the plan again
     #[arg(long, value_name = "LOGS")]
     simulated: Option<PathBuf>,
@@ -148,9 +156,11 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
     }
     let both = Both { measured: &found, simulated: simulated.as_ref(), hover: hover.as_ref() };
     let explained = compare(&both, &vehicle, &options)?;
+    context.check_stop()?;
     create_folder(&folder)?;
     let _lock = context.lock(&folder)?;
-    let root = args.campaign.as_ref().or(args.measured.as_ref()).cloned().unwrap_or_default();
+    let root = args.campaign.as_ref().or(args.measured.as_ref()).or(args.csv.as_ref());
+    let root = root.cloned().unwrap_or_default();
     let settings = settings(args, &found, &vehicle);
     let work = Work { flights: vec![found], ..Work::new(&root) };
     let provenance = Provenance { seed: Some(args.seed), ..provenance(&work, settings) };
@@ -219,6 +229,11 @@ fn write(
 /// The measured flight, and the others that are there.
 fn measured(args: &GapArgs) -> Result<(Found, Vec<Found>), CommandError> {
     let plan = args.plan.as_deref().map(load_plan).transpose()?;
+    if let Some(mapping) = &args.csv {
+        let mut work = Work::new(mapping);
+        find_tables(mapping, &mut work)?;
+        return chosen(work.flights, mapping, args.flight.as_deref());
+    }
     match (&args.campaign, &args.measured) {
         (Some(campaign), _) => {
             if plan.is_some() {
@@ -236,7 +251,7 @@ fn measured(args: &GapArgs) -> Result<(Found, Vec<Found>), CommandError> {
             }
             Ok((found, others))
         }
-        (None, None) => Err(CommandError::Usage("give a campaign or --measured".to_owned())),
+        (None, None) => Err(CommandError::Usage("give a campaign, --measured or --csv".to_owned())),
     }
 }
 
@@ -258,7 +273,15 @@ fn is_campaign(campaign: &Path) -> Result<(), CommandError> {
 fn one_flight(path: &Path, name: Option<&str>) -> Result<(Found, Vec<Found>), CommandError> {
     let mut work = Work::new(path);
     find(path, None, &mut work)?;
-    let mut flights = work.flights;
+    chosen(work.flights, path, name)
+}
+
+/// As [`one_flight`], of flights that were found.
+fn chosen(
+    mut flights: Vec<Found>,
+    path: &Path,
+    name: Option<&str>,
+) -> Result<(Found, Vec<Found>), CommandError> {
     let is_meant = |flight: &Found| name.is_none_or(|name| flight.name == name);
     if let Some(name) = name
         && !flights.iter().any(is_meant)
@@ -342,7 +365,21 @@ fn compare(
     options: &Options,
 ) -> Result<Explained, CommandError> {
     let Both { measured: found, simulated, hover } = *both;
-    let read = logs::read(found, Path::new(""));
+    let mut read = logs::read(found, Path::new(""));
+    let mapping = found.logs.iter().find_map(|log| log.table.clone());
+    let has_speeds = |(_, flight): &(u16, Flight)| flight.indicator == Indicator::RotorSpeed;
+    let by_speed = read.flights.iter().any(has_speeds);
+    let planned = vehicle;
+    let lossless = lossless(planned);
+    let vehicle = if by_speed { &lossless } else { planned };
+    for (_, flight) in &mut read.flights {
+        if mapping.is_some() {
+            *flight = aloft(flight);
+        }
+        if by_speed {
+            *flight = as_pulses(flight, vehicle);
+        }
+    }
     let others = simulated.map(|simulated| logs::read(simulated, Path::new("")));
     let flown: Vec<Flown<'_>> =
         read.flights.iter().map(|(slot, flight)| Flown { slot: *slot, flight }).collect();
@@ -371,9 +408,11 @@ fn compare(
         plan: found.plan.as_ref(),
         flown: &flown,
         simulated: other.as_deref(),
+        table: mapping.as_ref().map(|mapping| &mapping.steps),
         left_out,
     };
     let mut explained = explain(&input, options)?;
+    explained.model.airframe.rotor = planned.airframe.rotor;
     if let Some((hover, plan)) = hover.and_then(|hover| Some((hover, hover.plan.as_ref()?))) {
         let read = logs::read(hover, Path::new(""));
         let flown: Vec<Flown<'_>> =
