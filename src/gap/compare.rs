@@ -282,15 +282,15 @@ impl Comparison {
 
     /// Distance of the mean leans of both sides in hover and in vertical flight, rad.
     pub fn apart_rad(&self) -> f64 {
-        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        let (mut sum, mut count) = ([0.0_f64; 2], 0.0);
         for (group, side) in self.data.groups.iter().zip(&self.side) {
             for (bin, values) in side.iter().enumerate() {
                 if group.bins[bin].is_horizontal() {
                     continue;
                 }
                 count += 1.0;
-                for axis in 0..2 {
-                    sum[axis] += group.mean(bin, |one| one.lean_rad[axis]) - values.lean_rad[axis];
+                for (axis, sum) in sum.iter_mut().enumerate() {
+                    *sum += group.mean(bin, |one| one.lean_rad[axis]) - values.lean_rad[axis];
                 }
             }
         }

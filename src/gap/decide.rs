@@ -17,6 +17,10 @@ const FREE_BETTER: f64 = 1.25;
 /// And when this share of its gain is left with the effect in the model.
 const FREE_LEFT: f64 = 0.25;
 
+/// The free shape that is a product of climb speed and time, and by how much it beats effects, nats.
+const PRODUCT: &str = "climb-time";
+const PRODUCT_NATS: f64 = 2.5;
+
 /// An effect this near to a size that matters is named before a free shape that looks like it.
 const NEARLY: f64 = 0.6;
 
@@ -94,6 +98,16 @@ pub(super) fn decide(
         if left > FLOOR_NATS.max(FREE_LEFT * free.gain) {
             return Decision { what: What::Free(free.clone()), thresholds: limits };
         }
+    }
+    // A ladder whose rungs grow makes a response that grows with time look like drag: a line in V with its
+    // product with time has one number more than an effect, and must not be better.
+    let product = round.generics.iter().find(|free| {
+        sought.generics[free.generic].depends_on == PRODUCT
+            && free.size_us >= material_us
+            && free.gain > limits.generic.max(best_gain + PRODUCT_NATS)
+    });
+    if let Some(product) = product {
+        return Decision { what: What::Free(product.clone()), thresholds: limits };
     }
     let Some(best) = best.filter(|best| best.gain > limits.library) else {
         return nothing(limits);

@@ -196,11 +196,13 @@ fn a_half_fleet_that_lost_a_log_is_compared() {
     assert!(data["held_out"].as_array().is_some_and(|held| held.len() == 3), "{data}");
 }
 
+/// Climbs of the ladder in a table.
+const CLIMBS_MPS: [f64; 7] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0];
+
 #[test]
 fn tables_are_held_against_the_closed_forms() {
     let bench = Bench::new();
-    // A ladder in rotor speeds: 5400 in hover and 87 per m/s of climb, as the vehicle has it.
-    const CLIMBS_MPS: [f64; 7] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0];
+    // In rotor speeds: 5400 in hover and 87 per m/s of climb, as the vehicle has it.
     let mut rows = "time,speed,up,height,roll,pitch\n".to_owned();
     let mut height_m = 30.0;
     for step in 0..7 * 100 {
