@@ -170,12 +170,12 @@ pub(super) fn read_otherwise(
     if is_known || comparison.wind.measured.is_some() {
         return Ok(None);
     }
-    let base = comparison.pulses_by_lean(vehicle, true)?;
+    let base = comparison.pulses_by_lean(vehicle)?;
     let mut variants = Vec::new();
     for size in DRAGS {
         let mut other = vehicle.clone();
         set(&mut other, effect, parameter, size);
-        let column = comparison.pulses_by_lean(&other, true)?.less(&base);
+        let column = comparison.pulses_by_lean(&other)?.less(&base);
         variants.push(Variant { vehicle: Some(other), size, column });
     }
     let size =
@@ -197,13 +197,13 @@ pub(super) fn drag_by_lean(
     vehicle: &Vehicle,
     base: &Solution,
 ) -> Result<Option<(f64, f64)>, EffectError> {
-    let without = comparison.pulses_by_lean(vehicle, true)?;
+    let without = comparison.pulses_by_lean(vehicle)?;
     let mut gains = Vec::new();
     for step in 1..=MOST_DRAG_STEPS {
         let size = DRAG_STEP * f64::from(step);
         let mut other = vehicle.clone();
         set(&mut other, DRAG.0, DRAG.1, size);
-        let gain = base.gain(&comparison.pulses_by_lean(&other, true)?.less(&without));
+        let gain = base.gain(&comparison.pulses_by_lean(&other)?.less(&without));
         // Gain of the form as it is, where `gain` has that of its best multiple.
         let information = 2.0 * gain.nats / gain.beta.powi(2);
         let as_it_is = (gain.beta - 0.5) * information;

@@ -164,9 +164,8 @@ impl Comparison {
         let bent = rectified(&self.scene, vehicle, gusts_mps)?;
         let response = self.scene.response(vehicle)?;
         let closed = self.scene.pulses(vehicle)?;
-        let sides =
-            [self.by_wind(vehicle, 0, SIDE_STEP_MPS)?, self.by_wind(vehicle, 1, SIDE_STEP_MPS)?]
-                .map(|column| column.means());
+        let side = |axis| Ok(self.by_wind(vehicle, &closed, axis, SIDE_STEP_MPS)?.means());
+        let sides: [Vec<Vec<f64>>; 2] = [side(0)?, side(1)?];
         Ok(self
             .data
             .groups
@@ -231,23 +230,12 @@ impl Comparison {
         self.wind.air_mps.iter().map(|group| group.iter().map(angle).collect()).collect()
     }
 
-    /// Pulses of a vehicle in the wind that its own law reads from the leans, where no leg tells more;
-    /// with the gusts of that wind where the law is believed so far, or in its mean alone.
+    /// Pulses of a vehicle in the wind that its own law reads from the leans, where no leg tells more.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
-    pub fn pulses_by_lean(
-        &self,
-        vehicle: &Vehicle,
-        with_gusts: bool,
-    ) -> Result<Column, EffectError> {
-        let mut wind = wind(&self.data, lean_law(vehicle, self.amsl_m), None);
-        if !with_gusts {
-            let steady =
-                |bin: &Bin| [0, 1].map(|axis| bin.velocity_mps[axis] - wind.mean_mps[axis]);
-            let groups = self.data.groups.iter();
-            wind.air_mps = groups.map(|group| group.bins.iter().map(steady).collect()).collect();
-        }
+    pub fn pulses_by_lean(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
+        let wind = wind(&self.data, lean_law(vehicle, self.amsl_m), None);
         Scene::measured(&self.data, &self.side, &wind, self.amsl_m).pulses(vehicle)
     }
 
@@ -256,9 +244,10 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub fn wind_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
+        let closed = self.scene.pulses(vehicle)?;
         let mut doubts = Vec::new();
         for axis in 0..2 {
-            let doubt = self.by_wind(vehicle, axis, self.wind.mean_se_mps)?;
+            let doubt = self.by_wind(vehicle, &closed, axis, self.wind.mean_se_mps)?;
             // Where the model does not feel wind there is nothing to doubt.
             if doubt.spread(&self.data.counts()) > LEAST_DOUBT_US {
                 doubts.push(doubt);
@@ -267,8 +256,14 @@ impl Comparison {
         Ok(doubts)
     }
 
-    /// What more wind along an axis of the show does to the pulse, us.
-    fn by_wind(&self, vehicle: &Vehicle, axis: usize, by_mps: f64) -> Result<Column, EffectError> {
+    /// What more wind along an axis of the show does to the vehicle's closed form, us.
+    fn by_wind(
+        &self,
+        vehicle: &Vehicle,
+        closed: &Column,
+        axis: usize,
+        by_mps: f64,
+    ) -> Result<Column, EffectError> {
         let mut scene = self.scene.clone();
         for (signals, air) in scene.signals.iter_mut().zip(&self.wind.air_mps) {
             for (signals, air) in signals.iter_mut().zip(air) {
@@ -277,7 +272,7 @@ impl Comparison {
                 signals.horizontal_mps = air[0].hypot(air[1]);
             }
         }
-        Ok(scene.pulses(vehicle)?.less(&self.scene.pulses(vehicle)?))
+        Ok(scene.pulses(vehicle)?.less(closed))
     }
 
     /// Distance of the mean leans of both sides in hover and in vertical flight, rad.

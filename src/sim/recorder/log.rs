@@ -12,7 +12,7 @@ use super::{Moment, Recorder, control, navigation, start};
 use crate::log::{LogWriter, MessageDef, catalog};
 use crate::sim::flight::{FlightSetup, STEP_S, STEP_US};
 
-/// Steps between rows at 25 Hz and at 10 Hz.
+/// Control steps between two of the rows that a log has 25 times a second.
 const STEPS_25_HZ: u64 = 16;
 /// Control steps between two of the rows that a log has ten times a second.
 pub const STEPS_10_HZ: u64 = 40;
