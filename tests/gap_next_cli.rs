@@ -37,7 +37,7 @@ fn without_a_verdict_or_a_question_it_says_so() {
     let ended = bench.expect(2, &["gap", "next", "campaign", "--z", "0"]);
     assert!(ended.err.contains("a number from 0.5 to 100"), "{ended}");
     let ended = bench.expect(2, &["gap"]);
-    assert!(ended.err.contains("CAMPAIGN"), "{ended}");
+    assert!(ended.err.contains("a campaign folder, --measured LOGS or --csv"), "{ended}");
 }
 
 #[test]

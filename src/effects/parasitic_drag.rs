@@ -32,8 +32,8 @@ impl Effect for ParasiticDrag {
                 that adds to the linear one of the rotors. AirSim has it already, with four times \
                 the area of the rotor discs; real bodies have much less. In steady windows its \
                 size cannot be told from a wrong thrust curve.",
-            formula: "D = rho/2 |v| (S_h v_x, S_h v_y, S_v v_z), S = C_D area;  du = A V|V|, \
-                A = L rho S_v/(2 m g)",
+            formula: "D = rho/2 |v| (S_h v_x, S_h v_y, S_v v_z) along the body's axes, S = C_D area;  \
+                du = A V|V|, A = L rho S_v/(2 m g)",
             source: "Hoerner, Fluid-Dynamic Drag",
             class: Class::AxialShape,
             signals: &[Signal::Climb, Signal::Horizontal],
@@ -63,10 +63,12 @@ impl Effect for ParasiticDrag {
 
     fn pulse_us(&self, at: &Reference, values: &Values, signals: &Signals) -> f64 {
         let speed = signals.climb_mps.hypot(signals.horizontal_mps);
-        let pressure = DENSITY * at.density_ratio / 2.0 * speed;
-        let down = at.weight_n() + pressure * values[VERTICAL] * signals.climb_mps;
-        let back = pressure * values[HORIZONTAL] * signals.horizontal_mps;
-        at.thrust_us(down.hypot(back) / at.weight_n())
+        let per_weight = DENSITY * at.density_ratio / 2.0 * speed / at.weight_n();
+        let own_lean = (per_weight * values[HORIZONTAL] * signals.horizontal_mps).atan();
+        // The plate leans with the rotors: the wind presses on its top.
+        let leaning = Signals { tilt_rad: signals.tilt_rad.max(own_lean), ..*signals };
+        let along = per_weight * values[VERTICAL] * leaning.axial_mps();
+        at.thrust_us(own_lean.cos() + along)
     }
 
     fn loads(&self, own: &mut Own, now: &Now, change: &mut Change) {

@@ -3,10 +3,13 @@
 
 use super::compare::Comparison;
 use super::gls::{Column, Solution};
+use super::noise::{GroupPattern, Hyper};
+use super::response::{self, Response};
 use super::scene::Scene;
 use crate::effects::select::value_of;
 use crate::effects::{EffectError, LIBRARY, Sought};
-use crate::vehicle::Vehicle;
+use crate::sim::plant::drag::Drag;
+use crate::vehicle::{RotorLaw, Vehicle};
 
 /// Change of a size that is in the model already, for its derivative.
 const CHANGE: f64 = 0.15;
@@ -50,6 +53,9 @@ pub(super) struct Variant {
     pub size: f64,
     /// What it adds to the pulse, us.
     pub column: Column,
+    /// What it adds to the response to vertical air speed, by group and bin; empty: nothing, or scatter
+    /// does not show it.
+    pub felt: Vec<Vec<Response>>,
 }
 
 /// All effects of the library that steady flight can show, held against a vehicle.
@@ -58,6 +64,7 @@ pub(super) struct Variant {
 /// Effects of the vehicle that are not valid.
 pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>, EffectError> {
     let base = scene.pulses(vehicle)?;
+    let response = scene.response(vehicle)?;
     let mut found = Vec::new();
     for effect in LIBRARY {
         let definition = effect.definition();
@@ -71,7 +78,8 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
             stated.unwrap_or_else(|| (parameter.default)(vehicle))
         });
         let sizes: Vec<f64> = if now == 0.0 {
-            sizes.to_vec()
+            let is_possible = |size: &&f64| is_possible(vehicle, definition.name, **size);
+            sizes.iter().filter(is_possible).copied().collect()
         } else {
             let step = now * CHANGE;
             vec![if now + step <= parameter.high { now + step } else { now - step }]
@@ -95,7 +103,12 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
                 // A form that the vehicle cannot have is no candidate.
                 let Ok(pulses) = scene.pulses(&other) else { continue };
                 let column = pulses.less(&base);
-                variants.push(Variant { vehicle: Some(other), size: value, column });
+                let mut felt = scene.response(&other)?;
+                response::add(&mut felt, -1.0, &response);
+                if felt.iter().flatten().all(|one| *one == Response::default()) {
+                    felt.clear();
+                }
+                variants.push(Variant { vehicle: Some(other), size: value, column, felt });
             }
         }
         let usual = sizes_usual(definition.name, vehicle, parameter.default);
@@ -114,6 +127,13 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
         });
     }
     Ok(found)
+}
+
+/// Whether a vehicle that lacks an effect can have it with a size. Thrust that grows slower than the pulse is
+/// no curve that a rotor has: only a model that is curved itself can be curved too much.
+fn is_possible(vehicle: &Vehicle, effect: &str, size: f64) -> bool {
+    let is_straight = matches!(vehicle.airframe.rotor, RotorLaw::Linear);
+    !(effect == "thrust-curve" && is_straight && size < 0.0)
 }
 
 fn sizes_usual(name: &str, vehicle: &Vehicle, default: fn(&Vehicle) -> f64) -> f64 {
@@ -146,10 +166,30 @@ fn prepare(vehicle: &mut Vehicle, name: &str, scene: &Scene) {
 
 /// Sets a parameter of an effect and switches it on.
 pub(super) fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f64) {
+    let sides =
+        (effect == "parasitic-drag" && parameter == "vertical_m2").then(|| sides_of(vehicle));
     let table = vehicle.effects.entry(effect.to_owned()).or_default();
     table.on = true;
     table.parameters.insert(parameter.to_owned(), value);
+    // A body that is larger is larger from all sides: leans, by which the wind is read, must know it.
+    if let Some(sides) = sides {
+        table.parameters.insert("horizontal_m2".to_owned(), sides * value);
+    }
 }
+
+/// Drag area of a body's sides over that of its top.
+fn sides_of(vehicle: &Vehicle) -> f64 {
+    let of = |parameter| value_of(vehicle, "parasitic-drag", parameter).filter(|area| *area > 0.0);
+    if let (Some(top), Some(sides)) = (of("vertical_m2"), of("horizontal_m2")) {
+        return sides / top;
+    }
+    let factor = Drag::new(&vehicle.airframe).factor_m2();
+    let sides = (factor.x * factor.y).sqrt();
+    if factor.z > 0.0 && sides > 0.0 { sides / factor.z } else { USUAL_SIDES }
+}
+
+/// The same where nothing is known.
+const USUAL_SIDES: f64 = 0.5;
 
 /// The drag of the rotors: effect and size.
 pub(super) const DRAG: (&str, &str) = ("blade-flapping", "drag_per_weight");
@@ -176,7 +216,7 @@ pub(super) fn read_otherwise(
         let mut other = vehicle.clone();
         set(&mut other, effect, parameter, size);
         let column = comparison.pulses_by_lean(&other)?.less(&base);
-        variants.push(Variant { vehicle: Some(other), size, column });
+        variants.push(Variant { vehicle: Some(other), size, column, felt: Vec::new() });
     }
     let size =
         Size { name: parameter, unit: "s/m", low: 0.0, high: 0.1, now: 0.0, usual: DRAGS[1] };
@@ -228,19 +268,24 @@ pub(super) fn drag_by_lean(
 }
 
 /// Motions of the air that an effect may be mistaken for: not the vehicle's, and never added to it.
-pub(super) fn of_the_air(scene: &Scene, response: &[Vec<f64>], least: f64) -> Vec<Candidate> {
+pub(super) fn of_the_air(
+    scene: &Scene,
+    patterns: &[GroupPattern],
+    hyper: &Hyper,
+) -> Vec<Candidate> {
     let last_s = scene.signals.iter().flatten().map(|s| s.time_s).fold(1.0, f64::max);
     let column = |of: &dyn Fn(&crate::effects::Signals) -> f64| {
-        let group = |(signals, response): (&Vec<crate::effects::Signals>, &Vec<f64>)| {
-            signals.iter().zip(response).map(|(s, r)| -(r.abs() + least) * of(s)).collect()
+        let group = |(signals, pattern): (&Vec<crate::effects::Signals>, &GroupPattern)| {
+            let responses = pattern.responses(hyper);
+            signals.iter().zip(responses).map(|(s, response)| -response * of(s)).collect()
         };
-        Column::Shared(scene.signals.iter().zip(response).map(group).collect())
+        Column::Shared(scene.signals.iter().zip(patterns).map(group).collect())
     };
     let air = |name, column| Candidate {
         name,
         was_there: false,
         size: None,
-        variants: vec![Variant { vehicle: None, size: 1.0, column }],
+        variants: vec![Variant { vehicle: None, size: 1.0, column, felt: Vec::new() }],
     };
     vec![
         air("updraft-drift", column(&|signals| signals.time_s / last_s)),

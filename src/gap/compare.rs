@@ -7,8 +7,9 @@ use super::data::Data;
 use super::error::GapError;
 use super::gls::{Column, Pulses};
 use super::lean::{LeanLaw, Wind, wind};
-use super::noise::{GRADIENT, GUSTS, GroupPattern, Hyper, OWN, SHARED};
+use super::noise::GroupPattern;
 use super::refly::{mean_drone, refly};
+use super::response::{self, Response};
 use super::scene::Scene;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::effects::{EffectError, Model, Reference, Signals};
@@ -39,6 +40,8 @@ pub struct Comparison {
     pub wind: Wind,
     /// What the closed loop does besides the closed form, by group and bin, us.
     closure_us: Vec<Vec<f64>>,
+    /// What no effect of the vehicle adds to the response to vertical air speed; empty: nothing.
+    felt: Vec<Vec<Response>>,
     amsl_m: f64,
     /// The fleet's mean drone of the model.
     pub vehicle: Vehicle,
@@ -118,7 +121,14 @@ impl Comparison {
                 bins.iter().enumerate().map(apart).collect()
             })
             .collect();
-        Ok(Self { data, side, scene, wind: blown, closure_us, amsl_m, vehicle })
+        Ok(Self { data, side, scene, wind: blown, closure_us, felt: Vec::new(), amsl_m, vehicle })
+    }
+
+    /// The same with a response to vertical air speed by group and bin that no effect of the
+    /// vehicle has.
+    #[must_use]
+    pub(super) fn feeling(self, felt: &[Vec<Response>]) -> Self {
+        Self { felt: felt.to_vec(), ..self }
     }
 
     /// Measured less simulated pulses of all drones for a vehicle whose closed form is near the
@@ -162,7 +172,8 @@ impl Comparison {
         gusts_mps: f64,
     ) -> Result<Vec<GroupPattern>, EffectError> {
         let bent = rectified(&self.scene, vehicle, gusts_mps)?;
-        let response = self.scene.response(vehicle)?;
+        let mut response = self.scene.response(vehicle)?;
+        response::add(&mut response, 1.0, &self.felt);
         let closed = self.scene.pulses(vehicle)?;
         let side = |axis| Ok(self.by_wind(vehicle, &closed, axis, SIDE_STEP_MPS)?.means());
         let sides: [Vec<Vec<f64>>; 2] = [side(0)?, side(1)?];
@@ -189,6 +200,7 @@ impl Comparison {
                     time_s: of.bins.iter().map(Bin::middle_s).collect(),
                     height_m: self.scene.signals[group].iter().map(|s| s.height_m).collect(),
                     response: response[group].clone(),
+                    shift_mps: Vec::new(),
                     bent_us: bent[group].clone(),
                     side_response: (0..of.bins.len())
                         .map(|bin| {
@@ -218,6 +230,7 @@ impl Comparison {
             scene: self.scene.only(&keep),
             wind,
             closure_us: pick(&self.closure_us, &keep),
+            felt: pick(&self.felt, &keep),
             amsl_m: self.amsl_m,
             vehicle: self.vehicle.clone(),
         }
@@ -312,17 +325,6 @@ const LEAST_DOUBT_US: f64 = 1e-3;
 const SIDE_STEP_MPS: f64 = 0.25;
 /// Fewest bins of a comparison.
 const FEWEST_BINS: usize = 12;
-
-/// The air that all drones share is believed up to so many times what each has for itself: what the model
-/// lacks is shared, too.
-const MOST_SHARED: f64 = 2.5;
-
-/// Standard deviation of the vertical air that a noise says a drone meets, m/s.
-pub(super) fn gusts_mps(hyper: &Hyper) -> f64 {
-    let own_mps = hyper.get(OWN).hypot(hyper.get(GUSTS));
-    let shared_mps = hyper.get(SHARED).hypot(hyper.get(GRADIENT));
-    own_mps.hypot(shared_mps.min(MOST_SHARED * own_mps))
-}
 
 fn fly_groups(
     data: &Data,

@@ -9,17 +9,24 @@ use super::search::{
 };
 
 /// Rivals within so many nats explain as well.
-const CLASS_NATS: f64 = 4.0;
+pub(super) const CLASS_NATS: f64 = 4.0;
+/// Rivals within so many nats, as regressors, are held against each other in full.
+const CONTEST_NATS: f64 = 8.0;
 /// Rivals must leave a similar trace: correlation with everything else partialled out.
-const ALIKE: f64 = 0.6;
+pub(super) const ALIKE: f64 = 0.6;
 /// A free shape is another thing than the best effect when it gains this much more.
 const FREE_BETTER: f64 = 1.25;
 /// And when this share of its gain is left with the effect in the model.
 const FREE_LEFT: f64 = 0.25;
 
-/// The free shape that is a product of climb speed and time, and by how much it beats effects, nats.
-const PRODUCT: &str = "climb-time";
-const PRODUCT_NATS: f64 = 2.5;
+/// What the air itself may depend on: such shapes must say more, and matter by what they do over the whole
+/// flight.
+const OF_THE_AIR: [&str; 2] = ["height", "time"];
+
+/// Free shapes of a number or two, and by how much they must be better than an effect to be believed, nats:
+/// a product with time brings a line along, and a line is much of what any effect of the climb is.
+pub(super) const PRODUCT: &str = "climb-time";
+const SIMPLE: [(&str, f64); 2] = [(PRODUCT, 6.0), ("step", 2.5)];
 
 /// An effect this near to a size that matters is named before a free shape that looks like it.
 const NEARLY: f64 = 0.6;
@@ -28,7 +35,7 @@ const NEARLY: f64 = 0.6;
 pub(super) enum What {
     /// The search has ended.
     Nothing,
-    /// Best first; more than one: a class.
+    /// Best first; more than one: rivals that must be held against each other.
     Effects(Vec<Ranked>),
     /// No effect that is known.
     Free(RankedGeneric),
@@ -54,11 +61,18 @@ pub(super) fn decide(
     let floor = FLOOR_NATS;
     let mut limits = Thresholds { library: floor, generic: FREE_FLOOR_NATS };
     let nothing = |limits| Decision { what: What::Nothing, thresholds: limits };
+    // What has so much freedom must show in the means, whatever it does to the scatter.
     let free = round.generics.iter().find(|free| {
-        free.size_us >= material_us
-            || (free.range_us >= material_us
-                && free.gain > FREE_BETTER * FREE_FLOOR_NATS
-                && sought.generics[free.generic].is_shared())
+        let is_plain = free.gain > FREE_BETTER * FREE_FLOOR_NATS;
+        let matters = if OF_THE_AIR.contains(&sought.generics[free.generic].depends_on) {
+            free.size_us >= material_us && is_plain
+        } else {
+            free.size_us >= material_us
+                || (free.range_us >= material_us
+                    && is_plain
+                    && sought.generics[free.generic].is_shared())
+        };
+        matters && free.plain >= FREE_FLOOR_NATS.min(free.gain)
     });
     let is_named = |ranked: &&Ranked| {
         // A known effect that explains more than a free shape of a size that matters is named first.
@@ -99,15 +113,17 @@ pub(super) fn decide(
             return Decision { what: What::Free(free.clone()), thresholds: limits };
         }
     }
-    // A ladder whose rungs grow makes a response that grows with time look like drag: a line in V with its
-    // product with time has one number more than an effect, and must not be better.
-    let product = round.generics.iter().find(|free| {
-        sought.generics[free.generic].depends_on == PRODUCT
-            && free.size_us >= material_us
-            && free.gain > limits.generic.max(best_gain + PRODUCT_NATS)
+    // A ladder whose rungs grow makes a response that grows with time look like drag, and a step early in
+    // the flight looks like motors that warm up: what has hardly more numbers than an effect must not be
+    // better.
+    let simple = round.generics.iter().find(|free| {
+        let simple = SIMPLE.iter().find(|one| one.0 == sought.generics[free.generic].depends_on);
+        free.size_us >= material_us
+            && free.plain > FREE_FLOOR_NATS
+            && simple.is_some_and(|(_, more)| free.gain > limits.generic.max(best_gain + more))
     });
-    if let Some(product) = product {
-        return Decision { what: What::Free(product.clone()), thresholds: limits };
+    if let Some(simple) = simple {
+        return Decision { what: What::Free(simple.clone()), thresholds: limits };
     }
     let Some(best) = best.filter(|best| best.gain > limits.library) else {
         return nothing(limits);
@@ -116,9 +132,10 @@ pub(super) fn decide(
     let at = problem.at(&best.hyper);
     let own = at.white(column(best));
     let alike = |ranked: &&Ranked| {
+        let is_alike = || at.likeness(&own, &at.white(column(ranked))).abs() > ALIKE;
         ranked.candidate != best.candidate
-            && ranked.gain > best.gain - CLASS_NATS
-            && at.likeness(&own, &at.white(column(ranked))).abs() > ALIKE
+            // What is better though too small to be named alone is not passed over.
+            && (ranked.gain > best.gain || ranked.gain > best.gain - CONTEST_NATS && is_alike())
     };
     let mut members = vec![best.clone()];
     members.extend(round.library.iter().filter(alike).cloned());
@@ -129,7 +146,7 @@ pub(super) fn decide(
 const SURE_NATS: f64 = 40.0;
 
 /// What an effect in its best form adds to the pulse.
-fn form<'a>(sought: Sought<'a>, ranked: &Ranked) -> &'a Column {
+pub(super) fn form<'a>(sought: Sought<'a>, ranked: &Ranked) -> &'a Column {
     &sought.library[ranked.candidate].variants[ranked.variant].column
 }
 

@@ -7,7 +7,7 @@ use super::error::GapError;
 use super::explain::Found;
 use super::gls::Split;
 use super::noise::{
-    GUST_TIME, GUSTS, GroupPattern, Hyper, LEAST, OFFSETS, OWN, SHARED_TIME, SLOPES, WHITE,
+    GUST_TIME, GUSTS, GroupPattern, Hyper, OFFSETS, OWN, SHARED_TIME, SLOPES, WHITE,
 };
 use super::verdict::{DroneOffset, Drones, Finding, Fitted, Interval, Step};
 use crate::effects::select::value_of;
@@ -59,12 +59,12 @@ impl Blup {
     fn new(pattern: &GroupPattern, hyper: &Hyper) -> Self {
         let count = pattern.time_s.len();
         let square = |place: usize| hyper.get(place).powi(2);
-        let response = |bin: usize| pattern.response[bin].abs() + hyper.get(LEAST);
+        let responses = pattern.own_responses(hyper);
         let covariance = DMatrix::from_fn(count, count, |a, b| {
             let apart_s = (pattern.time_s[a] - pattern.time_s[b]).abs();
             let air = square(OWN) * (-apart_s / hyper.get(SHARED_TIME)).exp()
                 + square(GUSTS) * (-apart_s / hyper.get(GUST_TIME)).exp();
-            response(a) * response(b) * air
+            responses[a] * responses[b] * air
                 + square(OFFSETS)
                 + square(SLOPES) * pattern.slope_us[a] * pattern.slope_us[b]
                 + if a == b { square(WHITE) } else { 0.0 }

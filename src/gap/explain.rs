@@ -1,14 +1,16 @@
 //! The workflow: find, name, add, and again, until nothing passes.
 
 use super::candidates::{DRAG, Variant, drag_by_lean, library, of_the_air, read_otherwise, set};
-use super::compare::{Comparison, Simulated, gusts_mps};
+use super::compare::{Comparison, Simulated};
+use super::contest::{Contest, before, entered};
 use super::data::Data;
 use super::decide::{What, decide};
 use super::error::GapError;
 use super::generic::{all, drawn};
 use super::gls::{Column, Likelihood, Problem, Split};
-use super::noise::{GroupPattern, Hyper, LEAST, WHITE};
+use super::noise::{GroupPattern, Hyper, WHITE};
 use super::refine::{Parameter, doubts, fitted, half_interval, parameters_of, refine, slopes};
+use super::response::{self, Response, gusts_mps};
 use super::search::{Round, Sought, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::mission::plan::Plan;
@@ -39,9 +41,9 @@ const MATERIAL_US: f64 = 2.5;
 /// Smallest effect that is named, us: where air and noise are much smaller than in the field (a single
 /// drone in a simulator's still air), smaller effects are real.
 fn material_us(groups: &[GroupPattern], hyper: &Hyper) -> f64 {
-    let responses = || groups.iter().flat_map(|group| &group.response);
-    let mean = responses().map(|one| one.abs()).sum::<f64>() / responses().count().max(1) as f64;
-    let noise_us = hyper.get(WHITE) + (mean + hyper.get(LEAST)) * gusts_mps(hyper);
+    let responses: Vec<f64> = groups.iter().flat_map(|group| group.responses(hyper)).collect();
+    let mean = responses.iter().sum::<f64>() / responses.len().max(1) as f64;
+    let noise_us = hyper.get(WHITE) + mean * gusts_mps(hyper);
     (2.0 * noise_us).clamp(0.75, MATERIAL_US)
 }
 
@@ -54,6 +56,8 @@ pub struct Found {
     pub comparison: Comparison,
     /// Regressors of what is no effect of the vehicle.
     pub extras: Vec<Column>,
+    /// What they add to the response to vertical air speed, by group and bin; empty: nothing.
+    pub felt: Vec<Vec<Response>>,
     /// Fitted parameters.
     pub parameters: Vec<Parameter>,
     /// Their values and standard errors.
@@ -84,6 +88,7 @@ pub fn search(
         vehicle: comparison.vehicle.clone(),
         comparison: comparison.clone(),
         extras: Vec::new(),
+        felt: Vec::new(),
         parameters: Vec::new(),
         values: Vec::new(),
         hyper: Hyper::default(),
@@ -108,19 +113,19 @@ pub fn search(
         split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         // What was named before stays free: its size may change with what comes after.
         let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&free);
-        let least = quick.hyper.get(LEAST);
         let mut candidates = library(&found.vehicle, &comparison.scene)?;
         candidates.extend(read_otherwise(&comparison, &found.vehicle)?);
         candidates.retain(|candidate| !refused.contains(&candidate.name));
-        let response: Vec<Vec<f64>> = patterns.iter().map(|group| group.response.clone()).collect();
-        candidates.extend(of_the_air(&comparison.scene, &response, least));
+        candidates.extend(of_the_air(&comparison.scene, &patterns, &quick.hyper));
         let generics = all(&comparison.scene, &comparison.headings());
         let drones = comparison.data.counts();
         let sought = Sought { library: &candidates, generics: &generics, drones: &drones };
         let round = round(&problem, quick.hyper, sought);
         found.hyper = round.base.hyper;
         let material_us = material_us(&patterns, &round.base.hyper);
-        let decision = decide(&problem, &round, sought, material_us, options, step);
+        let mut decision = decide(&problem, &round, sought, material_us, options, step);
+        decision.what = Contest { found: &found, comparison: &comparison, sought, round: &round }
+            .settle(&problem, decision.what)?;
         found.rest = Rest {
             gain_nats: round.best().max(round.best_generic()),
             candidate: best_name(&round, sought),
@@ -142,14 +147,7 @@ pub fn search(
                 let variant = &candidate.variants[best.variant];
                 let rivals = rivals(&round, sought);
                 let mut by_lean = None;
-                if let Some(changed) = &variant.vehicle {
-                    let before =
-                        candidate.was_there.then(|| candidate.size.map(|size| size.now)).flatten();
-                    let mut next = changed.clone();
-                    if let Some(size) = candidate.size {
-                        let start = size.now + best.beta * (variant.size - size.now);
-                        set(&mut next, candidate.name, size.name, start.clamp(size.low, size.high));
-                    }
+                if let Some(mut next) = entered(candidate, best) {
                     if candidate.name == DRAG.0
                         && let Some((drag, se)) =
                             drag_by_lean(&comparison, &found.vehicle, &round.base)?
@@ -159,8 +157,13 @@ pub fn search(
                     }
                     let known = found.parameters.iter().any(|p| p.effect == candidate.name);
                     if !known {
-                        let more =
-                            parameters_of(&comparison, &next, candidate.name, before, &round.base)?;
+                        let more = parameters_of(
+                            &comparison,
+                            &next,
+                            candidate.name,
+                            before(candidate),
+                            &round.base,
+                        )?;
                         found.parameters.extend(more);
                     }
                     found.vehicle = next;
@@ -187,6 +190,7 @@ pub fn search(
                 let generic = &generics[free.generic];
                 let shape = generic.shape(&free.beta);
                 found.extras.extend(generic.columns.iter().cloned());
+                add_felt(&mut found.felt, &generic.felt, &free.beta);
                 found.hyper = free.hyper;
                 found.steps.push(Step {
                     finding: Finding::Unknown {
@@ -202,8 +206,10 @@ pub fn search(
                 });
             }
         }
+        comparison = comparison.feeling(&found.felt);
         if !matches!(simulated, Simulated::Given(_)) {
-            comparison = Comparison::new(data, &found.vehicle, simulated, plan)?;
+            comparison =
+                Comparison::new(data, &found.vehicle, simulated, plan)?.feeling(&found.felt);
             if !found.parameters.is_empty() {
                 // Against the re-flown model: what closed forms leave is small, and taken up here.
                 found.refit(&comparison)?;
@@ -213,7 +219,8 @@ pub fn search(
             // Explained by what came after it, or a size of nothing.
             found.drop_effect(gone, vehicle);
             refused.push(gone);
-            comparison = Comparison::new(data, &found.vehicle, simulated, plan)?;
+            comparison =
+                Comparison::new(data, &found.vehicle, simulated, plan)?.feeling(&found.felt);
             found.refit(&comparison)?;
         }
         found.comparison = comparison.clone();
@@ -283,6 +290,16 @@ fn along_climb(comparison: &Comparison, variant: &Variant, beta: f64) -> Shape {
     drawn("vertical velocity (m/s)", points)
 }
 
+/// Adds what a free shape does to the response.
+fn add_felt(sum: &mut Vec<Vec<Response>>, felt: &[Vec<Vec<Response>>], beta: &[f64]) {
+    for (felt, beta) in felt.iter().zip(beta) {
+        if sum.is_empty() {
+            *sum = felt.iter().map(|group| vec![Response::default(); group.len()]).collect();
+        }
+        response::add(sum, *beta, felt);
+    }
+}
+
 fn rivals(round: &Round, sought: Sought<'_>) -> Vec<Rival> {
     let effects = round.library.iter().map(|ranked| Rival {
         name: sought.library[ranked.candidate].name.to_owned(),
@@ -310,64 +327,7 @@ fn best_name(round: &Round, sought: Sought<'_>) -> String {
     }
 }
 
-/// A vehicle with one effect as it was.
-fn taken_back(vehicle: &Vehicle, effect: &str, original: &Vehicle) -> Vehicle {
-    let mut vehicle = vehicle.clone();
-    match original.effects.get(effect) {
-        Some(table) => {
-            vehicle.effects.insert(effect.to_owned(), table.clone());
-        }
-        None => {
-            vehicle.effects.remove(effect);
-        }
-    }
-    super::refly::mean_drone(&vehicle)
-}
-
-/// An effect whose trace has a smaller Fisher z is taken back.
-const KEPT_Z: f64 = 3.0;
-
 impl Found {
-    /// The effect whose trace says least, if that is too little. By its trace and not by the error of
-    /// its size: an effect may begin with a jump (translational lift saves power at any share).
-    fn weakest(
-        &self,
-        comparison: &Comparison,
-        original: &Vehicle,
-    ) -> Result<Option<&'static str>, GapError> {
-        if self.parameters.is_empty() {
-            return Ok(None);
-        }
-        let patterns = comparison.patterns(&self.vehicle, self.gusts_mps)?;
-        let split = Split::of(&comparison.residual(&self.vehicle, self.gusts_mps)?);
-        let doubts = doubts(comparison, &self.vehicle, &self.parameters)?;
-        let mut worst: Option<(&'static str, f64)> = None;
-        let mut effects: Vec<&'static str> = self.parameters.iter().map(|p| p.effect).collect();
-        effects.dedup();
-        for effect in effects {
-            let others: Vec<Parameter> =
-                self.parameters.iter().filter(|p| p.effect != effect).cloned().collect();
-            let slopes = slopes(comparison, &self.vehicle, &others)?;
-            let problem =
-                Problem::new(&patterns, &split).doubting(&doubts).with(&self.extras).with(&slopes);
-            let solution = problem.at(&self.hyper);
-            let without = taken_back(&self.vehicle, effect, original);
-            let trace = comparison.change(&without, &self.vehicle)?;
-            let z = solution.information(&solution.white(&trace)).sqrt();
-            if z < KEPT_Z && worst.is_none_or(|(_, least)| z < least) {
-                worst = Some((effect, z));
-            }
-        }
-        Ok(worst.map(|(effect, _)| effect))
-    }
-
-    /// Takes an effect back: the model has it as it was.
-    fn drop_effect(&mut self, effect: &str, original: &Vehicle) {
-        self.vehicle = taken_back(&self.vehicle, effect, original);
-        self.parameters.retain(|parameter| parameter.effect != effect);
-        self.steps.retain(|step| step.finding.effects().first() != Some(&effect));
-    }
-
     /// Fits all sizes and the noise anew; the gusts of that noise bend the model's curve, so twice.
     pub(super) fn refit(&mut self, comparison: &Comparison) -> Result<(), GapError> {
         for _ in 0..REFITS {
@@ -398,4 +358,4 @@ const REFITS: usize = 4;
 /// Gusts this near to those of the fit before change nothing, m/s.
 const SAME_GUSTS_MPS: f64 = 0.02;
 /// Stronger gusts are not believed while the model still lacks its response to them, m/s.
-const MOST_GUSTS_MPS: f64 = 1.5;
+pub(super) const MOST_GUSTS_MPS: f64 = 1.5;

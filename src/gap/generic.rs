@@ -1,6 +1,7 @@
 //! Free shapes: what depends on something, though no effect of the library says how.
 
 use super::gls::{Column, means_of};
+use super::response::Response;
 use super::scene::Scene;
 use crate::effects::Signals;
 use crate::gap::verdict::Shape;
@@ -14,6 +15,8 @@ pub(super) struct Generic {
     pub axis: &'static str,
     /// Regressors.
     pub columns: Vec<Column>,
+    /// What each adds to the response to vertical air speed, by group and bin; empty: nothing.
+    pub felt: Vec<Vec<Vec<Response>>>,
     /// The signal itself by group and bin, for drawing.
     pub along: Vec<Vec<f64>>,
     /// Nats that its freedom takes: 2 for each regressor beyond the first, and the logarithm of how
@@ -31,6 +34,8 @@ const GROWTHS: [fn(f64) -> f64; 2] =
     [|speed_mps| speed_mps, |speed_mps| KNEE_MPS * speed_mps / speed_mps.hypot(KNEE_MPS)];
 /// Instants at which a step is tried.
 const STEPS: usize = 47;
+/// Step of the slope by vertical air speed, m/s.
+const SLOPE_STEP: f64 = 0.01;
 /// A signal that moves less than this share of its scale says nothing.
 const LEAST_SPAN: f64 = 0.05;
 
@@ -44,7 +49,7 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     let time = along(&|s| s.time_s);
     let height = along(&|s| s.height_m);
     let wind = along(&|s| s.horizontal_mps);
-    found.extend(smooth("climb", "vertical velocity (m/s)", &climb, 5, 0.5));
+    found.extend(smooth("climb", "vertical velocity (m/s)", &climb, 5, 0.5).map(Generic::feels));
     found.extend(smooth("time", "time since arming (s)", &time, 3, 30.0));
     found.extend(smooth("height", "height (m)", &height, 3, 3.0));
     found.extend(smooth("wind", "horizontal air speed (m/s)", &wind, 3, 1.5));
@@ -57,6 +62,7 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
                 depends_on: "height",
                 axis: "height (m)",
                 columns: vec![phase(f64::sin), phase(f64::cos)],
+                felt: Vec::new(),
                 along: height.clone(),
                 penalty: 2.0 + (WAVES_M.len() as f64).ln(),
             });
@@ -73,6 +79,10 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
         axis: "vertical velocity times time, scaled",
         // A product comes with its own mean part. What goes with the size of the climb and time is what a
         // drift of the air does.
+        felt: vec![
+            straight(map(&time, &|time| (time - middle) / half)),
+            straight(map(&time, &|_| 1.0)),
+        ],
         columns: vec![Column::Shared(crossed.clone()), Column::Shared(climb.clone())],
         along: crossed,
         penalty: 2.0,
@@ -83,6 +93,7 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
             depends_on: "step",
             axis: "time since arming (s)",
             columns: vec![Column::Shared(map(&time, &|t| if t < at_s { 0.0 } else { 1.0 }))],
+            felt: Vec::new(),
             along: time.clone(),
             penalty: (STEPS as f64).ln(),
         });
@@ -102,6 +113,7 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
             depends_on: "voltage",
             axis: "charge by the voltage at rest (share)",
             columns: powers.collect(),
+            felt: Vec::new(),
             along: means_of(charge),
             penalty: 4.0,
         });
@@ -122,12 +134,19 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
                 depends_on: "heading",
                 axis: "direction of the air from the nose (rad)",
                 columns: vec![Column::Shared(ahead), Column::Shared(aside)],
+                felt: Vec::new(),
                 along: headings.to_vec(),
                 penalty: 2.0 + (GROWTHS.len() as f64).ln(),
             });
         }
     }
     found
+}
+
+/// What a smooth shape does to the response is hardly bent over a gust.
+fn straight(slopes: Vec<Vec<f64>>) -> Vec<Vec<Response>> {
+    let group = |slopes: Vec<f64>| slopes.into_iter().map(Response::straight).collect();
+    slopes.into_iter().map(group).collect()
 }
 
 fn smooth(
@@ -148,13 +167,18 @@ fn smooth(
         depends_on,
         axis,
         columns: columns.collect(),
+        felt: Vec::new(),
         along: along.to_vec(),
         penalty: 2.0 * (order as f64 - 1.0),
     })
 }
 
 fn chebyshev(order: usize, x: f64) -> f64 {
-    (order as f64 * x.clamp(-1.0, 1.0).acos()).cos()
+    let (mut before, mut now) = (1.0, x);
+    for _ in 1..order {
+        (before, now) = (now, 2.0 * x * now - before);
+    }
+    if order == 0 { 1.0 } else { now }
 }
 
 fn map(values: &[Vec<f64>], of: &dyn Fn(f64) -> f64) -> Vec<Vec<f64>> {
@@ -174,6 +198,20 @@ fn span(values: &[Vec<f64>]) -> f64 {
 }
 
 impl Generic {
+    /// The same of a signal that vertical air moves: what the shape does to the response.
+    fn feels(self) -> Self {
+        let (low, high) = (least(&self.along), most(&self.along));
+        let scale = 2.0 / (high - low);
+        let slope = |power: usize| {
+            straight(map(&self.along, &|v| {
+                let at = |by| chebyshev(power, scale * (v + by) - (low + high) / (high - low));
+                (at(SLOPE_STEP) - at(-SLOPE_STEP)) / (2.0 * SLOPE_STEP)
+            }))
+        };
+        let felt = (1..=self.columns.len()).map(slope).collect();
+        Self { felt, ..self }
+    }
+
     /// Whether all drones of a group have the same. Drones that drift each by its own are not in the noise,
     /// and a regressor of each one's own finds some of it by chance.
     pub(super) fn is_shared(&self) -> bool {

@@ -220,6 +220,14 @@ impl<'a> Problem<'a> {
         Self { groups, pulses, columns: vec![Split::of_column(&Column::Shared(ones))] }
     }
 
+    /// The same with other patterns of the groups.
+    pub(super) fn among<'b>(&self, groups: &'b [GroupPattern]) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem { groups, pulses: self.pulses, columns: self.columns.clone() }
+    }
+
     /// With further regressors.
     #[must_use]
     pub(super) fn with<'c>(&self, columns: impl IntoIterator<Item = &'c Column>) -> Self {
@@ -235,6 +243,17 @@ impl<'a> Problem<'a> {
         let doubts = columns.into_iter().map(Split::of_column);
         more.columns.extend(doubts.map(|column| Split { is_doubt: true, ..column }));
         more
+    }
+
+    /// What a solution leaves of the groups' means, by group and bin, us.
+    pub(super) fn rest(&self, solution: &Solution) -> Vec<Vec<f64>> {
+        let mut rest = self.pulses.means.clone();
+        for (column, beta) in self.columns.iter().zip(&solution.beta) {
+            for (rest, value) in rest.iter_mut().flatten().zip(column.means.iter().flatten()) {
+                *rest -= beta * value;
+            }
+        }
+        rest
     }
 
     /// At fixed noise.

@@ -11,6 +11,7 @@ use super::gls::{Column, Problem, Pulses, Split, means_of};
 use super::noise::{GroupPattern, Hyper};
 use super::posterior::SharedAir;
 use super::refine::refine;
+use super::response::Response;
 use super::verdict::{Gap, Interval, Shrink};
 use crate::base::rng::{Purpose, stream};
 use crate::mission::plan::Plan;
@@ -27,7 +28,8 @@ struct Residuals<'a> {
     before: Pulses,
     after: Pulses,
     air: &'a [Vec<f64>],
-    response: &'a [Vec<f64>],
+    response: &'a [Vec<Response>],
+    gusts_mps: f64,
     segments: &'a [Vec<usize>],
 }
 
@@ -76,6 +78,7 @@ impl Case<'_> {
             after: end,
             air: &fitted.air(&own, self.found),
             response: &after.scene.response(vehicle)?,
+            gusts_mps,
             segments: &fitted.segments,
         };
         Ok(self.shrink(&residuals, fitted))
@@ -119,6 +122,7 @@ impl Case<'_> {
             after: end,
             air: &air,
             response: &comparison.scene.response(vehicle)?,
+            gusts_mps: *gusts_mps,
             segments: &fitted.segments,
         };
         Ok(Some(self.shrink(&residuals, fitted)))
@@ -237,7 +241,8 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
                     blocks.push(Block::default());
                     last = segment;
                 }
-                let response = residuals.response[group][bin].abs().max(1.0);
+                let response =
+                    residuals.response[group][bin].over(residuals.gusts_mps).abs().max(1.0);
                 if let Some(block) = blocks.last_mut() {
                     block.count += 1.0;
                     for side in 0..2 {

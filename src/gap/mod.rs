@@ -1,8 +1,10 @@
 //! Where simulation and measurement disagree, which physics is missing, and what cannot be known.
 
+mod backward;
 mod bins;
 mod candidates;
 mod compare;
+mod contest;
 pub mod data;
 mod decide;
 mod detectable;
@@ -30,6 +32,7 @@ mod posterior;
 mod refine;
 mod refly;
 mod regimes;
+mod response;
 mod scene;
 mod search;
 mod sensor;

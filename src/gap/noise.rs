@@ -6,11 +6,14 @@
 //! y = mean + a_i + b_i r_k + (S_k + s0) (W(t_k) + X_i(t_k) + g_i(t_k)) + H_k h(t_k) + e
 //! ```
 //!
-//! with W the updraft that all share (it may change with height), X a slow updraft of the drone's own place, g its gusts, a its hover pulse, b its relative response, S the model's response to vertical air speed and s0 what it
-//! is at least, h the horizontal gusts that are not known and H the model's response to them. Within a command group the likelihood splits exactly into the group's mean and the
-//! deviations of its drones; both are whitened by filters.
+//! with W the updraft that all share (it may change with height), X a slow updraft of the drone's own place,
+//! g its gusts, a its hover pulse, b its relative response, S the model's response to vertical air speed in
+//! gusts as strong as this noise has them, s0 what it is at least, h the horizontal gusts that are not known
+//! and H the model's response to them. Within a command group the likelihood splits exactly into the group's
+//! mean and the deviations of its drones; both are whitened by filters.
 
 use super::filter::{Filter, Observation, State};
+use super::response::{Response, gusts_mps};
 
 /// Parameters of the noise, by their logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,8 +106,10 @@ pub struct GroupPattern {
     pub time_s: Vec<f64>,
     /// Height in each bin, m.
     pub height_m: Vec<f64>,
-    /// The model's response to vertical air speed in each bin, us/(m/s).
-    pub response: Vec<f64>,
+    /// The model's response to vertical air speed in each bin.
+    pub response: Vec<Response>,
+    /// By how much the air that all share changes the speed relative to it, in each bin, m/s; empty: not known.
+    pub shift_mps: Vec<f64>,
     /// What gusts do to the mean of a curved response, us, which is as uncertain as it is large;
     /// empty: nothing.
     pub bent_us: Vec<f64>,
@@ -127,8 +132,11 @@ pub(super) struct Whitener {
     pub log_det: f64,
 }
 
-const SHARED_STATES: usize = 6;
+const SHARED_STATES: usize = 7;
 const OWN_STATES: usize = 4;
+/// How the gradient itself changes over [`ALOFT_M`], as a share of it: an eddy of 150 m is not straight over
+/// the height of a ladder.
+pub(super) const CURVED: f64 = 0.3;
 /// Heights are taken from here, m, in units of [`ALOFT_M`].
 const MIDDLE_M: f64 = 45.0;
 const ALOFT_M: f64 = 50.0;
@@ -137,6 +145,22 @@ impl GroupPattern {
     /// Height of a bin in units of the gradient.
     pub fn aloft(&self, bin: usize) -> f64 {
         (self.height_m[bin] - MIDDLE_M) / ALOFT_M
+    }
+
+    /// Response to vertical air speed in each bin, in this noise, us/(m/s).
+    pub fn responses(&self, hyper: &Hyper) -> Vec<f64> {
+        let (gusts_mps, least) = (gusts_mps(hyper), hyper.get(LEAST));
+        self.response.iter().map(|response| response.over(gusts_mps).abs() + least).collect()
+    }
+
+    /// The same to what a drone does not share with the others.
+    pub fn own_responses(&self, hyper: &Hyper) -> Vec<f64> {
+        if self.shift_mps.is_empty() {
+            return self.responses(hyper);
+        }
+        let least = hyper.get(LEAST);
+        let each = self.response.iter().zip(&self.shift_mps);
+        each.map(|(response, shift_mps)| response.at(*shift_mps).abs() + least).collect()
     }
 
     /// Covariance of two bins by the horizontal gusts that the fleet shares, us².
@@ -163,14 +187,16 @@ impl Whitener {
                 State { variance: square(SLOPES) * share, time_s: f64::INFINITY },
             ]
         };
-        let least = hyper.get(LEAST);
-        let looks = |group: &GroupPattern, bin: usize, first: usize| {
-            let response = group.response[bin].abs() + least;
+        let responses: Vec<Vec<f64>> = groups.iter().map(|group| group.responses(hyper)).collect();
+        let own_responses: Vec<Vec<f64>> =
+            groups.iter().map(|group| group.own_responses(hyper)).collect();
+        let looks = |index: usize, bin: usize, first: usize| {
+            let response = own_responses[index][bin];
             vec![
                 (first, response),
                 (first + 1, response),
                 (first + 2, 1.0),
-                (first + 3, group.slope_us[bin]),
+                (first + 3, groups[index].slope_us[bin]),
             ]
         };
         let mut order: Vec<(usize, usize)> = groups
@@ -191,6 +217,7 @@ impl Whitener {
             State { variance: square(SIDE_GUSTS), time_s: SIDE_GUSTS_S },
             State { variance: square(SIDE_GUSTS), time_s: SIDE_GUSTS_S },
             State { variance: 2.0 * shared_share.powi(2), time_s: time_s / 2.0 },
+            State { variance: (CURVED * hyper.get(GRADIENT)).powi(2), time_s },
         ];
         for group in groups {
             states.extend(own(1.0 / group.drones.max(1) as f64));
@@ -199,10 +226,11 @@ impl Whitener {
             .iter()
             .map(|(index, bin)| {
                 let group = &groups[*index];
-                let mut looks_at = looks(group, *bin, SHARED_STATES + OWN_STATES * index);
-                let response = group.response[*bin].abs() + least;
+                let mut looks_at = looks(*index, *bin, SHARED_STATES + OWN_STATES * index);
+                let response = responses[*index][*bin];
                 looks_at.push((0, response));
                 looks_at.push((1, response * group.aloft(*bin)));
+                looks_at.push((6, response * group.aloft(*bin).powi(2)));
                 // How far gusts bend the mean is computed, and doubted by as much as it is.
                 looks_at.push((2, group.bent_us.get(*bin).copied().unwrap_or(0.0)));
                 let [x, y] = group.side_response.get(*bin).copied().unwrap_or_default();
@@ -220,11 +248,12 @@ impl Whitener {
         let mut log_det = means.log_det;
         let deviations: Vec<Filter> = groups
             .iter()
-            .map(|group| {
+            .enumerate()
+            .map(|(index, group)| {
                 let observations: Vec<Observation> = (0..group.time_s.len())
                     .map(|bin| Observation {
                         time_s: group.time_s[bin],
-                        looks_at: looks(group, bin, 0),
+                        looks_at: looks(index, bin, 0),
                         noise: square(WHITE),
                     })
                     .collect();

@@ -1,19 +1,21 @@
 //! Flights with nothing to find, made by the noise that the search reckons with: least squares that takes
-//! every bin for independent names something on most of them, the search on hardly any.
+//! every bin for independent names something on most of them, the search on hardly any. And flights with
+//! rotor inflow, whose scatter tells it from drag.
 
 use nalgebra::DVector;
 use rand_distr::{Distribution as _, StandardNormal};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::bins::{BinValues, of_segments};
-use super::candidates::{Candidate, library, of_the_air};
+use super::candidates::{Candidate, library, of_the_air, set};
 use super::compare::{Comparison, Simulated, thrust_exponent};
 use super::data::{Data, PlannedPart};
+use super::decide::CLASS_NATS;
 use super::generic::{Generic, all};
 use super::gls::{Column, Problem, Pulses, Split};
-use super::noise::{GUSTS, Hyper, LEAST, SHARED, SHARED_TIME};
+use super::noise::{GUSTS, GroupPattern, Hyper, SHARED, SHARED_TIME};
 use super::refly::refly;
-use super::search::{FLOOR_NATS, FREE_FLOOR_NATS, Sought, round};
+use super::search::{FLOOR_NATS, FREE_FLOOR_NATS, Ranked, Sought, round};
 use crate::base::rng::{Purpose, stream};
 use crate::mission::Plan;
 use crate::mission::resolve::{Override, resolve};
@@ -115,10 +117,9 @@ fn independent_errors_name_something_on_most_null_flights_and_the_search_on_hard
     let comparison = comparison(&plan, &vehicle);
     let patterns = comparison.patterns(&vehicle, 0.0).unwrap();
     let effects = library(&vehicle, &comparison.scene).unwrap();
-    let response: Vec<Vec<f64>> = patterns.iter().map(|group| group.response.clone()).collect();
     let hyper = field_day();
     let mut candidates = effects.clone();
-    candidates.extend(of_the_air(&comparison.scene, &response, hyper.get(LEAST)));
+    candidates.extend(of_the_air(&comparison.scene, &patterns, &hyper));
     let generics: Vec<Generic> = all(&comparison.scene, &comparison.headings());
     let drones = comparison.data.counts();
     let sought = Sought { library: &candidates, generics: &generics, drones: &drones };
@@ -134,4 +135,53 @@ fn independent_errors_name_something_on_most_null_flights_and_the_search_on_hard
     }
     assert!(by_f.len() * 2 > FLIGHTS as usize, "the F test named {by_f:?}");
     assert!(by_search.len() <= 1, "the search named {by_search:?}");
+}
+
+/// Flights with inflow.
+const FEW: u64 = 8;
+
+/// Gain of the rotors' inflow over the best other effect on each flight, nats.
+fn inflow_ahead(candidates: &[Candidate], flights: &[(Vec<GroupPattern>, Split)]) -> Vec<f64> {
+    let sought = Sought { library: candidates, generics: &[], drones: &[9] };
+    let ahead = |(patterns, split): &(Vec<GroupPattern>, Split)| {
+        let round = round(&Problem::new(patterns, split), field_day(), sought);
+        let (inflow, others): (Vec<_>, Vec<_>) = round
+            .library
+            .iter()
+            .partition(|ranked| candidates[ranked.candidate].name == "rotor-inflow");
+        let best = |ranked: &[&Ranked]| ranked.iter().map(|one| one.gain).fold(0.0, f64::max);
+        best(&inflow) - best(&others)
+    };
+    flights.iter().map(ahead).collect()
+}
+
+#[test]
+fn scatter_between_drones_tells_inflow_from_drag() {
+    let (plan, vehicle) = (plan(), builtin("airsim-generic-quad").unwrap());
+    let comparison = comparison(&plan, &vehicle);
+    let mut true_vehicle = vehicle.clone();
+    set(&mut true_vehicle, "rotor-inflow", "inflow_share", 0.3);
+    let added = comparison.change(&vehicle, &true_vehicle).unwrap();
+    let patterns = comparison.patterns(&vehicle, 0.0).unwrap();
+    let true_patterns = comparison.patterns(&true_vehicle, 0.0).unwrap();
+    let nothing = Split::of(&comparison.residual(&vehicle, 0.0).unwrap());
+    let truth = Problem::new(&true_patterns, &nothing).at(&field_day());
+    let flights: Vec<(Vec<GroupPattern>, Split)> = (0..FEW)
+        .map(|flight| {
+            let mut rng = stream(2, flight, Purpose::Resampling);
+            let mut pulses = truth.simulate(|| StandardNormal.sample(&mut rng));
+            for drone in pulses.iter_mut().flatten() {
+                drone.iter_mut().enumerate().for_each(|(bin, us)| *us += added.at(0, 0, bin));
+            }
+            (patterns.clone(), Split::of(&pulses))
+        })
+        .collect();
+    let feeling = library(&vehicle, &comparison.scene).unwrap();
+    let mut numb = feeling.clone();
+    numb.iter_mut().flat_map(|one| &mut one.variants).for_each(|form| form.felt.clear());
+    let is_sure = |ahead: &&f64| **ahead > CLASS_NATS;
+    let (with, without) = (inflow_ahead(&feeling, &flights), inflow_ahead(&numb, &flights));
+    let sure = |gains: &[f64]| gains.iter().filter(is_sure).count();
+    assert!(sure(&with) >= 6, "{with:?}");
+    assert!(sure(&without) <= 3, "{without:?}");
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::noise::{
-    GRADIENT, GUST_TIME, GUSTS, GroupPattern, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME,
+    CURVED, GRADIENT, GUST_TIME, GUSTS, GroupPattern, Hyper, OFFSETS, OWN, SHARED, SHARED_TIME,
     SLOPES, WHITE,
 };
 
@@ -24,12 +24,13 @@ impl SharedAir {
             .flat_map(|(index, group)| (0..group.time_s.len()).map(move |bin| (index, bin)))
             .collect();
         let square = |place: usize| hyper.get(place).powi(2);
-        let least = hyper.get(LEAST);
-        let response = |(group, bin): (usize, usize)| groups[group].response[bin].abs() + least;
+        let responses: Vec<Vec<f64>> = groups.iter().map(|group| group.responses(hyper)).collect();
+        let response = |(group, bin): (usize, usize)| responses[group][bin];
         let time = |(group, bin): (usize, usize)| groups[group].time_s[bin];
         let aloft = |(group, bin): (usize, usize)| groups[group].aloft(bin);
         let shared = |a, b| {
-            (square(SHARED) + square(GRADIENT) * aloft(a) * aloft(b))
+            let heights = aloft(a) * aloft(b);
+            (square(SHARED) + square(GRADIENT) * heights * (1.0 + CURVED * CURVED * heights))
                 * (-(time(a) - time(b)).abs() / hyper.get(SHARED_TIME)).exp()
         };
         let count = order.len();
@@ -75,10 +76,10 @@ impl SharedAir {
             self.order.iter().map(|(group, bin)| means[*group][*bin]),
         );
         let air = &self.map * y;
-        let least = hyper.get(LEAST);
+        let responses: Vec<Vec<f64>> = groups.iter().map(|group| group.responses(hyper)).collect();
         let mut pulses: Vec<Vec<f64>> = groups.iter().map(|_| Vec::new()).collect();
         for ((group, bin), value) in self.order.iter().zip(air.iter()) {
-            pulses[*group].push(value * (groups[*group].response[*bin].abs() + least));
+            pulses[*group].push(value * responses[*group][*bin]);
         }
         pulses
     }

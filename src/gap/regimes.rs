@@ -6,7 +6,7 @@ use super::compare::Comparison;
 use super::error::GapError;
 use super::explain::Found;
 use super::gls::Pulses;
-use super::noise::{LEAST, Whitener};
+use super::noise::Whitener;
 use super::verdict::Regime;
 use crate::base::rng::{Purpose, stream};
 
@@ -47,7 +47,8 @@ pub(super) fn regimes(
         })
         .collect();
     let (flat_start, flat_end) = (centred(&start), centred(&end));
-    let least = found.hyper.get(LEAST);
+    let responses: Vec<Vec<f64>> =
+        patterns.iter().map(|group| group.responses(&found.hyper)).collect();
     let mut rows = Vec::new();
     for axis in axes(after) {
         let by_drone = axis.by == "drone" || axis.by == "place";
@@ -70,11 +71,9 @@ pub(super) fn regimes(
                 places.iter().map(|(g, d, b)| pulses[*g][*d][*b]).sum::<f64>() / places.len() as f64
             };
             let square = draws.iter().map(|draw| mean(draw).powi(2)).sum::<f64>();
-            let response = places
-                .iter()
-                .map(|(group, _, bin)| patterns[*group].response[*bin].abs() + least)
-                .sum::<f64>()
-                / places.len() as f64;
+            let response =
+                places.iter().map(|(group, _, bin)| responses[*group][*bin]).sum::<f64>()
+                    / places.len() as f64;
             let before_us = mean(from);
             rows.push(Regime {
                 by: axis.by.to_owned(),

@@ -5,6 +5,7 @@ use super::compare::thrust_exponent;
 use super::data::Data;
 use super::gls::Column;
 use super::lean::Wind;
+use super::response::Response;
 use crate::base::air::density_ratio;
 use crate::effects::battery::charge_of_cell;
 use crate::effects::{EffectError, Model, Reference, Signals, find, select};
@@ -182,20 +183,29 @@ impl Scene {
         Ok(Column::Own((0..self.signals.len()).map(group).collect()))
     }
 
-    /// Response to vertical air speed of a model, us/(m/s), by group and bin: by differences, so that
-    /// effects that build on the rest of the model are in it.
+    /// Response to vertical air speed of a model by group and bin: by the whole model, so that effects that
+    /// build on the rest of it are in it.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
-    pub fn response(&self, vehicle: &Vehicle) -> Result<Vec<Vec<f64>>, EffectError> {
-        let model = Model::of(vehicle)?;
-        let half_mps = 0.05;
+    pub fn response(&self, vehicle: &Vehicle) -> Result<Vec<Vec<Response>>, EffectError> {
+        let mut calm = vehicle.clone();
+        // What shakes has a scatter of its own, which hides how it answers gusts.
+        calm.effects.retain(|name, _| !shakes(name));
+        let model = Model::of(&calm)?;
         let of = |signals: &Signals| {
             let at = |climb_mps| model.pulse_us(&Signals { climb_mps, ..*signals });
-            (at(signals.climb_mps + half_mps) - at(signals.climb_mps - half_mps)) / (2.0 * half_mps)
+            Response::of(|shift_mps| at(signals.climb_mps + shift_mps))
         };
         Ok(self.signals.iter().map(|group| group.iter().map(of).collect()).collect())
     }
+}
+
+/// Whether an effect has a scatter of its own.
+fn shakes(effect: &str) -> bool {
+    find(effect).is_some_and(|effect| {
+        effect.definition().parameters.iter().any(|parameter| parameter.name == "jitter")
+    })
 }
 
 struct Battery {

@@ -7,11 +7,12 @@ use rayon::prelude::*;
 use super::candidates::{Candidate, Variant};
 use super::generic::Generic;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
-use super::noise::Hyper;
+use super::noise::{GroupPattern, Hyper};
+use super::response::{Response, add_to};
 use crate::base::rng::{Purpose, stream};
 
 /// Candidates this near to the best by the quick scan are fitted with their own noise, nats.
-const NEAR_NATS: f64 = 7.0;
+const NEAR_NATS: f64 = 20.0;
 /// At most so many.
 const MOST_FITTED: usize = 6;
 /// A multiple of the effect's tried form beyond this is another effect.
@@ -45,6 +46,8 @@ pub(super) struct RankedGeneric {
     pub generic: usize,
     /// Gain less its penalty, nats.
     pub gain: f64,
+    /// The same as a regressor alone: without what it does to the scatter between drones.
+    pub plain: f64,
     /// Coefficients.
     pub beta: Vec<f64>,
     /// Standard deviation over bins, us.
@@ -155,8 +158,22 @@ fn refit(
 ) -> Ranked {
     let candidate = &sought.library[ranked.candidate];
     let variant = &candidate.variants[ranked.variant];
-    let with = problem.with([&variant.column]).fit(base.hyper, Likelihood::Profile);
-    let beta = with.beta.last().copied().unwrap_or(0.0);
+    let mut with = problem.with([&variant.column]).fit(base.hyper, Likelihood::Profile);
+    let mut beta = with.beta.last().copied().unwrap_or(0.0);
+    // Who feels a climb feels the air as well: the scatter must fit what the effect makes of gusts.
+    for _ in 0..FELT_ROUNDS {
+        if variant.felt.is_empty() {
+            break;
+        }
+        let groups = feeling(problem.groups, &[&variant.felt], &[beta]);
+        let felt = problem.with([&variant.column]).among(&groups);
+        with = felt.fit(with.hyper, Likelihood::Profile);
+        let before = beta;
+        beta = with.beta.last().copied().unwrap_or(0.0);
+        if (beta - before).abs() < FELT_SAME * before.abs() {
+            break;
+        }
+    }
     let gain = with.log_posterior() - before;
     if !admissible(candidate, variant, beta) || gain < ranked.gain {
         // The noise at its start is a fit as well.
@@ -173,6 +190,25 @@ fn refit(
     }
 }
 
+/// Rounds in which an effect's size and the response that it brings settle, and the change that is settled.
+const FELT_ROUNDS: usize = 3;
+const FELT_SAME: f64 = 0.1;
+
+/// Groups whose response to the air has some multiples of others.
+pub(super) fn feeling(
+    groups: &[GroupPattern],
+    felt: &[&Vec<Vec<Response>>],
+    beta: &[f64],
+) -> Vec<GroupPattern> {
+    let mut groups = groups.to_vec();
+    for (felt, beta) in felt.iter().zip(beta) {
+        for (group, felt) in groups.iter_mut().zip(*felt) {
+            add_to(&mut group.response, *beta, felt);
+        }
+    }
+    groups
+}
+
 fn free_shapes(
     problem: &Problem<'_>,
     base: &Solution,
@@ -184,8 +220,15 @@ fn free_shapes(
         let (beta, nats) = base.gain_of_all(&generic.columns);
         let gain = nats - generic.penalty;
         let hyper = base.hyper;
-        let found =
-            RankedGeneric { generic: index, gain, beta, size_us: 0.0, range_us: 0.0, hyper };
+        let found = RankedGeneric {
+            generic: index,
+            gain,
+            plain: gain,
+            beta,
+            size_us: 0.0,
+            range_us: 0.0,
+            hyper,
+        };
         let same =
             |other: &RankedGeneric| sought.generics[other.generic].depends_on == generic.depends_on;
         match best.iter_mut().find(|other| same(other)) {
@@ -197,20 +240,28 @@ fn free_shapes(
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let refitted: Vec<RankedGeneric> = best
         .par_iter()
-        .take(2)
+        .take(3)
         .map(|found| {
             if found.gain < 0.5 {
                 return found.clone();
             }
             let generic = &sought.generics[found.generic];
-            let with = problem.with(&generic.columns).fit(base.hyper, Likelihood::Profile);
-            let gain = with.log_posterior() - before - generic.penalty;
+            let mut with = problem.with(&generic.columns).fit(base.hyper, Likelihood::Profile);
             let first = with.beta.len() - generic.columns.len();
+            let plain = found.plain.max(with.log_posterior() - before - generic.penalty);
+            if !generic.felt.is_empty() {
+                let felt: Vec<_> = generic.felt.iter().collect();
+                let groups = feeling(problem.groups, &felt, &with.beta[first..]);
+                let again = problem.with(&generic.columns).among(&groups);
+                with = again.fit(with.hyper, Likelihood::Profile);
+            }
+            let gain = with.log_posterior() - before - generic.penalty;
             if gain < found.gain {
-                return found.clone();
+                return RankedGeneric { plain, ..found.clone() };
             }
             RankedGeneric {
                 gain,
+                plain,
                 beta: with.beta[first..].to_vec(),
                 hyper: with.hyper,
                 ..found.clone()

@@ -52,7 +52,7 @@ pub(super) struct GapArgs {
     #[command(subcommand)]
     command: Option<GapCommand>,
     /// Campaign folder
-    #[arg(required_unless_present_any = ["measured", "csv"], conflicts_with_all = ["measured", "csv"])]
+    #[arg(conflicts_with_all = ["measured", "csv"])]
     campaign: Option<PathBuf>,
     /// Logs of the drones: a folder, or one log
     #[arg(long, value_name = "LOGS")]
@@ -251,7 +251,9 @@ fn measured(args: &GapArgs) -> Result<(Found, Vec<Found>), CommandError> {
             }
             Ok((found, others))
         }
-        (None, None) => Err(CommandError::Usage("give a campaign, --measured or --csv".to_owned())),
+        (None, None) => Err(CommandError::Usage(
+            "give a campaign folder, --measured LOGS or --csv MAPPING.toml".to_owned(),
+        )),
     }
 }
 

@@ -1,0 +1,68 @@
+//! The backward check: what was named must still say something with all that came after it.
+
+use super::compare::Comparison;
+use super::error::GapError;
+use super::explain::Found;
+use super::gls::{Problem, Split};
+use super::refine::{Parameter, doubts, slopes};
+use super::refly::mean_drone;
+use crate::vehicle::Vehicle;
+
+/// A vehicle with one effect as it was.
+fn taken_back(vehicle: &Vehicle, effect: &str, original: &Vehicle) -> Vehicle {
+    let mut vehicle = vehicle.clone();
+    match original.effects.get(effect) {
+        Some(table) => {
+            vehicle.effects.insert(effect.to_owned(), table.clone());
+        }
+        None => {
+            vehicle.effects.remove(effect);
+        }
+    }
+    mean_drone(&vehicle)
+}
+
+/// An effect whose trace has a smaller Fisher z is taken back.
+const KEPT_Z: f64 = 3.0;
+
+impl Found {
+    /// The effect whose trace says least, if that is too little. By its trace and not by the error of
+    /// its size: an effect may begin with a jump (translational lift saves power at any share).
+    pub(super) fn weakest(
+        &self,
+        comparison: &Comparison,
+        original: &Vehicle,
+    ) -> Result<Option<&'static str>, GapError> {
+        if self.parameters.is_empty() {
+            return Ok(None);
+        }
+        let patterns = comparison.patterns(&self.vehicle, self.gusts_mps)?;
+        let split = Split::of(&comparison.residual(&self.vehicle, self.gusts_mps)?);
+        let doubts = doubts(comparison, &self.vehicle, &self.parameters)?;
+        let mut worst: Option<(&'static str, f64)> = None;
+        let mut effects: Vec<&'static str> = self.parameters.iter().map(|p| p.effect).collect();
+        effects.dedup();
+        for effect in effects {
+            let others: Vec<Parameter> =
+                self.parameters.iter().filter(|p| p.effect != effect).cloned().collect();
+            let slopes = slopes(comparison, &self.vehicle, &others)?;
+            let problem =
+                Problem::new(&patterns, &split).doubting(&doubts).with(&self.extras).with(&slopes);
+            let solution = problem.at(&self.hyper);
+            let without = taken_back(&self.vehicle, effect, original);
+            let trace = comparison.change(&without, &self.vehicle)?;
+            let z = solution.information(&solution.white(&trace)).sqrt();
+            if z < KEPT_Z && worst.is_none_or(|(_, least)| z < least) {
+                worst = Some((effect, z));
+            }
+        }
+        Ok(worst.map(|(effect, _)| effect))
+    }
+
+    /// Takes an effect back: the model has it as it was.
+    pub(super) fn drop_effect(&mut self, effect: &str, original: &Vehicle) {
+        self.vehicle = taken_back(&self.vehicle, effect, original);
+        self.parameters.retain(|parameter| parameter.effect != effect);
+        self.steps.retain(|step| step.finding.effects().first() != Some(&effect));
+    }
+}

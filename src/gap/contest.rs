@@ -1,0 +1,182 @@
+//! The last word between effects that leave similar traces: each is taken into the model and fitted in full,
+//! with all that was found before, the bend that gusts give to its curve, and the response to the air that
+//! it brings along.
+
+use rayon::prelude::*;
+
+use super::candidates::{Candidate, set};
+use super::compare::Comparison;
+use super::decide::{ALIKE, CLASS_NATS, PRODUCT, What, form};
+use super::error::GapError;
+use super::explain::{Found, MOST_GUSTS_MPS};
+use super::gls::{Likelihood, Problem, Split};
+use super::refine::{Parameter, doubts, parameters_of, refine, slopes};
+use super::response::{gusts_mps, shifted};
+use super::search::{FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, feeling};
+use crate::vehicle::Vehicle;
+
+/// A product of climb and time is held against so many effects at most, and those that gain at least so much as regressors, nats.
+const MOST: usize = 5;
+const LEAST_NATS: f64 = 4.0;
+/// By how much a product of climb and time must explain more than an effect, nats: it brings a line along,
+/// and a line is much of what any effect of the climb is.
+const PRODUCT_NATS: f64 = 13.0;
+/// Rounds in which the speed relative to the shared air settles.
+const SHIFTS: usize = 3;
+/// Rounds in which a rival's gusts settle.
+const ROUNDS: usize = 2;
+
+/// The vehicle with a candidate at its fitted size; `None`: it is a motion of the air.
+pub(super) fn entered(candidate: &Candidate, ranked: &Ranked) -> Option<Vehicle> {
+    let variant = candidate.variants.get(ranked.variant)?;
+    let mut next = variant.vehicle.clone()?;
+    if let Some(size) = candidate.size {
+        let start = size.now + ranked.beta * (variant.size - size.now);
+        set(&mut next, candidate.name, size.name, start.clamp(size.low, size.high));
+    }
+    Some(next)
+}
+
+/// The size of an effect that the model had.
+pub(super) fn before(candidate: &Candidate) -> Option<f64> {
+    candidate.was_there.then(|| candidate.size.map(|size| size.now)).flatten()
+}
+
+/// What is known where a round's rivals are held against each other.
+pub(super) struct Contest<'a> {
+    /// What was found before.
+    pub found: &'a Found,
+    /// Both sides, against the model with that.
+    pub comparison: &'a Comparison,
+    /// What was looked for.
+    pub sought: Sought<'a>,
+    /// What the round found.
+    pub round: &'a Round,
+}
+
+impl Contest<'_> {
+    /// Holds what a decision names against its rivals, and the product of climb and time against effects.
+    ///
+    /// # Errors
+    /// Effects of a vehicle that are not valid.
+    pub(super) fn settle(&self, problem: &Problem<'_>, what: What) -> Result<What, GapError> {
+        let of = |free: &RankedGeneric| self.sought.generics[free.generic].depends_on == PRODUCT;
+        let product =
+            self.round.generics.iter().find(|free| of(free) && free.plain > FREE_FLOOR_NATS);
+        let rivals = match &what {
+            What::Nothing => return Ok(what),
+            What::Free(free) if !of(free) => return Ok(what),
+            What::Free(_) => self.likely(),
+            What::Effects(members) if members.len() == 1 && product.is_none() => return Ok(what),
+            What::Effects(members) => members.clone(),
+        };
+        let members = self.of_effects(problem, rivals)?;
+        let Some((best, _)) = members.first() else { return Ok(what) };
+        if let (Some(best), Some(product)) = (best, product)
+            && self.of_product(problem, product) > best + PRODUCT_NATS
+        {
+            return Ok(What::Free(product.clone()));
+        }
+        Ok(What::Effects(members.into_iter().map(|(_, rival)| rival).collect()))
+    }
+
+    /// Effects that a product may stand for.
+    fn likely(&self) -> Vec<Ranked> {
+        let effects = self.round.library.iter().take(MOST);
+        effects
+            .filter(|rival| {
+                let candidate = &self.sought.library[rival.candidate];
+                rival.fitted && rival.gain > LEAST_NATS && is_felt(candidate)
+            })
+            .cloned()
+            .collect()
+    }
+
+    /// Standings of the rivals that explain as well as the best of them, best first; `None`: such an effect
+    /// stands by its gain as a regressor.
+    fn of_effects(
+        &self,
+        problem: &Problem<'_>,
+        rivals: Vec<Ranked>,
+    ) -> Result<Vec<(Option<f64>, Ranked)>, GapError> {
+        let standings: Result<Vec<Option<f64>>, GapError> =
+            rivals.par_iter().map(|rival| self.standing(rival)).collect();
+        let standings = standings?;
+        let best = standings.iter().flatten().copied().reduce(f64::max);
+        let most = rivals.iter().map(|rival| rival.gain).fold(0.0, f64::max);
+        let behind = |standing: Option<f64>, rival: &Ranked| match (standing, best) {
+            (Some(standing), Some(best)) => best - standing,
+            _ => most - rival.gain,
+        };
+        let mut members: Vec<(f64, Option<f64>, Ranked)> = standings
+            .into_iter()
+            .zip(rivals)
+            .map(|(standing, rival)| (behind(standing, &rival), standing, rival))
+            .filter(|(behind, ..)| *behind < CLASS_NATS)
+            .collect();
+        members.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((.., first)) = members.first().cloned() else { return Ok(Vec::new()) };
+        let at = problem.at(&first.hyper);
+        let white = |rival: &Ranked| at.white(form(self.sought, rival));
+        let own = white(&first);
+        members.retain(|(.., rival)| {
+            rival.candidate == first.candidate || at.likeness(&own, &white(rival)).abs() > ALIKE
+        });
+        Ok(members.into_iter().map(|(_, standing, rival)| (standing, rival)).collect())
+    }
+
+    /// Log-posterior of the flight with a product of climb and time.
+    fn of_product(&self, problem: &Problem<'_>, product: &RankedGeneric) -> f64 {
+        let generic = &self.sought.generics[product.generic];
+        let felt: Vec<_> = generic.felt.iter().collect();
+        let problem = problem.with(&generic.columns);
+        let first = problem.columns.len() - generic.columns.len();
+        let mut with = problem.at(&product.hyper);
+        for _ in 0..SHIFTS {
+            let groups = feeling(problem.groups, &felt, &with.beta[first..]);
+            let groups = shifted(&groups, &problem, &with);
+            with = problem.among(&groups).fit(with.hyper, Likelihood::Profile);
+        }
+        with.log_posterior() - generic.penalty
+    }
+
+    /// Log-posterior of the flight with a rival in the model; `None`: that would say nothing.
+    fn standing(&self, ranked: &Ranked) -> Result<Option<f64>, GapError> {
+        let Self { found, comparison, .. } = self;
+        let candidate = &self.sought.library[ranked.candidate];
+        // Where scatter does not show it, or in no vehicle, it stands by its gain as a regressor.
+        let Some(mut vehicle) = entered(candidate, ranked).filter(|_| is_felt(candidate)) else {
+            return Ok(None);
+        };
+        let mut parameters: Vec<Parameter> = found.parameters.clone();
+        if !parameters.iter().any(|known| known.effect == candidate.name) {
+            let (before, base) = (before(candidate), &self.round.base);
+            parameters.extend(parameters_of(comparison, &vehicle, candidate.name, before, base)?);
+        }
+        let mut hyper = ranked.hyper;
+        let mut gusts = found.gusts_mps;
+        for _ in 0..ROUNDS {
+            let fit = refine(comparison, &vehicle, &parameters, &found.extras, hyper, gusts, true)?;
+            vehicle = fit.vehicle;
+            hyper = fit.hyper;
+            gusts = gusts_mps(&hyper).min(MOST_GUSTS_MPS);
+        }
+        let patterns = comparison.patterns(&vehicle, gusts)?;
+        let split = Split::of(&comparison.residual(&vehicle, gusts)?);
+        let doubts = doubts(comparison, &vehicle, &parameters)?;
+        let slopes = slopes(comparison, &vehicle, &parameters)?;
+        let problem =
+            Problem::new(&patterns, &split).doubting(&doubts).with(&found.extras).with(&slopes);
+        let mut solution = problem.at(&hyper);
+        for _ in 0..SHIFTS {
+            let groups = shifted(&patterns, &problem, &solution);
+            solution = problem.among(&groups).fit(solution.hyper, Likelihood::Profile);
+        }
+        Ok(Some(solution.log_posterior()))
+    }
+}
+
+/// Whether the scatter between drones shows an effect.
+fn is_felt(candidate: &Candidate) -> bool {
+    candidate.variants.iter().any(|variant| !variant.felt.is_empty())
+}

@@ -1,0 +1,109 @@
+//! The response of the pulse to vertical air speed. It is that of the speed relative to the air: where the
+//! pulse is a curved function of it, an updraft that all drones share changes how each answers its own gusts.
+
+use super::gls::{Problem, Solution};
+use super::noise::{GRADIENT, GUSTS, GroupPattern, Hyper, OWN, SHARED};
+
+/// Shifts of the vertical speed that a response is computed for, m/s: so many steps to either side.
+const STEPS: usize = 4;
+/// One of them, m/s: as strong as gusts are that a drone does not share.
+const STEP_MPS: f64 = 0.25;
+const COUNT: usize = 2 * STEPS + 1;
+
+/// Change of the pulse per vertical speed, us/(m/s), at speeds around the flown one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Response([f64; COUNT]);
+
+impl Response {
+    /// Of a pulse as a function of the shift of the vertical speed, m/s.
+    pub(super) fn of(pulse_us: impl Fn(f64) -> f64) -> Self {
+        let at: [f64; COUNT + 2] =
+            std::array::from_fn(|index| pulse_us((index as f64 - STEPS as f64 - 1.0) * STEP_MPS));
+        Self(std::array::from_fn(|index| (at[index + 2] - at[index]) / (2.0 * STEP_MPS)))
+    }
+
+    /// The same at any speed: of a line.
+    pub(super) fn straight(slope: f64) -> Self {
+        Self([slope; COUNT])
+    }
+
+    /// At a shifted speed, m/s.
+    pub(super) fn at(&self, shift_mps: f64) -> f64 {
+        let place = (shift_mps / STEP_MPS + STEPS as f64).clamp(0.0, (COUNT - 1) as f64);
+        let low = (place.floor() as usize).min(COUNT - 2);
+        let share = place - low as f64;
+        self.0[low] + share * (self.0[low + 1] - self.0[low])
+    }
+
+    /// Over gusts of a strength, m/s: a curve that is flat in hover does answer gusts there.
+    pub(super) fn over(&self, gusts_mps: f64) -> f64 {
+        // Two points of this distance and half of the weight have the variance of the gusts.
+        let apart_mps = std::f64::consts::SQRT_2 * gusts_mps.min(MOST_GUSTS_MPS);
+        0.5 * self.at(0.0) + 0.25 * (self.at(apart_mps) + self.at(-apart_mps))
+    }
+
+    /// With a multiple of another.
+    #[must_use]
+    pub(super) fn plus(mut self, times: f64, other: &Self) -> Self {
+        self.0.iter_mut().zip(other.0).for_each(|(own, other)| *own += times * other);
+        self
+    }
+}
+
+/// Stronger gusts are not reckoned with: what a model lacks looks like gusts, and with gusts strong enough
+/// any curve would look like what it lacks.
+const MOST_GUSTS_MPS: f64 = 0.5;
+
+/// Adds a multiple of responses to others, by group and bin.
+pub(super) fn add(sum: &mut [Vec<Response>], times: f64, other: &[Vec<Response>]) {
+    for (own, other) in sum.iter_mut().zip(other) {
+        add_to(own, times, other);
+    }
+}
+
+/// The same of one group.
+pub(super) fn add_to(sum: &mut [Response], times: f64, other: &[Response]) {
+    sum.iter_mut().zip(other).for_each(|(own, other)| *own = own.plus(times, other));
+}
+
+/// Patterns that know how fast the drones moved relative to the air that all shared: by what a solution
+/// leaves of the groups' means.
+pub(super) fn shifted(
+    groups: &[GroupPattern],
+    problem: &Problem<'_>,
+    solution: &Solution,
+) -> Vec<GroupPattern> {
+    let rest = problem.rest(solution);
+    let group = |(group, rest): (&GroupPattern, Vec<f64>)| {
+        let responses = group.responses(&solution.hyper);
+        let shift_mps = rest.iter().zip(responses).map(|(us, response)| us / response).collect();
+        GroupPattern { shift_mps, ..group.clone() }
+    };
+    groups.iter().zip(rest).map(group).collect()
+}
+
+/// The air that all drones share is believed up to so many times what each has for itself: what the model
+/// lacks is shared, too.
+const MOST_SHARED: f64 = 2.5;
+
+/// Standard deviation of the vertical air that a noise says a drone meets, m/s.
+pub(super) fn gusts_mps(hyper: &Hyper) -> f64 {
+    let own_mps = hyper.get(OWN).hypot(hyper.get(GUSTS));
+    let shared_mps = hyper.get(SHARED).hypot(hyper.get(GRADIENT));
+    own_mps.hypot(shared_mps.min(MOST_SHARED * own_mps))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signed_square_answers_by_the_speed_relative_to_the_air() {
+        let response = Response::of(|shift| 8.0 * (0.5 + shift) * f64::abs(0.5 + shift));
+        assert!((response.at(0.0) - 8.0).abs() < 1e-9);
+        assert!((response.at(0.3) - 12.8).abs() < 1e-9, "{}", response.at(0.3));
+        assert!((response.at(9.0) - 24.0).abs() < 1e-9, "the last");
+        let hover = Response::of(|shift| 8.0 * shift * shift.abs());
+        assert!(hover.at(0.0) < 2.5 && hover.over(0.4) > 4.0, "{}", hover.over(0.4));
+    }
+}
