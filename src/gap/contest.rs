@@ -8,11 +8,12 @@ use super::candidates::{Candidate, set};
 use super::compare::Comparison;
 use super::decide::{ALIKE, CLASS_NATS, PRODUCT, What, form};
 use super::error::GapError;
-use super::explain::{Found, MOST_GUSTS_MPS};
-use super::gls::{Likelihood, Problem, Split};
+use super::explain::{Found, MOST_GUSTS_MPS, with_felt};
+use super::gls::{Column, Likelihood, Problem, Split};
+use super::noise::Hyper;
 use super::refine::{Parameter, doubts, parameters_of, refine, slopes};
-use super::response::{gusts_mps, shifted};
-use super::search::{FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, feeling};
+use super::response::{Response, gusts_mps, shifted};
+use super::search::{FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought};
 use crate::vehicle::Vehicle;
 
 /// A product of climb and time is held against so many effects at most, and those that gain at least so much as regressors, nats.
@@ -73,7 +74,13 @@ impl Contest<'_> {
         let members = self.of_effects(problem, rivals)?;
         let Some((best, _)) = members.first() else { return Ok(what) };
         if let (Some(best), Some(product)) = (best, product)
-            && self.of_product(problem, product) > best + PRODUCT_NATS
+            && {
+                let p = self.of_product(product)?;
+                if std::env::var("CONTEST").is_ok() {
+                    eprintln!("CONTEST product {:.1} plain {:.1} gain {:.1}; best {} {:.1}; diff {:.1}", p, product.plain, product.gain, self.sought.library[members[0].1.candidate].name, best, p - best);
+                }
+                p > best + PRODUCT_NATS
+            }
         {
             return Ok(What::Free(product.clone()));
         }
@@ -126,18 +133,12 @@ impl Contest<'_> {
     }
 
     /// Log-posterior of the flight with a product of climb and time.
-    fn of_product(&self, problem: &Problem<'_>, product: &RankedGeneric) -> f64 {
+    fn of_product(&self, product: &RankedGeneric) -> Result<f64, GapError> {
         let generic = &self.sought.generics[product.generic];
-        let felt: Vec<_> = generic.felt.iter().collect();
-        let problem = problem.with(&generic.columns);
-        let first = problem.columns.len() - generic.columns.len();
-        let mut with = problem.at(&product.hyper);
-        for _ in 0..SHIFTS {
-            let groups = feeling(problem.groups, &felt, &with.beta[first..]);
-            let groups = shifted(&groups, &problem, &with);
-            with = problem.among(&groups).fit(with.hyper, Likelihood::Profile);
-        }
-        with.log_posterior() - generic.penalty
+        let free = Free { columns: &generic.columns, felt: &generic.felt, beta: &product.beta };
+        let found = self.found;
+        let (vehicle, parameters) = (found.vehicle.clone(), &found.parameters);
+        Ok(self.settled(vehicle, parameters, free, product.hyper)? - generic.penalty)
     }
 
     /// Log-posterior of the flight with a rival in the model; `None`: that would say nothing.
@@ -145,7 +146,7 @@ impl Contest<'_> {
         let Self { found, comparison, .. } = self;
         let candidate = &self.sought.library[ranked.candidate];
         // Where scatter does not show it, or in no vehicle, it stands by its gain as a regressor.
-        let Some(mut vehicle) = entered(candidate, ranked).filter(|_| is_felt(candidate)) else {
+        let Some(vehicle) = entered(candidate, ranked).filter(|_| is_felt(candidate)) else {
             return Ok(None);
         };
         let mut parameters: Vec<Parameter> = found.parameters.clone();
@@ -153,27 +154,48 @@ impl Contest<'_> {
             let (before, base) = (before(candidate), &self.round.base);
             parameters.extend(parameters_of(comparison, &vehicle, candidate.name, before, base)?);
         }
-        let mut hyper = ranked.hyper;
+        self.settled(vehicle, &parameters, Free::default(), ranked.hyper).map(Some)
+    }
+
+    /// Log-posterior of the flight with a model whose sizes and gusts settle first, at the speed relative to
+    /// the air that all share.
+    fn settled(
+        &self,
+        mut vehicle: Vehicle,
+        parameters: &[Parameter],
+        free: Free<'_>,
+        mut hyper: Hyper,
+    ) -> Result<f64, GapError> {
+        let Self { found, comparison, .. } = self;
+        let comparison = &Comparison::clone(comparison).feeling(&with_felt(&found.felt, free.felt, free.beta));
+        let extras = [&found.extras[..], free.columns].concat();
         let mut gusts = found.gusts_mps;
         for _ in 0..ROUNDS {
-            let fit = refine(comparison, &vehicle, &parameters, &found.extras, hyper, gusts, true)?;
+            let fit = refine(comparison, &vehicle, parameters, &extras, hyper, gusts, true)?;
             vehicle = fit.vehicle;
             hyper = fit.hyper;
             gusts = gusts_mps(&hyper).min(MOST_GUSTS_MPS);
         }
         let patterns = comparison.patterns(&vehicle, gusts)?;
         let split = Split::of(&comparison.residual(&vehicle, gusts)?);
-        let doubts = doubts(comparison, &vehicle, &parameters)?;
-        let slopes = slopes(comparison, &vehicle, &parameters)?;
-        let problem =
-            Problem::new(&patterns, &split).doubting(&doubts).with(&found.extras).with(&slopes);
+        let doubts = doubts(comparison, &vehicle, parameters)?;
+        let slopes = slopes(comparison, &vehicle, parameters)?;
+        let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&extras).with(&slopes);
         let mut solution = problem.at(&hyper);
         for _ in 0..SHIFTS {
             let groups = shifted(&patterns, &problem, &solution);
             solution = problem.among(&groups).fit(solution.hyper, Likelihood::Profile);
         }
-        Ok(Some(solution.log_posterior()))
+        Ok(solution.log_posterior())
     }
+}
+
+/// A free shape that is held against effects, with what it does to the response.
+#[derive(Clone, Copy, Default)]
+struct Free<'a> {
+    columns: &'a [Column],
+    felt: &'a [Vec<Vec<Response>>],
+    beta: &'a [f64],
 }
 
 /// Whether the scatter between drones shows an effect.

@@ -190,7 +190,7 @@ pub fn search(
                 let generic = &generics[free.generic];
                 let shape = generic.shape(&free.beta);
                 found.extras.extend(generic.columns.iter().cloned());
-                add_felt(&mut found.felt, &generic.felt, &free.beta);
+                found.felt = with_felt(&found.felt, &generic.felt, &free.beta);
                 found.hyper = free.hyper;
                 found.steps.push(Step {
                     finding: Finding::Unknown {
@@ -290,14 +290,20 @@ fn along_climb(comparison: &Comparison, variant: &Variant, beta: f64) -> Shape {
     drawn("vertical velocity (m/s)", points)
 }
 
-/// Adds what a free shape does to the response.
-fn add_felt(sum: &mut Vec<Vec<Response>>, felt: &[Vec<Vec<Response>>], beta: &[f64]) {
+/// Responses with what a free shape adds to them.
+pub(super) fn with_felt(
+    sum: &[Vec<Response>],
+    felt: &[Vec<Vec<Response>>],
+    beta: &[f64],
+) -> Vec<Vec<Response>> {
+    let mut sum = sum.to_vec();
     for (felt, beta) in felt.iter().zip(beta) {
         if sum.is_empty() {
-            *sum = felt.iter().map(|group| vec![Response::default(); group.len()]).collect();
+            sum = felt.iter().map(|group| vec![Response::default(); group.len()]).collect();
         }
-        response::add(sum, *beta, felt);
+        response::add(&mut sum, *beta, felt);
     }
+    sum
 }
 
 fn rivals(round: &Round, sought: Sought<'_>) -> Vec<Rival> {
