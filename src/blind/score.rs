@@ -126,6 +126,7 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
             Finding::Class { effects, .. } => {
                 let fits = |effect: &String| {
                     library(truth).any(|hidden| equivalent(&hidden.effect, effect))
+                        || truth.hidden.iter().any(|hidden| accepts(hidden, effect))
                 };
                 outcome.wrong_classes += usize::from(!effects.iter().any(fits));
                 outcome.found.push(effects.join(" or "));
@@ -201,7 +202,10 @@ fn called(hidden: &Hidden, verdict: &Verdict) -> Called {
         let this = match &step.finding {
             Finding::Unknown { depends_on, .. } if accepts(hidden, depends_on) => Called::Named,
             Finding::Unknown { .. } => Called::Unknown,
-            _ if hidden.foreign => Called::Silent,
+            _ if hidden.foreign => {
+                let fits = step.finding.effects().iter().any(|one| accepts(hidden, one));
+                if fits { Called::InClass } else { Called::Silent }
+            }
             Finding::Name { effect, .. } if *effect == hidden.effect => Called::Named,
             Finding::Name { .. } | Finding::Class { .. } => {
                 let fits = step.finding.effects().iter().any(|one| equivalent(one, &hidden.effect));

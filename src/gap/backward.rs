@@ -6,6 +6,7 @@ use super::explain::Found;
 use super::gls::{Problem, Split};
 use super::refine::{Parameter, doubts, slopes};
 use super::refly::mean_drone;
+use super::response::shifted;
 use crate::vehicle::Vehicle;
 
 /// A vehicle with one effect as it was.
@@ -48,7 +49,8 @@ impl Found {
             let slopes = slopes(comparison, &self.vehicle, &others)?;
             let problem =
                 Problem::new(&patterns, &split).doubting(&doubts).with(&self.extras).with(&slopes);
-            let solution = problem.at(&self.hyper);
+            let groups = shifted(&patterns, &problem, &problem.at(&self.hyper));
+            let solution = problem.among(&groups).at(&self.hyper);
             let without = taken_back(&self.vehicle, effect, original);
             let trace = comparison.change(&without, &self.vehicle)?;
             let z = solution.information(&solution.white(&trace)).sqrt();

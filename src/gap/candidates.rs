@@ -105,7 +105,7 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
                 let column = pulses.less(&base);
                 let mut felt = scene.response(&other)?;
                 response::add(&mut felt, -1.0, &response);
-                if felt.iter().flatten().all(|one| *one == Response::default()) {
+                if is_hardly_felt(&felt, &response) {
                     felt.clear();
                 }
                 variants.push(Variant { vehicle: Some(other), size: value, column, felt });
@@ -128,6 +128,20 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
     }
     Ok(found)
 }
+
+/// Share of the response that a form must change for scatter to show it.
+const FELT: f64 = 0.1;
+
+/// Whether what a form adds to the response is too little for scatter to show it.
+fn is_hardly_felt(felt: &[Vec<Response>], response: &[Vec<Response>]) -> bool {
+    let sum = |of: &[Vec<Response>]| -> f64 {
+        of.iter().flatten().map(|one| one.at(0.0).abs() + one.at(FELT_AT_MPS).abs()).sum()
+    };
+    sum(felt) < FELT * sum(response)
+}
+
+/// Where responses are compared besides the flown speed: some are flat in hover, m/s.
+const FELT_AT_MPS: f64 = 0.5;
 
 /// Whether a vehicle that lacks an effect can have it with a size. Thrust that grows slower than the pulse is
 /// no curve that a rotor has: only a model that is curved itself can be curved too much.

@@ -6,13 +6,13 @@ use rayon::prelude::*;
 
 use super::candidates::{Candidate, set};
 use super::compare::Comparison;
-use super::decide::{ALIKE, CLASS_NATS, PRODUCT, What, form};
+use super::decide::{ALIKE, CLASS_NATS, PRODUCT, What, form, margin_nats};
 use super::error::GapError;
 use super::explain::{Found, MOST_GUSTS_MPS, with_felt};
-use super::gls::{Column, Likelihood, Problem, Split};
+use super::gls::{Column, Problem, Split};
 use super::noise::Hyper;
 use super::refine::{Parameter, doubts, parameters_of, refine, slopes};
-use super::response::{Response, gusts_mps, shifted};
+use super::response::{Response, gusts_mps, settled};
 use super::search::{FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought};
 use crate::vehicle::Vehicle;
 
@@ -22,8 +22,6 @@ const LEAST_NATS: f64 = 4.0;
 /// By how much a product of climb and time must explain more than an effect, nats: it brings a line along,
 /// and a line is much of what any effect of the climb is.
 const PRODUCT_NATS: f64 = 13.0;
-/// Rounds in which the speed relative to the shared air settles.
-const SHIFTS: usize = 3;
 /// Rounds in which a rival's gusts settle.
 const ROUNDS: usize = 2;
 
@@ -68,23 +66,25 @@ impl Contest<'_> {
             What::Nothing => return Ok(what),
             What::Free(free) if !of(free) => return Ok(what),
             What::Free(_) => self.likely(),
-            What::Effects(members) if members.len() == 1 && product.is_none() => return Ok(what),
-            What::Effects(members) => members.clone(),
+            What::Effects { members, .. } if members.len() == 1 && product.is_none() => {
+                return Ok(what);
+            }
+            What::Effects { members, .. } => members.clone(),
         };
         let members = self.of_effects(problem, rivals)?;
-        let Some((best, _)) = members.first() else { return Ok(what) };
-        if let (Some(best), Some(product)) = (best, product)
-            && {
-                let p = self.of_product(product)?;
-                if std::env::var("CONTEST").is_ok() {
-                    eprintln!("CONTEST product {:.1} plain {:.1} gain {:.1}; best {} {:.1}; diff {:.1}", p, product.plain, product.gain, self.sought.library[members[0].1.candidate].name, best, p - best);
-                }
-                p > best + PRODUCT_NATS
+        let Some((best, first)) = members.first() else { return Ok(what) };
+        let mut or_else = None;
+        if let (Some(best), Some(product)) = (best, product) {
+            let more = self.of_product(product)? - best;
+            if more > PRODUCT_NATS && product.gain > first.gain + CLASS_NATS {
+                return Ok(What::Free(product.clone()));
             }
-        {
-            return Ok(What::Free(product.clone()));
+            if more > CLASS_NATS || product.gain > first.gain + CLASS_NATS {
+                or_else = Some(product.clone());
+            }
         }
-        Ok(What::Effects(members.into_iter().map(|(_, rival)| rival).collect()))
+        let members = members.into_iter().map(|(_, rival)| rival).collect();
+        Ok(What::Effects { members, or_else })
     }
 
     /// Effects that a product may stand for.
@@ -111,15 +111,24 @@ impl Contest<'_> {
         let standings = standings?;
         let best = standings.iter().flatten().copied().reduce(f64::max);
         let most = rivals.iter().map(|rival| rival.gain).fold(0.0, f64::max);
-        let behind = |standing: Option<f64>, rival: &Ranked| match (standing, best) {
-            (Some(standing), Some(best)) => best - standing,
-            _ => most - rival.gain,
-        };
+        let leader =
+            rivals.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)).map(|one| one.candidate);
+        let margin = margin_nats(most);
         let mut members: Vec<(f64, Option<f64>, Ranked)> = standings
             .into_iter()
             .zip(rivals)
-            .map(|(standing, rival)| (behind(standing, &rival), standing, rival))
-            .filter(|(behind, ..)| *behind < CLASS_NATS)
+            .map(|(standing, rival)| {
+                let behind = match (standing, best) {
+                    (Some(standing), Some(best)) => best - standing,
+                    _ => most - rival.gain,
+                };
+                (behind, standing, rival)
+            })
+            .filter(|(behind, _, rival)| {
+                // Who leads as a regressor must be beaten clearly.
+                let leads = Some(rival.candidate) == leader;
+                *behind < if leads { PRODUCT_NATS } else { margin }
+            })
             .collect();
         members.sort_by(|a, b| a.0.total_cmp(&b.0));
         let Some((.., first)) = members.first().cloned() else { return Ok(Vec::new()) };
@@ -135,10 +144,14 @@ impl Contest<'_> {
     /// Log-posterior of the flight with a product of climb and time.
     fn of_product(&self, product: &RankedGeneric) -> Result<f64, GapError> {
         let generic = &self.sought.generics[product.generic];
-        let free = Free { columns: &generic.columns, felt: &generic.felt, beta: &product.beta };
+        let columns = &generic.columns;
         let found = self.found;
-        let (vehicle, parameters) = (found.vehicle.clone(), &found.parameters);
-        Ok(self.settled(vehicle, parameters, free, product.hyper)? - generic.penalty)
+        let of = |felt| {
+            let free = Free { columns, felt, beta: &product.beta };
+            self.in_full(found.vehicle.clone(), &found.parameters, free, product.hyper)
+        };
+        // What it does to the scatter is known by its size, which means alone may hardly tell.
+        Ok(of(&generic.felt)?.max(of(&[])?) - generic.penalty)
     }
 
     /// Log-posterior of the flight with a rival in the model; `None`: that would say nothing.
@@ -154,12 +167,12 @@ impl Contest<'_> {
             let (before, base) = (before(candidate), &self.round.base);
             parameters.extend(parameters_of(comparison, &vehicle, candidate.name, before, base)?);
         }
-        self.settled(vehicle, &parameters, Free::default(), ranked.hyper).map(Some)
+        self.in_full(vehicle, &parameters, Free::default(), ranked.hyper).map(Some)
     }
 
     /// Log-posterior of the flight with a model whose sizes and gusts settle first, at the speed relative to
     /// the air that all share.
-    fn settled(
+    fn in_full(
         &self,
         mut vehicle: Vehicle,
         parameters: &[Parameter],
@@ -167,7 +180,8 @@ impl Contest<'_> {
         mut hyper: Hyper,
     ) -> Result<f64, GapError> {
         let Self { found, comparison, .. } = self;
-        let comparison = &Comparison::clone(comparison).feeling(&with_felt(&found.felt, free.felt, free.beta));
+        let comparison =
+            &Comparison::clone(comparison).feeling(&with_felt(&found.felt, free.felt, free.beta));
         let extras = [&found.extras[..], free.columns].concat();
         let mut gusts = found.gusts_mps;
         for _ in 0..ROUNDS {
@@ -181,11 +195,7 @@ impl Contest<'_> {
         let doubts = doubts(comparison, &vehicle, parameters)?;
         let slopes = slopes(comparison, &vehicle, parameters)?;
         let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&extras).with(&slopes);
-        let mut solution = problem.at(&hyper);
-        for _ in 0..SHIFTS {
-            let groups = shifted(&patterns, &problem, &solution);
-            solution = problem.among(&groups).fit(solution.hyper, Likelihood::Profile);
-        }
+        let (_, solution) = settled(&problem, problem.at(&hyper), |_| patterns.clone());
         Ok(solution.log_posterior())
     }
 }

@@ -9,9 +9,12 @@ use super::search::{
 };
 
 /// Rivals within so many nats explain as well.
-pub(super) const CLASS_NATS: f64 = 4.0;
+pub(super) const CLASS_NATS: f64 = 6.0;
+/// So do those within this share of the gain: closed forms are not the effects themselves, and what they
+/// leave out counts the more the larger an effect is.
+const CLASS_SHARE: f64 = 0.1;
 /// Rivals within so many nats, as regressors, are held against each other in full.
-const CONTEST_NATS: f64 = 8.0;
+const CONTEST_NATS: f64 = 12.0;
 /// Rivals must leave a similar trace: correlation with everything else partialled out.
 pub(super) const ALIKE: f64 = 0.6;
 /// A free shape is another thing than the best effect when it gains this much more.
@@ -31,12 +34,22 @@ const SIMPLE: [(&str, f64); 2] = [(PRODUCT, 6.0), ("step", 2.5)];
 /// An effect this near to a size that matters is named before a free shape that looks like it.
 const NEARLY: f64 = 0.6;
 
+/// By how much a rival must be worse than what gains so much, nats.
+pub(super) fn margin_nats(gain: f64) -> f64 {
+    CLASS_NATS.max(CLASS_SHARE * gain)
+}
+
 /// What is to be done.
 pub(super) enum What {
     /// The search has ended.
     Nothing,
-    /// Best first; more than one: rivals that must be held against each other.
-    Effects(Vec<Ranked>),
+    /// Effects.
+    Effects {
+        /// Best first; more than one: rivals that must be held against each other.
+        members: Vec<Ranked>,
+        /// A free shape that explains as well.
+        or_else: Option<RankedGeneric>,
+    },
     /// No effect that is known.
     Free(RankedGeneric),
 }
@@ -135,11 +148,11 @@ pub(super) fn decide(
         let is_alike = || at.likeness(&own, &at.white(column(ranked))).abs() > ALIKE;
         ranked.candidate != best.candidate
             // What is better though too small to be named alone is not passed over.
-            && (ranked.gain > best.gain || ranked.gain > best.gain - CONTEST_NATS && is_alike())
+            && (ranked.gain > best.gain || ranked.gain > best.gain - CONTEST_NATS.max(2.0 * margin_nats(best.gain)) && is_alike())
     };
     let mut members = vec![best.clone()];
     members.extend(round.library.iter().filter(alike).cloned());
-    Decision { what: What::Effects(members), thresholds: limits }
+    Decision { what: What::Effects { members, or_else: None }, thresholds: limits }
 }
 
 /// Gains above this need no threshold, nats.

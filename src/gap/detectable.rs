@@ -5,6 +5,7 @@ use super::error::GapError;
 use super::explain::Found;
 use super::gls::{Problem, Solution, Split, White};
 use super::refine::doubts;
+use super::response::shifted;
 use super::search::FLOOR_NATS;
 use super::verdict::Detectable;
 use crate::effects::{LIBRARY, Sought};
@@ -26,7 +27,8 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
     let doubts = doubts(comparison, &found.vehicle, &found.parameters)?;
     let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&found.extras);
-    let solution = problem.at(&found.hyper);
+    let groups = shifted(&patterns, &problem, &problem.at(&found.hyper));
+    let solution = problem.among(&groups).at(&found.hyper);
     let candidates = library(&found.vehicle, &comparison.scene)?;
     let drones = comparison.data.counts();
     let best: Vec<(&Candidate, Option<Trace>)> = candidates

@@ -97,6 +97,7 @@ pub fn search(
         rest: Rest::default(),
     };
     let mut refused: Vec<&'static str> = Vec::new();
+    let mut last: Option<(Found, f64)> = None;
     for step in 0..=options.most_steps {
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         let mut split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
@@ -120,7 +121,16 @@ pub fn search(
         let generics = all(&comparison.scene, &comparison.headings());
         let drones = comparison.data.counts();
         let sought = Sought { library: &candidates, generics: &generics, drones: &drones };
-        let round = round(&problem, quick.hyper, sought);
+        let round = round(&problem, quick.hyper, sought, true);
+        let problem = problem.among(&round.groups);
+        let likely = round.base.log_posterior();
+        if let Some((before, was)) = last.take()
+            && likely < was - WORSE_NATS
+        {
+            // Fitted together with the rest it explains less than was explained without.
+            found = before;
+            break;
+        }
         found.hyper = round.base.hyper;
         let material_us = material_us(&patterns, &round.base.hyper);
         let mut decision = decide(&problem, &round, sought, material_us, options, step);
@@ -141,7 +151,7 @@ pub fn search(
                 found.comparison = comparison;
                 break;
             }
-            What::Effects(members) => {
+            What::Effects { members, or_else } => {
                 let best = &members[0];
                 let candidate = &candidates[best.candidate];
                 let variant = &candidate.variants[best.variant];
@@ -173,8 +183,9 @@ pub fn search(
                     found.extras.push(variant.column.clone());
                     found.hyper = best.hyper;
                 }
-                let names: Vec<String> =
-                    members.iter().map(|one| candidates[one.candidate].name.to_owned()).collect();
+                let free = or_else.iter().map(|free| generics[free.generic].depends_on);
+                let effects = members.iter().map(|one| candidates[one.candidate].name);
+                let names: Vec<String> = effects.chain(free).map(str::to_owned).collect();
                 let finding = finding(names, candidate.was_there, by_lean);
                 found.steps.push(Step {
                     finding,
@@ -187,6 +198,7 @@ pub fn search(
                 });
             }
             What::Free(free) => {
+                last = Some((Found { comparison: comparison.clone(), ..found.clone() }, likely));
                 let generic = &generics[free.generic];
                 let shape = generic.shape(&free.beta);
                 found.extras.extend(generic.columns.iter().cloned());
@@ -359,6 +371,9 @@ impl Found {
     }
 }
 
+/// A free shape after which a flight is so much less likely is taken back, nats. (With an effect the model is
+/// flown anew, and is another.)
+const WORSE_NATS: f64 = 2.0;
 /// Joint fits after each finding, at most.
 const REFITS: usize = 4;
 /// Gusts this near to those of the fit before change nothing, m/s.

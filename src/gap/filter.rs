@@ -118,6 +118,23 @@ impl Filter {
             .collect()
     }
 
+    /// The inverse of the covariance times a series: the whitening and its transpose.
+    pub(super) fn weigh(&self, series: &[f64]) -> Vec<f64> {
+        let mut weighed = self.whiten(series);
+        let mut back = vec![0.0; self.dim];
+        for (step, value) in self.steps.iter().zip(&mut weighed).rev() {
+            let sum: f64 = step.gain.iter().zip(&back).map(|(gain, back)| gain * back).sum();
+            *value = (*value + sum) * step.inverse_sd;
+            for (index, factor) in &step.looks_at {
+                back[*index] -= factor * *value;
+            }
+            for (back, decay) in back.iter_mut().zip(&step.decay) {
+                *back *= decay;
+            }
+        }
+        weighed
+    }
+
     /// A series with the filter's covariance, from independent noise of variance 1.
     pub(super) fn colour(&self, noise: &[f64]) -> Vec<f64> {
         let mut state = vec![0.0; self.dim];
@@ -189,6 +206,9 @@ mod tests {
         let vector = DVector::from_vec(series.clone());
         let theirs = vector.dot(&dense.solve(&vector));
         assert!((ours - theirs).abs() < 1e-9 * theirs, "{ours} {theirs}");
+        for (weighed, solved) in filter.weigh(&series).iter().zip(dense.solve(&vector).iter()) {
+            assert!((weighed - solved).abs() < 1e-9, "{weighed} {solved}");
+        }
         for (value, back) in series.iter().zip(filter.colour(&white)) {
             assert!((value - back).abs() < 1e-9);
         }

@@ -256,6 +256,12 @@ impl<'a> Problem<'a> {
         rest
     }
 
+    /// The updraft that all drones share by a solution, by group and bin, m/s.
+    pub(super) fn shared_mps(&self, solution: &Solution) -> Vec<Vec<f64>> {
+        let rest = self.rest(solution);
+        solution.whitener.shared_mps(&rest, self.groups, &solution.hyper)
+    }
+
     /// At fixed noise.
     pub(super) fn at(&self, hyper: &Hyper) -> Solution {
         let whitener = Whitener::new(self.groups, hyper);

@@ -7,9 +7,8 @@ use super::compare::{Comparison, Simulated};
 use super::data::Data;
 use super::error::GapError;
 use super::explain::Found;
-use super::gls::{Column, Problem, Pulses, Split, means_of};
+use super::gls::{Column, Problem, Pulses, Split};
 use super::noise::{GroupPattern, Hyper};
-use super::posterior::SharedAir;
 use super::refine::refine;
 use super::response::Response;
 use super::verdict::{Gap, Interval, Shrink};
@@ -86,8 +85,8 @@ impl Case<'_> {
 
     fn shrink(&self, residuals: &Residuals<'_>, fitted: &Fitted) -> Shrink {
         let counts: Vec<usize> = residuals.after.iter().map(Vec::len).collect();
-        let Fitted { patterns, shared, .. } = fitted;
-        let floor_us = floor(patterns, &counts, &self.found.hyper, shared, self.seed);
+        let Fitted { patterns, .. } = fitted;
+        let floor_us = floor(patterns, &counts, &self.found.hyper, self.seed);
         shrink(residuals, floor_us, self.seed)
     }
 
@@ -160,7 +159,6 @@ struct Fitted {
     residual: Pulses,
     /// What the free shapes say in each bin.
     shapes: Vec<Vec<f64>>,
-    shared: SharedAir,
     segments: Vec<Vec<usize>>,
 }
 
@@ -180,16 +178,27 @@ impl Fitted {
             (0..pattern.time_s.len()).map(|bin| value(group, bin)).collect()
         };
         let shapes = patterns.iter().enumerate().map(bins).collect();
-        let shared = SharedAir::new(&patterns, &found.hyper);
         let of = |group: &super::data::Group| group.bins.iter().map(|bin| bin.segment).collect();
         let segments = comparison.data.groups.iter().map(of).collect();
-        Ok(Self { patterns, residual, shapes, shared, segments })
+        Ok(Self { patterns, residual, shapes, segments })
     }
 
     /// What the shared air does to the pulse, by these residuals of the fitted drones.
     fn air(&self, residual: &Pulses, found: &Found) -> Vec<Vec<f64>> {
-        self.shared.pulses(&means_of(residual), &self.patterns, &found.hyper)
+        shared_us(&self.patterns, residual, &found.hyper)
     }
+}
+
+/// What the updraft that these drones share does to the pulse, by group and bin, us.
+fn shared_us(patterns: &[GroupPattern], residual: &Pulses, hyper: &Hyper) -> Vec<Vec<f64>> {
+    let split = Split::of(residual);
+    let problem = Problem::new(patterns, &split);
+    let shared = problem.shared_mps(&problem.at(hyper));
+    let of = |(pattern, shared): (&GroupPattern, Vec<f64>)| {
+        let responses = pattern.responses(hyper);
+        shared.iter().zip(responses).map(|(mps, response)| mps * response).collect()
+    };
+    patterns.iter().zip(shared).map(of).collect()
 }
 
 /// A comparison with only the bins of another.
@@ -307,13 +316,7 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
 
 /// What noise and the air that is not known leave of held-out drones, us: the same sums on simulated
 /// flights.
-fn floor(
-    patterns: &[GroupPattern],
-    held: &[usize],
-    hyper: &Hyper,
-    shared: &SharedAir,
-    seed: u64,
-) -> f64 {
+fn floor(patterns: &[GroupPattern], held: &[usize], hyper: &Hyper, seed: u64) -> f64 {
     // Fitted and held-out drones together, so that they share the air.
     let both: Vec<GroupPattern> = patterns
         .iter()
@@ -330,7 +333,7 @@ fn floor(
             .zip(patterns)
             .map(|(drones, group)| drones.iter().take(group.drones).cloned().collect())
             .collect();
-        let air = shared.pulses(&means_of(&fitted), patterns, hyper);
+        let air = shared_us(patterns, &fitted, hyper);
         for ((drones, group), air) in pulses.iter().zip(patterns).zip(&air) {
             for drone in drones.iter().skip(group.drones) {
                 let rest: Vec<f64> = drone.iter().zip(air).map(|(v, a)| v - a).collect();

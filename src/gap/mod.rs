@@ -28,7 +28,6 @@ pub mod next;
 mod noise;
 #[cfg(test)]
 mod null_flights;
-mod posterior;
 mod refine;
 mod refly;
 mod regimes;

@@ -58,7 +58,7 @@ const PRIOR: [(f64, f64); COUNT] = [
     (2.0, 2.5),
     (10.0, 2.5),
     (0.05, 2.0),
-    (3.0, 2.5),
+    (0.5, 1.7),
     (0.08, 2.0),
     (0.3, 2.0),
 ];
@@ -136,7 +136,7 @@ const SHARED_STATES: usize = 7;
 const OWN_STATES: usize = 4;
 /// How the gradient itself changes over [`ALOFT_M`], as a share of it: an eddy of 150 m is not straight over
 /// the height of a ladder.
-pub(super) const CURVED: f64 = 0.3;
+const CURVED: f64 = 0.3;
 /// Heights are taken from here, m, in units of [`ALOFT_M`].
 const MIDDLE_M: f64 = 45.0;
 const ALOFT_M: f64 = 50.0;
@@ -159,19 +159,10 @@ impl GroupPattern {
             return self.responses(hyper);
         }
         let least = hyper.get(LEAST);
+        let own_mps = hyper.get(OWN).hypot(hyper.get(GUSTS));
         let each = self.response.iter().zip(&self.shift_mps);
-        each.map(|(response, shift_mps)| response.at(*shift_mps).abs() + least).collect()
-    }
-
-    /// Covariance of two bins by the horizontal gusts that the fleet shares, us².
-    pub(super) fn side_gusts(&self, bin: usize, other: &Self, at: usize, hyper: &Hyper) -> f64 {
-        let of = |group: &Self, bin: usize| -> [f64; 2] {
-            group.side_response.get(bin).copied().unwrap_or_default()
-        };
-        let (a, b) = (of(self, bin), of(other, at));
-        let apart_s = (self.time_s[bin] - other.time_s[at]).abs();
-        let gusts = hyper.get(SIDE_GUSTS).powi(2) * (-apart_s / SIDE_GUSTS_S).exp();
-        gusts * (a[0] * b[0] + a[1] * b[1])
+        each.map(|(response, shift_mps)| response.around(*shift_mps, own_mps).abs() + least)
+            .collect()
     }
 }
 
@@ -273,6 +264,56 @@ impl Whitener {
         self.means.whiten(&series)
     }
 
+    /// The updraft that all drones share, by what is left of the groups' means, by group and bin, m/s: its
+    /// mean over what this noise holds for likely.
+    pub(super) fn shared_mps(
+        &self,
+        by_group: &[Vec<f64>],
+        groups: &[GroupPattern],
+        hyper: &Hyper,
+    ) -> Vec<Vec<f64>> {
+        let series: Vec<f64> =
+            self.order.iter().map(|(group, bin)| by_group[*group][*bin]).collect();
+        let weighed = self.means.weigh(&series);
+        let responses: Vec<Vec<f64>> = groups.iter().map(|group| group.responses(hyper)).collect();
+        let variances = [
+            hyper.get(SHARED).powi(2),
+            hyper.get(GRADIENT).powi(2),
+            (CURVED * hyper.get(GRADIENT)).powi(2),
+        ];
+        let mut shared: Vec<Vec<f64>> =
+            responses.iter().map(|bins| vec![0.0; bins.len()]).collect();
+        // Both ways, as far as it is remembered; what is in a bin itself comes once.
+        let forward: Vec<usize> = (0..self.order.len()).collect();
+        let backward: Vec<usize> = forward.iter().rev().copied().collect();
+        for (places, has_own) in [(forward, true), (backward, false)] {
+            let mut heard = [0.0; 3];
+            let mut before_s = None;
+            for place in places {
+                let (index, bin) = self.order[place];
+                let group = &groups[index];
+                let time_s = group.time_s[bin];
+                let apart_s = before_s.map_or(0.0, |before_s: f64| (time_s - before_s).abs());
+                before_s = Some(time_s);
+                let kept = (-apart_s / hyper.get(SHARED_TIME)).exp();
+                let aloft = group.aloft(bin);
+                let own = responses[index][bin] * weighed[place];
+                for (power, heard) in heard.iter_mut().enumerate() {
+                    let height = aloft.powi(power as i32);
+                    *heard *= kept;
+                    if has_own {
+                        *heard += height * own;
+                    }
+                    shared[index][bin] += variances[power] * height * *heard;
+                    if !has_own {
+                        *heard += height * own;
+                    }
+                }
+            }
+        }
+        shared
+    }
+
     /// Whitens one drone's deviations from its group's mean.
     pub(super) fn deviation(&self, group: usize, series: &[f64]) -> Vec<f64> {
         self.deviations[group].whiten(series)
@@ -307,5 +348,50 @@ impl Whitener {
                     .collect()
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shared_updraft_is_its_mean_over_what_the_noise_holds_for_likely() {
+        let group = |drones: usize, first: f64| GroupPattern {
+            drones,
+            time_s: (0..6).map(|bin| first + 20.0 * f64::from(bin)).collect(),
+            height_m: (0..6).map(|bin| 10.0 + 15.0 * f64::from(bin)).collect(),
+            response: vec![Response::straight(20.0); 6],
+            slope_us: vec![0.0; 6],
+            ..GroupPattern::default()
+        };
+        let groups = [group(5, 0.0), group(7, 8.0)];
+        let hyper = Hyper::default();
+        let rest: Vec<Vec<f64>> = (0..2)
+            .map(|group| (0..6).map(|bin| f64::from((bin * 5 + group * 3) % 7) - 3.0).collect())
+            .collect();
+        let whitener = Whitener::new(&groups, &hyper);
+        let found = whitener.shared_mps(&rest, &groups, &hyper);
+        let series: Vec<f64> =
+            whitener.order.iter().map(|(group, bin)| rest[*group][*bin]).collect();
+        let weighed = whitener.means.weigh(&series);
+        let responses: Vec<Vec<f64>> = groups.iter().map(|one| one.responses(&hyper)).collect();
+        for (group, bin) in &whitener.order {
+            let (at, here) = (&groups[*group], groups[*group].aloft(*bin));
+            let each = whitener.order.iter().zip(&weighed).map(|((other, place), weighed)| {
+                let (there, from) = (groups[*other].aloft(*place), &groups[*other]);
+                let apart_s = (at.time_s[*bin] - from.time_s[*place]).abs();
+                let gradient = hyper.get(GRADIENT).powi(2) * here * there;
+                let bent = (CURVED * hyper.get(GRADIENT)).powi(2) * (here * there).powi(2);
+                (hyper.get(SHARED).powi(2) + gradient + bent)
+                    * (-apart_s / hyper.get(SHARED_TIME)).exp()
+                    * responses[*other][*place]
+                    * weighed
+            });
+            let wanted: f64 = each.sum();
+            let found = found[*group][*bin];
+            assert!((found - wanted).abs() < 1e-9 * wanted.abs().max(1.0), "{found} {wanted}");
+            assert!(found.abs() < 0.3, "{found}: three pulses of 20 us/(m/s) are 0.15 m/s");
+        }
     }
 }

@@ -57,7 +57,7 @@ fn field_day() -> Hyper {
 
 /// What the search names of a flight by its floors: an effect, or a free shape.
 fn named(problem: &Problem<'_>, sought: Sought<'_>) -> Option<String> {
-    let round = round(problem, Hyper::default(), sought);
+    let round = round(problem, Hyper::default(), sought, true);
     let library = round.library.iter().find(|ranked| {
         // As `decide` has it: what the air does needs more, and a drift is never named.
         let candidate = &sought.library[ranked.candidate];
@@ -144,7 +144,7 @@ const FEW: u64 = 8;
 fn inflow_ahead(candidates: &[Candidate], flights: &[(Vec<GroupPattern>, Split)]) -> Vec<f64> {
     let sought = Sought { library: candidates, generics: &[], drones: &[9] };
     let ahead = |(patterns, split): &(Vec<GroupPattern>, Split)| {
-        let round = round(&Problem::new(patterns, split), field_day(), sought);
+        let round = round(&Problem::new(patterns, split), field_day(), sought, true);
         let (inflow, others): (Vec<_>, Vec<_>) = round
             .library
             .iter()

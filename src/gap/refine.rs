@@ -8,6 +8,7 @@ use super::compare::Comparison;
 use super::error::GapError;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{Hyper, SHARED_TIME};
+use super::response::shifted;
 use super::verdict::{Fitted, Interval};
 use crate::effects::select::value_of;
 use crate::effects::{Definition, Sought, find};
@@ -69,8 +70,12 @@ pub(super) fn refine(
     let mut vehicle = vehicle.clone();
     let mut hyper = start;
     let mut last = None;
+    let mut shifts: Vec<Vec<f64>> = Vec::new();
     for round in 0..ROUNDS {
-        let patterns = comparison.patterns(&vehicle, gusts_mps)?;
+        let mut patterns = comparison.patterns(&vehicle, gusts_mps)?;
+        for (pattern, shift_mps) in patterns.iter_mut().zip(std::mem::take(&mut shifts)) {
+            pattern.shift_mps = shift_mps;
+        }
         let split = Split::of(&comparison.residual(&vehicle, gusts_mps)?);
         let slopes = slopes(comparison, &vehicle, parameters)?;
         let doubts = doubts(comparison, &vehicle, parameters)?;
@@ -79,6 +84,7 @@ pub(super) fn refine(
         let solution =
             if is_fitted { problem.fit(hyper, Likelihood::Restricted) } else { problem.at(&hyper) };
         hyper = solution.hyper;
+        shifts = shifted(&patterns, &problem, &solution).into_iter().map(|p| p.shift_mps).collect();
         let first = solution.beta.len() - parameters.len();
         let covariance = solution.covariance();
         let mut moved: f64 = 0.0;

@@ -1,7 +1,7 @@
 //! The response of the pulse to vertical air speed. It is that of the speed relative to the air: where the
 //! pulse is a curved function of it, an updraft that all drones share changes how each answers its own gusts.
 
-use super::gls::{Problem, Solution};
+use super::gls::{Likelihood, Problem, Solution};
 use super::noise::{GRADIENT, GUSTS, GroupPattern, Hyper, OWN, SHARED};
 
 /// Shifts of the vertical speed that a response is computed for, m/s: so many steps to either side.
@@ -37,9 +37,15 @@ impl Response {
 
     /// Over gusts of a strength, m/s: a curve that is flat in hover does answer gusts there.
     pub(super) fn over(&self, gusts_mps: f64) -> f64 {
+        self.around(0.0, gusts_mps)
+    }
+
+    /// The same around a shifted speed, m/s.
+    pub(super) fn around(&self, shift_mps: f64, gusts_mps: f64) -> f64 {
         // Two points of this distance and half of the weight have the variance of the gusts.
         let apart_mps = std::f64::consts::SQRT_2 * gusts_mps.min(MOST_GUSTS_MPS);
-        0.5 * self.at(0.0) + 0.25 * (self.at(apart_mps) + self.at(-apart_mps))
+        let sides = self.at(shift_mps + apart_mps) + self.at(shift_mps - apart_mps);
+        0.5 * self.at(shift_mps) + 0.25 * sides
     }
 
     /// With a multiple of another.
@@ -73,14 +79,39 @@ pub(super) fn shifted(
     problem: &Problem<'_>,
     solution: &Solution,
 ) -> Vec<GroupPattern> {
-    let rest = problem.rest(solution);
-    let group = |(group, rest): (&GroupPattern, Vec<f64>)| {
-        let responses = group.responses(&solution.hyper);
-        let shift_mps = rest.iter().zip(responses).map(|(us, response)| us / response).collect();
-        GroupPattern { shift_mps, ..group.clone() }
-    };
-    groups.iter().zip(rest).map(group).collect()
+    let shared = problem.shared_mps(solution);
+    let group =
+        |(group, shift_mps): (&GroupPattern, Vec<f64>)| GroupPattern { shift_mps, ..group.clone() };
+    groups.iter().zip(shared).map(group).collect()
 }
+
+/// Most probable noise with everything linear at its best, at the speed relative to the air that all share:
+/// `groups` makes the patterns of a solution's coefficients. With the patterns it was found for.
+pub(super) fn settled(
+    problem: &Problem<'_>,
+    start: Solution,
+    groups: impl Fn(&[f64]) -> Vec<GroupPattern>,
+) -> (Vec<GroupPattern>, Solution) {
+    // Where a model lacks much, what it leaves is no air, and nothing is known of the speed relative to it.
+    let mut best = (problem.groups.to_vec(), start.clone());
+    let mut last = start;
+    for _ in 0..SETTLED {
+        let patterns = shifted(&groups(&last.beta), problem, &last);
+        last = problem.among(&patterns).fit(last.hyper, Likelihood::Profile);
+        let more = last.log_posterior() - best.1.log_posterior();
+        if more > 0.0 {
+            best = (patterns, last.clone());
+        }
+        if more.abs() < SAME_NATS {
+            break;
+        }
+    }
+    best
+}
+
+/// Rounds in which that settles, at most, and a change of the log-posterior that is none, nats.
+const SETTLED: usize = 4;
+const SAME_NATS: f64 = 0.3;
 
 /// The air that all drones share is believed up to so many times what each has for itself: what the model
 /// lacks is shared, too.
@@ -105,5 +136,9 @@ mod tests {
         assert!((response.at(9.0) - 24.0).abs() < 1e-9, "the last");
         let hover = Response::of(|shift| 8.0 * shift * shift.abs());
         assert!(hover.at(0.0) < 2.5 && hover.over(0.4) > 4.0, "{}", hover.over(0.4));
+        assert!(
+            (hover.around(0.5, 0.1) - 8.0).abs() < 1e-9,
+            "away from the bend gusts change nothing"
+        );
     }
 }

@@ -8,7 +8,7 @@ use super::candidates::{Candidate, Variant};
 use super::generic::Generic;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper};
-use super::response::{Response, add_to};
+use super::response::{Response, add_to, settled};
 use crate::base::rng::{Purpose, stream};
 
 /// Candidates this near to the best by the quick scan are fitted with their own noise, nats.
@@ -61,6 +61,8 @@ pub(super) struct RankedGeneric {
 /// What a round found.
 #[derive(Clone, Debug)]
 pub(super) struct Round {
+    /// The groups' patterns with the air that all shared.
+    pub groups: Vec<GroupPattern>,
     /// The model so far with its noise.
     pub base: Solution,
     /// Candidates, best first.
@@ -92,9 +94,21 @@ pub(super) struct Sought<'a> {
     pub drones: &'a [usize],
 }
 
-/// Looks once.
-pub(super) fn round(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>) -> Round {
-    let base = problem.fit(start, Likelihood::Profile);
+/// Looks once. Whether it `settles`, for each candidate, at which speed relative to the air that all share the
+/// drones flew; otherwise that is what the groups know of it.
+pub(super) fn round(
+    problem: &Problem<'_>,
+    start: Hyper,
+    sought: Sought<'_>,
+    settles: bool,
+) -> Round {
+    let first = problem.fit(start, Likelihood::Profile);
+    let (groups, base) = if settles {
+        settled(problem, first, |_| problem.groups.to_vec())
+    } else {
+        (problem.groups.to_vec(), first)
+    };
+    let problem = &problem.among(&groups);
     let mut library = scan(&base, sought);
     let best = library.first().map_or(0.0, |best| best.gain);
     let near = |ranked: &Ranked| ranked.gain > 0.5 && ranked.gain > best - NEAR_NATS;
@@ -103,12 +117,12 @@ pub(super) fn round(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>) -> 
     let fitted: Vec<Ranked> = library
         .par_iter()
         .take(count)
-        .map(|ranked| refit(problem, &base, before, ranked, sought))
+        .map(|ranked| refit(problem, &base, before, ranked, sought, settles))
         .collect();
     library.splice(..count, fitted);
     library.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let generics = free_shapes(problem, &base, before, sought);
-    Round { base, library, generics }
+    let generics = free_shapes(problem, &base, before, sought, settles);
+    Round { groups, base, library, generics }
 }
 
 /// Whether a coefficient makes a size that the effect can have.
@@ -155,25 +169,23 @@ fn refit(
     before: f64,
     ranked: &Ranked,
     sought: Sought<'_>,
+    settles: bool,
 ) -> Ranked {
     let candidate = &sought.library[ranked.candidate];
     let variant = &candidate.variants[ranked.variant];
-    let mut with = problem.with([&variant.column]).fit(base.hyper, Likelihood::Profile);
-    let mut beta = with.beta.last().copied().unwrap_or(0.0);
+    let problem = problem.with([&variant.column]);
+    let mut with = problem.fit(base.hyper, Likelihood::Profile);
     // Who feels a climb feels the air as well: the scatter must fit what the effect makes of gusts.
-    for _ in 0..FELT_ROUNDS {
-        if variant.felt.is_empty() {
-            break;
-        }
-        let groups = feeling(problem.groups, &[&variant.felt], &[beta]);
-        let felt = problem.with([&variant.column]).among(&groups);
-        with = felt.fit(with.hyper, Likelihood::Profile);
-        let before = beta;
-        beta = with.beta.last().copied().unwrap_or(0.0);
-        if (beta - before).abs() < FELT_SAME * before.abs() {
-            break;
-        }
+    let feeling = |beta: &[f64]| {
+        let beta = beta.last().copied().unwrap_or(0.0);
+        feeling(problem.groups, &[&variant.felt], &[beta])
+    };
+    if settles && candidate.size.is_some() {
+        with = settled(&problem, with, feeling).1;
+    } else if !variant.felt.is_empty() {
+        with = problem.among(&feeling(&with.beta)).fit(with.hyper, Likelihood::Profile);
     }
+    let beta = with.beta.last().copied().unwrap_or(0.0);
     let gain = with.log_posterior() - before;
     if !admissible(candidate, variant, beta) || gain < ranked.gain {
         // The noise at its start is a fit as well.
@@ -189,10 +201,6 @@ fn refit(
         ..ranked.clone()
     }
 }
-
-/// Rounds in which an effect's size and the response that it brings settle, and the change that is settled.
-const FELT_ROUNDS: usize = 3;
-const FELT_SAME: f64 = 0.1;
 
 /// Groups whose response to the air has some multiples of others.
 pub(super) fn feeling(
@@ -214,6 +222,7 @@ fn free_shapes(
     base: &Solution,
     before: f64,
     sought: Sought<'_>,
+    settles: bool,
 ) -> Vec<RankedGeneric> {
     let mut best: Vec<RankedGeneric> = Vec::new();
     for (index, generic) in sought.generics.iter().enumerate() {
@@ -246,14 +255,26 @@ fn free_shapes(
                 return found.clone();
             }
             let generic = &sought.generics[found.generic];
-            let mut with = problem.with(&generic.columns).fit(base.hyper, Likelihood::Profile);
+            let problem = problem.with(&generic.columns);
+            let mut with = problem.fit(base.hyper, Likelihood::Profile);
             let first = with.beta.len() - generic.columns.len();
+            if settles {
+                with = settled(&problem, with, |_| problem.groups.to_vec()).1;
+            }
             let plain = found.plain.max(with.log_posterior() - before - generic.penalty);
-            if !generic.felt.is_empty() {
-                let felt: Vec<_> = generic.felt.iter().collect();
-                let groups = feeling(problem.groups, &felt, &with.beta[first..]);
-                let again = problem.with(&generic.columns).among(&groups);
-                with = again.fit(with.hyper, Likelihood::Profile);
+            let felt: Vec<_> = generic.felt.iter().collect();
+            let feeling = |beta: &[f64]| feeling(problem.groups, &felt, &beta[first..]);
+            if !felt.is_empty() {
+                let numb = with.clone();
+                with = if settles {
+                    settled(&problem, with, feeling).1
+                } else {
+                    problem.among(&feeling(&with.beta)).fit(with.hyper, Likelihood::Profile)
+                };
+                // What it does to the scatter is known by its size, which means alone may hardly tell.
+                if numb.log_posterior() > with.log_posterior() {
+                    with = numb;
+                }
             }
             let gain = with.log_posterior() - before - generic.penalty;
             if gain < found.gain {
@@ -324,7 +345,7 @@ pub(super) fn thresholds(
                 pulses: &split,
                 columns: problem.columns.clone(),
             };
-            let round = round(&null, base.hyper, sought);
+            let round = round(&null, base.hyper, sought, false);
             (round.best(), round.best_generic())
         })
         .collect();

@@ -125,7 +125,8 @@ pub enum Finding {
     },
     /// Several effects explain it equally well; the first is in the model.
     Class {
-        /// Their names, best first.
+        /// Their names, best first. A motion of the air (`updraft-drift`, `updraft-profile`) or what something
+        /// unknown would depend on (`climb-time`) may be among the others.
         effects: Vec<String>,
         /// Parameters of the first.
         parameters: Vec<Fitted>,
