@@ -209,6 +209,27 @@ fn a_class_gets_a_flight_that_separates_it_better() {
     assert!(search(&known, &present, VEHICLE, &questions, none).unwrap().is_none());
 }
 
+/// A class may have members that are no effects: what something unknown would depend on, and a motion of
+/// the air. They are told from its first as well.
+#[test]
+fn members_that_are_no_effects_are_told_apart_too() {
+    let effects = ["rotor-inflow", "climb-time", "updraft-drift"].map(str::to_owned).to_vec();
+    let parameters = vec![fitted("inflow_share", INFLOW)];
+    let verdict = verdict(vec![Finding::Class { effects, parameters }]);
+    let base = library::builtin(VEHICLE).unwrap();
+    let known = Known::new(&verdict, base, with_inflow(), [3.0, 0.0]);
+    let questions = ask(&verdict);
+    assert_eq!(
+        questions[0].words,
+        "is it rotor-inflow or something unknown that depends on climb speed times time or an updraft \
+         that changes steadily?"
+    );
+    let was = predict(&known, &flown(&known, Elements::PAPER), (false, false), &questions).unwrap();
+    let from: Vec<&str> = was[0].iter().map(|one| one.from.as_str()).collect();
+    assert_eq!(from, ["climb-time", "updraft-drift"]);
+    assert!(least(&was[0]) > 0.5, "{was:?}");
+}
+
 #[test]
 fn what_is_asked_is_what_was_left_open() {
     let name = Finding::Name {

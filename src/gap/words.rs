@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::decide::PRODUCT;
 use super::verdict::{Finding, Fitted, Step, Verdict};
 
 /// One finding as a phrase: `rotor-inflow (inflow_share 0.42, 0.39 to 0.45)`.
@@ -13,7 +14,7 @@ pub fn phrase(finding: &Finding) -> String {
         }
         Finding::Class { effects, parameters } => format!(
             "{}: this flight cannot separate them{}",
-            either(effects),
+            either(&effects.iter().map(|name| member(name)).collect::<Vec<_>>()),
             if parameters.is_empty() {
                 String::new()
             } else {
@@ -27,10 +28,21 @@ pub fn phrase(finding: &Finding) -> String {
     }
 }
 
-fn either(names: &[String]) -> String {
+/// A member of a class in words: effects by their names; motions of the air and what something unknown would
+/// depend on by what they are.
+pub fn member(name: &str) -> &str {
+    match name {
+        "updraft-drift" => "an updraft that changes steadily",
+        "updraft-profile" => "an updraft that grows with height",
+        PRODUCT => "something unknown that depends on climb speed times time",
+        effect => effect,
+    }
+}
+
+fn either(names: &[&str]) -> String {
     match names {
         [] => String::new(),
-        [one] => one.clone(),
+        [one] => (*one).to_owned(),
         [first @ .., last] => format!("{} or {last}", first.join(", ")),
     }
 }

@@ -6,12 +6,12 @@ use minijinja::value::Value;
 use crate::effects;
 use crate::gap::Verdict;
 use crate::gap::verdict::{Detectable, Finding, Fitted, Shrink, Step};
-use crate::gap::words::phrase;
+use crate::gap::words::{member, phrase};
 
 use super::figures::gap::map::ORDER;
 use super::figures::gap::step;
 use super::gap_words::{
-    after_mps, depends_on, interval_to, kind, micro, minus, number, or_none, per_thousand, percent,
+    after_mps, depends_on, kind, micro, minus, number, or_none, per_thousand, percent, range_to,
     regime_title, with_unit,
 };
 use super::page::{Gallery, capitalised};
@@ -118,7 +118,8 @@ pub(super) fn step_section(found: &Step, number_of: usize, figures: &mut Gallery
 
 fn heading(finding: &Finding) -> String {
     let title = |name: &str| {
-        effects::find(name).map_or_else(|| clean(name), |one| one.definition().title.to_owned())
+        effects::find(name)
+            .map_or_else(|| clean(member(name)), |one| one.definition().title.to_owned())
     };
     match finding {
         Finding::Name { effect, .. } => title(effect),
@@ -157,7 +158,7 @@ fn what_it_means(finding: &Finding) -> String {
 /// An effect in the library's own words.
 fn described(name: &str) -> Value {
     effects::find(name).map_or_else(
-        || context! { name => clean(name), title => clean(name), what => "", why => "", formula => "", source => "" },
+        || context! { name => clean(name), title => clean(member(name)), what => "", why => "", formula => "", source => "" },
         |effect| {
             let one = effect.definition();
             context! {
@@ -192,8 +193,10 @@ pub(super) fn gap_rows(verdict: &Verdict) -> Vec<Value> {
             let (gone, range) = percent(shrink.excess_shrink);
             context! {
                 name,
-                before => interval_to(shrink.before_us, 1),
-                after => interval_to(shrink.after_us, 1),
+                before => fixed(shrink.before_us.value, 1),
+                before_range => range_to(shrink.before_us, 1),
+                after => fixed(shrink.after_us.value, 1),
+                after_range => range_to(shrink.after_us, 1),
                 mps => format!("{} → {}", fixed(shrink.before_mps, 2), fixed(shrink.after_mps, 2)),
                 without => format!(
                     "{} → {}",
@@ -202,11 +205,8 @@ pub(super) fn gap_rows(verdict: &Verdict) -> Vec<Value> {
                 ),
                 floor => fixed(shrink.floor_us, 1),
                 chi2 => format!("{} → {}", reduced(shrink.chi2.0), reduced(shrink.chi2.1)),
-                shrink => if verdict.steps.is_empty() {
-                    NONE.to_owned()
-                } else {
-                    format!("{gone} ({range})")
-                },
+                shrink => if verdict.steps.is_empty() { NONE } else { &gone },
+                shrink_range => if verdict.steps.is_empty() { "" } else { &range },
             }
         })
         .collect()

@@ -11,7 +11,7 @@ pub(super) fn micro(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut word = String::new();
     for c in text.chars().chain(std::iter::once('\0')) {
-        if c.is_alphanumeric() {
+        if c.is_alphanumeric() || c == '_' {
             word.push(c);
             continue;
         }
@@ -35,10 +35,13 @@ pub(super) fn number(value: f64) -> String {
 }
 
 /// A value with its interval: `0.40 (0.39 to 0.41)`.
-pub(super) fn interval_to(interval: Interval, decimals: usize) -> String {
-    let Interval { value, low, high } = interval;
-    let [value, low, high] = [value, low, high].map(|one| fixed(one, decimals));
-    format!("{value} ({low} to {high})")
+fn interval_to(interval: Interval, decimals: usize) -> String {
+    format!("{} ({})", fixed(interval.value, decimals), range_to(interval, decimals))
+}
+
+/// Only the ends of an interval.
+pub(super) fn range_to(interval: Interval, decimals: usize) -> String {
+    format!("{} to {}", fixed(interval.low, decimals), fixed(interval.high, decimals))
 }
 
 /// A share with its interval, per cent, to the digits that the interval supports.
@@ -161,5 +164,6 @@ mod tests {
         assert_eq!(micro("from 52.1 to 5.1 us; thus"), "from 52.1 to 5.1 µs; thus");
         assert_eq!(micro("0.5 h us"), "0.5 h µs");
         assert_eq!(micro("us/(m/s) in use"), "µs/(m/s) in use");
+        assert_eq!(micro("drift_us 17 us"), "drift_us 17 µs");
     }
 }

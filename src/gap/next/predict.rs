@@ -155,9 +155,14 @@ impl Scenery<'_> {
         };
         let own = solution.white(&self.merged(light, loaded));
         let strength = solution.information(&own).max(0.0).sqrt();
+        let generics = all(scene, &self.comparison.headings());
         let mut separations = Vec::new();
         for other in others {
-            let Some(rival) = self.candidate(&without, other)? else { continue };
+            let Some(rival) = self.candidate(&without, other)? else {
+                // What something unknown would depend on.
+                separations.extend(from_shape(solution, &own, &generics, other));
+                continue;
+            };
             // The form and size of the rival that looks most like it, of those that it can have.
             let nearest = rival
                 .variants
@@ -167,7 +172,8 @@ impl Scenery<'_> {
                     let alike = solution.likeness(&own, &white).clamp(-1.0, 1.0);
                     let per_time = solution.information(&white).max(0.0).sqrt();
                     let best = alike * strength / per_time.max(1e-12);
-                    let times = if rival.was_there { best } else { best.clamp(0.0, MOST_TIMES) };
+                    let is_free = rival.was_there || rival.size.is_none();
+                    let times = if is_free { best } else { best.clamp(0.0, MOST_TIMES) };
                     let left = strength * strength - 2.0 * times * alike * strength * per_time
                         + (times * per_time).powi(2);
                     (left.max(0.0).sqrt(), times, variant.size)
@@ -214,20 +220,29 @@ impl Scenery<'_> {
         };
         let along = |bins: &Vec<f64>| bins.iter().map(|x| interpolated(shape, *x)).collect();
         let target = solution.white(&Column::Shared(own.along.iter().map(along).collect()));
-        let strength = solution.information(&target).max(0.0).sqrt();
-        let mut separations: Vec<Separation> = Vec::new();
-        for rival in generics.iter().filter(|generic| generic.depends_on != depends_on) {
-            let z = strength * (1.0 - explained(solution, &target, rival)).max(0.0).sqrt();
-            let same = |other: &&mut Separation| other.from == rival.depends_on;
-            if let Some(other) = separations.iter_mut().find(same) {
-                other.z = other.z.min(z);
-            } else {
-                let from = rival.depends_on.to_owned();
-                separations.push(Separation { from, z, size: None });
+        let mut others: Vec<&str> = Vec::new();
+        for rival in generics.iter().map(|generic| generic.depends_on) {
+            if rival != depends_on && !others.contains(&rival) {
+                others.push(rival);
             }
         }
-        separations
+        let from = |other: &str| from_shape(solution, &target, &generics, other);
+        others.into_iter().filter_map(from).collect()
     }
+}
+
+/// How well something is told from any free shape along a signal.
+fn from_shape(
+    solution: &Solution,
+    target: &White,
+    generics: &[Generic],
+    depends_on: &str,
+) -> Option<Separation> {
+    let strength = solution.information(target).max(0.0).sqrt();
+    let along = generics.iter().filter(|generic| generic.depends_on == depends_on);
+    let left = along.map(|generic| (1.0 - explained(solution, target, generic)).max(0.0).sqrt());
+    let z = strength * left.reduce(f64::min)?;
+    Some(Separation { from: depends_on.to_owned(), z, size: None })
 }
 
 /// Share of something that a free shape explains.

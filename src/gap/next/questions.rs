@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::gap::verdict::{Detectable, Finding, Shape, Verdict};
+use crate::gap::words::member;
 
 /// One thing that the flight did not tell.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,7 +70,10 @@ pub fn ask(verdict: &Verdict) -> Vec<Question> {
     let found = verdict.steps.iter().filter_map(|step| match &step.finding {
         Finding::Name { .. } => None,
         Finding::Class { effects, parameters } => Some(Question {
-            words: format!("is it {}?", effects.join(" or ")),
+            words: {
+                let members: Vec<&str> = effects.iter().map(|name| member(name)).collect();
+                format!("is it {}?", members.join(" or "))
+            },
             sought: Sought::Apart {
                 effects: effects.clone(),
                 size: parameters

@@ -5,7 +5,7 @@ use super::known::{Flight, Known, cells, charge_of};
 use crate::effects::battery::cell_v;
 use crate::gap::GapError;
 use crate::gap::bins::{Bin, BinValues};
-use crate::gap::candidates::{Candidate, library};
+use crate::gap::candidates::{Candidate, library, of_the_air};
 use crate::gap::compare::{Comparison, Simulated};
 use crate::gap::data::{Data, PlannedPart};
 use crate::gap::gls::{Column, Problem, Solution, Split};
@@ -145,14 +145,20 @@ impl<'a> Scenery<'a> {
         Ok(Problem::new(&patterns, &split).with(&columns).at(&self.known.hyper))
     }
 
-    /// An effect's forms, held against a vehicle.
+    /// An effect's forms, or a motion of the air, held against a vehicle.
     pub(super) fn candidate(
         &self,
         vehicle: &Vehicle,
         effect: &str,
     ) -> Result<Option<Candidate>, GapError> {
         let find = |vehicle: &Vehicle| -> Result<Option<Candidate>, GapError> {
-            let all = library(vehicle, &self.comparison.scene)?;
+            let scene = &self.comparison.scene;
+            let mut all = library(vehicle, scene)?;
+            all.extend(of_the_air(
+                scene,
+                &self.comparison.patterns(vehicle, 0.0)?,
+                &self.known.hyper,
+            ));
             Ok(all.into_iter().find(|candidate| candidate.name == effect))
         };
         let Some(mut light) = find(vehicle)? else { return Ok(None) };
