@@ -148,7 +148,7 @@ fn the_next_flight(bencher: Bencher<'_, '_>) {
 
 fn proposed(fleet: &Fleet, explained: &Explained) -> Choice {
     let verdict = &explained.verdict;
-    let known = Known::new(verdict, base(), explained.model.clone(), WIND_MPS);
+    let known = Known::new(verdict, explained.model.clone(), WIND_MPS);
     let present = next::Flight::new(&known, fleet.plan.clone()).unwrap();
     let is_asked = |question: &Question| match &question.sought {
         Sought::Seen { effect } => matters(&known, &present, effect).unwrap(),

@@ -47,8 +47,7 @@ fn with_noise(change: impl Fn(&mut Noise)) -> Known {
     };
     let mut said = verdict(vec![finding]);
     change(&mut said.noise);
-    let base = library::builtin(VEHICLE).unwrap();
-    Known::new(&said, base, with_inflow(), [3.0, 0.0])
+    Known::new(&said, with_inflow(), [3.0, 0.0])
 }
 
 fn flown(known: &Known, elements: Elements) -> Flight {
@@ -179,8 +178,7 @@ fn the_ground_shows_only_near_it() {
 #[test]
 fn a_class_gets_a_flight_that_separates_it_better() {
     let verdict = verdict(vec![climb_class()]);
-    let base = library::builtin(VEHICLE).unwrap();
-    let known = Known::new(&verdict, base, with_inflow(), [3.0, 0.0]);
+    let known = Known::new(&verdict, with_inflow(), [3.0, 0.0]);
     let questions = ask(&verdict);
     assert_eq!(questions.len(), 1);
     let present = paper();
@@ -216,8 +214,7 @@ fn members_that_are_no_effects_are_told_apart_too() {
     let effects = ["rotor-inflow", "climb-time", "updraft-drift"].map(str::to_owned).to_vec();
     let parameters = vec![fitted("inflow_share", INFLOW)];
     let verdict = verdict(vec![Finding::Class { effects, parameters }]);
-    let base = library::builtin(VEHICLE).unwrap();
-    let known = Known::new(&verdict, base, with_inflow(), [3.0, 0.0]);
+    let known = Known::new(&verdict, with_inflow(), [3.0, 0.0]);
     let questions = ask(&verdict);
     assert_eq!(
         questions[0].words,

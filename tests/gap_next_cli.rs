@@ -41,6 +41,37 @@ fn without_a_verdict_or_a_question_it_says_so() {
 }
 
 #[test]
+fn a_verdict_of_another_flight_is_not_taken() {
+    let bench = Bench::new();
+    let mut other = verdict(vec![climb_class()]);
+    other.data.groups = vec![("climbers".to_owned(), 4)];
+    compared(&bench, &other);
+    let ended = bench.expect(2, &["gap", "next", "campaign"]);
+    assert!(ended.err.contains("a group \"climbers\", which the flight calibration"), "{ended}");
+    other.data.groups.clear();
+    other.data.drones = 49;
+    compared(&bench, &other);
+    let ended = bench.expect(2, &["gap", "next", "campaign"]);
+    assert!(ended.err.contains("it compares 49 drones, and the flight calibration has 4"), "{ended}");
+    other.schema = "updraft.verdict/0".to_owned();
+    compared(&bench, &other);
+    let ended = bench.expect(2, &["gap", "next", "campaign"]);
+    assert!(ended.err.contains("its schema is \"updraft.verdict/0\""), "{ended}");
+}
+
+#[test]
+fn a_comparison_may_be_elsewhere() {
+    let bench = Bench::new();
+    compared(&bench, &verdict(vec![climb_class()]));
+    std::fs::rename(bench.path("campaign/gap"), bench.path("elsewhere")).unwrap();
+    let ended = bench.expect(5, &["gap", "next", "campaign", "--gap", "nowhere"]);
+    assert!(ended.err.contains("nowhere has no verdict.json"), "{ended}");
+    bench.expect(0, &["gap", "next", "campaign", "--gap", "elsewhere", "--no-verify"]);
+    assert!(bench.path("elsewhere/next.toml").is_file());
+    assert!(!bench.path("campaign/gap").exists());
+}
+
+#[test]
 fn the_template_is_one_that_plan_takes_and_check_passes() {
     let bench = Bench::new();
     compared(&bench, &verdict(vec![climb_class()]));

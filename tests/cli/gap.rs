@@ -287,6 +287,16 @@ fn a_file_where_the_verdict_should_go_is_kept() {
 }
 
 #[test]
+fn the_report_of_another_command_is_kept() {
+    let bench = campaign();
+    let page = bench.path("campaign/report/index.html");
+    fs::create_dir_all(page.parent().unwrap()).unwrap();
+    fs::write(&page, "mine").unwrap();
+    assert_snapshot!(refused(&bench, 2, &["campaign", "-o", "campaign"]));
+    assert_eq!(fs::read_to_string(page).unwrap(), "mine");
+}
+
+#[test]
 fn options_that_exclude_each_other_are_refused() {
     let bench = campaign();
     assert_snapshot!(refused(&bench, 2, &["campaign", "--plan", "campaign/plan.json"]));

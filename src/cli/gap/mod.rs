@@ -144,6 +144,9 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
             folder.display()
         )));
     }
+    if args.output.is_some() {
+        has_room(&folder)?;
+    }
     let simulated = args.simulated.as_deref().map(|path| one_flight(path, None)).transpose()?;
     let simulated = simulated.map(|(flight, _)| flight);
     let hover = args.campaign.as_ref().and_then(|_| known_air(others));
@@ -189,6 +192,19 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
 /// File names in the folder of a comparison.
 const VERDICT: &str = "verdict.json";
 const MODEL: &str = "model.toml";
+
+/// Refuses a named folder with files of somebody else's where this command's would go.
+fn has_room(folder: &Path) -> Result<(), CommandError> {
+    let page = Path::new("report").join(report::PAGE_FILE);
+    let theirs = [Path::new(MODEL), &page].into_iter().find(|file| folder.join(file).exists());
+    match theirs {
+        Some(file) if !folder.join(VERDICT).exists() => Err(CommandError::Usage(format!(
+            "{} is there and was not made by `updraft gap`; choose another folder with -o",
+            folder.join(file).display()
+        ))),
+        _ => Ok(()),
+    }
+}
 
 /// What was chosen, for the page.
 fn settings(args: &GapArgs, found: &Found, vehicle: &Vehicle) -> Vec<(&'static str, String)> {

@@ -20,6 +20,7 @@ use crate::gap::next::questions::Kind;
 use crate::gap::next::result::{Asked, Told};
 use crate::gap::next::search::{Aim, Choice, search};
 use crate::gap::next::{Flight, Known, NEXT_SCHEMA, Next, Question, Sought, ask};
+use crate::gap::verdict::VERDICT_SCHEMA;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::mission::resolve::{ResolvedFlight, resolve_text};
@@ -49,6 +50,9 @@ found, and simulates it with each answer in turn. Exit code 5: there is no verdi
 pub(super) struct NextArgs {
     /// Campaign folder that `updraft gap` has compared
     campaign: PathBuf,
+    /// Folder of the comparison [default: CAMPAIGN/gap]
+    #[arg(long, value_name = "FOLDER")]
+    gap: Option<PathBuf>,
     /// Fisher z that every question should reach: 5 is found nearly always
     #[arg(long, value_name = "Z", default_value_t = 5.0, value_parser = z)]
     z: f64,
@@ -67,9 +71,16 @@ pub(super) struct NextArgs {
     /// Seed of the simulated flights
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder for next.toml and next.json [default: CAMPAIGN/gap]
+    /// Folder for next.toml and next.json [default: that of the comparison]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
+}
+
+impl NextArgs {
+    /// Folder of the comparison.
+    fn compared(&self) -> PathBuf {
+        self.gap.clone().unwrap_or_else(|| self.campaign.join("gap"))
+    }
 }
 
 fn number(text: &str, low: f64, high: f64) -> Result<f64, String> {
@@ -95,7 +106,7 @@ pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandErr
     let before = Before::read(args)?;
     let wind_mps = [args.wind, 0.0];
     let verdict = &before.verdict;
-    let known = Known::new(verdict, before.base.clone(), before.model.clone(), wind_mps);
+    let known = Known::new(verdict, before.model.clone(), wind_mps);
     let present = Flight::new(&known, before.plan.clone())?;
     let (questions, passed_over) = questions(&known, &present, verdict)?;
     if questions.is_empty() {
@@ -115,7 +126,7 @@ pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandErr
     })?;
     let mut next = result(&before, &questions, &choice, args.z);
     next.notes = notes(&questions, &passed_over, &choice, &known);
-    let folder = args.output.clone().unwrap_or_else(|| args.campaign.join("gap"));
+    let folder = args.output.clone().unwrap_or_else(|| args.compared());
     crate::base::file::create_folder(&folder)?;
     let _lock = context.lock(&folder)?;
     let text = choice.elements.template(&choice.plan, &before.word, &head(&next), &next.briefing);
@@ -167,7 +178,6 @@ struct Before {
     place: PathBuf,
     verdict: Verdict,
     plan: Plan,
-    base: Vehicle,
     model: Vehicle,
     /// The template's word for the vehicle.
     word: String,
@@ -176,25 +186,54 @@ struct Before {
 impl Before {
     fn read(args: &NextArgs) -> Result<Self, CommandError> {
         let campaign = &args.campaign;
-        let place = campaign.join("gap").join(VERDICT);
+        let compared = args.compared();
+        let place = compared.join(VERDICT);
         if !place.is_file() {
             // A folder that is not there is another matter than one that was not compared.
             std::fs::metadata(campaign).map_err(|error| FileError::new("read", campaign, error))?;
+            let at = match &args.gap {
+                Some(folder) => format!("{} has no {VERDICT}", folder.display()),
+                None => format!("{} has no gap/{VERDICT}", campaign.display()),
+            };
             return Err(CommandError::Nothing(format!(
-                "{} has no gap/{VERDICT}: compare it first (`updraft gap {}`)",
-                campaign.display(),
+                "{at}: compare it first (`updraft gap {}`), or say where that was put (--gap)",
                 campaign.display()
             )));
         }
         let verdict: Verdict = read_json(&place)?;
         let (folder, plan) = flight_of(campaign, args.flight.as_deref())?;
+        is_of(&verdict, &plan).map_err(|why| {
+            CommandError::Usage(format!("{} cannot be used: {why}", place.display()))
+        })?;
         let vehicle = folder.vehicle();
-        let base = library::load(&vehicle.display().to_string())?;
-        let model = campaign.join("gap").join(MODEL);
+        let model = compared.join(MODEL);
         let model = library::load(&model.display().to_string())?;
         let is_builtin = library::names().any(|name| name == plan.vehicle);
         let word = if is_builtin { plan.vehicle.clone() } else { vehicle.display().to_string() };
-        Ok(Self { place, verdict, plan, base, model, word })
+        Ok(Self { place, verdict, plan, model, word })
+    }
+}
+
+/// Whether a verdict can be one of this flight; else why not.
+fn is_of(verdict: &Verdict, plan: &Plan) -> Result<(), String> {
+    if verdict.schema != VERDICT_SCHEMA {
+        return Err(format!("its schema is \"{}\", not {VERDICT_SCHEMA}", verdict.schema));
+    }
+    let names = |group: &(String, usize)| plan.groups.iter().any(|known| known.name == group.0);
+    let stranger = verdict.data.groups.iter().find(|group| !names(group));
+    match stranger {
+        Some((name, _)) => Err(format!(
+            "it compares a group \"{name}\", which the flight {} does not have: name the flight that \
+             was compared (--flight)",
+            plan.name
+        )),
+        None if verdict.data.drones > plan.slots.len() => Err(format!(
+            "it compares {} drones, and the flight {} has {}",
+            verdict.data.drones,
+            plan.name,
+            plan.slots.len()
+        )),
+        None => Ok(()),
     }
 }
 

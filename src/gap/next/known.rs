@@ -21,8 +21,6 @@ const LEAST_NOISE: f64 = 1e-3;
 /// What is known from the flight before.
 #[derive(Clone, Debug)]
 pub struct Known {
-    /// The vehicle that was held against the logs.
-    pub base: Vehicle,
     /// The vehicle with what was found.
     pub model: Vehicle,
     /// Sizes that were fitted; they stay free.
@@ -58,8 +56,8 @@ fn hyper_of(noise: &Noise) -> Hyper {
 }
 
 impl Known {
-    /// From a verdict with its two vehicles.
-    pub fn new(verdict: &Verdict, base: Vehicle, model: Vehicle, wind_mps: [f64; 2]) -> Self {
+    /// From a verdict with its model.
+    pub fn new(verdict: &Verdict, model: Vehicle, wind_mps: [f64; 2]) -> Self {
         let mut parameters = Vec::new();
         for step in &verdict.steps {
             let (effect, fitted) = match &step.finding {
@@ -73,7 +71,7 @@ impl Known {
         // The search says so where it is so.
         let has_voltage = !verdict.cautions.iter().any(|text| text.contains("BAT.VoltR"));
         let hyper = hyper_of(&verdict.noise);
-        Self { base, model, parameters, hyper, wind_mps, has_voltage }
+        Self { model, parameters, hyper, wind_mps, has_voltage }
     }
 }
 
