@@ -226,12 +226,15 @@ impl Data {
         let mut holes = Vec::new();
         for (slot, place_m, values) in drones {
             let there: Vec<Option<BinValues>> = kept.iter().map(|bin| values[*bin]).collect();
-            let count = there.iter().filter(|value| value.is_some()).count();
-            if (count as f64) < DRONE_SHARE * kept.len() as f64 || count == 0 {
+            let count = |values: &[Option<BinValues>]| values.iter().flatten().count();
+            if (count(&there) as f64) < DRONE_SHARE * kept.len() as f64 || count(&there) == 0 {
+                // Where no bin is common to the fleet, each drone's own say how bad it is.
+                let of = if kept.is_empty() { &values } else { &there };
                 self.left_out.push(format!(
-                    "slot {slot}: only {count} of {} steady bins are usable (gaps in the log, \
-                     motors at a limit, or another flight)",
-                    kept.len()
+                    "slot {slot}: only {} of {} steady bins are usable (gaps in the log, motors at a \
+                     limit, or another flight)",
+                    count(of),
+                    of.len()
                 ));
                 continue;
             }

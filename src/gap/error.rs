@@ -21,8 +21,8 @@ pub enum GapError {
     },
     /// Too few bins on both sides.
     #[error(
-        "measurement and simulation have too little steady flight in common: were both flown from \
-         the same plan?"
+        "measurement and simulation have too little steady flight in common: gaps, motors at their \
+         limits (`updraft analyze` says where), or were they flown from different plans?"
     )]
     NothingCommon,
     /// The pulse never changes.
