@@ -1,14 +1,20 @@
 //! What naming is for: the error of the map of the air, by the model before and after.
 //!
 //! The law of the model is inverted in a measurement flight whose true air is known. What one drone's
-//! rotors differ by is its mean residual in the calibration's hovers, as the paper's baseline (eq. 5).
+//! rotors differ by from the others' is its mean residual in the calibration's hovers, as the paper's
+//! baseline (eq. 5). What all drones have in common is told from the updraft that they share by the noise that
+//! was found: air that lasts for minutes has no mean of zero in either flight, but where the response changes
+//! with the speed it shows as a change between rungs and hovers, and both flights together say more than one.
 
 use std::collections::BTreeMap;
 
 use super::compare::{Comparison, Simulated};
 use super::data::{Data, Flown};
 use super::error::GapError;
+use super::explain::Found;
+use super::gls::{Problem, Split};
 use super::make::{Explained, Input};
+use super::refine::slopes;
 use super::scene::Scene;
 use super::verdict::{MapError, MapGain};
 use crate::analysis::TruthSeries;
@@ -53,37 +59,79 @@ pub fn map_gain(
     if ladder.drones() == 0 || hover.drones() == 0 {
         return Ok(None);
     }
-    let gusts_mps = explained.found.gusts_mps;
-    let errors = |vehicle: &Vehicle| -> Result<(Vec<f64>, Vec<f64>), GapError> {
+    let found = &explained.found;
+    let errors = |vehicle: &Vehicle| -> Result<Errors, GapError> {
         let calibration = Comparison::new(&ladder, vehicle, &Simulated::Refly(plan), Some(plan))?;
-        let offsets_us = offsets(&calibration, gusts_mps)?;
         let flight = Simulated::Refly(measured.plan);
         let comparison = Comparison::new(&hover, vehicle, &flight, Some(measured.plan))?;
-        errors_of(&comparison, gusts_mps, &offsets_us, measured.truth)
+        let zero = Zero::of(&calibration, found)?.and(Zero::of(&comparison, found)?);
+        let offsets_us = about(zero.us, &offsets(&calibration, found.gusts_mps)?);
+        errors_of(&comparison, found.gusts_mps, (&offsets_us, zero.variance_us2), measured.truth)
     };
-    let (before, zero) = errors(input.vehicle)?;
-    let (after, _) = errors(&explained.found.vehicle)?;
+    let before = errors(input.vehicle)?;
+    let after = errors(&found.vehicle)?;
     let drones = hover
         .groups
         .iter()
         .flat_map(|group| &group.slots)
         .filter(|slot| measured.truth.contains_key(slot))
         .count();
-    Ok((!before.is_empty() && !after.is_empty()).then(|| MapGain {
+    Ok((!before.errors_mps.is_empty() && !after.errors_mps.is_empty()).then(|| MapGain {
         flight: measured.name.to_owned(),
         drones,
-        values: after.len(),
-        zero_mps: rms(&zero),
-        before: summed(&before),
-        after: summed(&after),
+        values: after.errors_mps.len(),
+        zero_mps: rms(&after.truths_mps),
+        common_sd_mps: after.common_sd_mps,
+        before: summed(&before.errors_mps),
+        after: summed(&after.errors_mps),
     }))
 }
 
-/// Each drone's mean residual in the hovers of its calibration, us.
-fn offsets(calibration: &Comparison, gusts_mps: f64) -> Result<BTreeMap<u16, f64>, GapError> {
-    let residual = calibration.residual(&calibration.vehicle, gusts_mps)?;
+/// What all drones of a flight need more than the model says.
+#[derive(Clone, Copy, Debug)]
+struct Zero {
+    us: f64,
+    variance_us2: f64,
+}
+
+impl Zero {
+    /// Of a flight, with everything found in doubt by its standard error.
+    fn of(flight: &Comparison, found: &Found) -> Result<Self, GapError> {
+        let vehicle = &flight.vehicle;
+        let patterns = flight.patterns(vehicle, found.gusts_mps)?;
+        let split = Split::of(&flight.residual(vehicle, found.gusts_mps)?);
+        let mut doubts = slopes(flight, vehicle, &found.parameters)?;
+        for (doubt, (_, error)) in doubts.iter_mut().zip(&found.values) {
+            let per_size = doubt.clone();
+            *doubt = per_size.each(|group, drone, bin| error * per_size.at(group, drone, bin));
+        }
+        let solution = Problem::new(&patterns, &split).doubting(&doubts).at(&found.hyper);
+        let variance_us2 = solution.covariance()[(0, 0)];
+        Ok(Self { us: solution.beta[0], variance_us2 })
+    }
+
+    /// Of both, each by what it says.
+    fn and(self, other: Self) -> Self {
+        let all = self.variance_us2 + other.variance_us2;
+        let share = if all > 0.0 { self.variance_us2 / all } else { 0.5 };
+        Self {
+            us: self.us + share * (other.us - self.us),
+            variance_us2: share * other.variance_us2,
+        }
+    }
+}
+
+/// The same about another mean.
+fn about(mean_us: f64, offsets_us: &BTreeMap<u16, f64>) -> BTreeMap<u16, f64> {
+    let was_us = offsets_us.values().sum::<f64>() / offsets_us.len().max(1) as f64;
+    offsets_us.iter().map(|(slot, offset_us)| (*slot, offset_us - was_us + mean_us)).collect()
+}
+
+/// Each drone's mean residual in the hovers of a flight, us.
+fn offsets(flight: &Comparison, gusts_mps: f64) -> Result<BTreeMap<u16, f64>, GapError> {
+    let residual = flight.residual(&flight.vehicle, gusts_mps)?;
     let mut offsets_us = BTreeMap::new();
-    for (group, drones) in calibration.data.groups.iter().zip(&residual) {
+    for (group, drones) in flight.data.groups.iter().zip(&residual) {
         for (slot, values) in group.slots.iter().zip(drones) {
             let hovers = group.bins.iter().zip(values).filter(|(bin, _)| bin.kind.is_hover());
             let (sum, count) = hovers.fold((0.0, 0.0), |(s, n), (_, value)| (s + value, n + 1.0));
@@ -95,17 +143,26 @@ fn offsets(calibration: &Comparison, gusts_mps: f64) -> Result<BTreeMap<u16, f64
     Ok(offsets_us)
 }
 
-/// Errors of the running means of the estimates, and the truth itself, m/s.
+/// How wrong the running means of the estimates are.
+struct Errors {
+    errors_mps: Vec<f64>,
+    /// The truth itself.
+    truths_mps: Vec<f64>,
+    /// What the doubt about the drones' common zero makes of the air.
+    common_sd_mps: f64,
+}
+
+/// Inverts a model in a flight, with each drone's offset and the variance of what they have in common.
 fn errors_of(
     comparison: &Comparison,
     gusts_mps: f64,
-    offsets_us: &BTreeMap<u16, f64>,
+    (offsets_us, variance_us2): (&BTreeMap<u16, f64>, f64),
     truth: &BTreeMap<u16, TruthSeries>,
-) -> Result<(Vec<f64>, Vec<f64>), GapError> {
+) -> Result<Errors, GapError> {
     let model = Model::of(&comparison.vehicle)?;
     let residual = comparison.residual(&comparison.vehicle, gusts_mps)?;
     let Comparison { data, scene: Scene { signals, .. }, .. } = comparison;
-    let (mut errors, mut truths) = (Vec::new(), Vec::new());
+    let (mut errors_mps, mut truths_mps, mut doubts_mps) = (Vec::new(), Vec::new(), Vec::new());
     for ((group, signals), drones) in data.groups.iter().zip(signals).zip(&residual) {
         for (slot, values) in group.slots.iter().zip(drones) {
             let (Some(offset_us), Some(truth)) = (offsets_us.get(slot), truth.get(slot)) else {
@@ -116,6 +173,7 @@ fn errors_of(
                 .zip(values)
                 .map(|(signals, value)| inverted(&model, signals, value - offset_us))
                 .collect();
+            doubts_mps.extend(signals.iter().map(|at| inverted(&model, at, variance_us2.sqrt())));
             for (bin, middle) in group.bins.iter().enumerate() {
                 let near = |other: &usize| {
                     (group.bins[*other].middle_s() - middle.middle_s()).abs() < HALF_S
@@ -127,13 +185,13 @@ fn errors_of(
                 if group.bins[bin].kind.is_hover()
                     && let Some(true_mps) = true_mps.filter(|value| value.is_finite())
                 {
-                    errors.push(mean - true_mps);
-                    truths.push(true_mps);
+                    errors_mps.push(mean - true_mps);
+                    truths_mps.push(true_mps);
                 }
             }
         }
     }
-    Ok((errors, truths))
+    Ok(Errors { errors_mps, truths_mps, common_sd_mps: rms(&doubts_mps) })
 }
 
 /// The updraft in which the model asks for so much more pulse, m/s.
@@ -179,6 +237,22 @@ mod tests {
             let found = inverted(&model, &signals, more_us);
             assert!((found - updraft_mps).abs() < 1e-6, "{updraft_mps}: {found}");
         }
+    }
+
+    #[test]
+    fn two_flights_count_by_what_they_say() {
+        let one = Zero { us: 4.0, variance_us2: 4.0 };
+        let both = one.and(Zero { us: 9.0, variance_us2: 1.0 });
+        assert!((both.us - 8.0).abs() < 1e-12 && (both.variance_us2 - 0.8).abs() < 1e-12);
+        let sure = one.and(Zero { us: 9.0, variance_us2: 0.0 });
+        assert!((sure.us - 9.0).abs() < 1e-12 && sure.variance_us2 == 0.0);
+    }
+
+    #[test]
+    fn offsets_keep_their_differences_about_another_mean() {
+        let moved = about(10.0, &BTreeMap::from([(1, 3.0), (2, 6.0), (3, 0.0)]));
+        assert_eq!(moved, BTreeMap::from([(1, 10.0), (2, 13.0), (3, 7.0)]));
+        assert!(about(10.0, &BTreeMap::new()).is_empty());
     }
 
     #[test]

@@ -332,6 +332,10 @@ pub struct MapGain {
     pub values: usize,
     /// What answering zero would be wrong by: the root mean square of the true air, m/s.
     pub zero_mps: f64,
+    /// How well the zero that all drones have in common is known, m/s, standard deviation: the air that they
+    /// share has no mean of zero in a flight.
+    #[serde(default)]
+    pub common_sd_mps: f64,
     /// By the model that was held against the logs.
     pub before: MapError,
     /// With what was found.

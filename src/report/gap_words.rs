@@ -56,7 +56,7 @@ pub(super) fn map_words(map: &MapGain) -> String {
     format!(
         "The map of the air of {} by the model, against the truth ({}, running means of 10 s): rms \
          error {} m/s before, {} m/s after (answering zero: {}); what all drones have in common {} \
-         before, {} after; the rest {} and {}",
+         before, {} after (by the air that both flights shared ±{} is to be expected); the rest {} and {}",
         clean(&map.flight),
         count(map.drones, "drone"),
         fixed(map.before.rms_mps, 2),
@@ -64,6 +64,7 @@ pub(super) fn map_words(map: &MapGain) -> String {
         fixed(map.zero_mps, 2),
         signed(map.before.bias_mps),
         signed(map.after.bias_mps),
+        fixed(map.common_sd_mps, 2),
         fixed(map.before.without_bias_mps, 2),
         fixed(map.after.without_bias_mps, 2),
     )

@@ -150,6 +150,7 @@ pub(crate) fn nothing() -> Verdict {
             drones: 7,
             values: 1200,
             zero_mps: 0.42,
+            common_sd_mps: 0.21,
             before: MapError { rms_mps: 0.61, bias_mps: -0.5, without_bias_mps: 0.35 },
             after: MapError { rms_mps: 0.21, bias_mps: 0.15, without_bias_mps: 0.15 },
         }),
