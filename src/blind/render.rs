@@ -86,10 +86,13 @@ fn demand(metric: &Metric, demand: &Demand) -> String {
         }
         Demand::Within { low, high } => format!("{} to {}", percent(low), percent(high)),
     };
-    let met = match demand.is_met(metric) {
-        Some(true) => "met",
-        Some(false) => "missed",
-        None => "",
+    let met = match demand.missed_by(metric) {
+        Some(0.0) => "met".to_owned(),
+        Some(by) => {
+            let chance = if demand.may_be_chance(metric) { ", may be chance" } else { "" };
+            format!("missed by {:.1}{chance}", 100.0 * by)
+        }
+        None => String::new(),
     };
     format!("{words} {met}")
 }

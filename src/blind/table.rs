@@ -128,15 +128,26 @@ pub struct EffectRow {
 }
 
 impl Demand {
-    /// Whether it is met.
-    pub fn is_met(&self, metric: &Metric) -> Option<bool> {
+    /// By how much it is missed; 0: met.
+    pub fn missed_by(&self, metric: &Metric) -> Option<f64> {
         let value = metric.value?;
-        Some(match *self {
-            Self::AtLeast { bound } => value >= bound,
-            Self::AtMost { bound } => value <= bound,
-            Self::UpperAtMost { bound } => metric.interval.map_or(value, |(_, high)| high) <= bound,
-            Self::Within { low, high } => (low..=high).contains(&value),
-        })
+        let by = match *self {
+            Self::AtLeast { bound } => bound - value,
+            Self::AtMost { bound } => value - bound,
+            Self::UpperAtMost { bound } => metric.interval.map_or(value, |(_, high)| high) - bound,
+            Self::Within { low, high } => (low - value).max(value - high),
+        };
+        Some(by.max(0.0))
+    }
+
+    /// Whether so few flights could have missed it by chance: the interval has what is demanded.
+    pub fn may_be_chance(&self, metric: &Metric) -> bool {
+        let Some((from, to)) = metric.interval else { return false };
+        match *self {
+            Self::AtLeast { bound } => to >= bound,
+            Self::AtMost { bound } | Self::UpperAtMost { bound } => from <= bound,
+            Self::Within { low, high } => to >= low && from <= high,
+        }
     }
 }
 
@@ -202,9 +213,11 @@ fn effects(settings: &Settings, outcomes: &[Outcome]) -> Vec<EffectRow> {
                     protocol: protocol.name().to_owned(),
                     kind: kind.name.to_owned(),
                     count: of.len(),
-                    named: called(Called::Named),
+                    named: if kind.foreign { 0 } else { called(Called::Named) },
                     in_class: called(Called::InClass),
-                    unknown: called(Called::Unknown),
+                    // What no library has is right to be unknown.
+                    unknown: called(Called::Unknown)
+                        + if kind.foreign { called(Called::Named) } else { 0 },
                     silent: called(Called::Silent),
                     error: median(&errors),
                 });

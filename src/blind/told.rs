@@ -80,6 +80,7 @@ pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
             format!("Wrong: nothing was hidden, and {} was named.", outcome.found.join(" and "))
         });
     } else {
+        words.extend(no_shrink(verdict));
         let in_class = |name: &str| {
             outcome.hidden.iter().any(|one| super::classes::equivalent(&one.effect, name))
         };
@@ -105,8 +106,38 @@ pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
     words
 }
 
+/// Effects that drones differ by: the fleet's mean does not feel them.
+const SPREADS: [&str; 2] = ["mass-spread", "thrust-spread"];
+
+/// Why a gap did not shrink though something was found.
+fn no_shrink(verdict: &Verdict) -> Option<String> {
+    let gap = verdict.gap.drones.or(verdict.gap.rungs).filter(|_| !verdict.steps.is_empty())?;
+    if gap.after_us.value < gap.before_us.value {
+        return None;
+    }
+    let is_spread = |name: &str| SPREADS.contains(&name);
+    let effects: Vec<&str> = verdict.steps.iter().flat_map(|step| step.finding.effects()).collect();
+    Some(if !effects.is_empty() && effects.into_iter().all(is_spread) {
+        "The gap is as it was: what drones differ by from each other is no part of it.".to_owned()
+    } else {
+        format!(
+            "The gap as it is did not shrink ({:.1} to {:.1} us): the air that all drones share is \
+             larger than what was found. Without that air it goes from {:.1} to {:.1} us.",
+            gap.before_us.value,
+            gap.after_us.value,
+            gap.before_without_air_us,
+            gap.after_without_air_us
+        )
+    })
+}
+
 fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
-    let what = format!("{} was hidden, at {}", one.effect, short(one.value));
+    let of_all = if one.effect == "motor-thermal" && one.value != 0.0 {
+        " in the fleet's mean (motors that were warm at take-off drift no more)"
+    } else {
+        ""
+    };
+    let what = format!("{} was hidden, at {}{of_all}", one.effect, short(one.value));
     let sizes = match (one.fitted, one.covered, one.relative_error) {
         (Some(fitted), covered, error) => {
             let off = error.map_or_else(String::new, |error| {

@@ -21,8 +21,15 @@ use crate::vehicle::Vehicle;
 pub enum Simulated<'a> {
     /// The embedded simulator re-flies the plan.
     Refly(&'a Plan),
-    /// Somebody else's simulation: its bins by group.
-    Given(Vec<Vec<Option<BinValues>>>),
+    /// Somebody else's simulation.
+    Given {
+        /// Its bins by group.
+        values: Vec<Vec<Option<BinValues>>>,
+        /// The model that stands for what it flew. Nobody can fly it again with something added: what is
+        /// added is what it does to the model in the embedded simulator, or, without a plan, by the closed
+        /// forms.
+        flew: &'a Vehicle,
+    },
     /// The model's closed forms at the climb that was flown: nobody has a plan that could be flown again.
     Closed,
 }
@@ -80,7 +87,17 @@ impl Comparison {
         let first = wind(data, law, None).mean_mps;
         let fly = |wind_mps: [f64; 2]| -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
             match simulated {
-                Simulated::Given(values) => Ok(values.clone()),
+                Simulated::Given { values, flew } => {
+                    let flew = mean_drone(flew);
+                    match plan.filter(|_| flew != vehicle) {
+                        Some(plan) => {
+                            let without = fly_groups(data, &flew, plan, wind_mps)?;
+                            let with = fly_groups(data, &vehicle, plan, wind_mps)?;
+                            Ok(changed(values, &without, &with))
+                        }
+                        None => Ok(values.clone()),
+                    }
+                }
                 Simulated::Refly(plan) => fly_groups(data, &vehicle, plan, wind_mps),
                 Simulated::Closed => Ok(data.as_flown()),
             }
@@ -104,7 +121,12 @@ impl Comparison {
         let blown = wind(&data, law, Some((&side, flown_mps)));
         let scene = Scene::measured(&data, &side, &blown, amsl_m);
         let simulated_scene = scene.simulated(&data, &side, flown_mps);
-        let closed = simulated_scene.pulses(&vehicle)?;
+        let closed = match simulated {
+            Simulated::Given { flew, .. } if plan.is_none() => {
+                simulated_scene.pulses(&mean_drone(flew))?
+            }
+            _ => simulated_scene.pulses(&vehicle)?,
+        };
         if matches!(simulated, Simulated::Closed) {
             for (group, bins) in side.iter_mut().enumerate() {
                 for (bin, values) in bins.iter_mut().enumerate() {
@@ -348,6 +370,29 @@ fn fly_groups(
             let exponent = thrust_exponent(vehicle);
             Ok(refly(vehicle, plan, slot, &group.bins, wind_mps, exponent)?)
         })
+        .collect()
+}
+
+/// Bins of another simulation, with what a change of the model does in this one.
+fn changed(
+    values: &[Vec<Option<BinValues>>],
+    without: &[Vec<Option<BinValues>>],
+    with: &[Vec<Option<BinValues>>],
+) -> Vec<Vec<Option<BinValues>>> {
+    let bin = |((given, without), with): (
+        (&Option<BinValues>, &Option<BinValues>),
+        &Option<BinValues>,
+    )| {
+        let (given, without, with) = ((*given)?, (*without)?, (*with)?);
+        Some(BinValues {
+            pulse_us: given.pulse_us + with.pulse_us - without.pulse_us,
+            climb_mps: given.climb_mps + with.climb_mps - without.climb_mps,
+            ..given
+        })
+    };
+    let groups = values.iter().zip(without).zip(with);
+    groups
+        .map(|((given, without), with)| given.iter().zip(without).zip(with).map(bin).collect())
         .collect()
 }
 

@@ -139,7 +139,11 @@ pub fn search(
         found.rest = Rest {
             gain_nats: round.best().max(round.best_generic()),
             candidate: best_name(&round, sought),
-            threshold_nats: decision.thresholds.library,
+            threshold_nats: if round.best() >= round.best_generic() {
+                decision.thresholds.library
+            } else {
+                decision.thresholds.generic
+            },
             reduced_chi2: round.base.chi2 / round.base.freedom.max(1.0),
         };
         if step == options.most_steps {
@@ -218,14 +222,10 @@ pub fn search(
                 });
             }
         }
-        comparison = comparison.feeling(&found.felt);
-        if !matches!(simulated, Simulated::Given(_)) {
-            comparison =
-                Comparison::new(data, &found.vehicle, simulated, plan)?.feeling(&found.felt);
-            if !found.parameters.is_empty() {
-                // Against the re-flown model: what closed forms leave is small, and taken up here.
-                found.refit(&comparison)?;
-            }
+        comparison = Comparison::new(data, &found.vehicle, simulated, plan)?.feeling(&found.felt);
+        if !found.parameters.is_empty() {
+            // Against the re-flown model: what closed forms leave is small, and taken up here.
+            found.refit(&comparison)?;
         }
         if let Some(gone) = found.weakest(&comparison, vehicle)? {
             // Explained by what came after it, or a size of nothing.
@@ -237,8 +237,22 @@ pub fn search(
         }
         found.comparison = comparison.clone();
     }
+    told_once(&mut found.steps);
     settle(&mut found);
     Ok(found)
+}
+
+/// An effect that was found again, when it had been flown with its first size, is one finding.
+fn told_once(steps: &mut Vec<Step>) {
+    let mut told: Vec<String> = Vec::new();
+    steps.retain(|step| match &step.finding {
+        Finding::Name { effect, .. } if told.contains(effect) => false,
+        Finding::Name { effect, .. } => {
+            told.push(effect.clone());
+            true
+        }
+        Finding::Class { .. } | Finding::Unknown { .. } => true,
+    });
 }
 
 /// Takes the last joint fit into the steps.

@@ -43,7 +43,13 @@ fn comparison(plan: &Plan, vehicle: &Vehicle) -> Comparison {
     let part = PlannedPart { name: "all".to_owned(), slots, bins: &bins, values: &values };
     let data = Data::planned(plan, &[part], |_, _| f64::NAN);
     let side = data.groups[0].measured[0].iter().copied().map(Some).collect();
-    Comparison::new(&data, vehicle, &Simulated::Given(vec![side]), Some(plan)).unwrap()
+    Comparison::new(
+        &data,
+        vehicle,
+        &Simulated::Given { values: vec![side], flew: vehicle },
+        Some(plan),
+    )
+    .unwrap()
 }
 
 /// A field day (physics note, section 4.4), as far as it is not the median of the priors.

@@ -103,11 +103,17 @@ pub fn summary(verdict: &Verdict) -> String {
     if let Some(shrink) =
         verdict.gap.drones.or(verdict.gap.rungs).filter(|_| !verdict.steps.is_empty())
     {
+        let is_unknown = |step: &Step| matches!(step.finding, Finding::Unknown { .. });
+        let without = if verdict.steps.iter().any(is_unknown) {
+            " (with the unknown's shape taken away, which no model has)"
+        } else {
+            ""
+        };
         let _ = write!(
             text,
-            " On data that was not used for fitting the gap goes from {:.1} to {:.1} us; noise and air \
+            " On data that was not used for fitting the gap goes from {:.1} to {:.1} us{}; noise and air \
              alone leave {:.1}.",
-            shrink.before_without_air_us, shrink.after_without_air_us, shrink.floor_us
+            shrink.before_without_air_us, shrink.after_without_air_us, without, shrink.floor_us
         );
     }
     text

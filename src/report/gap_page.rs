@@ -11,7 +11,7 @@ use super::fill::{OPEN_LIMIT, common, fill};
 use super::gap_parts::{
     detectables, gap_rows, noise_rows, regime_rows, sensor, step_section, tiles,
 };
-use super::gap_words::{map_words, micro};
+use super::gap_words::{left_over, map_words, micro};
 use super::page::Gallery;
 use super::text::{clean, count, fixed, reduced, sentence};
 use super::{Provenance, Report, ReportError};
@@ -63,8 +63,7 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         steps,
         rest => context! {
             candidate => clean(&rest.candidate),
-            gain => fixed(rest.gain_nats, 1),
-            threshold => fixed(rest.threshold_nats, 1),
+            words => left_over(rest),
             chi2 => reduced(rest.reduced_chi2),
         },
         gap => gap_rows(verdict),

@@ -11,8 +11,8 @@ use crate::gap::words::{member, phrase};
 use super::figures::gap::map::ORDER;
 use super::figures::gap::step;
 use super::gap_words::{
-    after_mps, depends_on, kind, micro, minus, number, or_none, per_thousand, percent, range_to,
-    regime_title, with_unit,
+    after_mps, depends_on, kind, lost, micro, minus, number, or_none, per_thousand, percent,
+    range_to, regime_title, with_unit,
 };
 use super::page::{Gallery, capitalised};
 use super::text::{NONE, clean, count, fixed, reduced, sentence, signed, unit};
@@ -249,7 +249,7 @@ pub(super) fn detectables(verdict: &Verdict) -> Value {
             z => fixed(one.usual_z.abs(), 1),
             like => if one.like.is_empty() { NONE.to_owned() } else { clean(&one.like.join(", ")) },
             why => if one.why.is_empty() && !one.would_be_seen {
-                "at its usual size it is lost in air and noise; larger ones are seen".to_owned()
+                lost(one).to_owned()
             } else {
                 micro(&one.why)
             },

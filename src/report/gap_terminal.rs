@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::gap_parts::first_gap;
-use super::gap_words::{kind, map_words, per_thousand, percent};
+use super::gap_words::{kind, left_over, lost, map_words, per_thousand, percent};
 use super::table::{Align, Column, column, lines};
 use super::text::{clean, count, fixed, reduced};
 use crate::gap::Verdict;
@@ -60,14 +60,11 @@ pub fn gap_summary(verdict: &Verdict, width: usize, color: bool) -> String {
     page.line("", "");
     let rest = &verdict.rest;
     let left = if rest.candidate.is_empty() {
-        "Left: no candidate gains anything".to_owned()
+        "no candidate gains anything".to_owned()
     } else {
-        format!(
-            "Left: {} would gain {:.1} nats, {:.1} are needed",
-            rest.candidate, rest.gain_nats, rest.threshold_nats
-        )
+        left_over(rest)
     };
-    page.say("", &format!("{left}; reduced chi2 {}", reduced(rest.reduced_chi2)), 2);
+    page.say("", &format!("Left: {left}; reduced chi2 {}", reduced(rest.reduced_chi2)), 2);
     gap(&mut page, verdict);
     undetectable(&mut page, &verdict.detectable);
     if !verdict.data.left_out.is_empty() {
@@ -187,6 +184,10 @@ fn shrink_row(name: &str, shrink: Shrink, named: bool) -> Vec<String> {
 fn undetectable(page: &mut Page, all: &[Detectable]) {
     let (sought, other): (Vec<&Detectable>, Vec<&Detectable>) =
         all.iter().filter(|one| !one.would_be_seen).partition(|one| !one.parameter.is_empty());
+    if sought.is_empty() && all.iter().any(|one| one.would_be_seen) {
+        page.line("", "");
+        page.say("", "At its usual size every effect that is looked for would have been seen.", 2);
+    }
     if !sought.is_empty() {
         let rows: Vec<Vec<String>> = sought.iter().map(|one| hidden_row(one)).collect();
         let columns = [
@@ -211,7 +212,7 @@ fn hidden_row(one: &Detectable) -> Vec<String> {
     let unit = if one.unit.is_empty() { String::new() } else { format!(" {}", clean(&one.unit)) };
     let why = match (one.why.is_empty(), one.like.is_empty()) {
         (false, _) => clean(&one.why),
-        (true, true) => "lost in air and noise at this size".to_owned(),
+        (true, true) => lost(one).to_owned(),
         (true, false) => format!("looks like {}", clean(&one.like.join(", "))),
     };
     vec![

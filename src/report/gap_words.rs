@@ -1,6 +1,6 @@
 //! Numbers and names of a verdict as people read them.
 
-use crate::gap::verdict::{Finding, Interval, MapGain, Regime};
+use crate::gap::verdict::{Detectable, Finding, Interval, MapGain, Regime, Rest};
 use crate::gap::words::short;
 
 use super::text::{NONE, clean, count, fixed, unit, usable};
@@ -44,8 +44,15 @@ pub(super) fn range_to(interval: Interval, decimals: usize) -> String {
     format!("{} to {}", fixed(interval.low, decimals), fixed(interval.high, decimals))
 }
 
+/// Widest interval of a share that says anything.
+const WIDEST: f64 = 2.0;
+
 /// A share with its interval, per cent, to the digits that the interval supports.
 pub(super) fn percent(Interval { value, low, high }: Interval) -> (String, String) {
+    if !(low..=high).contains(&value) || high - low > WIDEST {
+        // A gap that hardly stands above the floor has no share to speak of.
+        return (NONE.to_owned(), "gap hardly above the floor".to_owned());
+    }
     let of = |share: f64| fixed(100.0 * share, usize::from(high - low < 0.03));
     (format!("{} %", of(value)), format!("{} to {} %", of(low), of(high)))
 }
@@ -68,6 +75,29 @@ pub(super) fn map_words(map: &MapGain) -> String {
         fixed(map.before.without_bias_mps, 2),
         fixed(map.after.without_bias_mps, 2),
     )
+}
+
+/// Fisher z that is seen in every second flight.
+const EVEN_Z: f64 = 4.0;
+
+/// Why an effect of the usual size would not have been seen for sure.
+pub(super) fn lost(one: &Detectable) -> &'static str {
+    if one.usual_z.abs() >= EVEN_Z {
+        "at its usual size it is seen in some of such flights only"
+    } else {
+        "at its usual size it is lost in air and noise; larger ones are seen"
+    }
+}
+
+/// The best candidate that was left, and why it is no finding.
+pub(super) fn left_over(rest: &Rest) -> String {
+    let gains = format!("{} would gain {:.1} nats", clean(&rest.candidate), rest.gain_nats);
+    if rest.gain_nats < rest.threshold_nats {
+        format!("{gains}, {:.1} are needed", rest.threshold_nats)
+    } else {
+        // Enough by its gain: then it moves the pulse by too little, or the air may do the same.
+        format!("{gains}, but moves the pulse by too little, or as the air may")
+    }
 }
 
 /// A value with its unit.

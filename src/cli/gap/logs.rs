@@ -17,6 +17,8 @@ pub(in crate::cli) struct Read {
     pub(in crate::cli) flights: Vec<(u16, Flight)>,
     /// Each other log with its reason.
     pub(in crate::cli) left_out: Vec<String>,
+    /// What is lost of logs that were read all the same.
+    pub(in crate::cli) in_part: Vec<String>,
 }
 
 /// Reads all logs of a flight; a log that cannot be used stops none of the others.
@@ -33,7 +35,7 @@ pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
         ..FlightInput::default()
     };
     let (whose, warnings) = whose_logs(&input);
-    let opened: Vec<Result<(u16, Flight), String>> = found
+    let opened: Vec<Result<(u16, Flight, Option<String>), String>> = found
         .logs
         .par_iter()
         .zip(whose)
@@ -51,13 +53,18 @@ pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
             let flight =
                 Flight::open(&log.path, options).map_err(|error| with_causes(&error, ": "))?;
             let number = u16::try_from(index + 1).unwrap_or(u16::MAX);
-            Ok((slot.unwrap_or(number), flight))
+            let lost = flight.losses();
+            let lost = (!lost.is_empty()).then(|| format!("{shown}: {}", lost.join("; ")));
+            Ok((slot.unwrap_or(number), flight, lost))
         })
         .collect();
     let mut read = Read { left_out: warnings, ..Read::default() };
     for one in opened {
         match one {
-            Ok(flight) => read.flights.push(flight),
+            Ok((slot, flight, lost)) => {
+                read.flights.push((slot, flight));
+                read.in_part.extend(lost);
+            }
             Err(reason) => read.left_out.push(reason),
         }
     }

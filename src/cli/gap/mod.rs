@@ -158,7 +158,8 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
         ));
     }
     let both = Both { measured: &found, simulated: simulated.as_ref(), hover: hover.as_ref() };
-    let explained = compare(&both, &vehicle, &options)?;
+    let mut explained = compare(&both, &vehicle, &options)?;
+    explained.verdict.cautions.extend(unplanned(args, &found, &vehicle));
     context.check_stop()?;
     create_folder(&folder)?;
     let _lock = context.lock(&folder)?;
@@ -376,6 +377,17 @@ fn model_of(args: &GapArgs, found: &Found) -> Result<Vehicle, CommandError> {
     }
 }
 
+/// What a reader must know of logs without a plan.
+fn unplanned(args: &GapArgs, found: &Found, vehicle: &Vehicle) -> Option<String> {
+    (args.vehicle.is_none() && args.csv.is_none() && found.plan.is_none()).then(|| {
+        format!(
+            "no plan says which vehicle flew: {} is taken, and its closed forms stand for what effects do \
+             (--vehicle, --plan)",
+            vehicle.name
+        )
+    })
+}
+
 /// Reads the logs and compares.
 fn compare(
     both: &Both<'_>,
@@ -405,6 +417,7 @@ fn compare(
         others.flights.iter().map(|(slot, flight)| Flown { slot: *slot, flight }).collect()
     });
     let mut left_out = read.left_out.clone();
+    left_out.extend(read.in_part.iter().map(|lost| format!("{lost} (the rest is used)")));
     left_out.extend(others.iter().flat_map(|others| others.left_out.clone()));
     let unusable = |logs: &str, reasons: &[String]| {
         CommandError::Nothing(format!(

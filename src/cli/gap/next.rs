@@ -191,6 +191,7 @@ impl Before {
         if !place.is_file() {
             // A folder that is not there is another matter than one that was not compared.
             std::fs::metadata(campaign).map_err(|error| FileError::new("read", campaign, error))?;
+            campaign::flights(campaign)?;
             let at = match &args.gap {
                 Some(folder) => format!("{} has no {VERDICT}", folder.display()),
                 None => format!("{} has no gap/{VERDICT}", campaign.display()),
