@@ -176,6 +176,7 @@ fn the_gap_and_what_could_not_be_seen() {
         before_without_air_us: 18.0,
         after_without_air_us: 4.0,
         excess_shrink: around(0.9, 0.05),
+        mean_us: (10.0, 4.0),
         ..Shrink::default()
     };
     let mut said = verdict(vec![plain("battery")]);

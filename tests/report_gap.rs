@@ -125,7 +125,7 @@ fn steps_say_what_they_are() {
         "0.390 to 0.406",
         "not in the model",
         "Leishman",
-        "would gain 2.3 nats where 8.0 are needed",
+        "would gain 2.3 nats, 8.0 are needed",
     ] {
         assert!(one.contains(words), "{words}: {one}");
     }

@@ -84,6 +84,9 @@ pub struct Outcome {
     pub wrong_unknowns: usize,
     /// Share of the held-out gap that is gone.
     pub raw_shrink: Option<f64>,
+    /// The same of the drones' mean.
+    #[serde(default)]
+    pub mean_shrink: Option<f64>,
     /// Share of its excess over the floor that is gone.
     pub excess_shrink: Option<f64>,
     /// Whether something was found, and the held-out gap is larger for it.
@@ -114,6 +117,7 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
         wrong_classes: 0,
         wrong_unknowns: 0,
         raw_shrink: None,
+        mean_shrink: None,
         excess_shrink: None,
         made_worse: false,
     };
@@ -141,6 +145,8 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
     if let Some(shrink) = &verdict.gap.drones {
         let (before, after) = (shrink.before_us.value, shrink.after_us.value);
         outcome.raw_shrink = (before > 0.0).then(|| 1.0 - after / before);
+        let (before, after) = shrink.mean_us;
+        outcome.mean_shrink = (before > 0.0).then(|| 1.0 - after / before);
         outcome.excess_shrink = Some(shrink.excess_shrink.value);
         // Without the air, which is the same before and after and only blurs the difference.
         outcome.made_worse = !outcome.found.is_empty()

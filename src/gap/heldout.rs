@@ -230,7 +230,9 @@ struct Block {
 
 fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
     let mut blocks: Vec<Block> = Vec::new();
+    let (mut mean_square, mut means) = ([0.0; 2], 0.0);
     for (group, drones) in residuals.after.iter().enumerate() {
+        let mut sums = vec![[0.0; 2]; residuals.air[group].len()];
         for (drone, after) in drones.iter().enumerate() {
             let before = &residuals.before[group][drone];
             let air = &residuals.air[group];
@@ -255,6 +257,7 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
                 if let Some(block) = blocks.last_mut() {
                     block.count += 1.0;
                     for side in 0..2 {
+                        sums[bin][side] += raw[side][bin];
                         block.raw[side] += raw[side][bin].powi(2);
                         block.clean[side] += clean[side][bin].powi(2);
                         block.mps[side] += (raw[side][bin] / response).powi(2);
@@ -262,8 +265,15 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
                 }
             }
         }
+        let count = drones.len().max(1) as f64;
+        for sum in sums {
+            means += 1.0;
+            for side in 0..2 {
+                mean_square[side] += (sum[side] / count).powi(2);
+            }
+        }
     }
-    let sums = |blocks: &mut dyn Iterator<Item = &Block>| {
+    let summed = |blocks: &mut dyn Iterator<Item = &Block>| {
         let mut sum = Block::default();
         for block in blocks {
             sum.count += block.count;
@@ -281,13 +291,13 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
         let [before, after] = sum.clean.map(|square| square / sum.count.max(1.0));
         if before <= floor { 0.0 } else { (before - after) / (before - floor) }
     };
-    let whole = sums(&mut blocks.iter());
+    let whole = summed(&mut blocks.iter());
     let mut rng = stream(seed, 0, Purpose::Resampling);
     let draws: Vec<(f64, f64, f64)> = (0..DRAWS)
         .map(|_| {
             let mut chosen =
                 (0..blocks.len()).filter_map(|_| blocks.get(rng.random_range(0..blocks.len())));
-            let sum = sums(&mut chosen);
+            let sum = summed(&mut chosen);
             (rms(sum.raw[0], sum.count), rms(sum.raw[1], sum.count), excess(&sum))
         })
         .collect();
@@ -311,6 +321,7 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
             whole.clean[1] / whole.count.max(1.0) / floor,
         ),
         excess_shrink: interval(|draw| draw.2, excess(&whole)),
+        mean_us: (rms(mean_square[0], means), rms(mean_square[1], means)),
     }
 }
 

@@ -319,6 +319,10 @@ pub struct Shrink {
     pub chi2: (f64, f64),
     /// Share of the excess over the floor that is gone, with its 95 % interval.
     pub excess_shrink: Interval,
+    /// The same as `before_us` and `after_us` of the mean of these drones: what each has for itself is no part
+    /// of it, the air that all share is.
+    #[serde(default)]
+    pub mean_us: (f64, f64),
 }
 
 /// The error of the map of the air by the model before and after.

@@ -197,6 +197,7 @@ pub(super) fn gap_rows(verdict: &Verdict) -> Vec<Value> {
                 before_range => range_to(shrink.before_us, 1),
                 after => fixed(shrink.after_us.value, 1),
                 after_range => range_to(shrink.after_us, 1),
+                mean => format!("{} → {}", fixed(shrink.mean_us.0, 1), fixed(shrink.mean_us.1, 1)),
                 mps => format!("{} → {}", fixed(shrink.before_mps, 2), fixed(shrink.after_mps, 2)),
                 without => format!(
                     "{} → {}",

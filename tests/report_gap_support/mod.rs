@@ -96,6 +96,7 @@ fn shrink(before: f64, after: f64) -> Shrink {
         after_mps: (after + 8.0) / 52.0,
         chi2: ((before / 5.1).powi(2), (after / 5.1).powi(2)),
         excess_shrink: Interval { value: 0.97, low: 0.93, high: 0.99 },
+        mean_us: (30.0, 3.5),
     }
 }
 
