@@ -71,11 +71,15 @@ impl Contest<'_> {
             }
             What::Effects { members, .. } => members.clone(),
         };
-        let members = self.of_effects(problem, rivals)?;
+        let (members, in_full) = rayon::join(
+            || self.of_effects(problem, rivals),
+            || product.map(|product| self.of_product(product)).transpose(),
+        );
+        let (members, in_full) = (members?, in_full?);
         let Some((best, first)) = members.first() else { return Ok(what) };
         let mut or_else = None;
-        if let (Some(best), Some(product)) = (best, product) {
-            let more = self.of_product(product)? - best;
+        if let (Some(best), Some(product), Some(in_full)) = (best, product, in_full) {
+            let more = in_full - best;
             if more > PRODUCT_NATS && product.gain > first.gain + CLASS_NATS {
                 return Ok(What::Free(product.clone()));
             }
@@ -146,12 +150,13 @@ impl Contest<'_> {
         let generic = &self.sought.generics[product.generic];
         let columns = &generic.columns;
         let found = self.found;
-        let of = |felt| {
+        let of = |felt: &[Vec<Vec<Response>>]| {
             let free = Free { columns, felt, beta: &product.beta };
             self.in_full(found.vehicle.clone(), &found.parameters, free, product.hyper)
         };
         // What it does to the scatter is known by its size, which means alone may hardly tell.
-        Ok(of(&generic.felt)?.max(of(&[])?) - generic.penalty)
+        let (felt, numb) = rayon::join(|| of(&generic.felt), || of(&[]));
+        Ok(felt?.max(numb?) - generic.penalty)
     }
 
     /// Log-posterior of the flight with a rival in the model; `None`: that would say nothing.

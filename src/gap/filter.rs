@@ -29,41 +29,62 @@ pub(super) struct Observation {
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
     dim: usize,
-    steps: Vec<Step>,
+    /// What each observation looks at.
+    looks_at: Vec<Vec<(usize, f64)>>,
+    /// Factors on the states since the observation before: `dim` for each observation.
+    decays: Vec<f64>,
+    /// Gains over the innovation's standard deviation: `dim` for each observation.
+    gains: Vec<f64>,
+    /// Of the innovations, by observation.
+    inverse_sd: Vec<f64>,
     /// Sum of ln of the innovations' variances.
     pub log_det: f64,
 }
 
-#[derive(Clone, Debug)]
-struct Step {
-    looks_at: Vec<(usize, f64)>,
-    /// Factors on the states since the observation before.
-    decay: Vec<f64>,
-    /// Gain over the innovation's standard deviation.
-    gain: Vec<f64>,
+/// One observation of a filter.
+#[derive(Clone, Copy)]
+struct Step<'a> {
+    looks_at: &'a [(usize, f64)],
+    decay: &'a [f64],
+    gain: &'a [f64],
     inverse_sd: f64,
 }
 
 impl Filter {
     /// Runs the covariances through the observations.
-    pub(super) fn new(states: &[State], observations: &[Observation]) -> Self {
+    pub(super) fn new(states: &[State], observations: Vec<Observation>) -> Self {
         let dim = states.len();
+        // Of a symmetric matrix only what is not above the diagonal.
         let mut covariance = vec![0.0; dim * dim];
+        let at = |a: usize, b: usize| a.max(b) * dim + a.min(b);
         for (index, state) in states.iter().enumerate() {
-            covariance[index * dim + index] = state.variance;
+            covariance[at(index, index)] = state.variance;
         }
-        let mut steps = Vec::with_capacity(observations.len());
-        let mut log_det = 0.0;
+        let count = observations.len();
+        let mut filter = Self {
+            dim,
+            looks_at: Vec::with_capacity(count),
+            decays: Vec::with_capacity(count * dim),
+            gains: Vec::with_capacity(count * dim),
+            inverse_sd: Vec::with_capacity(count),
+            log_det: 0.0,
+        };
         let mut before_s = observations.first().map_or(0.0, |first| first.time_s);
+        let (mut last_s, mut decay) = (f64::NAN, vec![1.0; dim]);
         let mut cross = vec![0.0; dim];
         for seen in observations {
             let elapsed_s = (seen.time_s - before_s).max(0.0);
             before_s = seen.time_s;
-            let decay: Vec<f64> =
-                states.iter().map(|state| (-elapsed_s / state.time_s).exp()).collect();
+            if elapsed_s != last_s {
+                // Bins come at regular times.
+                last_s = elapsed_s;
+                for (decay, state) in decay.iter_mut().zip(states) {
+                    *decay = (-elapsed_s / state.time_s).exp();
+                }
+            }
             if elapsed_s > 0.0 {
                 for row in 0..dim {
-                    for column in 0..dim {
+                    for column in 0..=row {
                         covariance[row * dim + column] *= decay[row] * decay[column];
                     }
                     let kick = states[row].variance * (1.0 - decay[row] * decay[row]);
@@ -74,43 +95,53 @@ impl Filter {
                 *value = seen
                     .looks_at
                     .iter()
-                    .map(|(state, factor)| covariance[row * dim + state] * factor)
+                    .map(|(state, factor)| covariance[at(row, *state)] * factor)
                     .sum();
             }
             let variance = seen.noise
                 + seen.looks_at.iter().map(|(state, factor)| cross[*state] * factor).sum::<f64>();
             let variance = variance.max(f64::MIN_POSITIVE);
-            log_det += variance.ln();
+            filter.log_det += variance.ln();
             for row in 0..dim {
-                for column in 0..dim {
+                for column in 0..=row {
                     covariance[row * dim + column] -= cross[row] * cross[column] / variance;
                 }
             }
             let sd = variance.sqrt();
-            steps.push(Step {
-                looks_at: seen.looks_at.clone(),
-                decay,
-                gain: cross.iter().map(|value| value / sd).collect(),
-                inverse_sd: 1.0 / sd,
-            });
+            filter.decays.extend_from_slice(&decay);
+            filter.gains.extend(cross.iter().map(|value| value / sd));
+            filter.inverse_sd.push(1.0 / sd);
+            filter.looks_at.push(seen.looks_at);
         }
-        Self { dim, steps, log_det }
+        filter
+    }
+
+    fn steps(&self) -> impl DoubleEndedIterator<Item = Step<'_>> + ExactSizeIterator {
+        let by_state = |values| <[f64]>::chunks_exact(values, self.dim.max(1));
+        let of_states = by_state(&self.decays).zip(by_state(&self.gains));
+        self.looks_at.iter().zip(of_states).zip(&self.inverse_sd).map(
+            |((looks_at, (decay, gain)), inverse_sd)| Step {
+                looks_at,
+                decay,
+                gain,
+                inverse_sd: *inverse_sd,
+            },
+        )
     }
 
     /// A series as independent noise of variance 1, if its covariance is the filter's.
     pub(super) fn whiten(&self, series: &[f64]) -> Vec<f64> {
         let mut state = vec![0.0; self.dim];
-        self.steps
-            .iter()
+        self.steps()
             .zip(series)
             .map(|(step, value)| {
-                for (value, decay) in state.iter_mut().zip(&step.decay) {
+                for (value, decay) in state.iter_mut().zip(step.decay) {
                     *value *= decay;
                 }
                 let expected: f64 =
                     step.looks_at.iter().map(|(index, factor)| state[*index] * factor).sum();
                 let innovation = (value - expected) * step.inverse_sd;
-                for (value, gain) in state.iter_mut().zip(&step.gain) {
+                for (value, gain) in state.iter_mut().zip(step.gain) {
                     *value += gain * innovation;
                 }
                 innovation
@@ -122,13 +153,13 @@ impl Filter {
     pub(super) fn weigh(&self, series: &[f64]) -> Vec<f64> {
         let mut weighed = self.whiten(series);
         let mut back = vec![0.0; self.dim];
-        for (step, value) in self.steps.iter().zip(&mut weighed).rev() {
+        for (step, value) in self.steps().zip(&mut weighed).rev() {
             let sum: f64 = step.gain.iter().zip(&back).map(|(gain, back)| gain * back).sum();
             *value = (*value + sum) * step.inverse_sd;
-            for (index, factor) in &step.looks_at {
+            for (index, factor) in step.looks_at {
                 back[*index] -= factor * *value;
             }
-            for (back, decay) in back.iter_mut().zip(&step.decay) {
+            for (back, decay) in back.iter_mut().zip(step.decay) {
                 *back *= decay;
             }
         }
@@ -138,16 +169,15 @@ impl Filter {
     /// A series with the filter's covariance, from independent noise of variance 1.
     pub(super) fn colour(&self, noise: &[f64]) -> Vec<f64> {
         let mut state = vec![0.0; self.dim];
-        self.steps
-            .iter()
+        self.steps()
             .zip(noise)
             .map(|(step, innovation)| {
-                for (value, decay) in state.iter_mut().zip(&step.decay) {
+                for (value, decay) in state.iter_mut().zip(step.decay) {
                     *value *= decay;
                 }
                 let expected: f64 =
                     step.looks_at.iter().map(|(index, factor)| state[*index] * factor).sum();
-                for (value, gain) in state.iter_mut().zip(&step.gain) {
+                for (value, gain) in state.iter_mut().zip(step.gain) {
                     *value += gain * innovation;
                 }
                 expected + innovation / step.inverse_sd
@@ -196,8 +226,8 @@ mod tests {
     #[test]
     fn it_is_the_dense_covariance() {
         let (states, observations) = case();
-        let filter = Filter::new(&states, &observations);
         let dense = covariance(&states, &observations).cholesky().unwrap();
+        let filter = Filter::new(&states, observations);
         let log_det: f64 = dense.l().diagonal().iter().map(|value| 2.0 * value.ln()).sum();
         assert!((filter.log_det - log_det).abs() < 1e-9, "{} {log_det}", filter.log_det);
         let series: Vec<f64> = (0..12).map(|index| f64::from(index * index % 7)).collect();

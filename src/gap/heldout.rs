@@ -2,6 +2,7 @@
 
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
+use rayon::prelude::*;
 
 use super::compare::{Comparison, Simulated};
 use super::data::Data;
@@ -110,8 +111,10 @@ impl Case<'_> {
         let before = self.against(train, self.original)?;
         let mut end = fitted.residual.clone();
         if !self.found.parameters.is_empty() {
-            for held in &speeds {
-                self.refit_without(*held, &speed, &mut end)?;
+            let without: Result<Vec<Pulses>, GapError> =
+                speeds.par_iter().map(|held| self.refit_without(*held, &speed)).collect();
+            for (held, there) in speeds.iter().zip(without?) {
+                take(&mut end, &there, |group, bin| speed(group, bin) == *held);
             }
         }
         subtract(&mut end, &fitted.shapes);
@@ -127,29 +130,31 @@ impl Case<'_> {
         Ok(Some(self.shrink(&residuals, fitted)))
     }
 
-    /// Residuals of one rung by sizes that were fitted without it.
+    /// Residuals by sizes that were fitted without one rung.
     fn refit_without(
         &self,
         held: i64,
-        speed: &impl Fn(usize, usize) -> i64,
-        end: &mut Pulses,
-    ) -> Result<(), GapError> {
+        speed: &(impl Fn(usize, usize) -> i64 + Sync),
+    ) -> Result<Pulses, GapError> {
         let Found { comparison, vehicle, parameters, extras, hyper, gusts_mps, .. } = self.found;
         let keep = |group, bin| speed(group, bin) != held;
         let extras: Vec<Column> = extras.iter().map(|extra| extra.only(keep)).collect();
         let others = comparison.only(keep);
         let fit = refine(&others, vehicle, parameters, &extras, *hyper, *gusts_mps, false)?;
-        let there = comparison.residual(&fit.vehicle, *gusts_mps)?;
-        for (group, drones) in end.iter_mut().enumerate() {
-            for (drone, values) in drones.iter_mut().enumerate() {
-                for (bin, value) in values.iter_mut().enumerate() {
-                    if speed(group, bin) == held {
-                        *value = there[group][drone][bin];
-                    }
+        Ok(comparison.residual(&fit.vehicle, *gusts_mps)?)
+    }
+}
+
+/// Takes over some bins.
+fn take(into: &mut Pulses, from: &Pulses, is_wanted: impl Fn(usize, usize) -> bool) {
+    for (group, (drones, from)) in into.iter_mut().zip(from).enumerate() {
+        for (values, from) in drones.iter_mut().zip(from) {
+            for (bin, (value, from)) in values.iter_mut().zip(from).enumerate() {
+                if is_wanted(group, bin) {
+                    *value = *from;
                 }
             }
         }
-        Ok(())
     }
 }
 

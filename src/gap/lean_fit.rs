@@ -158,7 +158,7 @@ fn misfit(points: &[Point], of: &Candidate, [linear, square_part]: [f64; 2]) -> 
             off.push(point.lean_rad[axis] - wanted[axis]);
         }
     }
-    let filter = Filter::new(&[gust, gust], &seen);
+    let filter = Filter::new(&[gust, gust], seen);
     let square = |value: f64| value * value;
     let chi2: f64 = filter.whiten(&off).into_iter().map(square).sum();
     let known = square((of.law.square.max(1e-7) / square_part).ln() / SQUARE_DOUBT)

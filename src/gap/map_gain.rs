@@ -76,14 +76,14 @@ pub fn map_gain(
         .flat_map(|group| &group.slots)
         .filter(|slot| measured.truth.contains_key(slot))
         .count();
-    Ok((!before.errors_mps.is_empty() && !after.errors_mps.is_empty()).then(|| MapGain {
+    Ok((!before.off.is_empty() && !after.off.is_empty()).then(|| MapGain {
         flight: measured.name.to_owned(),
         drones,
-        values: after.errors_mps.len(),
-        zero_mps: rms(&after.truths_mps),
-        common_sd_mps: after.common_sd_mps,
-        before: summed(&before.errors_mps),
-        after: summed(&after.errors_mps),
+        values: after.off.len(),
+        zero_mps: rms(&after.truth),
+        common_sd_mps: after.common_sd,
+        before: summed(&before.off),
+        after: summed(&after.off),
     }))
 }
 
@@ -145,11 +145,12 @@ fn offsets(flight: &Comparison, gusts_mps: f64) -> Result<BTreeMap<u16, f64>, Ga
 
 /// How wrong the running means of the estimates are.
 struct Errors {
-    errors_mps: Vec<f64>,
-    /// The truth itself.
-    truths_mps: Vec<f64>,
-    /// What the doubt about the drones' common zero makes of the air.
-    common_sd_mps: f64,
+    /// Estimate less truth, m/s.
+    off: Vec<f64>,
+    /// The truth itself, m/s.
+    truth: Vec<f64>,
+    /// What the doubt about the drones' common zero makes of the air, m/s.
+    common_sd: f64,
 }
 
 /// Inverts a model in a flight, with each drone's offset and the variance of what they have in common.
@@ -191,7 +192,7 @@ fn errors_of(
             }
         }
     }
-    Ok(Errors { errors_mps, truths_mps, common_sd_mps: rms(&doubts_mps) })
+    Ok(Errors { off: errors_mps, truth: truths_mps, common_sd: rms(&doubts_mps) })
 }
 
 /// The updraft in which the model asks for so much more pulse, m/s.

@@ -235,7 +235,7 @@ impl Whitener {
                 }
             })
             .collect();
-        let means = Filter::new(&states, &observations);
+        let means = Filter::new(&states, observations);
         let mut log_det = means.log_det;
         let deviations: Vec<Filter> = groups
             .iter()
@@ -248,7 +248,7 @@ impl Whitener {
                         noise: square(WHITE),
                     })
                     .collect();
-                let filter = Filter::new(&own(1.0), &observations);
+                let filter = Filter::new(&own(1.0), observations);
                 log_det += filter.log_det * group.drones.saturating_sub(1) as f64;
                 filter
             })

@@ -21,6 +21,14 @@ pub(in crate::cli) struct Read {
     pub(in crate::cli) in_part: Vec<String>,
 }
 
+/// A log that could be read.
+struct Opened {
+    slot: u16,
+    flight: Flight,
+    /// What is lost of it.
+    lost: Option<String>,
+}
+
 /// Reads all logs of a flight; a log that cannot be used stops none of the others.
 pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
     if found.logs.iter().any(|log| log.table.is_some()) {
@@ -35,7 +43,7 @@ pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
         ..FlightInput::default()
     };
     let (whose, warnings) = whose_logs(&input);
-    let opened: Vec<Result<(u16, Flight, Option<String>), String>> = found
+    let opened: Vec<Result<Opened, String>> = found
         .logs
         .par_iter()
         .zip(whose)
@@ -55,15 +63,15 @@ pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
             let number = u16::try_from(index + 1).unwrap_or(u16::MAX);
             let lost = flight.losses();
             let lost = (!lost.is_empty()).then(|| format!("{shown}: {}", lost.join("; ")));
-            Ok((slot.unwrap_or(number), flight, lost))
+            Ok(Opened { slot: slot.unwrap_or(number), flight, lost })
         })
         .collect();
     let mut read = Read { left_out: warnings, ..Read::default() };
     for one in opened {
         match one {
-            Ok((slot, flight, lost)) => {
-                read.flights.push((slot, flight));
-                read.in_part.extend(lost);
+            Ok(opened) => {
+                read.flights.push((opened.slot, opened.flight));
+                read.in_part.extend(opened.lost);
             }
             Err(reason) => read.left_out.push(reason),
         }
