@@ -108,6 +108,9 @@ fn options_that_do_not_go_with_hidden_physics_are_refused() {
     let ended = bench.expect(2, &["run", "--hide", "3", "--vehicle", "phantom4"]);
     assert!(ended.err.contains("airsim-generic-quad and pixel, not from phantom4"), "{ended}");
     bench.expect(2, &["run", "--protocol", "paper"]);
+    bench.expect(0, &["plan", "calibration", "--grid", "2x2", "-o", "campaign"]);
+    let ended = bench.expect(2, &["run", "--hide", "3", "-o", "campaign"]);
+    assert!(ended.err.contains("campaign is a campaign; choose another folder"), "{ended}");
     std::fs::create_dir_all(bench.path("mine/flight")).unwrap();
     let ended = bench.expect(2, &["run", "--hide", "3", "-o", "mine", "--force"]);
     assert!(ended.err.contains("was not made by `run --hide`"), "{ended}");

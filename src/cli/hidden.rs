@@ -191,6 +191,12 @@ fn make_room(folder: &Path, force: bool) -> Result<(), CommandError> {
         }
         return Ok(play::remove(folder)?);
     }
+    if crate::campaign::flights(folder).is_ok_and(|flights| !flights.is_empty()) {
+        return Err(CommandError::Usage(format!(
+            "{} is a campaign; choose another folder with -o",
+            folder.display()
+        )));
+    }
     if flight.exists() {
         return Err(CommandError::Usage(format!(
             "{} is there and was not made by `run --hide`; choose another folder with -o",

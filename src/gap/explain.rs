@@ -13,6 +13,7 @@ use super::refine::{Parameter, doubts, fitted, half_interval, parameters_of, ref
 use super::response::{self, Response, gusts_mps};
 use super::search::{Round, Sought, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
+use crate::effects::Signals;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
@@ -198,7 +199,7 @@ pub fn search(
                     alpha: options.alpha,
                     size_us: best.size_us,
                     rivals,
-                    shape: Some(along_climb(&comparison, variant, best.beta)),
+                    shape: Some(along_its_signal(&comparison, variant, best.beta)),
                 });
             }
             What::Free(free) => {
@@ -305,15 +306,34 @@ fn lean_parameter(drag: f64, se: f64) -> Fitted {
 /// What a lean says of the rotors' drag depends on the body's, which is known to some tenths, s/m.
 const LEAN_DOUBT: f64 = 0.005;
 
-/// What one form of an effect does, along the climb.
-fn along_climb(comparison: &Comparison, variant: &Variant, beta: f64) -> Shape {
-    let mut points: Vec<(f64, f64)> = Vec::new();
-    for (group, signals) in comparison.scene.signals.iter().enumerate() {
-        for (bin, signal) in signals.iter().enumerate() {
-            points.push((signal.climb_mps, beta * variant.column.at(group, 0, bin)));
-        }
-    }
-    drawn("vertical velocity (m/s)", points)
+/// What the form of an effect may be drawn along.
+const AXES: [(&str, fn(&Signals) -> f64); 4] = [
+    ("vertical velocity (m/s)", |signals| signals.climb_mps),
+    ("time since arming (s)", |signals| signals.time_s),
+    ("height (m)", |signals| signals.height_m),
+    ("horizontal air speed (m/s)", |signals| signals.horizontal_mps),
+];
+
+/// What one form of an effect does, along that on which it depends most plainly.
+fn along_its_signal(comparison: &Comparison, variant: &Variant, beta: f64) -> Shape {
+    let along = |of: fn(&Signals) -> f64| -> Vec<(f64, f64)> {
+        let groups = comparison.scene.signals.iter().enumerate();
+        let points = groups.flat_map(|(group, signals)| {
+            let value = move |bin: usize| beta * variant.column.at(group, 0, bin);
+            signals.iter().enumerate().map(move |(bin, signals)| (of(signals), value(bin)))
+        });
+        points.collect()
+    };
+    let all = AXES.iter().map(|(axis, of)| (*axis, along(*of)));
+    let plainest = all.min_by(|a, b| roughness(&a.1).total_cmp(&roughness(&b.1)));
+    plainest.map_or_else(Shape::default, |(axis, points)| drawn(axis, points))
+}
+
+/// Sum of the squared steps from each point to the next: small where a curve goes through them.
+fn roughness(points: &[(f64, f64)]) -> f64 {
+    let mut points = points.to_vec();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points.windows(2).map(|pair| (pair[1].1 - pair[0].1).powi(2)).sum()
 }
 
 /// Responses with what a free shape adds to them.
@@ -394,3 +414,18 @@ const REFITS: usize = 4;
 const SAME_GUSTS_MPS: f64 = 0.02;
 /// Stronger gusts are not believed while the model still lacks its response to them, m/s.
 pub(super) const MOST_GUSTS_MPS: f64 = 1.5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_is_smoother_along_what_it_depends_on() {
+        let curve: Vec<(f64, f64)> = (0..50).map(|i| (f64::from(i), f64::from(i).sqrt())).collect();
+        let shuffled: Vec<(f64, f64)> =
+            curve.iter().map(|(x, y)| ((x * 17.0) % 50.0, *y)).collect();
+        assert!(roughness(&curve) < 0.1 * roughness(&shuffled));
+        let backwards: Vec<(f64, f64)> = curve.iter().rev().copied().collect();
+        assert!((roughness(&curve) - roughness(&backwards)).abs() < 1e-9);
+    }
+}
