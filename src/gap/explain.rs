@@ -306,8 +306,11 @@ fn lean_parameter(drag: f64, se: f64) -> Fitted {
 /// What a lean says of the rotors' drag depends on the body's, which is known to some tenths, s/m.
 const LEAN_DOUBT: f64 = 0.005;
 
+/// A signal with its label.
+type Axis = (&'static str, fn(&Signals) -> f64);
+
 /// What the form of an effect may be drawn along.
-const AXES: [(&str, fn(&Signals) -> f64); 4] = [
+const AXES: [Axis; 4] = [
     ("vertical velocity (m/s)", |signals| signals.climb_mps),
     ("time since arming (s)", |signals| signals.time_s),
     ("height (m)", |signals| signals.height_m),
