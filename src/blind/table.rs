@@ -137,7 +137,8 @@ impl Demand {
             Self::UpperAtMost { bound } => metric.interval.map_or(value, |(_, high)| high) - bound,
             Self::Within { low, high } => (low - value).max(value - high),
         };
-        Some(by.max(0.0))
+        // What is no number is not met.
+        Some(if by <= 0.0 { 0.0 } else { by })
     }
 
     /// Whether so few flights could have missed it by chance: the interval has what is demanded.
@@ -206,6 +207,9 @@ fn effects(settings: &Settings, outcomes: &[Outcome]) -> Vec<EffectRow> {
             let of: Vec<_> =
                 flights.flat_map(|one| &one.hidden).filter(|one| one.kind == kind.name).collect();
             let called = |called| of.iter().filter(|one| one.called == called).count();
+            // What no library has is right to be unknown.
+            let right = called(Called::Named);
+            let (named, recognised) = if kind.foreign { (0, right) } else { (right, 0) };
             let errors: Vec<f64> =
                 of.iter().filter_map(|one| one.relative_error).map(f64::abs).collect();
             if !of.is_empty() {
@@ -213,11 +217,9 @@ fn effects(settings: &Settings, outcomes: &[Outcome]) -> Vec<EffectRow> {
                     protocol: protocol.name().to_owned(),
                     kind: kind.name.to_owned(),
                     count: of.len(),
-                    named: if kind.foreign { 0 } else { called(Called::Named) },
+                    named,
                     in_class: called(Called::InClass),
-                    // What no library has is right to be unknown.
-                    unknown: called(Called::Unknown)
-                        + if kind.foreign { called(Called::Named) } else { 0 },
+                    unknown: called(Called::Unknown) + recognised,
                     silent: called(Called::Silent),
                     error: median(&errors),
                 });

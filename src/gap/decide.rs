@@ -13,8 +13,8 @@ pub(super) const CLASS_NATS: f64 = 6.0;
 /// So do those within this share of the gain: closed forms are not the effects themselves, and what they
 /// leave out counts the more the larger an effect is.
 const CLASS_SHARE: f64 = 0.1;
-/// Rivals within so many nats, as regressors, are held against each other in full.
-const CONTEST_NATS: f64 = 12.0;
+/// Rivals within so many margins, as regressors, are held against each other in full.
+const CONTEST_MARGINS: f64 = 2.0;
 /// Rivals must leave a similar trace: correlation with everything else partialled out.
 pub(super) const ALIKE: f64 = 0.6;
 /// A free shape is another thing than the best effect when it gains this much more.
@@ -144,11 +144,12 @@ pub(super) fn decide(
     let column = |ranked: &Ranked| form(sought, ranked);
     let at = problem.at(&best.hyper);
     let own = at.white(column(best));
+    let contested = best.gain - CONTEST_MARGINS * margin_nats(best.gain);
     let alike = |ranked: &&Ranked| {
         let is_alike = || at.likeness(&own, &at.white(column(ranked))).abs() > ALIKE;
         ranked.candidate != best.candidate
             // What is better though too small to be named alone is not passed over.
-            && (ranked.gain > best.gain || ranked.gain > best.gain - CONTEST_NATS.max(2.0 * margin_nats(best.gain)) && is_alike())
+            && (ranked.gain > best.gain || ranked.gain > contested && is_alike())
     };
     let mut members = vec![best.clone()];
     members.extend(round.library.iter().filter(alike).cloned());

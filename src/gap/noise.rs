@@ -259,9 +259,12 @@ impl Whitener {
 
     /// Whitens the groups' means, by group and bin.
     pub(super) fn means(&self, by_group: &[Vec<f64>]) -> Vec<f64> {
-        let series: Vec<f64> =
-            self.order.iter().map(|(group, bin)| by_group[*group][*bin]).collect();
-        self.means.whiten(&series)
+        self.means.whiten(&self.series(by_group))
+    }
+
+    /// Groups' means in the order of the filter.
+    fn series(&self, by_group: &[Vec<f64>]) -> Vec<f64> {
+        self.order.iter().map(|(group, bin)| by_group[*group][*bin]).collect()
     }
 
     /// The updraft that all drones share, by what is left of the groups' means, by group and bin, m/s: its
@@ -272,9 +275,7 @@ impl Whitener {
         groups: &[GroupPattern],
         hyper: &Hyper,
     ) -> Vec<Vec<f64>> {
-        let series: Vec<f64> =
-            self.order.iter().map(|(group, bin)| by_group[*group][*bin]).collect();
-        let weighed = self.means.weigh(&series);
+        let weighed = self.means.weigh(&self.series(by_group));
         let responses: Vec<Vec<f64>> = groups.iter().map(|group| group.responses(hyper)).collect();
         let variances = [
             hyper.get(SHARED).powi(2),
@@ -372,9 +373,7 @@ mod tests {
             .collect();
         let whitener = Whitener::new(&groups, &hyper);
         let found = whitener.shared_mps(&rest, &groups, &hyper);
-        let series: Vec<f64> =
-            whitener.order.iter().map(|(group, bin)| rest[*group][*bin]).collect();
-        let weighed = whitener.means.weigh(&series);
+        let weighed = whitener.means.weigh(&whitener.series(&rest));
         let responses: Vec<Vec<f64>> = groups.iter().map(|one| one.responses(&hyper)).collect();
         for (group, bin) in &whitener.order {
             let (at, here) = (&groups[*group], groups[*group].aloft(*bin));

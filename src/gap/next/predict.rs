@@ -155,11 +155,11 @@ impl Scenery<'_> {
         };
         let own = solution.white(&self.merged(light, loaded));
         let strength = solution.information(&own).max(0.0).sqrt();
-        let generics = all(scene, &self.comparison.headings());
         let mut separations = Vec::new();
         for other in others {
             let Some(rival) = self.candidate(&without, other)? else {
                 // What something unknown would depend on.
+                let generics = all(scene, &self.comparison.headings());
                 separations.extend(from_shape(solution, &own, &generics, other));
                 continue;
             };

@@ -153,13 +153,13 @@ impl<'a> Scenery<'a> {
     ) -> Result<Option<Candidate>, GapError> {
         let find = |vehicle: &Vehicle| -> Result<Option<Candidate>, GapError> {
             let scene = &self.comparison.scene;
-            let mut all = library(vehicle, scene)?;
-            all.extend(of_the_air(
-                scene,
-                &self.comparison.patterns(vehicle, 0.0)?,
-                &self.known.hyper,
-            ));
-            Ok(all.into_iter().find(|candidate| candidate.name == effect))
+            let is_it = |candidate: &Candidate| candidate.name == effect;
+            let found = library(vehicle, scene)?.into_iter().find(is_it);
+            if found.is_some() {
+                return Ok(found);
+            }
+            let patterns = self.comparison.patterns(vehicle, 0.0)?;
+            Ok(of_the_air(scene, &patterns, &self.known.hyper).into_iter().find(is_it))
         };
         let Some(mut light) = find(vehicle)? else { return Ok(None) };
         if let Some(loaded) = self.loaded(vehicle)
