@@ -213,6 +213,7 @@ fn imported(logs: &Path, bytes: &[u8], incomplete: Option<&str>) {
         incomplete: incomplete.map(str::to_owned),
         attempts: 1,
         at_unix_s: 0,
+        flight: None,
     };
     Shelf::open(logs, "test").unwrap().add(entry).unwrap();
 }

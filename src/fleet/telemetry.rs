@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 use super::messages::chars;
 use super::vehicle_clock::VehicleClock;
 use crate::base::frame::Geodetic;
+use crate::base::time::GpsTime;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::Watch;
 use crate::link::frame::{MavMessage, dialect};
@@ -107,6 +108,8 @@ pub struct Drone {
     pub health: Heard<Health>,
     /// Its clock.
     pub clock: VehicleClock,
+    /// GPS time when it was switched on, by its own clock.
+    pub booted: Option<GpsTime>,
     /// Which firmware.
     pub version: Option<Version>,
     /// What it said, oldest first.
@@ -174,7 +177,13 @@ impl Drone {
                 self.gps = Some((now, Gps { fix, satellites, h_acc_m }));
             }
             MavMessage::SYS_STATUS(status) => self.health = Some((now, health(status))),
-            MavMessage::SYSTEM_TIME(time) => self.clock.read(now, time.time_unix_usec),
+            MavMessage::SYSTEM_TIME(time) => {
+                self.clock.read(now, time.time_unix_usec);
+                let unix_ms = (time.time_unix_usec / 1000) as i64 - i64::from(time.time_boot_ms);
+                let booted = GpsTime::from_unix_ms(unix_ms);
+                // Before the first fix its clock says nothing.
+                self.booted = booted.filter(|_| time.time_unix_usec > 0).or(self.booted);
+            }
             MavMessage::STATUSTEXT(text) => self.text(now, text),
             MavMessage::AUTOPILOT_VERSION(version) => {
                 let [_, patch, minor, major] = version.flight_sw_version.to_le_bytes();

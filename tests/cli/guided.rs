@@ -96,7 +96,7 @@ fn stock_drones_are_flown_and_their_logs_analysed() {
     assert!(ended.err.contains("2 of 2 drones have landed"), "{ended}");
     let start = fs::read(bench.path("campaign/logs/start.json")).unwrap();
     let start: serde_json::Value = serde_json::from_slice(&start).unwrap();
-    assert_eq!(start["schema"], "updraft.start/1");
+    assert_eq!(start["schema"], "updraft.start/2");
     let analysed = |ended: &Ended| {
         let analysis = ended.json("updraft.analyze/1")["analysis"].clone();
         let drones = analysis["flights"][0]["drones"].as_array().unwrap().clone();

@@ -3,6 +3,7 @@
 mod end;
 mod eyes;
 mod guided;
+mod identity;
 mod keep;
 mod load;
 mod start;
@@ -16,6 +17,7 @@ use serde::Serialize;
 
 use crate::base::file::FileError;
 use crate::campaign::FlightFolder;
+use crate::campaign::start::StartRecord;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
@@ -68,6 +70,8 @@ pub(in crate::cli) struct Crew<'a> {
     pub(in crate::cli) is_virtual: bool,
     /// The station flies the drones by streaming targets; nobody needs the show mode.
     pub(in crate::cli) is_guided: bool,
+    /// The start that was authorized and written down.
+    begun: Option<StartRecord>,
 }
 
 /// Listens to all, and looks for Ctrl-C.
@@ -130,6 +134,7 @@ impl<'a> Crew<'a> {
             told: BTreeSet::new(),
             is_virtual: false,
             is_guided: false,
+            begun: None,
         }
     }
 

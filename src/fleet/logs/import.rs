@@ -196,6 +196,7 @@ pub fn import(
                     incomplete: identity.cut.map(str::to_owned),
                     attempts: 1,
                     at_unix_s: options.unix_s,
+                    flight: None,
                 };
                 shelf.add(entry.clone())?;
                 report.taken.push(entry);

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::part::{PartFile, sums};
 use crate::base::file::{FileError, create_folder, write_whole};
+use crate::base::time::GpsTime;
+use crate::campaign::start::{earlier_folder, free_name};
 use crate::campaign::{CampaignError, read_json, to_json};
 use crate::link::id::DroneId;
 
@@ -61,6 +63,29 @@ pub struct ManifestEntry {
     pub attempts: u32,
     /// When it was whole, Unix seconds.
     pub at_unix_s: u64,
+    /// The flight that it is of; absent: no start was written down when it came.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flight: Option<LogFlight>,
+}
+
+/// The flight that a log is of.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LogFlight {
+    /// Number of the start in this folder; 0: it is of none of those that were written down.
+    pub number: u32,
+    /// GPS time of show time 0 as authorized; absent: not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub authorized_start: Option<GpsTime>,
+    /// GPS time of show time 0 by the log itself; absent: it does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gps_start: Option<GpsTime>,
+    /// When the drone was switched on, by its log; absent: it does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub booted: Option<GpsTime>,
+    /// Checksum of the show that the drone was given, as ArduPilot computes it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub show_crc32: Option<u32>,
 }
 
 /// What is at home of a file of a shelf.
@@ -194,15 +219,51 @@ impl Shelf {
         }
     }
 
+    /// Moves a log, with what the manifest says of it, into the folder of an earlier start,
+    /// `flight-K`; 0 for one that is of no start that was written down. Nothing there is
+    /// overwritten. Where it lies now; `None`: there was none.
+    ///
+    /// # Errors
+    /// When a folder or manifest cannot be read or written.
+    pub fn retire(&mut self, file: &str, number: u32) -> Result<Option<PathBuf>, CampaignError> {
+        let from = self.path(file);
+        if !from.exists() {
+            return Ok(None);
+        }
+        let folder = earlier_folder(&self.folder, number);
+        create_folder(&folder)?;
+        let (stem, extension) = file.rsplit_once('.').unwrap_or((file, "BIN"));
+        let to = free_name(&folder, stem.rsplit('/').next().unwrap_or(stem), extension);
+        let name = to.file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
+        // Its entry is there before the file is: a file without one would be anybody's.
+        if let Some(entry) = self.entry(file).cloned() {
+            let mut there = Self::open(&folder, &self.manifest.made_by)?;
+            there.add(ManifestEntry { file: name, ..entry })?;
+        }
+        std::fs::rename(&from, &to).map_err(|error| FileError::new("move aside", &from, error))?;
+        self.forget(file)?;
+        Ok(Some(to))
+    }
+
+    /// Takes a file's entry out.
+    fn forget(&mut self, file: &str) -> Result<(), FileError> {
+        self.manifest.logs.retain(|other| other.file != file);
+        self.write()
+    }
+
+    fn write(&self) -> Result<(), FileError> {
+        let path = self.folder.join("manifest.json");
+        let bytes =
+            to_json(&self.manifest).map_err(|source| FileError::new("write", &path, source))?;
+        write_whole(&path, &bytes)
+    }
+
     /// Writes an entry.
     pub fn add(&mut self, entry: ManifestEntry) -> Result<(), FileError> {
         self.manifest.logs.retain(|other| other.file != entry.file);
         self.manifest.logs.push(entry);
         self.manifest.logs.sort_by(|a, b| a.file.cmp(&b.file));
-        let path = self.folder.join("manifest.json");
-        let bytes =
-            to_json(&self.manifest).map_err(|source| FileError::new("write", &path, source))?;
-        write_whole(&path, &bytes)
+        self.write()
     }
 
     /// Gives a finished part its name, with its entry. The entry is first: a part without its

@@ -6,9 +6,8 @@ use super::eyes::Eyes;
 use super::stubborn::Stubborn;
 use super::{AT_ONCE, Crew};
 use crate::base::time::GpsTime;
-use crate::campaign::start::StartRecord;
 use crate::cli::exit::CommandError;
-use crate::cli::simulate::made_by;
+
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Action};
 use crate::fleet::command::Command;
 use crate::fleet::fence::PutFence;
@@ -120,9 +119,7 @@ impl<'a> Crew<'a> {
         }
         self.not_ordered_down()?;
         start.check_time(&self.telemetry, self.net.now()).map_err(refused)?;
-        if let Some(time) = start.time() {
-            StartRecord::new(made_by(), time).write(self.folder)?;
-        }
+        self.write_start(start)?;
         self.note("authorized", Some(format!("start at {}", start.second_of_week())))
     }
 

@@ -24,7 +24,7 @@ const SETTLE_VIRTUAL: Micros = 100 * MS;
 /// Uploads at once per network.
 const UPLOADS_AT_ONCE: usize = 16;
 /// Largest show file, bytes.
-const MOST_SKYB: u64 = 1 << 20;
+pub(super) const MOST_SKYB: u64 = 1 << 20;
 
 impl Crew<'_> {
     /// Reads the required parameters, and mends them if allowed. Whether they are right.

@@ -43,6 +43,10 @@ impl<'a> Crew<'a> {
         start
             .authorize(&self.telemetry, self.net.now())
             .map_err(|error| CommandError::Failed(error.to_string()))?;
+        if let Err(error) = self.write_start(start) {
+            self.cancel(start)?;
+            return Err(error);
+        }
         self.note("authorized", Some(format!("start at {}", start.second_of_week())))?;
         self.until_taken(start)
     }
@@ -91,6 +95,7 @@ impl<'a> Crew<'a> {
             }
         }
         self.finish_orders()?;
+        self.withdraw_start();
         self.try_note("cancelled", &BTreeMap::new());
         Ok(())
     }
@@ -120,6 +125,7 @@ impl<'a> Crew<'a> {
                 // A start packet has no address: who goes on needs a new one.
                 self.context.insist("The start is taken back for everyone");
                 start.cancel(now);
+                self.withdraw_start();
             }
             let cancelled = start.phase() == Phase::Cancelled;
             let told = cancelled && start.late(eyes.telemetry(), now).is_empty();

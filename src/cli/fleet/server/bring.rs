@@ -367,6 +367,7 @@ impl Puller<'_> {
             incomplete: None,
             attempts: target.tries,
             at_unix_s: SystemClock::start().unix_us() / 1_000_000,
+            flight: None,
         })?;
         write_whole(&path, bytes)?;
         Ok(())

@@ -83,6 +83,7 @@ impl PullOne {
             incomplete: self.incomplete.take(),
             attempts: self.attempts,
             at_unix_s: self.options.unix_s,
+            flight: None,
         };
         self.attempts = 0;
         (self.held, self.size) = (0, 0);
