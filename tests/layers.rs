@@ -20,7 +20,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("campaign", &["base", "vehicle", "mission", "show", "check"]),
     (
         "fleet",
-        &["base", "vehicle", "mission", "show", "check", "log", "link", "protocol", "campaign"],
+        &[
+            "base", "vehicle", "mission", "show", "check", "log", "link", "protocol", "campaign",
+            "flight",
+        ],
     ),
     ("effects", &["base", "vehicle"]),
     ("sim", &["base", "vehicle", "mission", "show", "log", "effects"]),

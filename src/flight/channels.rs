@@ -57,14 +57,17 @@ const WANTED: &[Select<'static>] = &[
     Select { message: "ESC", fields: &["TimeUS", "Instance", "RPM"] },
     Select { message: "CURR", fields: &["TimeUS", "TimeMS", "Volt", "Curr"] },
     Select { message: "SHOW", fields: &["TimeUS", "ClockMS", "Stage"] },
-    Select { message: "GPS", fields: &["TimeUS", "I", "Status", "GMS", "GWk", "Lat", "Lng"] },
+    Select {
+        message: "GPS",
+        fields: &["TimeUS", "I", "Status", "GMS", "GWk", "Lat", "Lng", "Alt"],
+    },
     Select { message: "ARM", fields: &["TimeUS", "ArmState"] },
     Select { message: "EV", fields: &["TimeUS", "TimeMS", "Id"] },
     Select { message: "PARM", fields: &["TimeUS", "Name", "Value"] },
 ];
 
 /// All messages of a log that matter, over board time.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Messages {
     rows: BTreeMap<String, Rows>,
     pub(super) parameters: BTreeMap<String, f64>,
@@ -86,7 +89,10 @@ impl Messages {
             .iter()
             .filter(|select| matches!(select.message, "PARM" | "GPS" | "ARM" | "EV" | "SHOW"))
             .copied()
-            .chain([Select { message: "RCOU", fields: &["TimeUS", "TimeMS", "C1", "Ch1"] }])
+            .chain([
+                Select { message: "RCOU", fields: &["TimeUS", "TimeMS", "C1", "Ch1"] },
+                Select { message: "ORGN", fields: &["TimeUS", "Type", "Lat", "Lng", "Alt"] },
+            ])
             .collect();
         Self::select(log, &wanted)
     }
@@ -95,6 +101,11 @@ impl Messages {
     pub(super) fn output_times(&self) -> Option<Series> {
         let rows = self.rows("RCOU")?;
         rows.series("C1", |pulse| pulse).or_else(|| rows.series("Ch1", |pulse| pulse))
+    }
+
+    /// Whether the vehicle logs nothing while it is disarmed.
+    pub(super) fn logs_only_armed(&self) -> bool {
+        self.parameters.get("LOG_DISARMED") == Some(&0.0)
     }
 
     /// MAVLink system id.
@@ -108,7 +119,11 @@ impl Messages {
 
     fn select(log: &Log, wanted: &[Select<'_>]) -> Self {
         let (tables, scan) = log.select(wanted);
-        let mut messages = Self { scan, ..Self::default() };
+        Self { scan, ..Self::of_tables(tables) }
+    }
+
+    pub(super) fn of_tables(tables: impl IntoIterator<Item = Table>) -> Self {
+        let mut messages = Self::default();
         for table in tables {
             if table.message == "PARM" {
                 messages.parameters = parameters(&table);

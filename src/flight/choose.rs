@@ -1,11 +1,13 @@
 //! Which flight of a log is analysed, where it holds several: two boots in one file, or two take-offs
-//! in one boot.
+//! in one boot. The firmware goes on in the same file when it is armed again.
 
 use std::path::Path;
 
 use super::align::planned_up_mps;
+use super::identity::{Belongs, SAME_START_S, identify, later_s};
 use super::load::{Held, Wanted, load as load_one, ordinal};
-use super::{Flight, FlightError, FlightOptions};
+use super::{Alignment, Flight, FlightError, FlightOptions};
+use crate::base::time::GpsTime;
 use crate::log::Log;
 use crate::mission::plan::Segment;
 
@@ -18,8 +20,11 @@ const CLIP_MPS: f64 = 0.5;
 /// A flight whose commands differ by less from the plan's, on the average, flew it, m/s.
 const SAME_MPS: f64 = 0.1;
 
-/// Reads the flight of a log that flew the plan; without a plan, or where none did, the last one that
-/// performed a show, else the last one.
+/// A vehicle is armed at most so long before or after its start, s.
+const NEAR_S: f64 = 60.0;
+
+/// Reads the flight of a log that is of the given start and flew the plan; without either, or where none
+/// did, the last one that performed a show, else the last one.
 pub(super) fn load(
     log: &Log,
     source: &Path,
@@ -33,10 +38,15 @@ pub(super) fn load(
         (Ok(_), None) => true,
         (Err(_), _) => false,
     };
-    if fits || !several {
+    let away_s = |flight: &Flight| options.start.map_or(0.0, |start| away_s(flight, start));
+    let is_of_start = usual.as_ref().is_ok_and(|flight| away_s(flight) == 0.0);
+    if is_of_start && (fits || !several) {
         return usual;
     }
-    let mut best: Option<(f64, Flight)> = None;
+    if !several {
+        return of_start_or_none(log, source, options, usual);
+    }
+    let mut best: Option<((f64, f64), Flight)> = None;
     let mut which = String::new();
     let mut looked_at = 0;
     for boot in 0..held.boots.max(1) {
@@ -52,7 +62,9 @@ pub(super) fn load(
             looked_at += 1;
             let Ok(flight) = found else { continue };
             // Without a plan the later one counts.
-            let off = options.segments.map_or(0.0, |segments| difference_mps(&flight, segments));
+            let off_mps =
+                options.segments.map_or(0.0, |segments| difference_mps(&flight, segments));
+            let off = (away_s(&flight), off_mps);
             if best.as_ref().is_none_or(|(lowest, _)| off <= *lowest) {
                 which = if held.boots > 1 {
                     ordinal(boot, held.boots)
@@ -64,7 +76,19 @@ pub(super) fn load(
         }
     }
     match (best, options.segments) {
-        (Some((off, mut flight)), Some(_)) if off < SAME_MPS => {
+        (Some(((away_s, _), mut flight)), _)
+            if options.start.is_some() && !is_of_start && is_near(&flight, away_s) =>
+        {
+            flight.warnings.push(format!(
+                "{}; the one that began at the flight's start is analysed: the {which}",
+                of(held)
+            ));
+            Ok(flight)
+        }
+        (_, _) if options.start.is_some() && !is_of_start => {
+            of_start_or_none(log, source, options, usual)
+        }
+        (Some(((_, off), mut flight)), Some(_)) if off < SAME_MPS => {
             flight
                 .warnings
                 .push(format!("{}; the one that flew the plan is analysed: the {which}", of(held)));
@@ -78,6 +102,45 @@ pub(super) fn load(
         }
         _ => usual,
     }
+}
+
+/// How far what was read is from a start, s; 0: it is of it, or the log does not say when it began.
+fn away_s(flight: &Flight, start: GpsTime) -> f64 {
+    let Some(began) = flight.clock.start else { return 0.0 };
+    let apart_s = later_s(began, start).abs();
+    if flight.clock.method == Alignment::Takeoff {
+        // It is not known how long after its start it took off.
+        return (apart_s - NEAR_S).max(0.0);
+    }
+    if apart_s > SAME_START_S {
+        return apart_s;
+    }
+    // Its show time was made with this start: then it must have been armed about that time.
+    let (from_s, to_s) = flight.pulse_us.span().unwrap_or_default();
+    (from_s - NEAR_S).max(-to_s).max(0.0)
+}
+
+/// Whether what was read can be of a start from which it is so far away: drones may wait for their turn.
+fn is_near(flight: &Flight, away_s: f64) -> bool {
+    away_s == 0.0 || flight.clock.method == Alignment::GpsTime
+}
+
+/// What was read is of another start than the one that is meant. That is said where the log knows of the
+/// start: then the drone did not take off for it. Else the start may be wrong, as it always could.
+fn of_start_or_none(
+    log: &Log,
+    source: &Path,
+    options: FlightOptions<'_>,
+    usual: Result<Flight, FlightError>,
+) -> Result<Flight, FlightError> {
+    let knows = || options.start.map(|start| identify(log).belongs_to(start)) == Some(Belongs::Yes);
+    let is_near =
+        |flight: &Flight| options.start.is_none_or(|start| is_near(flight, away_s(flight, start)));
+    if usual.as_ref().is_ok_and(|flight| !is_near(flight)) && knows() {
+        let reason = "the drone did not take off for this start".to_owned();
+        return Err(FlightError::NoFlight { source_path: source.to_owned(), reason });
+    }
+    usual
 }
 
 /// What the log holds.

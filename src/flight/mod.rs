@@ -18,6 +18,8 @@ mod align;
 mod channels;
 mod choose;
 mod clean;
+mod fit;
+pub mod identity;
 mod indicator;
 mod load;
 mod pick;
@@ -34,6 +36,8 @@ use crate::base::time::GpsTime;
 use crate::log::{Log, LogError, ScanStats};
 use crate::mission::plan::Segment;
 
+pub use fit::share_flown;
+pub use identity::{Belongs, Identity, identify};
 pub use indicator::Indicator;
 
 /// A channel: samples with their own times.
@@ -112,7 +116,8 @@ pub struct Flight {
 /// What is known about a flight besides its log.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlightOptions<'a> {
-    /// GPS time of show time 0, for logs without SHOW rows.
+    /// GPS time of show time 0: which flight of a log with several is meant, and when it began in
+    /// logs without SHOW rows.
     pub start: Option<GpsTime>,
     /// What stands for rotor effort.
     pub indicator: Indicator,
@@ -184,48 +189,6 @@ pub enum FlightError {
     },
 }
 
-/// A first fix this long after arming is still near home, s.
-const SOON_S: f64 = 10.0;
-
-/// What a log says about who wrote it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Identity {
-    /// MAVLink system id, if the log has the parameter.
-    pub system_id: Option<u8>,
-    /// Where the vehicle stood when it was armed for its flight: (latitude, longitude), degrees.
-    /// Without a flight, the first place with a 3-D fix; `None` as well if it was in the air before
-    /// it had one.
-    pub home_deg: Option<(f64, f64)>,
-    /// Whether the log holds a flight: motors armed for some seconds, with their outputs.
-    pub flew: bool,
-}
-
-/// Reads only what tells drones apart.
-pub fn identify(log: &Log) -> Identity {
-    let mut messages = channels::Messages::read_identity(log);
-    messages.keep_one_boot(None);
-    let flight = messages.output_times().and_then(|times| {
-        let armed = pick::armed(&messages, &times);
-        pick::flight(&armed, &pick::stages(&messages), &times)
-    });
-    let places = messages.places();
-    let home = match &flight {
-        // The last fix on the ground, else the first one soon after.
-        Some(((armed_s, _), _)) => {
-            let before = places.partition_point(|(time, ..)| time <= armed_s);
-            let soon = |(time, ..): &&(f64, f64, f64)| *time <= armed_s + SOON_S;
-            (before.checked_sub(1).and_then(|last| places.get(last)))
-                .or_else(|| places.get(before).filter(soon))
-        }
-        None => places.first(),
-    };
-    Identity {
-        system_id: messages.system_id(),
-        home_deg: home.map(|(_, lat, lon)| (*lat, *lon)),
-        flew: flight.is_some(),
-    }
-}
-
 impl Flight {
     /// What of the flight or of its log is lost, one phrase each, as in [`Flight::warnings`]: the
     /// log ends in the air, or its reader skipped damage. Empty: nothing.
@@ -236,8 +199,8 @@ impl Flight {
 
     /// Reads one flight of a log.
     ///
-    /// With several flights or boots in the log, the one that flew the plan is read
-    /// ([`FlightOptions::segments`]); without a plan the last one that performed a show, else the
+    /// With several flights or boots in the log, the one of the start ([`FlightOptions::start`]) that
+    /// flew the plan is read ([`FlightOptions::segments`]); without a plan the last one that performed a show, else the
     /// last armed one. [`Flight::warnings`] says so.
     ///
     /// # Errors

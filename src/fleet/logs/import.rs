@@ -11,7 +11,8 @@ use crate::base::file::{FileError, write_with};
 use crate::base::frame::Geodetic;
 use crate::base::time::GpsTime;
 use crate::campaign::CampaignError;
-use crate::log::{Log, Select, Table};
+use crate::flight::{Identity, identify};
+use crate::log::Log;
 use crate::mission::Plan;
 use nalgebra::Vector3;
 
@@ -52,79 +53,11 @@ pub struct Imported {
     pub missing: Vec<u16>,
 }
 
-/// What a log says of itself.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Identity {
-    /// SYSID_THISMAV.
-    pub system: Option<u8>,
-    /// Where it was when it knew first.
-    pub home: Option<Geodetic>,
-    /// First and last time by its satellites.
-    pub span: Option<(GpsTime, GpsTime)>,
-    /// What tells that it is only the beginning of a log.
-    pub cut: Option<&'static str>,
-}
-
-/// Reads what a log says of itself.
-pub fn identity(log: &Log) -> Identity {
-    let (tables, stats) = log.select(&[
-        Select { message: "PARM", fields: &["Name", "Value"] },
-        Select { message: "ORGN", fields: &["Lat", "Lng", "Alt"] },
-        Select { message: "GPS", fields: &["Status", "GMS", "GWk", "Lat", "Lng", "Alt"] },
-        Select { message: "ARM", fields: &["ArmState"] },
-    ]);
-    let [parameters, origins, positions, armings] = tables.as_slice() else {
-        return Identity { system: None, home: None, span: None, cut: None };
-    };
-    // The firmware writes of disarming before it closes its log.
-    let is_armed = armings.number("ArmState").and_then(<[f64]>::last).is_some_and(|at| *at > 0.0);
-    let cut = match (stats.truncated_bytes > 0, is_armed) {
-        (true, _) => Some("it ends in the middle of a message"),
-        (_, true) => Some("it ends while the drone is armed"),
-        _ => None,
-    };
-    let names = parameters.text("Name").unwrap_or_default();
-    let values = parameters.number("Value").unwrap_or_default();
-    let system = names.iter().zip(values).rfind(|(name, _)| *name == "SYSID_THISMAV");
-    let is_id = |value: f64| (1.0..=255.0).contains(&value);
-    let fixed = |row: usize| at(positions, "Status", row).is_some_and(|status| status >= 3.0);
-    let rows: Vec<usize> = (0..positions.rows).filter(|row| fixed(*row)).collect();
-    let time = |row: Option<&usize>| {
-        let row = *row?;
-        let week = at(positions, "GWk", row)?;
-        let ms = at(positions, "GMS", row)?;
-        Some(GpsTime { week: week as u16, tow_ms: ms as u32 })
-    };
-    let home = place(origins, 0).or_else(|| place(positions, *rows.first()?));
-    Identity {
-        system: system.map(|(_, value)| *value).filter(|value| is_id(*value)).map(|v| v as u8),
-        home,
-        span: time(rows.first()).zip(time(rows.last())),
-        cut,
-    }
-}
-
 /// The number of a log in the name that the firmware gave it: `00000012.BIN`.
 fn number(path: &Path) -> Option<u32> {
     let stem = path.file_stem()?.to_str()?;
     let is_number = stem.len() == 8 && stem.bytes().all(|byte| byte.is_ascii_digit());
     if is_number { stem.parse().ok() } else { None }
-}
-
-fn at(table: &Table, field: &str, row: usize) -> Option<f64> {
-    table.number(field)?.get(row).copied()
-}
-
-fn place(table: &Table, row: usize) -> Option<Geodetic> {
-    let place = Geodetic {
-        lat_deg: at(table, "Lat", row)?,
-        lon_deg: at(table, "Lng", row)?,
-        amsl_m: at(table, "Alt", row)?,
-    };
-    let is_place = place.lat_deg.is_finite()
-        && place.lon_deg.is_finite()
-        && (place.lat_deg, place.lon_deg) != (0.0, 0.0);
-    is_place.then_some(place)
 }
 
 struct Candidate {
@@ -158,7 +91,7 @@ pub fn import(
         match Log::open(&path) {
             Err(error) => report.left.push((path, error.to_string())),
             Ok(log) => {
-                let identity = identity(&log);
+                let identity = identify(&log);
                 match slot_of(&identity, plan, options) {
                     Ok(slot) => {
                         of_slot.entry(slot).or_default().push(Candidate { path, identity });
@@ -237,7 +170,7 @@ fn find(path: &Path, found: &mut Vec<PathBuf>, left: &mut Vec<(PathBuf, String)>
 fn slot_of(identity: &Identity, plan: &Plan, options: &ImportOptions) -> Result<u16, String> {
     let frame = plan.site.frame();
     let distance_m = |slot: u16| {
-        let home = identity.home?;
+        let home = identity.home(options.start)?;
         let slot = plan.slot(slot)?;
         let there = frame.from_geodetic(Geodetic { amsl_m: frame.origin.amsl_m, ..home });
         let own = Vector3::from(slot.home_m);
@@ -247,7 +180,7 @@ fn slot_of(identity: &Identity, plan: &Plan, options: &ImportOptions) -> Result<
         distance_m(slot).filter(|distance| *distance < NEAR_M).map(|distance| (distance, slot))
     });
     let near = near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, slot)| slot);
-    let by_id = identity.system.and_then(|system| {
+    let by_id = identity.system_id.and_then(|system| {
         if options.slots.is_empty() {
             plan.slot(system.into()).map(|slot| slot.slot)
         } else {
@@ -280,14 +213,14 @@ fn choose(
     start: Option<GpsTime>,
     left: &mut Vec<(PathBuf, String)>,
 ) -> Option<Candidate> {
-    let covers = |candidate: &Candidate| match (start, candidate.identity.span) {
+    let covers = |candidate: &Candidate| match (start, candidate.identity.span()) {
         (Some(start), Some((first, last))) => {
             (first.total_ms()..=last.total_ms()).contains(&start.total_ms())
         }
         _ => false,
     };
     let rank = |candidate: &Candidate| {
-        let latest = candidate.identity.span.map(|(first, _)| first.total_ms());
+        let latest = candidate.identity.span().map(|(first, _)| first.total_ms());
         (covers(candidate), latest, candidate.path.clone())
     };
     let mut candidates = candidates;
