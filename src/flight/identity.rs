@@ -113,6 +113,16 @@ impl Identity {
         of_start.or_else(|| self.boots.iter().rev().find_map(|boot| boot.home))
     }
 
+    /// The boot that is of a start.
+    pub fn boot_of(&self, start: GpsTime) -> Option<&Boot> {
+        self.boots.iter().find(|boot| boot.belongs_to(start, None) == Belongs::Yes)
+    }
+
+    /// How far a start is from what the log is of, s: from its nearest show, else from its time.
+    pub fn away_s(&self, start: GpsTime) -> f64 {
+        self.boots.iter().map(|boot| boot.away_s(start)).fold(f64::INFINITY, f64::min)
+    }
+
     /// The show that began at a start, if the log has its clock.
     pub fn show_of(&self, start: GpsTime) -> Option<&Show> {
         let shows = self.shows().filter(|show| later_s(show.start, start).abs() <= SAME_START_S);
@@ -299,10 +309,14 @@ fn parts(messages: &Messages) -> Vec<Boot> {
         let time = |board_s: f64| {
             GpsTime::from_total_ms((board_s * 1000.0 + clock.offset_ms).round() as i64)
         };
-        let mut own = fixes.iter().map(|(time, _)| *time).filter(|time| holds(*time));
-        let first = own.next();
-        let span =
-            first.and_then(|first| Some((time(first)?, time(own.next_back().unwrap_or(first))?)));
+        let steady = |(board_s, ms): &&(f64, f64)| {
+            holds(*board_s) && same_boot(ms - board_s * 1000.0, clock.offset_ms)
+        };
+        let mut own = fixes.iter().filter(steady).map(|(_, ms)| *ms as i64);
+        let span = own.next().and_then(|first| {
+            let last = own.next_back().unwrap_or(first);
+            GpsTime::from_total_ms(first).zip(GpsTime::from_total_ms(last))
+        });
         let armed = armed.iter().filter(|(start, _)| holds(*start));
         boots.push(Boot {
             booted: time(0.0),
@@ -318,14 +332,20 @@ fn parts(messages: &Messages) -> Vec<Boot> {
     boots
 }
 
+/// Whether two differences of GPS time and board time, ms, are of one boot.
+fn same_boot(one_ms: f64, other_ms: f64) -> bool {
+    (one_ms - other_ms).abs() <= SAME_BOOT_S * 1000.0
+}
+
 /// The clocks that the satellites' time tells apart, in the order of board time.
 fn clocks(fixes: &[(f64, f64)]) -> Vec<Clock> {
     let offsets: Vec<f64> = fixes.iter().map(|(time, ms)| ms - time * 1000.0).collect();
-    let same = |a: f64, b: f64| (a - b).abs() <= SAME_BOOT_S * 1000.0;
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (index, offset) in offsets.iter().enumerate() {
         match runs.last_mut() {
-            Some((first, end)) if offsets.get(*first).is_some_and(|old| same(*old, *offset)) => {
+            Some((first, end))
+                if offsets.get(*first).is_some_and(|old| same_boot(*old, *offset)) =>
+            {
                 *end = index + 1;
             }
             _ => runs.push((index, index + 1)),
@@ -341,7 +361,8 @@ fn clocks(fixes: &[(f64, f64)]) -> Vec<Clock> {
         let Some(offset_ms) = own.get(own.len() / 2).copied() else { continue };
         let from_s = fixes.get(first).map_or(0.0, |(time, _)| *time);
         // After a damaged stretch the same clock goes on.
-        if clocks.last().is_none_or(|last| !same(last.offset_ms, offset_ms)) && clocks.len() < MOST
+        if clocks.last().is_none_or(|last| !same_boot(last.offset_ms, offset_ms))
+            && clocks.len() < MOST
         {
             clocks.push(Clock { from_s, offset_ms });
         }
