@@ -29,6 +29,8 @@ mod fleet_refusals;
 #[cfg(unix)]
 #[path = "cli/fleet_upload.rs"]
 mod fleet_upload;
+#[path = "cli/foreign_text.rs"]
+mod foreign_text;
 #[path = "cli/gap.rs"]
 mod gap;
 #[path = "cli/guided.rs"]

@@ -106,11 +106,6 @@ fn a_file_reads_as_its_bytes_do() {
         let path = folder.path().join("log.BIN");
         std::fs::write(&path, &bytes).unwrap();
         let file = Log::open(&path).unwrap();
-        // Somebody puts another log in its place: it is still the one that was opened.
-        if round % 4 == 0 {
-            std::fs::remove_file(&path).unwrap();
-            std::fs::write(&path, whole()).unwrap();
-        }
         let memory = Log::from_bytes(bytes);
         assert_eq!(file.inventory(), memory.inventory(), "round {round}");
         // NaN is not itself; its text is.
@@ -346,4 +341,42 @@ fn a_format_said_again_keeps_its_units() {
     // Another format has other units, which the log does not give.
     let other = fmt(70, 15, b"ATT", b"Qf", b"TimeUS,Roll");
     assert_eq!(tables(&[header, other].concat()).0[0].unit("Roll"), None);
+}
+
+#[test]
+fn what_is_cut_off_or_replaced_meanwhile_is_missing_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.BIN");
+    let bytes = [whole(), whole(), whole()].concat();
+    std::fs::write(&path, &bytes).unwrap();
+    let log = Log::open(&path).unwrap();
+    let before = log.inventory();
+    // A map of the file would end the program here (SIGBUS).
+    let cut = whole().len() + 10;
+    std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(cut as u64).unwrap();
+    let after = log.inventory();
+    assert_eq!(after.size_bytes, bytes.len() as u64);
+    assert_eq!(after.stats.truncated_bytes, (bytes.len() - whole().len()) as u64);
+    assert!(after.messages.iter().map(|one| one.count).sum::<u64>() > 0);
+    assert!(after.messages.iter().zip(&before.messages).all(|(now, then)| now.count <= then.count));
+    // Somebody puts another log in its place: that is not taken for it.
+    std::fs::remove_file(&path).unwrap();
+    std::fs::write(folder.path().join("other"), whole()).unwrap();
+    std::fs::rename(folder.path().join("other"), &path).unwrap();
+    let gone = log.inventory();
+    assert_eq!(gone.stats.truncated_bytes, bytes.len() as u64);
+    assert!(gone.messages.iter().all(|one| one.count == 0));
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_refused_and_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("00000001.BIN");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    for path in [pipe.as_path(), "/dev/zero".as_ref(), folder.path()] {
+        let error = Log::open(path).unwrap_err();
+        assert!(matches!(error, updraft::log::LogError::Open { .. }), "{error}");
+    }
 }

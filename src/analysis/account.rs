@@ -6,6 +6,7 @@ use super::drone::One;
 use super::input::{FlightInput, LogInput};
 use super::result::{DroneAnalysis, Missing, PartlyUsedLog, UnusedLog};
 use super::slots::SlotMatch;
+use crate::base::plain::Shown as _;
 
 /// The logs of a flight, sorted by their use.
 #[derive(Default)]
@@ -31,7 +32,7 @@ impl Account {
                 }
                 Err(reason) => {
                     // Errors name the file as it was opened; results name it as their reader finds it.
-                    let reason = reason.replace(&log.path.display().to_string(), &source);
+                    let reason = reason.replace(&log.path.shown().to_string(), &source);
                     let reason = match reason.strip_prefix(&format!("{source}: ")) {
                         Some(rest) => rest.to_owned(),
                         None => reason,

@@ -14,6 +14,7 @@ use super::track;
 use super::updraft::{self, DroneSeries, Lean, RUNNING_S, Running};
 use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
+use crate::base::plain::plain;
 use crate::flight::{Alignment, Flight, FlightOptions, table};
 use crate::mission::plan::{Kind, Purpose, Segment, Slot};
 
@@ -85,7 +86,7 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
 
     let name = match slot {
         Some((slot, _)) => slot.name.clone(),
-        None => log.path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        None => plain(&log.path.file_stem().unwrap_or_default().to_string_lossy()).into_owned(),
     };
     let number = slot.map(|(slot, _)| slot.slot);
     let reference = shared.reference.and_then(|reference| laws_for(reference, number, &name));

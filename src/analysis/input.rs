@@ -9,6 +9,7 @@ use super::density::Density;
 use super::lean_table::LeanTable;
 use super::statistics::result::TrueAir;
 use super::wind::Leaning;
+use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::flight::Indicator;
 use crate::flight::table::Mapping;
@@ -78,7 +79,7 @@ impl FlightInput<'_> {
     /// A log's path as results give it.
     pub(super) fn shown(&self, path: &Path) -> String {
         let inside = self.folder.and_then(|folder| path.strip_prefix(folder).ok());
-        inside.unwrap_or(path).display().to_string()
+        inside.unwrap_or(path).shown().to_string()
     }
 }
 

@@ -1,18 +1,20 @@
 //! Writing files so that nothing half-written is ever taken for whole.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 use thiserror::Error;
 
+use super::plain::Shown as _;
+
 /// Marks our unfinished files, so that a later step can recognise and sweep them.
 pub const PARTIAL_PREFIX: &str = ".partial-";
 
 /// A file could not be read or written.
 #[derive(Debug, Error)]
-#[error("failed to {action} {}", path.display())]
+#[error("failed to {action} {}", path.shown())]
 pub struct FileError {
     /// What was being done ("read", "write", "create the folder").
     pub action: &'static str,
@@ -76,17 +78,54 @@ pub fn create_folder(path: &Path) -> Result<(), FileError> {
     fs::create_dir_all(path).map_err(|source| FileError::new("create the folder", path, source))
 }
 
-/// Reads a whole file, refusing one larger than `limit_bytes`.
+/// Opens a file to read it. What is no file is refused before it is opened: a named pipe may keep
+/// its reader waiting for ever, and a device may never end.
+pub fn open_regular(path: &Path) -> io::Result<(File, Metadata)> {
+    let regular = |metadata: &Metadata| match metadata {
+        of if of.is_file() => Ok(()),
+        of if of.is_dir() => Err(io::Error::from(io::ErrorKind::IsADirectory)),
+        _ => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "it is no file, but a pipe, a socket or a device",
+        )),
+    };
+    regular(&fs::metadata(path)?)?;
+    let file = File::open(path)?;
+    // Another may stand there by now.
+    let metadata = file.metadata()?;
+    regular(&metadata)?;
+    Ok((file, metadata))
+}
+
+/// Opens what a user names: a file, or a pipe that their shell gives below `/dev` (`<(...)`).
+pub fn open_named(path: &Path) -> io::Result<File> {
+    let is_dir = || fs::metadata(path).is_ok_and(|metadata| metadata.is_dir());
+    if path.starts_with("/dev") && !is_dir() {
+        return File::open(path);
+    }
+    open_regular(path).map(|(file, _)| file)
+}
+
+/// Reads a whole file, refusing one larger than `limit_bytes`, also one that has no end.
 pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FileError> {
     let fail = |source| FileError::new("read", path, source);
-    let size = fs::metadata(path).map_err(fail)?.len();
-    if size > limit_bytes {
-        return Err(fail(io::Error::new(
+    let file = open_named(path).map_err(fail)?;
+    let size = file.metadata().map_err(fail)?.len();
+    let too_large = |size: String| {
+        fail(io::Error::new(
             io::ErrorKind::FileTooLarge,
             format!("the file has {size} bytes, more than the {limit_bytes} allowed here"),
-        )));
+        ))
+    };
+    if size > limit_bytes {
+        return Err(too_large(size.to_string()));
     }
-    fs::read(path).map_err(fail)
+    let mut content = Vec::with_capacity(size as usize);
+    file.take(limit_bytes.saturating_add(1)).read_to_end(&mut content).map_err(fail)?;
+    if content.len() as u64 > limit_bytes {
+        return Err(too_large("more".to_owned()));
+    }
+    Ok(content)
 }
 
 /// Bytes that are read at a time; they stay in the processor's cache.
@@ -95,7 +134,7 @@ const PIECE_BYTES: usize = 1 << 17;
 /// Reads a file through, piece by piece; returns its size in bytes.
 pub fn read_pieces(path: &Path, mut piece: impl FnMut(&[u8])) -> Result<u64, FileError> {
     let fail = |source| FileError::new("read", path, source);
-    let mut file = File::open(path).map_err(fail)?;
+    let (mut file, _) = open_regular(path).map_err(fail)?;
     let mut buffer = vec![0; PIECE_BYTES];
     let mut size_bytes = 0;
     loop {

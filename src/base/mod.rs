@@ -8,5 +8,7 @@ pub mod file;
 pub mod frame;
 pub mod json;
 pub mod number;
+pub mod parse;
+pub mod plain;
 pub mod rng;
 pub mod time;

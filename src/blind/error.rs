@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::base::file::FileError;
+use crate::base::plain::Shown as _;
+use crate::base::plain::plain;
 use crate::campaign::CampaignError;
 use crate::effects::EffectError;
 use crate::mission::resolve::MissionError;
@@ -44,7 +46,7 @@ pub enum BlindError {
     #[error(transparent)]
     Sim(#[from] SimError),
     /// There is nothing of this name to hide.
-    #[error("nothing is called \"{name}\" that could be hidden; there are {known}")]
+    #[error("nothing is called \"{}\" that could be hidden; there are {known}", plain(name))]
     Unknown {
         /// As asked for.
         name: String,
@@ -104,7 +106,7 @@ pub enum BlindError {
     /// The truth was asked for too early.
     #[error(
         "the truth in {} stays sealed: there is no verdict at {}; write the verdict first",
-        sealed.display(), verdict.display()
+        sealed.shown(), verdict.shown()
     )]
     NoVerdict {
         /// The sealed folder.
@@ -115,7 +117,7 @@ pub enum BlindError {
     /// The truth is not what was sealed.
     #[error(
         "{} was changed after it was sealed: its SHA-256 is {found}, published was {published}",
-        path.display()
+        path.shown()
     )]
     Tampered {
         /// The truth's file.
@@ -126,7 +128,7 @@ pub enum BlindError {
         published: String,
     },
     /// The search failed.
-    #[error("no verdict on {}", flight.display())]
+    #[error("no verdict on {}", flight.shown())]
     Explain {
         /// The flight's folder.
         flight: PathBuf,
@@ -135,7 +137,7 @@ pub enum BlindError {
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A file is of another program.
-    #[error("{} has the format \"{found}\", this program reads \"{wanted}\"", path.display())]
+    #[error("{} has the format \"{found}\", this program reads \"{wanted}\"", path.shown())]
     Schema {
         /// The file.
         path: PathBuf,
@@ -147,7 +149,7 @@ pub enum BlindError {
     /// The folder holds flights of other settings.
     #[error(
         "{} holds flight {index} of another table ({why}); choose another folder with -o",
-        folder.display()
+        folder.shown()
     )]
     Other {
         /// The folder.

@@ -27,6 +27,8 @@ use thiserror::Error;
 
 use crate::base::crc::file_crc32;
 use crate::base::file::{FileError, read_whole};
+use crate::base::parse;
+use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::mission::Plan;
 use crate::mission::plan::PLAN_SCHEMA;
@@ -136,7 +138,7 @@ pub enum CampaignError {
     #[error(transparent)]
     File(#[from] FileError),
     /// A JSON file is wrong.
-    #[error("{} is not valid: {reason}", path.display())]
+    #[error("{} is not valid: {reason}", path.shown())]
     Json {
         /// The file.
         path: PathBuf,
@@ -144,7 +146,7 @@ pub enum CampaignError {
         reason: String,
     },
     /// There is neither a plan nor a campaign.
-    #[error("{} holds no plan.json and no campaign.json; make one with `updraft plan`", path.display())]
+    #[error("{} holds no plan.json and no campaign.json; make one with `updraft plan`", path.shown())]
     NoPlan {
         /// The folder.
         path: PathBuf,
@@ -152,20 +154,20 @@ pub enum CampaignError {
     /// Another process is writing into the folder.
     #[error(
         "another updraft is writing into {}; wait until it is done, or choose another folder",
-        path.display()
+        path.shown()
     )]
     Busy {
         /// The folder.
         path: PathBuf,
     },
     /// A file where a folder is expected.
-    #[error("{} is not a campaign folder", path.display())]
+    #[error("{} is not a campaign folder", path.shown())]
     NotFolder {
         /// The file.
         path: PathBuf,
     },
     /// The folder already holds something else.
-    #[error("{} already holds {what}; choose another folder or give --force", path.display())]
+    #[error("{} already holds {what}; choose another folder or give --force", path.shown())]
     Occupied {
         /// The folder.
         path: PathBuf,
@@ -331,7 +333,7 @@ pub fn is_campaign(folder: &Path) -> bool {
 /// Reads a JSON file; errors name the file, line and column.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CampaignError> {
     let bytes = read_whole(path, MAX_JSON_BYTES)?;
-    serde_json::from_slice(&bytes)
+    parse::json(&bytes)
         .map_err(|error| CampaignError::Json { path: path.to_owned(), reason: error.to_string() })
 }
 
@@ -343,7 +345,7 @@ pub fn read_plan(path: &Path) -> Result<Plan, CampaignError> {
 
 /// A plan from its JSON, if its parts fit together; else why not.
 pub fn parse_plan(bytes: &[u8]) -> Result<Plan, String> {
-    let plan: Plan = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+    let plan: Plan = parse::json(bytes).map_err(|error| error.to_string())?;
     validate_plan(&plan)?;
     Ok(plan)
 }

@@ -21,6 +21,7 @@ use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, OffsetRule, analyze};
 use crate::base::file::write_with;
 use crate::base::json::write_json;
+use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign;
 use crate::flight::Indicator;
@@ -378,7 +379,7 @@ fn finish(
     }
     let place = match page {
         _ if nothing => ": nothing found".to_owned(),
-        Some(page) => format!(" -> {}", page.display()),
+        Some(page) => format!(" -> {}", page.shown()),
         None => String::new(),
     };
     let used: usize = analysis.flights.iter().map(|flight| flight.drones.len()).sum();
@@ -430,7 +431,7 @@ pub(super) fn load_plan(path: &Path) -> Result<Plan, CommandError> {
     if loaded.len() != 1 {
         return Err(CommandError::Usage(format!(
             "{} holds {} flights; give the folder of one of them",
-            path.display(),
+            path.shown(),
             loaded.len()
         )));
     }
@@ -444,9 +445,7 @@ fn read_reference(path: &Path) -> Result<FlightAnalysis, CommandError> {
         .flights
         .into_iter()
         .find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some())
-        .ok_or_else(|| {
-            CommandError::Usage(format!("{} has no calibration to hold", path.display()))
-        })
+        .ok_or_else(|| CommandError::Usage(format!("{} has no calibration to hold", path.shown())))
 }
 
 /// Flights of several campaigns may have the same name: the folder's name tells them apart.

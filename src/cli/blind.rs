@@ -10,6 +10,7 @@ use super::progress::Progress;
 use super::simulate::made_by;
 use super::words;
 use crate::base::file::write_whole;
+use crate::base::plain::Shown as _;
 use crate::blind::hide::KINDS;
 use crate::blind::render::{Style, render};
 use crate::blind::series::{self, Place, Settings};
@@ -262,7 +263,7 @@ pub(super) fn run(context: &Context, args: &BlindArgs) -> Result<Exit, CommandEr
     context.say(&format!(
         "{} scored -> {}",
         words::count(outcomes.len(), "blind flight"),
-        markdown.display()
+        markdown.shown()
     ));
     Ok(if lost.is_empty() { Exit::Done } else { Exit::Losses })
 }

@@ -10,6 +10,7 @@ use super::exit::with_reasons;
 use super::load::{MAX_SKYB_BYTES, has_extension, read_show};
 use crate::base::causes::with_causes;
 use crate::base::file::read_whole;
+use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::mission::Plan;
 use crate::show::csv::CsvOptions;
@@ -39,7 +40,7 @@ pub(super) struct FlightFiles {
 /// Reads and compares everything in a flight's folder.
 pub(super) fn open(folder: &FlightFolder) -> FlightFiles {
     let mut problems = Vec::new();
-    let vehicle = match library::load(&folder.vehicle().display().to_string()) {
+    let vehicle = match library::load(&folder.vehicle().to_string_lossy()) {
         _ if !present(&folder.vehicle(), &mut problems) => None,
         Ok(vehicle) => Some(vehicle),
         Err(error) => {
@@ -64,7 +65,7 @@ pub(super) fn open(folder: &FlightFolder) -> FlightFiles {
     if let Some(show) = &compiled {
         compare(&folder.skyc(), show, &planned, SKYC_M, true, &mut problems);
         if !same_fence(&show.fence, &planned.fence) {
-            problems.push(format!("{}: its fence is not the plan's", folder.skyc().display()));
+            problems.push(format!("{}: its fence is not the plan's", folder.skyc().shown()));
         }
     }
     if let Some(show) = archived(&folder.csv(), &mut problems) {
@@ -78,7 +79,7 @@ pub(super) fn open(folder: &FlightFolder) -> FlightFiles {
 fn present(path: &Path, problems: &mut Vec<String>) -> bool {
     let there = path.is_file();
     if !there {
-        problems.push(format!("{} is missing", path.display()));
+        problems.push(format!("{} is missing", path.shown()));
     }
     there
 }
@@ -92,7 +93,7 @@ fn archived(path: &Path, problems: &mut Vec<String>) -> Option<Show> {
         .map_err(|error| with_causes(&error, ": "))
         .and_then(|bytes| {
             verify_archive(&bytes)
-                .map_err(|error| format!("{}: {}", path.display(), with_causes(&error, ": ")))
+                .map_err(|error| format!("{}: {}", path.shown(), with_causes(&error, ": ")))
         });
     if let Err(problem) = sound {
         problems.push(problem);
@@ -110,7 +111,7 @@ fn compare(
     homes: bool,
     problems: &mut Vec<String>,
 ) {
-    let path = path.display();
+    let path = path.shown();
     if here.drones.len() != planned.drones.len() {
         let (here, there) = (here.drones.len(), planned.drones.len());
         problems.push(format!("{path} has {here} drones, the plan {there}"));
@@ -153,11 +154,11 @@ fn binaries(folder: &FlightFolder, plan: &Plan, planned: &Show, problems: &mut V
         plan.slots.iter().map(|slot| folder.skyb(slot.slot, plan.slots.len())).collect();
     let checked = |(path, there): (&PathBuf, &ShowDrone)| -> Option<String> {
         if !path.is_file() {
-            return Some(format!("{} is missing", path.display()));
+            return Some(format!("{} is missing", path.shown()));
         }
         let contents = match read_whole(path, MAX_SKYB_BYTES) {
             Ok(bytes) => skyb::read(&bytes)
-                .map_err(|error| format!("{}: {}", path.display(), with_causes(&error, ": "))),
+                .map_err(|error| format!("{}: {}", path.shown(), with_causes(&error, ": "))),
             Err(error) => Err(with_causes(&error, ": ")),
         };
         let contents = match contents {
@@ -166,12 +167,12 @@ fn binaries(folder: &FlightFolder, plan: &Plan, planned: &Show, problems: &mut V
         };
         let unit_m = f64::from(contents.scale_mm) / 1000.0;
         let how = contents.drone.trajectory.difference(&there.trajectory, unit_m)?;
-        Some(format!("{} does not fly the plan: {how}", path.display()))
+        Some(format!("{} does not fly the plan: {how}", path.shown()))
     };
     let found: Vec<_> = paths.par_iter().zip(&planned.drones).map(checked).collect::<Vec<_>>();
     let found: Vec<_> = found.into_iter().flatten().collect();
     let place = folder.skyb_folder();
-    name_some(found, &format!("{}: and", place.display()), "more files missing or wrong", problems);
+    name_some(found, &format!("{}: and", place.shown()), "more files missing or wrong", problems);
     let wanted: BTreeSet<&PathBuf> = paths.iter().collect();
     let mut stray: Vec<_> = std::fs::read_dir(&place)
         .into_iter()
@@ -180,9 +181,9 @@ fn binaries(folder: &FlightFolder, plan: &Plan, planned: &Show, problems: &mut V
         .map(|entry| entry.path())
         .filter(|path| has_extension(path, "skyb") && !wanted.contains(path))
         .map(|path| {
-            format!("{} is of no slot of the plan, but would be uploaded with them", path.display())
+            format!("{} is of no slot of the plan, but would be uploaded with them", path.shown())
         })
         .collect();
     stray.sort();
-    name_some(stray, &format!("{}: and", place.display()), "more files of no slot", problems);
+    name_some(stray, &format!("{}: and", place.shown()), "more files of no slot", problems);
 }

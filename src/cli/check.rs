@@ -13,6 +13,7 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::load::{Loaded, load_shows};
 use super::words::wrap;
+use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
 use crate::check::{CheckInput, CheckReport, NAMES, Options, Severity, check};
 use crate::mission::Plan;
@@ -170,7 +171,7 @@ fn show_report(
         }
         return Ok(());
     }
-    let mut text = format!("{}\n", subject.path.display());
+    let mut text = format!("{}\n", subject.path.shown());
     if let Some(report) = report {
         let _ = writeln!(text, "{report}");
         if report.counts.values().any(|count| count.omitted > 0) && !args.verbose {
@@ -222,7 +223,7 @@ fn plan_beside(path: &Path) -> Option<(Plan, Vehicle, PathBuf)> {
         if !own.iter().any(|file| file == path || Some(file.as_path()) == path.parent()) {
             return None;
         }
-        let vehicle = library::load(&folder.vehicle().display().to_string()).ok()?;
+        let vehicle = library::load(&folder.vehicle().to_string_lossy()).ok()?;
         Some((folder.read_plan().ok()?, vehicle, folder.plan()))
     })
 }
@@ -262,7 +263,7 @@ pub(super) fn checked(
         Origin::Show => input.with_polygon(fence),
     });
     if let Origin::Beside(file) = origin {
-        report.notes.push(format!("limits and fence are those of {}", file.display()));
+        report.notes.push(format!("limits and fence are those of {}", file.shown()));
     }
     report
 }

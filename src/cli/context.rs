@@ -9,6 +9,8 @@ use serde::Serialize;
 
 use super::Global;
 use super::exit::CommandError;
+use crate::base::plain::Shown as _;
+use crate::base::plain::{for_terminal, json_for_terminal};
 use crate::campaign::lock::FolderLock;
 
 /// What a second Ctrl-C says while this program flies drones.
@@ -107,7 +109,7 @@ impl Context {
         if !lock.is_held() {
             self.warn(&format!(
                 "{} cannot be locked on this file system: let no other updraft write into it",
-                folder.display()
+                folder.shown()
             ));
         }
         Ok(lock)
@@ -121,12 +123,15 @@ impl Context {
     /// The file or folder that the command made: on standard output when that is all that is asked
     /// for.
     pub(super) fn result(&self, path: &Path) -> Result<(), CommandError> {
-        if self.quiet && !self.json { self.emit(&format!("{}\n", path.display())) } else { Ok(()) }
+        if self.quiet && !self.json { self.emit(&format!("{}\n", path.shown())) } else { Ok(()) }
     }
 
     /// What the user asked for, on standard output, also when quiet.
-    #[expect(clippy::unused_self, reason = "prints like the other methods")]
     pub(super) fn emit(&self, text: &str) -> Result<(), CommandError> {
+        Self::write_out(&for_terminal(text, self.color))
+    }
+
+    fn write_out(text: &str) -> Result<(), CommandError> {
         let mut out = io::stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
         match written {
@@ -143,13 +148,13 @@ impl Context {
         let mut text = serde_json::to_string_pretty(value)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
         text.push('\n');
-        self.emit(&text)
+        Self::write_out(&json_for_terminal(&text))
     }
 
     /// Talk, on standard error, unless quiet.
     pub(super) fn say(&self, text: &str) {
         if !self.quiet {
-            let _ = writeln!(io::stderr().lock(), "{text}");
+            complain(text);
         }
     }
 
@@ -161,8 +166,13 @@ impl Context {
     /// Something that must be said even when quiet, on standard error.
     #[expect(clippy::unused_self, reason = "talks like the other methods")]
     pub(super) fn insist(&self, text: &str) {
-        let _ = writeln!(io::stderr().lock(), "{text}");
+        complain(text);
     }
+}
+
+/// A line, or some, on standard error, without styles: the one way out to it.
+pub(super) fn complain(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{}", for_terminal(text, false));
 }
 
 /// Narrowest terminal that lines are broken for.

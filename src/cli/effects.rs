@@ -11,6 +11,7 @@ use super::effects_plot::{svg, text_plot};
 use super::exit::{CommandError, Exit};
 use super::words::wrap;
 use crate::base::file::write_whole;
+use crate::base::plain::Shown as _;
 use crate::effects::definition::{Hook, Signal};
 use crate::effects::doc::{curve, number, size_text};
 use crate::effects::select::{known, values_of};
@@ -102,7 +103,7 @@ pub(super) fn run(context: &Context, args: &EffectsArgs) -> Result<Exit, Command
                     &curve(effect, &vehicle, POINTS)?,
                 );
                 write_whole(file, drawn.as_bytes())?;
-                context.say(&format!("Wrote {}", file.display()));
+                context.say(&format!("Wrote {}", file.shown()));
             }
             if context.json {
                 context.print_json(&output(&vehicle, &[effect])?)?;

@@ -7,6 +7,7 @@ use super::context::Context;
 use super::exit::CommandError;
 use crate::analysis::result::Analysis;
 use crate::base::file::write_with;
+use crate::base::plain::Shown as _;
 use crate::campaign;
 use crate::report::fields;
 use crate::study::result::{STUDY_RESULT_SCHEMA, StudyResult};
@@ -45,7 +46,7 @@ pub(super) fn read_study(context: &Context, root: &Path) -> Option<StudyResult> 
             context.warn(&format!(
                 "{} has the format \"{}\", this program reads \"{STUDY_RESULT_SCHEMA}\": the report \
                  goes without Fig. 2 and Table I; fly the study again",
-                path.display(),
+                path.shown(),
                 study.schema
             ));
             None

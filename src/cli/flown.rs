@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::exit::CommandError;
 use super::simulate::{Simulation, made_by, sha256};
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
+use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::{FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_json};
 use crate::log::{Log, Select};
@@ -53,7 +54,7 @@ pub(super) fn prepare(
         Some(existing) if existing.source != record.source => {
             return Err(CommandError::Usage(format!(
                 "{} holds logs of real drones; simulate into another campaign",
-                folder.logs().display()
+                folder.logs().shown()
             )));
         }
         Some(existing) => {
@@ -63,7 +64,7 @@ pub(super) fn prepare(
                 return Err(CommandError::Usage(format!(
                     "{} holds logs flown with other settings; give --force to replace them, or use \
                      another folder",
-                    folder.logs().display()
+                    folder.logs().shown()
                 )));
             }
             if same {
@@ -75,7 +76,7 @@ pub(super) fn prepare(
         None if !present_logs(folder, plan).is_empty() => {
             return Err(CommandError::Usage(format!(
                 "{} holds logs that this program did not simulate; use another folder",
-                folder.logs().display()
+                folder.logs().shown()
             )));
         }
         None => {}
@@ -141,7 +142,7 @@ pub(super) fn changed_logs(
                 Ok(None) => None,
                 Ok(Some(_)) if is_of_others(&path) => Some(Err(CommandError::Usage(format!(
                     "{} was not simulated by this program; move it away, or use another folder",
-                    path.display()
+                    path.shown()
                 )))),
                 Ok(Some(how)) => Some(Ok((slot.slot, how))),
                 Err(error) => Some(Err(error.into())),

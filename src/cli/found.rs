@@ -19,6 +19,8 @@ use crate::analysis::wind::Leaning;
 use crate::analysis::{LogInput, TruthSeries};
 use crate::base::causes::with_causes;
 use crate::base::file::FileError;
+use crate::base::plain::Shown as _;
+use crate::base::plain::plain;
 use crate::base::time::GpsTime;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, LogRecord};
@@ -119,7 +121,7 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
     if logs.is_empty() {
         return Err(CommandError::Nothing(format!(
             "{} holds no .BIN logs: give a campaign, or the folder in which they are",
-            path.display()
+            path.shown()
         )));
     }
     work.flights.push(Found {
@@ -203,7 +205,7 @@ fn found_flight(folder: &FlightFolder, hashes: &Hashes) -> Result<Found, Command
             table: None,
         })
         .collect();
-    let vehicle = library::load(&folder.vehicle().display().to_string()).ok();
+    let vehicle = library::load(&folder.vehicle().to_string_lossy()).ok();
     let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
     let flown = record.as_ref().zip(vehicle.as_ref());
     // Logs of the simulator have a record; others may have been flown by streaming.
@@ -256,7 +258,7 @@ fn held_record(
             Ok(None) => held += 1,
             Ok(Some(how)) => notes.push(format!(
                 "{} is not the log that flight.json speaks of: {how}",
-                path_of(log).display()
+                path_of(log).shown()
             )),
             // The analysis says why it cannot be read.
             Err(_) => {}
@@ -266,7 +268,7 @@ fn held_record(
     if !holds && !files.is_empty() {
         *notes = vec![format!(
             "{} speaks of other logs than those beside it: it is not used",
-            folder.record().display()
+            folder.record().shown()
         )];
     }
     holds.then_some(record)
@@ -344,6 +346,6 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
 
 pub(super) fn stem(path: &Path) -> String {
     let name = path.file_stem().or(path.file_name());
-    let text = name.map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let text = name.map_or_else(String::new, |name| plain(&name.to_string_lossy()).into_owned());
     if text.is_empty() { "logs".to_owned() } else { text }
 }

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use super::found::{Found, Work};
 use crate::analysis::result::FlightAnalysis;
+use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
 use crate::flight::Indicator;
 use crate::mission::Plan;
@@ -47,7 +48,7 @@ pub(super) fn doubts(
             "{}: the laws seem to be those of other drones: {}. A law is a drone's own; with another \
              fleet's the map is wrong by as much as the fleets differ, which no error here says. Hold \
              the laws of a calibration of these drones",
-            path.display(),
+            path.shown(),
             reasons.join("; ")
         )
     })

@@ -12,6 +12,7 @@ use super::mission_args::MissionArgs;
 use super::simulate::made_by;
 use super::words;
 use crate::base::file::{create_folder, write_whole};
+use crate::base::plain::Shown as _;
 use crate::blind::play::{self, Act, play};
 use crate::blind::scenario::FULL_SIDE;
 use crate::blind::told::{HiddenRun, gap_words};
@@ -139,7 +140,7 @@ pub(super) fn run(
         Act::Sealed(hash) => context.say(&format!(
             "Sealed: an effect that {} does not have, of a size that is usual\n  SHA-256 {hash} -> {}",
             cell.base.vehicle_name(),
-            seal::truth_path(folder).display()
+            seal::truth_path(folder).shown()
         )),
         Act::Flown(flown) => {
             let lost = truth.nuisance.missing.len() + flown.lost;
@@ -149,7 +150,7 @@ pub(super) fn run(
                 cell.protocol.template(),
                 cell.air.name(),
                 words::count(flown.logs, "log"),
-                play::flight(folder).display()
+                play::flight(folder).shown()
             ));
         }
         Act::Explained(verdict) => {
@@ -157,7 +158,7 @@ pub(super) fn run(
             if let Some(shrink) = verdict.gap.drones.or(verdict.gap.rungs) {
                 context.say(&format!("Gap on held-out data: {}", gap_words(&shrink)));
             }
-            context.say(&format!("  -> {}", play::verdict(folder).display()));
+            context.say(&format!("  -> {}", play::verdict(folder).shown()));
         }
     }
     };
@@ -186,7 +187,7 @@ fn make_room(folder: &Path, force: bool) -> Result<(), CommandError> {
             return Err(CommandError::Usage(format!(
                 "{} has a flight with hidden physics; choose another folder with -o, or replace it with \
                  --force",
-                folder.display()
+                folder.shown()
             )));
         }
         return Ok(play::remove(folder)?);
@@ -194,13 +195,13 @@ fn make_room(folder: &Path, force: bool) -> Result<(), CommandError> {
     if crate::campaign::flights(folder).is_ok_and(|flights| !flights.is_empty()) {
         return Err(CommandError::Usage(format!(
             "{} is a campaign; choose another folder with -o",
-            folder.display()
+            folder.shown()
         )));
     }
     if flight.exists() {
         return Err(CommandError::Usage(format!(
             "{} is there and was not made by `run --hide`; choose another folder with -o",
-            flight.display()
+            flight.shown()
         )));
     }
     Ok(())

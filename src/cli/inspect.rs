@@ -13,6 +13,7 @@ use super::show_text::{describe_show, describe_skyb};
 use super::timetable;
 use super::words::{shorten, wrap};
 use crate::base::file::read_whole;
+use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
 use crate::log::{Inventory, Log, ScanStats};
 use crate::mission::Plan;
@@ -75,9 +76,9 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
         let text = match &found {
             InspectOutput::Log(inventory) => describe_log(path, inventory, context.width),
             InspectOutput::Show(show) => {
-                format!("{}: {}", path.display(), describe_show(show, context.width))
+                format!("{}: {}", path.shown(), describe_show(show, context.width))
             }
-            InspectOutput::Skyb(file) => format!("{}: {}", path.display(), describe_skyb(file)),
+            InspectOutput::Skyb(file) => format!("{}: {}", path.shown(), describe_skyb(file)),
             InspectOutput::Plans(plans) => plans
                 .iter()
                 .map(|plan| timetable::describe(plan, context.width))
@@ -91,7 +92,7 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
 
 fn describe_log(path: &Path, log: &Inventory, width: Option<usize>) -> String {
     let fields_width = width.map_or(60, |width| width.saturating_sub(37).clamp(12, 60));
-    let mut text = format!("{}: {:.2} MB", path.display(), log.size_bytes as f64 / 1e6);
+    let mut text = format!("{}: {:.2} MB", path.shown(), log.size_bytes as f64 / 1e6);
     if let Some(duration_s) = log.duration_s {
         let _ = write!(text, ", {duration_s:.1} s");
     }

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use crate::base::file::{FileError, read_whole};
+use crate::base::plain::Shown as _;
+use crate::base::plain::plain;
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::mission::Plan;
 use crate::show::{Show, csv, skyb, skyc};
@@ -29,7 +31,7 @@ pub enum LoadError {
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
     /// A `.skyc` file is broken.
-    #[error("{} is not a usable .skyc file", path.display())]
+    #[error("{} is not a usable .skyc file", path.shown())]
     Skyc {
         /// The file.
         path: PathBuf,
@@ -38,7 +40,7 @@ pub enum LoadError {
         source: skyc::SkycError,
     },
     /// A `.skyb` file is broken.
-    #[error("{} is not a usable .skyb file", path.display())]
+    #[error("{} is not a usable .skyb file", path.shown())]
     Skyb {
         /// The file.
         path: PathBuf,
@@ -47,7 +49,7 @@ pub enum LoadError {
         source: skyb::SkybError,
     },
     /// A CSV show is broken.
-    #[error("{} is not a usable CSV show", path.display())]
+    #[error("{} is not a usable CSV show", path.shown())]
     Csv {
         /// The file.
         path: PathBuf,
@@ -56,7 +58,7 @@ pub enum LoadError {
         source: csv::CsvError,
     },
     /// Not a kind of file that holds a show.
-    #[error("{} is not a campaign folder, .skyc, .skyb or zipped CSV show", path.display())]
+    #[error("{} is not a campaign folder, .skyc, .skyb or zipped CSV show", path.shown())]
     Unknown {
         /// The path.
         path: PathBuf,
@@ -137,7 +139,7 @@ fn read_skyb(path: &Path) -> Result<crate::show::ShowDrone, LoadError> {
     let mut drone = contents.drone;
     if drone.name.is_empty() {
         drone.name =
-            path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into());
+            path.file_stem().map_or_else(String::new, |stem| plain(&stem.to_string_lossy()).into());
     }
     Ok(drone)
 }
@@ -166,7 +168,7 @@ fn load_flight(folder: &FlightFolder) -> Result<Loaded, LoadError> {
                 .map_err(|source| LoadError::Skyb { path: path.clone(), source })?;
             let unit_m = f64::from(contents.scale_mm) / 1000.0;
             if let Some(how) = contents.drone.trajectory.difference(&there.trajectory, unit_m) {
-                mismatches.push(format!("{} does not fly the plan: {how}", path.display()));
+                mismatches.push(format!("{} does not fly the plan: {how}", path.shown()));
             }
         }
     } else {
@@ -176,6 +178,6 @@ fn load_flight(folder: &FlightFolder) -> Result<Loaded, LoadError> {
             planned.drones.len()
         ));
     }
-    let vehicle = library::load(&folder.vehicle().display().to_string())?;
+    let vehicle = library::load(&folder.vehicle().to_string_lossy())?;
     Ok(Loaded { path: folder.0.clone(), show, plan, vehicle, mismatches })
 }

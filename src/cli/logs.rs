@@ -21,6 +21,7 @@ use super::fleet::{one_flight, server};
 use super::simulate::{SlotSet, made_by, parse_slots};
 use super::words;
 use crate::base::file::create_folder;
+use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::logs::import::{ImportOptions, import};
 use crate::fleet::logs::one::Which;
@@ -240,7 +241,7 @@ fn word(text: &str) -> String {
 
 /// The command that brings these slots' logs, over the same links and with the same options.
 fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
-    let campaign = args.campaign.display().to_string();
+    let campaign = args.campaign.shown().to_string();
     let mut words = vec!["updraft logs pull".to_owned(), word(&campaign)];
     let mut add = |option: &str, value: &str| words.push(format!("{option} {}", word(value)));
     add("--flight", flight);
@@ -248,7 +249,7 @@ fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
         add("--connect", link);
     }
     if let Some(key) = &args.connect.key {
-        add("--key", &key.display().to_string());
+        add("--key", &key.shown().to_string());
     }
     match args.log {
         Which::Newest => {}
@@ -437,7 +438,7 @@ fn cards(context: &Context, args: &ImportArgs) -> Result<Exit, CommandError> {
     };
     let report = import(&args.cards, &plan, &folder.logs(), &options)?;
     for (path, reason) in &report.left {
-        context.warn(&format!("{} was left: {reason}", path.display()));
+        context.warn(&format!("{} was left: {reason}", path.shown()));
     }
     for (entry, why) in
         report.taken.iter().filter_map(|entry| Some((entry, entry.incomplete.as_ref()?)))
@@ -469,7 +470,7 @@ fn cards(context: &Context, args: &ImportArgs) -> Result<Exit, CommandError> {
             left: report
                 .left
                 .iter()
-                .map(|(path, why)| format!("{}: {why}", path.display()))
+                .map(|(path, why)| format!("{}: {why}", path.shown()))
                 .collect(),
             missing_slots: report.missing,
         })?;

@@ -39,14 +39,15 @@ mod true_scales;
 mod twice;
 mod words;
 
-use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::builder::FalseyValueParser;
 use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 
-use context::Context;
+use context::{Context, complain};
 use exit::{CommandError, Exit};
+
+use crate::base::plain::{for_terminal, plain};
 
 /// Measure the vertical motion of the air with a swarm of show drones.
 ///
@@ -165,6 +166,7 @@ pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
+            let error = quoting_plainly(&error);
             let asked = std::env::args_os().any(|word| word == "--json");
             if error.use_stderr() && asked {
                 let text = error.to_string();
@@ -193,9 +195,12 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// The last line on standard error.
-fn complain(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+/// The same error with what was given on the command line as plain text.
+fn quoting_plainly(error: &clap::Error) -> clap::Error {
+    let given = std::env::args_os().map(|word| plain(&word.to_string_lossy()).into_owned());
+    // Whether it is an error may hang on such a character.
+    let anyhow = || clap::Error::raw(error.kind(), for_terminal(&error.to_string(), false));
+    Cli::try_parse_from(given).err().unwrap_or_else(anyhow)
 }
 
 fn dispatch(context: &Context, command: Command) -> Result<Exit, CommandError> {

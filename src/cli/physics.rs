@@ -191,7 +191,7 @@ fn fleet(args: &PhysicsArgs) -> Result<Fleet, CommandError> {
         }
         let vehicle = match &args.vehicle {
             Some(name) => library::load(name)?,
-            None => library::load(&folder.vehicle().display().to_string())?,
+            None => library::load(&folder.vehicle().to_string_lossy())?,
         };
         let count = counted(args.instances.unwrap_or(plan.slots.len()))?;
         if count > plan.slots.len() {

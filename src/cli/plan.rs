@@ -11,6 +11,8 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::mission_args::MissionArgs;
 use super::{timetable, words};
+use crate::base::file::read_whole;
+use crate::base::plain::Shown as _;
 use crate::campaign::write::{FlightFiles, folders, write_index};
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::check::CheckReport;
@@ -116,13 +118,13 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         context.insist(&format!("{}: written as asked for", verdict(true, &allowed)));
     }
     if args.dry_run {
-        context.say(&format!("Would write {}", folder.display()));
+        context.say(&format!("Would write {}", folder.shown()));
     } else {
         context.result(&folder)?;
         context.say(&format!(
             "Planned {} in {watch} -> {}",
             what_for_whom(&mission),
-            folder.display()
+            folder.shown()
         ));
     }
     Ok(Exit::Done)
@@ -174,21 +176,23 @@ fn refuse_occupied(
     if folder.0.as_path() == root && campaign::index_path(root).exists() {
         return occupied("a campaign of several flights");
     }
-    let existing = match std::fs::read(folder.plan()) {
-        Ok(existing) => existing,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => {
-            return Err(crate::base::file::FileError::new("read", &folder.plan(), error).into());
-        }
+    // One more is another plan already.
+    let existing = match read_whole(&folder.plan(), plan.len() as u64) {
+        Ok(existing) => Some(existing),
+        Err(error) => match error.source.kind() {
+            std::io::ErrorKind::NotFound => return Ok(()),
+            std::io::ErrorKind::FileTooLarge => None,
+            _ => return Err(error.into()),
+        },
     };
-    if existing == plan {
+    if existing.is_some_and(|existing| existing == plan) {
         return Ok(());
     }
     if folder.record().exists() || folder.logs().is_dir() {
         return Err(CommandError::Usage(format!(
             "{} holds the logs of another plan, which are never overwritten; choose another folder, \
              or move its logs folder away and give --force",
-            folder.0.display()
+            folder.0.shown()
         )));
     }
     if force { Ok(()) } else { occupied("another plan") }

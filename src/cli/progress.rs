@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::clock::Stopwatch;
 use super::context::Context;
+use crate::base::plain::plain;
 
 /// How often a run without a terminal says where it is.
 const LINE_EVERY: Duration = Duration::from_secs(10);
@@ -35,7 +36,7 @@ impl Progress {
         ) {
             bar.set_style(style.progress_chars("━╸ "));
         }
-        bar.set_message(what.to_owned());
+        bar.set_message(plain(what).into_owned());
         Self {
             bar,
             what: what.to_owned(),

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::found::Work;
 use super::simulate::made_by;
+use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
 use crate::report::{InputFile, Provenance};
 
@@ -20,7 +21,7 @@ pub(super) fn provenance(work: &Work, settings: Vec<(&'static str, String)>) -> 
             let sha256 = work.hashes.sha256(path);
             let sha256 = sha256.unwrap_or_else(|error| format!("not read: {error}"));
             let shown = path.strip_prefix(&work.root).unwrap_or(path);
-            InputFile { path: shown.display().to_string(), sha256 }
+            InputFile { path: shown.shown().to_string(), sha256 }
         })
         .collect();
     let shown: Vec<_> = std::env::args()

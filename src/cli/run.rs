@@ -18,6 +18,7 @@ use super::simulate::{
     AirArgs, AirSpecs, Simulation, SlotSet, air_help, air_specs, simulate, speed, updraft,
 };
 use super::sweep::fly_study;
+use crate::base::plain::Shown as _;
 use crate::base::rng::{Purpose as Chance, stream};
 use crate::campaign;
 use crate::mission::Plan;
@@ -115,7 +116,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     context.say(&format!(
         "Planned {} in {watch} -> {}",
         what_for_whom(&mission),
-        args.output.display()
+        args.output.shown()
     ));
     let mut lost = false;
     for (folder, flight) in campaign::flights(&args.output)?.iter().zip(&mission.flights) {

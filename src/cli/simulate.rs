@@ -14,6 +14,7 @@ use super::exit::{CommandError, Exit};
 use super::flown::{changed_logs, prepare, taken_down, write_record};
 use super::progress::Progress;
 use super::words;
+use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder, FlightRecord};
 use crate::effects;
 use crate::mission::Plan;
@@ -277,7 +278,7 @@ pub(super) fn resolved_vehicle(
 ) -> Result<Vehicle, CommandError> {
     let mut vehicle = match other {
         Some(vehicle) => vehicle.clone(),
-        None => library::load(&folder.vehicle().display().to_string())?,
+        None => library::load(&folder.vehicle().to_string_lossy())?,
     };
     for choice in choices {
         effects::select::choose(&mut vehicle, choice)?;
@@ -323,7 +324,7 @@ pub(super) fn make_ready<'a>(
     let changed = changed_logs(folder, &record, &wanted, count)?;
     for (slot, how) in &changed {
         let path = folder.log(*slot, count);
-        context.warn(&format!("{} is not as it was flown ({how}): flown again", path.display()));
+        context.warn(&format!("{} is not as it was flown ({how}): flown again", path.shown()));
     }
     record.logs.retain(|log| !changed.contains_key(&log.slot));
     let is_open =

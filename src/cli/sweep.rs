@@ -11,6 +11,7 @@ use super::exit::{CommandError, Exit};
 use super::progress::Progress;
 use super::simulate::made_by;
 use crate::base::file::write_whole;
+use crate::base::plain::Shown as _;
 use crate::campaign::{self, to_json};
 use crate::report::{self, Provenance};
 use crate::study::result::StudyResult;
@@ -96,7 +97,7 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
     context.say(&format!(
         "Flew {} flights in {flying}, all done in {watch} -> {}",
         flown.flown,
-        page.display()
+        page.shown()
     ));
     Ok(if result.lost.is_empty() { Exit::Done } else { Exit::Losses })
 }
@@ -155,7 +156,7 @@ fn refuse_campaign(folder: &Path) -> Result<(), CommandError> {
     if campaign::is_campaign(folder) {
         return Err(CommandError::Usage(format!(
             "{} is a campaign; give the study another folder with --output",
-            folder.display()
+            folder.shown()
         )));
     }
     Ok(())
@@ -181,5 +182,5 @@ fn write(
 
 /// The command line that gives these results.
 fn command(args: &SweepArgs) -> String {
-    format!("updraft sweep {} --seed {} -o {}", args.study, args.seed, args.output.display())
+    format!("updraft sweep {} --seed {} -o {}", args.study, args.seed, args.output.shown())
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::exit::CommandError;
 use super::found::{Found, Work};
+use crate::base::plain::Shown as _;
 
 /// `Err` if two of the paths are the same, or two flights of one plan (or of none) have a log in
 /// common: the same file, or a copy.
@@ -17,8 +18,8 @@ pub(super) fn refuse(paths: &[PathBuf], work: &Work) -> Result<(), CommandError>
         if let Some(before) = seen.insert(real(path), path) {
             return Err(CommandError::Usage(format!(
                 "{} and {} are the same: give it once",
-                before.display(),
-                path.display()
+                before.shown(),
+                path.shown()
             )));
         }
     }
@@ -72,12 +73,12 @@ fn same_log(one: &Path, other: &Path, how: &str) -> CommandError {
     if one == other {
         return CommandError::Usage(format!(
             "{} is in two of the folders and logs that were given: give it once",
-            one.display()
+            one.shown()
         ));
     }
     CommandError::Usage(format!(
         "{} and {} {how}: a log counts once; give each flight once, or take the copy away",
-        one.display(),
-        other.display()
+        one.shown(),
+        other.shown()
     ))
 }

@@ -2,12 +2,14 @@
 
 use thiserror::Error;
 
+use crate::base::plain::plain;
+
 /// An effect or its parameter cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EffectError {
     /// No effect of this name.
-    #[error("there is no effect \"{name}\"; `updraft effects` lists them{hint}")]
+    #[error("there is no effect \"{}\"; `updraft effects` lists them{hint}", plain(name))]
     Unknown {
         /// What was asked for.
         name: String,
@@ -15,7 +17,7 @@ pub enum EffectError {
         hint: String,
     },
     /// The effect has no such parameter.
-    #[error("the effect {effect} has no parameter \"{name}\"; it has: {known}")]
+    #[error("the effect {effect} has no parameter \"{}\"; it has: {known}", plain(name))]
     Parameter {
         /// The effect.
         effect: &'static str,

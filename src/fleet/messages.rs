@@ -2,6 +2,7 @@
 //!
 //! [`text`] writes a message out as people check it in a dry run: name, fields, units.
 
+use crate::base::plain::{plain, plain_string};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::link::station::AUTOPILOT;
@@ -238,10 +239,10 @@ pub fn position_target(drone: DroneId, time_boot_ms: u32, target: &Target) -> Ma
     })
 }
 
-/// A fixed-size name or text without its zeros.
+/// A fixed-size name or text without its zeros, plain: a drone may say anything.
 pub fn chars(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-    String::from_utf8_lossy(&bytes[..end]).into_owned()
+    plain_string(String::from_utf8_lossy(&bytes[..end]).into_owned())
 }
 
 /// A message as one line.
@@ -312,13 +313,13 @@ pub fn text(message: &MavMessage) -> String {
             t.vz,
             t.yaw
         ),
-        other => format!("{other:?}"),
+        other => plain_string(format!("{other:?}")),
     }
 }
 
 fn ftp_text(packet: &Packet) -> String {
     use crate::protocol::ftp::Op;
-    let name = || String::from_utf8_lossy(&packet.data).trim_end_matches('\0').to_owned();
+    let name = || plain(String::from_utf8_lossy(&packet.data).trim_end_matches('\0')).into_owned();
     match packet.op {
         Op::WriteFile => {
             format!("FTP WriteFile {} bytes at {}", packet.data.len(), packet.offset)

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::abort::{Aborted, Action};
 use crate::base::file::{FileError, create_folder, read_whole};
+use crate::base::parse;
 use crate::link::id::DroneId;
 
 /// The folder in a flight's folder.
@@ -84,7 +85,7 @@ fn put<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
 
 /// A file of this format; `None`: there is none that can be read, or not yet.
 fn get<T: DeserializeOwned>(path: &Path) -> Option<T> {
-    serde_json::from_slice(&read_whole(path, MOST_BYTES).ok()?).ok()
+    parse::json(&read_whole(path, MOST_BYTES).ok()?).ok()
 }
 
 /// An order that a station has taken.

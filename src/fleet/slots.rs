@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::telemetry::Telemetry;
 use crate::base::file::{read_whole, write_whole};
 use crate::base::frame::Geodetic;
+use crate::base::parse;
 use crate::campaign::{CampaignError, to_json};
 use crate::link::clock::{Micros, S};
 use crate::link::id::DroneId;
@@ -67,7 +68,7 @@ impl FleetTable {
 
     /// A table from its JSON; else why not.
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
-        let table: Self = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+        let table: Self = parse::json(bytes).map_err(|error| error.to_string())?;
         if table.schema == FLEET_SCHEMA {
             Ok(table)
         } else {

@@ -32,6 +32,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::log::{Log, LogError, ScanStats};
 use crate::mission::plan::Segment;
@@ -135,14 +136,14 @@ pub enum FlightError {
     /// The file has no messages at all.
     #[error(
         "{}: the log is empty (was it copied before the drone finished writing it?)",
-        source_path.display()
+        source_path.shown()
     )]
     Empty {
         /// The log file.
         source_path: PathBuf,
     },
     /// A message that the analysis cannot do without is missing.
-    #[error("{}: the log has no {what} ({messages}); {remedy}", source_path.display())]
+    #[error("{}: the log has no {what} ({messages}); {remedy}", source_path.shown())]
     Missing {
         /// The log file.
         source_path: PathBuf,
@@ -157,7 +158,7 @@ pub enum FlightError {
     #[error(
         "{}: {columns} in the log holds not one number: the position filter had failed, or the log \
          is damaged; fetch the log again, and do not use the drone if it stays so",
-        source_path.display()
+        source_path.shown()
     )]
     NoNumbers {
         /// The log file.
@@ -169,7 +170,7 @@ pub enum FlightError {
     #[error(
         "{}: {columns} in the log holds no value that can be one ({range}): the log is damaged; \
          fetch it again",
-        source_path.display()
+        source_path.shown()
     )]
     OutOfRange {
         /// The log file.
@@ -180,7 +181,7 @@ pub enum FlightError {
         range: &'static str,
     },
     /// The vehicle never armed or never left the ground.
-    #[error("{}: no flight in this log: {reason}", source_path.display())]
+    #[error("{}: no flight in this log: {reason}", source_path.shown())]
     NoFlight {
         /// The log file.
         source_path: PathBuf,

@@ -4,6 +4,9 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use crate::base::file::read_whole;
+use crate::base::plain::Shown as _;
+
 /// A link and the network it belongs to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
@@ -50,7 +53,7 @@ pub enum AddressError {
         what: &'static str,
     },
     /// A list file that cannot be read.
-    #[error("cannot read the list of links {path}: {reason}")]
+    #[error("cannot read the list of links {}: {reason}", path.shown())]
     List {
         /// The file.
         path: PathBuf,
@@ -58,7 +61,7 @@ pub enum AddressError {
         reason: String,
     },
     /// A wrong line of a list file.
-    #[error("{path}:{line}: {source}")]
+    #[error("{}:{line}: {source}", path.shown())]
     Line {
         /// The file.
         path: PathBuf,
@@ -140,11 +143,9 @@ pub fn links(text: &str) -> Result<Vec<Address>, AddressError> {
 
 fn list(path: &Path) -> Result<Vec<Address>, AddressError> {
     let unreadable = |reason: String| AddressError::List { path: path.to_owned(), reason };
-    let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
-    if size > LONGEST_LIST {
-        return Err(unreadable(format!("it has {size} bytes, more than a list can have")));
-    }
-    let text = std::fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))?;
+    let bytes =
+        read_whole(path, LONGEST_LIST).map_err(|error| unreadable(error.source.to_string()))?;
+    let text = String::from_utf8(bytes).map_err(|error| unreadable(error.to_string()))?;
     let mut links = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default().trim();

@@ -4,6 +4,7 @@
 //! double nearest to the decimal value, and other parsers do the same.
 
 use super::writer::Value;
+use crate::base::plain::plain_string;
 
 /// A field's storage, one variant per letter that differs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,10 +219,11 @@ impl Sink for Many<'_> {
     }
 }
 
-/// The text in a fixed-size field: up to the first NUL, bytes that are no UTF-8 replaced.
+/// The text in a fixed-size field: up to the first NUL, bytes that are no UTF-8 replaced,
+/// and made plain: whoever wrote the log wrote it.
 pub(super) fn field_text(field: &[u8]) -> String {
     let end = field.iter().position(|&byte| byte == 0).unwrap_or(field.len());
-    String::from_utf8_lossy(&field[..end]).into_owned()
+    plain_string(String::from_utf8_lossy(&field[..end]).into_owned())
 }
 
 fn float(value: Value<'_>) -> Option<f64> {

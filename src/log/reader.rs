@@ -2,9 +2,9 @@
 
 use std::fmt;
 use std::fs::{File, Metadata};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
 use thiserror::Error;
 
 use super::columns::Notes;
@@ -12,25 +12,27 @@ use super::format::{FMT_ID, Format};
 use super::inventory::{self, Count, Inventory};
 use super::scan::{Scan, ScanStats, Visitor, scan, scan_file};
 use super::writer::MAGIC;
+use crate::base::file::open_regular;
+use crate::base::plain::Shown as _;
 
 /// A log must start within this many bytes.
 const SEARCHED_BYTES: usize = 4096;
 
-/// A DataFlash log, mapped from a file or held in memory.
+/// Bytes that are looked at for the start of a log: a definition may begin at the last of those
+/// searched.
+const START_BYTES: usize = SEARCHED_BYTES + 89;
+
+/// A DataFlash log, in a file or held in memory.
 ///
-/// A mapped file must not be cut short by another process while it is being read.
+/// A file is read anew, piece by piece, each time: never more of it than a window is in memory, and
+/// none is held open (thousands of logs may be). What another process cuts off meanwhile is missing
+/// at the end, like the end of a log whose drone lost power.
 pub struct Log {
     bytes: Bytes,
 }
 
 enum Bytes {
-    /// The map serves those who want the bytes themselves; messages are read from the file again,
-    /// which is faster. The file is not held open: thousands of logs may be.
-    Mapped {
-        map: Mmap,
-        path: PathBuf,
-        metadata: Metadata,
-    },
+    File { path: PathBuf, identity: Identity, size: usize, start: Vec<u8> },
     Held(Vec<u8>),
 }
 
@@ -103,8 +105,8 @@ impl Table {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// The file could not be opened or mapped.
-    #[error("failed to open the log {}", path.display())]
+    /// The file could not be opened.
+    #[error("failed to open the log {}", path.shown())]
     Open {
         /// The file.
         path: PathBuf,
@@ -113,7 +115,7 @@ pub enum LogError {
         source: std::io::Error,
     },
     /// Not a DataFlash log at all.
-    #[error("{} is not a DataFlash log: {reason}", path.display())]
+    #[error("{} is not a DataFlash log: {reason}", path.shown())]
     NotALog {
         /// The file.
         path: PathBuf,
@@ -123,25 +125,20 @@ pub enum LogError {
 }
 
 impl Log {
-    /// Maps a log file.
+    /// Opens a log file.
     ///
     /// # Errors
     /// [`LogError::Open`] if the file cannot be read, [`LogError::NotALog`] if no message
     /// definition is near its start.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let fail = |source| LogError::Open { path: path.to_owned(), source };
-        let file = File::open(path).map_err(fail)?;
-        let metadata = file.metadata().map_err(fail)?;
-        if metadata.is_dir() {
-            return Err(fail(std::io::ErrorKind::IsADirectory.into()));
-        }
-        let bytes = if metadata.len() == 0 {
-            Bytes::Held(Vec::new())
-        } else {
-            let map = map(&file).map_err(fail)?;
-            Bytes::Mapped { map, path: path.to_owned(), metadata }
-        };
-        let log = Self { bytes };
+        let (file, metadata) = open_regular(path).map_err(fail)?;
+        let mut start = Vec::new();
+        (&file).take(START_BYTES as u64).read_to_end(&mut start).map_err(fail)?;
+        let size = usize::try_from(metadata.len())
+            .map_err(|_| fail(std::io::ErrorKind::FileTooLarge.into()))?;
+        let identity = Identity::of(&metadata);
+        let log = Self { bytes: Bytes::File { path: path.to_owned(), identity, size, start } };
         match log.why_not_a_log() {
             None => Ok(log),
             Some(reason) => Err(LogError::NotALog { path: path.to_owned(), reason }),
@@ -169,36 +166,38 @@ impl Log {
 
     /// Shows all messages to a visitor.
     fn walk<V: Visitor>(&self, new: impl Fn() -> V) -> (V, Scan) {
-        if let Bytes::Mapped { path, metadata, .. } = &self.bytes
-            && let Some(file) = reopen(path, metadata)
-        {
-            let mut visitor = new();
-            // A file that fails half-way is left to the map.
-            if let Ok(scan) = scan_file(&file, self.bytes().len(), &mut visitor) {
-                return (visitor, scan);
-            }
-        }
         let mut visitor = new();
-        let scan = scan(self.bytes(), &mut visitor);
+        let scan = match &self.bytes {
+            Bytes::Held(bytes) => scan(bytes, &mut visitor),
+            Bytes::File { path, identity, size, .. } => {
+                scan_file(reopen(path, identity), *size, &mut visitor)
+            }
+        };
         (visitor, scan)
     }
 
     /// Size of the log.
     pub fn size_bytes(&self) -> u64 {
-        self.bytes().len() as u64
+        match &self.bytes {
+            Bytes::File { size, .. } => *size as u64,
+            Bytes::Held(bytes) => bytes.len() as u64,
+        }
     }
 
-    /// The log as it was written.
-    pub fn bytes(&self) -> &[u8] {
+    /// The bytes of a log that is held in memory.
+    pub fn held(&self) -> Option<&[u8]> {
         match &self.bytes {
-            Bytes::Mapped { map, .. } => map,
-            Bytes::Held(bytes) => bytes,
+            Bytes::File { .. } => None,
+            Bytes::Held(bytes) => Some(bytes),
         }
     }
 
     /// What is there instead of a log; `None`: it begins as one.
     pub fn why_not_a_log(&self) -> Option<String> {
-        let bytes = self.bytes();
+        let bytes = match &self.bytes {
+            Bytes::File { start, .. } => start,
+            Bytes::Held(bytes) => bytes,
+        };
         let start = &bytes[..bytes.len().min(SEARCHED_BYTES)];
         let header = [MAGIC[0], MAGIC[1], FMT_ID];
         let is_format = |at: usize| {
@@ -228,24 +227,31 @@ impl fmt::Debug for Log {
     }
 }
 
+/// Which file it is, whatever its name.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Identity {
+    #[cfg(unix)]
+    file: (u64, u64),
+    /// Where files have no number, one that was written since is another.
+    #[cfg(not(unix))]
+    file: (u64, Option<std::time::SystemTime>),
+}
+
+impl Identity {
+    #[cfg(unix)]
+    fn of(metadata: &Metadata) -> Self {
+        use std::os::unix::fs::MetadataExt as _;
+        Self { file: (metadata.dev(), metadata.ino()) }
+    }
+
+    #[cfg(not(unix))]
+    fn of(metadata: &Metadata) -> Self {
+        Self { file: (metadata.len(), metadata.modified().ok()) }
+    }
+}
+
 /// Opens a file again, if it is still the one that it was.
-#[cfg(unix)]
-fn reopen(path: &Path, before: &Metadata) -> Option<File> {
-    use std::os::unix::fs::MetadataExt;
-    let file = File::open(path).ok()?;
-    let now = file.metadata().ok()?;
-    (now.dev() == before.dev() && now.ino() == before.ino()).then_some(file)
-}
-
-/// Where files have no identity there is only the map.
-#[cfg(not(unix))]
-fn reopen(_path: &Path, _before: &Metadata) -> Option<File> {
-    None
-}
-
-#[expect(unsafe_code, reason = "memory-mapping a file has no safe form")]
-fn map(file: &File) -> std::io::Result<Mmap> {
-    // SAFETY: the map is read-only and private to this type; that no other process cuts the file
-    // short meanwhile is the documented condition of `Log`.
-    unsafe { Mmap::map(file) }
+fn reopen(path: &Path, before: &Identity) -> Option<File> {
+    let (file, now) = open_regular(path).ok()?;
+    (Identity::of(&now) == *before).then_some(file)
 }

@@ -30,7 +30,7 @@ pub struct ScanStats {
     pub unknown: u64,
     /// FMT rows refused because their length does not fit their letters.
     pub rejected_formats: u64,
-    /// Bytes of an unfinished message at the end of the file.
+    /// Bytes of an unfinished message at the end of the file, and of what could not be read of it.
     pub truncated_bytes: u64,
     /// Times at which TimeUS went back (by more than a second: the firmware's threads write a
     /// little out of order) or jumped ahead by more than a minute.
@@ -146,24 +146,27 @@ pub(super) fn scan<V: Visitor>(bytes: &[u8], visitor: &mut V) -> Scan {
     walk.scan
 }
 
-/// Walks through all messages of the first `size` bytes of a file.
-pub(super) fn scan_file<V: Visitor>(file: &File, size: usize, visitor: &mut V) -> io::Result<Scan> {
-    scan_windows(Windows::new(file, size), visitor)
+/// Walks through all messages of the first `size` bytes of a file; `None`: it is gone. What cannot be
+/// read any more is cut off.
+pub(super) fn scan_file<V: Visitor>(file: Option<File>, size: usize, visitor: &mut V) -> Scan {
+    match file {
+        Some(file) => scan_windows(Windows::new(file, size), visitor),
+        None => scan_windows(Windows::new(io::empty(), size), visitor),
+    }
 }
 
 /// Walks through windows.
-pub(super) fn scan_windows<R: Read, V: Visitor>(
-    mut windows: Windows<R>,
-    visitor: &mut V,
-) -> io::Result<Scan> {
+pub(super) fn scan_windows<R: Read, V: Visitor>(mut windows: Windows<R>, visitor: &mut V) -> Scan {
     let mut walk = Walk::new(visitor);
     let mut done = 0;
     loop {
-        let window = windows.advance(done)?;
+        let window = windows.advance(done);
         done = walk.run(window, visitor);
         visitor.leave(window);
         if window.is_last {
-            return Ok(walk.scan);
+            let missing = window.size.saturating_sub(window.base + window.bytes.len());
+            walk.scan.stats.truncated_bytes += missing as u64;
+            return walk.scan;
         }
     }
 }

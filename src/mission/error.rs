@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
+use crate::base::plain::plain;
+
 /// A template cannot be used: where, why, and what is allowed.
 #[derive(Clone, Debug)]
 pub struct TemplateError {
@@ -28,7 +30,13 @@ impl TemplateError {
         span: Option<Range<usize>>,
         message: impl Into<String>,
     ) -> Self {
-        Self { path: path.into(), text: text.into(), span, message: message.into(), help: None }
+        Self {
+            path: plain(path).into_owned(),
+            text: text.into(),
+            span,
+            message: message.into(),
+            help: None,
+        }
     }
 
     /// Adds what to do or what is allowed.

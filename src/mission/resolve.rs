@@ -12,6 +12,9 @@ use super::keys::{TOP_LEVEL, keys_of, short_numbers};
 use super::plan::Plan;
 use super::template::{FlightTemplate, Template, span_of};
 use crate::base::file::{FileError, read_whole};
+use crate::base::parse;
+use crate::base::plain::Shown as _;
+use crate::base::plain::plain;
 use crate::vehicle::{Vehicle, VehicleError};
 
 /// Largest template file that is read, bytes.
@@ -53,19 +56,19 @@ pub enum MissionError {
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
     /// There is no such template.
-    #[error("there is no template {name}; built in are {}", names().join(", "))]
+    #[error("there is no template {}; built in are {}", plain(name), names().join(", "))]
     NoTemplate {
         /// As asked for.
         name: String,
     },
     /// A template file is not text.
-    #[error("{} is not UTF-8 text", path.display())]
+    #[error("{} is not UTF-8 text", path.shown())]
     NotText {
         /// The file.
         path: PathBuf,
     },
     /// An override does not fit the template.
-    #[error("cannot set {key}: {reason}")]
+    #[error("cannot set {}: {}", plain(key), plain(reason))]
     Override {
         /// As asked for.
         key: String,
@@ -142,7 +145,7 @@ fn load(name: &str, relative_to: Option<&Path>) -> Result<(String, String), Miss
         let bytes = read_whole(&path, MAX_TEMPLATE_BYTES)?;
         let text =
             String::from_utf8(bytes).map_err(|_| MissionError::NotText { path: path.clone() })?;
-        return Ok((path.display().to_string(), text));
+        return Ok((path.to_string_lossy().into_owned(), text));
     }
     let plain = name.strip_prefix("templates/").unwrap_or(name);
     BUILTIN
@@ -292,7 +295,7 @@ fn resolve_flight(
     let (shown_path, resolved_text) = if overrides.is_empty() {
         (path.to_owned(), text.to_owned())
     } else {
-        let mut table: Table = text.parse().map_err(|error: toml::de::Error| {
+        let mut table: Table = parse::toml(text).map_err(|error: toml::de::Error| {
             TemplateError::new(path, text, error.span(), error.message())
         })?;
         for (used, item) in used.iter_mut().zip(overrides) {

@@ -13,6 +13,7 @@ use toml::Spanned;
 
 use super::error::TemplateError;
 use super::plan::Purpose;
+use crate::base::parse;
 
 /// Name and version of the template format.
 pub const TEMPLATE_SCHEMA: &str = "updraft.template/1";
@@ -412,11 +413,11 @@ impl Template {
         let failed = |error: &toml::de::Error| {
             TemplateError::new(path, text, error.span(), first_line(error.message()))
         };
-        let table: toml::Table = text.parse().map_err(|error| failed(&error))?;
+        let table: toml::Table = parse::toml(text).map_err(|error| failed(&error))?;
         let template = if table.contains_key("flights") {
-            Self::Campaign(toml::from_str(text).map_err(|error| failed(&error))?)
+            Self::Campaign(parse::toml(text).map_err(|error| failed(&error))?)
         } else {
-            Self::Flight(Box::new(toml::from_str(text).map_err(|error| failed(&error))?))
+            Self::Flight(Box::new(parse::toml(text).map_err(|error| failed(&error))?))
         };
         let schema = match &template {
             Self::Flight(flight) => &flight.schema,

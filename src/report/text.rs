@@ -2,6 +2,7 @@
 
 use crate::analysis::result::{Fit, Parameter, Rejection};
 use crate::base::estimate::Estimate;
+use crate::base::plain::plain;
 use crate::flight::Indicator;
 use crate::mission::plan::{Kind, Purpose};
 
@@ -16,14 +17,10 @@ pub(super) fn usable(value: f64) -> bool {
     value.is_finite() && value.abs() < LARGEST
 }
 
-/// Text from outside without control characters, which no output may pass on: they are not allowed
-/// in XML and drive terminals.
+/// Text from outside as [`plain`] text: no output may pass on what drives terminals, turns the order
+/// of what is read, or is not allowed in XML.
 pub(super) fn clean(text: &str) -> String {
-    text.chars()
-        .map(
-            |c| if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { '\u{fffd}' } else { c },
-        )
-        .collect()
+    plain(text).into_owned()
 }
 
 /// [`clean`] cut to `limit` characters with an ellipsis.
@@ -210,7 +207,7 @@ mod tests {
 
     #[test]
     fn control_characters_do_not_pass() {
-        assert_eq!(clean("a\u{1b}[31mb\0"), "a\u{fffd}[31mb\u{fffd}");
+        assert_eq!(clean("a\u{1b}[31mb\0"), "a␛[31mb␀");
         assert_eq!(shortened("abcdef", 4), "abc…");
     }
 

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use zip::ZipArchive;
 
 use super::skyc::{Limits, SkycError};
+use crate::base::plain::acts;
 
 /// Entries smaller than this may be compressed as well as they like, bytes.
 const SMALL: u64 = 1 << 20;
@@ -123,7 +124,7 @@ fn path_trick(name: &str) -> Option<&'static str> {
         Some("has a backslash in its name")
     } else if name.contains(':') {
         Some("has a colon in its name")
-    } else if name.chars().any(char::is_control) {
+    } else if name.contains(acts) {
         Some("has a control character in its name")
     } else if name.split('/').any(|part| part == "..") {
         Some("has \"..\" in its path")

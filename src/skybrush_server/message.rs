@@ -2,6 +2,8 @@
 
 use serde_json::{Value, json};
 
+use crate::base::parse;
+
 /// The protocol's version.
 const VERSION: &str = "1.0";
 
@@ -25,7 +27,7 @@ pub(super) fn request(id: &str, body: &Value) -> String {
 
 /// A line from the server; `None`: it is none of its messages.
 pub fn parse(line: &[u8]) -> Option<Incoming> {
-    let mut value: Value = serde_json::from_slice(line).ok()?;
+    let mut value: Value = parse::json(line).ok()?;
     let refers_to = value.get("refs").and_then(Value::as_str).map(str::to_owned);
     let body = value.get_mut("body")?.take();
     let kind = body.get("type")?.as_str()?.to_owned();

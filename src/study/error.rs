@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::base::file::FileError;
+use crate::base::plain::plain;
 use crate::mission::error::TemplateError;
 use crate::mission::resolve::MissionError;
 use crate::vehicle::VehicleError;
@@ -24,7 +25,7 @@ pub enum StudyError {
     #[error(transparent)]
     File(#[from] FileError),
     /// There is no such file, and no built-in study of that name.
-    #[error("there is no study {name}; built in is study.toml")]
+    #[error("there is no study {}; built in is study.toml", plain(name))]
     NoStudy {
         /// As asked for.
         name: String,

@@ -12,6 +12,7 @@ use toml::{Spanned, Value};
 use super::cell::{Cell, Condition};
 use super::error::StudyError;
 use crate::base::file::read_whole;
+use crate::base::parse;
 use crate::mission::error::TemplateError;
 use crate::mission::plan::{Plan, Segment, Slot};
 use crate::mission::resolve::{MissionError, Override, resolve};
@@ -164,7 +165,7 @@ impl StudyPlan {
     /// # Errors
     /// See [`StudyPlan::load`].
     pub fn parse(path: &str, text: &str) -> Result<Self, StudyError> {
-        let typed: StudyTemplate = toml::from_str(text).map_err(|error: toml::de::Error| {
+        let typed: StudyTemplate = parse::toml(text).map_err(|error: toml::de::Error| {
             TemplateError::new(path, text, error.span(), first_line(error.message()))
         })?;
         let place = Place { path, text };
@@ -357,7 +358,7 @@ fn resolved(place: &Place<'_>, typed: &StudyTemplate) -> Result<(Plan, Vehicle),
     // Beside the study's file, else from where the program runs, else built in.
     let beside = |name: &str| {
         let path = folder.join(name);
-        if path.is_file() { path.display().to_string() } else { name.to_owned() }
+        if path.is_file() { path.to_string_lossy().into_owned() } else { name.to_owned() }
     };
     let mut overrides = Vec::new();
     for (key, value) in &typed.set {

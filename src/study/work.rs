@@ -10,6 +10,7 @@ use super::error::StudyError;
 use super::fly::{CELL_SCHEMA, CellLog, CellRecord, FlyError, fly_cell};
 use super::template::StudyPlan;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
+use crate::base::parse;
 use crate::sim::SimError;
 
 /// Largest record that is read back, bytes.
@@ -132,7 +133,7 @@ impl<'a> Work<'a> {
                 let result = match fly_cell(study, &item.cell, settings.seed, stop) {
                     Ok((mut record, log)) => {
                         record.key = item.key;
-                        let log = settings.keep_logs.then(|| log.bytes());
+                        let log = settings.keep_logs.then(|| log.held()).flatten();
                         keep(folder, &item.cell, &mut record, log)?;
                         Ok(record)
                     }
@@ -171,7 +172,7 @@ fn finished(folder: &Path, cell: &Cell, key: &str, settings: Settings) -> Option
         return None;
     }
     let bytes = read_whole(&record_path(folder, cell), MAX_RECORD_BYTES).ok()?;
-    let record: CellRecord = serde_json::from_slice(&bytes).ok()?;
+    let record: CellRecord = parse::json(&bytes).ok()?;
     if record.schema != CELL_SCHEMA || record.key != key {
         return None;
     }

@@ -3,13 +3,15 @@
 use thiserror::Error;
 
 use super::{RotorLaw, SitlFrame, Vehicle};
+use crate::base::parse;
+use crate::base::plain::plain;
 
 /// A vehicle file could not be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum VehicleError {
     /// Not TOML, an unknown key, a missing key or a wrong type; the source shows the line.
-    #[error("the vehicle file {name} is not valid")]
+    #[error("the vehicle file {} is not valid", plain(name))]
     Toml {
         /// The file or built-in name.
         name: String,
@@ -18,7 +20,7 @@ pub enum VehicleError {
         source: Box<toml::de::Error>,
     },
     /// A number outside of what makes sense.
-    #[error("the vehicle file {name}: {key} = {} is not allowed; it must be {allowed}", crate::base::number::plain(*value))]
+    #[error("the vehicle file {}: {key} = {} is not allowed; it must be {allowed}", plain(name), crate::base::number::plain(*value))]
     Value {
         /// The file or built-in name.
         name: String,
@@ -33,7 +35,7 @@ pub enum VehicleError {
     #[error(transparent)]
     File(#[from] crate::base::file::FileError),
     /// No built-in vehicle of this name.
-    #[error("there is no built-in vehicle {name}; there are: {known}")]
+    #[error("there is no built-in vehicle {}; there are: {known}", plain(name))]
     Unknown {
         /// What was asked for.
         name: String,
@@ -56,7 +58,7 @@ impl Vehicle {
     /// # Errors
     /// Bad TOML, unknown or missing keys, and numbers outside their range.
     pub fn from_toml(text: &str, name: &str) -> Result<Self, VehicleError> {
-        let vehicle: Self = toml::from_str(text).map_err(|source| VehicleError::Toml {
+        let vehicle: Self = parse::toml(text).map_err(|source| VehicleError::Toml {
             name: name.to_owned(),
             source: Box::new(source),
         })?;

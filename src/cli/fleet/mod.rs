@@ -20,6 +20,7 @@ use self::crew::Crew;
 use self::start::{LeadArgs, fly_now};
 use super::context::Context;
 use super::exit::{CommandError, Exit};
+use crate::base::plain::Shown as _;
 use crate::campaign::lock::FolderLock;
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::abort::Action;
@@ -131,7 +132,7 @@ fn needs_folder(campaign: &std::path::Path) -> Result<(), CommandError> {
     if campaign.is_file() {
         return Err(CommandError::Usage(format!(
             "{} is a file: give the campaign's folder",
-            campaign.display()
+            campaign.shown()
         )));
     }
     Ok(())

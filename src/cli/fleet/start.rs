@@ -9,6 +9,7 @@ use clap::Args;
 
 use super::crew::Crew;
 use super::tables;
+use crate::base::plain::for_terminal;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::start::{LEAST_LEAD_S, MOST_LEAD_S, Start, StartOptions};
@@ -123,7 +124,9 @@ pub(in crate::cli) fn asked(
 ) -> Result<bool, CommandError> {
     let failed = |error: std::io::Error| CommandError::Failed(format!("failed to ask: {error}"));
     let mut err = std::io::stderr().lock();
-    err.write_all(question.as_bytes()).and_then(|()| err.flush()).map_err(failed)?;
+    err.write_all(for_terminal(question, false).as_bytes())
+        .and_then(|()| err.flush())
+        .map_err(failed)?;
     drop(err);
     let (answers, answered) = std::sync::mpsc::sync_channel(1);
     // Ends with the program if nobody answers.

@@ -12,6 +12,7 @@ use super::connect::read_key;
 use super::one_flight;
 use super::sim::{Hangar, Mishaps};
 use crate::base::file::read_whole;
+use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
@@ -118,7 +119,7 @@ fn mishaps(
         if cards.is_empty() {
             return Err(CommandError::Nothing(format!(
                 "{} has no logs for the drones' cards: `updraft simulate` makes them",
-                folder.logs().display()
+                folder.logs().shown()
             )));
         }
     }

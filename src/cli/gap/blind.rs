@@ -34,7 +34,7 @@ impl Explain for Written {
 
 fn explained(flight: &Path) -> Result<(Explained, Found), Cause> {
     let (found, _) = one_flight(flight, None)?;
-    let vehicle = library::load(&FlightFolder::at(flight).vehicle().display().to_string())?;
+    let vehicle = library::load(&FlightFolder::at(flight).vehicle().to_string_lossy())?;
     let both = Both { measured: &found, simulated: None, hover: None };
     let explained = compare(&both, &vehicle, &Options::default())?;
     Ok((explained, found))

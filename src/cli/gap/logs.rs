@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::analysis::FlightInput;
 use crate::analysis::slots::whose_logs;
 use crate::base::causes::with_causes;
+use crate::base::plain::Shown as _;
 use crate::cli::found::Found;
 use crate::flight::{Flight, FlightOptions, Indicator, table};
 
@@ -49,7 +50,7 @@ pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
         .zip(whose)
         .enumerate()
         .map(|(index, (log, slot))| {
-            let shown = log.path.strip_prefix(root).unwrap_or(&log.path).display().to_string();
+            let shown = log.path.strip_prefix(root).unwrap_or(&log.path).shown().to_string();
             let slot = slot.map_err(|reason| format!("{shown}: {reason}"))?;
             let plan = found.plan.as_ref();
             let planned = plan.zip(slot).and_then(|(plan, slot)| Some((plan, plan.slot(slot)?)));
@@ -86,7 +87,7 @@ fn tables(found: &Found) -> Read {
     for (index, log) in found.logs.iter().enumerate() {
         let Some(mapping) = &log.table else { continue };
         let number = u16::try_from(index + 1).unwrap_or(u16::MAX);
-        let shown = log.path.display();
+        let shown = log.path.shown();
         match table::read(&log.path, mapping) {
             Ok(flight) if flight.indicator == Indicator::Power => read.left_out.push(format!(
                 "{shown}: electrical power is no pulse; give pulses or rotor speeds"

@@ -17,6 +17,7 @@ use super::provenance::provenance;
 use super::words;
 use crate::analysis::TruthSeries;
 use crate::base::file::{create_folder, write_whole};
+use crate::base::plain::Shown as _;
 use crate::campaign::{self, CampaignError, FlightFolder, to_json};
 use crate::effects::select::resolved;
 use crate::flight::{Flight, Indicator};
@@ -141,7 +142,7 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
     if folder.exists() && !folder.is_dir() {
         return Err(CommandError::Failed(format!(
             "{} is a file: --output must name a folder",
-            folder.display()
+            folder.shown()
         )));
     }
     if args.output.is_some() {
@@ -185,7 +186,7 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
     context.say(&format!(
         "{} compared -> {}",
         words::count(verdict.data.drones, "drone"),
-        page.display()
+        page.shown()
     ));
     Ok(if verdict.data.left_out.is_empty() { Exit::Done } else { Exit::Losses })
 }
@@ -201,7 +202,7 @@ fn has_room(folder: &Path) -> Result<(), CommandError> {
     match theirs {
         Some(file) if !folder.join(VERDICT).exists() => Err(CommandError::Usage(format!(
             "{} is there and was not made by `updraft gap`; choose another folder with -o",
-            folder.join(file).display()
+            folder.join(file).shown()
         ))),
         _ => Ok(()),
     }
@@ -216,7 +217,7 @@ fn settings(args: &GapArgs, found: &Found, vehicle: &Vehicle) -> Vec<(&'static s
         ("Simulated flights for a threshold", format!("{} (--replicates)", args.replicates)),
     ];
     if let Some(path) = &args.simulated {
-        settings.push(("Simulated logs", path.display().to_string()));
+        settings.push(("Simulated logs", path.shown().to_string()));
     }
     if let Some(seed) = found.seed {
         settings.push(("Seed of the flight", format!("{seed}: its logs are simulated")));
@@ -281,7 +282,7 @@ fn is_campaign(campaign: &Path) -> Result<(), CommandError> {
         Err(CampaignError::NoPlan { path }) => Err(CommandError::Nothing(format!(
             "{} is no campaign folder: it has no plan.json and no campaign.json (for logs alone: \
              --measured LOGS with --plan or --simulated)",
-            path.display()
+            path.shown()
         ))),
         Err(error) => Err(error.into()),
     }
@@ -321,7 +322,7 @@ fn chosen(
         CommandError::Nothing(format!(
             "{} holds no logs: fly it (`updraft fly`), or put the drones' .BIN files into the \
              flight's logs folder",
-            path.display()
+            path.shown()
         ))
     })?;
     Ok((flight, flights))
@@ -368,7 +369,7 @@ fn model_of(args: &GapArgs, found: &Found) -> Result<Vehicle, CommandError> {
         let of =
             |folder: &&FlightFolder| folder.read_plan().is_ok_and(|plan| plan.name == found.name);
         if let Some(folder) = flights.iter().find(of) {
-            return Ok(library::load(&folder.vehicle().display().to_string())?);
+            return Ok(library::load(&folder.vehicle().to_string_lossy())?);
         }
     }
     match &found.plan {

@@ -7,6 +7,7 @@ use clap::Args;
 use super::blind::Searched;
 use super::{MODEL, VERDICT};
 use crate::base::file::{FileError, write_whole};
+use crate::base::plain::Shown as _;
 use crate::blind::rehearse::{Rehearsal, answers, rehearse};
 use crate::campaign::{self, FlightFolder, read_json, to_json};
 use crate::cli::check::{Origin, checked, is_safe};
@@ -113,7 +114,7 @@ pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandErr
         return Err(CommandError::Nothing(format!(
             "{}: nothing is left to ask: no class, nothing unknown, and every effect that matters would \
              have been seen",
-            before.place.display()
+            before.place.shown()
         )));
     }
     let limits = &before.plan.limits;
@@ -165,11 +166,7 @@ pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandErr
         context.print(&crate::report::next_terminal::text(&next))?;
     }
     context.result(&path)?;
-    context.say(&format!(
-        "{} -> {}",
-        words::count(next.questions.len(), "question"),
-        path.display()
-    ));
+    context.say(&format!("{} -> {}", words::count(next.questions.len(), "question"), path.shown()));
     Ok(Exit::Done)
 }
 
@@ -193,24 +190,25 @@ impl Before {
             std::fs::metadata(campaign).map_err(|error| FileError::new("read", campaign, error))?;
             campaign::flights(campaign)?;
             let at = match &args.gap {
-                Some(folder) => format!("{} has no {VERDICT}", folder.display()),
-                None => format!("{} has no gap/{VERDICT}", campaign.display()),
+                Some(folder) => format!("{} has no {VERDICT}", folder.shown()),
+                None => format!("{} has no gap/{VERDICT}", campaign.shown()),
             };
             return Err(CommandError::Nothing(format!(
                 "{at}: compare it first (`updraft gap {}`), or say where that was put (--gap)",
-                campaign.display()
+                campaign.shown()
             )));
         }
         let verdict: Verdict = read_json(&place)?;
         let (folder, plan) = flight_of(campaign, args.flight.as_deref())?;
         is_of(&verdict, &plan).map_err(|why| {
-            CommandError::Usage(format!("{} cannot be used: {why}", place.display()))
+            CommandError::Usage(format!("{} cannot be used: {why}", place.shown()))
         })?;
         let vehicle = folder.vehicle();
         let model = compared.join(MODEL);
-        let model = library::load(&model.display().to_string())?;
+        let model = library::load(&model.to_string_lossy())?;
         let is_builtin = library::names().any(|name| name == plan.vehicle);
-        let word = if is_builtin { plan.vehicle.clone() } else { vehicle.display().to_string() };
+        let word =
+            if is_builtin { plan.vehicle.clone() } else { vehicle.to_string_lossy().into_owned() };
         Ok(Self { place, verdict, plan, model, word })
     }
 }
@@ -282,7 +280,7 @@ fn questions(
 }
 
 fn planned(path: &Path, text: &str) -> Result<ResolvedFlight, CommandError> {
-    let mut mission = resolve_text(&path.display().to_string(), text, &[])?;
+    let mut mission = resolve_text(&path.shown().to_string(), text, &[])?;
     if mission.flights.is_empty() {
         return Err(CommandError::Failed("the proposed template has no flight".to_owned()));
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::PullArgs;
+use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::fleet::logs::one::Which;
 use crate::mission::Plan;
@@ -22,7 +23,7 @@ pub(super) fn lines(
     let mut lines = BTreeMap::new();
     for slot in plan.slots.iter().map(|slot| slot.slot).filter(|slot| is_meant(*slot)) {
         let path = folder.log(slot, plan.slots.len());
-        let place = path.strip_prefix(&folder.0).unwrap_or(&path).display();
+        let place = path.strip_prefix(&folder.0).unwrap_or(&path).shown();
         let line = if path.exists() && !args.again && args.log == Which::Newest {
             format!("the list of its logs, and what {place} lacks")
         } else {

@@ -2,6 +2,7 @@
 
 use super::exchange::Wish;
 use super::{Caller, Exchange, FtpError};
+use crate::base::plain::acts;
 use crate::link::clock::Micros;
 use crate::link::drive::{Machine, Step};
 use crate::link::frame::MavMessage;
@@ -53,7 +54,9 @@ impl List {
                 (None, Some(folder)) => (folder, None),
                 (None, None) => continue,
             };
-            let is_plain = !matches!(name, "" | "." | "..") && !name.contains(['/', '\\', ':']);
+            let is_plain = !matches!(name, "" | "." | "..")
+                && !name.contains(['/', '\\', ':'])
+                && !name.contains(acts);
             if is_plain && self.names.len() < MOST_NAMES {
                 self.names.push(Listed { name: name.to_owned(), size });
             }

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 
 use super::manifest::{ManifestEntry, Method, Shelf, Verified};
 use super::part::sums;
-use crate::base::file::{FileError, write_with};
+use crate::base::file::{FileError, open_regular, write_with};
 use crate::base::frame::Geodetic;
+use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::CampaignError;
 use crate::flight::{Identity, identify};
@@ -120,7 +121,7 @@ pub fn import(
                     slot,
                     drone: None,
                     boot: number(&path),
-                    source: path.display().to_string(),
+                    source: path.shown().to_string(),
                     size_bytes: sums.size,
                     sha256: sums.sha256,
                     method: Method::Import,
@@ -227,14 +228,15 @@ fn choose(
     candidates.sort_by_key(|candidate| rank(candidate));
     let best = candidates.pop()?;
     for other in candidates {
-        let reason = format!("{} is of the same drone, and later", best.path.display());
+        let reason = format!("{} is of the same drone, and later", best.path.shown());
         left.push((other.path, reason));
     }
     Some(best)
 }
 
 fn copy(from: &Path, to: &Path) -> Result<super::part::Sums, FileError> {
-    let mut source = File::open(from).map_err(|error| FileError::new("open", from, error))?;
+    let (mut source, _) =
+        open_regular(from).map_err(|error| FileError::new("open", from, error))?;
     write_with(to, |out| io::copy(&mut source, out).map(drop))?;
     let (right, found) = (sums(from)?, sums(to)?);
     if right == found {

@@ -12,6 +12,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::base::crc::{ApCrc32, ap_crc32};
 use crate::base::file::FileError;
+use crate::base::plain::Shown as _;
 use crate::fleet::intervals::Intervals;
 use crate::fleet::sink::Sink;
 use crate::link::clock::{Micros, S};
@@ -232,7 +233,7 @@ impl Sink for PartFile {
             return Ok(0);
         }
         let explain = |error: &dyn std::fmt::Display| {
-            format!("cannot write {}: {error}", part_path(&self.path).display())
+            format!("cannot write {}: {error}", part_path(&self.path).shown())
         };
         if self.position != offset {
             self.file.seek(SeekFrom::Start(offset)).map_err(|error| explain(&error))?;

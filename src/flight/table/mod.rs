@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::base::file::FileError;
+use crate::base::plain::Shown as _;
 
 pub use mapping::{Channel, Mapping, Steps, TableFlight, TimeColumn, TimeFormat};
 pub use read::{read, read_from};
@@ -22,7 +23,7 @@ pub enum TableError {
     #[error(transparent)]
     File(#[from] FileError),
     /// The mapping is not what it should be.
-    #[error("{}: {reason}", path.display())]
+    #[error("{}: {reason}", path.shown())]
     Mapping {
         /// The mapping file.
         path: PathBuf,
@@ -32,7 +33,7 @@ pub enum TableError {
     /// A column that the mapping names is not in the table.
     #[error(
         "{}: there is no column \"{column}\", which the mapping names for {channel}; there are: {there}",
-        path.display()
+        path.shown()
     )]
     Column {
         /// The table.
@@ -45,7 +46,7 @@ pub enum TableError {
         there: String,
     },
     /// A cell is not what its column holds.
-    #[error("{}, line {line}, column \"{column}\": {reason}", path.display())]
+    #[error("{}, line {line}, column \"{column}\": {reason}", path.shown())]
     Cell {
         /// The table.
         path: PathBuf,
@@ -57,7 +58,7 @@ pub enum TableError {
         reason: String,
     },
     /// A line cannot be read at all.
-    #[error("{}: {reason}", path.display())]
+    #[error("{}: {reason}", path.shown())]
     Row {
         /// The table.
         path: PathBuf,
@@ -65,7 +66,7 @@ pub enum TableError {
         reason: String,
     },
     /// There is not even a header line.
-    #[error("{}: the table is empty: there is no line with the columns' names", path.display())]
+    #[error("{}: the table is empty: there is no line with the columns' names", path.shown())]
     Empty {
         /// The table.
         path: PathBuf,
@@ -73,7 +74,7 @@ pub enum TableError {
     /// The file is larger than any flight's table.
     #[error(
         "{}: the table has {bytes} bytes, and more than {most} are not read; cut it to the flight",
-        path.display()
+        path.shown()
     )]
     Huge {
         /// The table.
@@ -86,7 +87,7 @@ pub enum TableError {
     /// There are too few rows for a flight.
     #[error(
         "{}: {rows} usable rows are no flight{}",
-        path.display(),
+        path.shown(),
         left_out(*backward)
     )]
     Short {

@@ -1,14 +1,15 @@
 //! Rows of a table to a flight.
 
+use std::borrow::Cow;
 use std::cell::Cell;
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
 use super::TableError;
 use super::mapping::{Channel, Mapping, TimeFormat};
 use super::time::seconds_of;
-use crate::base::file::FileError;
+use crate::base::file::{FileError, open_named};
+use crate::base::plain::plain;
 use crate::flight::{Clock, Flight, Series};
 
 /// Rows that are read at most.
@@ -65,12 +66,12 @@ impl Wanted<'_> {
 /// [`TableError`]: a column is missing, a cell is no number or no time, or there are too few rows.
 pub fn read(path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
     let fail = |source| TableError::File(FileError::new("open", path, source));
-    let file = File::open(path).map_err(fail)?;
+    let file = open_named(path).map_err(fail)?;
     let bytes = file.metadata().map_err(fail)?.len();
     if bytes > MOST_BYTES {
         return Err(TableError::Huge { path: path.to_owned(), bytes, most: MOST_BYTES });
     }
-    read_from(file, path, mapping)
+    read_from(file.take(MOST_BYTES), path, mapping)
 }
 
 /// Passes bytes on, and none when too many came since the last row was taken.
@@ -108,11 +109,13 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
         return Err(TableError::Empty { path: path.to_owned() });
     }
     let find = |column: &str, channel: &'static str| {
-        heads.iter().position(|head| head.trim() == column).ok_or_else(|| TableError::Column {
-            path: path.to_owned(),
-            column: column.to_owned(),
-            channel,
-            there: short(&heads.iter().collect::<Vec<_>>().join(", ")).to_owned(),
+        heads.iter().position(|head| plain(head.trim()) == column).ok_or_else(|| {
+            TableError::Column {
+                path: path.to_owned(),
+                column: column.to_owned(),
+                channel,
+                there: short(&heads.iter().collect::<Vec<_>>().join(", ")).into_owned(),
+            }
         })
     };
     let time_index = find(&mapping.time.column, "time")?;
@@ -233,9 +236,9 @@ fn from_start(mut series: Series) -> Series {
     series
 }
 
-/// The beginning of what may be long.
-fn short(text: &str) -> &str {
+/// The beginning of what may be long, as plain text.
+fn short(text: &str) -> Cow<'_, str> {
     const MOST: usize = 200;
     let end = (0..=MOST.min(text.len())).rev().find(|end| text.is_char_boundary(*end));
-    text.get(..end.unwrap_or(0)).unwrap_or_default()
+    plain(text.get(..end.unwrap_or(0)).unwrap_or_default())
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::units::{to_m, value_count};
 use super::{BlockKind, MAGIC, MAX_FILE, SkybError, TRAJECTORY_HEADER, yaw};
 use crate::base::crc::ApCrc32;
+use crate::base::plain::plain;
 use crate::show::bezier::{Scalar, path_through};
 use crate::show::{Path, Segment, ShowDrone, Trajectory};
 
@@ -88,8 +89,8 @@ pub fn read(bytes: &[u8]) -> Result<SkybContents, SkybError> {
         .transpose()?
         .unwrap_or_default();
     let lights = body(BlockKind::Lights).map(|(block, _)| block.to_vec()).unwrap_or_default();
-    let comment =
-        body(BlockKind::Comment).map(|(block, _)| String::from_utf8_lossy(block).into_owned());
+    let comment = body(BlockKind::Comment)
+        .map(|(block, _)| plain(&String::from_utf8_lossy(block)).into_owned());
     Ok(SkybContents {
         drone: ShowDrone { trajectory: flown.trajectory, lights, yaw, ..ShowDrone::default() },
         version,

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::SkycError;
 use super::trajectory::short;
+use crate::base::parse;
 use crate::show::archive::Archive;
 
 /// Name of the entry everything starts from.
@@ -143,7 +144,7 @@ pub(super) fn parse(archive: &Archive<'_>, entry: &str) -> Result<Value, SkycErr
     let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&content);
     let limits = archive.limits();
     check_shape(content, limits.values, limits.depth).map_err(fail)?;
-    serde_json::from_slice(content).map_err(|error| fail(format!("it is not valid JSON: {error}")))
+    parse::json(content).map_err(|error| fail(format!("it is not valid JSON: {error}")))
 }
 
 /// Refuses JSON that would take far more memory than its text, before it is parsed.

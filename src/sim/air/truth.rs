@@ -12,6 +12,7 @@ use thiserror::Error;
 use super::Atmosphere;
 use crate::base::file::{FileError, read_whole, write_whole};
 use crate::base::frame::ShowFrame;
+use crate::base::plain::Shown as _;
 use crate::show::Trajectory;
 use crate::show::trajectory::Cursor;
 
@@ -120,7 +121,7 @@ pub fn read(path: &Path) -> Result<TrueUpdraft, TruthError> {
     let bytes = read_whole(path, MAX_BYTES)?;
     let text = String::from_utf8_lossy(&bytes);
     let wrong = |index: usize, reason: String| TruthError::Line {
-        file: path.display().to_string(),
+        file: path.shown().to_string(),
         line: index + 1,
         reason,
     };

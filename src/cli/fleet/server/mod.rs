@@ -20,6 +20,7 @@ use self::standing::assign;
 use self::upload::Shows;
 use super::bring::Wish;
 use super::start::{LeadArgs, asked, needs_person};
+use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
@@ -56,7 +57,7 @@ impl Flight<'_> {
     /// What a person types to end it.
     fn abort(&self) -> String {
         let Self { address, folder, .. } = self;
-        format!("updraft fleet abort {} --connect skybrush://{address}", folder.0.display())
+        format!("updraft fleet abort {} --connect skybrush://{address}", folder.0.shown())
     }
 }
 
@@ -144,7 +145,7 @@ pub(in crate::cli) fn fly(
     if brought.iter().all(|row| row.state != "missing") {
         return Ok((output, flown));
     }
-    let campaign = folder.0.display();
+    let campaign = folder.0.shown();
     context.insist(&format!(
         "To try again: updraft logs pull {campaign} --connect skybrush://{address}"
     ));

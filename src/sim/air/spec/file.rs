@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::{AirSpec, AirSpecError};
 use crate::base::file::read_whole;
+use crate::base::parse;
 
 /// Name and version of the format.
 pub const AIR_SCHEMA: &str = "updraft.air/1";
@@ -69,7 +70,7 @@ pub fn load(text: &str) -> Result<Vec<AirSpec>, AirSpecError> {
 
 fn parse(toml: &str, file: &str) -> Result<Vec<AirSpec>, AirSpecError> {
     let wrong = |reason: String| AirSpecError::Toml { file: file.to_owned(), reason };
-    let parsed: AirFile = toml::from_str(toml).map_err(|error| wrong(error.to_string()))?;
+    let parsed: AirFile = parse::toml(toml).map_err(|error| wrong(error.to_string()))?;
     if parsed.schema != AIR_SCHEMA {
         return Err(wrong(format!(
             "this program reads \"{AIR_SCHEMA}\", not \"{}\"",

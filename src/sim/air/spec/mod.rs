@@ -16,6 +16,7 @@ pub use file::{AIR_SCHEMA, builtin_names, load};
 pub use kinds::{KINDS, Key, Kind, Preset, help_text, kind};
 
 use crate::base::file::FileError;
+use crate::base::plain::plain;
 
 /// One component of the air: its kind and the keys that were given.
 ///
@@ -32,7 +33,10 @@ pub struct AirSpec {
 #[non_exhaustive]
 pub enum AirSpecError {
     /// There is no such kind.
-    #[error("there is no air \"{name}\"; there is {known}; or a .toml file of several ({builtin})")]
+    #[error(
+        "there is no air \"{}\"; there is {known}; or a .toml file of several ({builtin})",
+        plain(name)
+    )]
     UnknownKind {
         /// What was asked for.
         name: String,
@@ -42,7 +46,7 @@ pub enum AirSpecError {
         builtin: String,
     },
     /// The kind has no such key.
-    #[error("{kind} has no \"{key}\"; {allowed}")]
+    #[error("{kind} has no \"{}\"; {allowed}", plain(key))]
     UnknownKey {
         /// The kind.
         kind: &'static str,
@@ -52,7 +56,7 @@ pub enum AirSpecError {
         allowed: String,
     },
     /// Not of the form `key=number`.
-    #[error("{kind}: \"{text}\" is not KEY=NUMBER")]
+    #[error("{kind}: \"{}\" is not KEY=NUMBER", plain(text))]
     NotAPair {
         /// The kind.
         kind: &'static str,
@@ -105,7 +109,7 @@ pub enum AirSpecError {
     #[error(transparent)]
     File(#[from] FileError),
     /// A file is wrong.
-    #[error("{file}: {reason}")]
+    #[error("{}: {reason}", plain(file))]
     Toml {
         /// The file.
         file: String,
