@@ -5,9 +5,14 @@
 //! system id. Where they contradict each other, the first one counts and a warning names the logs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read;
 use std::path::Path;
 
+use rayon::prelude::*;
+
+use crate::base::crc::ap_crc32;
 use crate::base::frame::Geodetic;
+use crate::log::Log;
 use crate::mission::plan::Plan;
 
 /// How far a home may read from its slot besides half the spacing, m: metres of plain GPS, and the
@@ -322,33 +327,63 @@ fn contradictions(plan: &Plan, work: &Work<'_>, places: &[Place]) -> Vec<String>
 }
 
 /// For each log, the earlier one that has the very same bytes.
-pub(super) fn same_bytes(logs: &[Option<&[u8]>]) -> Vec<Option<usize>> {
-    let mut order: Vec<(usize, &[u8])> =
-        logs.iter().enumerate().filter_map(|(index, bytes)| Some((index, (*bytes)?))).collect();
-    // Logs differ early, at the first row with a time: comparing is cheaper than hashing.
-    order.sort_by(|left, right| {
-        left.1
-            .len()
-            .cmp(&right.1.len())
-            .then_with(|| left.1.cmp(right.1))
-            .then(left.0.cmp(&right.0))
-    });
+pub(super) fn same_bytes(logs: &[Option<&Log>]) -> Vec<Option<usize>> {
+    let mut sizes: BTreeMap<u64, Vec<(usize, &Log)>> = BTreeMap::new();
+    for (index, log) in logs.iter().enumerate() {
+        let Some(log) = log else { continue };
+        sizes.entry(log.size_bytes()).or_default().push((index, log));
+    }
     let mut result = vec![None; logs.len()];
-    let mut first: Option<(usize, &[u8])> = None;
-    for (index, bytes) in order {
-        match first {
-            Some((earlier, same)) if same.len() == bytes.len() && same == bytes => {
-                result[index] = Some(earlier);
+    for (size, logs) in sizes.into_iter().filter(|(_, logs)| logs.len() > 1) {
+        // Logs of one flight may all have one size, but differ early, at the first row with a time.
+        let starts: Vec<u32> = logs.par_iter().map(|(_, log)| start_of(log)).collect();
+        let mut first: BTreeMap<u32, Vec<(usize, &Log)>> = BTreeMap::new();
+        for ((index, log), start) in logs.into_iter().zip(starts) {
+            let alike = first.entry(start).or_default();
+            match alike.iter().find(|(_, earlier)| are_same(earlier, log, size)) {
+                Some((earlier, _)) => result[index] = Some(*earlier),
+                None => alike.push((index, log)),
             }
-            _ => first = Some((index, bytes)),
         }
     }
     result
 }
 
+/// Checksum of the beginning of a log.
+fn start_of(log: &Log) -> u32 {
+    const START_BYTES: u64 = 1 << 18;
+    let mut start = Vec::new();
+    // What cannot be read differs from everything, and is named when it is read.
+    let _ = log.reader().take(START_BYTES).read_to_end(&mut start);
+    ap_crc32(&start)
+}
+
+/// Whether two logs of `size` bytes are the same, byte by byte.
+fn are_same(one: &Log, other: &Log, size: u64) -> bool {
+    const PIECE_BYTES: u64 = 1 << 17;
+    let (mut one, mut other) = (one.reader(), other.reader());
+    let (mut left, mut right) = (Vec::new(), Vec::new());
+    let mut same_bytes = 0;
+    loop {
+        for (log, piece) in [(&mut one, &mut left), (&mut other, &mut right)] {
+            piece.clear();
+            if log.take(PIECE_BYTES).read_to_end(piece).is_err() {
+                return false;
+            }
+        }
+        if left != right {
+            return false;
+        }
+        if left.is_empty() {
+            return same_bytes == size;
+        }
+        same_bytes += left.len() as u64;
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{file_number, same_bytes};
+    use super::{Log, file_number, same_bytes};
     use std::path::Path;
 
     #[test]
@@ -368,8 +403,15 @@ mod tests {
 
     #[test]
     fn copies_are_told_from_logs_of_the_same_size() {
-        let logs: [Option<&[u8]>; 6] =
-            [Some(b"abc"), Some(b"abd"), Some(b"abc"), None, Some(b"ab"), Some(b"abc")];
-        assert_eq!(same_bytes(&logs), [None, None, Some(0), None, None, Some(0)]);
+        let long = |last: u8| Log::from_bytes([vec![7; 1 << 19], vec![last]].concat());
+        let short = |text: &[u8]| Log::from_bytes(text.to_vec());
+        let logs = [short(b"abc"), short(b"abd"), short(b"abc"), short(b"ab"), short(b"abc")];
+        let more = [long(1), long(2), long(1)];
+        let mut all: Vec<Option<&Log>> = logs.iter().chain(&more).map(Some).collect();
+        all.insert(3, None);
+        assert_eq!(
+            same_bytes(&all),
+            [None, None, Some(0), None, None, Some(0), None, None, Some(6)]
+        );
     }
 }

@@ -29,11 +29,9 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
     let opened: Vec<Result<Log, String>> = (input.logs.par_iter())
         .map(|log| Log::open(&log.path).map_err(|error| with_causes(&error, ": ")))
         .collect();
-    let bytes: Vec<Option<&[u8]>> = opened
-        .iter()
-        .map(|log| log.as_ref().ok().map(Log::bytes).filter(|bytes| !bytes.is_empty()))
-        .collect();
-    let copies = matching::same_bytes(&bytes);
+    let logs: Vec<Option<&Log>> =
+        opened.iter().map(|log| log.as_ref().ok().filter(|log| log.size_bytes() > 0)).collect();
+    let copies = matching::same_bytes(&logs);
     let Some(plan) = input.plan else {
         let refused = |first: usize| {
             let first = input.logs.get(first).map(|log| input.shown(&log.path));

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs::{File, Metadata};
-use std::io::Read as _;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
@@ -189,6 +189,17 @@ impl Log {
         match &self.bytes {
             Bytes::File { .. } => None,
             Bytes::Held(bytes) => Some(bytes),
+        }
+    }
+
+    /// The log as it was written, from its start; what cannot be read any more is not there.
+    pub fn reader(&self) -> Box<dyn Read + '_> {
+        match &self.bytes {
+            Bytes::Held(bytes) => Box::new(bytes.as_slice()),
+            Bytes::File { path, identity, size, .. } => match reopen(path, identity) {
+                Some(file) => Box::new(file.take(*size as u64)),
+                None => Box::new(std::io::empty()),
+            },
         }
     }
 

@@ -1,7 +1,7 @@
 //! Logs from cards: who flew where is in the logs themselves.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
