@@ -201,7 +201,7 @@ fn pull_from(station: &mut Station, clock: &Wall, ids: &[DroneId]) -> (f64, usiz
     let folder = tempfile::tempdir().expect("a folder");
     let wanted: Vec<Wanted> = (1..)
         .zip(ids)
-        .map(|(slot, id)| Wanted { drone: *id, slot, file: format!("{slot:03}.BIN") })
+        .map(|(slot, id)| Wanted { drone: *id, slot, file: format!("{slot:03}.BIN"), flight: None })
         .collect();
     let options = PullOptions {
         each: OneOptions::default(),

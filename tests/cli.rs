@@ -29,6 +29,9 @@ mod fleet_refusals;
 #[cfg(unix)]
 #[path = "cli/fleet_upload.rs"]
 mod fleet_upload;
+#[cfg(unix)]
+#[path = "cli/flights.rs"]
+mod flights;
 #[path = "cli/foreign_text.rs"]
 mod foreign_text;
 #[path = "cli/gap.rs"]

@@ -79,7 +79,7 @@ fn pulled_over(repeat: f64, lie: Lie) -> (OneDone, Option<Vec<u8>>) {
     let mut net = LossyNet::new(BTreeMap::from([(drone(1), liar)]), faults, 3);
     let folder = tempfile::tempdir().unwrap();
     let logs = folder.path().join("logs");
-    let wanted = [Wanted { drone: drone(1), slot: 1, file: "01.BIN".to_owned() }];
+    let wanted = [Wanted { drone: drone(1), slot: 1, file: "01.BIN".to_owned(), flight: None }];
     let options = PullOptions {
         each: OneOptions { patience: 40 * S, ..OneOptions::default() },
         at_once: 4,

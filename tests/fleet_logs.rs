@@ -76,6 +76,7 @@ fn wanted(count: u8) -> Vec<Wanted> {
         drone: drone(system),
         slot: system.into(),
         file: format!("{system:02}.BIN"),
+        flight: None,
     };
     (1..=count).map(one).collect()
 }

@@ -76,7 +76,7 @@ fn on_drone(net: &Net) -> Vec<u8> {
 }
 
 fn pull_again(net: &mut Net, logs: &Path, start_number: u32) -> OneDone {
-    let wanted = [Wanted { drone: drone(1), slot: 1, file: "01.BIN".to_owned() }];
+    let wanted = [Wanted { drone: drone(1), slot: 1, file: "01.BIN".to_owned(), flight: None }];
     let options = PullOptions {
         each: OneOptions { start_number, ..OneOptions::default() },
         at_once: 4,

@@ -7,13 +7,14 @@
 //! my-campaign/
 //!   campaign.json  campaign.toml
 //!   calibration/   template.toml  vehicle.toml  plan.json  show.skyc  skyb/01.skyb  show.csv.zip  logs/01.BIN
-//!                  truth/01.csv
+//!                  simulated/01.BIN  truth/01.csv
 //!   hover/         ...
 //!   study/         study.json  report/index.html
 //!   analysis.json  report/index.html  fields/updraft.csv  fields/updraft.parquet
 //! ```
 
 pub mod lock;
+pub mod origin;
 pub mod start;
 pub mod write;
 
@@ -52,7 +53,7 @@ pub struct CampaignIndex {
     pub flights: Vec<String>,
 }
 
-/// `logs/flight.json`: how the logs beside it came to be.
+/// `simulated/flight.json`: how the logs beside it came to be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FlightRecord {
@@ -221,19 +222,14 @@ impl FlightFolder {
         self.0.join("show.csv.zip")
     }
 
-    /// Folder of the logs.
+    /// Folder of the logs of real drones; see [`origin`] for simulated ones.
     pub fn logs(&self) -> PathBuf {
         self.0.join("logs")
     }
 
-    /// The log of a slot, among `count` slots.
+    /// The log of a slot's real drone, among `count` slots.
     pub fn log(&self, slot: u16, count: usize) -> PathBuf {
         self.logs().join(numbered(slot, count, "BIN"))
-    }
-
-    /// How the logs came to be.
-    pub fn record(&self) -> PathBuf {
-        self.logs().join("flight.json")
     }
 
     /// Folder of the true air, for simulated flights.
@@ -249,12 +245,6 @@ impl FlightFolder {
     /// Reads the plan.
     pub fn read_plan(&self) -> Result<Plan, CampaignError> {
         read_plan(&self.plan())
-    }
-
-    /// Reads the flight record, if there is one.
-    pub fn read_record(&self) -> Result<Option<FlightRecord>, CampaignError> {
-        let path = self.record();
-        if path.exists() { read_json(&path).map(Some) } else { Ok(None) }
     }
 }
 

@@ -9,7 +9,7 @@ use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::fields::{read_study, write_fields};
-use super::found::{Found, Work, find, find_tables, stem};
+use super::found::{Found, OriginChoice, Work, find, find_tables, stem};
 use super::load::{has_extension, load_shows};
 use super::outcome::{nothing_found, problems};
 use super::progress::Progress;
@@ -24,6 +24,7 @@ use crate::base::json::write_json;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign;
+use crate::campaign::origin::LogOrigin;
 use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
@@ -63,6 +64,9 @@ pub(super) struct AnalyzeArgs {
     /// Unix time of show time 0, s: aligns logs without SHOW rows by their GPS time
     #[arg(long, value_name = "UNIX_S")]
     start: Option<i64>,
+    /// Which logs of a campaign: real or simulated [default: real where there are any]
+    #[arg(long, value_name = "WHICH", value_enum, conflicts_with = "csv")]
+    logs: Option<OriginChoice>,
     /// Folder for analysis.json and report/ [default: the campaign, or NAME-analysis]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
@@ -239,6 +243,7 @@ struct AnalyzeOutput<'a> {
 pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, CommandError> {
     let plan = args.plan.as_deref().map(load_plan).transpose()?;
     let mut work = Work::new(Path::new("."));
+    work.origin = args.logs.map(Into::into);
     for path in &args.paths {
         find(path, plan.as_ref(), &mut work)?;
     }
@@ -283,6 +288,8 @@ pub(super) fn analyze_campaign(
     options: &AnalyzeOptions,
 ) -> Result<Exit, CommandError> {
     let mut work = Work::new(root);
+    // What was just flown here.
+    work.origin = Some(LogOrigin::Simulated);
     find(root, None, &mut work)?;
     finish(context, &work, options, None, Some(root))
 }
@@ -295,6 +302,9 @@ fn finish(
     output: Option<&Path>,
 ) -> Result<Exit, CommandError> {
     let watch = Stopwatch::start();
+    for used in &work.used {
+        context.say(used);
+    }
     let reference = hold.map(read_reference).transpose()?;
     for note in work.flights.iter().flat_map(|flight| &flight.notes) {
         context.warn(note);

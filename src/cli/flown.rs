@@ -48,13 +48,13 @@ pub(super) fn prepare(
         plan_sha256: sha256(&plan_bytes),
         logs: Vec::new(),
     };
-    create_folder(&folder.logs())?;
-    sweep_partial(&folder.logs())?;
+    create_folder(&folder.simulated())?;
+    sweep_partial(&folder.simulated())?;
     match folder.read_record()? {
         Some(existing) if existing.source != record.source => {
             return Err(CommandError::Usage(format!(
-                "{} holds logs of real drones; simulate into another campaign",
-                folder.logs().shown()
+                "{} holds logs of real drones, which belong into logs/; move them there",
+                folder.simulated().shown()
             )));
         }
         Some(existing) => {
@@ -64,7 +64,7 @@ pub(super) fn prepare(
                 return Err(CommandError::Usage(format!(
                     "{} holds logs flown with other settings; give --force to replace them, or use \
                      another folder",
-                    folder.logs().shown()
+                    folder.simulated().shown()
                 )));
             }
             if same {
@@ -76,7 +76,7 @@ pub(super) fn prepare(
         None if !present_logs(folder, plan).is_empty() => {
             return Err(CommandError::Usage(format!(
                 "{} holds logs that this program did not simulate; use another folder",
-                folder.logs().shown()
+                folder.simulated().shown()
             )));
         }
         None => {}
@@ -98,7 +98,7 @@ fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
 /// The logs of a plan's slots that are there.
 fn present_logs(folder: &FlightFolder, plan: &Plan) -> Vec<(u16, PathBuf)> {
     let count = plan.slots.len();
-    let paths = plan.slots.iter().map(|slot| (slot.slot, folder.log(slot.slot, count)));
+    let paths = plan.slots.iter().map(|slot| (slot.slot, folder.simulated_log(slot.slot, count)));
     paths.filter(|(_, path)| path.exists()).collect()
 }
 
@@ -136,7 +136,7 @@ pub(super) fn changed_logs(
     let changed: Result<Vec<_>, CommandError> = wanted
         .par_iter()
         .filter_map(|slot| {
-            let path = folder.log(slot.slot, count);
+            let path = folder.simulated_log(slot.slot, count);
             let log = known.get(&slot.slot).filter(|_| path.exists())?;
             match log.difference(&path) {
                 Ok(None) => None,

@@ -12,15 +12,18 @@ use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::sim::{Hangar, Mishaps, TO_START};
-use super::fleet::start::{LeadArgs, fly_now, guide_now};
+use super::fleet::start::{LeadArgs, asked, fly_now, guide_now, needs_person, say_landed};
 use super::fleet::tables::PreflightOutput;
 use super::fleet::{dry, end, lock, one_flight, server};
 use super::fly_output::{FlightEnd, FlightOutput, FlyOutput, LogOutput};
 use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
 use crate::base::time::GpsTime;
+use crate::campaign::origin::LogOrigin;
 use crate::campaign::{self, FlightFolder};
+use crate::fleet::preflight::Preflight;
 use crate::fleet::start::StartOptions;
 use crate::link::id::DroneId;
+use crate::link::station::Station;
 use crate::mission::Plan;
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
@@ -124,6 +127,7 @@ fn fly_target(
             Ok((vec![flight], exit))
         }
         Target::Sim => {
+            needs_person(&args.lead)?;
             let simulation = args.air.simulation(args.updraft, args.force);
             let mut lost = false;
             let mut flights = Vec::new();
@@ -132,7 +136,8 @@ fn fly_target(
                 if args.flight.as_ref().is_some_and(|name| *name != plan.name) {
                     continue;
                 }
-                let (flown, output) = fly_and_tell(context, &folder, &plan, &simulation)?;
+                let lead = Some(&args.lead);
+                let (flown, output) = fly_and_tell(context, &folder, &plan, &simulation, lead)?;
                 lost |= !flown.failed.is_empty();
                 flights.push(output);
             }
@@ -226,15 +231,17 @@ pub(super) fn fly_virtual(
     plan: &Plan,
     simulation: &Simulation,
 ) -> Result<Flown, CommandError> {
-    fly_and_tell(context, folder, plan, simulation).map(|(flown, _)| flown)
+    fly_and_tell(context, folder, plan, simulation, None).map(|(flown, _)| flown)
 }
 
-/// The same, with what `--json` prints of it.
+/// The same, with what `--json` prints of it. `rehearsed`: people practise, and are shown and asked what
+/// they are in the field.
 fn fly_and_tell(
     context: &Context,
     folder: &FlightFolder,
     plan: &Plan,
     simulation: &Simulation,
+    rehearsed: Option<&LeadArgs>,
 ) -> Result<(Flown, FlightOutput), CommandError> {
     let watch = Stopwatch::start();
     let ready = make_ready(context, folder, plan, simulation)?;
@@ -247,7 +254,8 @@ fn fly_and_tell(
     };
     let mut failed = Vec::new();
     if !ready.open.is_empty() {
-        let (flown, brought) = launch(context, folder, plan, simulation, &ready)?;
+        let (flown, brought) = launch(context, folder, plan, simulation, &ready, rehearsed)?;
+        output.preflight = flown.preflight;
         failed.extend(brought.iter().filter_map(Brought::loss));
         output.drones = flown.drones;
         for one in &brought {
@@ -259,12 +267,43 @@ fn fly_and_tell(
     Ok((settle(context, folder, plan, ready, failed, watch)?, output))
 }
 
+/// A crew for virtual drones of this program, once they are heard.
+fn virtual_crew<'a>(
+    context: &'a Context,
+    station: &'a mut Station,
+    folder: &'a FlightFolder,
+    plan: &'a Plan,
+) -> Result<Crew<'a>, CommandError> {
+    let mut crew = Crew::new(context, station, folder, plan);
+    crew.is_virtual = true;
+    crew.listen(60.0)?;
+    crew.greet()?;
+    Ok(crew)
+}
+
+/// Everything before the start; virtual drones have no reason to refuse.
+fn make_start_ready(crew: &mut Crew<'_>) -> Result<Preflight, CommandError> {
+    let no_go =
+        |what: &str| CommandError::Failed(format!("the virtual drones do not start: {what}"));
+    if !crew.assign(true)? {
+        return Err(no_go("they do not stand as planned"));
+    }
+    let refused = crew.upload()?;
+    crew.params(true)?;
+    let table = crew.preflight(20.0)?;
+    if !refused.is_empty() || !table.go() {
+        return Err(no_go(&format!("\n{table}")));
+    }
+    Ok(table)
+}
+
 fn launch(
     context: &Context,
     folder: &FlightFolder,
     plan: &Plan,
     simulation: &Simulation,
     ready: &Ready<'_>,
+    rehearsed: Option<&LeadArgs>,
 ) -> Result<(FlightOutput, Vec<Brought>), CommandError> {
     let start = ready.record.start;
     let switched_on = GpsTime::from_total_ms(start.total_ms() - (TO_START / 1000) as i64)
@@ -286,29 +325,44 @@ fn launch(
     // A part of the fleet is a fleet of its own.
     let mut part = plan.clone();
     part.slots.retain(|slot| ready.open.iter().any(|open| open.slot == slot.slot));
+    let mut found = None;
+    if let Some(lead) = rehearsed {
+        context.say(&format!("Practice of {} with virtual drones: as in the field", plan.name));
+        // While a person thinks, time goes on for drones on the ground, and the start that is the same
+        // every time would pass: they are switched on again for the flight.
+        found = hangar.open(|station| {
+            let mut crew = virtual_crew(context, station, folder, &part)?;
+            let table = make_start_ready(&mut crew)?;
+            if context.json {
+                context.say(&table.to_string());
+            } else {
+                context.print(&table.to_string())?;
+            }
+            if !lead.yes && !asked("Authorize the start? Type yes: ", || crew.idle())? {
+                return Err(CommandError::Unsafe("not authorized: nobody takes off".to_owned()));
+            }
+            Ok(Some(PreflightOutput::of(&table)))
+        })?;
+    }
     hangar.open(|station| {
-        let mut crew = Crew::new(context, station, folder, &part);
-        crew.is_virtual = true;
-        crew.listen(60.0)?;
-        crew.greet()?;
-        let no_go =
-            |what: &str| CommandError::Failed(format!("the virtual drones do not start: {what}"));
-        if !crew.assign(true)? {
-            return Err(no_go("they do not stand as planned"));
-        }
-        let refused = crew.upload()?;
-        crew.params(true)?;
-        let table = crew.preflight(20.0)?;
-        if !refused.is_empty() || !table.go() {
-            return Err(no_go(&format!("\n{table}")));
-        }
+        let mut crew = virtual_crew(context, station, folder, &part)?;
+        crew.tells_all = rehearsed.is_some();
+        make_start_ready(&mut crew)?;
         let options = StartOptions { at: Some(start), ..StartOptions::default() };
         let mut start = crew.announce(options)?;
         crew.authorize(&mut start)?;
         let alarms = crew.watch(&mut start)?;
-        let flown = FlightOutput::flown(&crew, &alarms, None);
+        if rehearsed.is_some() {
+            say_landed(context, &crew);
+        }
+        let flown = FlightOutput::flown(&crew, &alarms, found);
         // Virtual drones fly again at any time.
-        let wish = Wish { quiet: true, is_durable: false, ..Wish::default() };
+        let wish = Wish {
+            quiet: true,
+            is_durable: false,
+            origin: LogOrigin::Simulated,
+            ..Wish::default()
+        };
         Ok((flown, bring(context, crew.net, folder, plan, &crew.table, &wish)?))
     })
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use clap::ValueEnum;
 use rayon::prelude::*;
 
 use super::exit::CommandError;
@@ -22,6 +23,7 @@ use crate::base::file::FileError;
 use crate::base::plain::Shown as _;
 use crate::base::plain::plain;
 use crate::base::time::GpsTime;
+use crate::campaign::origin::{self, LogOrigin, LogsAt, is_set_aside};
 use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, LogRecord};
 use crate::flight::Indicator;
@@ -31,6 +33,24 @@ use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::sim::air::truth::{self, TrueUpdraft};
 use crate::vehicle::{Vehicle, library};
+
+/// Which logs of a campaign, if somebody chooses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum OriginChoice {
+    /// Those of real drones, in logs/
+    Real,
+    /// Simulated ones, in simulated/
+    Simulated,
+}
+
+impl From<OriginChoice> for LogOrigin {
+    fn from(choice: OriginChoice) -> Self {
+        match choice {
+            OriginChoice::Real => Self::Real,
+            OriginChoice::Simulated => Self::Simulated,
+        }
+    }
+}
 
 /// Exponent of density for electric rotors with a real thrust curve.
 const REAL_ROTOR_EXPONENT: f64 = 0.4;
@@ -67,6 +87,11 @@ pub(super) struct Work {
     pub(super) hashes: Hashes,
     /// Flights of a campaign that cannot be looked at, one sentence each.
     pub(super) absent: Vec<String>,
+    /// Which logs of campaigns are meant; `None` until a campaign is looked at: real ones if there are
+    /// any.
+    pub(super) origin: Option<LogOrigin>,
+    /// Which of them were taken, one sentence for each campaign.
+    pub(super) used: Vec<String>,
 }
 
 impl Work {
@@ -84,11 +109,14 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
             work.title = campaign::read_json::<CampaignIndex>(&index)?.title;
         }
         let folders = campaign::flights(path)?;
+        let origin = work.origin.unwrap_or_else(|| origin::default_of(&folders));
+        work.origin = Some(origin);
+        work.used.extend(used(&folders, origin));
         let several = folders.len() > 1;
         let mut first_error = None;
         let before = work.flights.len();
         for folder in folders {
-            let flight = match found_flight(&folder, &work.hashes) {
+            let flight = match found_flight(&folder, origin, &work.hashes) {
                 Ok(flight) => flight,
                 // The campaign's other flights can be analysed without this one.
                 Err(error) if several => {
@@ -189,18 +217,38 @@ pub(super) fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, Com
     Ok(shared.indicator)
 }
 
-fn found_flight(folder: &FlightFolder, hashes: &Hashes) -> Result<Found, CommandError> {
+/// Which logs are taken, where there are any.
+fn used(folders: &[FlightFolder], origin: LogOrigin) -> Option<String> {
+    let others = match origin {
+        LogOrigin::Real => folders.iter().any(FlightFolder::has_simulated_logs),
+        LogOrigin::Simulated => folders.iter().any(FlightFolder::has_real_logs),
+    };
+    let any = others || folders.iter().any(|folder| folder.logs_of(origin).folder.is_dir());
+    let left = match (others, origin) {
+        (false, _) => "",
+        (true, LogOrigin::Real) => "; the simulated ones are left (--logs simulated takes them)",
+        (true, LogOrigin::Simulated) => "; those of real drones are left (--logs real takes them)",
+    };
+    any.then(|| format!("Using the {}{left}", origin.words()))
+}
+
+fn found_flight(
+    folder: &FlightFolder,
+    origin: LogOrigin,
+    hashes: &Hashes,
+) -> Result<Found, CommandError> {
     let plan = folder.read_plan()?;
-    let files = if folder.logs().is_dir() { logs_in(&folder.logs())? } else { Vec::new() };
+    let at = folder.logs_of(origin);
+    let files = if at.folder.is_dir() { logs_in(&at.folder)? } else { Vec::new() };
     let mut notes = Vec::new();
-    let record = match folder.read_record()? {
-        Some(record) => held_record(folder, record, &files, &mut notes, hashes),
+    let record = match at.read_record()? {
+        Some(record) => held_record(&at, record, &files, &mut notes, hashes),
         None => None,
     };
     let logs = files
         .into_iter()
         .map(|path| LogInput {
-            slot: recorded_slot(folder, record.as_ref(), &path),
+            slot: recorded_slot(&at, record.as_ref(), &path),
             path,
             table: None,
         })
@@ -211,7 +259,7 @@ fn found_flight(folder: &FlightFolder, hashes: &Hashes) -> Result<Found, Command
     // Logs of the simulator have a record; others may have been flown by streaming.
     let start = match &record {
         Some(record) => Some(record.start),
-        None => StartRecord::read(folder)?.map(|record| record.start),
+        None => StartRecord::read_in(&at.folder)?.map(|record| record.start),
     };
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),
@@ -238,13 +286,13 @@ fn found_flight(folder: &FlightFolder, hashes: &Hashes) -> Result<Found, Command
 /// The record, if most of the logs are still those that it speaks of: somebody may have put the logs
 /// of real drones in their place. Says where files and record differ.
 fn held_record(
-    folder: &FlightFolder,
+    at: &LogsAt,
     record: FlightRecord,
     files: &[PathBuf],
     notes: &mut Vec<String>,
     hashes: &Hashes,
 ) -> Option<FlightRecord> {
-    let path_of = |log: &LogRecord| folder.logs().join(&log.file);
+    let path_of = |log: &LogRecord| at.folder.join(&log.file);
     let there: Vec<&LogRecord> = record.logs.iter().filter(|log| path_of(log).exists()).collect();
     let differences: Vec<Result<Option<String>, FileError>> = (there.par_iter())
         .map(|log| {
@@ -268,15 +316,15 @@ fn held_record(
     if !holds && !files.is_empty() {
         *notes = vec![format!(
             "{} speaks of other logs than those beside it: it is not used",
-            folder.record().shown()
+            at.record().shown()
         )];
     }
     holds.then_some(record)
 }
 
 /// Whose log a file is by the record.
-fn recorded_slot(folder: &FlightFolder, record: Option<&FlightRecord>, path: &Path) -> Option<u16> {
-    let named = |log: &&LogRecord| folder.logs().join(&log.file) == path;
+fn recorded_slot(at: &LogsAt, record: Option<&FlightRecord>, path: &Path) -> Option<u16> {
+    let named = |log: &&LogRecord| at.folder.join(&log.file) == path;
     record?.logs.iter().find(named).map(|log| log.slot)
 }
 
@@ -335,6 +383,10 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
         Ok(paths)
     };
     for path in list(folder)? {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        if path.is_dir() && is_set_aside(name) {
+            continue;
+        }
         if path.is_dir() {
             logs.extend(list(&path)?.into_iter().filter(|path| is_log(path)));
         } else if is_log(&path) {

@@ -9,6 +9,7 @@ use std::path::Path;
 use super::found::{Found, Work};
 use crate::analysis::result::FlightAnalysis;
 use crate::base::plain::Shown as _;
+use crate::campaign::origin::LogOrigin;
 use crate::campaign::{self, FlightFolder};
 use crate::flight::Indicator;
 use crate::mission::Plan;
@@ -60,7 +61,8 @@ fn calibrated_in(path: &Path) -> Option<(Plan, Option<u64>)> {
     let folders = campaign::is_campaign(root).then(|| campaign::flights(root).ok())??;
     let of_folder = |folder: &FlightFolder| {
         let plan = folder.read_plan().ok()?;
-        let seed = folder.read_record().ok().flatten().map(|record| record.seed);
+        let simulated = folder.logs_of(LogOrigin::Simulated);
+        let seed = simulated.read_record().ok().flatten().map(|record| record.seed);
         (plan.purpose == Purpose::Calibration).then_some((plan, seed))
     };
     folders.iter().find_map(of_folder)

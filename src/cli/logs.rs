@@ -6,7 +6,7 @@ mod simulated;
 mod who;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -22,6 +22,7 @@ use super::simulate::{SlotSet, made_by, parse_slots};
 use super::words;
 use crate::base::file::create_folder;
 use crate::base::plain::Shown as _;
+use crate::campaign::start::earlier_folders;
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::logs::import::{ImportOptions, import};
 use crate::fleet::logs::one::Which;
@@ -89,10 +90,10 @@ struct PullArgs {
     flight: Option<String>,
     #[command(flatten)]
     connect: ConnectArgs,
-    /// Which log of each drone: newest, all, or its number
-    #[arg(long, value_name = "WHICH", default_value = "newest", value_parser = which)]
+    /// Which log of each drone: that of the flight's start, newest, all, or its number
+    #[arg(long, value_name = "WHICH", default_value = "flight", value_parser = which)]
     log: Which,
-    /// Bring logs again that have come before
+    /// Bring logs again that have come before; those at home move to logs/flight-K
     #[arg(long)]
     again: bool,
     /// Only these slots: 1-10,12
@@ -141,9 +142,12 @@ struct ImportArgs {
 
 fn which(text: &str) -> Result<Which, String> {
     match text {
+        "flight" => Ok(Which::Flight),
         "newest" => Ok(Which::Newest),
         "all" => Ok(Which::All),
-        number => number.parse().map(Which::Number).map_err(|_| "newest, all, or a number".into()),
+        number => {
+            number.parse().map(Which::Number).map_err(|_| "flight, newest, all, or a number".into())
+        }
     }
 }
 
@@ -252,7 +256,8 @@ fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
         add("--key", &key.shown().to_string());
     }
     match args.log {
-        Which::Newest => {}
+        Which::Flight => {}
+        Which::Newest => add("--log", "newest"),
         Which::All => add("--log", "all"),
         Which::Number(number) => add("--log", &number.to_string()),
     }
@@ -267,16 +272,6 @@ fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
 fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     has_slots(&plan, args.slots.as_ref())?;
-    let asks_drones = args.dry_run || args.again || !args.connect.is_default();
-    if !asks_drones && simulated::all_home(&folder, &plan)? {
-        context.say(&format!(
-            "The {} of {} were simulated and are home: no drone was asked (`updraft logs verify` \
-             checks them; --again, or another --connect, asks drones)",
-            words::count(plan.slots.len(), "log"),
-            plan.name
-        ));
-        return end_pull(context, args, &plan, Vec::<Brought>::new(), &[]);
-    }
     let target = args.connect.target()?;
     if args.dry_run {
         let lines = dry::lines(&folder, &plan, args);
@@ -291,8 +286,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
         at_once: args.at_once.into(),
         patience_s: args.patience,
         wait_s: args.connect.wait,
-        quiet: false,
-        is_durable: true,
+        ..Wish::default()
     };
     let links = match target {
         Target::Links(links) => links,
@@ -370,20 +364,20 @@ fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
     let mut rows = Vec::new();
     for folder in campaign::flights(&args.campaign)? {
         let plan = folder.read_plan()?;
-        let came = verify(&folder.logs())?;
-        if came.is_empty() {
-            rows.extend(simulated::verify(&folder)?.into_iter().map(|(file, faults)| VerifyRow {
-                flight: plan.name.clone(),
-                file,
-                faults,
-            }));
+        let row = |logs: &Path, file: &str, faults: Vec<String>| {
+            let path = logs.join(file);
+            let shown = path.strip_prefix(&folder.0).unwrap_or(&path);
+            VerifyRow { flight: plan.name.clone(), file: shown.shown().to_string(), faults }
+        };
+        for (logs, file, faults) in simulated::verify(&folder)? {
+            rows.push(row(&logs, &file, faults));
         }
-        for checked in came {
-            rows.push(VerifyRow {
-                flight: plan.name.clone(),
-                file: checked.entry.file.clone(),
-                faults: checked.faults.iter().map(ToString::to_string).collect(),
-            });
+        let earlier = earlier_folders(&folder.logs())?.into_iter().map(|(_, folder)| folder);
+        for logs in std::iter::once(folder.logs()).chain(earlier) {
+            for checked in verify(&logs)? {
+                let faults = checked.faults.iter().map(ToString::to_string).collect();
+                rows.push(row(&logs, &checked.entry.file, faults));
+            }
         }
     }
     if rows.is_empty() {
@@ -395,7 +389,7 @@ fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
     }
     let bad = rows.iter().filter(|row| !row.faults.is_empty()).count();
     for row in rows.iter().filter(|row| !row.faults.is_empty()) {
-        context.warn(&format!("{}/logs/{} {}", row.flight, row.file, row.faults.join("; ")));
+        context.warn(&format!("{}/{} {}", row.flight, row.file, row.faults.join("; ")));
     }
     context.say(&format!(
         "{} of {} are as they came",

@@ -188,10 +188,10 @@ fn refuse_occupied(
     if existing.is_some_and(|existing| existing == plan) {
         return Ok(());
     }
-    if folder.record().exists() || folder.logs().is_dir() {
+    if folder.simulated().is_dir() || folder.logs().is_dir() {
         return Err(CommandError::Usage(format!(
             "{} holds the logs of another plan, which are never overwritten; choose another folder, \
-             or move its logs folder away and give --force",
+             or move its folders logs and simulated away and give --force",
             folder.0.shown()
         )));
     }

@@ -7,12 +7,13 @@ use rayon::prelude::*;
 use super::found::Work;
 use super::simulate::made_by;
 use crate::base::plain::Shown as _;
+use crate::campaign::origin::LogOrigin;
 use crate::campaign::{self, FlightFolder};
 use crate::report::{InputFile, Provenance};
 
 /// The provenance of an analysis.
 pub(super) fn provenance(work: &Work, settings: Vec<(&'static str, String)>) -> Provenance {
-    let mut paths = plans(&work.root);
+    let mut paths = plans(&work.root, work.origin.unwrap_or(LogOrigin::Real));
     paths.extend(work.flights.iter().flat_map(|flight| &flight.logs).map(|log| log.path.clone()));
     let inputs = paths
         .par_iter()
@@ -39,12 +40,13 @@ pub(super) fn provenance(work: &Work, settings: Vec<(&'static str, String)>) -> 
 }
 
 /// What a campaign knows about its flights: plans, vehicles, flight records, and a study.
-fn plans(root: &Path) -> Vec<PathBuf> {
+fn plans(root: &Path, origin: LogOrigin) -> Vec<PathBuf> {
     if !campaign::is_campaign(root) {
         return Vec::new();
     }
     let flights = campaign::flights(root).unwrap_or_default();
-    let of = |flight: &FlightFolder| [flight.plan(), flight.vehicle(), flight.record()];
+    let of =
+        |flight: &FlightFolder| [flight.plan(), flight.vehicle(), flight.logs_of(origin).record()];
     let mut paths = vec![campaign::index_path(root)];
     paths.extend(flights.iter().flat_map(of));
     paths.push(campaign::study_result(root));

@@ -1,6 +1,6 @@
 //! `updraft run`: plan, check, fly, collect, analyse, report.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -112,6 +112,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
         shows.push((show, report));
     }
     let _lock = context.lock(&args.output)?;
+    keep_off_the_field(&args.output)?;
     write(context, &mission, &shows, &args.output, args.force)?;
     context.say(&format!(
         "Planned {} in {watch} -> {}",
@@ -141,6 +142,22 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     let exit = analyze_campaign(context, &args.output, &AnalyzeOptions::default())?;
     context.say(&format!("Done in {watch}"));
     Ok(if lost { Exit::Losses } else { exit })
+}
+
+/// The page of a campaign is that of its drones' logs: it is not replaced by one of simulated flights.
+fn keep_off_the_field(output: &Path) -> Result<(), CommandError> {
+    if !campaign::is_campaign(output) {
+        return Ok(());
+    }
+    match campaign::flights(output)?.iter().find(|folder| folder.has_real_logs()) {
+        None => Ok(()),
+        Some(folder) => Err(CommandError::Usage(format!(
+            "{} holds logs of real drones, and this would put the report of a simulation in the place \
+             of theirs: choose another folder (-o), or practise there with `updraft fly --connect sim` \
+             or `updraft simulate`",
+            folder.logs().shown()
+        ))),
+    }
 }
 
 impl RunArgs {

@@ -323,12 +323,13 @@ pub(super) fn make_ready<'a>(
         .collect();
     let changed = changed_logs(folder, &record, &wanted, count)?;
     for (slot, how) in &changed {
-        let path = folder.log(*slot, count);
+        let path = folder.simulated_log(*slot, count);
         context.warn(&format!("{} is not as it was flown ({how}): flown again", path.shown()));
     }
     record.logs.retain(|log| !changed.contains_key(&log.slot));
-    let is_open =
-        |slot: &&Slot| changed.contains_key(&slot.slot) || !folder.log(slot.slot, count).exists();
+    let is_open = |slot: &&Slot| {
+        changed.contains_key(&slot.slot) || !folder.simulated_log(slot.slot, count).exists()
+    };
     let open: Vec<_> = wanted.iter().copied().filter(is_open).collect();
     let frame = plan.site.frame();
     let air = spec::build(&simulation.air, &frame, simulation.seed, &plan.name);
@@ -379,7 +380,7 @@ pub(super) fn simulate(
                 full_logs: simulation.full_logs,
                 hooks: Hooks { progress: None, stop: Some(context.stop_flag()) },
             };
-            let result = fly_to_file(&setup, &folder.log(slot.slot, count));
+            let result = fly_to_file(&setup, &folder.simulated_log(slot.slot, count));
             progress.advance();
             result.map_err(|error| match error {
                 SimError::Stopped { .. } => CommandError::Interrupted,

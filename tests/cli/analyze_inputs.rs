@@ -22,8 +22,8 @@ pub(crate) fn campaign() -> Bench {
     let bench = Bench::new();
     for flight in ["calibration", "hover"] {
         let (from, to) = (flown.path("campaign").join(flight), bench.path("campaign").join(flight));
-        fs::create_dir_all(to.join("logs")).unwrap();
-        for file in ["plan.json", "vehicle.toml", "logs/01.BIN", "logs/02.BIN"] {
+        fs::create_dir_all(to.join("simulated")).unwrap();
+        for file in ["plan.json", "vehicle.toml", "simulated/01.BIN", "simulated/02.BIN"] {
             fs::copy(from.join(file), to.join(file)).unwrap();
         }
     }
@@ -58,7 +58,7 @@ pub(crate) fn said(ended: &Ended) -> String {
     }
     told.push_str("-- err\n");
     for line in ended.err.lines() {
-        let timed = line.starts_with("Analysed");
+        let timed = line.contains("Analysed");
         told.push_str(if timed { line.split(" in ").next().unwrap_or_default() } else { line });
         told.push('\n');
     }
@@ -132,7 +132,7 @@ pub(crate) fn all(value: f32) -> impl Fn(usize, &mut [u8]) {
 #[test]
 fn a_campaign_without_its_hover_gives_laws() {
     let bench = campaign();
-    fs::remove_dir_all(bench.path("campaign/hover/logs")).unwrap();
+    fs::remove_dir_all(bench.path("campaign/hover/simulated")).unwrap();
     assert_snapshot!(analyze(&bench, 3));
     fs::remove_dir_all(bench.path("campaign/hover")).unwrap();
     assert_snapshot!(analyze(&bench, 3));
@@ -148,7 +148,7 @@ fn a_campaign_without_its_hover_gives_laws() {
 fn one_drone_is_no_fleet_and_still_measures() {
     let bench = campaign();
     for flight in ["calibration", "hover"] {
-        fs::remove_file(bench.path("campaign").join(flight).join("logs/02.BIN")).unwrap();
+        fs::remove_file(bench.path("campaign").join(flight).join("simulated/02.BIN")).unwrap();
     }
     assert_snapshot!(analyze(&bench, 3));
     assert!((mean_mps(&bench, 3, "Drone 1") - 1.0).abs() < 0.1);
@@ -157,12 +157,12 @@ fn one_drone_is_no_fleet_and_still_measures() {
 #[test]
 fn empty_logs_cost_their_drones() {
     let bench = campaign();
-    fs::write(bench.path("campaign/hover/logs/01.BIN"), b"").unwrap();
+    fs::write(bench.path("campaign/hover/simulated/01.BIN"), b"").unwrap();
     assert_snapshot!(analyze(&bench, 3));
-    fs::write(bench.path("campaign/hover/logs/02.BIN"), b"").unwrap();
+    fs::write(bench.path("campaign/hover/simulated/02.BIN"), b"").unwrap();
     assert_snapshot!(analyze(&bench, 3));
     for log in ["01.BIN", "02.BIN"] {
-        fs::write(bench.path("campaign/calibration/logs").join(log), b"").unwrap();
+        fs::write(bench.path("campaign/calibration/simulated").join(log), b"").unwrap();
     }
     assert_snapshot!(analyze(&bench, 5));
 }
@@ -170,7 +170,7 @@ fn empty_logs_cost_their_drones() {
 #[test]
 fn columns_without_numbers_are_named() {
     let clean = mean_mps(&campaign(), 0, "Drone 1");
-    let one = "campaign/hover/logs/01.BIN";
+    let one = "campaign/hover/simulated/01.BIN";
     for (column, value) in [("VD", f32::NAN), ("VD", f32::INFINITY), ("PD", f32::NEG_INFINITY)] {
         let bench = campaign();
         patch(&bench.path(one), "XKF1", column, all(value));
@@ -189,7 +189,7 @@ fn columns_without_numbers_are_named() {
     }
     // Without its parameters a log of the show firmware does not say what its commands were scaled by.
     let bench = campaign();
-    patch(&bench.path("campaign/calibration/logs/01.BIN"), "PARM", "Value", all(f32::NAN));
+    patch(&bench.path("campaign/calibration/simulated/01.BIN"), "PARM", "Value", all(f32::NAN));
     assert!((mean_mps(&bench, 0, "Drone 1") - clean).abs() < 0.02);
 }
 
@@ -203,8 +203,8 @@ fn a_stretch_without_numbers_costs_its_windows() {
             }
         }
     };
-    patch(&bench.path("campaign/calibration/logs/02.BIN"), "XKF1", "VD", stretch(400, 700));
-    patch(&bench.path("campaign/hover/logs/01.BIN"), "XKF1", "VD", stretch(400, 440));
+    patch(&bench.path("campaign/calibration/simulated/02.BIN"), "XKF1", "VD", stretch(400, 700));
+    patch(&bench.path("campaign/hover/simulated/01.BIN"), "XKF1", "VD", stretch(400, 440));
     let ended = bench.expect(0, &["analyze", "campaign", "--no-report"]);
     for words in [
         "slot 2: 3 windows gap in the log",
@@ -219,13 +219,14 @@ fn a_stretch_without_numbers_costs_its_windows() {
 fn of_two_boots_the_one_that_flew_the_plan_is_taken() {
     let whole = campaign();
     let clean = mean_mps(&whole, 0, "Drone 1");
-    let log =
-        |flight: &str| fs::read(whole.path("campaign").join(flight).join("logs/01.BIN")).unwrap();
+    let log = |flight: &str| {
+        fs::read(whole.path("campaign").join(flight).join("simulated/01.BIN")).unwrap()
+    };
     let (ladder, hover) = (log("calibration"), log("hover"));
     for both in [[&ladder[..], &hover].concat(), [&hover[..], &ladder].concat()] {
         let bench = campaign();
         for flight in ["calibration", "hover"] {
-            fs::write(bench.path("campaign").join(flight).join("logs/01.BIN"), &both).unwrap();
+            fs::write(bench.path("campaign").join(flight).join("simulated/01.BIN"), &both).unwrap();
         }
         assert!((mean_mps(&bench, 0, "Drone 1") - clean).abs() < 1e-9);
         let told = analyze(&bench, 0);
@@ -250,8 +251,8 @@ fn a_drone_that_flew_at_another_hour_is_not_in_the_map() {
             field.copy_from_slice(&then.to_le_bytes());
         });
     };
-    later("campaign/hover/logs/03.BIN", 3_600_000);
-    later("campaign/calibration/logs/01.BIN", -3_600_000);
+    later("campaign/hover/simulated/03.BIN", 3_600_000);
+    later("campaign/calibration/simulated/01.BIN", -3_600_000);
     let ended = bench.expect(3, &["analyze", "campaign", "--no-report"]);
     let told: Vec<&str> =
         ended.out.lines().skip_while(|l| !l.contains("show began")).take(3).collect();
@@ -264,7 +265,7 @@ fn a_drone_that_flew_at_another_hour_is_not_in_the_map() {
     // The same by the show's own clock: its plan would have been flown an hour before its log begins.
     let bench = Bench::new();
     fly(&bench, "campaign", "1x3");
-    patch(&bench.path("campaign/hover/logs/02.BIN"), "SHOW", "ClockMS", |_, field| {
+    patch(&bench.path("campaign/hover/simulated/02.BIN"), "SHOW", "ClockMS", |_, field| {
         let now = i32::from_le_bytes([field[0], field[1], field[2], field[3]]);
         field.copy_from_slice(&(now - 3_600_000).to_le_bytes());
     });
@@ -275,7 +276,8 @@ fn a_drone_that_flew_at_another_hour_is_not_in_the_map() {
 #[test]
 fn logs_in_the_folder_of_another_flight_are_refused() {
     let bench = campaign();
-    let path = |flight: &str, log: &str| bench.path("campaign").join(flight).join("logs").join(log);
+    let path =
+        |flight: &str, log: &str| bench.path("campaign").join(flight).join("simulated").join(log);
     let swap = |log: &str| {
         let held = fs::read(path("hover", log)).unwrap();
         fs::copy(path("calibration", log), path("hover", log)).unwrap();
@@ -295,7 +297,7 @@ fn logs_of_another_ladder_are_refused() {
     let small = ["--grid", "1x2", "--duration", "40", "--height", "30", "--speeds", "0.5,1.5,1"];
     other.expect(0, &[&run[..], &small, &["--leg", "20", "--hover", "6"]].concat());
     for log in ["01.BIN", "02.BIN"] {
-        let below = format!("campaign/calibration/logs/{log}");
+        let below = format!("campaign/calibration/simulated/{log}");
         fs::copy(other.path(&below), bench.path(&below)).unwrap();
     }
     assert_snapshot!(analyze(&bench, 5));

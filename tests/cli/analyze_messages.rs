@@ -7,7 +7,7 @@ use insta::assert_snapshot;
 use crate::analyze_inputs::{all, campaign, patch, said};
 use crate::support::{Bench, Ended};
 
-const HOVER: &str = "campaign/hover/logs/01.BIN";
+const HOVER: &str = "campaign/hover/simulated/01.BIN";
 
 fn analyze(bench: &Bench, code: i32) -> Ended {
     bench.expect(code, &["analyze", "campaign", "--no-report"])
@@ -56,11 +56,11 @@ fn a_battery_that_was_not_logged_is_an_error_of_its_size_and_a_caution() {
 
     let bench = campaign();
     for column in ["Volt", "VoltR"] {
-        patch(&bench.path("campaign/calibration/logs/02.BIN"), "BAT", column, all(f32::NAN));
+        patch(&bench.path("campaign/calibration/simulated/02.BIN"), "BAT", column, all(f32::NAN));
     }
     assert_snapshot!("a_ladder_without_voltage", about(&analyze(&bench, 0), "battery: "));
     for column in ["Volt", "VoltR"] {
-        patch(&bench.path("campaign/calibration/logs/01.BIN"), "BAT", column, all(f32::NAN));
+        patch(&bench.path("campaign/calibration/simulated/01.BIN"), "BAT", column, all(f32::NAN));
     }
     assert_snapshot!("no_ladder_with_voltage", about(&analyze(&bench, 0), "battery: "));
 }
@@ -71,7 +71,7 @@ fn values_that_cannot_be_are_not_called_missing() {
     for motor in ["C1", "C2", "C3", "C4"] {
         patch(&bench.path(HOVER), "RCOU", motor, |_, field| field.fill(0xff));
     }
-    patch(&bench.path("campaign/calibration/logs/02.BIN"), "XKF1", "VD", all(3e38));
+    patch(&bench.path("campaign/calibration/simulated/02.BIN"), "XKF1", "VD", all(3e38));
     assert_snapshot!(said(&analyze(&bench, 3)));
 }
 
@@ -104,7 +104,7 @@ fn quiet_keeps_what_is_wrong() {
     let lost = bench.expect(3, &["-q", "analyze", "campaign", "--no-report"]);
     assert_snapshot!("quiet_names_a_lost_drone", said(&lost));
     let bench = campaign();
-    fs::remove_dir_all(bench.path("campaign/calibration/logs")).unwrap();
+    fs::remove_dir_all(bench.path("campaign/calibration/simulated")).unwrap();
     let nothing = bench.expect(5, &["-q", "analyze", "campaign", "--no-report"]);
     assert_snapshot!("quiet_says_why_there_is_nothing", said(&nothing));
 }

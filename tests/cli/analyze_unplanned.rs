@@ -33,13 +33,13 @@ fn analyze(bench: &Bench, code: i32, args: &[&str]) -> Ended {
 #[test]
 fn a_hover_alone_is_no_calibration() {
     let bench = flown();
-    let alone = analyze(bench, 5, &["campaign/hover/logs/01.BIN"]);
+    let alone = analyze(bench, 5, &["campaign/hover/simulated/01.BIN"]);
     assert_snapshot!(said(&alone));
     assert!(
         alone.out.contains("without a plan a flight is a calibration only if it climbs"),
         "{alone}"
     );
-    let laws = ["campaign/hover/logs/01.BIN", "--hold", "campaign/analysis.json"];
+    let laws = ["campaign/hover/simulated/01.BIN", "--hold", "campaign/analysis.json"];
     let held = analyze(bench, 0, &laws);
     assert!(held.out.contains("vertical air speed W*, m/s: mean +"), "{held}");
 }
@@ -47,7 +47,7 @@ fn a_hover_alone_is_no_calibration() {
 #[test]
 fn a_ladder_and_a_hover_work_without_a_plan_in_any_order() {
     let bench = flown();
-    let (ladder, hover) = ("campaign/calibration/logs", "campaign/hover/logs");
+    let (ladder, hover) = ("campaign/calibration/simulated", "campaign/hover/simulated");
     let one = analyze(bench, 0, &[ladder, hover]);
     let other = analyze(bench, 0, &[hover, ladder]);
     assert_eq!(one.out, other.out);
@@ -61,7 +61,7 @@ fn a_ladder_and_a_hover_work_without_a_plan_in_any_order() {
 fn nothing_counts_twice() {
     let bench = campaign();
     fs::create_dir(bench.path("copy")).unwrap();
-    let log = bench.path("campaign/hover/logs/02.BIN");
+    let log = bench.path("campaign/hover/simulated/02.BIN");
     fs::copy(log, bench.path("copy/7.BIN")).unwrap();
     let mut told = String::new();
     for paths in [
@@ -102,7 +102,7 @@ fn simulated_logs_are_home_and_can_be_verified() {
     bench.fly();
     let pulled = bench.expect(0, &["logs", "pull", "campaign"]);
     let whole = bench.expect(0, &["logs", "verify", "campaign"]);
-    let path = bench.path("campaign/logs/02.BIN");
+    let path = bench.path("campaign/simulated/02.BIN");
     let mut log = fs::read(&path).unwrap();
     let last = log.len() - 9;
     log[last] ^= 1;

@@ -88,7 +88,7 @@ fn every_log_comes_home(grid: &str, count: u16, rate: &str, after: &str) {
     assert!(ended.err.contains(&again), "{ended}");
     for slot in 1..=count {
         let name = format!("{slot:02}.BIN");
-        let has = fs::read(bench.path("drones/logs").join(&name)).unwrap();
+        let has = fs::read(bench.path("drones/simulated").join(&name)).unwrap();
         match fs::read(bench.path("home/logs").join(&name)) {
             Ok(came) => assert!(slot != 3 && came == has, "log {slot} is another"),
             Err(_) => assert_eq!(slot, 3, "log {slot} is missing\n{ended}"),
@@ -113,15 +113,15 @@ fn virtual_drones_fly_as_simulated() {
     let bench = Bench::new();
     bench.planned("2x2", "campaign");
     bench.planned("2x2", "other");
-    bench.expect(0, &["fly", "campaign", "--connect", "sim"]);
+    bench.expect(0, &["fly", "campaign", "--connect", "sim", "--yes"]);
     bench.expect(0, &["simulate", "other"]);
     for slot in 1..=4 {
         let read = |folder: &str| {
-            fs::read(bench.path(folder).join(format!("logs/{slot:02}.BIN"))).unwrap()
+            fs::read(bench.path(folder).join(format!("simulated/{slot:02}.BIN"))).unwrap()
         };
         assert!(read("campaign") == read("other"), "log {slot}");
     }
-    let manifest = fs::read(bench.path("campaign/logs/manifest.json")).unwrap();
+    let manifest = fs::read(bench.path("campaign/simulated/manifest.json")).unwrap();
     let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
     assert_eq!(manifest["schema"], "updraft.logs/1");
     assert_eq!(manifest["logs"].as_array().unwrap().len(), 4);

@@ -42,7 +42,7 @@ fn campaign() -> Bench {
 /// Leaves the logs of these slots only.
 fn keep(bench: &Bench, slots: &[u16]) {
     for slot in (1..=4).filter(|slot| !slots.contains(slot)) {
-        fs::remove_file(bench.path(&format!("campaign/logs/{slot:02}.BIN"))).unwrap();
+        fs::remove_file(bench.path(&format!("campaign/simulated/{slot:02}.BIN"))).unwrap();
     }
 }
 
@@ -77,7 +77,7 @@ fn flights_that_hide_nothing_lack_nothing() {
         assert!(bench.path("campaign/gap").join(file).is_file(), "{file}");
     }
     // Against the logs of a simulation as well: here, its own.
-    let logs = "campaign/logs";
+    let logs = "campaign/simulated";
     let args = ["gap", "--measured", logs, "--simulated", logs, "--json", "-o", "own"];
     let verdict = &bench.expect(0, &args).json("updraft.gap/1")["verdict"];
     assert_eq!(verdict["steps"].as_array().unwrap().len(), 0, "{verdict}");
@@ -113,20 +113,20 @@ fn half_of_the_logs_are_compared_with_a_caution() {
     keep(&bench, &[1, 4]);
     assert_snapshot!(said(&bench, 0, &["campaign"]));
     // Logs that are there and cannot be read are losses.
-    fs::write(bench.path("campaign/logs/02.BIN"), b"").unwrap();
+    fs::write(bench.path("campaign/simulated/02.BIN"), b"").unwrap();
     assert_snapshot!(said(&bench, 3, &["campaign"]));
 }
 
 #[test]
 fn without_a_plan_there_must_be_a_simulated_side() {
     let bench = campaign();
-    assert_snapshot!(refused(&bench, 2, &["--measured", "campaign/logs"]));
+    assert_snapshot!(refused(&bench, 2, &["--measured", "campaign/simulated"]));
     fs::remove_file(bench.path("campaign/plan.json")).unwrap();
     assert_snapshot!(refused(&bench, 5, &["campaign"]));
     assert_snapshot!(refused(
         &bench,
         1,
-        &["--measured", "campaign/logs", "--plan", "campaign/plan.json"]
+        &["--measured", "campaign/simulated", "--plan", "campaign/plan.json"]
     ));
 }
 
@@ -173,13 +173,14 @@ fn logs_of_a_constant_are_refused() {
     fs::create_dir(bench.path("other")).unwrap();
     for slot in 1..=4 {
         let name = format!("{slot:02}.BIN");
-        fs::copy(bench.path("campaign/logs").join(&name), bench.path("other").join(&name)).unwrap();
+        fs::copy(bench.path("campaign/simulated").join(&name), bench.path("other").join(&name))
+            .unwrap();
     }
-    hold(&bench, "campaign/logs", 1..=1);
+    hold(&bench, "campaign/simulated", 1..=1);
     assert_snapshot!(said(&bench, 3, &["campaign"]));
     hold(&bench, "other", 1..=4);
     assert_snapshot!(refused(&bench, 5, &["campaign", "--simulated", "other"]));
-    hold(&bench, "campaign/logs", 2..=4);
+    hold(&bench, "campaign/simulated", 2..=4);
     assert_snapshot!(refused(&bench, 5, &["campaign"]));
 }
 
@@ -189,7 +190,7 @@ fn a_half_fleet_that_lost_a_log_is_compared() {
     let plan = ["plan", "calibration-counterphase", "--grid", "3x5", "--quiet", "-o", "campaign"];
     bench.expect(0, &[&plan[..], &SMALL].concat());
     bench.expect(0, &["simulate", "campaign", "--quiet"]);
-    fs::remove_file(bench.path("campaign/logs/02.BIN")).unwrap();
+    fs::remove_file(bench.path("campaign/simulated/02.BIN")).unwrap();
     let ended = bench.expect(0, &["gap", "campaign", "--json"]);
     let data = &ended.json("updraft.gap/1")["verdict"]["data"];
     assert_eq!(data["drones"], 14);
@@ -255,8 +256,8 @@ fn nothing_measured_is_nothing_to_work_on() {
     assert_snapshot!(refused(&bench, 5, &["campaign"]));
     assert_snapshot!(refused(&bench, 2, &["campaign", "--flight", "hover"]));
     for slot in 1..=4 {
-        fs::create_dir_all(bench.path("campaign/logs")).unwrap();
-        fs::write(bench.path(&format!("campaign/logs/{slot:02}.BIN")), b"").unwrap();
+        fs::create_dir_all(bench.path("campaign/simulated")).unwrap();
+        fs::write(bench.path(&format!("campaign/simulated/{slot:02}.BIN")), b"").unwrap();
     }
     assert_snapshot!(refused(&bench, 5, &["campaign"]));
 }

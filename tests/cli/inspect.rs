@@ -19,9 +19,9 @@ fn every_kind_of_file_is_described() {
         bench.expect(0, &["inspect", "--json", &path]).json("updraft.inspect/1");
     }
     insta::assert_snapshot!(all);
-    let path = "campaign/logs/01.BIN";
+    let path = "campaign/simulated/01.BIN";
     let log = bench.expect(0, &["inspect", path]);
-    assert!(log.out.starts_with("campaign/logs/01.BIN: 0."), "{log}");
+    assert!(log.out.starts_with("campaign/simulated/01.BIN: 0."), "{log}");
     assert!(log.out.contains("\nRCOU ") && log.out.ends_with("\nno damage found\n"), "{log}");
     let value = bench.expect(0, &["inspect", "--json", path]).json("updraft.inspect/1");
     assert!(value["log"]["messages"].is_array());

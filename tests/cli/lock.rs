@@ -23,7 +23,7 @@ fn a_second_writer_is_refused_until_the_first_is_gone() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let record = bench.path("campaign/logs/flight.json");
+    let record = bench.path("campaign/simulated/flight.json");
     while !record.exists() {
         std::thread::yield_now();
     }

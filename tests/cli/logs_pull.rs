@@ -16,8 +16,8 @@ impl Bench {
     }
 
     fn is_home(&self, slot: u16) -> bool {
-        let read = |folder: &str| fs::read(self.path(&format!("{folder}/logs/{slot:02}.BIN")));
-        read("home").is_ok_and(|bytes| bytes == read("drones").unwrap())
+        let read = |folder: &str| fs::read(self.path(&format!("{folder}/{slot:02}.BIN")));
+        read("home/logs").is_ok_and(|bytes| bytes == read("drones/simulated").unwrap())
     }
 }
 

@@ -190,7 +190,7 @@ fn tables_fit_a_narrow_terminal() {
         &["inspect", "campaign"],
         &["inspect", "campaign/show.skyc"],
         &["inspect", "campaign/skyb/01.skyb"],
-        &["inspect", "campaign/logs/01.BIN"],
+        &["inspect", "campaign/simulated/01.BIN"],
         &["effects"],
         &["--help"],
     ];

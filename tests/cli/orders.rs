@@ -138,7 +138,7 @@ fn json_is_one_object_however_a_flight_ends() {
     let flown = bench.expect(0, &go).json("updraft.fly/1");
     assert_eq!(flown["flights"][0]["drones"][1]["outcome"], "landed");
     assert_eq!(flown["flights"][0]["logs"][1]["state"], "pulled");
-    let sim = bench.expect(0, &["fly", "drones", "--connect", "sim", "--json"]);
+    let sim = bench.expect(0, &["fly", "drones", "--connect", "sim", "--yes", "--json"]);
     let sim = sim.json("updraft.fly/1");
     assert_eq!(sim["flights"][0]["drones"][1]["outcome"], "landed");
     assert_eq!(sim["flights"][0]["logs"].as_array().unwrap().len(), 2);

@@ -124,7 +124,8 @@ fn a_hover_in_the_folder_of_a_scan_is_refused() {
     let hover = ["plan", "hover", "--grid", "1x2", "--height", "60", "--duration", "130"];
     bench.expect(0, &[&hover[..], &["--set", "vehicle=pixel", "-o", "hover"]].concat());
     bench.expect(0, &["simulate", "hover", "--quiet"]);
-    fs::copy(bench.path("hover/logs/01.BIN"), bench.path("campaign/scan/logs/01.BIN")).unwrap();
+    fs::copy(bench.path("hover/simulated/01.BIN"), bench.path("campaign/scan/simulated/01.BIN"))
+        .unwrap();
     let ended = bench.expect(3, &["analyze", "campaign", "--no-report"]);
     assert!(ended.out.contains("2 of 2 horizontal legs were not flown"), "{ended}");
     assert!(ended.out.contains("scan, measurement: 1 of 2 drones"), "{ended}");

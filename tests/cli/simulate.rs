@@ -9,7 +9,7 @@ use crate::support::{Bench, Ended, SHORT, contents};
 fn only_missing_logs_are_flown_again() {
     let bench = Bench::new();
     bench.fly();
-    let logs = bench.path("campaign/logs");
+    let logs = bench.path("campaign/simulated");
     let before = contents(&logs);
     let names: Vec<_> = before.iter().map(|(path, _)| path.file_name().unwrap()).collect();
     assert_eq!(names, ["01.BIN", "02.BIN", "flight.json"]);
@@ -32,7 +32,7 @@ fn only_missing_logs_are_flown_again() {
 fn a_log_that_is_not_as_it_was_flown_is_flown_again() {
     let bench = Bench::new();
     bench.fly();
-    let logs = bench.path("campaign/logs");
+    let logs = bench.path("campaign/simulated");
     let before = contents(&logs);
     let whole = fs::read(logs.join("02.BIN")).unwrap();
     let mut flipped = whole.clone();
@@ -42,8 +42,9 @@ fn a_log_that_is_not_as_it_was_flown_is_flown_again() {
         let again = bench.expect(0, &["simulate", "campaign"]);
         let size = format!("it has {} bytes, not {}", damaged.len(), whole.len());
         let how = if damaged.len() == whole.len() { "its bytes were changed" } else { &size };
-        let warning =
-            format!("warning: campaign/logs/02.BIN is not as it was flown ({how}): flown again\n");
+        let warning = format!(
+            "warning: campaign/simulated/02.BIN is not as it was flown ({how}): flown again\n"
+        );
         assert!(again.err.starts_with(&warning), "{again}");
         assert!(again.err.contains("Flew calibration: 2 logs"), "{again}");
         assert!(contents(&logs) == before, "the same bytes again");
@@ -59,7 +60,7 @@ fn a_log_that_is_not_as_it_was_flown_is_flown_again() {
     let refused = bench.expect(2, &["simulate", "campaign"]);
     assert_eq!(
         refused.err,
-        "error: campaign/logs/02.BIN was not simulated by this program; move it away, or use \
+        "error: campaign/simulated/02.BIN was not simulated by this program; move it away, or use \
          another folder\n"
     );
     assert_eq!(fs::read(logs.join("02.BIN")).unwrap(), fs::read(real).unwrap());
@@ -75,18 +76,18 @@ fn other_settings_do_not_mix_with_logs() {
     assert!(refused.err.contains("logs flown with other settings; give --force"), "{refused}");
     assert_eq!(contents(&bench.path("campaign")), before);
     bench.expect(0, &[&windy[..], &["--force"]].concat());
-    assert_ne!(contents(&bench.path("campaign/logs")), before);
+    assert_ne!(contents(&bench.path("campaign/simulated")), before);
 }
 
 #[test]
 fn logs_of_others_are_not_touched() {
     let bench = Bench::new();
     bench.plan();
-    fs::create_dir(bench.path("campaign/logs")).unwrap();
-    fs::write(bench.path("campaign/logs/01.BIN"), b"somebody's").unwrap();
+    fs::create_dir(bench.path("campaign/simulated")).unwrap();
+    fs::write(bench.path("campaign/simulated/01.BIN"), b"somebody's").unwrap();
     let refused = bench.expect(2, &["simulate", "campaign", "--force"]);
     assert!(refused.err.contains("logs that this program did not simulate"), "{refused}");
-    assert_eq!(fs::read(bench.path("campaign/logs/01.BIN")).unwrap(), b"somebody's");
+    assert_eq!(fs::read(bench.path("campaign/simulated/01.BIN")).unwrap(), b"somebody's");
 }
 
 #[test]
@@ -96,7 +97,7 @@ fn some_drones_of_one_flight() {
     let flown = bench.expect(0, &["simulate", "campaign", "--drones", "2", "--json", "--quiet"]);
     let value = flown.json("updraft.simulate/1");
     assert_eq!(value["flights"][0]["logs"], 1);
-    assert!(!bench.path("campaign/logs/01.BIN").exists());
+    assert!(!bench.path("campaign/simulated/01.BIN").exists());
     bench.expect(2, &["simulate", "campaign", "--flight", "dance"]);
     bench.expect(2, &["simulate", "campaign", "--drones", "2-1"]);
     let none = bench.expect(2, &["simulate", "campaign", "--drones", "3"]);
@@ -119,7 +120,7 @@ fn an_interrupted_run_leaves_whole_logs_and_goes_on() {
         .spawn()
         .unwrap();
     // It is flying once an unfinished log is there.
-    let logs = bench.path("campaign/logs");
+    let logs = bench.path("campaign/simulated");
     let unfinished = || {
         fs::read_dir(&logs).is_ok_and(|mut entries| {
             entries.any(|entry| {
@@ -152,7 +153,7 @@ fn an_interrupted_run_leaves_whole_logs_and_goes_on() {
     let other = Bench::new();
     other.expect(0, &[&plan[..], &long].concat());
     other.expect(0, &["simulate", "campaign", "--full-logs"]);
-    for (here, there) in whole.iter().zip(contents(&other.path("campaign/logs"))) {
+    for (here, there) in whole.iter().zip(contents(&other.path("campaign/simulated"))) {
         assert!(here.1 == there.1, "{} differs from an uninterrupted run", here.0.display());
     }
 }

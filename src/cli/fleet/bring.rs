@@ -3,18 +3,24 @@
 mod bar;
 mod shares;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 
 use serde::Serialize;
 
 use self::bar::Bar;
 use super::connect::run_number;
 use crate::base::file::create_folder;
+use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
+use crate::campaign::origin::LogOrigin;
+use crate::campaign::start::StartRecord;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::simulate::made_by;
+use crate::cli::words;
+use crate::fleet::logs::manifest::LogFlight;
 use crate::fleet::logs::one::{OneOptions, Which};
 use crate::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use crate::fleet::slots::FleetTable;
@@ -39,12 +45,14 @@ pub(in crate::cli) struct Wish {
     pub(in crate::cli) is_durable: bool,
     /// Says nothing: the caller tells what is missing.
     pub(in crate::cli) quiet: bool,
+    /// Into which of the flight's folders.
+    pub(in crate::cli) origin: LogOrigin,
 }
 
 impl Default for Wish {
     fn default() -> Self {
         Self {
-            which: Which::Newest,
+            which: Which::Flight,
             again: false,
             most_bytes: 2 << 30,
             rate: None,
@@ -53,6 +61,7 @@ impl Default for Wish {
             wait_s: 60.0,
             is_durable: true,
             quiet: false,
+            origin: LogOrigin::Real,
         }
     }
 }
@@ -88,6 +97,40 @@ impl Brought {
     }
 }
 
+/// Says which logs of earlier flights made room.
+fn say_moved(context: &Context, outcomes: &BTreeMap<DroneId, Outcome>) {
+    let mut folders: BTreeMap<PathBuf, usize> = BTreeMap::new();
+    for done in outcomes.values().filter_map(Outcome::done) {
+        for path in &done.moved {
+            *folders.entry(path.parent().unwrap_or(path).to_owned()).or_default() += 1;
+        }
+    }
+    for (folder, count) in folders {
+        context.say(&format!(
+            "Moved {} of an earlier flight to {}",
+            words::count(count, "log"),
+            folder.shown()
+        ));
+    }
+}
+
+/// Names the drones that have newer logs than those of this flight: somebody may want them.
+fn say_newer(context: &Context, outcomes: &BTreeMap<DroneId, Outcome>) {
+    let newer = outcomes.iter().filter_map(|(drone, outcome)| {
+        let number = outcome.done()?.newer?;
+        Some(format!("{drone} (log {number})"))
+    });
+    let newer: Vec<String> = newer.collect();
+    if !newer.is_empty() {
+        context.warn(&format!(
+            "{} newer logs than those of this flight, which stay as they are: drones {}; `updraft \
+             logs pull --log newest` brings them",
+            if newer.len() == 1 { "one drone has" } else { "some drones have" },
+            newer.join(", ")
+        ));
+    }
+}
+
 /// Brings the logs of the table's drones into the flight's folder.
 pub(in crate::cli) fn bring(
     context: &Context,
@@ -98,16 +141,27 @@ pub(in crate::cli) fn bring(
     wish: &Wish,
 ) -> Result<Vec<Brought>, CommandError> {
     let quiet = wish.quiet;
-    create_folder(&folder.logs())?;
+    let at = match wish.origin {
+        LogOrigin::Real => folder.logs_of(LogOrigin::Real),
+        LogOrigin::Simulated => folder.simulated_at(),
+    };
+    create_folder(&at.folder)?;
     let count = plan.slots.len();
     let file = |slot: u16| {
         let path = folder.log(slot, count);
         path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     };
+    let start = StartRecord::read_in(&at.folder)?;
+    let flight = |slot: u16| start.as_ref().map(|start| LogFlight::wanted(start, slot));
     let wanted: Vec<Wanted> = table
         .drones
         .iter()
-        .map(|line| Wanted { drone: line.drone, slot: line.slot, file: file(line.slot) })
+        .map(|line| Wanted {
+            drone: line.drone,
+            slot: line.slot,
+            file: file(line.slot),
+            flight: flight(line.slot),
+        })
         .collect();
     let options = PullOptions {
         each: OneOptions {
@@ -129,7 +183,7 @@ pub(in crate::cli) fn bring(
     let absent = wanted.iter().filter(|one| !heard.contains(&one.drone));
     let absent = absent.map(|one| (one.drone, one.slot)).collect();
     let mut bar = Bar::new(context, absent, quiet);
-    let outcomes = pull(net, &folder.logs(), &wanted, &options, &mut bar)
+    let outcomes = pull(net, &at.folder, &wanted, &options, &mut bar)
         .map_err(|error| CommandError::Failed(with_reasons(&error)))?;
     bar.finish();
     let brought: Vec<Brought> = wanted
@@ -161,6 +215,10 @@ pub(in crate::cli) fn bring(
             Brought { slot, drone, state, bytes, reason, unchecked }
         })
         .collect();
+    if !quiet {
+        say_moved(context, &outcomes);
+        say_newer(context, &outcomes);
+    }
     let unchecked = brought
         .iter()
         .filter(|one| one.state == "there")

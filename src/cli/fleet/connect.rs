@@ -56,11 +56,6 @@ pub(in crate::cli) enum Target {
 }
 
 impl ConnectArgs {
-    /// Whether nothing was chosen.
-    pub(in crate::cli) fn is_default(&self) -> bool {
-        self.connect == [DEFAULT_LINK]
-    }
-
     /// What the words mean.
     pub(in crate::cli) fn target(&self) -> Result<Target, CommandError> {
         let usage = |text: String| CommandError::Usage(text);

@@ -68,6 +68,8 @@ pub(in crate::cli) struct Crew<'a> {
     /// Virtual drones that are gone after this flight: nobody waits for people, and nothing is kept
     /// of them but their logs.
     pub(in crate::cli) is_virtual: bool,
+    /// Virtual drones with which people practise: everything that happens is told, as in the field.
+    pub(in crate::cli) tells_all: bool,
     /// The station flies the drones by streaming targets; nobody needs the show mode.
     pub(in crate::cli) is_guided: bool,
     /// The start that was authorized and written down.
@@ -133,6 +135,7 @@ impl<'a> Crew<'a> {
             clock: SystemClock::start(),
             told: BTreeSet::new(),
             is_virtual: false,
+            tells_all: false,
             is_guided: false,
             begun: None,
         }

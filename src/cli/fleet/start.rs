@@ -92,7 +92,7 @@ pub(in crate::cli) fn guide_now(
     Ok((landed(context, crew, alarms.is_empty()), alarms))
 }
 
-pub(super) fn needs_person(lead: &LeadArgs) -> Result<(), CommandError> {
+pub(in crate::cli) fn needs_person(lead: &LeadArgs) -> Result<(), CommandError> {
     if !lead.yes && !std::io::stdin().is_terminal() {
         return Err(CommandError::Usage(
             "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
@@ -108,6 +108,12 @@ fn say_start(context: &Context, crew: &mut Crew<'_>, start: &Start, what: &str) 
         start.second_of_week(),
         start.left_s(&crew.telemetry, crew.net.now()).unwrap_or(0.0)
     ));
+}
+
+/// Says how many drones have landed.
+pub(in crate::cli) fn say_landed(context: &Context, crew: &Crew<'_>) {
+    let landed = crew.landed();
+    context.say(&format!("{landed} of {} drones have landed", crew.table.drones.len()));
 }
 
 fn landed(context: &Context, crew: &Crew<'_>, quiet: bool) -> Exit {

@@ -15,6 +15,7 @@ use crate::base::file::read_whole;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
+use crate::campaign::origin::default_of;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
@@ -109,9 +110,10 @@ fn mishaps(
         )));
     }
     let mut cards = BTreeMap::new();
+    let at = folder.logs_of(default_of(std::slice::from_ref(folder)));
     if args.flown {
         for slot in &plan.slots {
-            let path = folder.log(slot.slot, plan.slots.len());
+            let path = at.log(slot.slot, plan.slots.len());
             if path.exists() {
                 cards.insert(slot.slot, read_whole(&path, MOST_LOG)?);
             }
@@ -119,7 +121,7 @@ fn mishaps(
         if cards.is_empty() {
             return Err(CommandError::Nothing(format!(
                 "{} has no logs for the drones' cards: `updraft simulate` makes them",
-                folder.logs().shown()
+                at.folder.shown()
             )));
         }
     }

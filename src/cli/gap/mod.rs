@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::analyze::load_plan;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::found::{Found, Work, find, find_tables};
+use super::found::{Found, OriginChoice, Work, find, find_tables};
 use super::provenance::provenance;
 use super::words;
 use crate::analysis::TruthSeries;
@@ -70,6 +70,9 @@ pub(super) struct GapArgs {
     /// Flight of the campaign [default: its calibration]
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
+    /// Which logs of a campaign: real or simulated [default: real where there are any]
+    #[arg(long, value_name = "WHICH", value_enum, conflicts_with_all = ["measured", "csv"])]
+    logs: Option<OriginChoice>,
     /// Model to hold against the logs: a vehicle's name or file [default: the planned one]
     #[arg(long, value_name = "VEHICLE")]
     vehicle: Option<String>,
@@ -127,7 +130,7 @@ pub(super) fn run(context: &Context, args: &GapArgs) -> Result<Exit, CommandErro
         seed: args.seed,
         ..Options::default()
     };
-    let (found, others) = measured(args)?;
+    let (found, others) = measured(context, args)?;
     let vehicle = model_of(args, &found)?;
     // Before anything is flown: what is wrong with the model is the file's fault, not the flight's.
     resolved(&vehicle).map_err(|error| {
@@ -245,7 +248,7 @@ fn write(
 }
 
 /// The measured flight, and the others that are there.
-fn measured(args: &GapArgs) -> Result<(Found, Vec<Found>), CommandError> {
+fn measured(context: &Context, args: &GapArgs) -> Result<(Found, Vec<Found>), CommandError> {
     let plan = args.plan.as_deref().map(load_plan).transpose()?;
     if let Some(mapping) = &args.csv {
         let mut work = Work::new(mapping);
@@ -260,10 +263,10 @@ fn measured(args: &GapArgs) -> Result<(Found, Vec<Found>), CommandError> {
                 ));
             }
             is_campaign(campaign)?;
-            one_flight(campaign, args.flight.as_deref())
+            measured_in(context, campaign, args)
         }
         (None, Some(path)) => {
-            let (mut found, others) = one_flight(path, args.flight.as_deref())?;
+            let (mut found, others) = measured_in(context, path, args)?;
             if plan.is_some() {
                 found.plan = plan;
             }
@@ -294,6 +297,21 @@ fn one_flight(path: &Path, name: Option<&str>) -> Result<(Found, Vec<Found>), Co
     let mut work = Work::new(path);
     find(path, None, &mut work)?;
     chosen(work.flights, path, name)
+}
+
+/// The same of what was measured; says which logs are taken.
+fn measured_in(
+    context: &Context,
+    path: &Path,
+    args: &GapArgs,
+) -> Result<(Found, Vec<Found>), CommandError> {
+    let mut work = Work::new(path);
+    work.origin = args.logs.map(Into::into);
+    find(path, None, &mut work)?;
+    for used in &work.used {
+        context.say(used);
+    }
+    chosen(work.flights, path, args.flight.as_deref())
 }
 
 /// As [`one_flight`], of flights that were found.

@@ -15,6 +15,7 @@ pub(super) fn lines(
     args: &PullArgs,
 ) -> BTreeMap<String, Vec<String>> {
     let what = match args.log {
+        Which::Flight => "its log of this flight".to_owned(),
         Which::Newest => "its newest log".to_owned(),
         Which::All => "all of its logs".to_owned(),
         Which::Number(number) => format!("its log {number}"),
@@ -24,7 +25,7 @@ pub(super) fn lines(
     for slot in plan.slots.iter().map(|slot| slot.slot).filter(|slot| is_meant(*slot)) {
         let path = folder.log(slot, plan.slots.len());
         let place = path.strip_prefix(&folder.0).unwrap_or(&path).shown();
-        let line = if path.exists() && !args.again && args.log == Which::Newest {
+        let line = if path.exists() && !args.again && args.log == Which::Flight {
             format!("the list of its logs, and what {place} lacks")
         } else {
             format!("the list of its logs, and {what}, for {place}")

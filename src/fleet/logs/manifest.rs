@@ -273,6 +273,22 @@ impl Shelf {
         part.finish()
     }
 
+    /// Gives a finished part another name than it was begun for, that of its entry; a log that has
+    /// this name is moved aside.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub fn finish_as(&mut self, part: PartFile, entry: ManifestEntry) -> Result<(), FileError> {
+        let path = self.path(&entry.file);
+        path.parent().map_or(Ok(()), create_folder)?;
+        let same = self.entry(&entry.file).is_some_and(|there| there.sha256 == entry.sha256);
+        if !same {
+            self.set_aside(&entry.file, "other")?;
+        }
+        self.add(entry)?;
+        part.finish_as(&path)
+    }
+
     /// Waits until the disk has the names of all finished logs. Those of earlier logs are there
     /// with the entry of a later one; without this a power loss leaves the last log under the name
     /// of its part, whole.

@@ -2,6 +2,7 @@
 
 mod bring;
 mod choose;
+mod flight;
 mod home;
 mod options;
 mod prove;
@@ -10,9 +11,10 @@ mod settle;
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use self::flight::Retired;
 use self::home::Begun;
 pub use self::options::{Failure, OneDone, OneOptions, Which};
-use super::manifest::{AtHome, Shelf};
+use super::manifest::{AtHome, LogFlight, Shelf};
 use super::part::{PartFile, Sample, Sums};
 use crate::fleet::budget::Budget;
 use crate::fleet::ftp::Caller;
@@ -72,8 +74,14 @@ pub struct PullOne {
     grows: Option<Micros>,
     /// Why only its beginning comes.
     incomplete: Option<String>,
+    /// The flight whose log is wanted, if a start was written down.
+    flight: Option<LogFlight>,
     /// What was at home of the slot's file.
     home: AtHome,
+    /// What was at home and is of an earlier flight.
+    retired: Option<Retired>,
+    /// Why a log that came is not the one that is wanted.
+    not_it: Option<String>,
     /// The drone has more of it.
     is_outgrown: bool,
     /// What the download of the target began with.
@@ -143,7 +151,10 @@ impl PullOne {
             sized: 0,
             grows: None,
             incomplete: None,
+            flight: None,
             home: AtHome::Nothing,
+            retired: None,
+            not_it: None,
             is_outgrown: false,
             begun: Begun::Empty,
             rounds: 0,
@@ -158,6 +169,12 @@ impl PullOne {
             held: 0,
             options,
         }
+    }
+
+    /// Wants the log of this flight.
+    #[must_use]
+    pub fn of_flight(self, flight: Option<LogFlight>) -> Self {
+        Self { flight, ..self }
     }
 
     /// New bytes so far.
@@ -236,6 +253,10 @@ impl PullOne {
 
     fn start(&mut self) -> Stage {
         self.home = self.shelf.borrow().at_home(&self.file);
+        if let Err(reason) = self.make_room() {
+            return self
+                .fail_for_sure(reason, "make the folder writable, or make room, and run again");
+        }
         if self.home == AtHome::Foreign && !self.options.again {
             return self.fail(
                 format!("{} is there, but the manifest does not know it", self.file),

@@ -210,12 +210,18 @@ impl PartFile {
     /// Gives the finished file its name; its journal goes. The content is on the disk then, the
     /// name once its folder is: see [`super::manifest::Shelf::settle`].
     pub fn finish(self) -> Result<(), FileError> {
+        let path = self.path.clone();
+        self.finish_as(&path)
+    }
+
+    /// Gives the finished file another name than it was begun for.
+    pub fn finish_as(self, path: &Path) -> Result<(), FileError> {
         let part = part_path(&self.path);
         let fail = |source| FileError::new("rename", &part, source);
         if self.is_durable {
             self.file.sync_data().map_err(fail)?;
         }
-        fs::rename(&part, &self.path).map_err(fail)?;
+        fs::rename(&part, path).map_err(fail)?;
         // A journal without its part is begun anew by the next download; no harm.
         let _ = fs::remove_file(journal_path(&self.path));
         Ok(())

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 use std::rc::Rc;
 
-use super::manifest::Shelf;
+use super::manifest::{LogFlight, Shelf};
 use super::one::{OneDone, OneOptions, PullOne};
 use super::pace::Pace;
 use crate::campaign::CampaignError;
@@ -30,6 +30,8 @@ pub struct Wanted {
     pub slot: u16,
     /// Name of the slot's log file: `07.BIN`.
     pub file: String,
+    /// The flight whose log it is to be; none: no start was written down.
+    pub flight: Option<LogFlight>,
 }
 
 /// How logs are pulled.
@@ -66,6 +68,16 @@ pub enum Outcome {
     Stopped,
 }
 
+impl Outcome {
+    /// What became of it, if the run was not stopped before.
+    pub fn done(&self) -> Option<&OneDone> {
+        match self {
+            Self::Done(done) => Some(done),
+            Self::Stopped => None,
+        }
+    }
+}
+
 /// Pulls logs into the folder `logs`. One drone's trouble is its own: it is in its outcome.
 ///
 /// # Errors
@@ -99,7 +111,8 @@ fn pull_onto(
         let each = options.each.clone();
         let shelf = Rc::clone(shelf);
         let machine =
-            PullOne::new(one.drone, one.slot, &one.file, shelf, each, lane.budget.clone());
+            PullOne::new(one.drone, one.slot, &one.file, shelf, each, lane.budget.clone())
+                .of_flight(one.flight.clone());
         lane.waiting.push_back((one.drone, machine));
         outcomes.insert(one.drone, Outcome::Stopped);
     }

@@ -165,7 +165,8 @@ impl<'a> Crew<'a> {
         let mut monitor =
             Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
         monitor.set_start(start_gps_ms);
-        let mut eyes = Eyes::new(self.context, monitor, self.clock, self.is_virtual);
+        let mut eyes =
+            Eyes::new(self.context, monitor, self.clock, self.is_virtual && !self.tells_all);
         if !self.is_virtual {
             // Drones that are about to fly are watched, journal or not.
             eyes.write_into(Journal::open(&self.folder.0));

@@ -210,7 +210,7 @@ impl Puller<'_> {
             }
             AtHome::Intact(entry) if entry.incomplete.is_none() => {
                 one.over = match self.wish.which {
-                    Which::Newest => true,
+                    Which::Flight | Which::Newest => true,
                     Which::Number(number) => entry.boot == Some(number),
                     Which::All => false,
                 };
@@ -296,7 +296,7 @@ impl Puller<'_> {
         let known: Vec<String> = logs.iter().map(|log| log.id.clone()).collect();
         let which = self.wish.which;
         logs.retain(|log| match which {
-            Which::Newest => number(log) == newest,
+            Which::Flight | Which::Newest => number(log) == newest,
             Which::Number(wanted) => number(log) == wanted,
             Which::All => true,
         });

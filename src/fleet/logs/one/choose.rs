@@ -80,13 +80,31 @@ impl PullOne {
         // The log of this flight is home, or was: a later one is of another flight.
         let known = self.number_at_home();
         let known = known.filter(|known| logs.iter().any(|(number, ..)| number == known));
+        if let Some(known) = known.filter(|known| *known < newest)
+            && self.options.which == Which::Flight
+        {
+            self.done.newer = Some(newest);
+            if self.flight.as_ref().is_none_or(|of| of.authorized_start.is_none()) {
+                self.leave(self.file.clone(), None);
+                return self.fail_for_sure(
+                    format!(
+                        "the drone has a newer log (number {newest}) than the one at home (number \
+                         {known}), and no start was written down that tells which is of this flight"
+                    ),
+                    "`--log newest` brings it; the one at home then moves to logs/flight-0",
+                );
+            }
+        }
         if self.number_at_home().is_some() && known.is_none() && self.is_excused() {
             let why = "the drone has this log no more".to_owned();
             self.leave(self.file.clone(), Some(why));
             return Stage::Over;
         }
         let wanted = |number: u32| match self.options.which {
-            Which::Newest => number == known.unwrap_or(newest),
+            // Newest first; the ones before it if that turns out to be of a later flight.
+            Which::Flight if self.wants_flight() => known.is_none_or(|known| number == known),
+            Which::Flight => number == known.unwrap_or(newest),
+            Which::Newest => number == newest,
             Which::Number(wanted) => number == wanted,
             Which::All => true,
         };
@@ -113,12 +131,21 @@ impl PullOne {
     }
 
     pub(super) fn next_target(&mut self) -> Stage {
-        let Some(target) = self.targets.pop() else { return Stage::Over };
+        let Some(target) = self.targets.pop() else {
+            return match self.not_it.take() {
+                Some(reason) => self.ends_without(reason),
+                None => Stage::Over,
+            };
+        };
         let needed = self.needed(&target);
         if let Needed::Nothing(unchecked) = needed {
             self.leave(target.file, unchecked);
+            if self.wants_flight() {
+                return Stage::Over;
+            }
             return self.next_target();
         }
+        let beginning = self.beginning_of(&target.source, target.size);
         let path = self.shelf.borrow().path(&target.file);
         if target.size > self.options.most_size {
             let most = self.options.most_size;
@@ -138,6 +165,8 @@ impl PullOne {
         let seeded = opened.and_then(|mut part| {
             if matches!(needed, Needed::Rest) {
                 part.seed(&path)?;
+            } else if let Some(beginning) = beginning {
+                part.seed(&beginning)?;
             }
             Ok(part)
         });

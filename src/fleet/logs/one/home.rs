@@ -20,7 +20,7 @@ pub(super) enum Needed {
 /// What a download began with, and what becomes of what is at home.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Begun {
-    /// Nothing; what is at home is replaced, as was asked for.
+    /// Nothing; what is at home moves to the folder of its flight.
     Empty,
     /// Nothing: what is at home is damaged, and set aside.
     Damaged,
@@ -53,7 +53,9 @@ impl PullOne {
     fn intact(&self) -> Option<&ManifestEntry> {
         let AtHome::Intact(entry) = &self.home else { return None };
         let is_wanted = match self.options.which {
-            Which::Newest => true,
+            Which::Flight => true,
+            // Which one that is the drone must say.
+            Which::Newest => false,
             Which::Number(number) => entry.boot == Some(number),
             Which::All => false,
         };
@@ -68,7 +70,8 @@ impl PullOne {
 
     /// Number on the drone of the log at home; numbers of files and of the log messages differ.
     pub(super) fn number_at_home(&self) -> Option<u32> {
-        let entry = self.home.entry().filter(|_| !self.options.again)?;
+        let is_asked = self.options.again || self.options.which == Which::Newest;
+        let entry = self.home.entry().filter(|_| !is_asked)?;
         let is_of_messages = matches!(entry.method, Method::LogMessages | Method::SkybrushServer);
         entry.boot.filter(|_| is_of_messages == self.reason.is_some())
     }
@@ -93,7 +96,7 @@ impl PullOne {
         };
         let is_same = entry.source == target.source
             || (is_slots && self.number_at_home() == Some(target.number));
-        if !is_same && self.options.which != Which::Newest {
+        if !is_same && self.options.which != Which::Flight {
             return Needed::Whole;
         }
         let is_whole = entry.incomplete.is_none();

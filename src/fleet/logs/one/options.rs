@@ -1,12 +1,17 @@
 //! What is wanted of a drone's logs, and what became of them.
 
+use std::path::PathBuf;
+
 use crate::fleet::logs::manifest::ManifestEntry;
 use crate::link::clock::{Micros, S};
 
 /// Which of a drone's logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Which {
-    /// The newest.
+    /// The one of the flight: of its start, if one was written down; else the newest, unless an
+    /// older one is home.
+    Flight,
+    /// The newest, whatever it is of.
     Newest,
     /// The one of this number.
     Number(u32),
@@ -41,7 +46,7 @@ pub struct OneOptions {
 impl Default for OneOptions {
     fn default() -> Self {
         Self {
-            which: Which::Newest,
+            which: Which::Flight,
             patience: 60 * S,
             wait: 60 * S,
             most_size: 2 << 30,
@@ -74,6 +79,10 @@ pub struct OneDone {
     pub there: Vec<String>,
     /// Why what is there could not be compared with what the drone has now.
     pub unchecked: Option<String>,
+    /// Logs of earlier flights that were at home, where they lie now.
+    pub moved: Vec<PathBuf>,
+    /// Number of the drone's newest log, where that is newer than the one of this flight.
+    pub newer: Option<u32>,
     /// Why not all.
     pub failure: Option<Failure>,
 }

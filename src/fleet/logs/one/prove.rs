@@ -1,12 +1,13 @@
 //! Whether what came is what the drone has: by its checksum, or by pieces that are read again.
 //! Only then the file gets its name.
 
+use super::flight::Found;
 use super::{Failure, MOST_ROUNDS, PullOne, SAMPLE_BYTES, SAMPLES, Stage};
 use crate::fleet::ftp::FtpError;
 use crate::fleet::ftp::get::Get;
 use crate::fleet::ftp::sum::Sum;
 use crate::fleet::logs::manifest::{ManifestEntry, Method, Verified};
-use crate::fleet::logs::part::{PartFile, Sample, Sums};
+use crate::fleet::logs::part::{PartFile, Sample, Sums, part_path};
 
 impl PullOne {
     pub(super) fn compare(&mut self, mut part: PartFile, is_settled: bool) -> Stage {
@@ -87,6 +88,27 @@ impl PullOne {
         };
         self.attempts = 0;
         (self.held, self.size) = (0, 0);
+        let (found, flight) = self.judge(&part_path(part.path()));
+        let entry = ManifestEntry { flight, ..entry };
+        if self.wants_flight() {
+            match found {
+                Found::Others { why, is_later } => return self.put_by(part, entry, &why, is_later),
+                Found::Unknown(why) => {
+                    self.done.failure.get_or_insert(Failure {
+                        reason: format!("its log does not say of which flight it is: {why}"),
+                        advice: "look at it (`updraft inspect`); it is kept as this flight's",
+                        kept_bytes: entry.size_bytes,
+                    });
+                }
+                Found::Ours => {}
+            }
+            self.targets.clear();
+            self.not_it = None;
+        }
+        if let Err(reason) = self.clear_place(&entry) {
+            return self
+                .fail_for_sure(reason, "make the folder writable, or make room, and run again");
+        }
         let set_aside = |mark| self.shelf.borrow().set_aside(&entry.file, mark);
         let aside = self.begun.mark().map_or(Ok(()), set_aside);
         let finished = aside.and_then(|()| self.shelf.borrow_mut().finish(part, entry.clone()));
