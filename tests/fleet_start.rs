@@ -417,7 +417,8 @@ fn parameters_are_checked_mended_and_put_back() {
             .iter()
             .map(|change| updraft::fleet::changes::Change { was: change.now, ..change.clone() });
         changes.add(drone(1), &again.collect::<Vec<_>>());
-        drive(&mut net, changes.restore(false), 9, &mut NoWatch).unwrap()[&drone(1)]
+        drive(&mut net, changes.restore(|_, change| !change.unfences()), 9, &mut NoWatch).unwrap()
+            [&drone(1)]
             .clone()
             .unwrap();
         assert_eq!(net.vehicles[&drone(1)].inner.params, before, "the first old value counts");

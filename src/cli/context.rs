@@ -2,7 +2,6 @@
 
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
@@ -11,12 +10,8 @@ use super::Global;
 use super::exit::CommandError;
 use crate::base::plain::Shown as _;
 use crate::base::plain::{for_terminal, json_for_terminal};
+use super::signals::Signals;
 use crate::campaign::lock::FolderLock;
-
-/// What a second Ctrl-C says while this program flies drones.
-const LEFT_FLYING: &str = "Ended at once: drones that had not confirmed their return stop within 3 s \
-    (GUID_TIMEOUT) and return when they miss the station (FS_GCS_ENABLE). Watch them: `updraft fleet \
-    status`, `updraft fleet abort`, their remote controls";
 
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
@@ -32,27 +27,14 @@ pub(super) struct Context {
     pub(super) interactive: bool,
     /// Columns of the terminal that standard output is read on; none for files and pipes.
     pub(super) width: Option<usize>,
-    stop: Arc<AtomicBool>,
-    flies: Arc<AtomicBool>,
+    signals: Signals,
 }
 
 impl Context {
     /// From the global options and the terminal.
     pub(super) fn new(global: &Global) -> Self {
-        let stop = Arc::new(AtomicBool::new(false));
-        let raised = Arc::clone(&stop);
-        let flies = Arc::new(AtomicBool::new(false));
-        let in_the_air = Arc::clone(&flies);
-        // The second Ctrl-C ends at once: unfinished files are temporary and swept later.
-        let installed = ctrlc::set_handler(move || {
-            if raised.swap(true, Ordering::SeqCst) {
-                if in_the_air.load(Ordering::SeqCst) {
-                    let _ = writeln!(io::stderr().lock(), "{LEFT_FLYING}");
-                    std::process::exit(super::exit::Exit::Interrupted as i32);
-                }
-                std::process::abort();
-            }
-        });
+        let signals = Signals::default();
+        let installed = signals.take();
         let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let color = match global.color {
             super::ColorChoice::Always => true,
@@ -65,8 +47,7 @@ impl Context {
             color,
             interactive: io::stderr().is_terminal() && !global.quiet && !global.no_progress,
             width: columns(),
-            stop,
-            flies,
+            signals,
         };
         if let Err(error) = installed {
             context.warn(&format!("Ctrl-C ends the program at once ({error})"));
@@ -83,24 +64,27 @@ impl Context {
             color: false,
             interactive: false,
             width: None,
-            stop: Arc::default(),
-            flies: Arc::default(),
+            signals: Signals::default(),
         }
     }
 
-    /// Whether drones in the air need this program: a second Ctrl-C says what becomes of them.
-    pub(super) fn set_flies(&self, flies: bool) {
-        self.flies.store(flies, Ordering::SeqCst);
+    /// Ctrl-C and its like.
+    pub(super) fn signals(&self) -> &Signals {
+        &self.signals
     }
 
     /// The flag that Ctrl-C raises.
     pub(super) fn stop_flag(&self) -> &AtomicBool {
-        &self.stop
+        self.signals.stop_flag()
     }
 
     /// Ends the command if Ctrl-C was pressed.
     pub(super) fn check_stop(&self) -> Result<(), CommandError> {
-        if self.stop.load(Ordering::SeqCst) { Err(CommandError::Interrupted) } else { Ok(()) }
+        if self.stop_flag().load(Ordering::SeqCst) {
+            Err(CommandError::Interrupted)
+        } else {
+            Ok(())
+        }
     }
 
     /// Locks a campaign folder for this process; dropped, it is free again.

@@ -162,6 +162,10 @@ fn fly(
     crew: &mut Crew<'_>,
     args: &FlyArgs,
 ) -> Result<(FlightOutput, Exit), CommandError> {
+    if let Some(words) = crew.in_flight() {
+        context.insist(&format!("NO-GO: {words}"));
+        return Ok((FlightOutput::no_go(&crew.plan.name, Vec::new(), None), Exit::Unsafe));
+    }
     crew.greet()?;
     if !crew.assign(args.assign)? {
         context.insist("NO-GO: nothing was sent, as the drones do not stand as planned");
@@ -204,7 +208,8 @@ fn fly(
     if args.no_logs {
         return Ok((output, flown));
     }
-    let brought = bring(context, crew.net, crew.folder, crew.plan, &crew.table, &Wish::default())?;
+    let brought =
+        bring(context, &mut crew.net, crew.folder, crew.plan, &crew.table, &Wish::default())?;
     let lost = brought.iter().any(|one| one.state == "missing");
     output.logs = brought.iter().map(LogOutput::from).collect();
     Ok((output, if lost { Exit::Losses } else { flown }))
@@ -363,6 +368,6 @@ fn launch(
             origin: LogOrigin::Simulated,
             ..Wish::default()
         };
-        Ok((flown, bring(context, crew.net, folder, plan, &crew.table, &wish)?))
+        Ok((flown, bring(context, &mut crew.net, folder, plan, &crew.table, &wish)?))
     })
 }

@@ -6,9 +6,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::fleet::bring::Brought;
-use super::fleet::crew::Crew;
+use super::fleet::crew::{Crew, Ended};
 use super::fleet::tables::PreflightOutput;
 use crate::link::id::DroneId;
+use crate::link::net::Net as _;
 
 /// What `updraft fly --json` prints.
 #[derive(Serialize, JsonSchema)]
@@ -62,6 +63,8 @@ pub(in crate::cli) enum DroneEnd {
     Landed,
     /// It was ordered down from another terminal and has landed.
     OrderedDown,
+    /// It is on the ground, and was never seen in the air.
+    NeverTookOff,
     /// It has not been seen to land.
     NotSeenToLand,
 }
@@ -147,10 +150,11 @@ impl FlightOutput {
         let drones = crew.table.drones.iter().map(|line| DroneOutput {
             slot: line.slot,
             drone: line.drone.to_string(),
-            outcome: match crew.has_landed(line.drone) {
-                false => DroneEnd::NotSeenToLand,
-                true if ordered.contains_key(&line.drone) => DroneEnd::OrderedDown,
-                true => DroneEnd::Landed,
+            outcome: match crew.ended(line.drone) {
+                ended if !ended.is_down() => DroneEnd::NotSeenToLand,
+                _ if ordered.contains_key(&line.drone) => DroneEnd::OrderedDown,
+                Ended::NeverTookOff => DroneEnd::NeverTookOff,
+                _ => DroneEnd::Landed,
             },
             reasons: alarms.get(&line.drone).cloned().unwrap_or_default(),
         });

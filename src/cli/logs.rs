@@ -310,7 +310,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
     let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait)?;
     let table = crew.table.clone();
-    let mut brought = bring(context, crew.net, &folder, &plan, &table, &wish)?;
+    let mut brought = bring(context, &mut crew.net, &folder, &plan, &table, &wish)?;
     let nobody = nobody.into_iter().map(|(slot, why)| Brought {
         slot,
         drone: None,

@@ -31,6 +31,7 @@ mod progress;
 mod provenance;
 mod run;
 mod show_text;
+mod signals;
 mod simulate;
 mod sweep;
 mod timetable;

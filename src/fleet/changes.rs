@@ -120,11 +120,11 @@ impl Changes {
         self.drones.sort_by_key(|entry| entry.drone);
     }
 
-    /// A machine per vehicle that puts the old values back; those that leave it without a fence
-    /// only with `fence_off`. Once it is done, they can be taken out with [`Changes::forget`].
-    pub fn restore(&self, fence_off: bool) -> BTreeMap<DroneId, SetParams> {
+    /// A machine per vehicle that puts those old values back that may be. Once it is done, they can
+    /// be taken out with [`Changes::forget`].
+    pub fn restore(&self, may: impl Fn(DroneId, &Change) -> bool) -> BTreeMap<DroneId, SetParams> {
         let machine = |entry: &DroneChanges| {
-            let changes = entry.changes.iter().filter(|change| fence_off || !change.unfences());
+            let changes = entry.changes.iter().filter(|change| may(entry.drone, change));
             let values: Vec<_> = changes.map(|change| (change.name.clone(), change.was)).collect();
             (!values.is_empty()).then(|| (entry.drone, SetParams::new(entry.drone, values)))
         };
@@ -132,9 +132,9 @@ impl Changes {
     }
 
     /// Forgets what [`Changes::restore`] has put back on a vehicle.
-    pub fn forget(&mut self, drone: DroneId, fence_off: bool) {
+    pub fn forget(&mut self, drone: DroneId, may: impl Fn(DroneId, &Change) -> bool) {
         for entry in self.drones.iter_mut().filter(|entry| entry.drone == drone) {
-            entry.changes.retain(|change| !fence_off && change.unfences());
+            entry.changes.retain(|change| !may(drone, change));
         }
         self.drones.retain(|entry| !entry.changes.is_empty());
     }

@@ -2,6 +2,7 @@
 
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Step};
+use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use dialect::{MavCmd, MavResult};
 
@@ -48,6 +49,14 @@ pub enum CommandError {
         reason: &'static str,
         /// Its number (MAV_RESULT).
         result: u8,
+    },
+    /// It was not sent.
+    #[error("\"{what}\" was not sent, as {why}")]
+    Held {
+        /// What was to be asked.
+        what: String,
+        /// Why.
+        why: String,
     },
 }
 
@@ -109,6 +118,11 @@ impl Machine for Command {
             MavResult::MAV_RESULT_TEMPORARILY_REJECTED if self.tries < self.patience.tries => {}
             result => self.answer = Some(result),
         }
+    }
+
+    fn refused(&mut self, refusal: &Refusal) -> Option<Self::Done> {
+        let (what, why) = (self.what.clone(), refusal.why.clone());
+        Some(Err(CommandError::Held { what, why }))
     }
 
     fn poll(&mut self, now: Micros) -> Step<Self::Done> {

@@ -3,18 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::abort::{Abort, Aborted, Action};
-use super::messages::{LAND, RTL, start_packet};
 use super::orders::{ANSWER_SCHEMA, Answer, Inbox, Taken};
 use super::telemetry::Telemetry;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine as _, Step, Watch as _};
 use crate::link::error::NetError;
-use crate::link::frame::{MavMessage, dialect};
+use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
 use crate::link::traffic::Traffic;
-use crate::protocol::show::{CLEAR_TIME, StartConfig, TO_DRONE};
-use dialect::MavCmd;
 
 /// Orders are looked for so often.
 const LOOK: Micros = 500 * MS;
@@ -53,7 +50,8 @@ struct Open {
 }
 
 /// A net that sends drones home or lands them when another process orders it, beside everything
-/// else that goes through it. What would make such a drone fly again is not sent any more.
+/// else that goes through it. The [gate](super::gate) before it asks who was ordered down, and lets
+/// nothing pass that would make such a drone fly again.
 pub struct Desk<'a> {
     net: &'a mut dyn Net,
     inbox: Option<Inbox>,
@@ -154,27 +152,6 @@ impl<'a> Desk<'a> {
     }
 }
 
-/// What takes a drone into the air, or goes on with its flight.
-fn flies(message: &MavMessage) -> bool {
-    match message {
-        MavMessage::SET_POSITION_TARGET_GLOBAL_INT(_) => true,
-        MavMessage::COMMAND_LONG(command) => match command.command {
-            MavCmd::MAV_CMD_DO_SET_MODE => ![RTL, LAND].contains(&(command.param2 as u32)),
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => command.param1 != 0.0,
-            MavCmd::MAV_CMD_NAV_TAKEOFF => true,
-            _ => false,
-        },
-        _ => false,
-    }
-}
-
-/// A start time or an authorization; taking them back is none.
-fn starts(message: &MavMessage) -> bool {
-    let clear = StartConfig { start_tow_s: CLEAR_TIME, authorization: 0, countdown_ms: CLEAR_TIME };
-    matches!(message, MavMessage::DATA16(data) if data.mavtype == TO_DRONE)
-        && *message != start_packet(&clear)
-}
-
 impl Net for Desk<'_> {
     fn now(&self) -> Micros {
         self.net.now()
@@ -198,18 +175,10 @@ impl Net for Desk<'_> {
     }
 
     fn send(&mut self, to: DroneId, message: &MavMessage) -> Result<(), NetError> {
-        let kept = self.ordered.contains(&to) && flies(message);
-        if kept || (!self.ordered.is_empty() && starts(message)) {
-            return Ok(());
-        }
         self.net.send(to, message)
     }
 
     fn broadcast(&mut self, message: &MavMessage) -> Result<(), NetError> {
-        // It has no address: those who were ordered down would hear it, too.
-        if !self.ordered.is_empty() && starts(message) {
-            return Ok(());
-        }
         self.net.broadcast(message)
     }
 

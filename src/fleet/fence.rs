@@ -10,6 +10,7 @@ use super::params::{SetError, SetParams};
 use crate::check::{CheckInput, Severity, check};
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
+use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::mission::Plan;
@@ -134,6 +135,12 @@ pub enum FenceError {
     Different {
         /// Where.
         difference: String,
+    },
+    /// It was not sent.
+    #[error("the fence was not sent, as {why}")]
+    Held {
+        /// Why.
+        why: String,
     },
     /// One of its parameters.
     #[error("the fence is not set up")]
@@ -296,6 +303,10 @@ impl Machine for PutFence {
                 }
             }
         }
+    }
+
+    fn refused(&mut self, refusal: &Refusal) -> Option<Self::Done> {
+        Some(Err(FenceError::Held { why: refusal.why.clone() }))
     }
 
     fn poll(&mut self, now: Micros) -> Step<Self::Done> {

@@ -13,6 +13,7 @@ use super::vehicle_clock::VehicleClock;
 use crate::base::frame::ShowFrame;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
+use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::link::station::heartbeat;
@@ -78,6 +79,12 @@ pub enum GuidedError {
         mode: String,
         /// Show time, whole s.
         show_s: i64,
+    },
+    /// A message to it was held back.
+    #[error("the drone is not flown any more: {why}")]
+    Held {
+        /// Why.
+        why: String,
     },
     /// Nothing is heard of it, and nothing more is sent.
     #[error("the drone was lost at {show_s} s: nothing is heard of it any more; {then}")]
@@ -430,6 +437,10 @@ impl Machine for Guided {
             return Step::Wait(self.next);
         }
         self.fly(now, show_s, takeoff_s)
+    }
+
+    fn refused(&mut self, refusal: &Refusal) -> Option<Self::Done> {
+        Some(Err(self.failed.take().unwrap_or(GuidedError::Held { why: refusal.why.clone() })))
     }
 
     fn progress(&self) -> Progress {

@@ -15,6 +15,7 @@ pub mod desk;
 pub mod dry_run;
 pub mod fence;
 pub mod ftp;
+pub mod gate;
 pub mod greet;
 pub mod guided;
 pub mod intervals;

@@ -6,6 +6,7 @@ use super::command::Patience;
 use super::messages::{chars, param_list, param_read, param_read_index, param_set};
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
+use crate::link::error::Refusal;
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
 
@@ -115,6 +116,16 @@ pub enum SetError {
         /// What it is.
         is: f32,
     },
+    /// It was not sent.
+    #[error("{name} was not set to {wanted}: {why}")]
+    Refused {
+        /// Its name.
+        name: String,
+        /// What it should be.
+        wanted: f32,
+        /// Why.
+        why: String,
+    },
 }
 
 /// Sets parameters one after the other, each read back before the next; ends at the first that
@@ -142,6 +153,11 @@ impl SetParams {
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
         Self { patience, ..self }
+    }
+
+    /// Whether the next value was sent, so that it may have been taken.
+    pub(super) fn was_sent(&self) -> bool {
+        self.open.tries > 2
     }
 }
 
@@ -188,6 +204,11 @@ impl Machine for SetParams {
         } else {
             param_set(self.drone, name, *wanted)
         })
+    }
+
+    fn refused(&mut self, refusal: &Refusal) -> Option<Self::Done> {
+        let (name, wanted) = self.values.front().cloned()?;
+        Some(Err(SetError::Refused { name, wanted, why: refusal.why.clone() }))
     }
 
     fn progress(&self) -> Progress {

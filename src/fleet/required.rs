@@ -10,6 +10,7 @@ use super::command::Patience;
 use super::params::{ReadParams, SetError, SetParams, same};
 use crate::link::clock::Micros;
 use crate::link::drive::{Machine, Progress, Step};
+use crate::link::error::Refusal;
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
 use crate::link::station::STATION;
@@ -306,6 +307,25 @@ impl Machine for CheckParams {
                 Phase::Over => return Step::Done(std::mem::take(&mut self.standing)),
             }
         }
+    }
+
+    fn refused(&mut self, refusal: &Refusal) -> Option<Standing> {
+        if let Phase::Set(to_mend, set) = &mut self.phase {
+            if let Some((difference, wanted)) = to_mend.front() {
+                // Sent before, it may have worked: that is written down, too.
+                if let (Some(was), true) =
+                    (difference.is, set.as_ref().is_some_and(SetParams::was_sent))
+                {
+                    let name = difference.requirement.name.to_owned();
+                    self.standing.changed.push(Change { name, was, now: *wanted });
+                }
+                let (name, wanted) = (difference.requirement.name.to_owned(), *wanted);
+                let failed = SetError::Refused { name, wanted, why: refusal.why.clone() };
+                self.standing.failed.get_or_insert(failed);
+            }
+            self.standing.wrong.extend(to_mend.drain(..).map(|(difference, _)| difference));
+        }
+        Some(std::mem::take(&mut self.standing))
     }
 
     fn progress(&self) -> Progress {

@@ -205,9 +205,28 @@ pub struct Start {
     options: StartOptions,
     phase: Phase,
     next: Micros,
+    /// Another station has set it: it is not repeated, only taken back.
+    attached: bool,
+    /// Its time is known.
+    known: bool,
 }
 
 impl Start {
+    /// A start that another station has authorized, at this time, if that is known.
+    pub fn attached(drones: BTreeSet<DroneId>, at: Option<GpsTime>) -> Self {
+        let options = StartOptions { at, ..StartOptions::default() };
+        let (phase, next) = (Phase::Authorized, 0);
+        // A start that is not known is over.
+        let at_gps_ms = at.map_or(0, GpsTime::total_ms);
+        let known = at.is_some();
+        Self { drones, at_gps_ms, options, phase, next, attached: true, known }
+    }
+
+    /// Whether the time is known: not that of every start that another station has set.
+    pub fn is_known(&self) -> bool {
+        self.known
+    }
+
     /// Sets a start so many seconds ahead. Nothing is authorized by it.
     pub fn announce(
         drones: BTreeSet<DroneId>,
@@ -232,7 +251,9 @@ impl Start {
                     |at| at.total_ms().div_euclid(1000),
                 );
                 let at_gps_ms = second * 1000;
-                Ok(Self { drones, at_gps_ms, options, phase: Phase::Announced, next: 0 })
+                let (phase, next) = (Phase::Announced, 0);
+                let (attached, known) = (false, true);
+                Ok(Self { drones, at_gps_ms, options, phase, next, attached, known })
             }
         }
     }
@@ -353,7 +374,8 @@ impl Start {
     /// start, when a start time would be taken for next week's.
     pub fn due(&mut self, telemetry: &Telemetry, now: Micros) -> Option<MavMessage> {
         let over = self.left_s(telemetry, now).is_some_and(|left_s| left_s <= 0.0);
-        if now < self.next || (over && self.phase != Phase::Cancelled) {
+        let silent = over || self.attached;
+        if now < self.next || (silent && self.phase != Phase::Cancelled) {
             return None;
         }
         self.next = now + (S as f64 / self.rate(telemetry).max(1.0)) as Micros;

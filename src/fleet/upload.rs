@@ -11,6 +11,7 @@ use super::messages::{command_int, command_long, set_mode};
 use super::put_file::PutFile;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
+use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::mission::plan::Site;
@@ -51,12 +52,33 @@ pub enum UploadError {
          install the show firmware"
     )]
     NotShowFirmware,
+    /// It flies.
+    #[error(
+        "the drone is flying ({stage}): it is not touched; `updraft fleet watch` follows the \
+         flight, `updraft fleet abort` ends it"
+    )]
+    Flying {
+        /// The stage it is in.
+        stage: Stage,
+    },
     /// Its motors may run.
-    #[error("the drone is armed: it is not touched; disarm it first")]
+    #[error(
+        "the drone is armed and may be flying: it is not touched; `updraft fleet abort` ends its \
+         flight"
+    )]
     Armed,
     /// It may take off any time.
-    #[error("the drone's start is authorized: it is not touched; cancel the start first")]
+    #[error(
+        "the drone's start is authorized: it is not touched; `updraft fleet abort` takes the start \
+         back"
+    )]
     Authorized,
+    /// Something was not sent, as it took off meanwhile.
+    #[error("the upload was broken off, as {why}")]
+    Held {
+        /// Why.
+        why: String,
+    },
     /// It does not get to where it waits for a start.
     #[error("the drone does not enter show mode (stage {stage}): restart it")]
     NotReady {
@@ -224,7 +246,10 @@ impl Upload {
     fn untouchable(&self) -> Option<UploadError> {
         let authorized = self.status.is_some_and(|status| status.has(flag::AUTHORIZED));
         match self.armed {
-            Some(true) => Some(UploadError::Armed),
+            Some(true) => Some(match self.status.map(|status| status.stage) {
+                Some(stage) if stage.is_flying() => UploadError::Flying { stage },
+                _ => UploadError::Armed,
+            }),
             _ if authorized => Some(UploadError::Authorized),
             _ => None,
         }
@@ -347,6 +372,12 @@ impl Machine for Upload {
             Phase::Clear(part, _) => part.on_message(now, message),
             Phase::Wait | Phase::Flags { .. } => {}
         }
+    }
+
+    fn refused(&mut self, refusal: &Refusal) -> Option<Self::Done> {
+        let left = if matches!(self.phase, Phase::Wait) { Left::Untouched } else { Left::Unknown };
+        let why = UploadError::Held { why: refusal.why.clone() };
+        Some(Err(Refused { why, left }))
     }
 
     fn poll(&mut self, now: Micros) -> Step<Self::Done> {

@@ -148,6 +148,8 @@ pub struct Flying {
     pub distance_m: Option<f64>,
     /// Whether it has flown and is on the ground again, or never will.
     pub over: bool,
+    /// Whether it was seen in the air.
+    pub flew: bool,
 }
 
 #[expect(clippy::struct_excessive_bools, reason = "what was told, each on its own")]
@@ -185,6 +187,8 @@ pub struct Monitor {
     watched: BTreeMap<DroneId, Watched>,
     told: VecDeque<Told>,
     next: Micros,
+    /// The first look.
+    begun: Option<Micros>,
 }
 
 impl Monitor {
@@ -216,6 +220,7 @@ impl Monitor {
             watched: watched.collect(),
             told: VecDeque::new(),
             next: 0,
+            begun: None,
             telemetry,
         }
     }
@@ -243,16 +248,21 @@ impl Monitor {
 
     fn look(&mut self, now: Micros) {
         self.next = now + LOOK;
+        let begun = *self.begun.get_or_insert(now);
+        // By the clocks of those that are heard.
+        let show_s = self.watched.values().filter_map(|of| of.flying.show_s).reduce(f64::max);
         let Self { telemetry, watched, told, limits, frame, start_gps_ms, .. } = self;
         for (drone, watched) in watched {
-            let Some(of) = telemetry.drones.get(drone) else { continue };
             let mut tell = |event| {
                 if told.len() >= MOST_EVENTS {
                     told.pop_front();
                 }
                 told.push_back(Told { at: now, drone: *drone, event });
             };
-            watched.look(now, of, limits, frame, *start_gps_ms, &mut tell);
+            match telemetry.drones.get(drone) {
+                Some(of) => watched.look(now, of, limits, frame, *start_gps_ms, &mut tell),
+                None => watched.miss(now.saturating_sub(begun), limits, show_s, &mut tell),
+            }
         }
     }
 }
@@ -273,7 +283,30 @@ impl Watch for Monitor {
     }
 }
 
+/// Above home by so much a drone is in the air, m.
+const IN_THE_AIR_M: f64 = 0.5;
+/// A drone that is silent is waited for until so long after it should have landed, s.
+const SILENT_UNTIL_S: f64 = 60.0;
+
 impl Watched {
+    /// Nothing was ever heard of it, for so long.
+    fn miss(
+        &mut self,
+        silence: Micros,
+        limits: &Limits,
+        show_s: Option<f64>,
+        tell: &mut dyn FnMut(Event),
+    ) {
+        if silence > limits.silent && !self.silent {
+            self.silent = true;
+            tell(Event::Silent { seconds: silence / S });
+        }
+        let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
+        // Without anybody's clock it is waited for as long as a flight takes.
+        let show_s = show_s.unwrap_or(silence as f64 * 1e-6);
+        self.flying.over = show_s > end_s + SILENT_UNTIL_S;
+    }
+
     fn look(
         &mut self,
         now: Micros,
@@ -303,7 +336,14 @@ impl Watched {
         self.flying.show_s =
             start_gps_ms.zip(gps_ms).map(|(start, gps_ms)| (gps_ms - start as f64) / 1000.0);
         self.distance(of, limits, frame, start_gps_ms, tell);
-        self.flying.over = self.over();
+        let high = of.position.is_some_and(|(_, at)| at.above_home_m > IN_THE_AIR_M);
+        let flies = self.stage.is_some_and(Stage::is_flying);
+        self.flying.flew |= self.armed == Some(true) && (flies || high);
+        // A flight whose start nobody knows is over for a drone that has landed.
+        self.flying.over = match start_gps_ms {
+            None => self.was_armed && self.armed == Some(false) || silence > 60 * S,
+            Some(_) => self.over(),
+        };
     }
 
     fn states(&mut self, of: &Drone, tell: &mut dyn FnMut(Event)) {
@@ -388,7 +428,7 @@ impl Watched {
         let Some(show_s) = self.flying.show_s else { return false };
         let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
         match self.stage {
-            _ if self.silent => show_s > end_s + 60.0,
+            _ if self.silent => show_s > end_s + SILENT_UNTIL_S,
             _ if self.was_armed => show_s > 0.0,
             Some(Stage::Landed | Stage::Error) => show_s > 0.0,
             _ => show_s > TOO_LATE_S + self.wait_s(),

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use super::clock::{MS, Micros};
-use super::error::NetError;
+use super::error::{NetError, Refusal};
 use super::frame::MavMessage;
 use super::id::DroneId;
 use super::net::{Net, Received};
@@ -50,6 +50,13 @@ pub trait Machine {
     /// time it waits for.
     fn poll(&mut self, now: Micros) -> Step<Self::Done>;
 
+    /// A message of it was refused for good, as the drone's state does not allow it: what it ends
+    /// with then; `None`: it is absent from the results.
+    fn refused(&mut self, refusal: &Refusal) -> Option<Self::Done> {
+        let _ = refusal;
+        None
+    }
+
     /// How far it is.
     fn progress(&self) -> Progress {
         Progress::default()
@@ -66,6 +73,11 @@ pub trait Watch {
     /// A conversation has gone on or ended. Called often.
     fn on_progress(&mut self, drone: DroneId, progress: Progress, over: bool) {
         let _ = (drone, progress, over);
+    }
+
+    /// A message was held back.
+    fn on_refused(&mut self, drone: DroneId, refusal: &Refusal) {
+        let _ = (drone, refusal);
     }
 
     /// Whether to end now, with what is done.
@@ -85,7 +97,7 @@ impl Watch for NoWatch {}
 const LOOK: Micros = 100 * MS;
 
 /// Runs machines, at most `at_once` per network at the same time, the others in order after
-/// them. What a stopped run did not finish is absent from the result.
+/// them. What a stopped run did not finish, and what was refused, is absent from the result.
 pub fn drive<M: Machine>(
     net: &mut dyn Net,
     machines: BTreeMap<DroneId, M>,
@@ -158,7 +170,22 @@ fn advance<M: Machine>(
     let Some((machine, until)) = running.get_mut(&drone) else { return Ok(false) };
     loop {
         match machine.poll(net.now()) {
-            Step::Send(message) => net.send(drone, &message)?,
+            Step::Send(message) => match net.send(drone, &message) {
+                Ok(()) => {}
+                Err(NetError::Refused(refusal)) => {
+                    watch.on_refused(drone, &refusal);
+                    // What may be sent in a moment is as good as lost on the radio.
+                    if refusal.for_now {
+                        continue;
+                    }
+                    let done = machine.refused(&refusal);
+                    watch.on_progress(drone, machine.progress(), true);
+                    running.remove(&drone);
+                    finished.extend(done.map(|done| (drone, done)));
+                    return Ok(true);
+                }
+                Err(error) => return Err(error),
+            },
             Step::Wait(time) => {
                 *until = time;
                 watch.on_progress(drone, machine.progress(), false);

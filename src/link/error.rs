@@ -3,6 +3,21 @@
 use std::io;
 
 use super::address::Address;
+use super::id::DroneId;
+
+/// A message that a gate has held back.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("not sent: {what}, as {why}")]
+pub struct Refusal {
+    /// To whom; `None`: to everyone.
+    pub to: Option<DroneId>,
+    /// The message, in words.
+    pub what: String,
+    /// Why.
+    pub why: String,
+    /// It may be sent in a moment, as when a drone is heard again: like a message that was lost.
+    pub for_now: bool,
+}
 
 /// A link that cannot be used. A drone that does not answer is not one: that is told per drone.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +41,9 @@ pub enum NetError {
         /// What the system says.
         source: io::Error,
     },
+    /// The message was held back: the vehicle's state does not allow it. The link is fine.
+    #[error(transparent)]
+    Refused(Refusal),
     /// Every link is closed.
     #[error("all links are closed: {reason}")]
     Closed {

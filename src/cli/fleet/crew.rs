@@ -1,6 +1,9 @@
 //! What a station does with a fleet, step by step: the steps of `fly` and of `fleet`.
 
+mod attach;
+mod down;
 mod end;
+mod ends;
 mod eyes;
 mod guided;
 mod identity;
@@ -9,6 +12,8 @@ mod load;
 mod start;
 mod stubborn;
 mod troubles;
+
+pub(in crate::cli) use self::ends::Ended;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
@@ -21,6 +26,8 @@ use crate::campaign::start::StartRecord;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
+use crate::cli::fleet::interrupt::Choice;
+use crate::fleet::gate::Gate;
 use crate::fleet::greet::Greet;
 use crate::fleet::journal::{Entry, Journal};
 use crate::fleet::log_protocol::LogProtocolError;
@@ -30,7 +37,7 @@ use crate::fleet::slots::{FleetTable, SlotProblem, check_stands, picture, propos
 use crate::fleet::telemetry::Telemetry;
 use crate::link::clock::{Clock as _, MS, Micros, S};
 use crate::link::drive::{Machine, Progress as Share, Watch, drive};
-use crate::link::error::NetError;
+use crate::link::error::{NetError, Refusal};
 use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
 use crate::mission::Plan;
@@ -50,8 +57,8 @@ impl From<NetError> for CommandError {
 /// A fleet, its flight, and what is known of both.
 pub(in crate::cli) struct Crew<'a> {
     context: &'a Context,
-    /// The links.
-    pub(in crate::cli) net: &'a mut dyn Net,
+    /// The links, behind the gate: everything that is sent to drones goes through it.
+    pub(in crate::cli) net: Gate<'a>,
     /// Where the flight's files are.
     pub(in crate::cli) folder: &'a FlightFolder,
     /// The flight.
@@ -74,6 +81,14 @@ pub(in crate::cli) struct Crew<'a> {
     pub(in crate::cli) is_guided: bool,
     /// The start that was authorized and written down.
     begun: Option<StartRecord>,
+    /// What the drones do when this program is interrupted in flight.
+    pub(in crate::cli) on_interrupt: Choice,
+    /// Why messages were held back in the step that was last.
+    held: BTreeMap<DroneId, String>,
+    /// Drones that were seen in the air.
+    flew: BTreeSet<DroneId>,
+    /// The flight was on its way before this program looked.
+    attached: bool,
 }
 
 /// Listens to all, and looks for Ctrl-C.
@@ -81,6 +96,7 @@ struct Ears<'a> {
     telemetry: &'a mut Telemetry,
     context: &'a Context,
     done: BTreeSet<DroneId>,
+    held: BTreeMap<DroneId, String>,
 }
 
 impl Watch for Ears<'_> {
@@ -92,6 +108,10 @@ impl Watch for Ears<'_> {
         if over {
             self.done.insert(drone);
         }
+    }
+
+    fn on_refused(&mut self, drone: DroneId, refusal: &Refusal) {
+        self.held.insert(drone, refusal.why.clone());
     }
 
     fn stop(&mut self, _: Micros) -> bool {
@@ -125,7 +145,7 @@ impl<'a> Crew<'a> {
     ) -> Self {
         Self {
             context,
-            net,
+            net: Gate::new(net, plan),
             folder,
             show: Show::of_plan(plan),
             plan,
@@ -138,6 +158,10 @@ impl<'a> Crew<'a> {
             tells_all: false,
             is_guided: false,
             begun: None,
+            on_interrupt: Choice::Return,
+            held: BTreeMap::new(),
+            flew: BTreeSet::new(),
+            attached: false,
         }
     }
 
@@ -182,9 +206,11 @@ impl<'a> Crew<'a> {
         machines: BTreeMap<DroneId, M>,
         at_once: usize,
     ) -> Result<BTreeMap<DroneId, M::Done>, CommandError> {
-        let mut ears =
-            Ears { telemetry: &mut self.telemetry, context: self.context, done: BTreeSet::new() };
-        let done = drive(self.net, machines, at_once, &mut ears)?;
+        let telemetry = &mut self.telemetry;
+        let (done, held) = (BTreeSet::new(), BTreeMap::new());
+        let mut ears = Ears { telemetry, context: self.context, done, held };
+        let done = drive(&mut self.net, machines, at_once, &mut ears)?;
+        self.held = ears.held;
         self.context.check_stop()?;
         Ok(done)
     }
@@ -221,6 +247,7 @@ impl<'a> Crew<'a> {
                 Err(problems) => problems,
             }
         };
+        self.net.set_fleet(self.drones());
         if problems.is_empty() {
             return Ok(true);
         }
@@ -264,16 +291,6 @@ impl<'a> Crew<'a> {
         let listed = self.all(machines, AT_ONCE)?;
         let words = |error: LogProtocolError| crate::cli::exit::with_reasons(&error);
         Ok(listed.into_iter().map(|(drone, list)| (drone, list.map_err(words))).collect())
-    }
-
-    /// Drones of the table that are down and disarmed.
-    pub(in crate::cli) fn landed(&self) -> usize {
-        self.drones().into_iter().filter(|drone| self.has_landed(*drone)).count()
-    }
-
-    /// Whether a drone is down and disarmed.
-    pub(in crate::cli) fn has_landed(&self, drone: DroneId) -> bool {
-        self.telemetry.get(drone).is_some_and(|of| of.is_armed() == Some(false))
     }
 
     /// Listens for a moment. An order to end the flight ends the command, too.

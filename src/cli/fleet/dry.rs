@@ -14,7 +14,7 @@ use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::{Abort, Action};
-use crate::fleet::changes::Changes;
+use crate::fleet::changes::{Change, Changes};
 use crate::fleet::command::Command;
 use crate::fleet::dry_run::{Obliging, dry_run};
 use crate::fleet::fence::PutFence;
@@ -283,7 +283,8 @@ pub(in crate::cli) fn restore(
     fence_off: bool,
 ) -> Result<Exit, CommandError> {
     let dry = Dry::of(args)?;
-    let machines = Changes::read(&dry.folder.0)?.restore(fence_off).into_iter();
+    let may = |_, change: &Change| fence_off || !change.unfences();
+    let machines = Changes::read(&dry.folder.0)?.restore(may).into_iter();
     print(context, machines.map(|(drone, set)| (drone, dry.shown(drone, set))).collect())
 }
 

@@ -5,11 +5,13 @@ pub(super) mod connect;
 pub(super) mod crew;
 pub(super) mod dry;
 pub(super) mod end;
+pub(super) mod interrupt;
 pub(super) mod server;
 pub(super) mod sim;
 pub(super) mod start;
 pub(super) mod tables;
 pub(super) mod virtual_drones;
+pub(super) mod watch;
 
 use std::path::PathBuf;
 
@@ -21,6 +23,7 @@ use self::start::{LeadArgs, fly_now};
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use crate::base::plain::Shown as _;
+use super::words;
 use crate::campaign::lock::FolderLock;
 use crate::campaign::{self, FlightFolder};
 use crate::fleet::abort::Action;
@@ -37,12 +40,17 @@ use crate::mission::Plan;
   updraft fleet upload my-campaign --flight calibration --set-params
   updraft fleet preflight my-campaign --flight calibration
   updraft fleet start my-campaign --flight calibration --lead 60
+  updraft fleet watch my-campaign --flight calibration        # when the station that started it died
   updraft fleet abort my-campaign --flight calibration        # everyone returns
   updraft fleet land my-campaign --drones 7,1:12              # these land where they are
   updraft fleet virtual my-campaign --station 127.0.0.1:14550 # drones to practise with
 
 Which drone flies which slot is found from where they stand, and kept in fleet.json; `upload
---assign` finds it anew. Everything that happens is in fleet-journal.ndjson. Exit codes: 3 some drones
+--assign` finds it anew. Everything that happens is in fleet-journal.ndjson.
+
+Ctrl-C, SIGTERM and SIGHUP (a lost terminal) mean the same. In flight they ask on a terminal whether
+the drones land, return or are left flying; elsewhere --on-interrupt says it, and without it they
+return. `fleet watch` takes a flight over whose station is gone. Exit codes: 3 some drones
 refused, 4 no-go.")]
 pub(super) struct FleetArgs {
     #[command(subcommand)]
@@ -59,6 +67,8 @@ enum FleetCommand {
     Preflight(UploadArgs),
     /// Set a start time and authorize it, then watch the show
     Start(StartArgs),
+    /// Watch a flight that another station has started, and bring its logs home
+    Watch(watch::WatchArgs),
     /// Send drones home (those on the ground: take their start back)
     Abort(EndArgs),
     /// Land drones where they are (those on the ground: take their start back)
@@ -181,6 +191,7 @@ pub(super) fn run(context: &Context, args: &FleetArgs) -> Result<Exit, CommandEr
         FleetCommand::Upload(args) => upload(context, args),
         FleetCommand::Preflight(args) => preflight(context, args),
         FleetCommand::Start(args) => start(context, args),
+        FleetCommand::Watch(args) => watch::run(context, args),
         FleetCommand::Abort(args) => end::run(context, args, Action::Return),
         FleetCommand::Land(args) => end::run(context, args, Action::Land),
         FleetCommand::Restore(args) => restore(context, args),
@@ -195,13 +206,28 @@ fn with_crew(
     body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
 ) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let mut station = step_station(args)?;
+    let mut crew = Crew::new(context, &mut station, &folder, &plan);
+    crew.listen(args.connect.wait)?;
+    body(&mut crew)
+}
+
+/// The same for a step that flies: `fleet abort` of other terminals is carried out meanwhile. It
+/// listens itself.
+fn with_desk(
+    context: &Context,
+    args: &StepArgs,
+    body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
+) -> Result<Exit, CommandError> {
+    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+    let mut station = step_station(args)?;
+    let mut desk = end::desk(context, &mut station, &folder);
+    body(&mut Crew::new(context, &mut desk, &folder, &plan))
+}
+
+fn step_station(args: &StepArgs) -> Result<Station, CommandError> {
     match args.connect.target()? {
-        Target::Links(links) => {
-            let mut station = open(&args.campaign, &args.connect, links)?;
-            let mut crew = Crew::new(context, &mut station, &folder, &plan);
-            crew.listen(args.connect.wait)?;
-            body(&mut crew)
-        }
+        Target::Links(links) => open(&args.campaign, &args.connect, links),
         Target::Sim => Err(CommandError::Usage(
             "virtual drones live as long as their program: use `updraft fly --connect sim`, or \
              `updraft fleet virtual` in another terminal"
@@ -213,22 +239,6 @@ fn with_crew(
                 .to_owned(),
         )),
     }
-}
-
-/// The same for a step that flies: `fleet abort` of other terminals is carried out meanwhile.
-fn with_desk(
-    context: &Context,
-    args: &StepArgs,
-    body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
-) -> Result<Exit, CommandError> {
-    with_crew(context, args, |crew| {
-        let folder = crew.folder;
-        let plan = crew.plan;
-        let mut desk = end::desk(context, crew.net, folder);
-        let mut with = Crew::new(context, &mut desk, folder, plan);
-        with.telemetry = std::mem::take(&mut crew.telemetry);
-        body(&mut with)
-    })
 }
 
 /// Clocks and slots; refuses to go on when a drone stands wrong.
@@ -309,6 +319,10 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
     }
     let _lock = lock(context, &args.upload.step.campaign)?;
     with_desk(context, &args.upload.step, |crew| {
+        crew.listen(args.upload.step.connect.wait)?;
+        if let Some(words) = crew.in_flight() {
+            return Err(CommandError::Unsafe(words));
+        }
         let table = look(crew, &args.upload)?;
         if !table.go() {
             return tables::preflight(context, &table);
@@ -323,10 +337,20 @@ fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> 
     }
     let _lock = lock(context, &args.step.campaign)?;
     with_crew(context, &args.step, |crew| {
-        let left = crew.restore(args.fence_off)?;
-        let but = if left.is_empty() { "" } else { ", but for the drones named above" };
-        context.say(&format!("Parameters are as they were{but}"));
-        Ok(if left.is_empty() { Exit::Done } else { Exit::Losses })
+        let (put_back, left) = crew.restore(args.fence_off)?;
+        if left.is_empty() {
+            context.say("Parameters are as they were");
+            return Ok(Exit::Done);
+        }
+        context.insist(&match put_back {
+            0 => "No parameter was put back, for the reasons above".to_owned(),
+            drones => format!(
+                "Put back on {}; not on all of {}, for the reasons above",
+                words::count(drones, "drone"),
+                words::count(left.len(), "drone")
+            ),
+        });
+        Ok(Exit::Losses)
     })
 }
 

@@ -8,12 +8,14 @@ use std::time::Duration;
 use clap::Args;
 
 use super::crew::Crew;
+use super::interrupt::InterruptArgs;
 use super::tables;
 use crate::base::plain::for_terminal;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::start::{LEAST_LEAD_S, MOST_LEAD_S, Start, StartOptions};
 use crate::link::id::DroneId;
+use crate::link::net::Net as _;
 
 /// How a start is given.
 #[derive(Clone, Debug, Args)]
@@ -24,6 +26,8 @@ pub(in crate::cli) struct LeadArgs {
     /// Authorize the start without asking
     #[arg(short, long)]
     pub(in crate::cli) yes: bool,
+    #[command(flatten)]
+    pub(in crate::cli) interrupt: InterruptArgs,
 }
 
 /// Parser of `--lead`: nothing has been sent when it refuses.
@@ -42,6 +46,10 @@ impl LeadArgs {
         StartOptions { lead_s: self.lead, ..StartOptions::default() }
     }
 }
+
+/// What a person is told once a start is authorized.
+const AUTHORIZED: &str = "Authorized. Ctrl-C asks whether the drones land, return or fly on (without a \
+    terminal: --on-interrupt, by default they return); `updraft fleet abort` sends everyone home";
 
 /// What gave an alarm, by drone.
 pub(in crate::cli) type Alarms = BTreeMap<DroneId, Vec<String>>;
@@ -66,7 +74,8 @@ pub(in crate::cli) fn fly_now(
         return Err(CommandError::Unsafe("not authorized: the start was taken back".to_owned()));
     }
     crew.authorize(&mut start)?;
-    context.say("Authorized. Ctrl-C stops watching; `updraft fleet abort` sends everyone home");
+    crew.on_interrupt = lead.interrupt.on_interrupt;
+    context.say(AUTHORIZED);
     let alarms = crew.watch(&mut start)?;
     Ok((landed(context, crew, alarms.is_empty()), alarms))
 }
@@ -84,10 +93,9 @@ pub(in crate::cli) fn guide_now(
         return Err(CommandError::Unsafe("not authorized: nobody takes off".to_owned()));
     }
     crew.authorize_guided(&start)?;
-    context.say(
-        "Authorized. This program flies the drones: Ctrl-C sends everyone home, as does `updraft \
-         fleet abort`",
-    );
+    crew.on_interrupt = lead.interrupt.on_interrupt;
+    context.say(AUTHORIZED);
+    context.say("This program flies the drones: leave it running until they have landed");
     let alarms = crew.fly_guided(&start)?;
     Ok((landed(context, crew, alarms.is_empty()), alarms))
 }
@@ -110,17 +118,21 @@ fn say_start(context: &Context, crew: &mut Crew<'_>, start: &Start, what: &str) 
     ));
 }
 
-/// Says how many drones have landed.
-pub(in crate::cli) fn say_landed(context: &Context, crew: &Crew<'_>) {
-    let landed = crew.landed();
-    context.say(&format!("{landed} of {} drones have landed", crew.table.drones.len()));
+/// Says how many drones have landed, and names the others; whether all have.
+pub(in crate::cli) fn say_landed(context: &Context, crew: &Crew<'_>) -> bool {
+    let (all, words) = crew.ends();
+    if all {
+        context.say(&words);
+    } else {
+        context.insist(&words);
+    }
+    all
 }
 
-fn landed(context: &Context, crew: &Crew<'_>, quiet: bool) -> Exit {
-    let landed = crew.landed();
-    context.say(&format!("{landed} of {} drones have landed", crew.table.drones.len()));
+pub(super) fn landed(context: &Context, crew: &Crew<'_>, quiet: bool) -> Exit {
+    let all = say_landed(context, crew);
     let quiet = quiet && crew.net.ordered_down().is_empty();
-    if landed == crew.table.drones.len() && quiet { Exit::Done } else { Exit::Losses }
+    if all && quiet { Exit::Done } else { Exit::Losses }
 }
 
 /// Asks a person. While they think, the links are listened to and orders carried out.

@@ -15,6 +15,7 @@ use crate::fleet::messages::mode_name;
 use crate::fleet::preflight::{COLUMNS, Preflight};
 use crate::fleet::slots::{FleetTable, picture, stands};
 use crate::link::id::DroneId;
+use crate::link::net::Net as _;
 use crate::link::traffic::Traffic;
 
 /// UTC of a GPS time: `12:34:56 UTC`.

@@ -10,6 +10,7 @@ use crate::cli::simulate::SlotSet;
 use crate::fleet::slots::{FleetTable, SlotProblem, picture, propose, propose_clear};
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::Watch as _;
+use crate::link::net::Net as _;
 
 /// How often it is looked who stands where.
 const LOOK: Micros = 200 * MS;

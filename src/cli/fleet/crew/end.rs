@@ -10,6 +10,7 @@ use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Progress, Watch, drive};
 use crate::link::id::DroneId;
+use crate::link::net::Net as _;
 
 impl Crew<'_> {
     /// Listens until one of these drones (or anyone, and a moment more) is heard.
@@ -66,7 +67,7 @@ impl Crew<'_> {
         let machines: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
         let next = self.net.now() + TELL;
         let mut ears = Waiting { context: self.context, open: drones.clone(), next };
-        let done = drive(self.net, machines, ALL_AT_ONCE, &mut ears)?;
+        let done = drive(&mut self.net, machines, ALL_AT_ONCE, &mut ears)?;
         let outcomes = drones.iter().map(|drone| {
             (*drone, done.get(drone).map_or("not confirmed".to_owned(), Aborted::to_string))
         });

@@ -1,15 +1,17 @@
 //! Watches a flight, tells what happens, and writes it down.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::file::FileError;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
+use crate::cli::fleet::interrupt::{Choice, Interrupt};
 use crate::fleet::journal::{Entry, Journal};
 use crate::fleet::telemetry::Telemetry;
 use crate::fleet::watch::Monitor;
 use crate::link::clock::{Clock as _, Micros};
 use crate::link::drive::Watch;
+use crate::link::error::Refusal;
 use crate::link::id::DroneId;
 use crate::link::net::Received;
 
@@ -25,6 +27,7 @@ pub(super) struct Eyes<'a> {
     failed: Option<FileError>,
     /// Goes on although Ctrl-C was pressed: somebody is being brought down.
     pub(super) finishes: bool,
+    interrupt: Interrupt<'a>,
 }
 
 impl<'a> Eyes<'a> {
@@ -33,10 +36,12 @@ impl<'a> Eyes<'a> {
         monitor: Monitor,
         clock: SystemClock,
         is_virtual: bool,
+        interrupt: Interrupt<'a>,
     ) -> Self {
         let journal = None;
         let (alarms, failed) = (BTreeMap::new(), None);
-        Self { context, monitor, is_virtual, journal, clock, alarms, failed, finishes: false }
+        let finishes = false;
+        Self { context, monitor, is_virtual, journal, clock, alarms, failed, finishes, interrupt }
     }
 
     /// Writes what happens into a journal, if there is one.
@@ -56,6 +61,16 @@ impl<'a> Eyes<'a> {
 
     pub(super) fn is_over(&self) -> bool {
         self.monitor.is_over()
+    }
+
+    /// Drones that were seen in the air.
+    pub(super) fn flew(&self) -> BTreeSet<DroneId> {
+        self.monitor.flying().filter(|(_, of)| of.flew).map(|(drone, _)| drone).collect()
+    }
+
+    /// What Ctrl-C means, once there was one and somebody has said it.
+    pub(super) fn choice(&mut self, now: Micros) -> Option<Choice> {
+        self.interrupt.poll(now)
     }
 
     /// Adds an alarm that is not the monitor's.
@@ -93,9 +108,16 @@ impl Watch for Eyes<'_> {
         self.monitor.on_message(now, received);
     }
 
+    fn on_refused(&mut self, drone: DroneId, refusal: &Refusal) {
+        // What is held back for a moment is tried again.
+        if !refusal.for_now {
+            self.alarm(drone, format!("nothing more is sent to it: {}", refusal.why));
+        }
+    }
+
     fn stop(&mut self, now: Micros) -> bool {
         self.monitor.stop(now);
         self.tell();
-        !self.finishes && self.context.check_stop().is_err()
+        !self.finishes && self.interrupt.poll(now).is_some()
     }
 }

@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use super::down::{GUIDED_LEFT, bring_down, stopped};
 use super::eyes::Eyes;
 use super::stubborn::Stubborn;
 use super::{AT_ONCE, Crew};
 use crate::base::time::GpsTime;
 use crate::cli::exit::CommandError;
-
-use crate::fleet::abort::{ALL_AT_ONCE, Abort, Action};
+use crate::cli::fleet::interrupt::Choice;
+use crate::fleet::abort::ALL_AT_ONCE;
 use crate::fleet::command::Command;
 use crate::fleet::fence::PutFence;
-use crate::fleet::guided::{Flight, Guided};
+use crate::fleet::guided::{Flight, Guided, GuidedError};
 use crate::fleet::messages::{GUIDED, set_mode};
 use crate::fleet::start::{Start, StartOptions, StartRefusal};
 use crate::fleet::telemetry::Drone;
@@ -20,10 +21,6 @@ use crate::link::drive::{Watch as _, drive};
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 use crate::show::Trajectory;
-
-/// What became of guided drones when Ctrl-C was pressed.
-const SENT_HOME: &str = "stopped: this program flew the drones and has sent them home; those above that have not \
-     confirmed it need their remote controls";
 
 #[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
 fn refused(error: StartRefusal) -> CommandError {
@@ -148,16 +145,17 @@ impl<'a> Crew<'a> {
             machines.insert(line.drone, Guided::new(line.drone, flight));
         }
         let eyes = self.eyes(Some(start_gps_ms));
-        self.context.set_flies(true);
-        let (eyes, failed, ended) = self.stream(machines, eyes);
-        self.context.set_flies(false);
+        self.context.signals().set_flies(Some(GUIDED_LEFT));
+        let (mut eyes, failed, ended) = self.stream(machines, eyes);
+        self.context.signals().set_flies(None);
         if !ended.is_empty() {
             self.try_note("abort", &ended);
         }
+        let choice = eyes.choice(self.net.now());
         let written = failed.map_or(Ok(()), |reason| self.note("link", Some(reason)));
         let alarms = self.close(eyes);
-        if self.context.check_stop().is_err() {
-            return Err(CommandError::Stopped(SENT_HOME));
+        if let Some(choice) = choice {
+            return Err(stopped(choice, true));
         }
         written?;
         alarms
@@ -172,46 +170,26 @@ impl<'a> Crew<'a> {
         let drones = self.drones();
         let context = self.context;
         let mut ended = BTreeMap::new();
-        let mut net = Stubborn::new(&mut *self.net, context);
+        let mut net = Stubborn::new(&mut self.net, context);
         let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
         for (drone, outcome) in done {
-            if let Err(error) = outcome {
-                eyes.alarm(drone, error.to_string());
+            match outcome {
+                // That was told when it happened.
+                Ok(()) | Err(GuidedError::Held { .. }) => {}
+                Err(error) => eyes.alarm(drone, error.to_string()),
             }
         }
         // Those that were taken over or called home are still on their way.
         let going_on = |net: &Stubborn<'_>| net.ordered_down().into_values().any(|on| on);
-        while context.check_stop().is_ok() && (!eyes.is_over() || going_on(&net)) {
+        while eyes.choice(net.now()).is_none() && (!eyes.is_over() || going_on(&net)) {
             let until = net.now() + 100 * MS;
             if let Ok(Some(received)) = net.recv(until) {
                 eyes.on_message(net.now(), &received);
             }
             eyes.stop(net.now());
         }
-        if context.check_stop().is_err() {
-            context.insist(
-                "Stopped: this program flies the drones, so they are sent home. Ctrl-C again ends it \
-                 at once",
-            );
-            eyes.finishes = true;
-            // Those that were ordered down meanwhile do that already.
-            let ordered = net.ordered_down();
-            let end = |drone: &DroneId| {
-                (*drone, Abort::new(*drone, Action::Return, eyes.telemetry().get(*drone)))
-            };
-            let free = drones.iter().filter(|drone| !ordered.contains_key(drone));
-            let machines: BTreeMap<DroneId, Abort> = free.map(end).collect();
-            let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
-            for (drone, end) in done {
-                context.insist(&format!("drone {drone}: {end}"));
-                ended.insert(drone, end.to_string());
-            }
-            while going_on(&net) {
-                let until = net.now() + 100 * MS;
-                if let Ok(Some(received)) = net.recv(until) {
-                    eyes.on_message(net.now(), &received);
-                }
-            }
+        if let Some(action) = eyes.choice(net.now()).and_then(Choice::action) {
+            ended = bring_down(context, &mut net, &mut eyes, &drones, action);
         }
         (eyes, net.failed, ended)
     }

@@ -1,13 +1,15 @@
 //! Parameters that are changed on drones: what they were is on the disk before they are set, and
 //! is put back on request.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{AT_ONCE, Crew};
 use crate::cli::exit::CommandError;
-use crate::fleet::changes::{Change, Changes};
+use crate::fleet::changes::{Change, Changes, DroneChanges};
 use crate::fleet::command::Patience;
-use crate::fleet::params::{ReadParams, same};
+use crate::fleet::gate::State;
+use crate::fleet::params::{ReadParams, SetError, same};
+use crate::fleet::slots::FleetTable;
 use crate::link::clock::S;
 use crate::link::id::DroneId;
 
@@ -26,7 +28,10 @@ impl Crew<'_> {
         let wanted = self.fence()?.params();
         let names = || wanted.iter().map(|(name, _)| name.clone());
         let read = |drone| (drone, ReadParams::new(drone, names()).with_patience(PATIENCE));
-        let machines = self.drones().into_iter().map(read).collect();
+        // Nothing is changed on those in the air, so that nothing of them need be kept.
+        let is_touched =
+            |drone: &DroneId| matches!(self.net.state(*drone), State::Ground | State::Unheard);
+        let machines = self.drones().into_iter().filter(is_touched).map(read).collect();
         let found = self.all(machines, AT_ONCE)?;
         let mut changes = Changes::read(&self.folder.0)?;
         let before = changes.clone();
@@ -61,33 +66,74 @@ impl Crew<'_> {
         Ok(silent)
     }
 
-    /// Puts back the parameters that were changed; those that leave a drone without a fence only
-    /// with `fence_off`. Drones that did not take them.
+    /// Puts back the parameters that were changed, on drones that are disarmed; those that leave a
+    /// drone without a fence only with `fence_off`, and those that weaken a fence or a failsafe only
+    /// while every drone of the fleet is heard and disarmed. How many drones got theirs, and those
+    /// that did not get all.
     pub(in crate::cli) fn restore(
         &mut self,
         fence_off: bool,
-    ) -> Result<Vec<DroneId>, CommandError> {
+    ) -> Result<(usize, BTreeSet<DroneId>), CommandError> {
         let mut changes = Changes::read(&self.folder.0)?;
-        let machines = changes.restore(fence_off);
-        let wanted: Vec<DroneId> = machines.keys().copied().collect();
-        let done = self.all(machines, AT_ONCE)?;
-        let mut left = Vec::new();
+        let changed: BTreeSet<DroneId> = changes.drones.iter().map(|entry| entry.drone).collect();
+        let mut fleet = changed.clone();
+        if FleetTable::path(&self.folder.0).exists() {
+            fleet.extend(FleetTable::read(&self.folder.0)?.by_drone().into_keys());
+        }
+        self.net.set_fleet(fleet);
+        let mut left = BTreeSet::new();
         let mut outcomes = BTreeMap::new();
-        for drone in wanted {
-            let outcome = match done.get(&drone) {
-                Some(Ok(())) => "put back".to_owned(),
+        for drone in &changed {
+            if self.net.state(*drone) != State::Ground {
+                let text = format!("it {}, so nothing was set on it", self.net.words(*drone));
+                self.context.warn(&format!("drone {drone}: {text}"));
+                outcomes.insert(*drone, text);
+                left.insert(*drone);
+            }
+        }
+        let wanted = |change: &Change| fence_off || !change.unfences();
+        let held = self.net.not_grounded();
+        let protection = self.net.protection().clone();
+        let weakens = |change: &Change| protection.is_weakened_by(&change.name, change.was);
+        if let Some(why) = &held {
+            let kept =
+                |entry: &&DroneChanges| entry.changes.iter().any(|it| wanted(it) && weakens(it));
+            let kept: BTreeSet<DroneId> =
+                changes.drones.iter().filter(kept).map(|entry| entry.drone).collect();
+            if !kept.is_empty() {
+                self.context.warn(&format!(
+                    "fences and failsafes stay as they are, as {why}: they are put back once every \
+                     drone of the fleet is heard and disarmed (one that is gone for good is taken \
+                     out of fleet.json)"
+                ));
+                left.extend(kept);
+            }
+        }
+        let on_ground: BTreeSet<DroneId> =
+            changed.iter().copied().filter(|of| self.net.state(*of) == State::Ground).collect();
+        let may = |drone: DroneId, change: &Change| {
+            on_ground.contains(&drone) && wanted(change) && (held.is_none() || !weakens(change))
+        };
+        let machines = changes.restore(may);
+        let asked: Vec<DroneId> = machines.keys().copied().collect();
+        let done = self.all(machines, AT_ONCE)?;
+        for drone in &asked {
+            let outcome = match done.get(drone) {
+                Some(Ok(())) => {
+                    changes.forget(*drone, may);
+                    "put back".to_owned()
+                }
+                Some(Err(SetError::Silent { .. })) | None if self.held.contains_key(drone) => {
+                    self.held[drone].clone()
+                }
                 Some(Err(error)) => error.to_string(),
                 None => "no answer".to_owned(),
             };
-            outcomes.insert(drone, outcome);
-            match done.get(&drone) {
-                Some(Ok(())) => changes.forget(drone, fence_off),
-                Some(Err(error)) => {
-                    self.context.warn(&format!("drone {drone}: {error}"));
-                    left.push(drone);
-                }
-                None => left.push(drone),
+            if !matches!(done.get(drone), Some(Ok(()))) {
+                self.context.warn(&format!("drone {drone}: {outcome}"));
+                left.insert(*drone);
             }
+            outcomes.insert(*drone, outcome);
         }
         changes.write(&self.folder.0)?;
         if !fence_off {
@@ -102,6 +148,7 @@ impl Crew<'_> {
             }
         }
         self.note_each("restore", Some(format!("{} refused", left.len())), &outcomes)?;
-        Ok(left)
+        let put_back = done.values().filter(|done| done.is_ok()).count();
+        Ok((put_back, left))
     }
 }

@@ -29,10 +29,13 @@ pub(super) const MOST_SKYB: u64 = 1 << 20;
 impl Crew<'_> {
     /// Reads the required parameters, and mends them if allowed. Whether they are right.
     pub(in crate::cli) fn params(&mut self, may_change: bool) -> Result<bool, CommandError> {
+        // Who flies, or may be flying, keeps what it has.
+        let in_the_air = self.net.in_the_air(self.drones(), true);
         let machines = self
             .drones()
             .into_iter()
             .map(|drone| {
+                let may_change = may_change && !in_the_air.contains_key(&drone);
                 let show = self.telemetry.get(drone).and_then(Drone::has_show_firmware);
                 let by_show = show.unwrap_or(true) && !self.is_guided;
                 let required = requirements(self.plan, by_show);
@@ -53,19 +56,28 @@ impl Crew<'_> {
             self.context.say(&format!(
                 "Changed {} on {}; `updraft fleet restore` puts them back",
                 words::count(changed, "parameter"),
-                words::count(standings.len(), "drone")
+                words::count(
+                    standings.values().filter(|standing| !standing.changed.is_empty()).count(),
+                    "drone"
+                )
             ));
         }
         let mut unset = BTreeMap::new();
         for drone in self.drones() {
             match standings.get(&drone) {
                 Some(standing) if may_change && !standing.is_right() => {
-                    unset.insert(drone, standing.complaint());
+                    let complaint = match in_the_air.get(&drone) {
+                        Some(words) => format!("it {words}, so no parameter was set"),
+                        None => standing.complaint(),
+                    };
+                    unset.insert(drone, complaint);
                 }
                 Some(_) => {}
                 None => {
                     wrong += 1;
-                    unset.insert(drone, "its parameters were not read".to_owned());
+                    let held = self.held.get(&drone).map(|why| format!(", as {why}"));
+                    let text = format!("its parameters were not read{}", held.unwrap_or_default());
+                    unset.insert(drone, text);
                 }
             }
         }
@@ -131,6 +143,11 @@ impl Crew<'_> {
         let at_once = if self.is_virtual { AT_ONCE } else { UPLOADS_AT_ONCE };
         let done = self.all(uploads, at_once)?;
         let mut written = std::collections::BTreeSet::new();
+        for drone in self.drones() {
+            if let Some(why) = self.held.get(&drone).filter(|_| !done.contains_key(&drone)) {
+                refused.entry(drone).or_insert_with(|| why.clone());
+            }
+        }
         for (drone, outcome) in done {
             match outcome {
                 Ok(loaded) => {

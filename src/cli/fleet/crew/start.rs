@@ -4,20 +4,20 @@ use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 
 use super::Crew;
+use super::down::{SHOW_LEFT, bring_down, stopped};
 use super::eyes::Eyes;
 use crate::base::time::GpsTime;
 use crate::cli::exit::CommandError;
+use crate::cli::fleet::interrupt::Interrupt;
 use crate::fleet::journal::Journal;
 use crate::fleet::start::{Phase, Start, StartOptions};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::watch::{self, Monitor};
 use crate::link::clock::{MS, S};
 use crate::link::drive::Watch as _;
+use crate::link::error::NetError;
 use crate::link::id::DroneId;
-
-/// What becomes of drones in the show mode when nobody watches them.
-const FLY_ON: &str = "stopped: nobody watches any more, and the drones fly on by themselves; `updraft fleet \
-     abort` sends them home, `updraft fleet land` lands them where they are";
+use crate::link::net::Net as _;
 
 impl<'a> Crew<'a> {
     /// Sets a start and waits until every drone has taken it.
@@ -56,14 +56,25 @@ impl<'a> Crew<'a> {
         let until = self.net.now() + 10 * S;
         loop {
             let now = self.net.now();
-            if let Some(packet) = start.due(&self.telemetry, now) {
-                self.net.broadcast(&packet)?;
-            }
-            let late = start.late(&self.telemetry, now);
             if let Err(ordered) = self.not_ordered_down() {
                 self.cancel(start)?;
                 return Err(ordered);
             }
+            if let Some(packet) = start.due(&self.telemetry, now) {
+                match self.net.broadcast(&packet) {
+                    // It is sent again in a moment.
+                    Err(NetError::Refused(refusal)) if refusal.for_now => {}
+                    Err(NetError::Refused(refusal)) => {
+                        self.cancel(start)?;
+                        let why = refusal.why;
+                        return Err(CommandError::Unsafe(format!(
+                            "the start was cancelled: {why}"
+                        )));
+                    }
+                    sent => sent?,
+                }
+            }
+            let late = start.late(&self.telemetry, now);
             if late.is_empty() {
                 return Ok(());
             }
@@ -116,7 +127,12 @@ impl<'a> Crew<'a> {
         &mut self,
         start: &mut Start,
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
-        let mut eyes = self.eyes(start.time().map(GpsTime::total_ms));
+        let start_gps_ms = start.time().map(GpsTime::total_ms);
+        let mut eyes = self.eyes(start_gps_ms.filter(|_| start.is_known()));
+        if !self.is_virtual {
+            self.context.signals().set_flies(Some(SHOW_LEFT));
+        }
+        let (drones, mut held) = (self.drones(), false);
         let outcome = loop {
             let now = self.net.now();
             let ordered = self.net.ordered_down();
@@ -130,7 +146,15 @@ impl<'a> Crew<'a> {
             let cancelled = start.phase() == Phase::Cancelled;
             let told = cancelled && start.late(eyes.telemetry(), now).is_empty();
             if let Some(packet) = start.due(eyes.telemetry(), now).filter(|_| !told) {
-                self.net.broadcast(&packet)?;
+                match self.net.broadcast(&packet) {
+                    // Everyone has the start; it is only repeated.
+                    Err(NetError::Refused(refusal)) if !held => {
+                        held = true;
+                        self.context.warn(&format!("the start is not repeated: {}", refusal.why));
+                    }
+                    Err(NetError::Refused(_)) => {}
+                    sent => sent?,
+                }
             }
             let next = start.next().clamp(now + MS, now + 100 * MS);
             if let Some(received) = self.net.recv(next)? {
@@ -142,19 +166,24 @@ impl<'a> Crew<'a> {
                 let armed = eyes.telemetry().get(*drone).and_then(Drone::is_armed);
                 (cancelled || ordered.contains_key(drone)) && armed == Some(false)
             };
-            let all_down =
-                told == cancelled && !ordered.is_empty() && self.drones().iter().all(down);
+            let all_down = told == cancelled && !ordered.is_empty() && drones.iter().all(down);
             if !going_on && (eyes.is_over() || all_down) {
                 break Ok(());
             }
-            if self.context.stop_flag().load(Ordering::SeqCst) {
+            if let Some(choice) = eyes.choice(self.net.now()) {
+                if let Some(action) = choice.action() {
+                    let (context, net) = (self.context, &mut self.net);
+                    let ended = bring_down(context, net, &mut eyes, &drones, action);
+                    self.try_note("abort", &ended);
+                }
                 break Err(if self.is_virtual {
                     CommandError::Interrupted
                 } else {
-                    CommandError::Stopped(FLY_ON)
+                    stopped(choice, false)
                 });
             }
         };
+        self.context.signals().set_flies(None);
         let alarms = self.close(eyes);
         outcome.and(alarms)
     }
@@ -165,8 +194,13 @@ impl<'a> Crew<'a> {
         let mut monitor =
             Monitor::new(self.plan, &self.table, telemetry, watch::Limits::of(self.plan));
         monitor.set_start(start_gps_ms);
-        let mut eyes =
-            Eyes::new(self.context, monitor, self.clock, self.is_virtual && !self.tells_all);
+        let interrupt = if self.is_virtual {
+            Interrupt::silent(self.context)
+        } else {
+            Interrupt::new(self.context, self.on_interrupt)
+        };
+        let is_quiet = self.is_virtual && !self.tells_all;
+        let mut eyes = Eyes::new(self.context, monitor, self.clock, is_quiet, interrupt);
         if !self.is_virtual {
             // Drones that are about to fly are watched, journal or not.
             eyes.write_into(Journal::open(&self.folder.0));
@@ -179,6 +213,7 @@ impl<'a> Crew<'a> {
         &mut self,
         eyes: Eyes<'_>,
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
+        self.flew.extend(eyes.flew());
         let (telemetry, alarms) = eyes.close();
         self.telemetry = telemetry;
         self.tell_troubles();

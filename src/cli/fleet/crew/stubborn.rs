@@ -59,10 +59,15 @@ impl Net for Stubborn<'_> {
     }
 
     fn send(&mut self, to: DroneId, message: &MavMessage) -> Result<(), NetError> {
-        if let Err(error) = self.net.send(to, message) {
-            self.note(&error);
+        match self.net.send(to, message) {
+            // That is no fault of the link.
+            Err(NetError::Refused(refusal)) => Err(NetError::Refused(refusal)),
+            Err(error) => {
+                self.note(&error);
+                Ok(())
+            }
+            Ok(()) => Ok(()),
         }
-        Ok(())
     }
 
     fn broadcast(&mut self, message: &MavMessage) -> Result<(), NetError> {

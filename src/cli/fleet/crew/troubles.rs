@@ -1,6 +1,7 @@
 //! What is wrong with the links: told once each, and written into the journal.
 
 use super::Crew;
+use crate::link::net::Net as _;
 use crate::link::traffic::troubles;
 
 impl Crew<'_> {

@@ -1,0 +1,81 @@
+//! Ctrl-C in flight: everyone is brought down, or left.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::eyes::Eyes;
+use crate::cli::context::Context;
+use crate::cli::exit::CommandError;
+use crate::cli::fleet::interrupt::Choice;
+use crate::fleet::abort::{ALL_AT_ONCE, Abort, Action};
+use crate::link::clock::MS;
+use crate::link::drive::{Watch as _, drive};
+use crate::link::id::DroneId;
+use crate::link::net::Net;
+
+/// What is said when the program is ended at once while a show is in the air.
+pub(super) const SHOW_LEFT: &str = "Ended at once: drones that have not confirmed a return or a landing fly on \
+    by themselves. `updraft fleet watch` follows them, `updraft fleet abort` sends them home; else their \
+    remote controls";
+/// The same while this program flies the drones.
+pub(super) const GUIDED_LEFT: &str = "Ended at once: drones that had not confirmed their return stop within 3 s \
+    (GUID_TIMEOUT) and return when they miss the station (FS_GCS_ENABLE). Watch them: `updraft fleet \
+    watch`, `updraft fleet abort`, their remote controls";
+
+/// Tells all of these to return or land, except those that were ordered down already, until each
+/// has confirmed it; how it ended for each.
+pub(super) fn bring_down(
+    context: &Context,
+    net: &mut dyn Net,
+    eyes: &mut Eyes<'_>,
+    drones: &BTreeSet<DroneId>,
+    action: Action,
+) -> BTreeMap<DroneId, String> {
+    context.insist(match action {
+        Action::Return => "Stopped: the drones are sent home. Ctrl-C again ends it at once",
+        Action::Land => "Stopped: the drones land where they are. Ctrl-C again ends it at once",
+    });
+    context.signals().next_ends();
+    eyes.finishes = true;
+    let ordered = net.ordered_down();
+    let end = |drone: &DroneId| (*drone, Abort::new(*drone, action, eyes.telemetry().get(*drone)));
+    let machines: BTreeMap<DroneId, Abort> =
+        drones.iter().filter(|drone| !ordered.contains_key(drone)).map(end).collect();
+    let done = drive(net, machines, ALL_AT_ONCE, eyes).unwrap_or_default();
+    let mut ended = BTreeMap::new();
+    for (drone, end) in done {
+        context.insist(&format!("drone {drone}: {end}"));
+        ended.insert(drone, end.to_string());
+    }
+    while net.ordered_down().into_values().any(|going_on| going_on) {
+        let until = net.now() + 100 * MS;
+        if let Ok(Some(received)) = net.recv(until) {
+            eyes.on_message(net.now(), &received);
+        }
+    }
+    ended
+}
+
+/// How a command ends that was interrupted while drones were in the air.
+pub(super) fn stopped(choice: Choice, is_guided: bool) -> CommandError {
+    CommandError::Stopped(match (choice, is_guided) {
+        (Choice::Return, _) => {
+            "stopped: this program has sent them home; those above that have not confirmed it need \
+             their remote controls; `updraft fleet watch` follows them"
+        }
+        (Choice::Land, _) => {
+            "stopped: this program has told them to land; those above that have not confirmed it \
+             need their remote controls; `updraft fleet watch` follows them"
+        }
+        (Choice::Leave, false) => {
+            "stopped: nobody watches any more, and the drones fly on by themselves (those on the \
+             ground take off at their time); `updraft fleet watch` goes on watching, `updraft fleet \
+             abort` sends them home, `updraft fleet land` lands them where they are"
+        }
+        (Choice::Leave, true) => {
+            "stopped: nobody flies the drones any more. Those in the air stop where they are within \
+             3 s (GUID_TIMEOUT) and return when they have missed the station for 5 s \
+             (FS_GCS_ENABLE); `updraft fleet watch` follows them, `updraft fleet land` lands them \
+             where they are"
+        }
+    })
+}

@@ -1,0 +1,61 @@
+//! How a flight has ended for each drone: nobody has landed who never took off, and nobody who is
+//! not heard.
+
+use super::Crew;
+use crate::fleet::gate::State;
+use crate::link::id::DroneId;
+
+/// How a flight has ended for one drone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::cli) enum Ended {
+    /// It was seen in the air, and is on the ground and disarmed.
+    Landed,
+    /// It is on the ground, and was not in the air.
+    NeverTookOff,
+    /// It is on the ground; whether it was in the air nobody has seen.
+    OnGround,
+    /// It has not been seen to land: in words why.
+    NotSeen(String),
+}
+
+impl Ended {
+    /// Whether it is on the ground for sure.
+    pub(in crate::cli) fn is_down(&self) -> bool {
+        !matches!(self, Self::NotSeen(_))
+    }
+}
+
+impl std::fmt::Display for Ended {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Landed => f.write_str("has landed"),
+            Self::NeverTookOff => f.write_str("never took off"),
+            Self::OnGround => f.write_str("is on the ground, its flight was not seen"),
+            Self::NotSeen(words) => f.write_str(words),
+        }
+    }
+}
+
+impl Crew<'_> {
+    /// How the flight has ended for a drone.
+    pub(in crate::cli) fn ended(&self, drone: DroneId) -> Ended {
+        match self.net.state(drone) {
+            State::Ground | State::Waiting if self.flew.contains(&drone) => Ended::Landed,
+            State::Ground | State::Waiting if self.attached => Ended::OnGround,
+            State::Ground | State::Waiting => Ended::NeverTookOff,
+            _ => Ended::NotSeen(self.net.words(drone)),
+        }
+    }
+
+    /// Whether all drones of the table have landed, and the same in words.
+    pub(in crate::cli) fn ends(&self) -> (bool, String) {
+        let all: Vec<_> =
+            self.table.drones.iter().map(|line| (line, self.ended(line.drone))).collect();
+        let landed = all.iter().filter(|(_, ended)| *ended == Ended::Landed).count();
+        let mut text = format!("{landed} of {} drones have landed", all.len());
+        for (line, ended) in all.iter().filter(|(_, ended)| *ended != Ended::Landed) {
+            text.push_str(&format!("; drone {} (slot {}) {ended}", line.drone, line.slot));
+        }
+        (landed == all.len(), text)
+    }
+}

@@ -1,0 +1,60 @@
+//! `fleet watch`: a station in place of one that is gone, for a flight that is on its way.
+
+use clap::Args;
+
+use super::interrupt::InterruptArgs;
+use super::start::landed;
+use super::{StepArgs, bring, dry, lock, with_desk};
+use crate::cli::context::Context;
+use crate::cli::exit::{CommandError, Exit};
+use crate::fleet::slots::FleetTable;
+
+/// Arguments of `fleet watch`.
+#[derive(Clone, Debug, Args)]
+#[command(after_long_help = "Examples:
+  updraft fleet watch my-campaign --flight calibration
+  updraft fleet watch my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --no-logs
+
+Who flies which slot is in fleet.json; the start is what the drones say, or logs/start.json. Drones that
+were flown with --guided have lost who flew them: they are watched as they come down. `fleet abort` and
+`fleet land` of other terminals are carried out. Exit codes: 3 somebody has not landed, gave an alarm, or
+a log is missing; 5 nobody flies, and no start is set.")]
+pub(in crate::cli) struct WatchArgs {
+    #[command(flatten)]
+    step: StepArgs,
+    /// Leave the logs on the drones; `updraft logs pull` brings them
+    #[arg(long)]
+    no_logs: bool,
+    #[command(flatten)]
+    interrupt: InterruptArgs,
+}
+
+pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandError> {
+    if args.step.dry_run {
+        return dry::status(context, &args.step);
+    }
+    let _lock = lock(context, &args.step.campaign)?;
+    with_desk(context, &args.step, |crew| {
+        if !FleetTable::path(&crew.folder.0).exists() {
+            return Err(CommandError::Nothing(format!(
+                "{} is not there, so nobody knows which drone flies which slot: no flight was \
+                 started from this folder. `updraft fleet status` shows who is heard, `updraft fleet \
+                 abort` needs no table",
+                FleetTable::path(&crew.folder.0).display()
+            )));
+        }
+        crew.on_interrupt = args.interrupt.on_interrupt;
+        crew.hear_anyone(args.step.connect.wait, None)?;
+        let mut start = crew.attach()?;
+        let alarms = crew.watch(&mut start)?;
+        let exit = landed(context, crew, alarms.is_empty());
+        if args.no_logs {
+            return Ok(exit);
+        }
+        let wish = bring::Wish::default();
+        let brought =
+            bring::bring(context, &mut crew.net, crew.folder, crew.plan, &crew.table, &wish)?;
+        let lost = brought.iter().any(|one| one.state == "missing");
+        Ok(if lost { Exit::Losses } else { exit })
+    })
+}
