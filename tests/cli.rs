@@ -8,6 +8,9 @@ mod support;
 #[cfg(unix)]
 mod fleet_loaded_support;
 
+#[cfg(unix)]
+#[path = "cli/air.rs"]
+mod air;
 #[path = "cli/analyze.rs"]
 mod analyze;
 #[path = "cli/analyze_inputs.rs"]

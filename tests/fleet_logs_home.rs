@@ -113,7 +113,7 @@ fn the_open_log_of_a_drone_that_arms_is_never_whole() {
     logging(&mut net).grows = (S, 45 * S);
     let failure = pull_again(&mut net, logs, 1).failure.unwrap();
     let said = format!("{}; {}", failure.reason, failure.advice);
-    assert_eq!(said, "the drone is armed and gives no logs: disarm it; then run again");
+    assert_eq!(said, "the drone is armed and gives no logs until it has landed; then run again");
     assert!(!logs.join("01.BIN").exists(), "a beginning was published");
     // Armed all the time, then disarmed, with the 15 s that the firmware writes on.
     assert!(pull_again(&mut net, logs, 2).failure.is_some());

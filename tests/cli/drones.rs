@@ -45,6 +45,8 @@ pub(crate) struct Drones {
     pub(crate) faults: Faults,
     /// Parameters that are not as the firmware has them at first.
     pub(crate) params: Vec<(&'static str, f32)>,
+    /// Their seconds per second of the clock on the wall.
+    pub(crate) speed: f64,
 }
 
 impl Bench {
@@ -58,7 +60,8 @@ impl Bench {
             setup
         };
         let setups = plan.slots.iter().map(setup).collect();
-        Drones { folder, plan, setups, key: None, faults: Faults::default(), params: Vec::new() }
+        let (key, faults, params, speed) = (None, Faults::default(), Vec::new(), 1.0);
+        Drones { folder, plan, setups, key, faults, params, speed }
     }
 }
 
@@ -95,7 +98,7 @@ impl Drones {
         let options = ServerOptions {
             stations: vec![station],
             key: self.key.clone(),
-            pace: Pace::Speed(1.0),
+            pace: Pace::Speed(self.speed),
             faults: self.faults,
             seed: 4,
         };

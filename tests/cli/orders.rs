@@ -100,18 +100,6 @@ fn a_station_that_hangs_is_named_and_its_order_is_withdrawn() {
 }
 
 #[test]
-fn ctrl_c_while_a_show_is_in_the_air_says_what_the_drones_do() {
-    let (bench, _fleet, link) = stage(&["--speed", "5"]);
-    let mut flight = Flight::of(&bench, &shown(&link));
-    flight.hear("drone 2: armed");
-    flight.signal("-INT");
-    assert_eq!(flight.end(), Some(130), "{}", flight.said());
-    let said = flight.said();
-    assert!(said.contains("the drones fly on by themselves"), "{said}");
-    assert!(!said.contains("goes on where it stopped"), "{said}");
-}
-
-#[test]
 fn an_abort_needs_no_disk_and_names_who_was_not_heard() {
     let (bench, _fleet, link) = stage(&["--speed", "5"]);
     // Nothing can be written into a folder.

@@ -19,7 +19,7 @@ pub enum LogProtocolError {
         seconds: u64,
     },
     /// It is armed.
-    #[error("the drone is armed and gives no logs: disarm it")]
+    #[error("the drone is armed and gives no logs until it has landed")]
     Armed,
     /// There is no log of that number.
     #[error("the drone has no log {id}")]

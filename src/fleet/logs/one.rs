@@ -348,7 +348,7 @@ impl Machine for PullOne {
                 // A link is not loaded while anything flies on it.
                 // The open log grows, and its checksum is right for a moment only.
                 self.stage = self.fail_for_sure(
-                    "the drone is armed and gives no logs: disarm it".to_owned(),
+                    "the drone is armed and gives no logs until it has landed".to_owned(),
                     "then run again",
                 );
             }
