@@ -224,13 +224,8 @@ fn subcommands(plan: &Plan) -> BTreeMap<&'static str, Vec<MavMessage>> {
     let mut logs = sends(List::new(caller(), "/APM/LOGS", 3 * S), &mut shown());
     logs.extend(list.clone());
     logs.extend(sum.clone());
-    let reads = [
-        Op::OpenFileRO,
-        Op::ReadFile,
-        Op::BurstReadFile,
-        Op::TerminateSession,
-        Op::ResetSessions,
-    ];
+    let reads =
+        [Op::OpenFileRO, Op::ReadFile, Op::BurstReadFile, Op::TerminateSession, Op::ResetSessions];
     logs.extend(reads.map(|op| ftp(drone(1), &Packet::request(op))));
     logs.push(MavMessage::LOG_REQUEST_DATA(dialect::LOG_REQUEST_DATA_DATA::default()));
     logs.push(MavMessage::LOG_REQUEST_END(dialect::LOG_REQUEST_END_DATA::default()));
@@ -321,7 +316,8 @@ fn kind(message: &MavMessage) -> String {
             format!("PARAM_SET {name}")
         }
         ["FTP", operation, ..] => format!("FTP {operation}"),
-        [first, ..] => first.to_owned(),
+        // Messages without words of their own are shown with all that is in them.
+        [first, ..] => first.split('(').next().unwrap_or(first).to_owned(),
         [] => String::new(),
     }
 }
@@ -365,7 +361,8 @@ fn every_subcommands_messages_pass_by_what_they_do_and_what_the_drone_is_at() {
 fn nothing_changes_a_drone_that_is_not_heard_to_stand_disarmed() {
     let plan = plan();
     let ground = vec![beat(false), status(Stage::WaitForStart, None, 0)];
-    let stands = ["disarmed, stock", "disarmed, off", "disarmed, waiting", "start set", "landed", "error"];
+    let stands =
+        ["disarmed, stock", "disarmed, off", "disarmed, waiting", "start set", "landed", "error"];
     for (subcommand, messages) in subcommands(&plan) {
         for (situation, said, age) in situations() {
             for message in &messages {
@@ -392,7 +389,11 @@ fn nothing_changes_a_drone_that_is_not_heard_to_stand_disarmed() {
                             assert_eq!(passes, stands.contains(&situation), "{what}");
                         }
                         MavCmd::MAV_CMD_NAV_TAKEOFF => {
-                            assert_eq!(passes, !stands.contains(&situation) && situation != "authorized", "{what}");
+                            assert_eq!(
+                                passes,
+                                !stands.contains(&situation) && situation != "authorized",
+                                "{what}"
+                            );
                         }
                         _ => assert!(passes, "{what}"),
                     },

@@ -307,7 +307,10 @@ impl Look<'_> {
 
     fn prearm(&self) -> Cell {
         if self.of.is_armed() == Some(true) {
-            return bad("armed", "is armed, and may be flying: `updraft fleet abort` ends its flight");
+            return bad(
+                "armed",
+                "is armed, and may be flying: `updraft fleet abort` ends its flight",
+            );
         }
         match self.fresh(self.of.health).and_then(|health| health.prearm_ok) {
             None => bad("?", "does not report its arming checks"),

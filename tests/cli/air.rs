@@ -12,7 +12,7 @@ use crate::guided::{Flight, flown, modes, stage};
 use crate::support::{Bench, Ended};
 
 /// A flight of some minutes.
-const LONG: &[&str] = &["--speeds", "1,2", "--leg", "12", "--hover", "40", "--baseline", "120"];
+const LONG: &[&str] = &["--speeds", "1,2", "--leg", "12", "--hover", "40", "--baseline", "200"];
 
 fn shown<'a>(link: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let args = ["fly", "campaign", "--connect", link, "--set-params", "--yes", "--lead", "25"];
@@ -107,7 +107,8 @@ fn no_fence_is_weakened_while_a_drone_of_the_table_is_not_heard() {
     // Another day drone 2 is off, and drone 1 has the fence of the upload.
     drones.setups[1].gone_at = Some(0);
     drones.params = vec![("FENCE_ENABLE", 1.0), ("FENCE_ALT_MAX", 40.0), ("FENCE_TYPE", 5.0)];
-    let restore = ["fleet", "restore", "campaign", "--connect", &link, "--wait", "3", "--fence-off"];
+    let restore =
+        ["fleet", "restore", "campaign", "--connect", &link, "--wait", "3", "--fence-off"];
     let ended = drones.fly(
         station.parse().unwrap(),
         || bench.expect(3, &restore),
@@ -179,7 +180,8 @@ fn signals_end_every_command_and_nohup_is_respected() {
         std::thread::sleep(Duration::from_secs(2));
         waiting.signal(signal);
         assert_eq!(waiting.end(), Some(130), "{signal}: {}", waiting.said());
-        let mut fleet = Flight::of(&bench, &["fleet", "virtual", "campaign", "--station", "127.0.0.1:9"]);
+        let mut fleet =
+            Flight::of(&bench, &["fleet", "virtual", "campaign", "--station", "127.0.0.1:9"]);
         fleet.hear("switched on");
         std::thread::sleep(Duration::from_secs(1));
         fleet.signal(signal);
@@ -203,7 +205,7 @@ fn on_a_terminal(bench: &Bench, args: &[&str], typed: &str) -> Option<Ended> {
     use std::io::Write as _;
     let words: Vec<String> = args.iter().map(|word| format!("'{word}'")).collect();
     let program = env!("CARGO_BIN_EXE_updraft");
-    let line = format!("'{program}' {} ; echo ended with $?", words.join(" "));
+    let line = format!("trap : INT; '{program}' {}; echo ended with $?", words.join(" "));
     let mut command = Command::new("script");
     command.args(["-q", "-e", "-f", "-c", &line, "typescript"]).current_dir(bench.path(""));
     let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
@@ -291,7 +293,10 @@ fn nobody_has_landed_who_is_gone_or_never_took_off() {
     // Drone 2 goes off in the air.
     let (bench, _fleet, link) = stage(&["--speed", "5", "--gone", "2", "--after", "60"]);
     let ended = bench.expect(3, &shown(&link, &["--no-logs"]));
-    assert!(ended.err.contains("1 of 2 drones have landed; drone 2 (slot 2) has not been heard for"), "{ended}");
+    assert!(
+        ended.err.contains("1 of 2 drones have landed; drone 2 (slot 2) has not been heard for"),
+        "{ended}"
+    );
     // The start is taken back: nobody took off.
     let (bench, _fleet, link) = stage(&["--speed", "1"]);
     let mut flight = Flight::of(&bench, &shown(&link, &["--no-logs"]));
