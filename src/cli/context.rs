@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use super::Global;
 use super::exit::CommandError;
+use super::signals::Signals;
 use crate::base::plain::Shown as _;
 use crate::base::plain::{for_terminal, json_for_terminal};
-use super::signals::Signals;
 use crate::campaign::lock::FolderLock;
 
 /// Output and interruption for one run of the program.
