@@ -1,4 +1,7 @@
 //! Ctrl-C, SIGTERM and SIGHUP (the terminal was closed, ssh was lost): they mean the same.
+//!
+//! Only Ctrl-C counts a second time: a session that ends sends SIGHUP and SIGTERM one after the other,
+//! and more than once, while drones are being sent home.
 
 use std::io::{self, Write as _};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -32,7 +35,7 @@ impl Signals {
     /// Takes the signals from now on; else why not.
     pub(super) fn take(&self) -> Result<(), String> {
         let signals = self.clone();
-        listen(move || signals.on_signal())
+        listen(move |by_hand| signals.on_signal(by_hand))
     }
 
     /// The flag that the first one raises.
@@ -40,7 +43,7 @@ impl Signals {
         &self.0.stop
     }
 
-    /// How many have come.
+    /// How often Ctrl-C was pressed.
     pub(super) fn count(&self) -> u32 {
         self.0.count.load(Ordering::SeqCst)
     }
@@ -64,15 +67,18 @@ impl Signals {
     #[cfg(test)]
     pub(super) fn pretend(&self) {
         self.set_flies(Some("ended"));
-        self.on_signal();
+        self.on_signal(true);
     }
 
     fn air(&self) -> std::sync::MutexGuard<'_, Option<Air>> {
         self.0.air.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn on_signal(&self) {
+    fn on_signal(&self, by_hand: bool) {
         self.0.stop.store(true, Ordering::SeqCst);
+        if !by_hand {
+            return;
+        }
         let count = self.0.count.fetch_add(1, Ordering::SeqCst) + 1;
         let air = *self.air();
         match air {
@@ -88,7 +94,7 @@ impl Signals {
 }
 
 #[cfg(unix)]
-fn listen(mut on_signal: impl FnMut() + Send + 'static) -> Result<(), String> {
+fn listen(mut on_signal: impl FnMut(bool) + Send + 'static) -> Result<(), String> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut wanted = vec![SIGINT, SIGTERM];
     // `nohup` has it ignored, for a program that is to go on without its terminal.
@@ -97,7 +103,7 @@ fn listen(mut on_signal: impl FnMut() + Send + 'static) -> Result<(), String> {
     }
     let mut signals =
         signal_hook::iterator::Signals::new(wanted).map_err(|error| error.to_string())?;
-    let listen = move || signals.forever().for_each(|_| on_signal());
+    let listen = move || signals.forever().for_each(|signal| on_signal(signal == SIGINT));
     let thread = std::thread::Builder::new().name("signals".to_owned()).spawn(listen);
     thread.map(drop).map_err(|error| error.to_string())
 }
@@ -112,6 +118,6 @@ fn is_ignored(signal: i32) -> bool {
 }
 
 #[cfg(not(unix))]
-fn listen(on_signal: impl FnMut() + Send + 'static) -> Result<(), String> {
-    ctrlc::set_handler(on_signal).map_err(|error| error.to_string())
+fn listen(mut on_signal: impl FnMut(bool) + Send + 'static) -> Result<(), String> {
+    ctrlc::set_handler(move || on_signal(true)).map_err(|error| error.to_string())
 }

@@ -130,6 +130,11 @@ fn a_signal_in_flight_sends_everyone_home_whichever_it_is() {
         let (bench, _fleet, link) = stage(&["--speed", "5"]);
         let mut flight = in_the_air(&bench, &link, &["--no-logs"]);
         flight.signal(signal);
+        if signal != "-INT" {
+            // A session that ends sends them again.
+            flight.signal(signal);
+            flight.signal("-HUP");
+        }
         assert_eq!(flight.end(), Some(130), "{signal}: {}", flight.said());
         let said = flight.said();
         assert!(said.contains("drone 1: returns") && said.contains("drone 2: returns"), "{said}");
