@@ -270,6 +270,10 @@ impl Monitor {
 impl Watch for Monitor {
     fn on_message(&mut self, now: Micros, received: &Received) {
         self.telemetry.on_message(now, received);
+        let of = self.telemetry.drones.get(&received.from);
+        if let (Some(watched), Some(of)) = (self.watched.get_mut(&received.from), of) {
+            watched.flying.flew |= is_in_the_air(of);
+        }
         if now >= self.next {
             self.look(now);
         }
@@ -287,6 +291,13 @@ impl Watch for Monitor {
 const IN_THE_AIR_M: f64 = 0.5;
 /// A drone that is silent is waited for until so long after it should have landed, s.
 const SILENT_UNTIL_S: f64 = 60.0;
+
+/// Whether a drone is in the air by what it has said last.
+fn is_in_the_air(of: &Drone) -> bool {
+    let flies = of.status.is_some_and(|(_, status)| status.stage.is_flying());
+    let high = of.position.is_some_and(|(_, at)| at.above_home_m > IN_THE_AIR_M);
+    flies || (of.is_armed() == Some(true) && high)
+}
 
 impl Watched {
     /// Nothing was ever heard of it, for so long.
@@ -336,9 +347,6 @@ impl Watched {
         self.flying.show_s =
             start_gps_ms.zip(gps_ms).map(|(start, gps_ms)| (gps_ms - start as f64) / 1000.0);
         self.distance(of, limits, frame, start_gps_ms, tell);
-        let high = of.position.is_some_and(|(_, at)| at.above_home_m > IN_THE_AIR_M);
-        let flies = self.stage.is_some_and(Stage::is_flying);
-        self.flying.flew |= self.armed == Some(true) && (flies || high);
         // A flight whose start nobody knows is over for a drone that has landed.
         self.flying.over = match start_gps_ms {
             None => self.was_armed && self.armed == Some(false) || silence > 60 * S,
