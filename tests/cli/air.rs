@@ -12,7 +12,7 @@ use crate::guided::{Flight, flown, modes, stage};
 use crate::support::{Bench, Ended};
 
 /// A flight of some minutes.
-const LONG: &[&str] = &["--speeds", "1,2", "--leg", "12", "--hover", "40", "--baseline", "200"];
+const LONG: &[&str] = &["--speeds", "1,2", "--leg", "12", "--hover", "60", "--baseline", "20"];
 
 fn shown<'a>(link: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let args = ["fly", "campaign", "--connect", link, "--set-params", "--yes", "--lead", "25"];
@@ -231,7 +231,8 @@ fn on_a_terminal(bench: &Bench, args: &[&str], typed: &str) -> Option<Ended> {
     keys.write_all(b"\x03").unwrap();
     wait("be left flying (f)?");
     keys.write_all(typed.as_bytes()).unwrap();
-    wait("ended with");
+    // Its first line shows the command.
+    wait("ended with 1");
     drop(keys);
     let _ = child.kill();
     let _ = child.wait();

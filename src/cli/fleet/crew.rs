@@ -55,6 +55,7 @@ impl From<NetError> for CommandError {
 }
 
 /// A fleet, its flight, and what is known of both.
+#[expect(clippy::struct_excessive_bools, reason = "each is a way in which a flight is another")]
 pub(in crate::cli) struct Crew<'a> {
     context: &'a Context,
     /// The links, behind the gate: everything that is sent to drones goes through it.

@@ -56,11 +56,10 @@ pub fn class(message: &MavMessage) -> Option<Class> {
             MavCmd::MAV_CMD_REQUEST_MESSAGE | MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => {
                 Class::Harmless
             }
-            MavCmd::MAV_CMD_USER_1 => Class::Ground,
             MavCmd::MAV_CMD_DO_SET_MODE if [RTL, LAND].contains(&(command.param2 as u32)) => {
                 Class::Emergency
             }
-            MavCmd::MAV_CMD_DO_SET_MODE => Class::Ground,
+            MavCmd::MAV_CMD_USER_1 | MavCmd::MAV_CMD_DO_SET_MODE => Class::Ground,
             // Nobody is disarmed: in the air that is a crash.
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if command.param1 == 1.0 => Class::Ground,
             MavCmd::MAV_CMD_NAV_TAKEOFF => Class::Flight,

@@ -1,6 +1,8 @@
 //! How a flight has ended for each drone: nobody has landed who never took off, and nobody who is
 //! not heard.
 
+use std::fmt::Write as _;
+
 use super::Crew;
 use crate::fleet::gate::State;
 use crate::link::id::DroneId;
@@ -54,7 +56,7 @@ impl Crew<'_> {
         let landed = all.iter().filter(|(_, ended)| *ended == Ended::Landed).count();
         let mut text = format!("{landed} of {} drones have landed", all.len());
         for (line, ended) in all.iter().filter(|(_, ended)| *ended != Ended::Landed) {
-            text.push_str(&format!("; drone {} (slot {}) {ended}", line.drone, line.slot));
+            let _ = write!(text, "; drone {} (slot {}) {ended}", line.drone, line.slot);
         }
         (landed == all.len(), text)
     }
