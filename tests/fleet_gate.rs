@@ -507,7 +507,9 @@ impl Endpoint for Deaf {
     }
 }
 
-type Sent = Rc<RefCell<Vec<(DroneId, MavMessage)>>>;
+/// To whom, and what.
+type Messages = Vec<(DroneId, MavMessage)>;
+type Sent = Rc<RefCell<Messages>>;
 
 /// Writes down what is sent.
 struct Spy {
@@ -562,7 +564,7 @@ impl Watch for Orders<'_> {
 
 /// What drones 1 and 2 are sent after drone 1 was ordered down at a time of their guided flight,
 /// and what was refused.
-fn ordered_down(at: Micros, obeys: bool) -> (Vec<(DroneId, MavMessage)>, Vec<(DroneId, String)>) {
+fn ordered_down(at: Micros, obeys: bool) -> (Messages, Vec<(DroneId, String)>) {
     let (plan, folder) = (plan(), tempfile::tempdir().unwrap());
     let sent: Sent = Rc::default();
     let vehicles: BTreeMap<DroneId, Deaf> = [1_u8, 2]

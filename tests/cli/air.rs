@@ -55,7 +55,7 @@ fn nothing_is_set_on_drones_that_perform_whatever_is_asked() {
             let mut said = String::new();
             let mut refused = |code: i32, words: &[&'static str], more: &[&'static str]| {
                 let ended = bench.expect(code, &[&step(words, &link)[..], more].concat());
-                said.push_str(&format!("{} {}\n{}", words.join(" "), more.join(" "), ended.err));
+                said.push_str(&ended.err);
                 assert!(!ended.err.contains("disarm it"), "{ended}");
                 assert!(ended.err.contains("is flying (performing)"), "{ended}");
                 ended
