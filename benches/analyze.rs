@@ -65,7 +65,7 @@ fn flown() -> Campaign {
             };
             fly_to_file(&setup, &path).expect("a flight");
             bytes += size(&path);
-            LogInput { slot: Some(slot.slot), path, table: None }
+            LogInput { slot: Some(slot.slot), path, ..LogInput::default() }
         });
         logs.push(flown.collect());
     }

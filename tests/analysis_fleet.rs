@@ -47,7 +47,7 @@ fn ladders(folder: &Path, durations_s: &[f64]) -> Vec<LogInput> {
     let one = |(index, duration_s): (usize, &f64)| {
         let path = folder.join(format!("{}.BIN", index + 1));
         write(&path, index as u8 + 1, *duration_s, ladder_up);
-        LogInput { slot: None, path, table: None }
+        LogInput { slot: None, path, ..LogInput::default() }
     };
     durations_s.iter().enumerate().map(one).collect()
 }
@@ -107,7 +107,7 @@ fn a_map_takes_the_flocks_law_for_a_partial_ladder() {
         .map(|id| {
             let path = folder.path().join(format!("hover-{id}.BIN"));
             write(&path, id, 264.0, |_| 0.0);
-            LogInput { slot: None, path, table: None }
+            LogInput { slot: None, path, ..LogInput::default() }
         })
         .collect();
     let ladder = plan(Purpose::Calibration, ladder_up_segments(), 3);
@@ -147,7 +147,7 @@ fn twins(folder: &Path, name: &str) -> Vec<LogInput> {
     let one = |cut: usize| {
         let path = folder.join(format!("{}.BIN", cut + 1));
         fs::write(&path, &bytes[..bytes.len() - cut]).unwrap();
-        LogInput { slot: None, path, table: None }
+        LogInput { slot: None, path, ..LogInput::default() }
     };
     (0..2).map(one).collect()
 }
@@ -199,7 +199,7 @@ fn a_contradiction_is_told_once() {
     let path: PathBuf = folder.path().join("02.BIN");
     fs::copy(fixture("ladder-still.trimmed.BIN"), &path).unwrap();
     // Flown from the show's origin, the home of slot 1; record and name say 2.
-    let logs = [LogInput { slot: Some(2), path, table: None }];
+    let logs = [LogInput { slot: Some(2), path, ..LogInput::default() }];
     let flight = flown(Some(&plan(Purpose::Calibration, ladder(1.0), 2)), &logs);
     assert_eq!(flight.drones[0].slot, Some(1));
     let told: Vec<&String> = flight.warnings.iter().filter(|w| w.contains("02.BIN")).collect();

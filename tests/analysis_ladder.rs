@@ -28,7 +28,10 @@ fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> Fli
 }
 
 fn logs(paths: &[PathBuf]) -> Vec<LogInput> {
-    paths.iter().map(|path| LogInput { slot: None, path: path.clone(), table: None }).collect()
+    paths
+        .iter()
+        .map(|path| LogInput { slot: None, path: path.clone(), ..LogInput::default() })
+        .collect()
 }
 
 fn run(plan: Option<&Plan>, paths: &[PathBuf], options: &AnalysisOptions) -> FlightAnalysis {
@@ -285,12 +288,12 @@ fn synthetic_campaign(folder: &Path) -> [Vec<LogInput>; 2] {
     for id in 1..=2 {
         let path = folder.join(format!("cal-{id}.BIN"));
         fs::write(&path, drone(id, 265.0, ladder_up, |_| 0.0)).unwrap();
-        campaign[0].push(LogInput { slot: None, path, table: None });
+        campaign[0].push(LogInput { slot: None, path, ..LogInput::default() });
     }
     for id in 1..=3 {
         let path = folder.join(format!("hover-{id}.BIN"));
         fs::write(&path, drone(id, 264.0, |_| 0.0, wave)).unwrap();
-        campaign[1].push(LogInput { slot: None, path, table: None });
+        campaign[1].push(LogInput { slot: None, path, ..LogInput::default() });
     }
     campaign
 }
@@ -509,7 +512,7 @@ fn a_log_without_id_and_number_is_matched_by_its_home() {
     assert!(error.contains("name it after its slot"), "{error}");
 
     // Given by the caller, the slot needs no proof.
-    let given = [LogInput { slot: Some(3), path: paths[0].clone(), table: None }];
+    let given = [LogInput { slot: Some(3), path: paths[0].clone(), ..LogInput::default() }];
     let flight =
         analyze_flight(&input("calibration", Some(&plan), &given), &still(), None, &|_, _| {})
             .unwrap();
@@ -519,7 +522,7 @@ fn a_log_without_id_and_number_is_matched_by_its_home() {
 #[test]
 fn a_second_log_of_a_slot_is_left_out_and_named() {
     let twice: Vec<LogInput> = ["square-law-ladder.trimmed.BIN", "ladder-still.trimmed.BIN"]
-        .map(|name| LogInput { slot: Some(1), path: fixture(name), table: None })
+        .map(|name| LogInput { slot: Some(1), path: fixture(name), ..LogInput::default() })
         .to_vec();
     let plan = plan(Purpose::Calibration, ladder(1.0), 1);
     let flight =

@@ -49,6 +49,8 @@ mod inspect;
 mod lock;
 #[path = "cli/logs.rs"]
 mod logs;
+#[path = "cli/logs_import.rs"]
+mod logs_import;
 #[cfg(unix)]
 #[path = "cli/logs_pull.rs"]
 mod logs_pull;

@@ -35,7 +35,7 @@ fn log(path: &Path, drone: u8, length_s: f64, up: fn(f64) -> f64, air_mps: Vec<f
     });
     let log = Synthetic { system_id: drone, duration_s: length_s, velocity_up_mps: up, pulse_us };
     fs::write(path, log.write()).unwrap();
-    LogInput { slot: Some(u16::from(drone)), path: path.to_owned(), table: None }
+    LogInput { slot: Some(u16::from(drone)), path: path.to_owned(), ..LogInput::default() }
 }
 
 /// Calibration in still air, then a hover of drones in a grid.

@@ -25,6 +25,8 @@ pub struct LogInput {
     pub path: PathBuf,
     /// What its columns are, if it is a table and no DataFlash log.
     pub table: Option<Arc<Mapping>>,
+    /// Why it is not to be used, if whoever gives it knows: it is of another flight.
+    pub refused: Option<String>,
 }
 
 /// One flight to analyse.

@@ -41,6 +41,8 @@ pub(super) struct Candidate {
     pub(super) same_as: Option<usize>,
     /// Why nothing can be read from it.
     pub(super) unreadable: Option<String>,
+    /// Why it is not to be used.
+    pub(super) refused: Option<String>,
 }
 
 /// The slot of each log, or why it has none; and what contradicts itself, one sentence each.
@@ -133,6 +135,11 @@ pub(super) fn slots(plan: &Plan, logs: &[Candidate]) -> Matched {
     let places: Vec<Place> = logs.iter().map(|log| field.place(log.home_deg)).collect();
     let mut work = Work { logs, taken: BTreeMap::new(), result: vec![None; logs.len()] };
 
+    for (index, log) in logs.iter().enumerate() {
+        if let Some(reason) = &log.refused {
+            work.refuse(index, reason.clone());
+        }
+    }
     work.refuse_copies(&places);
     let mut standing: Vec<(usize, u16)> = Vec::new();
     for (index, place) in places.iter().enumerate() {
@@ -219,7 +226,8 @@ impl Work<'_> {
         let logs = self.logs;
         let mut alike: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (index, log) in logs.iter().enumerate() {
-            if let Some(first) = log.same_as {
+            // Of a refused log all copies are refused, each with the reason.
+            if let Some(first) = log.same_as.filter(|_| log.refused.is_none()) {
                 alike.entry(first).or_insert_with(|| vec![first]).push(index);
             }
         }

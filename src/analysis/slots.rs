@@ -38,7 +38,10 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
             let reason = matching::copy_of(&first.unwrap_or_default());
             SlotMatch::Refused { reason, meant_for: None }
         };
-        let slots = copies.into_iter().map(|copy| copy.map_or(SlotMatch::Unplanned, refused));
+        let slots = copies.into_iter().zip(input.logs).map(|(copy, log)| match &log.refused {
+            Some(reason) => SlotMatch::Refused { reason: reason.clone(), meant_for: None },
+            None => copy.map_or(SlotMatch::Unplanned, refused),
+        });
         return (slots.collect(), Vec::new());
     };
     // Each log is given back as soon as it was read: they are not in memory together.
@@ -56,6 +59,7 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
                 flew: identity.flew,
                 same_as: *copy,
                 unreadable: opened.err(),
+                refused: log.refused.clone(),
             }
         })
         .collect();

@@ -26,6 +26,7 @@ use crate::base::time::GpsTime;
 use crate::campaign;
 use crate::campaign::origin::LogOrigin;
 use crate::flight::Indicator;
+use crate::flight::identity::{SAME_START_S, later_s};
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::report::{self, Provenance, terminal_summary};
@@ -275,7 +276,13 @@ pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, Command
         let start = unix_s.checked_mul(1000).and_then(GpsTime::from_unix_ms).ok_or_else(|| {
             CommandError::Usage(format!("--start {unix_s} is not a time since 1980"))
         })?;
-        work.flights.iter_mut().for_each(|flight| flight.start = Some(start));
+        for flight in &mut work.flights {
+            // Whoever names another start than the one that was written down means its logs.
+            let is_other = |known: GpsTime| later_s(start, known).abs() > SAME_START_S;
+            if flight.start.replace(start).is_some_and(is_other) {
+                flight.logs.iter_mut().for_each(|log| log.refused = None);
+            }
+        }
     }
     let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
     finish(context, &work, &options, args.hold.as_deref(), output.as_deref())

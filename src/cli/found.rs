@@ -11,6 +11,7 @@ use super::exit::CommandError;
 use super::hashes::Hashes;
 use super::leaning::{lean_table, leaning};
 use super::load::has_extension;
+use super::of_start;
 use super::true_scales::true_scales;
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
@@ -24,7 +25,6 @@ use crate::base::plain::Shown as _;
 use crate::base::plain::plain;
 use crate::base::time::GpsTime;
 use crate::campaign::origin::{self, LogOrigin, LogsAt, is_set_aside};
-use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignIndex, FlightFolder, FlightRecord, LogRecord};
 use crate::flight::Indicator;
 use crate::flight::table::{Mapping, TableError};
@@ -116,7 +116,7 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
         let mut first_error = None;
         let before = work.flights.len();
         for folder in folders {
-            let flight = match found_flight(&folder, origin, &work.hashes) {
+            let flight = match found_flight(path, &folder, origin, &work.hashes) {
                 Ok(flight) => flight,
                 // The campaign's other flights can be analysed without this one.
                 Err(error) if several => {
@@ -152,22 +152,29 @@ pub(super) fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<
             path.shown()
         )));
     }
+    let mut logs: Vec<LogInput> =
+        logs.into_iter().map(|path| LogInput { path, ..LogInput::default() }).collect();
+    let (start, notes) = if path.is_dir() {
+        of_start::refuse(&of_start::Flight { logs: path, campaign: None }, &mut logs)?
+    } else {
+        (None, Vec::new())
+    };
     work.flights.push(Found {
         name: stem(path),
         plan: plan.cloned(),
         purpose: None,
-        logs: logs.into_iter().map(|path| LogInput { slot: None, path, table: None }).collect(),
+        logs,
         true_updraft_mps: None,
         truth: BTreeMap::new(),
         seed: None,
-        start: None,
+        start,
         density: plan.map(|plan| density(plan, None)),
         leaning: None,
         thrust_exponent: None,
         sag: Some(if plan.is_some() { Sag::default() } else { Sag::UNKNOWN }),
         lean_table: None,
         true_air: None,
-        notes: Vec::new(),
+        notes,
     });
     Ok(())
 }
@@ -192,9 +199,9 @@ pub(super) fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, Com
     let shared = Arc::new(mapping);
     work.flights.extend(shared.flights.iter().map(|flight| {
         let log = |path: &PathBuf| LogInput {
-            slot: None,
             path: path.clone(),
             table: Some(Arc::clone(&shared)),
+            ..LogInput::default()
         };
         Found {
             name: flight.name.clone(),
@@ -233,6 +240,7 @@ fn used(folders: &[FlightFolder], origin: LogOrigin) -> Option<String> {
 }
 
 fn found_flight(
+    campaign: &Path,
     folder: &FlightFolder,
     origin: LogOrigin,
     hashes: &Hashes,
@@ -245,21 +253,29 @@ fn found_flight(
         Some(record) => held_record(&at, record, &files, &mut notes, hashes),
         None => None,
     };
-    let logs = files
+    let mut logs: Vec<LogInput> = files
         .into_iter()
         .map(|path| LogInput {
             slot: recorded_slot(&at, record.as_ref(), &path),
             path,
-            table: None,
+            ..LogInput::default()
         })
         .collect();
     let vehicle = library::load(&folder.vehicle().to_string_lossy()).ok();
     let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
     let flown = record.as_ref().zip(vehicle.as_ref());
-    // Logs of the simulator have a record; others may have been flown by streaming.
+    // Logs of the simulator have a record; of others the start was written down when it was authorized.
     let start = match &record {
         Some(record) => Some(record.start),
-        None => StartRecord::read_in(&at.folder)?.map(|record| record.start),
+        None => {
+            let at = of_start::Flight {
+                logs: &at.folder,
+                campaign: Some((campaign, plan.name.as_str())),
+            };
+            let (start, doubts) = of_start::refuse(&at, &mut logs)?;
+            notes.extend(doubts);
+            start
+        }
     };
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),

@@ -1,34 +1,30 @@
 //! `updraft logs`: what is on the drones, bringing it home, checking it, and cards.
 
+mod ask;
+mod cards;
 mod dry;
 mod listing;
 mod simulated;
 mod who;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::clock::SystemClock;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::{one_flight, server};
-use super::simulate::{SlotSet, made_by, parse_slots};
+use super::simulate::{SlotSet, parse_slots};
 use super::words;
-use crate::base::file::create_folder;
 use crate::base::plain::Shown as _;
 use crate::campaign::start::earlier_folders;
 use crate::campaign::{self, FlightFolder};
-use crate::fleet::logs::import::{ImportOptions, import};
 use crate::fleet::logs::one::Which;
 use crate::fleet::logs::verify::verify;
-use crate::fleet::slots::FleetTable;
-use crate::link::clock::Clock as _;
 use crate::mission::Plan;
 
 pub(super) use listing::{ListRow, ListedLog};
@@ -40,7 +36,7 @@ pub(super) use listing::{ListRow, ListedLog};
   updraft logs pull my-campaign --flight hover              # go on after Ctrl-C: the same command
   updraft logs pull my-campaign --flight hover --log all --rate 400000
   updraft logs verify my-campaign
-  updraft logs import my-campaign --flight hover /media/card1 /media/card2
+  updraft logs import my-campaign /media/card1 /media/card2   # each log to the flight it is of
 
 Logs come over MAVFTP, or over the log messages where that fails. What has come is kept at every
 interruption; a log is given its name when its checksum (or size, and pieces read again) agrees with
@@ -63,8 +59,8 @@ enum LogsCommand {
     /// Check logs against their manifest (simulated ones: their record): size, checksum, and whether
     /// they are logs
     Verify(VerifyArgs),
-    /// Take logs from SD cards; whose they are, they say themselves
-    Import(ImportArgs),
+    /// Take logs from SD cards; whose they are and of which flight, they say themselves
+    Import(cards::ImportArgs),
 }
 
 #[derive(Debug, Args)]
@@ -122,24 +118,6 @@ struct VerifyArgs {
     campaign: PathBuf,
 }
 
-#[derive(Debug, Args)]
-struct ImportArgs {
-    /// Campaign folder
-    campaign: PathBuf,
-    /// Folders of cards, or files
-    #[arg(required = true)]
-    cards: Vec<PathBuf>,
-    /// Which flight, if the campaign has several
-    #[arg(long, value_name = "NAME")]
-    flight: Option<String>,
-    /// When the show started, Unix time in seconds: of several logs the one that covers it
-    #[arg(long, value_name = "UNIX_S")]
-    start: Option<i64>,
-    /// Replace logs that are there
-    #[arg(long)]
-    again: bool,
-}
-
 fn which(text: &str) -> Result<Which, String> {
     match text {
         "flight" => Ok(Which::Flight),
@@ -156,7 +134,7 @@ pub(super) fn run(context: &Context, args: &LogsArgs) -> Result<Exit, CommandErr
         LogsCommand::List(args) => list(context, args),
         LogsCommand::Pull(args) => pull(context, args),
         LogsCommand::Verify(args) => check(context, args),
-        LogsCommand::Import(args) => cards(context, args),
+        LogsCommand::Import(args) => cards::run(context, args),
     }
 }
 
@@ -233,21 +211,12 @@ struct PullOutput<T> {
     logs: Vec<T>,
 }
 
-/// A word of a shell's command line.
-fn word(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:@,+=".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text.to_owned()
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
-    }
-}
-
 /// The command that brings these slots' logs, over the same links and with the same options.
 fn once_more(args: &PullArgs, flight: &str, slots: &[u16]) -> String {
     let campaign = args.campaign.shown().to_string();
-    let mut words = vec!["updraft logs pull".to_owned(), word(&campaign)];
-    let mut add = |option: &str, value: &str| words.push(format!("{option} {}", word(value)));
+    let mut words = vec!["updraft logs pull".to_owned(), words::shell(&campaign)];
+    let mut add =
+        |option: &str, value: &str| words.push(format!("{option} {}", words::shell(value)));
     add("--flight", flight);
     for link in &args.connect.connect {
         add("--connect", link);
@@ -400,93 +369,4 @@ fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
         context.print_json(&VerifyOutput { schema: "updraft.verify/1", logs: rows })?;
     }
     Ok(if bad == 0 { Exit::Done } else { Exit::Losses })
-}
-
-#[derive(Serialize)]
-struct ImportOutput {
-    schema: &'static str,
-    taken: Vec<String>,
-    there: Vec<String>,
-    left: Vec<String>,
-    missing_slots: Vec<u16>,
-}
-
-fn cards(context: &Context, args: &ImportArgs) -> Result<Exit, CommandError> {
-    let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-    let _lock = context.lock(&args.campaign)?;
-    create_folder(&folder.logs())?;
-    let options = ImportOptions {
-        slots: system_ids(&folder)?,
-        files: log_names(&folder, &plan),
-        start: args
-            .start
-            .map(|unix_s| {
-                crate::base::time::GpsTime::from_unix_ms(unix_s.saturating_mul(1000)).ok_or_else(
-                    || CommandError::Usage(format!("--start {unix_s} is not a GPS time")),
-                )
-            })
-            .transpose()?,
-        again: args.again,
-        made_by: made_by(),
-        unix_s: SystemClock::start().unix_us() / 1_000_000,
-    };
-    let report = import(&args.cards, &plan, &folder.logs(), &options)?;
-    for (path, reason) in &report.left {
-        context.warn(&format!("{} was left: {reason}", path.shown()));
-    }
-    for (entry, why) in
-        report.taken.iter().filter_map(|entry| Some((entry, entry.incomplete.as_ref()?)))
-    {
-        context.warn(&format!(
-            "{} is not known to be whole: {why}; `updraft logs pull` brings the rest if the drone \
-             has it",
-            entry.file
-        ));
-    }
-    if !report.missing.is_empty() {
-        let slots: Vec<String> = report.missing.iter().map(ToString::to_string).collect();
-        context.warn(&format!("no log of slots {}", slots.join(", ")));
-    }
-    context.say(&format!(
-        "Took {} from cards{}",
-        words::count(report.taken.len(), "log"),
-        match report.there.len() {
-            0 => String::new(),
-            there => format!(" ({there} had come before)"),
-        }
-    ));
-    let lost = !report.missing.is_empty();
-    if context.json {
-        context.print_json(&ImportOutput {
-            schema: "updraft.import/1",
-            taken: report.taken.iter().map(|entry| entry.file.clone()).collect(),
-            there: report.there,
-            left: report
-                .left
-                .iter()
-                .map(|(path, why)| format!("{}: {why}", path.shown()))
-                .collect(),
-            missing_slots: report.missing,
-        })?;
-    }
-    Ok(if lost { Exit::Losses } else { Exit::Done })
-}
-
-/// Slots by system id, from the campaign's table.
-fn system_ids(folder: &FlightFolder) -> Result<BTreeMap<u8, u16>, CommandError> {
-    if !FleetTable::path(&folder.0).exists() {
-        return Ok(BTreeMap::new());
-    }
-    let table = FleetTable::read(&folder.0)?;
-    Ok(table.drones.iter().map(|line| (line.drone.system, line.slot)).collect())
-}
-
-fn log_names(folder: &FlightFolder, plan: &Plan) -> BTreeMap<u16, String> {
-    plan.slots
-        .iter()
-        .filter_map(|slot| {
-            let path = folder.log(slot.slot, plan.slots.len());
-            Some((slot.slot, path.file_name()?.to_string_lossy().into_owned()))
-        })
-        .collect()
 }

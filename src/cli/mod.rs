@@ -24,6 +24,7 @@ mod leaning;
 mod load;
 mod logs;
 mod mission_args;
+mod of_start;
 mod outcome;
 mod physics;
 mod plan;

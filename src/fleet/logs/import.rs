@@ -1,248 +1,164 @@
-//! Logs from cards: who flew where is in the logs themselves.
+//! Logs from cards: whose they are and which flight they are of, they say themselves.
+//!
+//! A card holds the logs of a day: both flights, what was aborted, last week's. [`survey`] reads what is
+//! there, [`decide`] says which log is taken for which slot of which flight, and what is left and why,
+//! and [`carry_out`] copies. Where two logs fit equally, or a log contradicts itself, nothing is chosen:
+//! that is a [`Doubt`] for a person.
+
+mod cards;
+mod carry;
+mod decide;
+mod place;
+mod survey;
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::manifest::{ManifestEntry, Method, Shelf, Verified};
-use super::part::sums;
-use crate::base::file::{FileError, open_regular, write_with};
-use crate::base::frame::Geodetic;
-use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
-use crate::campaign::CampaignError;
-use crate::flight::{Identity, identify};
-use crate::log::Log;
+use crate::campaign::start::StartRecord;
+use crate::flight::Identity;
 use crate::mission::Plan;
-use nalgebra::Vector3;
 
-/// A log's home is the slot's when it is nearer than this, m (satellite positions are no better).
-const NEAR_M: f64 = 2.5;
-/// A home this far from the slot of its system id contradicts it, m.
-const FAR_M: f64 = 10.0;
-/// Files and folders looked at below a card, at most.
-const MOST_FILES: usize = 100_000;
+pub use carry::{Carried, Carry, carry_out};
+pub use decide::decide;
+pub use survey::survey;
 
-/// How cards are imported.
+/// A flight of the campaign.
 #[derive(Clone, Debug)]
-pub struct ImportOptions {
+pub struct ImportFlight {
+    /// Short name.
+    pub name: String,
+    /// What was to be flown.
+    pub plan: Plan,
+    /// Its folder of logs.
+    pub logs: PathBuf,
     /// Slot of each system id; empty: the slot's number is the system id.
     pub slots: BTreeMap<u8, u16>,
     /// File name of each slot's log.
     pub files: BTreeMap<u16, String>,
-    /// When the flight started, if that is known: of several logs the one that covers it.
+    /// When it began, if that is known.
     pub start: Option<GpsTime>,
-    /// Takes the place of logs that are there.
-    pub again: bool,
-    /// Program and version, for the manifest.
-    pub made_by: String,
-    /// For the manifest, Unix seconds.
-    pub unix_s: u64,
+    /// What was written down when its start was authorized.
+    pub record: Option<StartRecord>,
+    /// Whether its logs are imported; those of others are only recognized.
+    pub is_wanted: bool,
 }
 
-/// What came of cards.
+/// A log on a card.
+#[derive(Clone, Debug)]
+pub struct CardLog {
+    /// The file.
+    pub path: PathBuf,
+    /// Its size, bytes.
+    pub size_bytes: u64,
+    /// What it says of itself.
+    pub identity: Identity,
+    /// The shows in it that were flown, held against the plans of flights without a known start.
+    pub flown: Vec<Flown>,
+    /// The first of the logs that has the very same bytes.
+    pub copy_of: Option<usize>,
+    /// A longer log that begins with it.
+    pub beginning_of: Option<usize>,
+}
+
+/// A flight in a log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flown {
+    /// GPS time of show time 0; `None`: the log does not say.
+    pub start: Option<GpsTime>,
+    /// For each flight of the campaign, the share of its plan that was flown, 0..1; 0 where its slot is
+    /// not known.
+    pub shares: Vec<f64>,
+}
+
+/// What was found on the cards.
 #[derive(Clone, Debug, Default)]
-pub struct Imported {
-    /// Taken over.
-    pub taken: Vec<ManifestEntry>,
-    /// There already: file names.
-    pub there: Vec<String>,
-    /// Logs that were left, and why.
-    pub left: Vec<(PathBuf, String)>,
-    /// Slots without a log, now.
-    pub missing: Vec<u16>,
+pub struct Survey {
+    /// The logs, by path.
+    pub logs: Vec<CardLog>,
+    /// Files that are no logs or cannot be read, and why.
+    pub unreadable: Vec<(PathBuf, String)>,
+    /// Cards without a log.
+    pub empty: Vec<PathBuf>,
 }
 
-/// The number of a log in the name that the firmware gave it: `00000012.BIN`.
-fn number(path: &Path) -> Option<u32> {
-    let stem = path.file_stem()?.to_str()?;
-    let is_number = stem.len() == 8 && stem.bytes().all(|byte| byte.is_ascii_digit());
-    if is_number { stem.parse().ok() } else { None }
+/// What a person has answered to doubts.
+#[derive(Clone, Debug, Default)]
+pub struct Answers {
+    /// By flight: when it began.
+    pub starts: BTreeMap<usize, GpsTime>,
+    /// By flight and slot: which log; `None`: none of them.
+    pub logs: BTreeMap<(usize, u16), Option<usize>>,
 }
 
-struct Candidate {
-    path: PathBuf,
-    identity: Identity,
+/// How the start of a flight is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StartFrom {
+    /// It was written down, or given, or answered.
+    Known,
+    /// So many drones flew the plan then, by their logs.
+    Agreed(usize),
 }
 
-/// Takes the logs of a flight over from cards (folders or files) into the folder `logs`.
-///
-/// A log belongs to the slot of its system id. Where ids are missing or were never set (several
-/// logs of one flight have the same) its home decides; where both contradict each other the log is
-/// left, with the reason.
-///
-/// # Errors
-/// When the folder's manifest cannot be read or written.
-pub fn import(
-    cards: &[PathBuf],
-    plan: &Plan,
-    logs: &Path,
-    options: &ImportOptions,
-) -> Result<Imported, CampaignError> {
-    let mut shelf = Shelf::open(logs, &options.made_by)?;
-    let mut report = Imported::default();
-    let mut found = Vec::new();
-    for card in cards {
-        find(card, &mut found, &mut report.left);
-    }
-    found.sort();
-    let mut of_slot: BTreeMap<u16, Vec<Candidate>> = BTreeMap::new();
-    for path in found {
-        match Log::open(&path) {
-            Err(error) => report.left.push((path, error.to_string())),
-            Ok(log) => {
-                let identity = identify(&log);
-                match slot_of(&identity, plan, options) {
-                    Ok(slot) => {
-                        of_slot.entry(slot).or_default().push(Candidate { path, identity });
-                    }
-                    Err(reason) => report.left.push((path, reason)),
-                }
-            }
-        }
-    }
-    for (slot, candidates) in of_slot {
-        let Some(file) = options.files.get(&slot) else { continue };
-        let target = shelf.path(file);
-        if target.exists() && !options.again {
-            let source = candidates.iter().map(|candidate| candidate.path.clone());
-            report.left.extend(source.map(|path| (path, format!("{file} is there already"))));
-            report.there.push(file.clone());
-            continue;
-        }
-        let best = choose(candidates, options.start, &mut report.left);
-        let Some(Candidate { path, identity }) = best else { continue };
-        match copy(&path, &target) {
-            Err(error) => report.left.push((path, format!("{error}: {}", error.source))),
-            Ok(sums) => {
-                let entry = ManifestEntry {
-                    file: file.clone(),
-                    slot,
-                    drone: None,
-                    boot: number(&path),
-                    source: path.shown().to_string(),
-                    size_bytes: sums.size,
-                    sha256: sums.sha256,
-                    method: Method::Import,
-                    method_reason: None,
-                    verified: Verified::Copy,
-                    incomplete: identity.cut.map(str::to_owned),
-                    attempts: 1,
-                    at_unix_s: options.unix_s,
-                    flight: None,
-                };
-                shelf.add(entry.clone())?;
-                report.taken.push(entry);
-            }
-        }
-    }
-    let has = |slot: u16| options.files.get(&slot).is_some_and(|file| shelf.path(file).exists());
-    report.missing = plan.slots.iter().map(|slot| slot.slot).filter(|slot| !has(*slot)).collect();
-    Ok(report)
+/// A log that is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Take {
+    /// The flight.
+    pub flight: usize,
+    /// The slot.
+    pub slot: u16,
+    /// The log.
+    pub log: usize,
 }
 
-/// Logs below a folder; links are not followed.
-fn find(path: &Path, found: &mut Vec<PathBuf>, left: &mut Vec<(PathBuf, String)>) {
-    let mut folders = vec![path.to_owned()];
-    while let Some(path) = folders.pop() {
-        let about = match fs::symlink_metadata(&path) {
-            Ok(about) => about,
-            Err(error) => {
-                left.push((path, format!("cannot be read: {error}")));
-                continue;
-            }
-        };
-        if about.is_dir() {
-            let entries = fs::read_dir(&path).into_iter().flatten().flatten();
-            folders.extend(entries.map(|entry| entry.path()));
-        } else if about.is_file()
-            && path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("bin"))
-        {
-            found.push(path.clone());
-        }
-        if found.len() + folders.len() > MOST_FILES {
-            left.push((path, format!("more than {MOST_FILES} files: give the cards' folders")));
-            return;
-        }
-    }
+/// What cannot be decided without a person.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Doubt {
+    /// The plan was flown at several times, by equally many drones.
+    Start {
+        /// The flight.
+        flight: usize,
+        /// The starts, earliest first, each with the number of drones that flew it.
+        starts: Vec<(GpsTime, usize)>,
+    },
+    /// Several logs fit one slot equally, or of the only one it is not known.
+    Log {
+        /// The flight.
+        flight: usize,
+        /// The slot.
+        slot: u16,
+        /// The logs.
+        logs: Vec<usize>,
+        /// Why none is taken, one clause.
+        why: String,
+    },
+    /// A log of the flight whose slot is not known.
+    Slot {
+        /// The flight.
+        flight: usize,
+        /// The log.
+        log: usize,
+        /// Why, one clause.
+        why: String,
+    },
+    /// A log that fits several flights equally.
+    Flight {
+        /// The log.
+        log: usize,
+        /// The flights.
+        flights: Vec<usize>,
+    },
 }
 
-fn slot_of(identity: &Identity, plan: &Plan, options: &ImportOptions) -> Result<u16, String> {
-    let frame = plan.site.frame();
-    let distance_m = |slot: u16| {
-        let home = identity.home(options.start)?;
-        let slot = plan.slot(slot)?;
-        let there = frame.from_geodetic(Geodetic { amsl_m: frame.origin.amsl_m, ..home });
-        let own = Vector3::from(slot.home_m);
-        Some((there - own).xy().norm())
-    };
-    let near = plan.slots.iter().map(|slot| slot.slot).filter_map(|slot| {
-        distance_m(slot).filter(|distance| *distance < NEAR_M).map(|distance| (distance, slot))
-    });
-    let near = near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, slot)| slot);
-    let by_id = identity.system_id.and_then(|system| {
-        if options.slots.is_empty() {
-            plan.slot(system.into()).map(|slot| slot.slot)
-        } else {
-            options.slots.get(&system).copied()
-        }
-    });
-    match (by_id, near) {
-        (Some(slot), Some(near)) if slot != near => {
-            if distance_m(slot).is_some_and(|distance| distance > FAR_M) {
-                // Ids that were never set: where it stood tells.
-                Ok(near)
-            } else {
-                Err(format!(
-                    "its system id is of slot {slot}, but it stood at slot {near}: \
-                     copy it by hand if you know which"
-                ))
-            }
-        }
-        (Some(slot), None) if distance_m(slot).is_some_and(|distance| distance > FAR_M) => {
-            Err(format!("its system id is of slot {slot}, but it was elsewhere: another flight"))
-        }
-        (Some(slot), _) | (None, Some(slot)) => Ok(slot),
-        (None, None) => Err("neither its system id nor its home is in the plan".to_owned()),
-    }
-}
-
-/// Of several logs of a slot: the one that covers the start, else the latest.
-fn choose(
-    candidates: Vec<Candidate>,
-    start: Option<GpsTime>,
-    left: &mut Vec<(PathBuf, String)>,
-) -> Option<Candidate> {
-    let covers = |candidate: &Candidate| match (start, candidate.identity.span()) {
-        (Some(start), Some((first, last))) => {
-            (first.total_ms()..=last.total_ms()).contains(&start.total_ms())
-        }
-        _ => false,
-    };
-    let rank = |candidate: &Candidate| {
-        let latest = candidate.identity.span().map(|(first, _)| first.total_ms());
-        (covers(candidate), latest, candidate.path.clone())
-    };
-    let mut candidates = candidates;
-    candidates.sort_by_key(|candidate| rank(candidate));
-    let best = candidates.pop()?;
-    for other in candidates {
-        let reason = format!("{} is of the same drone, and later", best.path.shown());
-        left.push((other.path, reason));
-    }
-    Some(best)
-}
-
-fn copy(from: &Path, to: &Path) -> Result<super::part::Sums, FileError> {
-    let (mut source, _) =
-        open_regular(from).map_err(|error| FileError::new("open", from, error))?;
-    write_with(to, |out| io::copy(&mut source, out).map(drop))?;
-    let (right, found) = (sums(from)?, sums(to)?);
-    if right == found {
-        Ok(found)
-    } else {
-        let error = io::Error::other("the copy differs from the card: read the card again");
-        Err(FileError::new("copy", from, error))
-    }
+/// What is to be done.
+#[derive(Clone, Debug, Default)]
+pub struct Decision {
+    /// By flight: when it began, and how that is known; `None`: no log on the cards flew it.
+    pub starts: Vec<Option<(GpsTime, StartFrom)>>,
+    /// What is taken, by flight and slot.
+    pub take: Vec<Take>,
+    /// What is left, and why.
+    pub left: Vec<(usize, String)>,
+    /// What a person must decide.
+    pub doubts: Vec<Doubt>,
 }
