@@ -79,6 +79,7 @@ fn a_log_of_another_start_is_refused_by_name() {
     let start = start_of(&one);
     write_start(&hover, start);
     bench.expect(0, &["analyze", "campaign", "--no-report"]);
+    let right = fs::read(&two).unwrap();
     shift(&two, -1_204_000);
     let ended = bench.expect(3, &["analyze", "campaign", "--no-report"]);
     let told = words(&ended);
@@ -88,6 +89,14 @@ fn a_log_of_another_start_is_refused_by_name() {
                    campaign --flight hover CARD`";
     assert!(told.contains(refused), "{ended}");
     assert!(told.contains("hover 1 of 2 drones") || told.contains("slot 2"), "{ended}");
+    // Where the right one was set aside, that is said instead.
+    let kept = hover.join("logs/flight-1/02.BIN");
+    fs::create_dir_all(kept.parent().unwrap()).unwrap();
+    fs::write(&kept, right).unwrap();
+    let ended = bench.expect(3, &["analyze", "campaign", "--no-report"]);
+    let place = "the log of this one is campaign/hover/logs/flight-1/02.BIN: put it in its place";
+    assert!(words(&ended).contains(place), "{ended}");
+    fs::remove_file(kept).unwrap();
     // Whoever names the other start means its logs.
     let other = (start.to_unix_ms() / 1000 - 1204).to_string();
     let ended = bench.run(&["analyze", "campaign", "--no-report", "--start", &other]);

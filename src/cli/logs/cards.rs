@@ -340,7 +340,9 @@ impl Report<'_> {
             }
             let came = outcomes.iter().any(|(take, _)| take.flight == index);
             let all = slots.len() == flight.plan.slots.len();
-            if all && !came && wanted > 1 && !outcomes.is_empty() && flight.record.is_none() {
+            let is_doubted = self.decision.doubts.iter().any(|doubt| doubt.is_of(index));
+            let is_free = all && !came && !is_doubted && flight.record.is_none();
+            if is_free && wanted > 1 && !outcomes.is_empty() {
                 self.context.say(&format!("no log of {} is on the cards", flight.name));
                 continue;
             }

@@ -150,6 +150,18 @@ pub enum Doubt {
     },
 }
 
+impl Doubt {
+    /// Whether it is about this flight.
+    pub fn is_of(&self, number: usize) -> bool {
+        match self {
+            Self::Start { flight, .. } | Self::Log { flight, .. } | Self::Slot { flight, .. } => {
+                *flight == number
+            }
+            Self::Flight { flights, .. } => flights.contains(&number),
+        }
+    }
+}
+
 /// What is to be done.
 #[derive(Clone, Debug, Default)]
 pub struct Decision {

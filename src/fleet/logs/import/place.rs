@@ -21,67 +21,55 @@ pub(super) enum NoSlot {
     Contradiction(String),
 }
 
-/// The slot of a flight's plan that a log is of. A log belongs to the slot of its system id. Where ids
-/// are missing or were never set (several logs of one flight have the same) its home decides.
+/// The slot of a flight's plan that a log is of: by the campaign's table of drones, which the place must
+/// not contradict; without a table by the place where it stood, as ids may be set in any order or never.
 pub(super) fn slot_of(
     identity: &Identity,
     flight: &ImportFlight,
     start: Option<GpsTime>,
 ) -> Result<u16, NoSlot> {
     let plan = &flight.plan;
-    let frame = plan.site.frame();
-    let home = identity.home(start);
-    let distance_m = |slot: u16| {
-        let slot = plan.slot(slot)?;
-        let there = frame.from_geodetic(Geodetic { amsl_m: frame.origin.amsl_m, ..home? });
-        Some((there - Vector3::from(slot.home_m)).xy().norm())
-    };
-    let mut near: Vec<(f64, u16)> = (plan.slots.iter())
-        .filter_map(|slot| Some((distance_m(slot.slot)?, slot.slot)))
-        .filter(|(distance, _)| *distance < NEAR_M)
-        .collect();
-    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let has_table = !flight.slots.is_empty();
     let by_id = identity.system_id.and_then(|system| {
-        if flight.slots.is_empty() {
-            plan.slot(system.into()).map(|slot| slot.slot)
-        } else {
+        if has_table {
             flight.slots.get(&system).copied()
+        } else {
+            plan.slot(system.into()).map(|slot| slot.slot)
         }
     });
-    let away_m = by_id.and_then(distance_m);
-    match (by_id, near.as_slice()) {
-        (Some(slot), _) if away_m.is_none_or(|away_m| away_m < NEAR_M) => Ok(slot),
-        (Some(slot), [(near_m, near), ..]) => {
-            let is_far = away_m.is_some_and(|away_m| away_m > FAR_M);
-            if is_far && flight.slots.is_empty() {
-                // Ids that were never set: where it stood tells.
-                Ok(*near)
-            } else {
-                Err(NoSlot::Contradiction(format!(
-                    "its system id is of slot {slot}, but it stood {near_m:.1} m from the home of slot \
-                     {near} and {:.1} m from its own",
-                    away_m.unwrap_or(f64::NAN)
-                )))
-            }
-        }
-        (Some(slot), []) if away_m.is_some_and(|away_m| away_m > FAR_M) => {
-            Err(NoSlot::Elsewhere(format!(
-                "its system id is of slot {slot}, but it stood {} from there: it was flown elsewhere",
-                metres(away_m.unwrap_or_default())
-            )))
-        }
-        (Some(slot), []) => Ok(slot),
-        (None, [(_, only)]) => Ok(*only),
-        (None, [(first_m, first), (second_m, second), ..]) => {
-            if 2.0 * first_m < *second_m {
-                Ok(*first)
-            } else {
-                Err(NoSlot::Contradiction(format!(
-                    "its system id is of no slot, and it stood between slots {first} and {second}"
-                )))
-            }
-        }
-        (None, []) => {
+    let Some(home) = identity.home(start) else {
+        let nowhere = "its system id is of no slot, and it does not say where it stood";
+        return by_id.ok_or_else(|| NoSlot::Elsewhere(nowhere.to_owned()));
+    };
+    let frame = plan.site.frame();
+    let there = frame.from_geodetic(Geodetic { amsl_m: frame.origin.amsl_m, ..home });
+    let mut slots: Vec<(f64, u16)> = (plan.slots.iter())
+        .map(|slot| ((there - Vector3::from(slot.home_m)).xy().norm(), slot.slot))
+        .collect();
+    slots.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((near_m, near)) = slots.first().copied() else {
+        return Err(NoSlot::Elsewhere("the plan has no slots".to_owned()));
+    };
+    let is_clear = near_m < NEAR_M && slots.get(1).is_none_or(|(next_m, _)| 2.0 * near_m < *next_m);
+    let own_m = by_id.and_then(|own| slots.iter().find(|(_, slot)| *slot == own));
+    match (by_id, own_m.map(|(own_m, _)| *own_m)) {
+        (Some(own), _) if own == near && near_m <= FAR_M => Ok(own),
+        (_, _) if is_clear && !has_table => Ok(near),
+        (None, _) if is_clear => Ok(near),
+        (Some(own), Some(own_m)) if is_clear => Err(NoSlot::Contradiction(format!(
+            "its system id is of slot {own}, but it stood {near_m:.1} m from the home of slot {near} \
+             and {own_m:.1} m from its own"
+        ))),
+        (Some(own), Some(own_m)) if own_m <= FAR_M => Ok(own),
+        (Some(own), Some(own_m)) => Err(NoSlot::Elsewhere(format!(
+            "its system id is of slot {own}, but it stood {} from there: it was flown elsewhere",
+            metres(own_m)
+        ))),
+        (_, _) if near_m < FAR_M => Err(NoSlot::Contradiction(format!(
+            "its system id is of no slot, and it stood {near_m:.1} m from the home of slot {near}, the \
+             nearest"
+        ))),
+        (_, _) => {
             Err(NoSlot::Elsewhere("neither its system id nor its home is in the plan".to_owned()))
         }
     }
