@@ -366,7 +366,7 @@ impl Report<'_> {
                         format!(
                             "{} (--start {}, {})",
                             utc(*start),
-                            start.to_unix_ms().div_euclid(1000),
+                            unix_s(*start),
                             words::count(*count, "log")
                         )
                     })
@@ -461,9 +461,14 @@ impl Report<'_> {
     }
 }
 
+/// The nearest second: starts are whole seconds, and logs know them to some tenths.
+fn unix_s(time: GpsTime) -> i64 {
+    time.to_unix_ms().saturating_add(500).div_euclid(1000)
+}
+
 /// `2026-11-21 14:03:11 UTC`.
 fn utc(time: GpsTime) -> String {
-    let seconds = time.to_unix_ms().div_euclid(1000);
+    let seconds = unix_s(time);
     let (year, month, day) = date(seconds.div_euclid(86_400));
     let second = seconds.rem_euclid(86_400);
     format!(

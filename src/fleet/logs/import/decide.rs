@@ -318,7 +318,17 @@ impl Work<'_> {
                         Ok(slot) if self.answers.logs.contains_key(&(number, slot)) => {
                             "not chosen".to_owned()
                         }
-                        Ok(slot) => format!("slot {slot} of {} has another log", flight.name),
+                        Ok(slot) => {
+                            let shares =
+                                log.flown.iter().filter_map(|flown| flown.shares.get(number));
+                            let share = shares.copied().fold(0.0, f64::max);
+                            let own = format!("slot {slot} of {} has another log", flight.name);
+                            if log.flown.is_empty() || share >= WHOLE {
+                                own
+                            } else {
+                                format!("{own}, which flew more of its plan")
+                            }
+                        }
                     };
                 }
             }
