@@ -202,8 +202,9 @@ fn cards_are_imported_into_the_flights_they_are_of() {
     bench.expect(0, &["logs", "verify", "campaign"]);
     bench.expect(0, &["analyze", "campaign", "--no-report"]);
     // Once more: they are home.
-    fs::create_dir_all(hover.join("logs")).unwrap();
-    write_start(&hover, start);
+    for flight in ["calibration", "hover"] {
+        write_start(&bench.path("campaign").join(flight), start);
+    }
     let ended = bench.expect(0, &import);
     assert!(ended.err.contains("Took 0 logs from cards (4 had come before)"), "{ended}");
     let json = bench.expect(0, &[&import[..], &["--json"]].concat()).json("updraft.import/1");
