@@ -456,6 +456,31 @@ fn a_fence_is_weakened_for_nobody_while_anyone_may_be_flying() {
 }
 
 #[test]
+fn a_drone_that_has_just_disarmed_is_on_the_ground_whatever_it_said_before() {
+    let plan = plan();
+    let landing = || status(Stage::Landing, Some(5), flag::AUTHORIZED);
+    for (before, after, wanted) in [
+        (landing(), None, State::Ground),
+        (landing(), Some(status(Stage::Landed, Some(5), flag::AUTHORIZED)), State::Ground),
+        // It says so after its heartbeat: that is what counts.
+        (landing(), Some(landing()), State::Flying),
+    ] {
+        let mut said = VecDeque::from([before, beat(false)]);
+        said.extend(after);
+        let later = Rc::new(RefCell::new(0));
+        let mut net = Later { net: Still::default(), now: Rc::clone(&later) };
+        let said = said.into_iter().map(|message| Received { from: drone(1), message });
+        net.net.said = said.collect();
+        let mut gate = Gate::new(&mut net, &plan);
+        while gate.recv(0).unwrap().is_some() {
+            *later.borrow_mut() += S / 10;
+        }
+        assert_eq!(gate.state(drone(1)), wanted);
+        assert!(gate.is_disarmed(drone(1)));
+    }
+}
+
+#[test]
 fn what_is_refused_says_what_and_why_and_is_not_sent() {
     let plan = plan();
     let mut net = Still::default();

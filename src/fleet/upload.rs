@@ -245,11 +245,11 @@ impl Upload {
     /// What keeps the vehicle from being touched at all.
     fn untouchable(&self) -> Option<UploadError> {
         let authorized = self.status.is_some_and(|status| status.has(flag::AUTHORIZED));
-        match self.armed {
-            Some(true) => Some(match self.status.map(|status| status.stage) {
-                Some(stage) if stage.is_flying() => UploadError::Flying { stage },
-                _ => UploadError::Armed,
-            }),
+        let stage = self.status.map(|status| status.stage);
+        match (self.armed, stage) {
+            // Its heartbeat may come later.
+            (_, Some(stage)) if stage.is_flying() => Some(UploadError::Flying { stage }),
+            (Some(true), _) => Some(UploadError::Armed),
             _ if authorized => Some(UploadError::Authorized),
             _ => None,
         }

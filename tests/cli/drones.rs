@@ -23,7 +23,7 @@ use updraft::virtual_fleet::world::World;
 
 use crate::support::Bench;
 
-struct Wall(Instant);
+pub(crate) struct Wall(pub(crate) Instant);
 
 impl Clock for Wall {
     fn now(&self) -> Micros {

@@ -74,6 +74,11 @@ impl<'a> Gate<'a> {
         self.seen.get(&drone).copied().unwrap_or_default().words(self.net.now())
     }
 
+    /// Whether its motors stand still, by a heartbeat that is fresh.
+    pub fn is_disarmed(&self, drone: DroneId) -> bool {
+        self.seen.get(&drone).is_some_and(|seen| seen.is_disarmed(self.net.now()))
+    }
+
     /// Drones of these that are armed or may be flying, with the words; those that are not heard
     /// are among them only with `unheard`.
     pub fn in_the_air(

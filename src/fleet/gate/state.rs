@@ -47,16 +47,23 @@ impl Seen {
         value.filter(|(at, _)| now.saturating_sub(*at) <= SILENT_AFTER).map(|(_, value)| value)
     }
 
+    /// Its motors stand still, by a heartbeat that is fresh.
+    pub(super) fn is_disarmed(&self, now: Micros) -> bool {
+        Self::fresh(self.beat, now) == Some(false)
+    }
+
     pub(super) fn state(&self, now: Micros) -> State {
         let Some(armed) = Self::fresh(self.beat, now) else { return State::Unheard };
         let status = Self::fresh(self.status, now);
         let stage = status.map(|status| status.stage);
+        // What was said of a flight before the motors stopped says nothing any more.
+        let is_older = self.status.map(|(at, _)| at) < self.beat.map(|(at, _)| at);
         let waits = matches!(stage, Some(Stage::Init | Stage::WaitForStart));
         let starts = status.is_some_and(|of| of.has(flag::AUTHORIZED) && of.start_tow_s >= 0);
         match (armed, waits) {
             (true, true) => State::Armed,
             (true, false) => State::Flying,
-            (false, _) if stage.is_some_and(Stage::is_flying) => State::Flying,
+            (false, _) if !is_older && stage.is_some_and(Stage::is_flying) => State::Flying,
             (false, true) if starts => State::Waiting,
             (false, _) => State::Ground,
         }

@@ -4,7 +4,6 @@
 use std::fmt::Write as _;
 
 use super::Crew;
-use crate::fleet::gate::State;
 use crate::link::id::DroneId;
 
 /// How a flight has ended for one drone.
@@ -41,11 +40,15 @@ impl std::fmt::Display for Ended {
 impl Crew<'_> {
     /// How the flight has ended for a drone.
     pub(in crate::cli) fn ended(&self, drone: DroneId) -> Ended {
-        match self.net.state(drone) {
-            State::Ground | State::Waiting if self.flew.contains(&drone) => Ended::Landed,
-            State::Ground | State::Waiting if self.attached => Ended::OnGround,
-            State::Ground | State::Waiting => Ended::NeverTookOff,
-            _ => Ended::NotSeen(self.net.words(drone)),
+        // The show's own status may be behind the heartbeat: the motors decide.
+        if !self.net.is_disarmed(drone) {
+            Ended::NotSeen(self.net.words(drone))
+        } else if self.flew.contains(&drone) {
+            Ended::Landed
+        } else if self.attached {
+            Ended::OnGround
+        } else {
+            Ended::NeverTookOff
         }
     }
 
