@@ -45,7 +45,7 @@ fn put(station: &str, params: &[(&str, f32)]) {
     let clock = Arc::new(Wall(Instant::now()));
     let links = links(&format!("udpin:{station}")).unwrap();
     let mut net = Station::open(Setup { links, key: None, clock }).unwrap();
-    let mut listen = |net: &mut Station, until: Micros| {
+    let listen = |net: &mut Station, until: Micros| {
         while net.now() < until && net.recv(until).unwrap().is_some() {}
     };
     while net.heard().len() < 2 {
