@@ -164,10 +164,12 @@ fn a_log_that_is_longer_on_the_drone_is_continued() {
     storage.put("/APM/LOGS/00000003.BIN", content(3, 900)).unwrap();
     let done = pull_again(&mut net, logs, 2);
     assert_eq!((&done.there[..], done.unchecked), (&["01.BIN".to_owned()][..], None));
+    let reason = done.failure.unwrap().reason;
+    assert!(reason.starts_with("the drone has a newer log (number 3)"), "{reason}");
     logging(&mut net).vehicle.storage.append(LOG, &content(4, 7_000)).unwrap();
     let before = net.carried.down;
     let done = pull_again(&mut net, logs, 3);
-    assert_eq!((done.failure, done.pulled.len()), (None, 1));
+    assert_eq!((done.newer, done.pulled.len()), (Some(3), 1));
     let came = net.carried.down - before;
     assert!(is_whole(&net, logs) && came < 40_000, "{came}");
     // The same number, but another log: what is home stays.

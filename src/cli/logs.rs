@@ -22,6 +22,7 @@ use super::simulate::{SlotSet, parse_slots};
 use super::words;
 use crate::base::plain::Shown as _;
 use crate::campaign;
+use crate::campaign::origin::LogOrigin;
 use crate::campaign::start::earlier_folders;
 use crate::fleet::logs::one::Which;
 use crate::fleet::logs::verify::verify;
@@ -277,7 +278,16 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     };
     let mut station = args.connect.open(links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait)?;
+    let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait);
+    let nobody = nobody.map_err(|error| match error {
+        CommandError::Nothing(text) if folder.has_simulated_logs() => {
+            CommandError::Nothing(format!(
+                "{text}\n  (the simulated logs need no pull: they lie in {})",
+                folder.logs_of(LogOrigin::Simulated).folder.shown()
+            ))
+        }
+        error => error,
+    })?;
     let table = crew.table.clone();
     let mut brought = bring(context, &mut crew.net, &folder, &plan, &table, &wish)?;
     let nobody = nobody.into_iter().map(|(slot, why)| Brought {

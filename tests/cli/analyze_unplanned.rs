@@ -100,7 +100,8 @@ fn laws_of_other_drones_are_used_with_a_warning() {
 fn simulated_logs_are_home_and_can_be_verified() {
     let bench = Bench::new();
     bench.fly();
-    let pulled = bench.expect(0, &["logs", "pull", "campaign"]);
+    let link = format!("udpin:{}", crate::fleet::free_port());
+    let pulled = bench.expect(5, &["logs", "pull", "campaign", "--connect", &link, "--wait", "1"]);
     let whole = bench.expect(0, &["logs", "verify", "campaign"]);
     let path = bench.path("campaign/simulated/02.BIN");
     let mut log = fs::read(&path).unwrap();

@@ -1,7 +1,7 @@
 //! Which of a drone's logs are brought home, and into which files.
 
 use super::home::Needed;
-use super::{FTP_PATIENCE, PullOne, Stage, Target, Which};
+use super::{FTP_PATIENCE, Failure, PullOne, Stage, Target, Which};
 use crate::base::file::create_folder;
 use crate::fleet::ftp::FtpError;
 use crate::fleet::ftp::list::Listed;
@@ -85,14 +85,15 @@ impl PullOne {
         {
             self.done.newer = Some(newest);
             if self.flight.as_ref().is_none_or(|of| of.authorized_start.is_none()) {
-                self.leave(self.file.clone(), None);
-                return self.fail_for_sure(
-                    format!(
+                // The one at home is looked after all the same.
+                self.done.failure.get_or_insert(Failure {
+                    reason: format!(
                         "the drone has a newer log (number {newest}) than the one at home (number \
                          {known}), and no start was written down that tells which is of this flight"
                     ),
-                    "`--log newest` brings it; the one at home then moves to logs/flight-0",
-                );
+                    advice: "`--log newest` brings it; the one at home then moves to logs/flight-0",
+                    kept_bytes: 0,
+                });
             }
         }
         if self.number_at_home().is_some() && known.is_none() && self.is_excused() {
