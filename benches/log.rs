@@ -139,7 +139,7 @@ fn write_rows(bencher: Bencher<'_, '_>) {
     });
 }
 
-/// Logs of the folder `UPDRAFT_DATA`, mapped.
+/// Logs of the folder `UPDRAFT_DATA`.
 fn real_logs() -> Vec<String> {
     let Some(folder) = std::env::var_os("UPDRAFT_DATA").map(PathBuf::from) else {
         return Vec::new();

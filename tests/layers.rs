@@ -85,3 +85,37 @@ fn no_room_uses_one_behind_it() {
     }
     assert!(against.is_empty(), "{}", against.join("\n"));
 }
+
+/// What passes on the text of others as it is, what to use instead, and the files that may.
+const DOORS: &[(&str, &str, &[&str])] = &[
+    (".display()", "base::plain::Shown: `path.shown()`", &[]),
+    ("serde_json::from_", "base::parse::json", &["base/parse.rs", "show/skyc/write.rs"]),
+    ("toml::from_str", "base::parse::toml", &[]),
+    ("io::stdout()", "cli::context::Context", &["cli/context.rs"]),
+    ("io::stderr()", "cli::context::complain", &["cli/context.rs", "cli/fleet/start.rs"]),
+    ("fs::read_to_string(", "base::file::read_whole, which is bounded", &[]),
+    ("fs::read(", "base::file::read_whole, which is bounded", &[]),
+];
+
+#[test]
+fn text_of_others_comes_and_goes_by_its_own_doors() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&src, &mut files);
+    let mut wrong = Vec::new();
+    for path in files {
+        let name = path.strip_prefix(&src).unwrap().to_str().unwrap().to_owned();
+        let text = fs::read_to_string(&path).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        let code = code.split("#[cfg(all(test").next().unwrap_or_default();
+        for (at, line) in code.lines().enumerate() {
+            for (call, instead, may) in DOORS {
+                let is_code = !line.trim_start().starts_with("//");
+                if is_code && line.contains(call) && !may.contains(&name.as_str()) {
+                    wrong.push(format!("src/{name}:{}: {call}: use {instead}", at + 1));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

@@ -1,6 +1,6 @@
 //! Writing files so that nothing half-written is ever taken for whole.
 
-use std::fs::{self, File, Metadata};
+use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -46,6 +46,21 @@ pub fn write_with(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
 ) -> Result<(), FileError> {
+    write_as(path, 0o644, fill)
+}
+
+/// [`write_whole`] for what only its owner may read.
+pub fn write_private(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    write_as(path, 0o600, |out| out.write_all(content))
+}
+
+/// `mode`: who may do what with it, where files have modes.
+#[cfg_attr(not(unix), expect(unused_variables, reason = "files have no modes there"))]
+fn write_as(
+    path: &Path,
+    mode: u32,
+    fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
+) -> Result<(), FileError> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -56,10 +71,12 @@ pub fn write_with(
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o644));
+        builder.permissions(fs::Permissions::from_mode(mode));
     }
     let mut temporary: NamedTempFile =
         builder.prefix(PARTIAL_PREFIX).tempfile_in(folder).map_err(fail)?;
+    // As long as it is locked, nobody sweeps it. Where it cannot be, the folder's lock must do.
+    let _ = temporary.as_file().try_lock();
     {
         let mut out = BufWriter::with_capacity(1 << 16, temporary.as_file_mut());
         fill(&mut out).and_then(|()| out.flush()).map_err(fail)?;
@@ -150,18 +167,61 @@ pub fn read_pieces(path: &Path, mut piece: impl FnMut(&[u8])) -> Result<u64, Fil
     }
 }
 
-/// Removes temporary files that a killed run left in `folder` (not in its subfolders).
+/// Removes temporary files that a killed run left in `folder` (not in its subfolders); one that is
+/// still being written is left alone.
 pub fn sweep_partial(folder: &Path) -> Result<usize, FileError> {
     let fail = |source| FileError::new("clean", folder, source);
     let mut swept = 0;
     for entry in fs::read_dir(folder).map_err(fail)? {
         let entry = entry.map_err(fail)?;
-        if entry.file_name().to_string_lossy().starts_with(PARTIAL_PREFIX) {
-            fs::remove_file(entry.path()).map_err(fail)?;
-            swept += 1;
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if is_file
+            && entry.file_name().to_string_lossy().starts_with(PARTIAL_PREFIX)
+            && !is_being_written(&entry.path())
+        {
+            match fs::remove_file(entry.path()) {
+                Ok(()) => swept += 1,
+                // Renamed or removed by its writer meanwhile.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(fail(error)),
+            }
         }
     }
     Ok(swept)
+}
+
+fn is_being_written(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    matches!(file.try_lock(), Err(TryLockError::WouldBlock))
+}
+
+/// Folders below a campaign's that files are written into: `flight/logs/flight-1`,
+/// `gap/report/figures`.
+const SWEPT_DEPTH: usize = 4;
+/// Folders that are looked into.
+const SWEPT_FOLDERS: usize = 10_000;
+
+/// [`sweep_partial`] for a folder and those below it. Links are not followed, and what cannot be read
+/// or removed is left.
+pub fn sweep_below(folder: &Path) -> usize {
+    let mut swept = 0;
+    let mut left = SWEPT_FOLDERS;
+    let mut open = vec![(folder.to_owned(), 0)];
+    while let Some((folder, depth)) = open.pop() {
+        swept += sweep_partial(&folder).unwrap_or(0);
+        if depth == SWEPT_DEPTH {
+            continue;
+        }
+        let Ok(entries) = fs::read_dir(&folder) else { continue };
+        for entry in entries.flatten() {
+            let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
+            if left > 0 && !is_hidden && entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                left -= 1;
+                open.push((entry.path(), depth + 1));
+            }
+        }
+    }
+    swept
 }
 
 #[cfg(test)]
@@ -189,6 +249,45 @@ mod tests {
         fs::write(folder.path().join("01.BIN"), b"whole").unwrap();
         assert_eq!(sweep_partial(folder.path()).unwrap(), 1);
         assert!(folder.path().join("01.BIN").exists());
+    }
+
+    #[test]
+    fn sweeps_all_folders_but_no_file_that_is_being_written() {
+        let root = tempfile::tempdir().unwrap();
+        let folders = ["", "a", "a/logs", "a/logs/older", "report/figures", "gap/report/figures"];
+        for folder in folders {
+            fs::create_dir_all(root.path().join(folder)).unwrap();
+            fs::write(root.path().join(folder).join(".partial-abc"), b"half").unwrap();
+        }
+        let path = root.path().join("a/logs/01.BIN");
+        write_with(&path, |out| {
+            out.write_all(b"half")?;
+            assert_eq!(sweep_below(root.path()), folders.len());
+            assert_eq!(sweep_below(root.path()), 0);
+            out.write_all(b" and half")
+        })
+        .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"half and half");
+        assert_eq!(fs::read_dir(root.path().join("a/logs")).unwrap().count(), 2);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_has_no_end_or_no_beginning_is_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let refused = |path: &Path| {
+            let whole = read_whole(path, 1 << 20).unwrap_err();
+            let pieces = read_pieces(path, |_| ()).unwrap_err();
+            (whole.source.kind(), pieces.source.kind())
+        };
+        let (wrong, large) = (io::ErrorKind::InvalidInput, io::ErrorKind::FileTooLarge);
+        assert_eq!(refused(&pipe), (wrong, wrong));
+        assert_eq!(refused(Path::new("/dev/zero")), (large, wrong));
+        let directory = io::ErrorKind::IsADirectory;
+        assert_eq!(refused(folder.path()), (directory, directory));
+        assert_eq!(read_whole(Path::new("/dev/null"), 10).unwrap(), b"");
     }
 
     #[test]

@@ -10,5 +10,6 @@ pub mod json;
 pub mod number;
 pub mod parse;
 pub mod plain;
+pub mod private;
 pub mod rng;
 pub mod time;

@@ -299,7 +299,7 @@ mod tests {
         assert_eq!(document.outer[1], Outer::New("␍".to_owned()));
         assert_eq!(document.outer[2], Outer::Struct { text: Some("\u{fffd}".to_owned()) });
         assert_eq!(document.pairs["k␇"], (1.5, true));
-        let toml: Document = super::toml(
+        let toml: Document = toml(
             "title = \"a\\u001b\"\nspanned = \"b\\n\"\ntagged = []\nouter = [\"Unit\"]\n[pairs]\n",
         )
         .unwrap();
@@ -314,7 +314,7 @@ mod tests {
         let text = error.to_string();
         assert!(text.starts_with("unknown field `wrong␊␛[2Jkey`"), "{text}");
         assert!(text.contains("line 2 column") && !text.contains(acts), "{text}");
-        let error = super::toml::<Document>("title = \"x\"\n\"wrong\\nkey\" = 1\n").unwrap_err();
+        let error = toml::<Document>("title = \"x\"\n\"wrong\\nkey\" = 1\n").unwrap_err();
         assert!(error.message().starts_with("unknown field `wrong␊key`"), "{error}");
         assert_eq!(error.span(), Some(12..24));
         assert!(json::<u8>(b"1 2").is_err(), "one value");

@@ -192,6 +192,6 @@ mod tests {
     #[test]
     fn a_path_is_one_line() {
         let path = Path::new("logs/\u{1b}[2K01\n.BIN");
-        assert_eq!(format!("{:>20}|", path.shown()), "  logs/␛[2K01␊.BIN|");
+        assert_eq!(format!("{:>20}|", path.shown()), "    logs/␛[2K01␊.BIN|");
     }
 }

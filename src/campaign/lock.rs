@@ -15,6 +15,7 @@ use crate::base::file::{FileError, create_folder};
 #[derive(Debug)]
 pub struct FolderLock {
     path: PathBuf,
+    locked: PathBuf,
     /// Open as long as the folder is locked; `None` where the file system knows no locks.
     file: Option<File>,
     /// The folder was made for the lock.
@@ -45,7 +46,12 @@ impl FolderLock {
             // Some network file systems have no locks; the work is worth more than the lock.
             Err(TryLockError::Error(_)) => None,
         };
-        Ok(Self { path: full, file, made })
+        Ok(Self { path: full, locked: path, file, made })
+    }
+
+    /// The folder that is locked: that of the whole campaign.
+    pub fn folder(&self) -> &Path {
+        &self.locked
     }
 
     /// Whether the file system could lock the folder.

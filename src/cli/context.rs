@@ -8,7 +8,11 @@ use serde::Serialize;
 
 use super::Global;
 use super::exit::CommandError;
+<<<<<<< HEAD
 use super::signals::Signals;
+=======
+use crate::base::file::sweep_below;
+>>>>>>> 959c7f8 (link: replays are refused over all networks and days, a flood is bounded; orders and journals are their user's alone; leftovers are swept everywhere)
 use crate::base::plain::Shown as _;
 use crate::base::plain::{for_terminal, json_for_terminal};
 use crate::campaign::lock::FolderLock;
@@ -90,6 +94,8 @@ impl Context {
     /// Locks a campaign folder for this process; dropped, it is free again.
     pub(super) fn lock(&self, folder: &Path) -> Result<FolderLock, CommandError> {
         let lock = FolderLock::take(folder)?;
+        // Nobody else writes here now: what a killed run left is nobody's.
+        sweep_below(lock.folder());
         if !lock.is_held() {
             self.warn(&format!(
                 "{} cannot be locked on this file system: let no other updraft write into it",

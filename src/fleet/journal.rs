@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::base::file::{FileError, create_folder};
+use crate::base::private::open_own;
 use crate::link::id::DroneId;
 
 /// Name of the journal in a campaign folder.
@@ -36,14 +37,11 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a folder; what is there stays.
+    /// Opens the journal of a folder, for its user alone; what is there stays.
     pub fn open(folder: &Path) -> Result<Self, FileError> {
         create_folder(folder)?;
         let path = folder.join(JOURNAL_FILE);
-        let file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&path)
+        let file = open_own(&path, OpenOptions::new().create(true).append(true))
             .map_err(|source| FileError::new("open the journal", &path, source))?;
         Ok(Self { path, file })
     }
@@ -54,5 +52,30 @@ impl Journal {
         let mut line = serde_json::to_vec(entry).map_err(|error| fail(error.into()))?;
         line.push(b'\n');
         self.file.write_all(&line).and_then(|()| self.file.flush()).map_err(fail)
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::fs;
+    use std::os::unix::fs::{PermissionsExt as _, symlink};
+
+    use super::*;
+
+    #[test]
+    fn a_journal_is_its_users_alone_and_no_link() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(JOURNAL_FILE);
+        fs::write(&path, "{}\n").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o644)).unwrap();
+        let entry = Entry { unix_us: 1, drone: None, event: &serde_json::json!({ "a": "\n" }) };
+        Journal::open(folder.path()).unwrap().write(&entry).unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        assert_eq!(fs::read_to_string(&path).unwrap().lines().count(), 2);
+        let other = folder.path().join("other");
+        fs::rename(&path, &other).unwrap();
+        symlink(&other, &path).unwrap();
+        let error = Journal::open(folder.path()).unwrap_err();
+        assert!(error.source.to_string().contains("symbolic link"), "{error:?}");
     }
 }

@@ -332,3 +332,17 @@ fn ftp_text(packet: &Packet) -> String {
 fn command_name(command: MavCmd) -> String {
     format!("{command:?}").trim_start_matches("MAV_CMD_").to_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::plain::acts;
+
+    #[test]
+    fn what_a_drone_says_is_text() {
+        assert_eq!(chars(b"GO\r\n\x1b[32mGO\0rest"), "GO␍␊␛[32mGO");
+        assert!(!chars("a\u{202e}\u{2066}\u{9b}\u{2028}\u{7f}b\u{200f}".as_bytes()).contains(acts));
+        let name = Packet::request(crate::protocol::ftp::Op::OpenFileRO).with_data(b"a\x1b[2J\n");
+        assert!(!ftp_text(&name).contains(acts), "{}", ftp_text(&name));
+    }
+}

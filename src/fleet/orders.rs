@@ -5,9 +5,12 @@
 //! station it is for, so that one that was given to a station that has died is never carried out
 //! by a later one. The station takes an order by removing its file, and writes the answer beside it
 //! again and again until every drone has confirmed.
+//!
+//! Whoever can write there commands the drones: the folder and its files are their user's alone, and one
+//! of somebody else, or a link to elsewhere, is refused.
 
-use std::fs;
-use std::io;
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -16,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use super::abort::{Aborted, Action};
 use crate::base::file::{FileError, create_folder, read_whole};
 use crate::base::parse;
+use crate::base::private::{is_own_folder, open_own, own_folder};
 use crate::link::id::DroneId;
 
 /// The folder in a flight's folder.
@@ -80,7 +84,12 @@ fn put<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
     let failed = |source| FileError::new("write", path, source);
     let bytes = serde_json::to_vec(value).map_err(|error| failed(error.into()))?;
     let part = path.with_extension("part");
-    fs::write(&part, bytes).and_then(|()| fs::rename(&part, path)).map_err(failed)
+    let mut options = OpenOptions::new();
+    options.write(true).create(true).truncate(true);
+    open_own(&part, &mut options)
+        .and_then(|mut file| file.write_all(&bytes))
+        .and_then(|()| fs::rename(&part, path))
+        .map_err(failed)
 }
 
 /// A file of this format; `None`: there is none that can be read, or not yet.
@@ -115,7 +124,8 @@ impl Inbox {
     /// other station of this flight has had or will have.
     pub fn open(flight: &Path, station: String) -> Result<Self, FileError> {
         let folder = flight.join(ORDERS_FOLDER);
-        create_folder(&folder)?;
+        create_folder(flight)?;
+        own_folder(&folder).map_err(|source| FileError::new("use the folder", &folder, source))?;
         for path in files(&folder) {
             let _ = fs::remove_file(path);
         }
@@ -185,6 +195,11 @@ pub fn give(
     drones: Option<Vec<DroneId>>,
 ) -> Result<Option<Given>, FileError> {
     let folder = flight.join(ORDERS_FOLDER);
+    match is_own_folder(&folder) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(FileError::new("use the folder", &folder, error)),
+    }
     let Some(file) = get::<StationFile>(&folder.join(STATION_FILE)) else { return Ok(None) };
     let order = Order { schema: ORDER_SCHEMA.to_owned(), station: file.station, action, drones };
     let given = Given {
@@ -250,6 +265,37 @@ mod tests {
         fs::write(&given.order, order).unwrap();
         assert!(later.take().is_empty(), "it is for another station");
         assert!(!given.order.exists(), "and is not looked at again");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn only_their_user_can_give_orders() {
+        use std::os::unix::fs::{PermissionsExt as _, symlink};
+        let flight = tempfile::tempdir().unwrap();
+        let folder = flight.path().join(ORDERS_FOLDER);
+        fs::create_dir(&folder).unwrap();
+        fs::set_permissions(&folder, fs::Permissions::from_mode(0o777)).unwrap();
+        let mut inbox = Inbox::open(flight.path(), "one".to_owned()).unwrap();
+        let given = give(flight.path(), "1", Action::Land, None).unwrap().unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode(&folder), 0o700);
+        assert_eq!(mode(&folder.join(STATION_FILE)), 0o600);
+        assert_eq!(mode(&given.order), 0o600);
+        let taken = inbox.take();
+        taken[0].answer(&Answer::default()).unwrap();
+        assert_eq!(mode(&given.answer), 0o600);
+        drop(inbox);
+        given.forget();
+        // A link to a folder that somebody else watches.
+        let elsewhere = tempfile::tempdir().unwrap();
+        let _ = fs::remove_dir_all(&folder);
+        symlink(elsewhere.path(), &folder).unwrap();
+        let error = Inbox::open(flight.path(), "two".to_owned()).unwrap_err();
+        assert!(error.source.to_string().contains("symbolic link"), "{error:?}");
+        let file = StationFile { schema: STATION_SCHEMA.to_owned(), station: "two".to_owned() };
+        put(&elsewhere.path().join(STATION_FILE), &file).unwrap();
+        let error = give(flight.path(), "1", Action::Return, None).unwrap_err();
+        assert!(error.source.to_string().contains("symbolic link"), "{error:?}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use crate::base::file::read_whole;
-use crate::base::plain::Shown as _;
+use crate::base::plain::{Shown as _, acts};
 
 /// A link and the network it belongs to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -90,6 +90,9 @@ impl FromStr for Address {
     type Err = AddressError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text.contains(acts) {
+            return Err(AddressError::Form { text: text.to_owned() });
+        }
         let number = |part: &str, what| AddressError::Number {
             text: text.to_owned(),
             part: part.to_owned(),

@@ -12,6 +12,7 @@ pub mod frame;
 pub mod id;
 pub mod net;
 pub mod signing;
+mod stamps;
 pub mod station;
 pub mod traffic;
 pub mod wire;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -14,6 +14,7 @@ use super::frame::{Frame, FrameReader, MavMessage, Sender, dialect, encode};
 use super::id::DroneId;
 use super::net::{Net, Received};
 use super::signing::{Key, Signer, Verifier, signing_time};
+use super::stamps::{Keeper, Stamps};
 use super::traffic::Traffic;
 use super::wire::{self, Peer, Receiving, Sending};
 
@@ -24,6 +25,11 @@ pub const AUTOPILOT: u8 = 1;
 
 /// Pieces of input that wait to be looked at; more are dropped by the kernel, not stored here.
 const BACKLOG: usize = 16_384;
+/// Bytes of them: seconds of what a fast network of drones sends. Of more, datagrams are thrown away
+/// and counted, and streams wait at the other end.
+const BACKLOG_BYTES: usize = 16 << 20;
+/// How long a stream's reader waits for room.
+const NO_ROOM: Duration = Duration::from_millis(5);
 /// A reader looks up so often whether it is to end.
 const READER_LOOK: Duration = Duration::from_millis(200);
 /// Longest piece read at once, bytes; a datagram is never longer.
@@ -48,8 +54,10 @@ pub struct Station {
     routes: BTreeMap<DroneId, Route>,
     /// Vehicles that were also heard from elsewhere while their route was alive.
     doubled: BTreeSet<DroneId>,
-    verifiers: BTreeMap<u16, Verifier>,
+    verifier: Option<Verifier>,
     signer: Option<Signer>,
+    keeper: Option<Keeper>,
+    backlog: Arc<Backlog>,
     traffic: BTreeMap<u16, Traffic>,
     queue: VecDeque<Received>,
     next_heartbeat: Micros,
@@ -72,6 +80,14 @@ struct Route {
     heard: Micros,
 }
 
+/// What waits to be looked at.
+#[derive(Default)]
+struct Backlog {
+    bytes: AtomicUsize,
+    /// Datagrams that were thrown away, by port.
+    dropped: Vec<AtomicU64>,
+}
+
 enum Piece {
     Bytes { port: usize, peer: Peer, bytes: Vec<u8> },
     Closed { port: usize, reason: String },
@@ -86,13 +102,19 @@ impl Station {
         let Setup { links, key, clock } = setup;
         let (output, input) = sync_channel(BACKLOG);
         let time = signing_time(clock.unix_us());
+        let backlog = Backlog {
+            bytes: AtomicUsize::new(0),
+            dropped: links.iter().map(|_| AtomicU64::new(0)).collect(),
+        };
         let mut station = Self {
             ports: Vec::new(),
             input,
             routes: BTreeMap::new(),
             doubled: BTreeSet::new(),
-            verifiers: BTreeMap::new(),
+            verifier: key.clone().map(|key| Verifier::new(key, time)),
             signer: key.clone().map(|key| Signer::new(key, 1, time)),
+            keeper: None,
+            backlog: Arc::new(backlog),
             traffic: BTreeMap::new(),
             queue: VecDeque::new(),
             next_heartbeat: 0,
@@ -100,22 +122,24 @@ impl Station {
             end: Arc::default(),
             readers: Vec::new(),
         };
+        if let Some(shelf) = key.as_ref().and_then(Key::shelf) {
+            let kept = shelf.keep(&Stamps::default()).map_err(NetError::Stamps)?;
+            station.signer.iter_mut().for_each(|signer| signer.go_on_from(&kept));
+            station.verifier.iter_mut().for_each(|verifier| verifier.go_on_from(&kept));
+            let started = Keeper::start(shelf);
+            station.keeper = Some(started.map_err(NetError::NoKeeper)?);
+        }
         for (index, address) in links.iter().enumerate() {
             let (sending, receiving) = wire::open(address)?;
             let stream = (!receiving.is_datagram()).then(FrameReader::default);
             let network = address.network;
             station.ports.push(Port { network, sending, sequence: 0, stream });
             station.traffic.entry(network).or_default();
-            if let Some(key) = &key {
-                station
-                    .verifiers
-                    .entry(network)
-                    .or_insert_with(|| Verifier::new(key.clone(), time));
-            }
             let (output, end) = (output.clone(), Arc::clone(&station.end));
+            let backlog = Arc::clone(&station.backlog);
             let reader = std::thread::Builder::new()
                 .name(format!("link {address}"))
-                .spawn(move || read(index, receiving, &output, &end))
+                .spawn(move || read(index, receiving, &output, &backlog, &end))
                 .map_err(|source| NetError::Thread { address: address.clone(), source })?;
             station.readers.push(reader);
         }
@@ -124,7 +148,10 @@ impl Station {
 
     fn take(&mut self, piece: Piece) -> Result<(), NetError> {
         let (port, peer, bytes) = match piece {
-            Piece::Bytes { port, peer, bytes } => (port, peer, bytes),
+            Piece::Bytes { port, peer, bytes } => {
+                self.backlog.bytes.fetch_sub(bytes.len(), Ordering::Relaxed);
+                (port, peer, bytes)
+            }
             Piece::Closed { port, reason } => {
                 let network = self.ports[port].network;
                 // The others may go on.
@@ -139,7 +166,7 @@ impl Station {
             }
         };
         let network = self.ports[port].network;
-        let mut verifier = self.verifiers.get_mut(&network);
+        let mut verifier = self.verifier.as_mut();
         if let Some(verifier) = verifier.as_deref_mut() {
             verifier.advance(signing_time(self.clock.unix_us()));
         }
@@ -205,11 +232,21 @@ impl Station {
             .map_err(|error| NetError::Closed { reason: error.to_string() })
     }
 
+    /// Has the stamps written down, if they are kept.
+    fn keep_stamps(&self) {
+        if let (Some(keeper), Some(signer), Some(verifier)) =
+            (&self.keeper, &self.signer, &self.verifier)
+        {
+            keeper.keep(Stamps { sent: signer.stamp(), heard: verifier.newest() });
+        }
+    }
+
     fn beat(&mut self) -> Result<(), NetError> {
         let now = self.clock.now();
         if now >= self.next_heartbeat {
             self.next_heartbeat = now + S;
             self.broadcast(&heartbeat())?;
+            self.keep_stamps();
         }
         Ok(())
     }
@@ -263,7 +300,11 @@ impl Net for Station {
     }
 
     fn traffic(&self) -> BTreeMap<u16, Traffic> {
-        self.traffic.clone()
+        let mut traffic = self.traffic.clone();
+        for (port, dropped) in self.ports.iter().zip(&self.backlog.dropped) {
+            traffic.entry(port.network).or_default().dropped += dropped.load(Ordering::Relaxed);
+        }
+        traffic
     }
 
     fn doubled(&self) -> BTreeSet<DroneId> {
@@ -273,6 +314,7 @@ impl Net for Station {
 
 impl Drop for Station {
     fn drop(&mut self) {
+        self.keep_stamps();
         self.end.store(true, Ordering::Relaxed);
         // A full backlog would keep readers from seeing it.
         while self.input.try_recv().is_ok() {}
@@ -290,13 +332,28 @@ fn read(
     port: usize,
     mut receiving: Box<dyn Receiving>,
     output: &SyncSender<Piece>,
+    backlog: &Backlog,
     end: &AtomicBool,
 ) {
     let mut buffer = vec![0; PIECE];
+    let has_room =
+        |size: usize| backlog.bytes.load(Ordering::Relaxed).saturating_add(size) <= BACKLOG_BYTES;
     while !end.load(Ordering::Relaxed) {
         let piece = match receiving.recv(&mut buffer, READER_LOOK) {
             Ok(None) => continue,
-            Ok(Some((peer, size))) => Piece::Bytes { port, peer, bytes: buffer[..size].to_vec() },
+            Ok(Some((_, size))) if receiving.is_datagram() && !has_room(size) => {
+                if let Some(dropped) = backlog.dropped.get(port) {
+                    dropped.fetch_add(1, Ordering::Relaxed);
+                }
+                continue;
+            }
+            Ok(Some((peer, size))) => {
+                while !has_room(size) && !end.load(Ordering::Relaxed) {
+                    std::thread::sleep(NO_ROOM);
+                }
+                backlog.bytes.fetch_add(size, Ordering::Relaxed);
+                Piece::Bytes { port, peer, bytes: buffer[..size].to_vec() }
+            }
             Err(error) => Piece::Closed { port, reason: error.to_string() },
         };
         let closed = matches!(piece, Piece::Closed { .. });
@@ -321,4 +378,66 @@ pub fn heartbeat() -> MavMessage {
         system_status: dialect::MavState::MAV_STATE_ACTIVE,
         mavlink_version: 3,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::UdpSocket;
+
+    use super::*;
+
+    /// Time that is asked for and does not pass by itself.
+    struct Still(AtomicU64);
+
+    impl Clock for Still {
+        fn now(&self) -> Micros {
+            self.0.fetch_add(1, Ordering::Relaxed)
+        }
+
+        fn unix_us(&self) -> u64 {
+            1_700_000_000_000_000
+        }
+    }
+
+    fn vehicle() -> Vec<u8> {
+        let beat = dialect::HEARTBEAT_DATA {
+            autopilot: dialect::MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+            ..Default::default()
+        };
+        encode(Sender { system: 7, component: 1 }, 0, &MavMessage::HEARTBEAT(beat), None)
+    }
+
+    #[test]
+    fn a_flood_is_thrown_away_and_told_of() {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let free = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let at = free.local_addr().unwrap();
+        drop(free);
+        let links = vec![format!("3@udpin:{at}").parse().unwrap()];
+        let clock = Arc::new(Still(AtomicU64::new(0)));
+        let mut station = Station::open(Setup { links, key: None, clock }).unwrap();
+        socket.send_to(&vehicle(), at).unwrap();
+        let dropped = |station: &Station| station.traffic()[&3].dropped;
+        let datagram = vec![0; 60_000];
+        let mut sent = 0_usize;
+        // Nobody looks at what comes; the system may lose some of it by itself.
+        while dropped(&station) < 100 && sent < 100_000 {
+            let _ = socket.send_to(&datagram, at);
+            sent += 1;
+            std::thread::yield_now();
+        }
+        assert!(dropped(&station) >= 100, "{sent} sent");
+        let held = station.backlog.bytes.load(Ordering::Relaxed);
+        assert!(held <= BACKLOG_BYTES && held > BACKLOG_BYTES / 2, "{held} bytes");
+        let first = station.recv(u64::MAX).unwrap().unwrap();
+        assert_eq!(first.from, DroneId { network: 3, system: 7 });
+        // All of it can be taken, and there is room again.
+        while station.recv(station.clock.now() + 10_000).unwrap().is_some() {}
+        while let Ok(piece) = station.input.try_recv() {
+            station.take(piece).unwrap();
+        }
+        let told = crate::link::traffic::troubles(&station.traffic(), &BTreeSet::new());
+        let told: Vec<_> = told.iter().map(|one| one.text.as_str()).collect();
+        assert!(told.iter().any(|text| text.contains("thrown away")), "{told:?}");
+    }
 }

@@ -19,6 +19,8 @@ pub struct Traffic {
     pub signed: u64,
     /// Bytes that gave none.
     pub loss: FrameLoss,
+    /// Datagrams that were thrown away, as more came than could be looked at.
+    pub dropped: u64,
 }
 
 /// Bytes outside of frames up to this share are no sign of a wrong link: a serial port is opened
@@ -55,6 +57,20 @@ pub fn troubles(traffic: &BTreeMap<u16, Traffic>, doubled: &BTreeSet<DroneId>) -
             all.push(Trouble { key, text: format!("network {network}: {text}") });
         };
         let FrameLoss { noise_bytes, version_1, unknown: _, unsigned, forged } = of.loss;
+        if of.dropped > 0 {
+            tell(
+                "dropped",
+                format!(
+                    "{} thrown away: more comes than can be looked at. Does somebody flood this \
+                     port? Drones may be heard late or not at all",
+                    if of.dropped == 1 {
+                        "1 datagram was".to_owned()
+                    } else {
+                        format!("{} datagrams were", of.dropped)
+                    }
+                ),
+            );
+        }
         if of.signed > 0 {
             tell(
                 "signed",

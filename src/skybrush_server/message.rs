@@ -33,3 +33,21 @@ pub fn parse(line: &[u8]) -> Option<Incoming> {
     let kind = body.get("type")?.as_str()?.to_owned();
     Some(Incoming { refers_to, kind, body })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::plain::acts;
+
+    #[test]
+    fn what_a_server_says_is_text() {
+        let line =
+            br#"{ "refs": "1", "body": { "type": "ACK-NAK", "reason": "x\u001b[2K\rGO\nGO\u202e",
+            "failed": { "01\u001b": "no\u0007" } } }"#;
+        let incoming = parse(line).unwrap();
+        let text = incoming.body.to_string();
+        assert_eq!(incoming.body["reason"], "x␛[2K␍GO␊GO\u{fffd}");
+        assert_eq!(incoming.body["failed"]["01␛"], "no␇");
+        assert!(!text.contains(acts) && !text.contains("\\u00"), "{text}");
+    }
+}

@@ -114,11 +114,41 @@ fn nobody_starts_a_fleet_without_a_person_or_yes() {
     insta::assert_snapshot!(err);
 }
 
+fn for_its_owner(key: &std::path::Path) {
+    use std::os::unix::fs::PermissionsExt as _;
+    fs::set_permissions(key, fs::Permissions::from_mode(0o600)).unwrap();
+}
+
+#[test]
+fn a_key_that_others_can_read_is_warned_of_and_used() {
+    let bench = Bench::new();
+    bench.planned("1x2", "campaign");
+    let key = bench.path("our.key");
+    fs::write(&key, "a passphrase of the crew").unwrap();
+    let link = format!("udpin:{}", free_port());
+    let step =
+        ["fleet", "status", "campaign", "--connect", &link, "--key", "our.key", "--wait", "0"];
+    fs::set_permissions(&key, std::os::unix::fs::PermissionsExt::from_mode(0o644)).unwrap();
+    let open = bench.run(&step);
+    assert!(open.err.contains("can be read or changed by others"), "{open}");
+    assert!(open.err.contains("chmod 600 our.key"), "{open}");
+    assert!(bench.path("our.key.stamps").is_file(), "{open}");
+    for_its_owner(&key);
+    let closed = bench.run(&step);
+    assert_eq!(closed.code, open.code);
+    assert!(!closed.err.contains("others"), "{closed}");
+    // What cannot be understood is not thrown away.
+    fs::write(bench.path("our.key.stamps"), "{").unwrap();
+    let broken = bench.expect(1, &step);
+    assert!(broken.err.contains("our.key.stamps"), "{broken}");
+}
+
 #[test]
 fn a_station_with_a_key_refuses_what_is_not_signed_and_says_so() {
     let bench = Bench::new();
     bench.planned("1x2", "campaign");
     fs::write(bench.path("our.key"), "a passphrase of the crew").unwrap();
+    for_its_owner(&bench.path("our.key"));
     let mut all = String::new();
     for key in [None, Some(Key::from_bytes([7; 32]))] {
         let mut drones = bench.drones();

@@ -70,3 +70,28 @@ fn a_second_writer_is_refused_until_the_first_is_gone() {
         .collect();
     assert!(names.is_empty(), "{names:?}");
 }
+
+#[test]
+fn what_a_killed_run_left_is_swept_in_every_folder() {
+    let bench = Bench::new();
+    bench.plan();
+    let folders =
+        ["", "logs", "logs/older", "skyb", "report/figures", "fields", "gap/report", "study"];
+    let left = |folder: &str| bench.path("campaign").join(folder).join(".partial-x1y2z3");
+    for folder in folders {
+        fs::create_dir_all(left(folder).parent().unwrap()).unwrap();
+        fs::write(left(folder), b"half").unwrap();
+    }
+    // One that another process is still writing.
+    let living = bench.path("campaign/fields/.partial-living");
+    let writer = fs::File::create(&living).unwrap();
+    writer.lock().unwrap();
+    bench.expect(0, &["simulate", "campaign"]);
+    for folder in folders {
+        assert!(!left(folder).exists(), "campaign/{folder}");
+    }
+    assert!(living.exists(), "it has a writer");
+    drop(writer);
+    bench.expect(0, &["analyze", "campaign"]);
+    assert!(!living.exists());
+}

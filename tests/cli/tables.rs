@@ -187,3 +187,25 @@ fn rows_without_numbers_are_counted() {
     let told: Vec<&str> = ended.out[from..].lines().take(2).map(str::trim).collect();
     assert_snapshot!(told.join(" "));
 }
+
+#[cfg(unix)]
+#[test]
+fn what_has_no_end_is_refused_and_what_never_begins_is_not_waited_for() {
+    let bench = Bench::new();
+    let endless = bench.expect(1, &["analyze", "--csv", "/dev/zero", "--no-report"]);
+    assert!(endless.err.contains("/dev/zero") && endless.err.contains("allowed here"), "{endless}");
+    let folder = bench.expect(1, &["analyze", "--csv", ".", "--no-report"]);
+    assert!(folder.err.contains("is a directory"), "{folder}");
+    let pipe = bench.path("ladder.csv");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    fs::write(bench.path("mapping.toml"), MAPPING).unwrap();
+    let waiting = bench.run(&["analyze", "--csv", "mapping.toml", "--no-report"]);
+    let said = format!("{}{}", waiting.out, waiting.err);
+    assert!(waiting.code != Some(0) && said.contains("it is no file, but a pipe"), "{waiting}");
+    let mapping = MAPPING.replace("ladder.csv", "/dev/zero");
+    fs::write(bench.path("mapping.toml"), mapping).unwrap();
+    let zeros = bench.run(&["analyze", "--csv", "mapping.toml", "--no-report"]);
+    assert!(zeros.code != Some(0), "{zeros}");
+    let mapping = bench.expect(1, &["analyze", "--csv", "ladder.csv", "--no-report"]);
+    assert!(mapping.err.contains("it is no file, but a pipe"), "{mapping}");
+}

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use updraft::link::clock::{Clock, MS, S};
-use updraft::link::frame::{FrameReader, MavMessage, dialect, encode};
+use updraft::link::frame::{FrameReader, MavMessage, Sender, dialect, encode};
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
 use updraft::link::signing::{Key, Signer, Verifier, signing_time};
@@ -105,6 +105,60 @@ fn a_frame_that_is_sent_again_is_refused() {
     let options = options(vec![socket.local_addr().unwrap()], Some(key(1)));
     let (seen, _) = serve(vehicles, &options, &clock, body).unwrap();
     assert_eq!(seen, (5, 1, 4));
+}
+
+/// A heartbeat of a vehicle that signs.
+fn beat(system: u8, signer: &mut Signer) -> Vec<u8> {
+    let beat = dialect::HEARTBEAT_DATA {
+        autopilot: dialect::MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        ..Default::default()
+    };
+    let sender = Sender { system, component: 1 };
+    encode(sender, 0, &MavMessage::HEARTBEAT(beat), Some(signer))
+}
+
+/// How many of these frames are taken and refused, in the network that they are sent into.
+fn judged(station: &mut Station, at: std::net::SocketAddr, frames: &[Vec<u8>]) -> (usize, u64) {
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let refused = |station: &Station| -> u64 {
+        station.traffic().values().map(|traffic| traffic.loss.forged).sum()
+    };
+    let before = refused(station);
+    let (mut taken, mut judged) = (0, 0);
+    for frame in frames {
+        socket.send_to(frame, at).unwrap();
+    }
+    let until = station.now() + 10 * S;
+    while judged < frames.len() && station.now() < until {
+        taken += usize::from(station.recv(station.now() + 20 * MS).unwrap().is_some());
+        judged = taken + (refused(station) - before) as usize;
+    }
+    (taken, refused(station) - before)
+}
+
+#[test]
+fn what_was_heard_in_one_network_or_by_an_earlier_station_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("swarm.key");
+    std::fs::write(&path, [7; 32]).unwrap();
+    let from_file = || Some(Key::from_file(&path).unwrap());
+    let clock = Arc::new(Wall::start());
+    let mut signer = Signer::new(from_file().unwrap(), 0, signing_time(clock.unix_us()));
+    let recorded: Vec<Vec<u8>> = (0..5).map(|_| beat(9, &mut signer)).collect();
+    let open = || {
+        let ports = [free_port(), free_port()];
+        let links = (0..2).map(|n| format!("{n}@udpin:{}", ports[n]).parse().unwrap()).collect();
+        let wall: Arc<dyn Clock> = clock.clone();
+        (Station::open(Setup { links, key: from_file(), clock: wall }).unwrap(), ports)
+    };
+    let (mut station, ports) = open();
+    assert_eq!(judged(&mut station, ports[0], &recorded), (5, 0));
+    assert_eq!(judged(&mut station, ports[1], &recorded), (0, 5), "in the other network");
+    drop(station);
+    let (mut station, ports) = open();
+    assert_eq!(judged(&mut station, ports[0], &recorded), (0, 5), "by the next station");
+    let newer = [beat(9, &mut signer)];
+    assert_eq!(judged(&mut station, ports[0], &newer), (1, 0));
 }
 
 #[test]

@@ -7,10 +7,11 @@ use std::sync::Arc;
 use clap::Args;
 
 use crate::cli::clock::SystemClock;
+use crate::cli::context::complain;
 use crate::cli::exit::CommandError;
 use crate::link::address::{Address, Way, links};
 use crate::link::clock::Clock as _;
-use crate::link::signing::Key;
+use crate::link::signing::{Key, exposure};
 use crate::link::station::{Setup, Station};
 
 /// Where drones are listened for without a choice.
@@ -91,6 +92,9 @@ impl ConnectArgs {
 /// The signing key in a file, if one is given.
 pub(in crate::cli) fn read_key(path: Option<&Path>) -> Result<Option<Key>, CommandError> {
     let key = path.map(Key::from_file).transpose();
+    if let Some(warning) = path.filter(|_| key.is_ok()).and_then(exposure) {
+        complain(&format!("warning: {warning}"));
+    }
     key.map_err(|error| CommandError::Usage(crate::cli::exit::with_reasons(&error)))
 }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 use super::connect::Target;
 use super::crew::Crew;
 use super::{EndArgs, StepArgs, dry, one_flight, server, tables};
+use crate::base::causes::with_causes;
 use crate::campaign::lock::FolderLock;
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::cli::clock::{Stopwatch, SystemClock};
@@ -52,7 +53,8 @@ pub(in crate::cli) fn desk<'a>(
     let inbox = Inbox::open(&folder.0, own_name());
     if let Err(error) = &inbox {
         context.warn(&format!(
-            "{error}; `fleet abort` from another terminal will not reach the drones: use Ctrl-C here"
+            "{}; `fleet abort` from another terminal will not reach the drones: use Ctrl-C here",
+            with_causes(error, ": ")
         ));
     }
     Desk::new(net, inbox.ok(), move |notice| tell(context, folder, notice))
@@ -120,7 +122,8 @@ fn order(
     for folder in folders {
         match give(&folder.0, &name, action, drones.clone()) {
             Ok(order) => given.extend(order),
-            Err(error) => context.warn(&format!("no order to the running station: {error}")),
+            Err(error) => context
+                .warn(&format!("no order to the running station: {}", with_causes(&error, ": "))),
         }
     }
     let watch = Stopwatch::start();
