@@ -4,6 +4,7 @@ use std::fmt;
 use std::fs::{File, Metadata};
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use thiserror::Error;
 
@@ -241,18 +242,20 @@ impl fmt::Debug for Log {
 /// Which file it is, whatever its name.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Identity {
+    /// Numbers are used again once a file is gone; when it was made tells them apart where that is
+    /// known.
     #[cfg(unix)]
-    file: (u64, u64),
+    file: (u64, u64, Option<SystemTime>),
     /// Where files have no number, one that was written since is another.
     #[cfg(not(unix))]
-    file: (u64, Option<std::time::SystemTime>),
+    file: (u64, Option<SystemTime>),
 }
 
 impl Identity {
     #[cfg(unix)]
     fn of(metadata: &Metadata) -> Self {
         use std::os::unix::fs::MetadataExt as _;
-        Self { file: (metadata.dev(), metadata.ino()) }
+        Self { file: (metadata.dev(), metadata.ino(), metadata.created().ok()) }
     }
 
     #[cfg(not(unix))]

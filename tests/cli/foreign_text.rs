@@ -140,7 +140,8 @@ fn arguments_are_quoted_plainly() {
     tame(&bench, &["check", "x", &format!("--{HOSTILE}")]);
     tame(&bench, &["check", HOSTILE]);
     tame(&bench, &["fly", "x", "--lead", HOSTILE]);
-    tame(&bench, &["fleet", "status", "x", "--connect", HOSTILE]);
+    bench.plan();
+    tame(&bench, &["fleet", "status", "campaign", "--connect", HOSTILE]);
     tame(&bench, &["plan", "calibration", "--set", &format!("{HOSTILE}=1"), "-o", "campaign"]);
 }
 
@@ -174,9 +175,6 @@ fn errors_about_json_and_toml_are_text() {
     fs::write(bench.path("campaign/plan.json"), wrong).unwrap();
     tame(&bench, &["inspect", "campaign"]);
     fs::write(bench.path("campaign/plan.json"), plan).unwrap();
-    let fleet = format!("{{ \"schema\": \"{}\", \"drones\": [] }}", quoted());
-    fs::write(bench.path("campaign/fleet.json"), fleet).unwrap();
-    tame(&bench, &["fleet", "preflight", "campaign", "--connect", "udpin:127.0.0.1:59123"]);
     fs::write(bench.path("air.toml"), format!("schema = \"{}\"\nair = []\n", quoted())).unwrap();
     tame(&bench, &["simulate", "campaign", "--air", "air.toml"]);
     fs::write(bench.path("v.toml"), format!("schema = \"{}\"\n# \u{1b}[2J\n", quoted())).unwrap();

@@ -258,15 +258,27 @@ impl Plant {
         let motion = &self.motion;
         let stood = self.on_ground;
         self.impact_mps2 = 0.0;
-        self.on_ground = motion.position_m.z <= self.ground_z_m && motion.velocity_mps.z <= 0.0;
-        if self.on_ground {
+        self.on_ground = false;
+        if motion.position_m.z <= self.ground_z_m {
+            self.touch(stood);
+        }
+    }
+
+    /// Is at the ground or in it; `stood`: it stood there in the step before.
+    #[cold]
+    #[inline(never)]
+    fn touch(&mut self, stood: bool) {
+        if self.motion.velocity_mps.z <= 0.0 {
+            self.on_ground = true;
             self.stand(stood);
+        } else {
+            // The step moved it by the speed in its middle, still downwards; at its end it rises. The
+            // ground does not give way meanwhile.
+            self.motion.position_m.z = self.ground_z_m;
         }
     }
 
     /// Stands on the ground; `stood`: as in the step before.
-    #[cold]
-    #[inline(never)]
     fn stand(&mut self, stood: bool) {
         let motion = &mut self.motion;
         if !stood {
@@ -327,6 +339,22 @@ mod tests {
         let mut plant = Plant::new(&airframe, Vector3::zeros(), DT_S);
         plant.motion.position_m.z = height_m;
         plant
+    }
+
+    #[test]
+    fn a_body_that_turns_round_at_the_ground_does_not_sink_into_it() {
+        let mut plant = plant(50.0);
+        let around = Surroundings { air_velocity_mps: Vector3::zeros(), density_ratio: 1.0 };
+        for _ in 0..400 {
+            plant.step(&[1.0; ROTORS], &around);
+        }
+        plant.motion.position_m.z = 1e-7;
+        plant.motion.velocity_mps = Vector3::new(0.0, 0.0, -1e-3);
+        plant.motion.acceleration_mps2 = Vector3::zeros();
+        plant.step(&[1.0; ROTORS], &around);
+        let motion = plant.motion();
+        assert!(motion.velocity_mps.z > 0.0 && !plant.on_ground(), "{motion:?}");
+        assert_eq!(motion.position_m.z, 0.0);
     }
 
     /// Vertical acceleration in the second step of flight at a speed relative to the air and a pulse.
