@@ -91,9 +91,9 @@ const DOORS: &[(&str, &str, &[&str])] = &[
     (".display()", "base::plain::Shown: `path.shown()`", &[]),
     ("serde_json::from_", "base::parse::json", &["base/parse.rs", "show/skyc/write.rs"]),
     ("toml::from_str", "base::parse::toml", &[]),
-    ("io::stdout()", "cli::context::Context", &["cli/context.rs"]),
-    ("io::stderr()", "cli::context::complain", &["cli/context.rs", "cli/fleet/start.rs"]),
-    ("fs::read_to_string(", "base::file::read_whole, which is bounded", &[]),
+    ("io::stdout().lock()", "cli::context::Context", &["cli/context.rs"]),
+    ("io::stderr().lock()", "cli::context::complain or prompt", &["cli/context.rs"]),
+    ("fs::read_to_string(", "base::file::read_whole, which is bounded", &["cli/signals.rs"]),
     ("fs::read(", "base::file::read_whole, which is bounded", &[]),
 ];
 

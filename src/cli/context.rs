@@ -8,13 +8,9 @@ use serde::Serialize;
 
 use super::Global;
 use super::exit::CommandError;
-<<<<<<< HEAD
 use super::signals::Signals;
-=======
 use crate::base::file::sweep_below;
->>>>>>> 959c7f8 (link: replays are refused over all networks and days, a flood is bounded; orders and journals are their user's alone; leftovers are swept everywhere)
-use crate::base::plain::Shown as _;
-use crate::base::plain::{for_terminal, json_for_terminal};
+use crate::base::plain::{Shown as _, for_terminal, json_for_terminal};
 use crate::campaign::lock::FolderLock;
 
 /// Output and interruption for one run of the program.
@@ -158,6 +154,12 @@ impl Context {
     pub(super) fn insist(&self, text: &str) {
         complain(text);
     }
+}
+
+/// A question on standard error; the answer follows on its line.
+pub(super) fn prompt(question: &str) -> io::Result<()> {
+    let mut err = io::stderr().lock();
+    err.write_all(for_terminal(question, false).as_bytes()).and_then(|()| err.flush())
 }
 
 /// A line, or some, on standard error, without styles: the one way out to it.

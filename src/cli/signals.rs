@@ -3,10 +3,10 @@
 //! Only Ctrl-C counts a second time: a session that ends sends SIGHUP and SIGTERM one after the other,
 //! and more than once, while drones are being sent home.
 
-use std::io::{self, Write as _};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::context::complain;
 use super::exit::Exit;
 
 /// Drones are in the air: a signal is answered by whoever watches them. Should that hang, so many
@@ -83,7 +83,7 @@ impl Signals {
         let air = *self.air();
         match air {
             Some(air) if count >= air.last => {
-                let _ = writeln!(io::stderr().lock(), "{}", air.words);
+                complain(air.words);
                 std::process::exit(Exit::Interrupted as i32);
             }
             // Unfinished files are temporary and swept later.

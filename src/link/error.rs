@@ -3,8 +3,8 @@
 use std::io;
 
 use super::address::Address;
-<<<<<<< HEAD
 use super::id::DroneId;
+use crate::base::file::FileError;
 
 /// A message that a gate has held back.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -19,9 +19,6 @@ pub struct Refusal {
     /// It may be sent in a moment, as when a drone is heard again: like a message that was lost.
     pub for_now: bool,
 }
-=======
-use crate::base::file::FileError;
->>>>>>> 959c7f8 (link: replays are refused over all networks and days, a flood is bounded; orders and journals are their user's alone; leftovers are swept everywhere)
 
 /// A link that cannot be used. A drone that does not answer is not one: that is told per drone.
 #[derive(Debug, thiserror::Error)]
@@ -45,11 +42,9 @@ pub enum NetError {
         /// What the system says.
         source: io::Error,
     },
-<<<<<<< HEAD
     /// The message was held back: the vehicle's state does not allow it. The link is fine.
     #[error(transparent)]
     Refused(Refusal),
-=======
     /// What was said last with the key cannot be kept.
     #[error(
         "cannot keep what was said last with the signing key beside it: put the key into a folder \
@@ -59,7 +54,6 @@ pub enum NetError {
     /// No thread for that.
     #[error("cannot start to keep what was said last with the signing key")]
     NoKeeper(#[source] io::Error),
->>>>>>> 959c7f8 (link: replays are refused over all networks and days, a flood is bounded; orders and journals are their user's alone; leftovers are swept everywhere)
     /// Every link is closed.
     #[error("all links are closed: {reason}")]
     Closed {

@@ -1,11 +1,11 @@
 //! What Ctrl-C means while drones are in the air: a person is asked, programs say it beforehand.
 
-use std::io::{BufRead as _, IsTerminal as _, Write as _};
+use std::io::{BufRead as _, IsTerminal as _};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::context::Context;
+use crate::cli::context::{Context, prompt};
 use crate::fleet::abort::Action;
 use crate::link::clock::{Micros, S};
 
@@ -149,8 +149,7 @@ fn ask_person(question: &str) -> Option<Receiver<Answer>> {
     if !std::io::stdin().is_terminal() || !std::io::stderr().is_terminal() {
         return None;
     }
-    let mut err = std::io::stderr().lock();
-    err.write_all(question.as_bytes()).and_then(|()| err.flush()).ok()?;
+    prompt(question).ok()?;
     let (send, answers) = sync_channel(1);
     // Ends with the program if nobody answers.
     let read = move || {

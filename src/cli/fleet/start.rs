@@ -1,7 +1,7 @@
 //! How a start is given: its time, a person's word, and the flight that comes of it.
 
 use std::collections::BTreeMap;
-use std::io::{BufRead as _, IsTerminal as _, Write as _};
+use std::io::{BufRead as _, IsTerminal as _};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
@@ -10,8 +10,7 @@ use clap::Args;
 use super::crew::Crew;
 use super::interrupt::InterruptArgs;
 use super::tables;
-use crate::base::plain::for_terminal;
-use crate::cli::context::Context;
+use crate::cli::context::{Context, prompt};
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::start::{LEAST_LEAD_S, MOST_LEAD_S, Start, StartOptions};
 use crate::link::id::DroneId;
@@ -141,11 +140,7 @@ pub(in crate::cli) fn asked(
     mut meanwhile: impl FnMut() -> Result<(), CommandError>,
 ) -> Result<bool, CommandError> {
     let failed = |error: std::io::Error| CommandError::Failed(format!("failed to ask: {error}"));
-    let mut err = std::io::stderr().lock();
-    err.write_all(for_terminal(question, false).as_bytes())
-        .and_then(|()| err.flush())
-        .map_err(failed)?;
-    drop(err);
+    prompt(question).map_err(failed)?;
     let (answers, answered) = std::sync::mpsc::sync_channel(1);
     // Ends with the program if nobody answers.
     let read = move || {

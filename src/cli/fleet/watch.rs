@@ -5,6 +5,7 @@ use clap::Args;
 use super::interrupt::InterruptArgs;
 use super::start::landed;
 use super::{StepArgs, bring, dry, lock, with_desk};
+use crate::base::plain::Shown as _;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::slots::FleetTable;
@@ -40,7 +41,7 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
                 "{} is not there, so nobody knows which drone flies which slot: no flight was \
                  started from this folder. `updraft fleet status` shows who is heard, `updraft fleet \
                  abort` needs no table",
-                FleetTable::path(&crew.folder.0).display()
+                FleetTable::path(&crew.folder.0).shown()
             )));
         }
         crew.on_interrupt = args.interrupt.on_interrupt;
