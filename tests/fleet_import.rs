@@ -12,8 +12,8 @@ use import_support::{Logger, Sortie, later};
 use updraft::base::time::GpsTime;
 use updraft::campaign::start::StartRecord;
 use updraft::fleet::logs::import::{
-    Answers, Carried, Carry, Decision, Doubt, ImportFlight, StartFrom, Survey, Take, carry_out,
-    decide, survey,
+    Answers, Carried, CarriedOut, Carry, Decision, Doubt, ImportFlight, StartFrom, Survey, Take,
+    carry_out, decide, survey,
 };
 use updraft::fleet::logs::manifest::Shelf;
 use updraft::fleet::logs::verify::verify;
@@ -75,7 +75,7 @@ impl Tried {
     fn of(cards: &Path, flights: &[ImportFlight], how: &Carry) -> Self {
         let found = survey(&[cards.to_owned()], flights, &|_| {}).unwrap();
         let decision = decide(&found, flights, &Answers::default());
-        let (outcomes, missing) = carry_out(&decision, &found, flights, how).unwrap();
+        let CarriedOut { outcomes, missing } = carry_out(&decision, &found, flights, how).unwrap();
         Self { found, decision, outcomes, missing }
     }
 

@@ -55,6 +55,9 @@ struct Event {
     share: f64,
 }
 
+/// A drone's slot, and for each of its boots the events that it saw.
+type Boots = (u16, Vec<Vec<usize>>);
+
 /// A log, and what is really in it.
 struct Truth {
     slot: u16,
@@ -63,10 +66,10 @@ struct Truth {
 
 /// A day of a fleet: its starts in their order, and for each drone its boots with the starts that they
 /// saw. `Chance` decides which drone failed when.
-fn day(chance: &mut Chance) -> (Vec<Event>, Vec<(u16, Vec<Vec<usize>>)>) {
+fn day(chance: &mut Chance) -> (Vec<Event>, Vec<Boots>) {
     let mut time_s = 0.0;
     let mut events = Vec::new();
-    for _ in 0..1 + chance.below(6) {
+    for _ in 0..=chance.below(6) {
         // At least as long as a flight takes.
         time_s += 900.0 + chance.below(5000) as f64;
         let share = [1.0, 1.0, 0.3, 0.05, 0.0][chance.below(5)];

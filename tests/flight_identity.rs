@@ -200,3 +200,38 @@ fn a_log_of_armed_time_alone_that_has_no_disarming_is_cut() {
         assert_eq!(identify(&log.log()).cut, cut, "LOG_DISARMED {disarmed}");
     }
 }
+
+#[test]
+fn damage_never_panics() {
+    let mut log = Writer::new();
+    log.parameter("SYSID_THISMAV", 7.0);
+    log.armed(92.0, true);
+    log.fly(BOOTED, 92.0, 110.0, Some(100.0), true);
+    log.armed(110.0, false);
+    log.fly(BOOTED, 60.0, 80.0, Some(70.0), true);
+    let whole = log.0.finish().unwrap();
+    let mut state = 1_u64;
+    let mut below = |end: usize| {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) % end as u64) as usize
+    };
+    for _ in 0..300 {
+        let mut bytes = whole.clone();
+        for _ in 0..1 + below(60) {
+            let at = below(bytes.len());
+            match below(3) {
+                0 => bytes[at] ^= 1 << below(8),
+                1 => drop(
+                    bytes.drain(at..(at + below(90)).min(whole.len()).min(bytes.len()).max(at)),
+                ),
+                _ => bytes[at] = 0xFF,
+            }
+        }
+        let identity = identify(&Log::from_bytes(bytes));
+        // Damage makes no log of another day.
+        let other_day = identity.belongs_to(at(100.0 + 86_400.0));
+        assert_ne!(other_day, Belongs::Yes);
+        let _ = identity.home(Some(at(100.0)));
+    }
+}

@@ -265,17 +265,18 @@ fn found_flight(
     let truth = if record.is_some() { true_air(folder, &plan)? } else { BTreeMap::new() };
     let flown = record.as_ref().zip(vehicle.as_ref());
     // Logs of the simulator have a record; of others the start was written down when it was authorized.
-    let start = match &record {
-        Some(record) => Some(record.start),
-        None => {
-            let at = of_start::Flight {
-                logs: &at.folder,
-                campaign: Some((campaign, plan.name.as_str())),
-            };
-            let (start, doubts) = of_start::refuse(&at, &mut logs)?;
-            notes.extend(doubts);
-            start
-        }
+    let start = if let Some(record) = &record {
+        Some(record.start)
+    } else {
+        // What was simulated no drone and no card has.
+        let is_real = at.origin == LogOrigin::Real;
+        let at = of_start::Flight {
+            logs: &at.folder,
+            campaign: is_real.then_some((campaign, plan.name.as_str())),
+        };
+        let (start, doubts) = of_start::refuse(&at, &mut logs)?;
+        notes.extend(doubts);
+        start
     };
     Ok(Found {
         leaning: flown.and_then(|(record, vehicle)| leaning(&plan, record, vehicle)),

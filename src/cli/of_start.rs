@@ -31,7 +31,7 @@ pub(super) fn written_start(logs: &Path) -> Result<Option<(GpsTime, &'static str
 pub(super) struct Flight<'a> {
     /// The folder of logs.
     pub(super) logs: &'a Path,
-    /// The campaign and the flight's name in it; `None`: a folder of logs alone.
+    /// The campaign and the flight's name in it; `None`: a folder of logs alone, or simulated ones.
     pub(super) campaign: Option<(&'a Path, &'a str)>,
 }
 

@@ -370,16 +370,20 @@ fn clocks(fixes: &[(f64, f64)]) -> Vec<Clock> {
     clocks
 }
 
+/// Rows of the show's clock that mean one start.
+struct Start {
+    /// Board time of show time 0 by each row, s.
+    offsets_s: Vec<f64>,
+    /// Rows in which the drone flew it.
+    flown: usize,
+}
+
 /// The starts that the show clock ran for: board time of show time 0 (s), and whether it was flown.
 fn shows(messages: &Messages, holds: impl Fn(f64) -> bool) -> Vec<(f64, bool)> {
     let Some(rows) = messages.rows("SHOW") else { return Vec::new() };
     let (Some(clocks), Some(stages)) = (rows.column("ClockMS"), rows.column("Stage")) else {
         return Vec::new();
     };
-    struct Start {
-        offsets_s: Vec<f64>,
-        flown: usize,
-    }
     let mut starts: Vec<Start> = Vec::new();
     for ((time, ms), stage) in rows.time_s.iter().zip(clocks).zip(stages) {
         if !ms.is_finite() || *ms == NO_CLOCK_MS || !holds(*time) {
@@ -412,7 +416,7 @@ fn home(messages: &Messages, times: std::ops::Range<f64>) -> Option<Geodetic> {
         let kinds = rows.column("Type").unwrap_or_default();
         let is_home = |row: &usize| kinds.get(*row).is_none_or(|kind| *kind == HOME);
         let own = || (0..rows.time_s.len()).filter(|row| times.contains(&rows.time_s[*row]));
-        let home = own().filter(is_home).next_back().or_else(|| own().next());
+        let home = own().rfind(is_home).or_else(|| own().next());
         place(rows, home?)
     });
     set.or_else(|| {

@@ -24,33 +24,45 @@ pub(super) fn which(
         if read == 0 {
             return Ok(None);
         }
-        if let Some(answer) = answer(&line, choices.len()) {
-            return Ok(answer);
+        match answer(&line, choices.len()) {
+            Answer::One(choice) => return Ok(Some(choice)),
+            Answer::None => return Ok(None),
+            Answer::Unclear => {}
         }
     }
 }
 
-/// What a line means: one of so many, or none of them; `None`: nothing.
-fn answer(line: &str, count: usize) -> Option<Option<usize>> {
+/// What a line means.
+#[derive(Debug, PartialEq)]
+enum Answer {
+    /// This one of the choices, from 0.
+    One(usize),
+    /// None of them.
+    None,
+    /// Nothing.
+    Unclear,
+}
+
+fn answer(line: &str, count: usize) -> Answer {
     match line.trim() {
-        "none" | "n" => Some(None),
-        number => {
-            let number: usize = number.parse().ok()?;
-            (1..=count).contains(&number).then(|| Some(number - 1))
-        }
+        "none" | "n" => Answer::None,
+        number => match number.parse::<usize>() {
+            Ok(number) if (1..=count).contains(&number) => Answer::One(number - 1),
+            _ => Answer::Unclear,
+        },
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::answer;
+    use super::{Answer, answer};
 
     #[test]
     fn an_answer_is_a_number_or_none() {
-        assert_eq!(answer("2\n", 2), Some(Some(1)));
-        assert_eq!(answer(" none ", 2), Some(None));
+        assert_eq!(answer("2\n", 2), Answer::One(1));
+        assert_eq!(answer(" none ", 2), Answer::None);
         for wrong in ["", "0", "3", "yes", "-1"] {
-            assert_eq!(answer(wrong, 2), None, "{wrong}");
+            assert_eq!(answer(wrong, 2), Answer::Unclear, "{wrong}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `updraft logs import`: each log on the cards goes to the flight and slot that it is of.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -20,8 +21,8 @@ use crate::cli::progress::Progress;
 use crate::cli::simulate::made_by;
 use crate::cli::words;
 use crate::fleet::logs::import::{
-    Answers, Carried, Carry, Decision, Doubt, ImportFlight, StartFrom, Survey, Take, carry_out,
-    decide, survey,
+    Answers, Carried, CarriedOut, Carry, Decision, Doubt, ImportFlight, StartFrom, Survey, Take,
+    carry_out, decide, survey,
 };
 use crate::fleet::slots::FleetTable;
 use crate::flight::identity::{SAME_START_S, later_s};
@@ -107,7 +108,7 @@ pub(super) fn run(context: &Context, args: &ImportArgs) -> Result<Exit, CommandE
         made_by: made_by(),
         unix_s: SystemClock::start().unix_us() / 1_000_000,
     };
-    let (outcomes, missing) = carry_out(&decision, &found, &flights, &how)?;
+    let CarriedOut { outcomes, missing } = carry_out(&decision, &found, &flights, &how)?;
     Report { context, found: &found, flights: &flights, decision: &decision }
         .print(&outcomes, &missing)
 }
@@ -186,7 +187,10 @@ fn decided(
     let mut decision = decide(found, flights, &answers);
     let may_ask = std::io::stdin().is_terminal() && context.interactive && !context.json;
     let mut asked = BTreeSet::new();
-    while may_ask {
+    if !may_ask {
+        return Ok(decision);
+    }
+    loop {
         let key = |doubt: &Doubt| match doubt {
             Doubt::Start { flight, .. } => Some((*flight, 0)),
             Doubt::Log { flight, slot, .. } => Some((*flight, *slot)),
@@ -196,7 +200,7 @@ fn decided(
             let key = key(doubt).filter(|key| !asked.contains(key))?;
             Some((key, doubt.clone()))
         });
-        let Some((key, doubt)) = open else { break };
+        let Some((key, doubt)) = open else { return Ok(decision) };
         asked.insert(key);
         match &doubt {
             Doubt::Start { flight, starts } => {
@@ -220,7 +224,6 @@ fn decided(
         }
         decision = decide(found, flights, &answers);
     }
-    Ok(decision)
 }
 
 /// A log, as people tell logs apart.
@@ -228,10 +231,10 @@ fn about(found: &Survey, log: usize) -> String {
     let Some(log) = found.logs.get(log) else { return String::new() };
     let mut text = log.path.shown().to_string();
     if let Some(system) = log.identity.system_id {
-        text.push_str(&format!(", drone {system}"));
+        let _ = write!(text, ", drone {system}");
     }
     if let Some((first, _)) = log.identity.span() {
-        text.push_str(&format!(", from {}", utc(first)));
+        let _ = write!(text, ", from {}", utc(first));
     }
     text
 }

@@ -19,7 +19,7 @@ use crate::campaign::start::StartRecord;
 use crate::flight::Identity;
 use crate::mission::Plan;
 
-pub use carry::{Carried, Carry, carry_out};
+pub use carry::{Carried, CarriedOut, Carry, carry_out};
 pub use decide::decide;
 pub use survey::survey;
 

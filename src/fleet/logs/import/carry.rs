@@ -39,8 +39,16 @@ pub enum Carried {
     Left(String),
 }
 
-/// Copies what was decided into the flights' folders. Each log's outcome, and the slots of each flight
-/// that have no log now.
+/// What came of all that was decided.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CarriedOut {
+    /// Of each log that was to be taken.
+    pub outcomes: Vec<(Take, Carried)>,
+    /// By flight: slots that have no log now.
+    pub missing: Vec<BTreeSet<u16>>,
+}
+
+/// Copies what was decided into the flights' folders.
 ///
 /// # Errors
 /// When a folder's manifest cannot be read or written. What a card does not give up is an outcome.
@@ -49,7 +57,7 @@ pub fn carry_out(
     survey: &Survey,
     flights: &[ImportFlight],
     how: &Carry,
-) -> Result<(Vec<(Take, Carried)>, Vec<BTreeSet<u16>>), CampaignError> {
+) -> Result<CarriedOut, CampaignError> {
     let mut outcomes = Vec::new();
     let mut missing = Vec::new();
     for (index, flight) in flights.iter().enumerate() {
@@ -77,7 +85,7 @@ pub fn carry_out(
         let slots = flight.plan.slots.iter().map(|slot| slot.slot);
         missing.push(slots.filter(|slot| !has(*slot)).collect());
     }
-    Ok((outcomes, missing))
+    Ok(CarriedOut { outcomes, missing })
 }
 
 /// The starts before the latest one, by their numbers.
