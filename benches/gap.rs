@@ -115,6 +115,7 @@ fn explained(fleet: &Fleet) -> Explained {
         flown: &flown,
         simulated: None,
         table: None,
+        logs: fleet.flights.len(),
         left_out: Vec::new(),
     };
     explain(&input, &Options::default()).unwrap()

@@ -33,7 +33,7 @@ fn show() -> Show {
             land_at_m: Some(home),
             trajectory: Trajectory { start_m: home, segments: segments.collect() },
             lights: lights::encode(&(0..20).map(step).collect::<Vec<_>>()),
-            yaw: None,
+            ..ShowDrone::default()
         }
     };
     Show { drones: (0..5000).map(drone).collect(), ..Show::default() }

@@ -9,7 +9,7 @@ use check_support::*;
 use updraft::check::{CheckInput, CheckReport, Severity, check};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, ResolvedFlight, resolve};
-use updraft::show::{FenceZone, Show, Validation};
+use updraft::show::{Extras, FenceZone, Show, Validation, YawControl};
 use updraft::vehicle::library;
 
 fn planned(template: &str, overrides: &[&str]) -> ResolvedFlight {
@@ -237,4 +237,102 @@ fn hovers_that_ramps_eat_are_counted() {
         ]
     );
     assert_eq!(named(&of_plan(&ramped("motion.ramp_mps2=5")), "ladder-window"), [""; 0]);
+}
+
+/// Studio for Blender states accelerations by direction, a yaw rate and an altitude below which nobody
+/// moves sideways.
+#[test]
+fn what_other_programs_state_counts_where_it_is_stricter() {
+    // Within 2 m/s² of the vehicle: 1.5 sideways, then 1.2 down to the side.
+    let swing = |number, x| {
+        let middle = vec![
+            cubic(4000, [[x, 0.0, 10.0], [x + 4.0, 0.0, 10.0], [x + 8.0, 0.0, 10.0]]),
+            hold(4000),
+            line(4000, x + 8.0, 0.0, 3.0),
+            line(4000, x + 10.0, 0.0, 3.0),
+        ];
+        flight(number, (x, 0.0), middle, (x + 10.0, 0.0))
+    };
+    let mut show = show(vec![swing(1, 0.0), swing(2, 20.0)]);
+    show.drones[1].yaw = Some(YawControl {
+        setpoints: vec![(0.0, 0.0), (10.0, 90.0), (12.0, 190.0)],
+        ..YawControl::default()
+    });
+    let found = |show: &Show| {
+        let report = check(&CheckInput::new(show, &limits()));
+        let names =
+            ["acceleration-horizontal", "acceleration-vertical", "yaw-rate", "nav-altitude"];
+        names.map(|name| report.counts.get(name).map_or(0, |count| count.errors + count.warnings))
+    };
+    assert_eq!(found(&show), [0; 4], "nothing is stated");
+    let stated = |xy, z, yaw, altitude| Validation {
+        max_acceleration_xy_mps2: Some(xy),
+        max_acceleration_z_mps2: Some(z),
+        max_yaw_rate_dps: Some(yaw),
+        min_nav_altitude_m: Some(altitude),
+        ..Validation::default()
+    };
+    show.validation = Some(stated(4.0, 4.0, 60.0, 2.5));
+    assert_eq!(found(&show), [0; 4], "looser than the vehicle, or kept");
+    show.validation = Some(stated(0.5, 0.5, 30.0, 5.0));
+    let [horizontal, vertical, yaw, altitude] = found(&show);
+    assert_eq!((horizontal, vertical), (2, 0), "where each swing begins, to the side alone");
+    assert_eq!(yaw, 1, "drone 2 turns at 50 deg/s");
+    assert!(altitude > 0, "it moves sideways at 3 m");
+    let report = check(&CheckInput::new(&show, &limits()));
+    let text = report.to_string();
+    assert!(
+        text.contains("warning[yaw-rate] Drone 2 at 10.000 s: turns at 50.000 deg/s"),
+        "{text}"
+    );
+    let report = check(&CheckInput::new(&show, &limits()).with_stock(&limits()));
+    assert!(!report.counts.contains_key("limits"), "{report}");
+    show.validation = Some(stated(4.0, 4.0, 60.0, 2.5));
+    let report = check(&CheckInput::new(&show, &limits()).with_stock(&limits()));
+    let text = report.to_string();
+    assert!(text.contains("the show states max_acceleration_mps2 = 4 m/s²"), "{text}");
+}
+
+/// What is not checked is named.
+#[test]
+fn what_is_there_and_not_checked_is_named() {
+    let mut show = show(vec![calm(1, 0.0, 0.0), calm(2, 10.0, 0.0), calm(3, 20.0, 0.0)]);
+    show.doubts = vec!["cues.json: cue 2 has no time and is left out".to_owned()];
+    show.drones[0].extras = Extras { pyro_events: 3, has_rth_plan: true, spare_coordinates: 0 };
+    show.drones[1].extras = Extras { pyro_events: 1, has_rth_plan: false, spare_coordinates: 7 };
+    let report = check(&CheckInput::new(&show, &limits()));
+    assert!(report.passed(), "{report}");
+    let text = report.to_string();
+    for words in [
+        "warning[file]: cues.json: cue 2 has no time and is left out",
+        "warning[file] Drone 2: has points with more than three coordinates",
+        "note: pyro: 4 events of 2 drones (first Drone 1); they are not checked",
+        "note: return-to-home plan of Drone 1: ",
+    ] {
+        assert!(text.contains(words), "{words}\n{text}");
+    }
+}
+
+/// A fleet that does the same by design is told so once; what one of them does is its own.
+#[test]
+fn equal_warnings_of_many_drones_are_one() {
+    let low = |number: usize, height: f64| {
+        let x = 10.0 * number as f64;
+        let segments = vec![
+            line(10_000, x, 0.0, 10.0),
+            line(10_000, x, 0.0, height),
+            hold(10_000),
+            line(10_000, x, 0.0, 10.0),
+            line(10_000, x, 0.0, 2.5),
+        ];
+        drone(number, x, 0.0, segments)
+    };
+    let mut drones: Vec<_> = (1..=9).map(|number| low(number, 1.5)).collect();
+    drones.push(low(10, 1.2));
+    let report = run(drones);
+    let low: Vec<_> = report.findings.iter().filter(|found| found.check == "low-flight").collect();
+    assert_eq!(low.iter().map(|found| found.drones.len()).collect::<Vec<_>>(), [1, 9], "{report}");
+    let text = report.to_string();
+    assert!(text.contains("warning[low-flight] Drone 1 to Drone 9 (9 drones) at "), "{text}");
+    assert_eq!(report.counts["low-flight"].warnings, 2);
 }

@@ -66,3 +66,5 @@ mod scan;
 mod simulate;
 #[path = "cli/tables.rs"]
 mod tables;
+#[path = "cli/words.rs"]
+mod words;

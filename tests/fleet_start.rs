@@ -20,7 +20,7 @@ use updraft::fleet::journal::{Entry, JOURNAL_FILE, Journal};
 use updraft::fleet::messages::{self, GUIDED, LAND, RTL};
 use updraft::fleet::params::{ListParams, ReadParams, SetParams};
 use updraft::fleet::preflight::{Known, Limits, Preflight, preflight};
-use updraft::fleet::required::{CheckParams, Standing, requirements};
+use updraft::fleet::required::{CheckParams, Difference, Requirement, Standing, requirements};
 use updraft::fleet::slots::{self, FleetTable};
 use updraft::fleet::start::{Phase, Start, StartOptions, StartRefusal};
 use updraft::fleet::telemetry::Telemetry;
@@ -131,6 +131,15 @@ fn every_no_go_is_said_in_words() {
     });
     case(&|_, _, known| {
         known.params.remove(&drone(1));
+    });
+    case(&|_, _, known| {
+        let wrong = |requirement: &Requirement| Difference {
+            requirement: requirement.clone(),
+            is: (requirement.name != "FENCE_ENABLE").then_some(7.0),
+        };
+        let required = requirements(&plan, true);
+        let standing = known.params.get_mut(&drone(1)).unwrap();
+        standing.wrong = required.iter().take(5).map(wrong).collect();
     });
     case(&|net, telemetry, _| {
         net.vehicles.get_mut(&drone(1)).unwrap().fault = Fault::Silent;

@@ -295,6 +295,7 @@ impl Work<'_> {
 /// Logs of which other evidence says something else than what decided: each log once.
 fn contradictions(plan: &Plan, work: &Work<'_>, places: &[Place]) -> Vec<String> {
     const WORDS: [&str; 4] = ["home position", "flight record", "file name", "system id"];
+    const SYSTEM_ID: usize = 3;
     let mut found: BTreeMap<(usize, Vec<usize>), Vec<String>> = BTreeMap::new();
     for ((log, place), result) in work.logs.iter().zip(places).zip(&work.result) {
         let Some(Ok(slot)) = result else { continue };
@@ -306,6 +307,12 @@ fn contradictions(plan: &Plan, work: &Work<'_>, places: &[Place]) -> Vec<String>
             .filter_map(|(word, said)| Some((word, (*said)?)))
             .filter(|(_, said)| said != slot && plan.slot(*said).is_some())
             .collect();
+        // A drone may fly any slot: its system id says nothing against its place where the record or
+        // the file name, which know who flew which, agree with that.
+        let known = says.iter().take(SYSTEM_ID).filter(|said| **said == Some(*slot)).count() > 1;
+        if known && others.iter().all(|(word, _)| *word == SYSTEM_ID) {
+            continue;
+        }
         let meant: BTreeSet<u16> = others.iter().map(|(_, said)| *said).collect();
         if meant.is_empty() {
             continue;

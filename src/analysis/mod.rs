@@ -37,6 +37,7 @@ mod starts;
 pub mod statistics;
 mod stats;
 pub mod steps;
+pub mod together;
 mod track;
 mod truth;
 pub mod updraft;

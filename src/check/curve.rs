@@ -188,6 +188,11 @@ impl Curve {
         self.axis(0).square().add(&self.axis(1).square())
     }
 
+    /// Square of the height.
+    pub(super) fn vertical_squared(&self) -> Poly {
+        self.axis(2).square()
+    }
+
     /// A box that contains the curve: that of its control points.
     pub(super) fn bounds(&self) -> Bounds {
         let mut bounds = Bounds::EMPTY;

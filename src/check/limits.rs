@@ -65,6 +65,11 @@ fn stated(input: &CheckInput<'_>, key: &str) -> Option<f64> {
         "max_speed_up_mps" => stated.max_velocity_z_up_mps.or(stated.max_velocity_z_mps),
         "max_speed_down_mps" => stated.max_velocity_z_mps,
         "max_altitude_m" => stated.max_altitude_m,
+        // A show that states it for all directions is one of this program's, where it counts.
+        "max_acceleration_mps2" if stated.max_acceleration_mps2.is_none() => {
+            let [xy, z] = [stated.max_acceleration_xy_mps2, stated.max_acceleration_z_mps2];
+            xy.into_iter().chain(z).reduce(f64::max)
+        }
         "min_distance_m" => stated.min_distance_m,
         _ => None,
     }

@@ -20,6 +20,7 @@ pub mod bernstein;
 mod curve;
 mod distance;
 mod endurance;
+mod extras;
 mod fence;
 mod firmware;
 mod format;
@@ -31,6 +32,7 @@ mod low_flight;
 mod motion;
 mod pair;
 mod report;
+mod stated;
 mod track;
 mod tree;
 mod validity;
@@ -49,6 +51,7 @@ use crate::mission::plan::{Fence, Plan};
 use crate::show::Show;
 use crate::vehicle::{Autopilot, Limits};
 use report::Collector;
+use stated::Stated;
 use track::Track;
 use watch::Watch;
 
@@ -113,6 +116,8 @@ pub struct CheckInput<'a> {
 /// Names of all checks, as findings carry them.
 pub const NAMES: &[&str] = &[
     "acceleration",
+    "acceleration-horizontal",
+    "acceleration-vertical",
     "altitude-max",
     "altitude-min",
     "distance",
@@ -120,6 +125,7 @@ pub const NAMES: &[&str] = &[
     "fence",
     "fence-altitude",
     "fence-exclusion",
+    "file",
     "firmware-away",
     "firmware-climb",
     "firmware-early-landing",
@@ -135,6 +141,7 @@ pub const NAMES: &[&str] = &[
     "low-flight",
     "low-lateral",
     "mixed-starts",
+    "nav-altitude",
     "same-home",
     "same-start",
     "skyb-duration",
@@ -146,6 +153,7 @@ pub const NAMES: &[&str] = &[
     "speed-up",
     "validity",
     "velocity-step",
+    "yaw-rate",
 ];
 
 impl<'a> CheckInput<'a> {
@@ -228,6 +236,7 @@ pub fn check(input: &CheckInput<'_>) -> CheckReport {
         .collect();
 
     limits::check(input, &mut collector);
+    extras::check(input, &mut collector);
     if let Some(plan) = input.plan {
         ladder::check(plan, &mut collector);
     }
@@ -254,6 +263,7 @@ fn watch_drones(input: &CheckInput<'_>, tracks: &[Track<'_>], collector: &mut Co
     let top = top.map(fence::altitude);
     let motion = motion::quantities(input);
     let lateral = lateral::quantity(input);
+    let stated = Stated::of(input);
     let low_flight = low_flight::quantity(input);
     let endurance = endurance::quantity(input);
     let watched: Vec<Vec<Watch>> = tracks
@@ -265,6 +275,7 @@ fn watch_drones(input: &CheckInput<'_>, tracks: &[Track<'_>], collector: &mut Co
             watches.push(endurance::watch(track, endurance, firmware.land_speed_mps));
             let clearances = zones.iter().map(|(zone, what)| fence::watch(track, zone, *what));
             watches.extend(clearances);
+            watches.extend(stated.watch(track));
             watches.extend(top.map(|what| fence::watch_altitude(track, what)));
             watches
         })

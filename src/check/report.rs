@@ -254,11 +254,16 @@ impl fmt::Display for CheckReport {
     }
 }
 
+/// Warnings whose words are remembered.
+const MOST_TOLD: usize = 10_000;
+
 /// Collects findings: bounded in memory, in an order that depends on the show alone.
 #[derive(Debug)]
 pub(super) struct Collector {
     per_check: usize,
     kept: BTreeMap<&'static str, Vec<(usize, Finding)>>,
+    /// Where the warning with these words is among those of its check.
+    told: BTreeMap<(&'static str, String), usize>,
     counts: BTreeMap<&'static str, Count>,
     margins: Vec<Margin>,
     notes: Vec<String>,
@@ -280,6 +285,7 @@ impl Collector {
         Self {
             per_check,
             kept: BTreeMap::new(),
+            told: BTreeMap::new(),
             counts: BTreeMap::new(),
             margins: Vec::new(),
             notes: Vec::new(),
@@ -287,7 +293,13 @@ impl Collector {
     }
 
     /// Adds a finding about the drone with this index (the first of them, if several).
+    ///
+    /// A warning that is the same for many drones is one with many drones: a fleet that flies low by
+    /// design is told so once.
     pub(super) fn add(&mut self, drone: usize, finding: Finding) {
+        if finding.severity == Severity::Warning && self.joins(&finding) {
+            return;
+        }
         let count = self.counts.entry(finding.check).or_default();
         match finding.severity {
             Severity::Error => count.errors += 1,
@@ -298,7 +310,26 @@ impl Collector {
         if kept.len() > self.per_check.saturating_mul(4).saturating_add(64) {
             kept.sort_by(by_urgency);
             kept.truncate(self.per_check);
+            self.told.clear();
         }
+    }
+
+    /// Adds the drone of a warning to the same one of other drones, if that was told.
+    fn joins(&mut self, finding: &Finding) -> bool {
+        let [name] = finding.drones.as_slice() else { return false };
+        let kept = self.kept.entry(finding.check).or_default();
+        let words = (finding.check, format!("{:?} {}", finding.time_s, finding.message));
+        if let Some((_, same)) = self.told.get(&words).and_then(|at| kept.get_mut(*at))
+            && same.end_s == finding.end_s
+        {
+            same.drones.push(name.clone());
+            return true;
+        }
+        if self.told.len() > MOST_TOLD {
+            self.told.clear();
+        }
+        self.told.insert(words, kept.len());
+        false
     }
 
     /// Says that a check stopped before it had counted everything.
@@ -317,7 +348,7 @@ impl Collector {
     }
 
     pub(super) fn finish(self, drones: usize, duration_s: f64) -> CheckReport {
-        let Self { per_check, kept, mut counts, margins, notes } = self;
+        let Self { per_check, kept, mut counts, margins, notes, told: _ } = self;
         let mut all = Vec::new();
         for (check, mut findings) in kept {
             findings.sort_by(by_urgency);
@@ -356,7 +387,9 @@ mod tests {
     fn keeps_the_first_and_counts_the_rest() {
         let mut collector = Collector::new(3);
         for drone in (0..1000).rev() {
-            collector.add(drone, finding(Severity::Warning, 5.0, drone));
+            let message = format!("too fast by {drone} m/s");
+            let warning = Finding { message, ..finding(Severity::Warning, 5.0, drone) };
+            collector.add(drone, warning);
             collector.add(drone, finding(Severity::Error, 7.0, drone));
         }
         let report = collector.finish(1000, 60.0);
@@ -366,6 +399,20 @@ mod tests {
         assert_eq!((report.errors(), report.warnings()), (1000, 1000));
         assert!(report.to_string().contains("speed-up: and 1997 more"), "{report}");
         assert_eq!(report.to_string().matches("help: slow down").count(), 1);
+    }
+
+    #[test]
+    fn the_same_warning_of_many_drones_is_one() {
+        let mut collector = Collector::new(20);
+        for drone in 0..49 {
+            collector.add(drone, finding(Severity::Warning, 5.0, drone));
+            collector.add(drone, finding(Severity::Error, 7.0, drone));
+        }
+        collector.add(49, finding(Severity::Warning, 5.5, 49));
+        let report = collector.finish(50, 60.0);
+        assert_eq!((report.errors(), report.warnings()), (49, 2));
+        let one = report.findings.iter().find(|found| found.severity == Severity::Warning);
+        assert!(one.is_none_or(|found| found.drones.len() == 49), "{report}");
     }
 
     #[test]

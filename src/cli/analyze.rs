@@ -385,8 +385,8 @@ fn finish(
             analysis: &analysis,
         })?;
     }
-    // Where neither tables nor the object are printed, what is lost would go unsaid.
-    if context.quiet && !context.json && !nothing {
+    // Where no tables are printed, what is lost would go unsaid.
+    if (context.quiet || context.json) && !nothing {
         for problem in problems(&analysis, false) {
             context.warn(&problem);
         }
@@ -443,14 +443,23 @@ pub(super) fn load_plan(path: &Path) -> Result<Plan, CommandError> {
     if has_extension(path, "json") {
         return Ok(campaign::read_plan(path)?);
     }
+    let several = |count: usize| {
+        CommandError::Usage(format!(
+            "{} holds {count} flights; give the folder of one of them",
+            path.shown()
+        ))
+    };
+    // The plan is what counts, whatever else of the flight is there.
+    if path.is_dir() && campaign::is_campaign(path) {
+        return match campaign::flights(path)?.as_slice() {
+            [flight] => Ok(flight.read_plan()?),
+            flights => Err(several(flights.len())),
+        };
+    }
     let vehicle = library::builtin("airsim-generic-quad")?;
     let mut loaded = load_shows(path, &vehicle)?;
     if loaded.len() != 1 {
-        return Err(CommandError::Usage(format!(
-            "{} holds {} flights; give the folder of one of them",
-            path.shown(),
-            loaded.len()
-        )));
+        return Err(several(loaded.len()));
     }
     Ok(loaded.remove(0).plan)
 }

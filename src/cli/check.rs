@@ -260,6 +260,7 @@ pub(super) fn checked(
     let mut report = check(&match origin {
         Origin::Plan => input.with_fence(fence).with_plan(plan),
         Origin::Beside(_) => input.with_fence(fence),
+        Origin::Show if show.fence_altitude_m.is_some() => input.with_fence(fence),
         Origin::Show => input.with_polygon(fence),
     });
     if let Origin::Beside(file) = origin {

@@ -2,6 +2,7 @@
 
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
@@ -28,6 +29,8 @@ pub(super) struct Context {
     /// Columns of the terminal that standard output is read on; none for files and pipes.
     pub(super) width: Option<usize>,
     signals: Signals,
+    /// Whether something was said that must be said even when quiet.
+    insisted: Arc<AtomicBool>,
 }
 
 impl Context {
@@ -48,6 +51,7 @@ impl Context {
             interactive: io::stderr().is_terminal() && !global.quiet && !global.no_progress,
             width: columns(),
             signals,
+            insisted: Arc::default(),
         };
         if let Err(error) = installed {
             context.warn(&format!("Ctrl-C ends the program at once ({error})"));
@@ -65,6 +69,7 @@ impl Context {
             interactive: false,
             width: None,
             signals: Signals::default(),
+            insisted: Arc::default(),
         }
     }
 
@@ -144,14 +149,21 @@ impl Context {
         }
     }
 
+    /// Says that something was lost if nobody has said what: no command ends so in silence.
+    pub(super) fn account_for_losses(&self) {
+        if !self.insisted.load(Ordering::Relaxed) {
+            self.insist("warning: done, with losses that are named above (exit code 3)");
+        }
+    }
+
     /// A warning, on standard error, always.
     pub(super) fn warn(&self, text: &str) {
         self.insist(&format!("warning: {text}"));
     }
 
     /// Something that must be said even when quiet, on standard error.
-    #[expect(clippy::unused_self, reason = "talks like the other methods")]
     pub(super) fn insist(&self, text: &str) {
+        self.insisted.store(true, Ordering::Relaxed);
         complain(text);
     }
 }

@@ -414,7 +414,9 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
 }
 
 pub(super) fn stem(path: &Path) -> String {
-    let name = path.file_stem().or(path.file_name());
+    // `arducopter-4.4` is a folder, not a file `arducopter-4` with an ending.
+    let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+    let name = name.or(path.file_name());
     let text = name.map_or_else(String::new, |name| plain(&name.to_string_lossy()).into_owned());
     if text.is_empty() { "logs".to_owned() } else { text }
 }

@@ -175,7 +175,14 @@ pub(super) fn run(
         context.print(&format!("{}\n", result.words.join("\n")))?;
     }
     context.result(&path)?;
-    Ok(if played.flown.lost > 0 { Exit::Losses } else { Exit::Done })
+    if played.flown.lost > 0 {
+        context.warn(&format!(
+            "{} could not be flown and gave no log",
+            words::count(played.flown.lost, "drone")
+        ));
+        return Ok(Exit::Losses);
+    }
+    Ok(Exit::Done)
 }
 
 /// A flight of another seed is not mixed with this one's.

@@ -81,7 +81,7 @@ pub(super) fn run(context: &Context, args: &InspectArgs) -> Result<Exit, Command
             InspectOutput::Skyb(file) => format!("{}: {}", path.shown(), describe_skyb(file)),
             InspectOutput::Plans(plans) => plans
                 .iter()
-                .map(|plan| timetable::describe(plan, context.width))
+                .map(|plan| timetable::describe(plan, context.width, false))
                 .collect::<Vec<_>>()
                 .join("\n"),
         };

@@ -181,7 +181,12 @@ pub fn main() -> ExitCode {
     };
     let context = Context::new(&cli.global);
     match dispatch(&context, cli.command) {
-        Ok(exit) => exit.into(),
+        Ok(exit) => {
+            if exit == Exit::Losses {
+                context.account_for_losses();
+            }
+            exit.into()
+        }
         Err(error) => {
             if !matches!(error, CommandError::BrokenPipe) {
                 let text = exit::with_reasons(&error);

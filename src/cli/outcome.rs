@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::exit::{BECAUSE, CommandError};
 use crate::analysis::result::{Analysis, FlightAnalysis, Unmeasured};
+use crate::analysis::together::{Remark, together};
 use crate::mission::plan::Purpose;
 
 /// Reasons that an error lists.
@@ -30,19 +31,41 @@ fn lost(flight: &FlightAnalysis) -> Vec<String> {
         Some(slot) => format!("slot {slot}"),
         None => drone.name.clone(),
     };
-    let missing = flight.missing.iter().map(|one| format!("slot {}: {}", one.slot, one.reason));
+    let missing = flight.missing.iter().map(|one| Remark {
+        slot: Some(one.slot),
+        name: format!("slot {}", one.slot),
+        text: one.reason.clone(),
+    });
     // A missing drone's reason is that of its log.
     let told = |slot: Option<u16>| flight.missing.iter().any(|one| Some(one.slot) == slot);
     let unused = flight.unused.iter().filter(|log| !told(log.slot));
-    let unused = unused.map(|log| format!("not used: {}", log.sentence()));
-    let partly = flight.partly_used.iter().map(|log| format!("{}: {}", log.source, log.reason));
+    let unused = unused.map(|log| Remark {
+        slot: log.slot,
+        name: "not used".to_owned(),
+        text: log.sentence(),
+    });
+    let partly = flight.partly_used.iter().map(|log| Remark {
+        slot: log.slot,
+        name: log.source.clone(),
+        text: log.reason.clone(),
+    });
     let what = match flight.purpose {
         Purpose::Calibration => "no law",
         Purpose::Measurement => "no value of the map",
     };
-    let unmeasured =
-        flight.unmeasured.iter().map(|one| format!("{}: {what}: {}", who(one), one.reason));
-    missing.chain(unused).chain(partly).chain(unmeasured).collect()
+    let unmeasured = flight.unmeasured.iter().map(|one| Remark {
+        slot: one.slot,
+        name: who(one),
+        text: format!("{what}: {}", one.reason),
+    });
+    let partial = flight.drones.iter().filter_map(|drone| {
+        drone.partial_ladder.map(|partial| Remark {
+            slot: drone.slot,
+            name: drone.slot.map_or_else(|| drone.name.clone(), |slot| format!("slot {slot}")),
+            text: format!("partial ladder ({}): not in the fleet's numbers", partial.short()),
+        })
+    });
+    together(missing.chain(unused).chain(partly).chain(unmeasured).chain(partial))
 }
 
 /// The error of an analysis without one law and one value, with what to do. `reasons`: also why, for

@@ -82,8 +82,9 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         let show = Show::of_plan(&flight.plan);
         let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few);
         if !context.json {
+            let is_example = args.mission.is_example(&flight.plan.site)?;
             context.print(&words::wrap(
-                &timetable::describe(&flight.plan, context.width),
+                &timetable::describe(&flight.plan, context.width, is_example),
                 context.width,
             ))?;
             context.print("\n")?;

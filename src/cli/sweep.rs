@@ -99,6 +99,9 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
         flown.flown,
         page.shown()
     ));
+    for lost in &result.lost {
+        context.warn(&format!("{} is lost: {}", lost.name, lost.reason));
+    }
     Ok(if result.lost.is_empty() { Exit::Done } else { Exit::Losses })
 }
 

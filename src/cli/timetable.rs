@@ -35,7 +35,9 @@ impl Room {
 }
 
 /// The plan's head and the timetable of each group; narrow terminals get no window column.
-pub(super) fn describe(plan: &Plan, width: Option<usize>) -> String {
+///
+/// `is_example`: nobody has said where it is, so that it is where the built-in templates are.
+pub(super) fn describe(plan: &Plan, width: Option<usize>, is_example: bool) -> String {
     let room = Room::of(width);
     let mut text = String::new();
     let _ = write!(text, "{}: {}", plan.title, count(plan.slots.len(), "drone"));
@@ -53,6 +55,20 @@ pub(super) fn describe(plan: &Plan, width: Option<usize>) -> String {
         site.orientation_deg,
         plan.vehicle
     );
+    if is_example {
+        text.push_str(
+            "THE SITE WAS NOT GIVEN: this is the templates' example, a field in Hungary. Give yours \
+             with --origin LAT,LON and --ground M before you fly\n",
+        );
+    } else if site.ground_assumed {
+        let _ = writeln!(
+            text,
+            "the height of the ground there is NOT KNOWN: {} m are assumed, which is the template's. \
+             It sets the density of the air in simulations and in the map (1 % for each 100 m); \
+             drones fly heights above home whatever it is. --ground M gives it",
+            site.ground_amsl_m
+        );
+    }
     for group in &plan.groups {
         describe_group(&mut text, plan, group, room);
     }

@@ -23,6 +23,7 @@ pub mod journal;
 pub mod log_protocol;
 pub mod logs;
 pub mod messages;
+mod off_course;
 pub mod orders;
 pub mod params;
 pub mod preflight;

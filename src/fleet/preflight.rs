@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::required::Standing;
+use super::required::{Difference, Standing};
 use super::slots::{self, FleetTable, SlotProblem};
 use super::start::{ClockSpread, clocks};
 use super::telemetry::{Drone, SILENT_AFTER, Telemetry};
@@ -380,11 +380,19 @@ impl Look<'_> {
     fn params(&self) -> Cell {
         match self.known.params.get(&self.drone) {
             None => bad("?", "its parameters were not checked"),
-            Some(standing) => match standing.wrong.first() {
-                Some(wrong) => bad(format!("{} wrong", standing.wrong.len()), wrong.to_string()),
-                None if standing.failed.is_some() => bad("failed", "a parameter was not set"),
-                None if standing.changed.is_empty() => good("ok"),
-                None => good(format!("{} changed", standing.changed.len())),
+            Some(standing) => match standing.wrong.as_slice() {
+                [] if standing.failed.is_some() => bad("failed", "a parameter was not set"),
+                [] if standing.changed.is_empty() => good("ok"),
+                [] => good(format!("{} changed", standing.changed.len())),
+                [one] => bad("1 wrong", one.to_string()),
+                several => {
+                    let all: Vec<String> = several.iter().map(Difference::brief).collect();
+                    let count = several.len();
+                    bad(
+                        format!("{count} wrong"),
+                        format!("{count} parameters are wrong: {}", all.join("; ")),
+                    )
+                }
             },
         }
     }
@@ -423,8 +431,16 @@ impl std::fmt::Display for Preflight {
         for why in &self.fleet {
             writeln!(f, "NO-GO: {why}")?;
         }
-        let ready = self.rows.iter().filter(|row| row.go()).count();
-        let verdict = if self.go() { "GO" } else { "NO-GO" };
-        writeln!(f, "{verdict}: {ready} of {} drones are ready", self.rows.len())
+        let (ready, all) = (self.rows.iter().filter(|row| row.go()).count(), self.rows.len());
+        match self.fleet.len() {
+            0 if self.go() => writeln!(f, "GO: {ready} of {all} drones are ready"),
+            // Each drone may be fine by itself and the fleet as a whole still must not start.
+            wrong if wrong > 0 && ready == all => writeln!(
+                f,
+                "NO-GO: each of the {all} drones is ready, but {} wrong with the fleet as a whole",
+                if wrong == 1 { "one thing is".to_owned() } else { format!("{wrong} things are") }
+            ),
+            _ => writeln!(f, "NO-GO: {ready} of {all} drones are ready"),
+        }
     }
 }

@@ -58,11 +58,11 @@ impl Wanted {
 impl std::fmt::Display for Wanted {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Is(value) => write!(f, "{value}"),
-            Self::AtLeast(value) => write!(f, "{value} or more"),
-            Self::AtMost(value) => write!(f, "{value} or less"),
-            Self::HasBits(bits) => write!(f, "to have all bits of {bits}"),
-            Self::LacksBits(bits) => write!(f, "to have no bit of {bits}"),
+            Self::Is(value) => write!(f, "be {value}"),
+            Self::AtLeast(value) => write!(f, "be {value} or more"),
+            Self::AtMost(value) => write!(f, "be {value} or less"),
+            Self::HasBits(bits) => write!(f, "have all bits of {bits}"),
+            Self::LacksBits(bits) => write!(f, "have no bit of {bits}"),
         }
     }
 }
@@ -162,12 +162,23 @@ impl std::fmt::Display for Difference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Requirement { name, wanted, why } = &self.requirement;
         match self.is {
-            Some(is) => write!(f, "{name} is {is}, it must be {wanted}: {why}"),
+            Some(is) => write!(f, "{name} is {is}, it must {wanted}: {why}"),
             None => write!(
                 f,
-                "{name} cannot be read (it must be {wanted}): the firmware has no such \
+                "{name} cannot be read (it must {wanted}): the firmware has no such \
                  parameter, or the radio does not reach the drone"
             ),
+        }
+    }
+}
+
+impl Difference {
+    /// What is and what must be, without the reason: one of a list.
+    pub fn brief(&self) -> String {
+        let Requirement { name, wanted, .. } = &self.requirement;
+        match self.is {
+            Some(is) => format!("{name} is {is}, it must {wanted}"),
+            None => format!("{name} cannot be read, it must {wanted}"),
         }
     }
 }

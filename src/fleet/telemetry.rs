@@ -50,6 +50,8 @@ pub struct Position {
     pub neu_mps: [f64; 3],
     /// Heading, degrees clockwise from north, if known.
     pub heading_deg: Option<f64>,
+    /// When it was measured, ms since the vehicle was switched on.
+    pub boot_ms: u32,
 }
 
 /// GPS receiver.
@@ -179,6 +181,7 @@ impl Drone {
             MavMessage::SYS_STATUS(status) => self.health = Some((now, health(status))),
             MavMessage::SYSTEM_TIME(time) => {
                 self.clock.read(now, time.time_unix_usec);
+                self.clock.read_board(time.time_boot_ms, time.time_unix_usec);
                 let unix_ms = (time.time_unix_usec / 1000) as i64 - i64::from(time.time_boot_ms);
                 let booted = GpsTime::from_unix_ms(unix_ms);
                 // Before the first fix its clock says nothing.
@@ -243,6 +246,7 @@ fn position(at: &dialect::GLOBAL_POSITION_INT_DATA) -> Position {
         above_home_m: f64::from(at.relative_alt) / 1000.0,
         neu_mps: [mps(at.vx), mps(at.vy), -mps(at.vz)],
         heading_deg: (at.hdg != u16::MAX).then(|| f64::from(at.hdg) / 100.0),
+        boot_ms: at.time_boot_ms,
     }
 }
 

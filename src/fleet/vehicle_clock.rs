@@ -27,7 +27,12 @@ const APART: Micros = 200_000;
 pub struct VehicleClock {
     /// Link time of arrival, and the vehicle's Unix time, us.
     readings: VecDeque<(Micros, u64)>,
+    /// Time since the vehicle was switched on, ms, and its Unix time then, us.
+    board: Option<(u32, u64)>,
 }
+
+/// A board time that is older or newer than the last reading by more is of another boot, ms.
+const SAME_BOOT_MS: std::ops::RangeInclusive<i64> = -5_000..=120_000;
 
 impl VehicleClock {
     /// A reading. Times before GPS existed (the vehicle has no GPS time yet) are ignored.
@@ -60,6 +65,25 @@ impl VehicleClock {
         if self.readings.len() > KEEP {
             self.readings.pop_front();
         }
+    }
+
+    /// What the board's time was when the clock showed this: both are in one message.
+    pub fn read_board(&mut self, boot_ms: u32, unix_us: u64) {
+        if unix_us / 1_000_000 >= GPS_EPOCH_UNIX_S as u64 {
+            self.board = Some((boot_ms, unix_us));
+        }
+    }
+
+    /// GPS time at a time of the board, ms since the GPS epoch, whenever the message that names it
+    /// arrives; `None`: the clock has said nothing since the vehicle was switched on.
+    pub fn gps_ms_on_board(&self, boot_ms: u32) -> Option<f64> {
+        let (read_ms, unix_us) = self.board?;
+        let since_ms = i64::from(boot_ms) - i64::from(read_ms);
+        if !SAME_BOOT_MS.contains(&since_ms) {
+            return None;
+        }
+        let unix_ms = i64::try_from(unix_us / 1000).ok()?.checked_add(since_ms)?;
+        Some(GpsTime::from_unix_ms(unix_ms)?.total_ms() as f64)
     }
 
     /// Seconds of the vehicle per second of the station; 1 until measured otherwise.

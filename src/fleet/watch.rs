@@ -5,16 +5,17 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::messages::mode_name;
+use super::off_course::{Change, Course, Moment};
 use super::preflight::charge_needed;
 use super::slots::FleetTable;
 use super::telemetry::{Drone, Telemetry};
 use crate::base::frame::ShowFrame;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::Watch;
+use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
 use crate::link::net::Received;
 use crate::mission::Plan;
@@ -24,9 +25,9 @@ use crate::show::Trajectory;
 /// When something is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Distance from the trajectory, m.
+    /// Distance from the trajectory, m; in and after steps of velocity a drone may be further away.
     pub far_m: f64,
-    /// Silence.
+    /// Silence while the station listens: a station that is held up hears nobody.
     pub silent: Micros,
     /// Charge, %; told once below the landing reserve by default of the plan.
     pub battery_percent: f64,
@@ -154,14 +155,15 @@ pub struct Flying {
 
 #[expect(clippy::struct_excessive_bools, reason = "what was told, each on its own")]
 struct Watched {
-    trajectory: Trajectory,
+    course: Course,
     flying: Flying,
+    /// How long the station had listened when it was heard last.
+    heard: Micros,
     stage: Option<Stage>,
     mode: Option<u32>,
     armed: Option<bool>,
     was_armed: bool,
     silent: bool,
-    far: bool,
     low: bool,
     breached: bool,
     texts: u64,
@@ -171,6 +173,15 @@ struct Watched {
 const MOST_EVENTS: usize = 10_000;
 /// Drones are looked at so often.
 const LOOK: Micros = 100 * MS;
+/// A station that looks again later than this was held up for the rest of the time.
+const LISTENS: Micros = S;
+/// How well a position's time is known by the drone's own board, s.
+const BOARD_DOUBT_S: f64 = 0.2;
+/// How well it is known by its arrival, s: what links delay, and how old the clock's reading is.
+const ARRIVAL_DOUBT_S: f64 = 1.0;
+/// Simulators do not keep their rate: the share of the time since the clock's reading that is not
+/// known.
+const RATE_DOUBT: f64 = 0.5;
 /// Nobody takes off later than this after the time at which it should; see the firmware's window.
 const TOO_LATE_S: f64 = 30.0;
 /// A drone that is guided from the ground has joined its trajectory so long after the take-off:
@@ -189,6 +200,9 @@ pub struct Monitor {
     next: Micros,
     /// The first look.
     begun: Option<Micros>,
+    /// When it was called last, and how long it has listened.
+    called: Option<Micros>,
+    listened: Micros,
 }
 
 impl Monitor {
@@ -199,14 +213,14 @@ impl Monitor {
             let trajectory = Trajectory::of_slot(plan, plan.slot(line.slot)?);
             let texts = telemetry.get(line.drone).map_or(0, |of| of.texts_said);
             let watched = Watched {
-                trajectory,
+                course: Course::new(trajectory),
                 flying: Flying::default(),
+                heard: 0,
                 stage: None,
                 mode: None,
                 armed: None,
                 was_armed: false,
                 silent: false,
-                far: false,
                 low: false,
                 breached: false,
                 texts,
@@ -221,6 +235,8 @@ impl Monitor {
             told: VecDeque::new(),
             next: 0,
             begun: None,
+            called: None,
+            listened: 0,
             telemetry,
         }
     }
@@ -246,12 +262,34 @@ impl Monitor {
         self.watched.values().all(|watched| watched.flying.over)
     }
 
+    /// The time in which it listened goes on.
+    fn listen(&mut self, now: Micros) {
+        let passed = now.saturating_sub(self.called.unwrap_or(now));
+        self.listened += passed.min(LISTENS);
+        self.called = Some(now);
+    }
+
+    /// Looks where a drone says that it is.
+    fn place(&mut self, now: Micros, drone: DroneId) {
+        let Self { telemetry, watched, told, limits, frame, start_gps_ms, .. } = self;
+        let (Some(watched), Some(of)) = (watched.get_mut(&drone), telemetry.drones.get(&drone))
+        else {
+            return;
+        };
+        if let Some(event) = watched.distance(of, limits, frame, *start_gps_ms) {
+            if told.len() >= MOST_EVENTS {
+                told.pop_front();
+            }
+            told.push_back(Told { at: now, drone, event });
+        }
+    }
+
     fn look(&mut self, now: Micros) {
         self.next = now + LOOK;
         let begun = *self.begun.get_or_insert(now);
         // By the clocks of those that are heard.
         let show_s = self.watched.values().filter_map(|of| of.flying.show_s).reduce(f64::max);
-        let Self { telemetry, watched, told, limits, frame, start_gps_ms, .. } = self;
+        let Self { telemetry, watched, told, limits, start_gps_ms, listened, .. } = self;
         for (drone, watched) in watched {
             let mut tell = |event| {
                 if told.len() >= MOST_EVENTS {
@@ -260,7 +298,7 @@ impl Monitor {
                 told.push_back(Told { at: now, drone: *drone, event });
             };
             match telemetry.drones.get(drone) {
-                Some(of) => watched.look(now, of, limits, frame, *start_gps_ms, &mut tell),
+                Some(of) => watched.look((now, *listened), of, limits, *start_gps_ms, &mut tell),
                 None => watched.miss(now.saturating_sub(begun), limits, show_s, &mut tell),
             }
         }
@@ -269,10 +307,15 @@ impl Monitor {
 
 impl Watch for Monitor {
     fn on_message(&mut self, now: Micros, received: &Received) {
+        self.listen(now);
         self.telemetry.on_message(now, received);
         let of = self.telemetry.drones.get(&received.from);
         if let (Some(watched), Some(of)) = (self.watched.get_mut(&received.from), of) {
             watched.flying.flew |= is_in_the_air(of);
+            watched.heard = self.listened;
+        }
+        if matches!(received.message, MavMessage::GLOBAL_POSITION_INT(_)) {
+            self.place(now, received.from);
         }
         if now >= self.next {
             self.look(now);
@@ -280,6 +323,7 @@ impl Watch for Monitor {
     }
 
     fn stop(&mut self, now: Micros) -> bool {
+        self.listen(now);
         if now >= self.next {
             self.look(now);
         }
@@ -312,7 +356,7 @@ impl Watched {
             self.silent = true;
             tell(Event::Silent { seconds: silence / S });
         }
-        let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
+        let end_s = self.course.trajectory().duration_ms() as f64 / 1000.0;
         // Without anybody's clock it is waited for as long as a flight takes.
         let show_s = show_s.unwrap_or(silence as f64 * 1e-6);
         self.flying.over = show_s > end_s + SILENT_UNTIL_S;
@@ -320,19 +364,17 @@ impl Watched {
 
     fn look(
         &mut self,
-        now: Micros,
+        (now, listened): (Micros, Micros),
         of: &Drone,
         limits: &Limits,
-        frame: &ShowFrame,
         start_gps_ms: Option<i64>,
         tell: &mut dyn FnMut(Event),
     ) {
         self.states(of, tell);
-        let silence = now.saturating_sub(of.heard);
-        let silent = silence > limits.silent;
+        let silent = listened.saturating_sub(self.heard) > limits.silent;
         if silent != self.silent {
             self.silent = silent;
-            let seconds = silence / S;
+            let seconds = now.saturating_sub(of.heard) / S;
             tell(if silent { Event::Silent { seconds } } else { Event::HeardAgain });
         }
         if let Some((_, health)) = of.health
@@ -346,10 +388,14 @@ impl Watched {
         let gps_ms = of.clock.gps_ms(now);
         self.flying.show_s =
             start_gps_ms.zip(gps_ms).map(|(start, gps_ms)| (gps_ms - start as f64) / 1000.0);
-        self.distance(of, limits, frame, start_gps_ms, tell);
+        if !performs(of) {
+            self.flying.distance_m = None;
+        }
         // A flight whose start nobody knows is over for a drone that has landed.
         self.flying.over = match start_gps_ms {
-            None => self.was_armed && self.armed == Some(false) || silence > 60 * S,
+            None => {
+                self.was_armed && self.armed == Some(false) || now.saturating_sub(of.heard) > 60 * S
+            }
             Some(_) => self.over(),
         };
     }
@@ -389,44 +435,43 @@ impl Watched {
         }
     }
 
-    /// Where it is against where it should have been when it said so.
+    /// Where it is against where it should have been when it measured that.
     fn distance(
         &mut self,
         of: &Drone,
         limits: &Limits,
         frame: &ShowFrame,
         start_gps_ms: Option<i64>,
-        tell: &mut dyn FnMut(Event),
-    ) {
-        let performing = match self.stage {
-            Some(stage) if stage != Stage::Off => stage == Stage::Performing,
-            // Without show mode, or not in it: while it is guided.
-            _ => self.armed == Some(true) && self.mode == Some(super::messages::GUIDED),
-        };
+    ) -> Option<Event> {
         self.flying.distance_m = None;
-        let (Some((at, position)), Some(start)) = (of.position, start_gps_ms) else { return };
-        let Some(gps_ms) = of.clock.gps_ms(at).filter(|_| performing) else { return };
+        let ((arrived, position), start) = of.position.zip(start_gps_ms)?;
+        let on_board = of.clock.gps_ms_on_board(position.boot_ms);
+        let by_arrival = || {
+            let age_s = of.clock.age(arrived)? as f64 / 1e6;
+            let rate = of.clock.rate();
+            let drift_s = if rate == 1.0 { 0.0 } else { RATE_DOUBT * rate * age_s };
+            Some((of.clock.gps_ms(arrived)?, ARRIVAL_DOUBT_S + drift_s))
+        };
+        let (gps_ms, doubt_s) =
+            on_board.map(|gps_ms| (gps_ms, BOARD_DOUBT_S)).or_else(by_arrival)?;
         let show_s = (gps_ms - start as f64) / 1000.0;
-        let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
+        let end_s = self.course.trajectory().duration_ms() as f64 / 1000.0;
         // The show firmware tells when it has joined its trajectory; without it, time does.
-        let joined = self.stage == Some(Stage::Performing) || show_s > self.wait_s() + CLIMB_S;
-        if show_s < 0.0 || show_s > end_s || !joined {
-            return;
+        let told = of.status.is_some_and(|(_, status)| status.stage == Stage::Performing);
+        let joined = told || show_s > self.wait_s() + CLIMB_S;
+        if !performs(of) || show_s < 0.0 || show_s > end_s || !joined {
+            return None;
         }
         let mut place = frame.from_geodetic(position.place);
         // Heights are above home, wherever the vehicle believes the sea to be.
-        place.z = position.above_home_m + self.trajectory.start_m.z;
-        let wanted: Vector3<f64> = self.trajectory.state_at(show_s).position_m;
-        let distance_m = (place - wanted).norm();
+        place.z = position.above_home_m + self.course.trajectory().start_m.z;
+        let at = Moment { show_s, doubt_s };
+        let (distance_m, change) = self.course.look(place, at, limits.far_m)?;
         self.flying.distance_m = Some(distance_m);
-        // A margin, so that one at the limit is not told again and again.
-        if !self.far && distance_m > limits.far_m {
-            self.far = true;
-            tell(Event::Far { distance_m, show_s });
-        } else if self.far && distance_m < 0.7 * limits.far_m {
-            self.far = false;
-            tell(Event::NearAgain);
-        }
+        Some(match change? {
+            Change::Far => Event::Far { distance_m, show_s },
+            Change::Near => Event::NearAgain,
+        })
     }
 
     fn over(&self) -> bool {
@@ -434,7 +479,7 @@ impl Watched {
             return false;
         }
         let Some(show_s) = self.flying.show_s else { return false };
-        let end_s = self.trajectory.duration_ms() as f64 / 1000.0;
+        let end_s = self.course.trajectory().duration_ms() as f64 / 1000.0;
         match self.stage {
             _ if self.silent => show_s > end_s + SILENT_UNTIL_S,
             _ if self.was_armed => show_s > 0.0,
@@ -445,13 +490,167 @@ impl Watched {
 
     /// Until then a drone of a later group stands on the ground, s.
     fn wait_s(&self) -> f64 {
-        let mut pieces = self.trajectory.pieces();
-        let first = pieces.find(|piece| piece.end_m() != self.trajectory.start_m);
+        let trajectory = self.course.trajectory();
+        let first = trajectory.pieces().find(|piece| piece.end_m() != trajectory.start_m);
         first.map_or(0.0, |piece| piece.start_ms as f64 / 1000.0)
+    }
+}
+
+/// Whether it flies its trajectory.
+fn performs(of: &Drone) -> bool {
+    match of.status.map(|(_, status)| status.stage) {
+        Some(stage) if stage != Stage::Off => stage == Stage::Performing,
+        // Without show mode, or not in it: while it is guided.
+        _ => {
+            let mode = of.mode.map(|(_, mode)| mode);
+            of.is_armed() == Some(true) && mode == Some(super::messages::GUIDED)
+        }
     }
 }
 
 /// The landing reserve and what a flight needs, %: for tables.
 pub fn charge(plan: &Plan) -> (f64, f64) {
     (100.0 * plan.limits.endurance_reserve, charge_needed(plan))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::frame::dialect;
+    use crate::mission::resolve::resolve;
+    use crate::protocol::show::{FROM_DRONE, Status};
+
+    /// Unix time at which the drones were switched on, us, and show time 0 after that, ms.
+    const ON_US: u64 = 1_795_143_537_000_000;
+    const START_MS: u64 = 100_000;
+
+    /// A station, its clock, and drones that say where they are.
+    struct Field {
+        plan: Plan,
+        monitor: Monitor,
+    }
+
+    impl Field {
+        fn new() -> Self {
+            let mission = resolve("calibration", &[]).unwrap();
+            let plan = mission.flights.into_iter().next().unwrap().plan;
+            let rows = [1, 2].map(|system| (DroneId { network: 0, system }, system.into()));
+            let table = FleetTable::new(rows);
+            let limits = Limits::of(&plan);
+            let mut monitor = Monitor::new(&plan, &table, Telemetry::default(), limits);
+            let unix_ms = (ON_US / 1000 + START_MS) as i64;
+            let start = crate::base::time::GpsTime::from_unix_ms(unix_ms).unwrap();
+            monitor.set_start(Some(start.total_ms()));
+            Self { plan, monitor }
+        }
+
+        fn hear(&mut self, now: Micros, system: u8, message: MavMessage) {
+            let from = DroneId { network: 0, system };
+            self.monitor.on_message(now, &Received { from, message });
+        }
+
+        /// What a drone says at a show time, off its trajectory by so much, m; heard at `now`.
+        fn say(&mut self, now: Micros, system: u8, show_ms: u64, off_m: f64) {
+            let boot_ms = (START_MS + show_ms) as u32;
+            let clock = dialect::SYSTEM_TIME_DATA {
+                time_unix_usec: ON_US + u64::from(boot_ms) * 1000,
+                time_boot_ms: boot_ms,
+            };
+            self.hear(now, system, MavMessage::SYSTEM_TIME(clock));
+            let status = Status { stage: Stage::Performing, ..Status::from_data(&[]) };
+            let data = dialect::DATA16_DATA {
+                mavtype: FROM_DRONE,
+                len: Status::LENGTH,
+                data: status.to_data(),
+            };
+            self.hear(now, system, MavMessage::DATA16(data));
+            let slot = self.plan.slot(system.into()).unwrap();
+            let trajectory = Trajectory::of_slot(&self.plan, slot);
+            let mut place = trajectory.state_at(show_ms as f64 / 1000.0).position_m;
+            place.x += off_m;
+            let at = self.plan.site.frame().to_geodetic(place);
+            let position = dialect::GLOBAL_POSITION_INT_DATA {
+                time_boot_ms: boot_ms,
+                lat: (at.lat_deg * 1e7).round() as i32,
+                lon: (at.lon_deg * 1e7).round() as i32,
+                relative_alt: ((place.z - trajectory.start_m.z) * 1000.0) as i32,
+                ..Default::default()
+            };
+            self.hear(now, system, MavMessage::GLOBAL_POSITION_INT(position));
+        }
+
+        fn alarms(&mut self) -> Vec<(Micros, String)> {
+            let told = self.monitor.take_events().into_iter();
+            told.filter(|told| told.event.is_alarm())
+                .map(|told| (told.at, told.event.to_string()))
+                .collect()
+        }
+    }
+
+    #[test]
+    fn neither_a_slow_link_nor_a_busy_station_is_a_distance() {
+        let mut field = Field::new();
+        for half_s in 0..600 {
+            let show_ms = 20_000 + 500 * half_s;
+            // Delayed by up to 4 s, in bursts; at 3.5 m/s that would be 14 m.
+            let delay = 7919 * half_s % 4000;
+            let now = (show_ms + delay).max(24_000 + 500 * half_s / 8 * 8) * MS;
+            field.say(now, 1, show_ms, 0.3);
+            field.say(now, 2, show_ms, 0.3);
+        }
+        assert_eq!(field.alarms(), []);
+    }
+
+    #[test]
+    fn neither_is_a_simulator_that_does_not_keep_its_rate() {
+        let mut field = Field::new();
+        let mut now = S;
+        for half_s in 0..600_u64 {
+            // From twice to a thousand times as fast as the clock on the wall.
+            now += 250_000 / [1, 3, 40, 500][(half_s / 25 % 4) as usize];
+            field.say(now, 1, 20_000 + 500 * half_s, 0.3);
+            field.say(now, 2, 20_000 + 500 * half_s, 0.3);
+        }
+        assert_eq!(field.alarms(), []);
+    }
+
+    #[test]
+    fn a_drone_on_a_wrong_way_is_told_within_seconds_over_the_same_link() {
+        let mut field = Field::new();
+        for half_s in 0..120 {
+            let show_ms = 20_000 + 500 * half_s;
+            let delay = 7919 * half_s % 1000;
+            let now = (show_ms + delay) * MS;
+            // Drone 2 is blown away at 1 m/s from 30 s on.
+            let off_m = ((show_ms as f64 - 30_000.0) / 1000.0).max(0.0);
+            field.say(now, 1, show_ms, 0.3);
+            field.say(now, 2, show_ms, off_m);
+        }
+        let alarms = field.alarms();
+        let [(at, text)] = &alarms[..] else { panic!("{alarms:?}") };
+        // 3 m are reached at 33 s.
+        assert!(text.contains(" m from its trajectory at 3"), "{text}");
+        assert!((33 * S..38 * S).contains(at), "{at}: {text}");
+    }
+
+    #[test]
+    fn a_station_that_was_held_up_calls_nobody_silent_and_a_silent_drone_is() {
+        let mut field = Field::new();
+        let mut now = 20 * S;
+        for tenth in 0..100 {
+            now += if tenth == 50 { 20 * S } else { 100 * MS };
+            // Held up for 20 s; then it looks before it hears.
+            field.monitor.stop(now);
+            for system in [1, 2] {
+                if system == 1 || tenth < 60 {
+                    field.say(now, system, 20_000 + 100 * tenth, 0.0);
+                }
+            }
+        }
+        let alarms = field.alarms();
+        let [(at, text)] = &alarms[..] else { panic!("{alarms:?}") };
+        assert_eq!(text, "not heard for 3 s");
+        // Its last words came at tenth 59.
+        assert!((42 * S..50 * S).contains(at), "{at}");
+    }
 }

@@ -33,8 +33,10 @@ const FEWEST_DESIRED: usize = 20;
 const MOTORS: &[&str] = &[
     "TimeUS", "TimeMS", "C1", "C2", "C3", "C4", "C5", "C6", "C7", "C8", "C9", "C10", "C11", "C12",
     "C13", "C14", "Ch1", "Ch2", "Ch3", "Ch4", "Ch5", "Ch6", "Ch7", "Ch8", "Ch9", "Ch10", "Ch11",
-    "Ch12",
+    "Ch12", "Chan1", "Chan2", "Chan3", "Chan4", "Chan5", "Chan6", "Chan7", "Chan8",
 ];
+/// What columns of motor outputs have been called, newest firmware first; `Chan1` in ArduCopter 3.2.
+const OUTPUT_NAMES: [&str; 3] = ["C", "Ch", "Chan"];
 const EKF: &[&str] = &["TimeUS", "TimeMS", "C", "VN", "VE", "VD", "PN", "PE", "PD"];
 
 /// Messages of position filters, newest first.
@@ -90,7 +92,7 @@ impl Messages {
             .filter(|select| matches!(select.message, "PARM" | "GPS" | "ARM" | "EV" | "SHOW"))
             .copied()
             .chain([
-                Select { message: "RCOU", fields: &["TimeUS", "TimeMS", "C1", "Ch1"] },
+                Select { message: "RCOU", fields: &["TimeUS", "TimeMS", "C1", "Ch1", "Chan1"] },
                 Select { message: "ORGN", fields: &["TimeUS", "Type", "Lat", "Lng", "Alt"] },
             ])
             .collect();
@@ -100,7 +102,7 @@ impl Messages {
     /// When motor outputs were logged, as the times of a channel.
     pub(super) fn output_times(&self) -> Option<Series> {
         let rows = self.rows("RCOU")?;
-        rows.series("C1", |pulse| pulse).or_else(|| rows.series("Ch1", |pulse| pulse))
+        OUTPUT_NAMES.iter().find_map(|name| rows.series(&format!("{name}1"), |pulse| pulse))
     }
 
     /// Whether the vehicle logs nothing while it is disarmed.
@@ -247,11 +249,17 @@ impl Messages {
         most.map_or(0.0, |(core, _)| *core as f64)
     }
 
+    /// Whether motor outputs have columns of a known name, whatever is in them.
+    pub(super) fn has_outputs(&self) -> bool {
+        let has = |name: &&str| self.rows("RCOU")?.column(&format!("{name}1"));
+        OUTPUT_NAMES.iter().any(|name| has(name).is_some())
+    }
+
     /// Mean, largest and smallest motor output, us.
     pub(super) fn motors(&self) -> Option<[Series; 3]> {
         let rows = self.rows("RCOU")?;
         let column = |channel: usize| {
-            rows.column(&format!("C{channel}")).or_else(|| rows.column(&format!("Ch{channel}")))
+            OUTPUT_NAMES.iter().find_map(|name| rows.column(&format!("{name}{channel}")))
         };
         let motors: Vec<&[f64]> = self.motor_channels().into_iter().filter_map(column).collect();
         let mut series = [Series::default(), Series::default(), Series::default()];
@@ -501,4 +509,37 @@ fn parameters(table: &Table) -> BTreeMap<String, f64> {
         .filter(|(_, value)| value.is_finite())
         .map(|(name, value)| (name.clone(), *value))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{LogWriter, MessageDef, Value};
+
+    /// As ArduCopter 3.2 defines it.
+    static RCOU_3_2: MessageDef = MessageDef {
+        id: 134,
+        name: "RCOU",
+        format: "Ihhhhhhhh",
+        fields: "TimeMS,Chan1,Chan2,Chan3,Chan4,Chan5,Chan6,Chan7,Chan8",
+        units: "s--------",
+        multipliers: "C--------",
+    };
+
+    #[test]
+    fn outputs_of_old_firmware_are_read() {
+        let mut writer = LogWriter::new(Vec::new(), &[&RCOU_3_2]).unwrap();
+        for row in 0..50 {
+            let outputs = [1500, 1520, 1480, 1500, 0, 0, 0, 0];
+            let values = [100 + 20 * row].into_iter().chain(outputs).map(Value::Int);
+            writer.row(&RCOU_3_2, &values.collect::<Vec<_>>()).unwrap();
+        }
+        let log = Log::from_bytes(writer.finish().unwrap());
+        let messages = Messages::read(&log);
+        assert!(messages.has_outputs());
+        let [mean, largest, smallest] = messages.motors().unwrap();
+        assert_eq!((mean.value[0], largest.value[0], smallest.value[0]), (1500.0, 1520.0, 1480.0));
+        assert_eq!((mean.value.len(), mean.time_s[0]), (50, 0.1));
+        assert_eq!(Messages::read_identity(&log).output_times().unwrap().time_s.len(), 50);
+    }
 }

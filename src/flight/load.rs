@@ -73,8 +73,15 @@ pub(super) fn load(
         range,
     };
     let [pulse, pulse_max, pulse_min] = messages.motors().ok_or_else(|| {
-        if messages.rows("RCOU").is_some() {
+        if messages.has_outputs() {
             return senseless("RCOU".to_owned(), "a motor's pulse of 500 to 2500 us");
+        }
+        if messages.rows("RCOU").is_some() {
+            return missing(
+                "motor outputs under a name that is known",
+                "RCOU with C1, Ch1 or Chan1",
+                "the firmware names its columns in another way: report it, with the log",
+            );
         }
         missing("motor outputs", "RCOU", "set LOG_BITMASK bit 10 (RCOUT, +1024) and fly again")
     })?;

@@ -39,6 +39,8 @@ pub struct Input<'a> {
     /// How steady flight is found in tables, which have neither plan nor commands: they are held against the
     /// model's closed forms at the climb that was flown.
     pub table: Option<&'a Steps>,
+    /// Measured logs that there are, used or not.
+    pub logs: usize,
     /// Logs that could not be used, with their reasons.
     pub left_out: Vec<String>,
 }
@@ -121,7 +123,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let mut left_out = input.left_out.clone();
     left_out.extend(data.left_out.iter().cloned());
     let used = DataUsed {
-        logs: input.flown.len() + input.left_out.len(),
+        logs: input.logs,
         drones: data.drones(),
         groups: data.groups.iter().map(|g| (g.name.clone(), g.slots.len())).collect(),
         bins: whole.data.groups.iter().map(|group| group.bins.len()).collect(),

@@ -73,6 +73,7 @@ fn site(source: &Source<'_>) -> Result<Site, TemplateError> {
             "m",
             -500.0..=6000.0,
         )?,
+        ground_assumed: site.ground_assumed,
         orientation_deg: source.in_range(
             &site.orientation_deg,
             "orientation",

@@ -66,6 +66,9 @@ pub struct Site {
     /// Ground height at the origin above mean sea level, m. Used for air density; drones fly heights
     /// relative to home.
     pub ground_amsl_m: f64,
+    /// Whether the ground height is another place's: the origin was moved, and nobody gave a height.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub ground_assumed: bool,
     /// Degrees clockwise from north to the show's x axis.
     pub orientation_deg: f64,
 }

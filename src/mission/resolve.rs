@@ -33,6 +33,10 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("scan-campaign.toml", include_str!("../../templates/scan-campaign.toml")),
 ];
 
+/// Where the built-in templates are, latitude and longitude in degrees: a field in Hungary, which is
+/// an example and nobody's own.
+pub const EXAMPLE_ORIGIN: [f64; 2] = [47.4733, 19.0621];
+
 /// One `KEY=VALUE` that replaces a value of a template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Override {

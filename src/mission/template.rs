@@ -112,6 +112,9 @@ pub struct SiteTemplate {
     pub origin: Spanned<[f64; 2]>,
     /// Ground height above mean sea level, m.
     pub ground_amsl_m: Spanned<f64>,
+    /// Whether that height is another place's, as nobody gave the one of this origin.
+    #[serde(default)]
+    pub ground_assumed: bool,
     /// Degrees clockwise from north to the show's x axis.
     #[serde(default = "zero")]
     pub orientation_deg: Spanned<f64>,

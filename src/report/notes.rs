@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::analysis::result::{FlightAnalysis, PartlyUsedLog};
+use crate::analysis::together::{Remark, together};
 
 use super::compare::flags;
 use super::text::{clean, count};
@@ -19,13 +20,23 @@ pub(super) fn without_result_lines(flight: &FlightAnalysis) -> Vec<String> {
 
 /// Logs that are not used, and why.
 pub(super) fn unused_lines(flight: &FlightAnalysis) -> Vec<String> {
-    flight.unused.iter().map(|log| clean(&log.sentence())).collect()
+    let remarks = flight.unused.iter().map(|log| match log.sentence() {
+        // An error that names the file by itself.
+        own if own == log.reason => Remark { slot: None, name: String::new(), text: own },
+        _ => Remark { slot: None, name: log.source.clone(), text: log.reason.clone() },
+    });
+    let bare = |line: String| line.strip_prefix(": ").map(str::to_owned).unwrap_or(line);
+    together(remarks).into_iter().map(|line| clean(&bare(line))).collect()
 }
 
 /// Logs that are used in part, and what is lost of them.
 pub(super) fn partly_used_lines(flight: &FlightAnalysis) -> Vec<String> {
-    let line = |log: &PartlyUsedLog| clean(&format!("{}: {}", log.source, log.reason));
-    flight.partly_used.iter().map(line).collect()
+    let remark = |log: &PartlyUsedLog| Remark {
+        slot: log.slot,
+        name: log.source.clone(),
+        text: log.reason.clone(),
+    };
+    together(flight.partly_used.iter().map(remark)).iter().map(|line| clean(line)).collect()
 }
 
 /// `43 of 48 logs used`.

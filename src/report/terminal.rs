@@ -144,8 +144,9 @@ impl Output {
         self.list("  Notes on drones", &note_lines(flight));
         let without = flight.missing.len() + flight.unmeasured.len();
         self.list_of("  Drones without a result", without, &without_result_lines(flight));
-        self.list("  Logs not used", &unused_lines(flight));
-        self.list("  Logs partly used", &partly_used_lines(flight));
+        self.list_of("  Logs not used", flight.unused.len(), &unused_lines(flight));
+        let partly = partly_used_lines(flight);
+        self.list_of("  Logs partly used", flight.partly_used.len(), &partly);
         let warnings: Vec<String> = flight.warnings.iter().map(|w| clean(w)).collect();
         self.list("  Cautions", &warnings);
     }

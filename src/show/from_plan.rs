@@ -120,7 +120,7 @@ impl Show {
             id: Some(format!("updraft-{}", plan.name)),
             title: Some(plan.title.clone()),
             frame: Some(plan.site.frame()),
-            has_amsl: false,
+            has_amsl: !plan.site.ground_assumed,
             drones,
             cues,
             validation: Some(Validation {
@@ -129,12 +129,18 @@ impl Show {
                 max_velocity_z_mps: Some(limits.max_speed_down_mps),
                 max_velocity_z_up_mps: Some(limits.max_speed_up_mps),
                 min_distance_m: Some(limits.min_distance_m),
+                max_acceleration_xy_mps2: Some(limits.max_acceleration_mps2),
+                max_acceleration_z_mps2: Some(limits.max_acceleration_mps2),
                 max_acceleration_mps2: Some(limits.max_acceleration_mps2),
                 max_velocity_step_mps: Some(limits.max_velocity_step_mps),
                 endurance_s: Some(limits.endurance_s),
                 endurance_reserve: Some(limits.endurance_reserve),
+                ..Validation::default()
             }),
             fence: fence(plan),
+            fence_altitude_m: (!plan.fence.polygon_m.is_empty())
+                .then_some(plan.fence.max_altitude_m),
+            doubts: Vec::new(),
             phases_s: takeoff_end
                 .zip(landing_start)
                 .map(|(takeoff, landing)| [at_s(takeoff), at_s(landing), at_s(plan.duration_ms)]),

@@ -33,7 +33,8 @@ pub struct Show {
     /// Place of the show frame on the globe, if known. Without AMSL the origin's altitude is 0 and
     /// [`Show::has_amsl`] is false.
     pub frame: Option<ShowFrame>,
-    /// Whether the altitude in [`Show::frame`] is meant (show heights then are AMSL-referenced).
+    /// Whether the altitude in [`Show::frame`] is known. Heights of a show are above its own ground all
+    /// the same: what they refer to on the drones is set apart from the file.
     pub has_amsl: bool,
     /// The drones, in the order of their slots.
     pub drones: Vec<ShowDrone>,
@@ -43,6 +44,10 @@ pub struct Show {
     pub validation: Option<Validation>,
     /// Proposed geofence: its polygons in the order of the file; empty: no fence.
     pub fence: Vec<FenceZone>,
+    /// Top of the fence, m above the show's ground, if it is stated.
+    pub fence_altitude_m: Option<f64>,
+    /// What the file says that is wrong and does no harm to a flight, one sentence each.
+    pub doubts: Vec<String>,
     /// End of take-off, start of landing and end of the show, s (`meta.segments`).
     pub phases_s: Option<[f64; 3]>,
 }
@@ -84,6 +89,19 @@ pub struct ShowDrone {
     pub lights: Vec<u8>,
     /// Yaw program, if any.
     pub yaw: Option<YawControl>,
+    /// What else its file has for it that is not read.
+    pub extras: Extras,
+}
+
+/// What a file has for a drone besides what is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extras {
+    /// Pyro events.
+    pub pyro_events: usize,
+    /// Whether it has a plan for an early return home.
+    pub has_rth_plan: bool,
+    /// Places with more than three coordinates.
+    pub spare_coordinates: usize,
 }
 
 /// A yaw program, as `.skyb` block 5 and `yawControl` in `.skyc` hold it.
@@ -119,6 +137,14 @@ pub struct Validation {
     pub max_velocity_z_up_mps: Option<f64>,
     /// Smallest distance between drones, m.
     pub min_distance_m: Option<f64>,
+    /// Largest horizontal acceleration, m/s².
+    pub max_acceleration_xy_mps2: Option<f64>,
+    /// Largest vertical acceleration, m/s².
+    pub max_acceleration_z_mps2: Option<f64>,
+    /// Fastest turn about the vertical axis, degrees/s.
+    pub max_yaw_rate_dps: Option<f64>,
+    /// Altitude below which drones must not move sideways, m.
+    pub min_nav_altitude_m: Option<f64>,
     /// Largest acceleration within a piece, m/s² (`maxAcceleration`; other tools ignore it).
     pub max_acceleration_mps2: Option<f64>,
     /// Largest jump of velocity between pieces, m/s (`maxVelocityStep`; other tools ignore it).

@@ -259,12 +259,14 @@ fn site(show: &Show) -> Site {
             origin_lat_deg: frame.origin.lat_deg,
             origin_lon_deg: frame.origin.lon_deg,
             ground_amsl_m: frame.origin.amsl_m,
+            ground_assumed: !show.has_amsl,
             orientation_deg: frame.orientation_deg,
         },
         None => Site {
             origin_lat_deg: 0.0,
             origin_lon_deg: 0.0,
             ground_amsl_m: 0.0,
+            ground_assumed: true,
             orientation_deg: 0.0,
         },
     }
@@ -311,13 +313,14 @@ fn limits(show: &Show, mut limits: Limits) -> Limits {
 }
 
 /// The first inclusion polygon that the show brings, if it does: none is made up (the check looks at
-/// the show's other polygons by itself). A show file knows no top of the fence; the altitude limit
-/// stands in its place.
+/// the show's other polygons by itself). Where a show file states no top of the fence, the altitude
+/// limit stands in its place.
 fn fence(show: &Show, limits: &Limits) -> Fence {
     let inclusion = show.fence.iter().find(|zone| zone.is_inclusion);
+    let top_m = show.fence_altitude_m.filter(|top_m| top_m.is_finite() && *top_m > 0.0);
     Fence {
         polygon_m: inclusion.map(|zone| zone.corners_m.clone()).unwrap_or_default(),
-        max_altitude_m: limits.max_altitude_m,
+        max_altitude_m: top_m.unwrap_or(limits.max_altitude_m),
         margin_m: 0.0,
     }
 }

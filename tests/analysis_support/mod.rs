@@ -89,6 +89,7 @@ pub(crate) fn plan(purpose: Purpose, segments: Vec<Segment>, slots: u16) -> Plan
             origin_lat_deg: -35.363_261,
             origin_lon_deg: 149.165_23,
             ground_amsl_m: 584.0,
+            ground_assumed: false,
             orientation_deg: 0.0,
         },
         limits: Limits {

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::show::skyc::{self, Limits};
 use updraft::show::{
-    Cue, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl,
+    Cue, Extras, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl,
 };
 
 fn full_show() -> Show {
@@ -49,6 +49,10 @@ fn full_show() -> Show {
             max_velocity_z_mps: Some(2.0),
             max_velocity_z_up_mps: None,
             min_distance_m: Some(2.5),
+            max_acceleration_xy_mps2: Some(3.5),
+            max_acceleration_z_mps2: Some(2.5),
+            max_yaw_rate_dps: Some(30.0),
+            min_nav_altitude_m: Some(2.5),
             max_acceleration_mps2: Some(3.0),
             max_velocity_step_mps: Some(6.5),
             endurance_s: Some(600.0),
@@ -58,8 +62,93 @@ fn full_show() -> Show {
             FenceZone::exclusion(vec![[30.0, 0.0], [31.0, 0.0], [31.0, 1.5], [30.0, 1.5]]),
             FenceZone::inclusion(vec![[-10.0, -10.0], [40.0, -10.0], [40.0, 20.5]]),
         ],
+        fence_altitude_m: Some(60.0),
+        doubts: vec![],
         phases_s: Some([10.0, 65.0, 73.0]),
     }
+}
+
+fn root_of(show: &Show) -> Value {
+    let mut zip = zip::ZipArchive::new(Cursor::new(skyc::write(show).unwrap())).unwrap();
+    let mut text = String::new();
+    zip.by_name("show.json").unwrap().read_to_string(&mut text).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// The names are those of Viewer 2.10.7 (`ValidationSettings`), of Studio for Blender 3.10's
+/// `SafetyCheckParams` and `ShowLocation`, and of the server's geofence.
+#[test]
+fn limits_place_and_fence_have_the_names_that_others_read() {
+    let flight = updraft::mission::resolve::resolve("calibration", &[]).unwrap().flights.remove(0);
+    let root = root_of(&Show::of_plan(&flight.plan));
+    let validation = root["settings"]["validation"].as_object().unwrap();
+    let keys: Vec<&str> = validation.keys().map(String::as_str).collect();
+    for key in ["maxAltitude", "maxVelocityXY", "maxVelocityZ", "maxVelocityZUp", "minDistance"] {
+        assert!(keys.contains(&key), "{key}: {keys:?}");
+    }
+    let own = flight.plan.limits.max_acceleration_mps2;
+    assert_eq!(validation["maxAccelerationXY"], json!(own));
+    assert_eq!(validation["maxAccelerationZ"], json!(own));
+    let ground_mm = (flight.plan.site.ground_amsl_m * 1000.0) as i64;
+    assert_eq!(root["environment"]["location"]["origin"][2], json!(ground_mm));
+    let fence = &root["settings"]["geofence"];
+    assert_eq!(fence["maxAltitude"], json!(flight.plan.fence.max_altitude_m));
+    // Nobody knows the ground there: no altitude is made up.
+    let mut elsewhere = flight.plan;
+    elsewhere.site.ground_assumed = true;
+    let root = root_of(&Show::of_plan(&elsewhere));
+    assert_eq!(root["environment"]["location"]["origin"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn what_others_write_is_read() {
+    let with = |settings: Value, drone: Value| {
+        let mut show = inline(&with_points(&points()));
+        show["settings"] = settings;
+        for (key, value) in drone.as_object().unwrap() {
+            show["swarm"]["drones"][0]["settings"][key] = value.clone();
+        }
+        read_json(&show).unwrap()
+    };
+    // As Studio for Blender writes it, and as some older shows have it (Viewer reads both).
+    let studio = json!({"maxAltitude": 150, "maxVelocityXY": 8, "maxVelocityZ": 3,
+        "maxAccelerationXY": 4, "maxAccelerationZ": 3.5, "minDistance": 3, "minNavAltitude": 2.5,
+        "maxYawRate": 30, "maxVelocityZUp": 5});
+    let snake = json!({"max_altitude": 150, "max_velocity_xy": 8, "max_velocity_z": 3,
+        "max_acceleration_xy": 4, "max_acceleration_z": 3.5, "min_distance": 3,
+        "min_nav_altitude": 2.5, "max_yaw_rate": 30, "max_velocity_z_up": 5});
+    let limits = Validation {
+        max_altitude_m: Some(150.0),
+        max_velocity_xy_mps: Some(8.0),
+        max_velocity_z_mps: Some(3.0),
+        max_velocity_z_up_mps: Some(5.0),
+        min_distance_m: Some(3.0),
+        max_acceleration_xy_mps2: Some(4.0),
+        max_acceleration_z_mps2: Some(3.5),
+        max_yaw_rate_dps: Some(30.0),
+        min_nav_altitude_m: Some(2.5),
+        ..Validation::default()
+    };
+    for validation in [studio, snake] {
+        let show = with(json!({ "validation": validation }), json!({}));
+        assert_eq!(show.validation, Some(limits), "{validation}");
+    }
+    // A bad cue costs the cue, not the show.
+    let cues = json!({"version": 1, "items": [{"time": 1, "name": "a"}, {"name": "b"}, 5]});
+    let show = with(json!({ "cues": cues }), json!({}));
+    assert_eq!(show.cues, [Cue { time_s: 1.0, name: "a".into() }]);
+    insta::assert_snapshot!(show.doubts.join("\n"), @r#"show.json: cue 2, {"name":"b"}, has no time and is left out (and 1 more)"#);
+    // Places with four values, pyro and a plan to return are there, and are known to be.
+    let four = json!([[0, [0, 0, 0, 1], []], [10, [0, 0, 10, 1], []]]);
+    let mut show = inline(&with_points(&four));
+    let event = json!([[1.5, 1, "flare"]]);
+    show["swarm"]["drones"][0]["settings"]["pyro"] =
+        json!({"version": 1, "events": event, "payloads": {"flare": {"name": "Flare"}}});
+    show["swarm"]["drones"][0]["settings"]["rthPlan"] = json!({"version": 1, "entries": []});
+    let drone = read_json(&show).unwrap().drones.remove(0);
+    assert_eq!(drone.trajectory, climb());
+    let extras = Extras { pyro_events: 1, has_rth_plan: true, spare_coordinates: 2 };
+    assert_eq!(drone.extras, extras);
 }
 
 /// Like [`archive`], with names and sizes exactly as given, which the ZIP library would not write.

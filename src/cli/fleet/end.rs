@@ -247,6 +247,11 @@ pub(super) fn find(args: &StepArgs) -> Result<(FlightFolder, Plan), CommandError
 
 fn print(context: &Context, done: &BTreeMap<DroneId, Aborted>) -> Result<Exit, CommandError> {
     let unsure = done.values().filter(|done| !done.is_confirmed()).count();
+    for (drone, done) in done.iter().filter(|(_, done)| !done.is_confirmed()) {
+        if context.json || context.quiet {
+            context.warn(&format!("drone {drone}: {done}"));
+        }
+    }
     if context.json {
         context.print_json(&tables::EndOutput::new(done))?;
     } else {

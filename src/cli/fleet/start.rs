@@ -76,7 +76,7 @@ pub(in crate::cli) fn fly_now(
     crew.on_interrupt = lead.interrupt.on_interrupt;
     context.say(AUTHORIZED);
     let alarms = crew.watch(&mut start)?;
-    Ok((landed(context, crew, alarms.is_empty()), alarms))
+    Ok((landed(context, crew, &alarms), alarms))
 }
 
 /// The same for drones that the station flies itself.
@@ -96,7 +96,7 @@ pub(in crate::cli) fn guide_now(
     context.say(AUTHORIZED);
     context.say("This program flies the drones: leave it running until they have landed");
     let alarms = crew.fly_guided(&start)?;
-    Ok((landed(context, crew, alarms.is_empty()), alarms))
+    Ok((landed(context, crew, &alarms), alarms))
 }
 
 pub(in crate::cli) fn needs_person(lead: &LeadArgs) -> Result<(), CommandError> {
@@ -128,10 +128,35 @@ pub(in crate::cli) fn say_landed(context: &Context, crew: &Crew<'_>) -> bool {
     all
 }
 
-pub(super) fn landed(context: &Context, crew: &Crew<'_>, quiet: bool) -> Exit {
+/// How the flight ends; what was lost is said.
+pub(super) fn landed(context: &Context, crew: &Crew<'_>, alarms: &Alarms) -> Exit {
     let all = say_landed(context, crew);
-    let quiet = quiet && crew.net.ordered_down().is_empty();
-    if all && quiet { Exit::Done } else { Exit::Losses }
+    let ordered = crew.net.ordered_down();
+    let mut why = Vec::new();
+    let named = |drones: Vec<DroneId>| {
+        let names: Vec<String> = drones.iter().map(ToString::to_string).collect();
+        names.join(", ")
+    };
+    if !ordered.is_empty() {
+        why.push(format!("ordered down: drones {}", named(ordered.keys().copied().collect())));
+    }
+    if !alarms.is_empty() {
+        let told: Vec<String> = alarms
+            .iter()
+            .map(|(drone, said)| match said.as_slice() {
+                [only] => format!("drone {drone} ({only})"),
+                [first, ..] => format!("drone {drone} ({first}, {} alarms)", said.len()),
+                [] => format!("drone {drone}"),
+            })
+            .collect();
+        why.push(format!("alarms of {}", told.join(", ")));
+    }
+    if why.is_empty() {
+        // Who has not landed is named above.
+        return if all { Exit::Done } else { Exit::Losses };
+    }
+    context.warn(&format!("not a flight without loss: {}", why.join("; ")));
+    Exit::Losses
 }
 
 /// Asks a person. While they think, the links are listened to and orders carried out.

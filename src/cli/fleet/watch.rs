@@ -48,7 +48,7 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
         crew.hear_anyone(args.step.connect.wait, None)?;
         let mut start = crew.attach()?;
         let alarms = crew.watch(&mut start)?;
-        let exit = landed(context, crew, alarms.is_empty());
+        let exit = landed(context, crew, &alarms);
         if args.no_logs {
             return Ok(exit);
         }

@@ -62,6 +62,7 @@ impl Explain for Searched {
             flown: &flown,
             simulated: None,
             table: None,
+            logs: found.logs.len(),
             left_out: Vec::new(),
         };
         let hidden = there(truth, &vehicle);

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::analysis::FlightInput;
 use crate::analysis::slots::whose_logs;
+use crate::analysis::together::{Remark, together};
 use crate::base::causes::with_causes;
 use crate::base::plain::Shown as _;
 use crate::cli::found::Found;
@@ -27,7 +28,7 @@ struct Opened {
     slot: u16,
     flight: Flight,
     /// What is lost of it.
-    lost: Option<String>,
+    lost: Option<Remark>,
 }
 
 /// Reads all logs of a flight; a log that cannot be used stops none of the others.
@@ -63,20 +64,26 @@ pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
                 Flight::open(&log.path, options).map_err(|error| with_causes(&error, ": "))?;
             let number = u16::try_from(index + 1).unwrap_or(u16::MAX);
             let lost = flight.losses();
-            let lost = (!lost.is_empty()).then(|| format!("{shown}: {}", lost.join("; ")));
+            let lost = (!lost.is_empty()).then(|| Remark {
+                slot,
+                name: shown.clone(),
+                text: lost.join("; "),
+            });
             Ok(Opened { slot: slot.unwrap_or(number), flight, lost })
         })
         .collect();
     let mut read = Read { left_out: warnings, ..Read::default() };
+    let mut in_part = Vec::new();
     for one in opened {
         match one {
             Ok(opened) => {
                 read.flights.push((opened.slot, opened.flight));
-                read.in_part.extend(opened.lost);
+                in_part.extend(opened.lost);
             }
             Err(reason) => read.left_out.push(reason),
         }
     }
+    read.in_part = together(in_part);
     read.flights.sort_by_key(|(slot, _)| *slot);
     read
 }

@@ -459,6 +459,7 @@ fn compare(
         flown: &flown,
         simulated: other.as_deref(),
         table: mapping.as_ref().map(|mapping| &mapping.steps),
+        logs: found.logs.len(),
         left_out,
     };
     let mut explained = explain(&input, options)?;

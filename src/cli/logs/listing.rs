@@ -35,6 +35,11 @@ pub(in crate::cli) struct ListedLog {
 /// Prints them; exit code 3 when one is not known.
 pub(super) fn show(context: &Context, rows: Vec<ListRow>) -> Result<Exit, CommandError> {
     let lost = rows.iter().any(|row| row.reason.is_some());
+    for row in &rows {
+        if let Some(reason) = row.reason.as_ref().filter(|_| context.quiet || context.json) {
+            context.warn(&format!("drone {}: {reason}", row.drone));
+        }
+    }
     if context.json {
         context.print_json(&ListOutput { schema: "updraft.log-list/1", drones: rows })?;
     } else {

@@ -248,6 +248,9 @@ impl Elements {
         line("\n[site]");
         line(&format!("origin = [{:?}, {:?}]", site.origin_lat_deg, site.origin_lon_deg));
         line(&format!("ground_amsl_m = {:?}", site.ground_amsl_m));
+        if site.ground_assumed {
+            line("ground_assumed = true");
+        }
         line(&format!("orientation_deg = {:?}", site.orientation_deg));
         line("\n[grid]");
         if let Some(grid) = plan.grid {

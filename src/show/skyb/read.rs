@@ -8,7 +8,7 @@ use super::{BlockKind, MAGIC, MAX_FILE, SkybError, TRAJECTORY_HEADER, yaw};
 use crate::base::crc::ApCrc32;
 use crate::base::plain::plain;
 use crate::show::bezier::{Scalar, path_through};
-use crate::show::{Path, Segment, ShowDrone, Trajectory};
+use crate::show::{Extras, Path, Segment, ShowDrone, Trajectory};
 
 /// Everything a `.skyb` file says.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +60,9 @@ pub struct Event {
     pub payload: [u8; 4],
 }
 
+/// The kind of event that fires pyro.
+const PYRO: u8 = 1;
+
 /// Reads a `.skyb` file of version 1 or 2.
 ///
 /// Of each block type the first one counts, as in the firmware; unknown types are skipped. Axes of
@@ -91,14 +94,23 @@ pub fn read(bytes: &[u8]) -> Result<SkybContents, SkybError> {
     let lights = body(BlockKind::Lights).map(|(block, _)| block.to_vec()).unwrap_or_default();
     let comment = body(BlockKind::Comment)
         .map(|(block, _)| plain(&String::from_utf8_lossy(block)).into_owned());
+    let has_rth_plan = body(BlockKind::RthPlan).is_some();
+    let pyro_events = events.iter().filter(|event| event.kind == PYRO).count();
+    let extras = Extras { pyro_events, has_rth_plan, ..Extras::default() };
     Ok(SkybContents {
-        drone: ShowDrone { trajectory: flown.trajectory, lights, yaw, ..ShowDrone::default() },
+        drone: ShowDrone {
+            trajectory: flown.trajectory,
+            lights,
+            yaw,
+            extras,
+            ..ShowDrone::default()
+        },
         version,
         has_crc,
         scale_mm: flown.scale_mm,
         comment,
         events,
-        has_rth_plan: body(BlockKind::RthPlan).is_some(),
+        has_rth_plan,
         has_trajectory_yaw: flown.has_yaw,
         blocks,
     })

@@ -15,7 +15,7 @@ use super::trajectory::{self, Problem, short};
 use super::{Limits, MAX_DRONES, SkycError};
 use crate::base::frame::{Geodetic, ShowFrame};
 use crate::show::archive::Archive;
-use crate::show::{Cue, FenceZone, Show, ShowDrone, Validation, YawControl};
+use crate::show::{Cue, Extras, FenceZone, Show, ShowDrone, Validation, YawControl};
 
 /// Reads a `.skyc` file with the default [`Limits`].
 ///
@@ -194,24 +194,47 @@ impl Reader<'_> {
 
     fn settings(&self, node: &Node<'_>, show: &mut Show) -> Result<(), SkycError> {
         if let Some(cues) = self.documents.child(node, "cues")? {
+            // People's timelines: a cue that cannot be read is not worth a show.
             let items = cues.value.get("items").and_then(Value::as_array);
-            for item in items.into_iter().flatten() {
+            if items.is_none() {
+                show.doubts.push(format!("{}: the cues are no list and are left out", cues.entry));
+            }
+            let mut bad = Vec::new();
+            for (index, item) in items.into_iter().flatten().enumerate() {
                 let Some(time_s) = item.get("time").and_then(Value::as_f64) else {
-                    return Err(wrong(&cues, "cues", format!("{} has no time", short(item))));
+                    bad.push((index + 1, item));
+                    continue;
                 };
                 let name = item.get("name").and_then(Value::as_str).unwrap_or_default();
                 show.cues.push(Cue { time_s, name: name.to_owned() });
             }
+            if let [(number, item), ..] = bad[..] {
+                let others = match bad.len() {
+                    1 => String::new(),
+                    count => format!(" (and {} more)", count - 1),
+                };
+                show.doubts.push(format!(
+                    "{}: cue {number}, {}, has no time and is left out{others}",
+                    cues.entry,
+                    short(item)
+                ));
+            }
         }
         if let Some(limits) = self.documents.child(node, "validation")? {
             let number = |key: &str| limits.value.get(key).and_then(Value::as_f64);
+            // Some shows have their keys in snake_case; Viewer reads both.
+            let either = |camel: &str, snake: &str| number(camel).or_else(|| number(snake));
             show.validation = Some(Validation {
-                max_altitude_m: number("maxAltitude"),
-                max_velocity_xy_mps: number("maxVelocityXY"),
-                max_velocity_z_mps: number("maxVelocityZ"),
-                max_velocity_z_up_mps: number("maxVelocityZUp"),
-                min_distance_m: number("minDistance"),
-                max_acceleration_mps2: number("maxAcceleration"),
+                max_altitude_m: either("maxAltitude", "max_altitude"),
+                max_velocity_xy_mps: either("maxVelocityXY", "max_velocity_xy"),
+                max_velocity_z_mps: either("maxVelocityZ", "max_velocity_z"),
+                max_velocity_z_up_mps: either("maxVelocityZUp", "max_velocity_z_up"),
+                min_distance_m: either("minDistance", "min_distance"),
+                max_acceleration_xy_mps2: either("maxAccelerationXY", "max_acceleration_xy"),
+                max_acceleration_z_mps2: either("maxAccelerationZ", "max_acceleration_z"),
+                max_yaw_rate_dps: either("maxYawRate", "max_yaw_rate"),
+                min_nav_altitude_m: either("minNavAltitude", "min_nav_altitude"),
+                max_acceleration_mps2: either("maxAcceleration", "max_acceleration"),
                 max_velocity_step_mps: number("maxVelocityStep"),
                 endurance_s: number("endurance"),
                 endurance_reserve: number("enduranceReserve"),
@@ -220,6 +243,8 @@ impl Reader<'_> {
         if let Some(fence) = self.documents.child(node, "geofence")? {
             show.fence =
                 zones(&fence.value).map_err(|problem| wrong(&fence, "geofence", problem))?;
+            let top = fence.value.get("maxAltitude").or_else(|| fence.value.get("max_altitude"));
+            show.fence_altitude_m = top.and_then(Value::as_f64);
         }
         Ok(())
     }
@@ -253,6 +278,11 @@ impl Reader<'_> {
         let trajectory =
             trajectory::from_json(&flown.value).map_err(|problem| inside(&flown, problem))?;
 
+        let mut extras = Extras {
+            spare_coordinates: trajectory::spare_coordinates(&flown.value),
+            has_rth_plan: documents.child(&settings, "rthPlan")?.is_some(),
+            ..Extras::default()
+        };
         let lights = match documents.child(&settings, "lights")? {
             None => Vec::new(),
             Some(node) => self.lights(&node).map_err(|error| match error {
@@ -265,7 +295,7 @@ impl Reader<'_> {
             .map(|node| yaw(&node.value).map_err(|problem| inside(&node, problem)))
             .transpose()?;
         if let Some(pyro) = documents.child(&settings, "pyro")? {
-            check_pyro(&pyro.value)
+            extras.pyro_events = check_pyro(&pyro.value)
                 .map_err(|problem| inside(&pyro, Problem::new("pyro: ", problem)))?;
         }
         let place = |key: &str| -> Result<Option<Vector3<f64>>, SkycError> {
@@ -277,7 +307,7 @@ impl Reader<'_> {
             }
         };
         let (home_m, land_at_m) = (place("home")?, place("landAt")?);
-        Ok(ShowDrone { name, home_m, land_at_m, trajectory, lights, yaw })
+        Ok(ShowDrone { name, home_m, land_at_m, trajectory, lights, yaw, extras })
     }
 
     fn charge_points(&self, count: usize) -> Result<(), SkycError> {
@@ -400,8 +430,8 @@ fn yaw(value: &Value) -> Result<YawControl, Problem> {
     Ok(program)
 }
 
-/// What the official loader checks of pyro programs, which are not kept.
-fn check_pyro(value: &Value) -> Result<(), String> {
+/// What the official loader checks of pyro programs, which are not kept; how many events there are.
+fn check_pyro(value: &Value) -> Result<usize, String> {
     if value.get("version").and_then(Value::as_f64) != Some(1.0) {
         return Err("its version must be 1".to_owned());
     }
@@ -425,5 +455,5 @@ fn check_pyro(value: &Value) -> Result<(), String> {
             return Err(format!("payload {name:?} is malformed"));
         }
     }
-    Ok(())
+    Ok(events.len())
 }

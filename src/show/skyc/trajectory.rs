@@ -120,12 +120,30 @@ fn time_ms(value: &Value) -> Result<i64, String> {
     Ok((time_s * 1000.0).round() as i64)
 }
 
-/// Three coordinates in metres.
+/// Places in the object with more than three coordinates, of which the rest is not read.
+pub(super) fn spare_coordinates(trajectory: &Value) -> usize {
+    let longer = |place: &Value| place.as_array().is_some_and(|place| place.len() > 3);
+    let of_entry = |entry: &Value| {
+        let (place, controls) = (entry.get(1), entry.get(2).and_then(Value::as_array));
+        place
+            .into_iter()
+            .chain(controls.into_iter().flatten())
+            .filter(|place| longer(place))
+            .count()
+    };
+    let points = trajectory.get("points").and_then(Value::as_array);
+    points.into_iter().flatten().map(of_entry).sum()
+}
+
+/// Three coordinates in metres; what follows them is left out, if it is numbers.
 pub(super) fn vector(value: &Value) -> Result<Vector3<f64>, String> {
     let wrong = || format!("{} is not [x, y, z]", short(value));
-    let Some([x, y, z]) = value.as_array().map(Vec::as_slice) else {
+    let Some([x, y, z, rest @ ..]) = value.as_array().map(Vec::as_slice) else {
         return Err(wrong());
     };
+    if !rest.iter().all(Value::is_number) {
+        return Err(wrong());
+    }
     let mut vector = Vector3::zeros();
     for (to, from) in vector.iter_mut().zip([x, y, z]) {
         *to = from.as_f64().ok_or_else(wrong)?;

@@ -170,6 +170,10 @@ fn settings(show: &Show) -> Result<Value, String> {
             ("maxVelocityZ", limits.max_velocity_z_mps),
             ("maxVelocityZUp", limits.max_velocity_z_up_mps),
             ("minDistance", limits.min_distance_m),
+            ("maxAccelerationXY", limits.max_acceleration_xy_mps2),
+            ("maxAccelerationZ", limits.max_acceleration_z_mps2),
+            ("maxYawRate", limits.max_yaw_rate_dps),
+            ("minNavAltitude", limits.min_nav_altitude_m),
             ("maxAcceleration", limits.max_acceleration_mps2),
             ("maxVelocityStep", limits.max_velocity_step_mps),
             ("endurance", limits.endurance_s),
@@ -188,7 +192,14 @@ fn settings(show: &Show) -> Result<Value, String> {
         }
         let polygon = |zone: &FenceZone| json!({ "isInclusion": zone.is_inclusion, "points": zone.corners_m });
         let polygons: Vec<_> = show.fence.iter().map(polygon).collect();
-        settings.insert("geofence".into(), json!({ "version": 1, "polygons": polygons }));
+        let mut fence = Map::new();
+        fence.insert("version".into(), 1.into());
+        fence.insert("polygons".into(), polygons.into());
+        if let Some(altitude_m) = show.fence_altitude_m {
+            finite("the top of the geofence", &[altitude_m])?;
+            fence.insert("maxAltitude".into(), altitude_m.into());
+        }
+        settings.insert("geofence".into(), fence.into());
     }
     Ok(settings.into())
 }

@@ -245,7 +245,10 @@ pub(in crate::cli) fn end(
                 Some(Err(reason)) => format!("NOT CONFIRMED: {reason}"),
                 None => "NOT CONFIRMED: the server says nothing of it".to_owned(),
             };
-            unsure += usize::from(!matches!(done.get(id), Some(Ok(_))));
+            if !matches!(done.get(id), Some(Ok(_))) {
+                unsure += 1;
+                context.warn(&format!("drone {id}: {text}"));
+            }
             context.emit(&format!("drone {id}: {text}\n"))?;
         }
     }
