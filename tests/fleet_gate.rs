@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt::Write as _;
 use std::rc::Rc;
 
-use fleet_show_support::{drone, load, plan, table};
+use fleet_show_support::{bad, drone, load, plan, table};
 use nalgebra::Vector3;
 use updraft::base::time::GpsTime;
 use updraft::fleet::abort::{Abort, Action};
@@ -589,7 +589,7 @@ impl Watch for Orders<'_> {
 
 /// What drones 1 and 2 are sent after drone 1 was ordered down at a time of their guided flight,
 /// and what was refused.
-fn ordered_down(at: Micros, obeys: bool) -> (Messages, Vec<(DroneId, String)>) {
+fn ordered_down(at: Micros, obeys: bool, faults: Faults) -> (Messages, Vec<(DroneId, String)>) {
     let (plan, folder) = (plan(), tempfile::tempdir().unwrap());
     let sent: Sent = Rc::default();
     let vehicles: BTreeMap<DroneId, Deaf> = [1_u8, 2]
@@ -601,7 +601,7 @@ fn ordered_down(at: Micros, obeys: bool) -> (Messages, Vec<(DroneId, String)>) {
         .into();
     let stock = vehicle(&plan, false);
     let flights = [1, 2].map(|system| (drone(system), flight(&plan, system, &stock)));
-    let net = LossyNet::new(vehicles, Faults::default(), 3);
+    let net = LossyNet::new(vehicles, faults, 3);
     let mut net = Spy { net, sent: Rc::clone(&sent) };
     let before = RefCell::new(None);
     let inbox = Inbox::open(folder.path(), "one".to_owned()).unwrap();
@@ -627,8 +627,10 @@ fn ordered_down(at: Micros, obeys: bool) -> (Messages, Vec<(DroneId, String)>) {
 #[test]
 fn a_drone_that_was_ordered_down_is_never_sent_a_take_off_or_a_target_again() {
     // Before it arms, while it takes off, and while it performs; it obeys, or is deaf to it.
-    for (at_s, obeys) in [(1, false), (8, false), (30, false), (30, true)] {
-        let (heard, refused) = ordered_down(at_s * S, obeys);
+    let cases = [(1, false), (8, false), (30, false), (30, true)];
+    let links = [Faults::default(), bad()];
+    for ((at_s, obeys), faults) in cases.iter().flat_map(|case| links.map(|link| (*case, link))) {
+        let (heard, refused) = ordered_down(at_s * S, obeys, faults);
         let to = |system: u8, class_: Class| {
             let of = |(to, message): &&(DroneId, MavMessage)| {
                 *to == drone(system) && class(message) == Some(class_)
