@@ -4,6 +4,7 @@
 //! A vehicle is an [`endpoint::Endpoint`]: no sockets and no clock of its own, so that a whole
 //! fleet with a bad radio link also runs in one thread, in simulated time ([`lossy::LossyNet`]).
 
+pub mod broadcast;
 pub mod endpoint;
 mod faulty;
 pub mod files;

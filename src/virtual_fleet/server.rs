@@ -12,6 +12,7 @@ use std::time::Duration;
 use rayon::prelude::*;
 use thiserror::Error;
 
+use super::broadcast::Broadcasts;
 use super::faulty::FaultyLink;
 use super::lossy::Faults;
 use super::post::Post;
@@ -139,6 +140,20 @@ pub fn serve<'w, T>(
     clock: &dyn Clock,
     body: impl FnOnce(&Running) -> T,
 ) -> Result<(T, Vec<VirtualVehicle<'w>>), ServerError> {
+    serve_with(vehicles, None, options, clock, body)
+}
+
+/// The same for a fleet that also hears what is broadcast at a port.
+///
+/// # Errors
+/// As [`serve`].
+pub fn serve_with<'w, T>(
+    vehicles: Vec<VirtualVehicle<'w>>,
+    broadcasts: Option<&Broadcasts>,
+    options: &ServerOptions,
+    clock: &dyn Clock,
+    body: impl FnOnce(&Running) -> T,
+) -> Result<(T, Vec<VirtualVehicle<'w>>), ServerError> {
     let (Pace::Speed(speed) | Pace::Fast { ground: speed }) = options.pace;
     if !(speed > 0.0 && speed <= 1000.0) {
         return Err(ServerError::Pace(speed));
@@ -164,7 +179,7 @@ pub fn serve<'w, T>(
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("virtual fleet".to_owned())
-            .spawn_scoped(scope, || run(posts, options, clock, &running))
+            .spawn_scoped(scope, || run(posts, broadcasts, options, clock, &running))
             .map_err(ServerError::Thread)?;
         let stop = StopAtEnd(&running);
         let given = body(&running);
@@ -188,6 +203,7 @@ type Frame = (usize, Vec<u8>);
 
 fn run<'w>(
     mut posts: Vec<Post<'w>>,
+    broadcasts: Option<&Broadcasts>,
     options: &ServerOptions,
     clock: &dyn Clock,
     running: &Running,
@@ -222,7 +238,7 @@ fn run<'w>(
             };
         }
         let time = signing_time(clock.unix_us());
-        let refused = hear(&mut posts, begun, time, &mut up, &mut buffer);
+        let refused = hear(&mut posts, broadcasts, begun, time, &mut up, &mut buffer);
         running.refused.fetch_add(refused, Ordering::Relaxed);
         let frames: Vec<Vec<Vec<u8>>> = posts
             .par_iter_mut()
@@ -269,17 +285,17 @@ fn run<'w>(
         let until = arrives.unwrap_or(Micros::MAX).max(begun + TRANSFER_ROUND).min(begun + round);
         let left = until.saturating_sub(clock.now());
         // The last sleep of a round looks for requests: an exchange of short packets is quick.
-        wait(&posts, clock, left);
+        wait(&posts, broadcasts, clock, left);
     }
     posts.into_iter().map(|post| post.vehicle).collect()
 }
 
 /// Sleeps, but not for longer than nothing comes.
-fn wait(posts: &[Post<'_>], clock: &dyn Clock, left: Micros) {
+fn wait(posts: &[Post<'_>], broadcasts: Option<&Broadcasts>, clock: &dyn Clock, left: Micros) {
     let until = clock.now() + left;
     while clock.now() < until {
         std::thread::sleep(Duration::from_micros(MS.min(left)));
-        if posts.iter().any(Post::has_mail) {
+        if posts.iter().any(Post::has_mail) || broadcasts.is_some_and(Broadcasts::has_mail) {
             return;
         }
     }
@@ -288,6 +304,7 @@ fn wait(posts: &[Post<'_>], clock: &dyn Clock, left: Micros) {
 /// Takes everything that waits at the sockets; returns how many frames were refused.
 fn hear(
     posts: &mut [Post<'_>],
+    broadcasts: Option<&Broadcasts>,
     now: Micros,
     time: u64,
     up: &mut [FaultyLink<Frame>],
@@ -297,6 +314,16 @@ fn hear(
         let link = &mut up[usize::from(post.vehicle.setup.network)];
         while let Some(bytes) = post.receive(buffer) {
             link.send(now, bytes.len(), &(index, bytes.to_vec()));
+        }
+    }
+    while let Some(bytes) = broadcasts.and_then(|broadcasts| broadcasts.receive(buffer)) {
+        // It is on the air once for all drones of a network.
+        let mut counted = vec![false; up.len()];
+        for (index, post) in posts.iter().enumerate() {
+            let network = usize::from(post.vehicle.setup.network);
+            let on_air = if counted[network] { 0 } else { bytes.len() };
+            counted[network] = true;
+            up[network].send(now, on_air, &(index, bytes.to_vec()));
         }
     }
     let mut refused = 0;

@@ -32,6 +32,8 @@ impl Bench {
 
     pub(crate) fn fleet(&self, station: &str, more: &[&str]) -> Fleet {
         let args = ["fleet", "virtual", "drones", "--station", station];
+        // Other tests have fleets at the same time.
+        let args = [&args[..], &["--broadcast-port", "0"]].concat();
         let mut command = self.command(&[&args[..], more].concat());
         Fleet(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
     }
@@ -155,6 +157,10 @@ fn what_cannot_be_is_refused() {
     refused(2, &[&["fleet", "status", "campaign"][..], &key].concat());
     refused(2, &["fleet", "virtual", "campaign", "--gone", "7"]);
     refused(5, &["fleet", "virtual", "campaign", "--flown"]);
+    let taken = UdpSocket::bind(("0.0.0.0", 0)).unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    let asked = bench.expect(1, &["fleet", "virtual", "campaign", "--broadcast-port", &port]);
+    all.push_str(&said(&asked, &station).replace(&port, "BROADCAST"));
     insta::assert_snapshot!(all);
 }
 

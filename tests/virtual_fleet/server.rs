@@ -10,12 +10,15 @@ use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavResult};
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
-use updraft::link::station::{Setup, Station};
-use updraft::protocol::show::{LEAVE_TIME, SHOW_FILE, StartConfig, TO_DRONE};
+use updraft::link::station::{STATION, Setup, Station};
+use updraft::protocol::show::{LEAVE_TIME, SHOW_FILE, StartConfig, Status, TO_DRONE};
 use updraft::show::ShowDrone;
 use updraft::sim::fly;
+use updraft::virtual_fleet::broadcast::Broadcasts;
 use updraft::virtual_fleet::lossy::Faults;
-use updraft::virtual_fleet::server::{Pace, Running, ServerError, ServerOptions, serve};
+use updraft::virtual_fleet::server::{
+    Pace, Running, ServerError, ServerOptions, serve, serve_with,
+};
 use updraft::virtual_fleet::storage::MemoryStorage;
 use updraft::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use updraft::virtual_fleet::world::World;
@@ -73,7 +76,7 @@ fn lead(station: &mut Station, running: &Running, field: &Field, count: u8) -> i
                 assert_eq!(ack.result, MavResult::MAV_RESULT_ACCEPTED);
             }
             if let MavMessage::DATA16(packet) = &received.message
-                && updraft::protocol::show::Status::from_data(&packet.data[..]).flags & 0xB0 == 0xB0
+                && Status::from_data(&packet.data[..]).flags & 0xB0 == 0xB0
             {
                 known |= 1_u64 << received.from.system;
             }
@@ -161,6 +164,70 @@ fn a_fleet_flies_at_a_chosen_speed_over_a_bad_link() {
     let faults =
         Faults { loss: 0.2, repeat: 0.1, delay: 5 * MS, jitter: 10 * MS, ..Faults::default() };
     fly_fleet(3, |place| show_of(place, 12.0), Pace::Speed(10.0), faults);
+}
+
+/// Skybrush Server tells all drones of a start at one port, and each where it speaks from.
+#[test]
+fn what_is_broadcast_at_one_port_is_heard_by_all() {
+    let field = Field::new();
+    let world = field.world();
+    let clock = Arc::new(Wall::start());
+    let ports = [free_port(), free_port()];
+    let links = ports.iter().enumerate();
+    let links = links.map(|(network, at)| format!("{network}@udpin:{at}").parse().unwrap());
+    let wall: Arc<dyn Clock> = clock.clone();
+    let setup = Setup { links: links.collect(), key: None, clock: wall };
+    let mut station = Station::open(setup).unwrap();
+    // Two networks, with the same system ids.
+    let vehicles = (0..4).map(|index: u16| {
+        let mut vehicle = drone(&world, (index % 2) as u8 + 1, &show_of(slot_m(1), 12.0));
+        vehicle.setup.network = index / 2;
+        vehicle
+    });
+    let broadcasts = Broadcasts::open(0).unwrap();
+    let port = broadcasts.port().unwrap();
+    let options = ServerOptions {
+        stations: ports.to_vec(),
+        key: None,
+        pace: Pace::Speed(1.0),
+        faults: Faults::default(),
+        seed: 1,
+    };
+    let tow_s = tow_at(1000);
+    let start = StartConfig { start_tow_s: tow_s, authorization: 0, countdown_ms: LEAVE_TIME };
+    let (data, len) = start.to_data();
+    let packet = MavMessage::DATA16(dialect::DATA16_DATA { mavtype: TO_DRONE, len, data });
+    let server = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let heard = |_: &Running| {
+        let mut told = std::collections::BTreeSet::new();
+        let until = station.now() + 20 * S;
+        let mut sequence = 0;
+        while told.len() < 4 && station.now() < until {
+            let frame = updraft::link::frame::encode(STATION, sequence, &packet, None);
+            sequence += 1;
+            server.send_to(&frame, ("127.0.0.1", port)).unwrap();
+            let next = station.now() + 200 * MS;
+            while let Some(received) = station.recv(next).unwrap() {
+                if let MavMessage::DATA16(packet) = &received.message
+                    && Status::from_data(&packet.data[..]).start_tow_s == tow_s
+                {
+                    told.insert((received.from.network, received.from.system));
+                }
+            }
+        }
+        told.len()
+    };
+    let vehicles = vehicles.collect();
+    let (count, _) =
+        serve_with(vehicles, Some(&broadcasts), &options, clock.as_ref(), heard).unwrap();
+    assert_eq!(count, 4);
+}
+
+#[test]
+fn a_port_that_is_taken_is_an_error() {
+    let taken = Broadcasts::open(0).unwrap();
+    let error = Broadcasts::open(taken.port().unwrap()).unwrap_err();
+    assert_eq!(error.kind(), std::io::ErrorKind::AddrInUse);
 }
 
 /// For measuring: 49 drones, 500 s each.

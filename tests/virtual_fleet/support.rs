@@ -289,6 +289,8 @@ impl<'w> Crew<'w> {
         [param1, param2]: [f32; 2],
     ) -> MavResult {
         let command = match number {
+            20 => MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH,
+            21 => MavCmd::MAV_CMD_NAV_LAND,
             176 => MavCmd::MAV_CMD_DO_SET_MODE,
             246 => MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
             511 => MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,

@@ -16,8 +16,9 @@ use crate::mission::Plan;
 use crate::mission::plan::Slot;
 use crate::sim::Atmosphere;
 use crate::vehicle::Vehicle;
+use crate::virtual_fleet::broadcast::Broadcasts;
 use crate::virtual_fleet::lossy::Faults;
-use crate::virtual_fleet::server::{Pace, Running, ServerOptions, serve};
+use crate::virtual_fleet::server::{Pace, Running, ServerOptions, serve_with};
 use crate::virtual_fleet::storage::MemoryStorage;
 use crate::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use crate::virtual_fleet::world::World;
@@ -74,14 +75,15 @@ impl Hangar<'_> {
         let (links, stations) = opened?.into_iter().unzip();
         let clock = SystemClock::start();
         let mut station = station(links, self.key.clone(), clock)?;
-        self.serve(stations, clock, |_| body(&mut station))?
+        self.serve(stations, None, clock, |_| body(&mut station))?
     }
 
     /// Switches the drones on; they look for a station at these addresses, one for each
-    /// network, among which they are divided evenly.
+    /// network, among which they are divided evenly. What is broadcast they all hear.
     pub(in crate::cli) fn serve<T>(
         &self,
         stations: Vec<SocketAddr>,
+        broadcasts: Option<&Broadcasts>,
         clock: SystemClock,
         body: impl FnOnce(&Running) -> T,
     ) -> Result<T, CommandError> {
@@ -135,7 +137,7 @@ impl Hangar<'_> {
             faults: self.faults,
             seed: self.seed,
         };
-        let served = serve(vehicles, &options, &clock, body);
+        let served = serve_with(vehicles, broadcasts, &options, &clock, body);
         let (given, _) = served.map_err(|error| CommandError::Failed(with_reasons(&error)))?;
         Ok(given)
     }

@@ -24,6 +24,7 @@ use crate::cli::words;
 use crate::link::clock::{Clock as _, MS, Micros, S};
 use crate::mission::Plan;
 use crate::sim::air::spec;
+use crate::virtual_fleet::broadcast::{BROADCAST_PORT, Broadcasts};
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
@@ -40,6 +41,10 @@ pub(in crate::cli) struct VirtualArgs {
     /// are divided evenly (a network has 253 system ids)
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:14550")]
     station: Vec<SocketAddr>,
+    /// UDP port at which all drones hear what a station broadcasts: Skybrush Server sends starts
+    /// to it; 0: none [default: 14555]
+    #[arg(long, value_name = "PORT")]
+    broadcast_port: Option<u16>,
     /// File with the signing key: the drones sign everything, and refuse what is not signed with it
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
@@ -92,6 +97,32 @@ fn share(text: &str) -> Result<f64, String> {
         Ok(value) if (0.0..=0.95).contains(&value) => Ok(value),
         _ => Err("a share between 0 and 0.95".to_owned()),
     }
+}
+
+/// The ear for broadcasts. The usual port may be another fleet's: this one does without it then,
+/// but says so; a port that was asked for is needed.
+fn broadcasts(context: &Context, asked: Option<u16>) -> Result<Option<Broadcasts>, CommandError> {
+    let port = asked.unwrap_or(BROADCAST_PORT);
+    if port == 0 {
+        return Ok(None);
+    }
+    let error = match Broadcasts::open(port) {
+        Ok(broadcasts) => return Ok(Some(broadcasts)),
+        Err(error) => error,
+    };
+    let taken = format!(
+        "UDP port {port}, at which Skybrush Server's starts are heard, cannot be listened to: \
+         {error}\n  Another `fleet virtual` has it, or a drone's simulator: end that one, or give \
+         --broadcast-port another port and the server the same (broadcast_port in its connection \
+         udp-listen://:14550?broadcast_port=PORT)"
+    );
+    if asked.is_some() {
+        return Err(CommandError::Failed(taken));
+    }
+    context.warn(&format!(
+        "{taken}; everything else works, and --broadcast-port 0 is without this warning"
+    ));
+    Ok(None)
 }
 
 /// Largest log that virtual drones have on their cards, bytes.
@@ -161,13 +192,14 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
         mishaps,
         key: read_key(args.key.as_deref())?,
     };
+    let broadcasts = broadcasts(context, args.broadcast_port)?;
     let stations: Vec<String> = args.station.iter().map(ToString::to_string).collect();
     context.say(&format!(
         "{} are switched on and speak to {}; Ctrl-C switches them off",
         words::count(plan.slots.len(), "virtual drone"),
         stations.join(", ")
     ));
-    hangar.serve(args.station.clone(), clock, |running| {
+    hangar.serve(args.station.clone(), broadcasts.as_ref(), clock, |running| {
         let mut told = false;
         while !context.stop_flag().load(Ordering::SeqCst) {
             std::thread::sleep(Duration::from_millis(100));

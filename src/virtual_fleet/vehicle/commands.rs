@@ -16,6 +16,8 @@ use dialect::MavResult::{
 };
 
 /// Numbers of MAVLink's commands.
+const NAV_RETURN_TO_LAUNCH: u16 = 20;
+const NAV_LAND: u16 = 21;
 const NAV_TAKEOFF: u16 = 22;
 const DO_SET_MODE: u16 = 176;
 const PREFLIGHT_REBOOT: u16 = 246;
@@ -74,6 +76,9 @@ impl VirtualVehicle<'_> {
         match command.number as u32 as u16 {
             show::RELOAD if !self.setup.stock => self.reload_or_clear(first),
             show::SET_ORIGIN if !self.setup.stock => self.set_origin(command),
+            // Skybrush Server brings drones down by these, not by their modes.
+            NAV_RETURN_TO_LAUNCH => self.set_mode(RTL),
+            NAV_LAND => self.set_mode(LAND),
             NAV_TAKEOFF if self.mode != GUIDED => FAILED,
             NAV_TAKEOFF => self.take_off(now, command.altitude_m, out),
             DO_SET_MODE if first as u32 & 1 == 0 => DENIED,

@@ -24,6 +24,8 @@ pub(super) const GPS_RAW_INT: u32 = 24;
 pub(super) const GLOBAL_POSITION_INT: u32 = 33;
 pub(super) const DATA16: u32 = 169;
 pub(super) const AUTOPILOT_VERSION: u32 = 148;
+/// Capability bit of parameters as floats, which newer descriptions of MAVLink rename.
+const PARAM_FLOAT: u64 = 0x02;
 /// Shortest interval that is granted, us.
 const SHORTEST: Micros = 20_000;
 
@@ -242,13 +244,20 @@ impl Telling {
 
     fn version(&self) -> MavMessage {
         use dialect::MavProtocolCapability as Can;
+        // What ArduCopter 4.4 has: ground stations choose their ways by it.
         let mut capabilities = Can::MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+            | Can::from_bits_retain(PARAM_FLOAT)
             | Can::MAV_PROTOCOL_CAPABILITY_MISSION_INT
             | Can::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
             | Can::MAV_PROTOCOL_CAPABILITY_FTP
+            | Can::MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+            | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+            | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+            | Can::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+            | Can::MAV_PROTOCOL_CAPABILITY_COMPASS_CALIBRATION
             | Can::MAV_PROTOCOL_CAPABILITY_MAVLINK2
             | Can::MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
-            | Can::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT;
+            | Can::MAV_PROTOCOL_CAPABILITY_MISSION_RALLY;
         if self.status.is_some() {
             capabilities |= Can::from_bits_retain(show::CAPABILITY);
         }
