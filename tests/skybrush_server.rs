@@ -9,12 +9,14 @@ mod skybrush_server_support;
 
 use std::fmt::Write as _;
 use std::fs;
-use std::process::Stdio;
+use std::io::{BufRead as _, BufReader};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Instant;
 
 use cli_support::{Bench, Ended};
 use serde_json::{Value, json};
+use skybrush_server_support::replay::Replay;
 use skybrush_server_support::{Fake, Fault};
 use updraft::link::clock::{Clock, Micros};
 use updraft::skybrush_server::{Client, Foreman, Job, Outcome, fetch_log};
@@ -41,7 +43,7 @@ fn run(bench: &Bench, server: &Fake, args: &[&str]) -> Ended {
 
 fn fly(bench: &Bench, fault: Fault) -> (Ended, Fake) {
     let server = Fake::start(&plan(bench), fault);
-    let ended = run(bench, &server, &["fly", "campaign", "--yes", "--lead", "20"]);
+    let ended = run(bench, &server, &["fly", "campaign", "--yes", "--lead", "20", "--wait", "1"]);
     (ended, server)
 }
 
@@ -64,7 +66,8 @@ fn a_flight_is_uploaded_started_watched_and_brings_its_logs_home() {
     // What the server was told.
     let plan = plan(&bench);
     let asked = server.asked();
-    let uploads: Vec<&Value> = asked.iter().filter(|body| body["type"] == "OBJ-CMD").collect();
+    let uploads: Vec<&Value> =
+        asked.iter().filter(|body| body["command"] == "__show_upload").collect();
     assert_eq!(uploads.len(), 2);
     assert_eq!(server.most_at_once(), 2, "both at once");
     for (index, upload) in uploads.iter().enumerate() {
@@ -83,7 +86,8 @@ fn a_flight_is_uploaded_started_watched_and_brings_its_logs_home() {
     }
     let starts: Vec<&Value> = asked.iter().filter(|body| body["type"] == "SHOW-SETCFG").collect();
     let start = |index: usize| &starts[index]["configuration"]["start"];
-    assert_eq!(starts.len(), 2);
+    assert_eq!(starts.len(), 3, "set, authorized, and cleared at the end");
+    assert_eq!((&start(2)["authorized"], &start(2)["time"]), (&json!(false), &Value::Null));
     assert_eq!((&start(0)["authorized"], &start(1)["authorized"]), (&json!(false), &json!(true)));
     assert_eq!(start(0)["time"], start(1)["time"]);
     assert_eq!(start(1)["uavIds"], json!(["02", "01"]));
@@ -100,7 +104,9 @@ fn a_flight_is_uploaded_started_watched_and_brings_its_logs_home() {
         assert!(entry["source"].as_str().unwrap().ends_with(&format!("drone {id} log 2")));
         let file = entry["file"].as_str().unwrap();
         let came = fs::read(bench.path("campaign/logs").join(file)).unwrap();
-        assert!(came == skybrush_server_support::log(id), "{file}");
+        let start = start(1)["time"].as_i64().unwrap();
+        assert!(came == skybrush_server_support::log_of(id, start), "{file}");
+        assert_eq!(entry["flight"]["number"], 1, "{entry}");
     }
     bench.expect(0, &["logs", "verify", "campaign"]);
     let journal = fs::read_to_string(bench.path("campaign/fleet-journal.ndjson")).unwrap();
@@ -143,9 +149,37 @@ fn nobody_starts_without_a_person() {
     insta::assert_snapshot!(format!("{ended}\n{short}"));
 }
 
+/// What the real server said, word for word.
+#[test]
+fn a_recorded_flight_through_the_real_server_is_flown_again() {
+    let bench = planned();
+    let server = Replay::start("skybrush-server-2.50.0-flight.jsonl");
+    let address = format!("skybrush://{}", server.address);
+    let args = ["fly", "campaign", "--yes", "--lead", "20", "--connect", &address];
+    let ended = Ended::of(&bench.command(&args).stdin(Stdio::null()).output().unwrap());
+    assert_eq!(server.surprises(), [""; 0], "{ended}");
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert!(ended.out.contains("GO: 2 of 2 drones are ready"), "{ended}");
+    assert!(ended.err.contains("2 of 2 drones have landed"), "{ended}");
+    assert!(ended.err.contains("Brought 2 of 2 logs home"), "{ended}");
+    bench.expect(0, &["logs", "verify", "campaign"]);
+}
+
+/// What is said of each fault; they take their time, so all at once.
+fn refusals(faults: &[Fault]) -> String {
+    let said: Vec<String> = std::thread::scope(|scope| {
+        let threads: Vec<_> = faults
+            .iter()
+            .map(|fault| scope.spawn(move || format!("{fault:?}\n{}", refused(*fault))))
+            .collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    });
+    said.join("\n")
+}
+
 #[test]
 fn every_refusal_says_why() {
-    let faults = [
+    insta::assert_snapshot!(refusals(&[
         Fault::StandsWrong,
         Fault::Upload("file transfer failed"),
         Fault::UploadTimeout,
@@ -153,10 +187,110 @@ fn every_refusal_says_why() {
         Fault::Nak("SHOW-SETCFG"),
         Fault::Gone("OBJ-CMD"),
         Fault::Trouble,
+    ]));
+}
+
+#[test]
+fn a_drone_that_cannot_fly_keeps_all_on_the_ground_before_anything_is_authorized() {
+    insta::assert_snapshot!(refusals(&[
+        Fault::OneFlies,
+        Fault::Initializes,
+        Fault::StaysOutOfShowMode,
+        Fault::FailsChecks,
+        Fault::NoShow,
+        Fault::NoShowStatus,
+        Fault::Silent,
+    ]));
+}
+
+#[test]
+fn a_start_that_not_every_drone_has_taken_is_taken_back() {
+    insta::assert_snapshot!(refusals(&[
+        Fault::NoStartTime,
+        Fault::OtherStartTime,
+        Fault::LeavesShowMode,
+        Fault::NoAuthorization,
+    ]));
+}
+
+#[test]
+fn nothing_is_sent_while_somebody_elses_start_is_authorized() {
+    let (ended, server) = fly(&planned(), Fault::AuthorizedAlready);
+    assert_eq!(ended.code, Some(4), "{ended}");
+    assert!(server.asked().is_empty(), "{ended}");
+    insta::assert_snapshot!(ended.to_string());
+}
+
+#[test]
+fn a_start_that_somebody_takes_back_is_no_flight() {
+    let bench = planned();
+    let (ended, _) = fly(&bench, Fault::TakenBack);
+    assert_eq!(ended.code, Some(4), "{ended}");
+    assert!(!bench.path("campaign/logs/start.json").exists());
+    insta::assert_snapshot!(ended.err);
+}
+
+#[test]
+fn a_drone_that_never_took_off_has_not_landed() {
+    let (ended, server) = fly(&planned(), Fault::NeverTakesOff);
+    assert_eq!(ended.code, Some(3), "{ended}");
+    assert!(!server.is_authorized());
+    assert!(ended.err.contains("drone 01 did not take off"), "{ended}");
+    assert!(ended.err.contains("1 of 2 drones have landed"), "{ended}");
+}
+
+#[test]
+fn status_upload_and_preflight_go_through_the_server() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::None);
+    let step = |args: &[&str]| {
+        let all = [args, &["campaign", "--wait", "1"]].concat();
+        format!("{}\n{}\n", args.join(" "), run(&bench, &server, &all))
+    };
+    let mut said = step(&["fleet", "status"]);
+    said += &step(&["fleet", "preflight"]);
+    assert!(server.asked().is_empty(), "nothing is sent by looking");
+    said += &step(&["fleet", "upload"]);
+    said += &step(&["fleet", "status", "--json"]);
+    said += &step(&["fleet", "preflight"]);
+    said += &step(&["fleet", "preflight", "--json"]);
+    said += &step(&["fleet", "status", "--dry-run"]);
+    let asked = server.asked();
+    let commands: Vec<&Value> = asked.iter().map(|body| &body["command"]).collect();
+    assert_eq!(commands, ["__show_upload", "__show_upload", "mode", "mode"]);
+    said += &step(&["fleet", "start", "--yes"]);
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn options_that_do_nothing_through_a_server_are_refused() {
+    let bench = planned();
+    fs::write(bench.path("swarm.key"), [7; 32]).unwrap();
+    let server = Fake::start(&plan(&bench), Fault::None);
+    let mut said = String::new();
+    let refusals: [&[&str]; 14] = [
+        &["fly", "--yes", "--set-params"],
+        &["fly", "--yes", "--assign"],
+        &["fly", "--yes", "--key", "swarm.key"],
+        &["fly", "--yes", "--force"],
+        &["fly", "--yes", "--wind", "3"],
+        &["fly", "--yes", "--effect", "gps=off"],
+        &["fly", "--dry-run", "--updraft", "1"],
+        &["fleet", "upload", "--set-params"],
+        &["fleet", "preflight", "--assign"],
+        &["fleet", "status", "--key", "swarm.key"],
+        &["fleet", "abort", "--key", "swarm.key"],
+        &["logs", "list", "--key", "swarm.key"],
+        &["logs", "pull", "--rate", "1000"],
+        &["logs", "pull", "--patience", "10"],
     ];
-    let said: Vec<String> =
-        faults.iter().map(|fault| format!("{fault:?}\n{}", refused(*fault))).collect();
-    insta::assert_snapshot!(said.join("\n"));
+    for words in refusals {
+        let ended = run(&bench, &server, &[words, &["campaign"]].concat());
+        assert_eq!(ended.code, Some(2), "{words:?} {ended}");
+        let _ = writeln!(said, "{}\n{}", words.join(" "), ended.err);
+    }
+    assert!(server.asked().is_empty());
+    insta::assert_snapshot!(said);
 }
 
 #[test]
@@ -187,7 +321,14 @@ fn logs_are_listed_and_pulled_and_losses_are_named() {
         Fault::Gone("LOG-DATA"),
     ] {
         let _ = write!(said, "\n{fault:?}\n{}", pull(fault));
-        assert!(!bench.path("campaign/logs/01.BIN").exists());
+        // Of a log that is still being written the beginning is kept.
+        let is_there = bench.path("campaign/logs/01.BIN").exists();
+        assert_eq!(is_there, fault == Fault::LogSize, "{fault:?}");
+        if is_there {
+            let manifest = fs::read_to_string(bench.path("campaign/logs/manifest.json")).unwrap();
+            assert!(manifest.contains(r#""incomplete": "it was listed"#), "{manifest}");
+            fs::remove_dir_all(bench.path("campaign/logs")).unwrap();
+        }
     }
     let _ = write!(said, "\nwhole\n{}", pull(Fault::None));
     // What is there is not asked for again.
@@ -244,7 +385,6 @@ fn lists_and_pulls_have_the_options_of_the_drones_own_links() {
     said += &logs(&["pull", "--json"]);
     said += &logs(&["pull", "--slots", "1", "--again"]);
     said += &logs(&["pull", "--slots", "1", "--log", "7"]);
-    said += &logs(&["pull", "--slots", "1", "--rate", "1000"]);
     let slot_1 = server.asked().iter().filter(|body| body["uavId"] == "02").count();
     assert_eq!(slot_1, 2, "once, and once again");
     fs::remove_file(bench.path("campaign/logs/manifest.json")).unwrap();
@@ -263,7 +403,7 @@ fn a_flights_dry_run_shows_the_servers_requests() {
     let bodies: Vec<Value> =
         lines.iter().map(|line| serde_json::from_str(line.as_str().unwrap()).unwrap()).collect();
     let kinds: Vec<&str> = bodies.iter().map(|body| body["type"].as_str().unwrap()).collect();
-    assert_eq!(kinds, ["OBJ-CMD", "SHOW-SETCFG", "SHOW-SETCFG"]);
+    assert_eq!(kinds, ["OBJ-CMD", "OBJ-CMD", "SHOW-SETCFG", "SHOW-SETCFG"]);
     assert_eq!(bodies[0]["kwds"]["show"]["mission"]["index"], 1);
     let ended = run(&bench, &server, &["fleet", "abort", "campaign", "--dry-run"]);
     assert!(server.asked().is_empty(), "{ended}");
@@ -283,6 +423,16 @@ fn drones_that_the_server_hears_late_are_waited_for() {
     let server = Fake::start(&plan(&bench), Fault::Late);
     let short = run(&bench, &server, &["logs", "pull", "campaign", "--wait", "0"]);
     insta::assert_snapshot!(format!("{ended}\n{short}"));
+}
+
+#[test]
+fn a_drone_that_the_server_only_remembers_stands_nowhere() {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::Remembers);
+    let ended = run(&bench, &server, &["logs", "pull", "campaign"]);
+    assert_eq!(ended.code, Some(0), "{ended}");
+    let left = "Left out, as the server has not heard them for a while: drones 77";
+    assert!(ended.err.contains(left), "{ended}");
 }
 
 /// Stops as soon as something moves.
@@ -315,6 +465,62 @@ fn what_nobody_waits_for_any_more_is_cancelled() {
     let asked = server.asked();
     assert_eq!(asked.len(), 2, "{asked:?}");
     assert_eq!(asked[1], json!({ "type": "ASYNC-CANCEL", "ids": ["receipt-1"] }));
+}
+
+/// A flight that is told to end when it says this; what it says from then on, and its exit code.
+fn ended_at(signal: &str, word: &str, more: &[&str]) -> (String, Option<i32>, Fake) {
+    let bench = planned();
+    let server = Fake::start(&plan(&bench), Fault::None);
+    let address = format!("skybrush://{}", server.address);
+    let args = ["fly", "campaign", "--yes", "--lead", "20", "--connect", &address];
+    let mut command = bench.command(&[&args[..], more].concat());
+    let command = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut flying = command.spawn().unwrap();
+    let mut lines = BufReader::new(flying.stderr.take().unwrap()).lines();
+    let found = lines.by_ref().map(Result::unwrap).find(|line| line.contains(word));
+    assert!(found.is_some(), "it never said {word}");
+    let pid = flying.id().to_string();
+    assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+    let rest: Vec<String> = lines.map(Result::unwrap).collect();
+    let code = flying.wait().unwrap().code();
+    (rest.join("\n"), code, server)
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_before_the_start_takes_it_back() {
+    let (said, code, server) = ended_at("-INT", "Authorized", &[]);
+    assert_eq!(code, Some(130), "{said}");
+    assert!(!server.is_authorized(), "{said}");
+    assert!(!server.asked().iter().any(|body| body["type"] == "UAV-RTH"), "{said}");
+    assert!(said.contains("the start was taken back, nobody takes off"), "{said}");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_in_flight_does_what_was_chosen() {
+    for (signal, chosen, order, word) in [
+        ("-INT", "return", "UAV-RTH", "this program has sent them home"),
+        ("-TERM", "land", "UAV-LAND", "this program has told them to land"),
+        ("-HUP", "leave", "", "the drones fly on by themselves"),
+    ] {
+        let (said, code, server) = ended_at(signal, "take-off", &["--on-interrupt", chosen]);
+        assert_eq!(code, Some(130), "{said}");
+        assert!(said.contains(word), "{said}");
+        let asked = server.asked();
+        let orders: Vec<&Value> = asked
+            .iter()
+            .filter(|body| ["UAV-RTH", "UAV-LAND"].contains(&body["type"].as_str().unwrap()))
+            .collect();
+        match order {
+            "" => assert!(orders.is_empty(), "{orders:?}"),
+            order => {
+                assert_eq!(orders.len(), 1, "{orders:?}");
+                assert_eq!(orders[0]["type"], order);
+                assert_eq!(orders[0]["ids"], json!(["02", "01"]));
+            }
+        }
+    }
 }
 
 #[test]

@@ -14,7 +14,7 @@ use super::fleet::crew::Crew;
 use super::fleet::sim::{Hangar, Mishaps, TO_START};
 use super::fleet::start::{LeadArgs, asked, fly_now, guide_now, needs_person, say_landed};
 use super::fleet::tables::PreflightOutput;
-use super::fleet::{dry, end, lock, one_flight, server};
+use super::fleet::{dry, end, lock, one_flight, refuse_of_upload, server};
 use super::fly_output::{FlightEnd, FlightOutput, FlyOutput, LogOutput};
 use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
 use crate::base::time::GpsTime;
@@ -86,6 +86,9 @@ pub(super) struct FlyArgs {
 
 pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandError> {
     if args.dry_run {
+        if let Target::Server(_) = args.connect.target()? {
+            refuse_of_server(args)?;
+        }
         let step = super::fleet::StepArgs {
             campaign: args.campaign.clone(),
             flight: args.flight.clone(),
@@ -102,12 +105,29 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
                 .to_owned(),
         ));
     }
+    if let Target::Server(_) = target {
+        refuse_of_server(args)?;
+    }
     let _lock = lock(context, &args.campaign)?;
     let (flights, exit) = fly_target(context, args, target)?;
     if context.json {
         context.print_json(&FlyOutput::new(flights))?;
     }
     Ok(exit)
+}
+
+/// Options that do nothing through a server.
+fn refuse_of_server(args: &FlyArgs) -> Result<(), CommandError> {
+    refuse_of_upload(&args.connect, args.set_params, args.assign)?;
+    let of_virtual = "it is for virtual drones of our own (--connect sim)";
+    let air = server::of_air(&args.air, args.updraft);
+    server::refuse(
+        &args.connect,
+        &[
+            ("--force", args.force, of_virtual),
+            (air.unwrap_or_default(), air.is_some(), of_virtual),
+        ],
+    )
 }
 
 fn fly_target(

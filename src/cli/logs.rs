@@ -30,6 +30,9 @@ use crate::mission::Plan;
 
 pub(super) use listing::{ListRow, ListedLog};
 
+/// How long a drone may be silent, s.
+const PATIENCE_S: f64 = 60.0;
+
 /// Arguments of `updraft logs`.
 #[derive(Debug, Args)]
 #[command(after_long_help = "Examples:
@@ -106,7 +109,7 @@ struct PullArgs {
     #[arg(long, value_name = "MB", default_value_t = 2048, value_parser = clap::value_parser!(u32).range(1..))]
     max_size: u32,
     /// Give a drone up after so long without an answer, s
-    #[arg(long, value_name = "S", default_value_t = 60.0, value_parser = super::fleet::connect::seconds)]
+    #[arg(long, value_name = "S", default_value_t = PATIENCE_S, value_parser = super::fleet::connect::seconds)]
     patience: f64,
     /// Tell what would be asked for, and ask nobody
     #[arg(long)]
@@ -145,6 +148,7 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
     let links = match args.connect.target()? {
         Target::Links(links) => links,
         Target::Server(address) => {
+            server::refuse(&args.connect, &[])?;
             let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
             return listing::show(context, server::list(context, &address, &plan, slots, wait_s)?);
         }
@@ -261,13 +265,16 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let links = match target {
         Target::Links(links) => links,
         Target::Server(address) => {
-            if args.rate.is_some() {
-                return Err(CommandError::Usage(
-                    "--rate is for the drones' own links: Skybrush Server asks them at its own \
-                     pace; --at-once bounds how many drones at a time"
-                        .to_owned(),
-                ));
-            }
+            let rate = "it asks the drones at its own pace; --at-once bounds how many drones at a \
+                        time";
+            let patience = "it gives a drone up by itself, after 90 s without progress";
+            server::refuse(
+                &args.connect,
+                &[
+                    ("--rate", args.rate.is_some(), rate),
+                    ("--patience", (args.patience - PATIENCE_S).abs() > 0.0, patience),
+                ],
+            )?;
             let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
             let rows = server::pull(context, &address, &folder, &plan, slots, &wish, wait_s)?;
             let lost = rows.iter().filter(|row| row.state == "missing").map(|row| row.slot);

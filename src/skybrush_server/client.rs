@@ -203,6 +203,28 @@ impl Client {
     }
 }
 
+impl Client {
+    /// What the autopilots of drones last said of arming checks that fail.
+    ///
+    /// # Errors
+    /// When the server refuses, or is not there.
+    pub fn arming_checks(
+        &mut self,
+        drones: &[String],
+        go_on: impl FnMut() -> bool,
+    ) -> Result<BTreeMap<String, String>, ServerError> {
+        let running = self.begin(&json!({ "type": "UAV-PREFLT", "ids": drones }))?;
+        let told = self.finish(running, go_on)?.into_iter();
+        let words = |(drone, outcome): (String, Outcome)| {
+            // It may lag behind: what has passed is no reason.
+            let report = outcome.ok().filter(|report| text(report, "result") != Some("pass"))?;
+            let message = text(&report, "message").filter(|message| !message.is_empty())?;
+            Some((drone, message.to_owned()))
+        };
+        Ok(told.filter_map(words).collect())
+    }
+}
+
 fn kind_of(body: &Value) -> String {
     match (text(body, "type"), text(body, "command")) {
         (Some(kind), Some(command)) => format!("{kind} {command}"),

@@ -7,10 +7,12 @@
 
 mod client;
 mod error;
+pub mod gate;
 pub mod lines;
 mod logs;
 pub mod message;
 mod show;
+pub mod state;
 mod upload;
 pub mod watch;
 mod work;
@@ -18,6 +20,6 @@ mod work;
 pub use client::Client;
 pub use error::ServerError;
 pub use logs::{LogEntry, fetch_log, list_logs, log_bytes, log_entries};
-pub use show::{StartConfig, end_flight};
+pub use show::{StartConfig, end_flight, mode, show_mode};
 pub use upload::{Fence, ShowUpload, upload};
 pub use work::{Foreman, Job, Outcome, Running};

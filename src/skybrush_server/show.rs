@@ -4,6 +4,8 @@ use serde_json::{Value, json};
 
 use super::client::Client;
 use super::error::ServerError;
+use super::work::Job;
+use crate::protocol::show::SHOW_MODE;
 
 /// When the show starts.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,4 +63,21 @@ impl Client {
 /// The request that sends drones home, or lets them land where they are.
 pub fn end_flight(drones: &[String], home: bool) -> Value {
     json!({ "type": if home { "UAV-RTH" } else { "UAV-LAND" }, "ids": drones })
+}
+
+/// The request that switches a drone to show mode, as over its own link: by number.
+pub fn show_mode(drone: &str) -> Job {
+    mode(drone, SHOW_MODE)
+}
+
+/// The request that switches a drone to a flight mode. The server knows names of its own; what is a
+/// number goes to the drone as it is.
+pub fn mode(drone: &str, number: u32) -> Job {
+    let body = json!({
+        "type": "OBJ-CMD",
+        "ids": [drone],
+        "command": "mode",
+        "args": [number.to_string()],
+    });
+    Job { drone: drone.to_owned(), body }
 }

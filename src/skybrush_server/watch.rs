@@ -8,9 +8,10 @@ use serde_json::Value;
 use crate::link::clock::{Micros, S};
 
 /// Codes below are states of a healthy drone.
-const FIRST_WARNING: u64 = 64;
+pub(super) const FIRST_WARNING: u64 = 64;
 const ON_GROUND: u64 = 1;
 const LANDED: u64 = 7;
+const MOTORS_RUN: u64 = 8;
 /// The server forgets drones that are silent for so long.
 const SILENT: Micros = 5 * S;
 
@@ -80,7 +81,11 @@ pub fn warnings(status: &Value) -> BTreeSet<u64> {
 
 /// Whether a drone is on the ground for certain.
 pub fn is_on_ground(status: &Value) -> bool {
-    let codes = codes(status);
+    is_down(&codes(status))
+}
+
+/// Whether these are codes of a drone that is on the ground for certain.
+pub(super) fn is_down(codes: &BTreeSet<u64>) -> bool {
     codes.contains(&ON_GROUND) || codes.contains(&LANDED)
 }
 
@@ -152,9 +157,11 @@ struct Watched {
     silent: bool,
     timestamp: Option<Value>,
     heard: Micros,
-    /// Off the ground, or about to be, since the start.
+    /// Off the ground since the start.
     flown: bool,
     landed: bool,
+    /// On the ground when it was heard last.
+    down: bool,
 }
 
 /// Watches a show: statuses in, events out. It does nothing on its own.
@@ -199,14 +206,33 @@ impl Monitor {
         self.drones.values().all(|watched| watched.landed)
     }
 
-    /// Who has not landed.
+    /// Whether nobody is in the air, as far as the server tells.
+    pub fn all_are_down(&self) -> bool {
+        self.drones.values().all(|watched| watched.landed || watched.stayed_down())
+    }
+
+    /// Who has flown, or may have, and has not been seen to land.
     pub fn in_the_air(&self) -> Vec<&str> {
-        let open = self.drones.iter().filter(|(_, watched)| !watched.landed);
-        open.map(|(id, _)| id.as_str()).collect()
+        self.named(|watched| !watched.landed && !watched.stayed_down())
+    }
+
+    /// Who has not left the ground.
+    pub fn not_flown(&self) -> Vec<&str> {
+        self.named(|watched| !watched.landed && watched.stayed_down())
+    }
+
+    fn named(&self, which: impl Fn(&Watched) -> bool) -> Vec<&str> {
+        let those = self.drones.iter().filter(|(_, watched)| which(watched));
+        those.map(|(id, _)| id.as_str()).collect()
     }
 }
 
 impl Watched {
+    /// It never left the ground, and is heard to be there.
+    fn stayed_down(&self) -> bool {
+        self.down && !self.flown && !self.silent
+    }
+
     /// A drone that is gone has no status, or one that does not get newer.
     fn hearing(&mut self, now: Micros, status: Option<&Value>, tell: &mut dyn FnMut(Event)) {
         if let Some(status) = status {
@@ -256,8 +282,10 @@ impl Watched {
         }
         // Not every driver of the server says that a drone has landed: those of ArduPilot are on
         // the ground again.
-        self.flown |= started && !is_on_ground(status);
+        let runs = now.contains(&MOTORS_RUN);
+        self.flown |= started && !is_on_ground(status) && !runs;
         self.landed = started && (now.contains(&LANDED) || self.flown && now.contains(&ON_GROUND));
+        self.down = is_on_ground(status);
     }
 }
 

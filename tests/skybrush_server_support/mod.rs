@@ -1,5 +1,8 @@
 //! A server that speaks as Skybrush Server does, with two drones and one fault.
 
+pub(crate) mod replay;
+
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -12,7 +15,10 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::Vector3;
 use serde_json::{Map, Value, json};
+use updraft::base::time::GpsTime;
 use updraft::campaign::parse_plan;
+use updraft::flight::identity::identify;
+use updraft::log::Log;
 
 /// What the server or one of its drones does wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +41,31 @@ pub(crate) enum Fault {
     TroubleInFlight,
     /// Drone 01 is in the air.
     OneFlies,
+    /// Drone 01 stays in the mode of its last abort.
+    StaysOutOfShowMode,
+    /// Drone 01 is in show mode, and leaves it once it has the start time.
+    LeavesShowMode,
+    /// Drone 01 is still initializing.
+    Initializes,
+    /// Drone 01 fails its arming checks.
+    FailsChecks,
+    /// Drone 01 has no show, whatever it is sent.
+    NoShow,
+    /// Drone 01 does not take the start time; it has another one; it is not authorized by it.
+    NoStartTime,
+    OtherStartTime,
+    NoAuthorization,
+    /// The server hears no more of drone 01.
+    Silent,
+    /// Drone 01 sends no show status.
+    NoShowStatus,
+    /// Somebody has authorized a start; or takes it back before it comes.
+    AuthorizedAlready,
+    TakenBack,
+    /// Drone 01 stays where it is.
+    NeverTakesOff,
+    /// The server remembers a drone that was there a minute ago, on the slot of drone 02.
+    Remembers,
     /// Logs are larger in the list.
     LogSize,
     /// Logs are cut.
@@ -65,8 +96,17 @@ const WORK: Duration = Duration::from_millis(150);
 #[derive(Default)]
 struct State {
     asked: Vec<Value>,
-    /// Unix time, s, once authorized.
+    /// Unix time, s, once set, and once authorized.
+    set: Option<i64>,
     start: Option<i64>,
+    /// Looks since it was set.
+    /// The start that was flown, whose log the drones have.
+    flown: Option<i64>,
+    looks_since_set: u64,
+    cleared: bool,
+    /// Drones that have a show, and are in show mode.
+    loaded: BTreeSet<String>,
+    in_show_mode: BTreeSet<String>,
     /// How often statuses were asked for, in all and since the start.
     looks: u64,
     looks_in_flight: u64,
@@ -84,13 +124,75 @@ pub(crate) struct Fake {
     over: Arc<AtomicBool>,
 }
 
-/// The newest log of a drone.
+/// The newest log of a drone, of no flight of today.
 pub(crate) fn log(id: &str) -> Vec<u8> {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ladder-still.trimmed.BIN");
     let mut bytes = fs::read(data).unwrap();
-    bytes.truncate(100_000);
+    bytes.truncate(SIZE);
     bytes.extend_from_slice(id.as_bytes());
     bytes
+}
+
+/// Bytes of the beginning of a real log that are used.
+const SIZE: usize = 100_000;
+
+/// The same log, as if its show had begun at this Unix time, s: its GPS times are moved.
+pub(crate) fn log_of(id: &str, start_unix_s: i64) -> Vec<u8> {
+    let mut bytes = log(id);
+    let identity = identify(&Log::from_bytes(bytes.clone()));
+    let began = identity.shows().next().expect("the log has a show clock").start;
+    let start = GpsTime::from_unix_ms(start_unix_s * 1000).unwrap();
+    move_gps(&mut bytes, start.total_ms() - began.total_ms());
+    bytes
+}
+
+/// Adds to the times of all GPS rows of a DataFlash log.
+fn move_gps(bytes: &mut [u8], by_ms: i64) {
+    let size = |kind: char| match kind {
+        'b' | 'B' | 'M' => 1,
+        'h' | 'H' | 'c' | 'C' => 2,
+        'i' | 'I' | 'f' | 'n' | 'e' | 'E' | 'L' => 4,
+        'd' | 'q' | 'Q' => 8,
+        'N' => 16,
+        'Z' | 'a' => 64,
+        other => panic!("a field of kind {other}"),
+    };
+    let mut lengths = [0_usize; 256];
+    let mut gps = None;
+    let mut at = 0;
+    while at + 3 <= bytes.len() && bytes[at..].starts_with(&[0xA3, 0x95]) {
+        let kind = bytes[at + 2];
+        if kind == 0x80 {
+            let row = &bytes[at + 3..at + 89];
+            lengths[usize::from(row[0])] = row[1].into();
+            if row[2..6] == *b"GPS\0" {
+                let formats = row[6..22].iter().map(|byte| char::from(*byte));
+                let labels = String::from_utf8_lossy(&row[22..86]).into_owned();
+                let labels = labels.trim_end_matches('\0').split(',').map(str::to_owned);
+                let mut place = 3;
+                let mut places = std::collections::BTreeMap::new();
+                for (format, label) in formats.zip(labels) {
+                    places.insert(label, place);
+                    place += size(format);
+                }
+                gps = Some((row[0], places["GMS"], places["GWk"]));
+            }
+        }
+        let length = if kind == 0x80 { 89 } else { lengths[usize::from(kind)] };
+        if length == 0 || at + length > bytes.len() {
+            return;
+        }
+        if let Some((_, ms, week)) = gps.filter(|(it, ..)| *it == kind) {
+            let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+            let weeks = u16::from_le_bytes([bytes[at + week], bytes[at + week + 1]]);
+            let total = i64::from(weeks) * 604_800_000 + i64::from(number(at + ms)) + by_ms;
+            let tow = (total % 604_800_000) as u32;
+            bytes[at + ms..at + ms + 4].copy_from_slice(&tow.to_le_bytes());
+            let weeks = (total / 604_800_000) as u16;
+            bytes[at + week..at + week + 2].copy_from_slice(&weeks.to_le_bytes());
+        }
+        at += length;
+    }
 }
 
 impl Fake {
@@ -147,7 +249,8 @@ impl Fake {
     }
 
     pub(crate) fn is_authorized(&self) -> bool {
-        self.state.lock().unwrap().start.is_some()
+        let state = self.state.lock().unwrap();
+        state.start.is_some() && !state.cleared
     }
 }
 
@@ -242,7 +345,8 @@ impl Visit {
 
     fn answer(&mut self, id: &str, body: &Value) -> Result<(), Closed> {
         let kind = body["type"].as_str().unwrap().to_owned();
-        if !["SYS-VER", "UAV-LIST", "UAV-INF"].contains(&kind.as_str()) {
+        let looks = ["SYS-VER", "UAV-LIST", "UAV-INF", "SHOW-CFG", "UAV-PREFLT"];
+        if !looks.contains(&kind.as_str()) {
             self.state.lock().unwrap().asked.push(body.clone());
         }
         if self.fault == Fault::Gone(leaked(&kind)) {
@@ -265,7 +369,10 @@ impl Visit {
                 let known = if self.fault == Fault::Late { state.lists - 1 } else { 2 };
                 drop(state);
                 // In no order.
-                let ids = &["02", "01"][..known.min(2) as usize];
+                let ids = match self.fault {
+                    Fault::Remembers => &["77", "02", "01"][..],
+                    _ => &["02", "01"][..known.min(2) as usize],
+                };
                 self.send(Some(id), &json!({ "type": kind, "ids": ids }))
             }
             "UAV-INF" => {
@@ -275,7 +382,24 @@ impl Visit {
                 self.send(None, &body)?;
                 self.send(Some(id), &body)
             }
+            "OBJ-CMD" if body["command"] == "mode" => self.mode(id, &ids(body)[0], &body["args"]),
             "OBJ-CMD" => self.upload(id, &ids(body)[0]),
+            "UAV-PREFLT" => {
+                let report = json!({ "message": "Need Position Estimate", "result": "failure" });
+                let result: Map<String, Value> =
+                    ids(body).into_iter().map(|id| (id, report.clone())).collect();
+                self.send(Some(id), &json!({ "type": kind, "result": result }))
+            }
+            "SHOW-CFG" => {
+                let set = self.state.lock().unwrap().start.is_some();
+                let authorized = match self.fault {
+                    Fault::AuthorizedAlready => true,
+                    Fault::TakenBack => false,
+                    _ => set,
+                };
+                let configuration = json!({ "start": { "authorized": authorized } });
+                self.send(Some(id), &json!({ "type": kind, "configuration": configuration }))
+            }
             "SHOW-SETCFG" => self.configure(id, &body["configuration"]["start"]),
             "LOG-INF" => self.list(id, &ids(body)),
             "LOG-DATA" => self.log(id, body["uavId"].as_str().unwrap()),
@@ -304,7 +428,9 @@ impl Visit {
         let flying = state.start.is_some_and(|start| unix_s() > start);
         state.looks_in_flight += u64::from(flying);
         let step = state.looks_in_flight;
-        let authorized = state.start.is_some();
+        state.looks_since_set += u64::from(state.set.is_some());
+        let known = (state.looks_since_set, state.set, state.start);
+        let (loaded, in_show_mode) = (state.loaded.clone(), state.in_show_mode.clone());
         drop(state);
         let trouble = self.fault == Fault::TroubleInFlight;
         if trouble && step == 3 {
@@ -312,8 +438,13 @@ impl Visit {
         }
         let status = ids.iter().map(|id| {
             let first = id == "01";
+            let step = if first && self.fault == Fault::NeverTakesOff { 0 } else { step };
+            let (since_set, set, authorized) = known;
+            let left = first && self.fault == Fault::LeavesShowMode && since_set > 2;
+            let in_show_mode = in_show_mode.contains(id) && !left;
+            let out = if first && self.fault == Fault::StaysOutOfShowMode { "rth" } else { "stab" };
             let (mode, mut codes) = match step {
-                0 => (if authorized { "show" } else { "stab" }, vec![1]),
+                0 => (if in_show_mode { "show" } else { out }, vec![1]),
                 1 => ("show", vec![8]),
                 2 => ("show", vec![5]),
                 3 => ("show", vec![]),
@@ -321,8 +452,26 @@ impl Visit {
                 // One driver says that it has landed, the other that it is on the ground.
                 _ => ("land", vec![if first { 7 } else { 1 }]),
             };
+            let set = match self.fault {
+                Fault::NoStartTime if first => None,
+                Fault::OtherStartTime if first => set.map(|set| set + 60),
+                _ => set,
+            };
+            let authorized = authorized.filter(|_| !first || self.fault != Fault::NoAuthorization);
+            let debug = match step {
+                _ if first && self.fault == Fault::NoShowStatus => String::new(),
+                0 => STANDARD.encode(show_line(
+                    loaded.contains(id) && !(first && self.fault == Fault::NoShow),
+                    in_show_mode,
+                    set,
+                    authorized.is_some(),
+                )),
+                _ => STANDARD.encode("[ 00:00:01] Performing show"),
+            };
             match self.fault {
                 Fault::Trouble if first => codes.push(133),
+                Fault::FailsChecks if first => codes.push(3),
+                Fault::Initializes if first => codes = vec![4],
                 Fault::OneFlies if first => codes.clear(),
                 Fault::TroubleInFlight if first && step == 2 => codes.push(75),
                 _ => {}
@@ -333,6 +482,7 @@ impl Visit {
                 (_, true) => json!([123, 80]),
                 (_, false) => json!([126]),
             };
+            let silent = first && self.fault == Fault::Silent;
             let late = self.fault == Fault::Late && looks < 5;
             let [lat, lon] = if late { [0, 0] } else { self.places[usize::from(!first)] };
             let status = json!({
@@ -349,16 +499,31 @@ impl Visit {
                 "battery": battery,
                 "light": 65535,
                 "rssi": [],
-                "debug": "",
-                "timestamp": 1_795_170_696_891_u64 + looks,
+                "debug": debug,
+                "timestamp": 1_795_170_696_891_u64 + if silent { 0 } else { looks }
+                    - if id == "77" { 60_000 } else { 0 },
             });
             (id.clone(), status)
         });
         Ok(status.collect())
     }
 
+    fn mode(&mut self, id: &str, drone: &str, args: &Value) -> Result<(), Closed> {
+        assert_eq!(args, &json!(["127"]));
+        let receipt = self.receipt();
+        self.send(Some(id), &json!({ "type": "OBJ-CMD", "receipt": { drone: receipt } }))?;
+        let end = if drone == "01" && self.fault == Fault::StaysOutOfShowMode {
+            json!({ "type": "ASYNC-RESP", "id": receipt, "error": "UAV rejected flight mode 127" })
+        } else {
+            self.state.lock().unwrap().in_show_mode.insert(drone.to_owned());
+            json!({ "type": "ASYNC-RESP", "id": receipt, "result": "Mode changed to '127'" })
+        };
+        self.send(None, &end)
+    }
+
     fn upload(&mut self, id: &str, drone: &str) -> Result<(), Closed> {
         let receipt = self.receipt();
+        self.state.lock().unwrap().loaded.insert(drone.to_owned());
         let answer = json!({ "type": "OBJ-CMD", "receipt": { drone: receipt } });
         let end = json!({ "type": "ASYNC-RESP", "id": receipt, "result": null });
         if drone != "01" && self.state.lock().unwrap().busy.is_empty() {
@@ -383,8 +548,19 @@ impl Visit {
         if authorized && self.fault == Fault::NakAuthorization {
             return self.nak(id, "not now");
         }
-        let time = start["time"].as_i64().filter(|_| authorized);
-        self.state.lock().unwrap().start = time;
+        let time = start["time"].as_i64();
+        let mut state = self.state.lock().unwrap();
+        // The flight is not over when its start is cleared.
+        let flies = time.is_none() && state.looks_in_flight > 0;
+        if !flies {
+            state.start = time.filter(|_| authorized);
+            state.flown = state.start.or(state.flown);
+        }
+        state.cleared = time.is_none();
+        if state.set != time {
+            (state.set, state.looks_since_set) = (time, 0);
+        }
+        drop(state);
         self.send(Some(id), &json!({ "type": "ACK-ACK" }))
     }
 
@@ -394,7 +570,7 @@ impl Visit {
             drones.iter().cloned().zip(receipts.iter().map(|receipt| json!(receipt))).collect();
         self.send(Some(id), &json!({ "type": "LOG-INF", "receipt": by_drone }))?;
         for (drone, receipt) in drones.iter().zip(&receipts) {
-            let size = log(drone).len();
+            let size = self.newest_log(drone).len();
             let size = match self.fault {
                 Fault::LogSize => size + 100,
                 Fault::LogGrows if self.state.lock().unwrap().downloads == 0 => size - 100,
@@ -408,6 +584,12 @@ impl Visit {
             self.send(None, &json!({ "type": "ASYNC-RESP", "id": receipt, "result": logs }))?;
         }
         Ok(())
+    }
+
+    /// Of the flight that was flown, if one was.
+    fn newest_log(&self, drone: &str) -> Vec<u8> {
+        let flown = self.state.lock().unwrap().flown;
+        flown.map_or_else(|| log(drone), |start| log_of(drone, start))
     }
 
     fn log(&mut self, id: &str, drone: &str) -> Result<(), Closed> {
@@ -439,7 +621,7 @@ impl Visit {
             }
             _ => {}
         }
-        let bytes = log(drone);
+        let bytes = self.newest_log(drone);
         let body = match self.fault {
             Fault::LogCut => STANDARD.encode(&bytes[..5000]),
             Fault::LogGarbled => "?".to_owned(),
@@ -453,6 +635,30 @@ impl Visit {
         );
         Ok(())
     }
+}
+
+/// What a drone on the ground says of its show, with a clock in another time zone.
+fn show_line(loaded: bool, in_show_mode: bool, set: Option<i64>, authorized: bool) -> String {
+    let clock = match set {
+        None => "---:--:--".to_owned(),
+        Some(start) => {
+            let elapsed = unix_s() - start;
+            let sign = if elapsed < 0 { '-' } else { ' ' };
+            let (sign, shown) = match elapsed {
+                -30.. => (sign, elapsed.abs()),
+                _ => ('@', (start + 5400).rem_euclid(86_400)),
+            };
+            format!("{sign}{:02}:{:02}:{:02}", shown / 3600, shown / 60 % 60, shown % 60)
+        }
+    };
+    let text = match (loaded, in_show_mode, set, authorized) {
+        (false, ..) => "No show data",
+        (_, false, ..) => "",
+        (_, _, None, _) => "Start time not set",
+        (_, _, _, false) => "Not authorized to start",
+        _ => "Countdown to show start",
+    };
+    format!("[{clock}] {text}")
 }
 
 /// The kinds that faults are named by.

@@ -179,12 +179,20 @@ impl Dry {
 
 /// What a look at the fleet would send.
 pub(in crate::cli) fn status(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.connect.target()? {
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::dry_look(context, &plan);
+    }
     let dry = Dry::of(args)?;
     print(context, dry.each(|drone| dry.shown(drone, Greet::new(drone))))
 }
 
 /// What the preflight table would send.
 pub(in crate::cli) fn preflight(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.connect.target()? {
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::dry_look(context, &plan);
+    }
     let dry = Dry::of(args)?;
     let lines = |drone| {
         let mut lines = dry.shown(drone, Greet::new(drone));
@@ -196,6 +204,10 @@ pub(in crate::cli) fn preflight(context: &Context, args: &StepArgs) -> Result<Ex
 
 /// What an upload would send.
 pub(in crate::cli) fn upload(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.connect.target()? {
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::dry_upload(context, &plan);
+    }
     print(context, Dry::of(args)?.upload(context)?)
 }
 

@@ -198,7 +198,10 @@ pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<E
         args.drones.as_ref().map(|drones| drones.iter().copied().collect());
     let links = match args.step.connect.target()? {
         Target::Links(links) => links,
-        Target::Server(address) => return server::end(context, &address, only.as_ref(), action),
+        Target::Server(address) => {
+            server::refuse(&args.step.connect, &[])?;
+            return server::end(context, &address, only.as_ref(), action);
+        }
         Target::Sim => {
             return Err(CommandError::Usage(
                 "give the drones' own links with --connect".to_owned(),

@@ -234,8 +234,9 @@ fn step_station(args: &StepArgs) -> Result<Station, CommandError> {
                 .to_owned(),
         )),
         Target::Server(_) => Err(CommandError::Usage(
-            "through Skybrush Server the whole flight is one command: `updraft fly`; of its \
-             single steps there are `fleet abort` and `fleet land`, the others are in Skybrush Live"
+            "through Skybrush Server the start is a part of `updraft fly`, and parameters are put \
+             back in Skybrush Live; there are `fleet status`, `upload`, `preflight`, `abort` and \
+             `land`"
                 .to_owned(),
         )),
     }
@@ -258,11 +259,35 @@ fn look(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<Preflight, CommandErro
     crew.preflight(args.step.connect.wait)
 }
 
+/// Options of an upload that do nothing through a server.
+pub(super) fn refuse_of_upload(
+    connect: &ConnectArgs,
+    set_params: bool,
+    assign: bool,
+) -> Result<(), CommandError> {
+    let params = "parameters are not looked at through it; set them over the drones' own links, or \
+                  in Skybrush Live";
+    let found = "who flies which slot is found anew every time, from where the drones stand";
+    server::refuse(connect, &[("--set-params", set_params, params), ("--assign", assign, found)])
+}
+
+/// The server that a step goes through, if it does; with options that do nothing there refused.
+fn server_of(args: &UploadArgs) -> Result<Option<String>, CommandError> {
+    let Target::Server(address) = args.step.connect.target()? else { return Ok(None) };
+    refuse_of_upload(&args.step.connect, args.set_params, args.assign)?;
+    Ok(Some(address))
+}
+
 fn preflight(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
+    let server = server_of(args)?;
     if args.step.dry_run {
         return dry::preflight(context, &args.step);
     }
     let _lock = lock(context, &args.step.campaign)?;
+    if let Some(address) = server {
+        let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())?;
+        return server::preflight(context, &address, &folder, &plan, args.step.connect.wait);
+    }
     with_crew(context, &args.step, |crew| tables::preflight(context, &look(crew, args)?))
 }
 
@@ -270,14 +295,24 @@ fn status(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
     if args.dry_run {
         return dry::status(context, args);
     }
+    if let Target::Server(address) = args.connect.target()? {
+        server::refuse(&args.connect, &[])?;
+        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+        return server::status(context, &address, &plan, args.connect.wait);
+    }
     with_crew(context, args, |crew| tables::status(context, crew))
 }
 
 fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
+    let server = server_of(args)?;
     if args.step.dry_run {
         return dry::upload(context, &args.step);
     }
     let _lock = lock(context, &args.step.campaign)?;
+    if let Some(address) = server {
+        let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())?;
+        return server::upload(context, &address, &folder, &plan, args.step.connect.wait);
+    }
     with_crew(context, &args.step, |crew| {
         prepare(crew, args)?;
         let refused = crew.upload()?;

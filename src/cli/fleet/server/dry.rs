@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::upload::Shows;
 use crate::cli::context::Context;
@@ -10,7 +10,7 @@ use crate::cli::exit::{CommandError, Exit};
 use crate::cli::fleet::dry::print;
 use crate::fleet::abort::Action;
 use crate::mission::Plan;
-use crate::skybrush_server::{StartConfig, end_flight};
+use crate::skybrush_server::{StartConfig, end_flight, show_mode};
 
 /// Which drone stands where, only the server knows.
 fn name(slot: u16) -> String {
@@ -38,7 +38,27 @@ pub(in crate::cli) fn dry_fly(
         body.to_string()
     };
     let lines = jobs.into_iter().map(|(slot, job)| {
-        (format!("on slot {slot}"), vec![job.body.to_string(), start(false), start(true)])
+        let mode = show_mode(&name(slot)).body.to_string();
+        (format!("on slot {slot}"), vec![job.body.to_string(), mode, start(false), start(true)])
+    });
+    print(context, lines.collect::<BTreeMap<_, _>>())
+}
+
+/// What an upload would ask of the server.
+pub(in crate::cli) fn dry_upload(context: &Context, plan: &Plan) -> Result<Exit, CommandError> {
+    let jobs = Shows::of(plan)?.jobs(|slot| Some(name(slot)))?;
+    let lines = jobs.into_iter().map(|(slot, job)| {
+        let mode = show_mode(&name(slot)).body.to_string();
+        (format!("on slot {slot}"), vec![job.body.to_string(), mode])
+    });
+    print(context, lines.collect::<BTreeMap<_, _>>())
+}
+
+/// What a look at the drones would ask of the server: nothing of the drones themselves.
+pub(in crate::cli) fn dry_look(context: &Context, plan: &Plan) -> Result<Exit, CommandError> {
+    let lines = plan.slots.iter().map(|slot| {
+        let ask = json!({ "type": "UAV-INF", "ids": [name(slot.slot)] });
+        (format!("on slot {}", slot.slot), vec![ask.to_string()])
     });
     print(context, lines.collect::<BTreeMap<_, _>>())
 }

@@ -1,10 +1,17 @@
 //! Flights through a running Skybrush Server.
 
 mod bring;
+mod down;
 mod dry;
+mod gate;
+mod identity;
+mod load;
 mod logs;
+mod options;
 mod rows;
 mod standing;
+mod start;
+mod steps;
 mod upload;
 mod watch;
 
@@ -12,36 +19,36 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use serde_json::Value;
-
 use self::bring::bring;
+use self::down::{NOT_CONFIRMED, bring_down};
+use self::gate::gate;
+use self::load::{load, patience};
 use self::rows::sum_up;
 use self::standing::assign;
 use self::upload::Shows;
 use super::bring::Wish;
-use super::start::{LeadArgs, asked, needs_person};
+use super::start::{LeadArgs, needs_person};
 use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit, with_reasons};
-use crate::cli::fly_output::{DroneEnd, FlightEnd, FlightOutput};
+use crate::cli::fly_output::{FlightEnd, FlightOutput};
 use crate::fleet::abort::Action;
-use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
-use crate::skybrush_server::watch::{code_name, is_on_ground, warnings};
-use crate::skybrush_server::{Client, ServerError, StartConfig, end_flight};
+use crate::skybrush_server::gate::Step;
+use crate::skybrush_server::{Client, ServerError, StartConfig};
 
-pub(in crate::cli) use dry::{dry_end, dry_fly};
+pub(in crate::cli) use dry::{dry_end, dry_fly, dry_look, dry_upload};
 pub(in crate::cli) use logs::{list, pull};
+pub(in crate::cli) use options::{of_air, refuse};
+pub(in crate::cli) use steps::{preflight, status, upload};
 
 /// Distance of the fence's circle beyond the farthest corner, m.
 const BEYOND_M: f64 = 10.0;
 /// Shortest lead, s, as over MAVLink.
 const LEAST_LEAD_S: f64 = 20.0;
-/// Authorization after this is too late, s before the start.
-const AUTHORIZE_BEFORE_S: f64 = 12.0;
 
 /// A flight through a server.
 struct Flight<'a> {
@@ -95,45 +102,48 @@ pub(in crate::cli) fn fly(
     let mut client = connect(context, address)?;
     let drones = assign(context, &mut client, plan, wait_s)?;
     let flight = Flight { address, folder, plan, drones: &drones };
-    let not_started = || {
-        let drones = drones.iter().map(|(slot, drone)| (*slot, drone.clone(), Vec::new()));
+    let not_started = |mut reasons: BTreeMap<String, String>| {
+        let drones = drones.iter().map(|(slot, drone)| {
+            (*slot, drone.clone(), reasons.remove(drone).into_iter().collect())
+        });
         FlightOutput::no_go(&plan.name, drones.collect(), None)
     };
-    let refused = shows.send(context, &mut client, &flight)?;
-    if refused > 0 {
-        context
-            .insist(&format!("NO-GO: {refused} drones do not have the show; nothing was started"));
-        return Ok((not_started(), Exit::Unsafe));
+    if let Err(refused) = load(context, &mut client, &flight, &shows, wait_s)? {
+        context.insist(&format!(
+            "NO-GO: {} of {} drones do not have the show; nothing was started",
+            refused.len(),
+            drones.len()
+        ));
+        return Ok((not_started(refused), Exit::Unsafe));
     }
-    let ids: Vec<String> = drones.values().cloned().collect();
-    let troubled = troubled(&client.status(&ids)?);
-    for problem in &troubled {
-        context.warn(problem);
+    let table = gate(context, &mut client, &flight, Step::Ready, patience(wait_s))?;
+    if context.json {
+        context.say(&table.to_string());
+    } else {
+        context.print(&table.to_string())?;
     }
-    if !troubled.is_empty() {
+    if !table.go() {
         context.insist("NO-GO: nothing was started; Skybrush Live tells more of these drones");
-        return Ok((not_started(), Exit::Unsafe));
+        let reasons = table.rows.iter().map(|row| (row.drone.clone(), row.no_go.join(", ")));
+        return Ok((not_started(reasons.collect()), Exit::Unsafe));
     }
-    let Some(unix_s) = start(context, &mut client, &flight, lead)? else {
-        return Err(CommandError::Unsafe("not authorized: the start was taken back".to_owned()));
-    };
+    let started = start::start(context, &mut client, &flight, lead)?;
     context.say(&format!(
-        "Authorized. Ctrl-C stops watching; `{}` sends everyone home",
+        "Authorized. Ctrl-C asks whether the drones land, return or fly on (without a terminal: \
+         --on-interrupt, by default they return); `{}` sends everyone home",
         flight.abort()
     ));
-    let watched = watch::watch(context, &mut client, &flight, unix_s)?;
-    for id in &watched.in_the_air {
-        context.warn(&format!("drone {id} has not been seen to land"));
+    let watched =
+        watch::watch(context, &mut client, &flight, started, lead.interrupt.on_interrupt)?;
+    let exit = watched.tell(context, &flight);
+    if watched.taken_back {
+        return Ok((not_started(BTreeMap::new()), Exit::Unsafe));
     }
-    let landed = drones.len() - watched.in_the_air.len();
-    context.say(&format!("{landed} of {} drones have landed", drones.len()));
-    let flown =
-        if watched.in_the_air.is_empty() && !watched.alarms { Exit::Done } else { Exit::Losses };
-    let mut output = not_started();
+    let flown = exit;
+    let mut output = not_started(BTreeMap::new());
     output.outcome = FlightEnd::Flown;
     for drone in &mut output.drones {
-        let up = watched.in_the_air.contains(&drone.drone);
-        drone.outcome = if up { DroneEnd::NotSeenToLand } else { DroneEnd::Landed };
+        drone.outcome = watched.end_of(&drone.drone);
     }
     if !with_logs {
         return Ok((output, flown));
@@ -152,70 +162,8 @@ pub(in crate::cli) fn fly(
     Ok((output, Exit::Losses))
 }
 
-/// The two steps of a start: its time, and its authorization; the Unix time, s, if a person or
-/// `--yes` authorized it.
-fn start(
-    context: &Context,
-    client: &mut Client,
-    flight: &Flight<'_>,
-    lead: &LeadArgs,
-) -> Result<Option<i64>, CommandError> {
-    let now_us = SystemClock::start().unix_us();
-    let unix_s = (now_us / 1_000_000) as i64 + lead.lead.ceil() as i64;
-    let mut start = StartConfig {
-        unix_s: Some(unix_s),
-        authorized: false,
-        drones: flight.drones.values().cloned().collect(),
-        duration_s: flight.plan.duration_ms as f64 / 1000.0,
-    };
-    client.set_start(&start)?;
-    if !lead.yes {
-        let answer = asked("Authorize the start? Type yes: ", || context.check_stop());
-        if !matches!(answer, Ok(true)) {
-            client.set_start(&StartConfig::none())?;
-            return answer.map(|_| None);
-        }
-    }
-    // A person may take their time.
-    let left_s = unix_s as f64 - SystemClock::start().unix_us() as f64 * 1e-6;
-    if left_s < AUTHORIZE_BEFORE_S {
-        client.set_start(&StartConfig::none())?;
-        return Err(CommandError::Usage(format!(
-            "{left_s:.0} s before the start it is too late to authorize it: the drones set their \
-             home and arm in the last 10 s; it was taken back, give a longer --lead"
-        )));
-    }
-    start.authorized = true;
-    if let Err(error) = client.set_start(&start) {
-        let back = match client.set_start(&StartConfig::none()) {
-            Ok(()) => "it was taken back".to_owned(),
-            Err(_) => format!(
-                "IT MAY BE AUTHORIZED all the same, and it could not be taken back: use Skybrush \
-                 Live, or `{}`",
-                flight.abort()
-            ),
-        };
-        return Err(CommandError::Failed(format!(
-            "the start was not authorized: {}\n  {back}",
-            with_reasons(&error)
-        )));
-    }
-    Ok(Some(unix_s))
-}
-
 fn stopped(context: &Context) -> bool {
     context.stop_flag().load(Ordering::SeqCst)
-}
-
-/// Drones that must not start, with why.
-fn troubled(status: &BTreeMap<String, Value>) -> Vec<String> {
-    let one = |(id, status): (&String, &Value)| {
-        let codes = warnings(status);
-        let text = |code: &u64| format!("{} (code {code})", code_name(*code));
-        let texts: Vec<String> = codes.iter().map(text).collect();
-        (!texts.is_empty()).then(|| format!("drone {id}: {}", texts.join(", ")))
-    };
-    status.iter().filter_map(one).collect()
 }
 
 /// Ends flights: those in the air return or land, the start is taken back when all are meant.
@@ -230,36 +178,21 @@ pub(in crate::cli) fn end(
         only.is_none_or(|only| id.parse().is_ok_and(|drone: DroneId| only.contains(&drone)))
     };
     let ids: Vec<String> = client.drones()?.into_iter().filter(is_meant).collect();
-    // Who is not known to be on the ground is told to come down.
-    let status = client.status(&ids)?;
-    let (down, up): (Vec<String>, Vec<String>) =
-        ids.into_iter().partition(|id| status.get(id).is_some_and(is_on_ground));
-    let mut unsure = 0;
-    if !up.is_empty() {
-        let running = client.begin(&end_flight(&up, action == Action::Return))?;
-        let done = client.finish(running, || !stopped(context))?;
-        for id in &up {
-            let text = match done.get(id) {
-                Some(Ok(_)) if action == Action::Return => "returns".to_owned(),
-                Some(Ok(_)) => "lands where it is".to_owned(),
-                Some(Err(reason)) => format!("NOT CONFIRMED: {reason}"),
-                None => "NOT CONFIRMED: the server says nothing of it".to_owned(),
-            };
-            if !matches!(done.get(id), Some(Ok(_))) {
-                unsure += 1;
-                context.warn(&format!("drone {id}: {text}"));
-            }
-            context.emit(&format!("drone {id}: {text}\n"))?;
+    let down = bring_down(&mut client, ids, action, &|| !stopped(context))?;
+    for (id, text) in &down.told {
+        if text.starts_with(NOT_CONFIRMED) {
+            context.warn(&format!("drone {id}: {text}"));
         }
+        context.emit(&format!("drone {id}: {text}\n"))?;
     }
-    for id in &down {
+    for id in &down.on_ground {
         context.emit(&format!("drone {id}: on the ground\n"))?;
     }
     if only.is_none() {
         client.set_start(&StartConfig::none())?;
         context.emit("the start is taken back\n")?;
-    } else if !down.is_empty() {
+    } else if !down.on_ground.is_empty() {
         context.warn("the start stays for drones on the ground: without --drones it is taken back");
     }
-    Ok(if unsure == 0 { Exit::Done } else { Exit::Losses })
+    Ok(if down.unsure == 0 { Exit::Done } else { Exit::Losses })
 }

@@ -18,12 +18,20 @@ use crate::skybrush_server::Client;
 /// How often the server is asked who is there.
 const EVERY: Duration = Duration::from_millis(500);
 
+/// A drone that was heard so much longer ago than another is not there any more, ms: the server keeps
+/// what it last said.
+const SILENT_MS: i64 = 15_000;
+
 /// Who stands where.
 pub(super) struct Standing {
     /// The server's names of all drones.
     pub(super) ids: Vec<String>,
     /// The server's names of the drones by slot.
     pub(super) found: BTreeMap<u16, String>,
+    /// Where they all stand, of those that say so.
+    pub(super) stands: BTreeMap<String, Stand>,
+    /// Those that the server hears no more; they stand nowhere.
+    pub(super) silent: Vec<String>,
     /// What is not as planned.
     pub(super) problems: Vec<String>,
     /// How many say where they are.
@@ -53,6 +61,12 @@ pub(super) fn standing(
     loop {
         let now = look(client, plan)?;
         if now.placed >= wanted || clock.now() >= until {
+            if !now.silent.is_empty() {
+                context.say(&format!(
+                    "Left out, as the server has not heard them for a while: drones {}",
+                    now.silent.join(", ")
+                ));
+            }
             return Ok(now);
         }
         if !said {
@@ -67,6 +81,11 @@ pub(super) fn standing(
         }
         std::thread::sleep(EVERY);
     }
+}
+
+/// When the server heard it last, ms.
+fn told_ms(status: &Value) -> Option<i64> {
+    status.get("timestamp").and_then(Value::as_i64)
 }
 
 /// Where a status says that its drone is; `None` without a position fix.
@@ -86,10 +105,17 @@ fn look(client: &mut Client, plan: &Plan) -> Result<Standing, CommandError> {
     let status = client.status(&ids)?;
     let allowed_m = allowed_m(plan);
     let mut found: BTreeMap<u16, String> = BTreeMap::new();
+    let mut stands = BTreeMap::new();
     let mut doubled = Vec::new();
     let mut problems = Vec::new();
     let mut placed = 0;
+    let newest_ms = status.values().filter_map(told_ms).max();
+    let mut silent = Vec::new();
     for (id, status) in &status {
+        if newest_ms.zip(told_ms(status)).is_some_and(|(newest, told)| newest - told > SILENT_MS) {
+            silent.push(id.clone());
+            continue;
+        }
         let Some(place) = place(status) else {
             problems.push(format!("drone {id} does not say where it stands"));
             continue;
@@ -97,6 +123,7 @@ fn look(client: &mut Client, plan: &Plan) -> Result<Standing, CommandError> {
         placed += 1;
         let Some(stand) = Stand::of(plan, place) else { continue };
         let (slot, away_m) = (stand.nearest, stand.distance_m);
+        stands.insert(id.clone(), stand);
         if away_m > allowed_m {
             problems.push(format!("drone {id} stands {away_m:.1} m from slot {slot}"));
         } else if let Some(other) = found.insert(slot, id.clone()) {
@@ -111,7 +138,7 @@ fn look(client: &mut Client, plan: &Plan) -> Result<Standing, CommandError> {
     }
     // Whose it is, nobody knows.
     found.retain(|slot, _| !doubled.contains(slot));
-    Ok(Standing { ids, found, problems, placed })
+    Ok(Standing { ids, found, stands, silent, problems, placed })
 }
 
 /// Slots and the server's names of their drones; everyone must stand as planned.

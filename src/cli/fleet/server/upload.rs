@@ -66,26 +66,26 @@ impl<'a> Shows<'a> {
         Ok(jobs)
     }
 
-    /// Sends every drone its show; how many do not have it.
+    /// Sends every drone its show; who does not have it, and why.
     pub(super) fn send(
         &self,
         context: &Context,
         client: &mut Client,
         flight: &Flight<'_>,
-    ) -> Result<usize, CommandError> {
+    ) -> Result<BTreeMap<String, String>, CommandError> {
         let jobs = self.jobs(|slot| flight.drones.get(&slot).cloned())?;
         let mut uploads = Uploads { context, ended: BTreeMap::new() };
         client.work(jobs.into_values(), AT_ONCE, &mut uploads)?;
         context.check_stop()?;
-        let mut refused = 0;
+        let mut refused = BTreeMap::new();
         for (slot, id) in flight.drones {
-            let reason = match uploads.ended.get(id) {
+            let reason = match uploads.ended.remove(id) {
                 Some(Ok(_)) => continue,
-                Some(Err(reason)) => reason.as_str(),
-                None => "the server says nothing of it",
+                Some(Err(reason)) => reason,
+                None => "the server says nothing of it".to_owned(),
             };
-            refused += 1;
             context.warn(&format!("drone {id} (slot {slot}): {reason}"));
+            refused.insert(id.clone(), reason);
         }
         Ok(refused)
     }

@@ -5,10 +5,14 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::down::{LEFT, interrupted};
+use super::start::{Started, take_back};
 use super::{Flight, stopped};
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
-use crate::cli::exit::{CommandError, with_reasons};
+use crate::cli::exit::{CommandError, Exit, with_reasons};
+use crate::cli::fleet::interrupt::{Choice, Interrupt};
+use crate::cli::fly_output::DroneEnd;
 use crate::fleet::journal::{Entry, Journal};
 use crate::link::clock::{Clock as _, Micros, S};
 use crate::skybrush_server::watch::{Event, Monitor};
@@ -32,41 +36,136 @@ struct Line<'a> {
 /// How a watched flight ended.
 pub(super) struct Watched {
     /// The server's names of drones that have not been seen to land.
-    pub(super) in_the_air: Vec<String>,
+    in_the_air: Vec<String>,
+    /// Those of drones that never left the ground.
+    not_flown: Vec<String>,
+    /// Somebody else took the start back before it came.
+    pub(super) taken_back: bool,
     /// Something was told that a person must look at.
-    pub(super) alarms: bool,
+    alarms: bool,
 }
 
-/// Watches until everyone has landed, or should have. A server that goes away is waited for: the
-/// drones fly on without it.
+impl Watched {
+    fn of(monitor: &Monitor, alarms: bool) -> Self {
+        let names = |those: Vec<&str>| those.into_iter().map(str::to_owned).collect();
+        let (in_the_air, not_flown) = (names(monitor.in_the_air()), names(monitor.not_flown()));
+        Self { in_the_air, not_flown, taken_back: false, alarms }
+    }
+
+    /// How a drone's flight ended.
+    pub(super) fn end_of(&self, drone: &str) -> DroneEnd {
+        let is_in = |those: &[String]| those.iter().any(|it| it == drone);
+        if is_in(&self.in_the_air) {
+            DroneEnd::NotSeenToLand
+        } else if is_in(&self.not_flown) {
+            DroneEnd::NotStarted
+        } else {
+            DroneEnd::Landed
+        }
+    }
+
+    /// Says how it ended, with names; and the exit code of it.
+    pub(super) fn tell(&self, context: &Context, flight: &Flight<'_>) -> Exit {
+        if self.taken_back {
+            context.insist("The start was taken back elsewhere: nobody takes off");
+            return Exit::Unsafe;
+        }
+        for id in &self.not_flown {
+            context.warn(&format!("drone {id} did not take off"));
+        }
+        for id in &self.in_the_air {
+            context.warn(&format!("drone {id} has not been seen to land"));
+        }
+        let all = flight.drones.len();
+        let landed = all.saturating_sub(self.in_the_air.len() + self.not_flown.len());
+        context.say(&format!("{landed} of {all} drones have landed"));
+        if !self.in_the_air.is_empty() {
+            context.insist(&format!(
+                "STILL IN THE AIR, for all that the server tells: {}; `{}` sends them home, Skybrush \
+                 Live and their remote controls do, too",
+                self.in_the_air.join(", "),
+                flight.abort()
+            ));
+        }
+        let quiet = self.in_the_air.is_empty() && self.not_flown.is_empty() && !self.alarms;
+        if quiet { Exit::Done } else { Exit::Losses }
+    }
+}
+
+/// Watches until everyone has landed, or should have; the start is cleared then, so that nobody
+/// takes off by it again. A server that goes away is waited for: the drones fly on without it.
 pub(super) fn watch(
     context: &Context,
     client: &mut Client,
     flight: &Flight<'_>,
-    start_unix_s: i64,
+    started: Started,
+    on_interrupt: Choice,
 ) -> Result<Watched, CommandError> {
+    let Started { unix_s, begun } = started;
+    context.signals().set_flies(Some(LEFT));
+    let watched = look_on(context, client, flight, unix_s, on_interrupt);
+    context.signals().set_flies(None);
+    let is_before = SystemClock::start().unix_us() / 1_000_000 < unix_s.max(0) as u64;
+    let is_over = match &watched {
+        Ok(watched) => {
+            if watched.taken_back {
+                begun.withdraw(context, flight.folder);
+            }
+            true
+        }
+        // Nobody watches: before the start that means that nobody takes off.
+        Err(error) if is_before || matches!(error, CommandError::Interrupted) => {
+            begun.withdraw(context, flight.folder);
+            true
+        }
+        Err(_) => false,
+    };
+    if is_over && let Err(error) = take_back(client, flight) {
+        context.warn(&format!(
+            "the start is still authorized on the server, as it could not be cleared ({error}): \
+             clear it in Skybrush Live before the drones are switched on again"
+        ));
+    }
+    match watched {
+        Err(CommandError::Interrupted) => {
+            Err(CommandError::Stopped("stopped: the start was taken back, nobody takes off"))
+        }
+        other => other,
+    }
+}
+
+fn look_on(
+    context: &Context,
+    client: &mut Client,
+    flight: &Flight<'_>,
+    start_unix_s: i64,
+    on_interrupt: Choice,
+) -> Result<Watched, CommandError> {
+    let mut interrupt = Interrupt::new(context, on_interrupt);
     let clock = SystemClock::start();
     let ids: Vec<String> = flight.drones.values().cloned().collect();
     let low = 100.0 * flight.plan.limits.endurance_reserve;
     let mut monitor = Monitor::new(ids.iter().cloned(), low, clock.now());
     let mut journal = Journal::open(&flight.folder.0)?;
-    let end_s = start_unix_s as f64 + flight.plan.duration_ms as f64 / 1000.0 + AFTER_S;
+    let show_end_s = start_unix_s as f64 + flight.plan.duration_ms as f64 / 1000.0;
     let mut alarms = false;
     let mut away = false;
+    let mut unwritten = false;
     let mut next = 0;
     loop {
-        if stopped(context) {
-            context.insist(&format!(
-                "Nobody watches any more; the drones fly on by themselves. `{}` sends them home; \
-                 Skybrush Live and their remote controls do, too",
-                flight.abort()
-            ));
+        let unix_us = clock.unix_us();
+        let unix_s = unix_us as f64 * 1e-6;
+        if stopped(context) && unix_s < start_unix_s as f64 {
             return Err(CommandError::Interrupted);
         }
-        let unix_us = clock.unix_us();
-        if monitor.is_over() || unix_us as f64 * 1e-6 > end_s {
-            let in_the_air = monitor.in_the_air().into_iter().map(str::to_owned).collect();
-            return Ok(Watched { in_the_air, alarms });
+        if let Some(choice) = interrupt.poll(clock.now()) {
+            return Err(interrupted(context, client, &ids, choice));
+        }
+        let over = monitor.is_over()
+            || unix_s > show_end_s && !away && monitor.all_are_down()
+            || unix_s > show_end_s + AFTER_S;
+        if over {
+            return Ok(Watched::of(&monitor, alarms));
         }
         if clock.now() < next {
             std::thread::sleep(NAP);
@@ -90,10 +189,18 @@ pub(super) fn watch(
                     context.insist("The server is back");
                 }
                 away = false;
+                if unix_s < start_unix_s as f64 && is_taken_back(client) {
+                    return Ok(Watched { taken_back: true, ..Watched::of(&monitor, alarms) });
+                }
                 let started = unix_us as i64 / 1_000_000 > start_unix_s;
                 for (id, event) in monitor.look(clock.now(), started, &status) {
                     let line = Line { server_drone: &id, event: &event };
-                    journal.write(&Entry { unix_us, drone: None, event: &line })?;
+                    // A full disk must not end the watch over drones in the air.
+                    if let Err(error) = journal.write(&Entry { unix_us, drone: None, event: &line })
+                        && !std::mem::replace(&mut unwritten, true)
+                    {
+                        context.warn(&format!("{error}; the flight is watched all the same"));
+                    }
                     if event.is_alarm() {
                         alarms = true;
                         context.warn(&format!("drone {id}: {event}"));
@@ -104,6 +211,13 @@ pub(super) fn watch(
             }
         }
     }
+}
+
+/// Whether the server has no authorized start any more: `fleet abort` and Skybrush Live take it
+/// back. What the server does not answer is looked at with the next status.
+fn is_taken_back(client: &mut Client) -> bool {
+    let start = client.start().unwrap_or_default();
+    start.pointer("/start/authorized").and_then(serde_json::Value::as_bool) == Some(false)
 }
 
 fn status(

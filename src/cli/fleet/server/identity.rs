@@ -1,0 +1,46 @@
+//! The identity of a flight through a server: written when its start is authorized, taken back when
+//! nobody took off.
+
+use super::Flight;
+use crate::base::time::GpsTime;
+use crate::campaign::FlightFolder;
+use crate::campaign::start::{Flying, StartRecord, StartedDrone};
+use crate::cli::clock::SystemClock;
+use crate::cli::context::Context;
+use crate::cli::exit::CommandError;
+use crate::cli::simulate::made_by;
+use crate::link::clock::Clock as _;
+
+/// The record of a start, if one could be written.
+#[derive(Default)]
+pub(super) struct Begun(Option<StartRecord>);
+
+impl Begun {
+    /// Writes down who starts when, before anybody is told to. The files on the drones are made by
+    /// the server, so that their checksums are not known.
+    pub(super) fn write(flight: &Flight<'_>, unix_s: i64) -> Result<Self, CommandError> {
+        let start = GpsTime::from_unix_ms(unix_s * 1000).ok_or_else(|| {
+            CommandError::Failed("this computer's clock is not set to any GPS time".to_owned())
+        })?;
+        let drone = |(slot, drone): (&u16, &String)| StartedDrone {
+            slot: *slot,
+            drone: drone.clone(),
+            show_crc32: None,
+            booted: None,
+        };
+        let drones = flight.drones.iter().map(drone).collect();
+        let now_s = SystemClock::start().unix_us() / 1_000_000;
+        let record = StartRecord::new(made_by(), start, now_s, Flying::SkybrushServer, drones);
+        Ok(Self(Some(record.begin(flight.folder)?)))
+    }
+
+    /// Nobody took off: the start before it is the latest again.
+    pub(super) fn withdraw(self, context: &Context, folder: &FlightFolder) {
+        let Some(record) = self.0 else { return };
+        if let Err(error) = record.withdraw(folder) {
+            context.warn(&format!(
+                "{error}: logs/start.json still speaks of the start that was taken back"
+            ));
+        }
+    }
+}
