@@ -32,10 +32,10 @@ fn check(path: &Path, is_right: impl Fn(&fs::Metadata) -> bool) -> io::Result<fs
 #[cfg(unix)]
 fn close_to_others(path: &Path, before: &fs::Metadata, mode: u32) -> io::Result<()> {
     use std::os::unix::fs::PermissionsExt as _;
-    if before.permissions().mode() & 0o077 == 0 {
-        return Ok(());
+    if before.permissions().mode() & 0o077 != 0 {
+        fs::set_permissions(path, fs::Permissions::from_mode(mode))?;
     }
-    fs::set_permissions(path, fs::Permissions::from_mode(mode))
+    Ok(())
 }
 
 /// Makes a folder that only this user can look into, or takes one that is there if it is theirs.
@@ -96,7 +96,8 @@ pub fn open_own(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     options.open(path)
 }
 
-#[cfg(all(test, unix))]
+#[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use std::io::Write as _;
     use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};

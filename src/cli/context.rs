@@ -135,6 +135,7 @@ impl Context {
     }
 
     /// Data as one JSON object, on standard output.
+    #[expect(clippy::unused_self, reason = "prints like the other methods")]
     pub(super) fn print_json<T: Serialize>(&self, value: &T) -> Result<(), CommandError> {
         let mut text = serde_json::to_string_pretty(value)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
