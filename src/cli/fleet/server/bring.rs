@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use self::one::One;
 use super::stopped;
 use crate::base::file::create_folder;
+use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::campaign::start::StartRecord;
 use crate::cli::clock::Stopwatch;
@@ -171,7 +172,7 @@ impl Puller<'_> {
             self.context.say(&format!(
                 "Moved {} of an earlier flight to {}",
                 words::count(count, "log"),
-                folder.display()
+                folder.shown()
             ));
         }
     }
