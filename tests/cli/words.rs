@@ -53,7 +53,7 @@ fn a_folder_with_a_plan_alone_is_a_plan() {
     fs::create_dir(bench.path("flown")).unwrap();
     fs::copy(bench.path("campaign/plan.json"), bench.path("flown/plan.json")).unwrap();
     let with = |plan: &str| {
-        let args = ["analyze", "campaign/logs", "--no-report", "--json", "--plan", plan];
+        let args = ["analyze", "campaign/simulated", "--no-report", "--json", "--plan", plan];
         bench.expect(0, &args).json("updraft.analyze/1")
     };
     assert_eq!(with("flown"), with("campaign/plan.json"));
@@ -63,7 +63,7 @@ fn a_folder_with_a_plan_alone_is_a_plan() {
 fn a_folder_keeps_its_whole_name() {
     let bench = Bench::new();
     bench.fly();
-    fs::rename(bench.path("campaign/logs"), bench.path("arducopter-4.4")).unwrap();
+    fs::rename(bench.path("campaign/simulated"), bench.path("arducopter-4.4")).unwrap();
     let args = ["analyze", "arducopter-4.4", "--plan", "campaign", "--json"];
     let analysed = bench.expect(0, &args).json("updraft.analyze/1");
     assert_eq!(analysed["analysis"]["title"], "arducopter-4.4");
@@ -78,11 +78,11 @@ fn one_cause_is_one_line_and_quiet_losses_have_their_reason() {
     bench.expect(0, &["simulate", "campaign", "--quiet"]);
     // All but one were switched off in the air.
     for slot in 2..=4 {
-        let path = bench.path(&format!("campaign/logs/{slot:02}.BIN"));
+        let path = bench.path(&format!("campaign/simulated/{slot:02}.BIN"));
         let log = fs::read(&path).unwrap();
         fs::write(&path, &log[..log.len() * 2 / 3]).unwrap();
     }
-    fs::remove_file(bench.path("campaign/logs/flight.json")).unwrap();
+    fs::remove_file(bench.path("campaign/simulated/flight.json")).unwrap();
     let analysed = bench.expect(3, &["analyze", "campaign", "--no-report"]);
     assert_eq!(analysed.out.matches("ends in the air").count(), 1, "{analysed}");
     assert!(analysed.out.contains("Logs partly used (3)"), "{analysed}");

@@ -208,6 +208,9 @@ fn a_full_show_comes_back() {
     };
     assert!((points[1].z - 1.0 / 3.0).abs() < 1e-7);
     points[1].z = 1.0 / 3.0;
+    // Names are read without what would drive a terminal.
+    assert_eq!(read.drones[1].name, "Drone \"2\"\u{240a}");
+    read.drones[1].name.clone_from(&show.drones[1].name);
     assert_eq!(read, show);
 }
 
