@@ -42,7 +42,7 @@ const PATIENCE_S: f64 = 60.0;
   updraft logs verify my-campaign
   updraft logs import my-campaign /media/card1 /media/card2   # each log to the flight it is of
 
-Logs come over MAVFTP, or over the log messages where that fails. What has come is kept at every
+Logs come over MAVFTP or over the log messages, whichever is faster. What has come is kept at every
 interruption; a log is given its name when its checksum (or size, and pieces read again) agrees with
 the drone's, and logs/manifest.json says how. A log that is home is compared with the drone's: a
 longer one is continued, and a file that was damaged since goes to logs/older and comes again. An

@@ -4,6 +4,7 @@ use super::endpoint::Endpoint;
 use super::ftp_server::FtpServer;
 use super::log_server::LogServer;
 use super::storage::Storage;
+use super::transfers::Transfers;
 use crate::link::clock::{Micros, S};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::station::STATION;
@@ -21,8 +22,8 @@ pub struct FileVehicle<S> {
     pub is_armed: bool,
     /// Silent until then: it boots.
     pub boots_until: Micros,
-    /// Packets per second of a server, for servers after a boot.
-    packets_per_s: f64,
+    /// For servers after a boot.
+    transfers: Transfers,
     log_folder: String,
     next_heartbeat: Micros,
 }
@@ -31,13 +32,18 @@ impl<S: Storage> FileVehicle<S> {
     /// A vehicle with these files, logs in `log_folder`, sending at most so many packets per
     /// second (0: no limit).
     pub fn new(storage: S, log_folder: &str, packets_per_s: f64) -> Self {
+        Self::with_transfers(storage, log_folder, Transfers::both(packets_per_s))
+    }
+
+    /// The same, each protocol with a speed of its own.
+    pub fn with_transfers(storage: S, log_folder: &str, transfers: Transfers) -> Self {
         Self {
             storage,
-            ftp: Some(FtpServer::new(packets_per_s)),
-            logs: LogServer::new(log_folder, packets_per_s),
+            ftp: Some(FtpServer::new(transfers.ftp_per_s)),
+            logs: LogServer::new(log_folder, transfers.logs_per_s),
             is_armed: false,
             boots_until: 0,
-            packets_per_s,
+            transfers,
             log_folder: log_folder.to_owned(),
             next_heartbeat: 0,
         }
@@ -45,8 +51,8 @@ impl<S: Storage> FileVehicle<S> {
 
     /// Loses everything but its files, and is silent for a while.
     pub fn reboot(&mut self, now: Micros, lasts: Micros) {
-        self.ftp = self.ftp.as_ref().map(|_| FtpServer::new(self.packets_per_s));
-        self.logs = LogServer::new(&self.log_folder, self.packets_per_s);
+        self.ftp = self.ftp.as_ref().map(|_| FtpServer::new(self.transfers.ftp_per_s));
+        self.logs = LogServer::new(&self.log_folder, self.transfers.logs_per_s);
         self.boots_until = now + lasts;
     }
 }
@@ -60,6 +66,8 @@ impl<S: Storage> Endpoint for FileVehicle<S> {
             ftp.on_message(STATION, message);
         }
         self.logs.on_message(message, self.is_armed, &self.storage, out);
+        // Served as it is heard.
+        self.logs.poll(now, self.is_armed, &self.storage, out);
     }
 
     fn poll(&mut self, now: Micros, out: &mut Vec<MavMessage>) -> Micros {

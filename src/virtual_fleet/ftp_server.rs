@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 
 use super::storage::{Storage, StorageError};
+use super::transfers::Meter;
 use crate::base::crc::ApCrc32;
 use crate::link::clock::{Micros, S};
 use crate::link::frame::{MavMessage, Sender, dialect};
@@ -32,7 +33,7 @@ pub struct FtpServer {
     burst: Option<Burst>,
     last: Option<Packet>,
     last_sent: Micros,
-    next_send: Micros,
+    meter: Meter,
 }
 
 #[derive(Debug)]
@@ -74,18 +75,15 @@ impl FtpServer {
     ) -> Micros {
         for _ in 0..AT_ONCE {
             if self.burst.is_none() && self.waiting.is_empty() {
+                self.meter.idle(now);
                 return Micros::MAX;
             }
-            if now < self.next_send {
-                return self.next_send;
+            if now < self.meter.next() {
+                return self.meter.next();
             }
             let Some((station, answer)) = self.next_answer(now, storage) else { continue };
             self.last_sent = now;
-            if self.packets_per_s > 0.0 {
-                let pause = (1e6 / self.packets_per_s) as Micros;
-                // Late by less than a packet is made up for; longer idling is not.
-                self.next_send = self.next_send.max(now.saturating_sub(pause)) + pause;
-            }
+            self.meter.count(now, self.packets_per_s);
             out.push(MavMessage::FILE_TRANSFER_PROTOCOL(dialect::FILE_TRANSFER_PROTOCOL_DATA {
                 target_network: 0,
                 target_system: station.system,

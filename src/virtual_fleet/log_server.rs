@@ -3,7 +3,10 @@
 //! Refused while armed. One list or one download at a time for all links; a request that comes
 //! meanwhile is dropped, without a word.
 
+use std::collections::BTreeMap;
+
 use super::storage::Storage;
+use super::transfers::Meter;
 use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, dialect};
 
@@ -20,7 +23,7 @@ pub struct LogServer {
     folder: String,
     sending: Option<Sending>,
     warned: bool,
-    next_send: Micros,
+    meter: Meter,
 }
 
 #[derive(Debug)]
@@ -38,7 +41,7 @@ impl LogServer {
             folder: folder.to_owned(),
             sending: None,
             warned: false,
-            next_send: 0,
+            meter: Meter::default(),
         }
     }
 
@@ -47,17 +50,23 @@ impl LogServer {
         self.sending.is_some()
     }
 
-    /// Logs in the order of their numbers; id 1 is the first.
+    /// Logs as the firmware numbers them: id 1 is the oldest file, one that is missing counts, and
+    /// there are as many as the number of the newest file, those beyond it without bytes.
     fn logs(&self, storage: &dyn Storage) -> Vec<(String, u32)> {
         let entries = storage.list(&self.folder).unwrap_or_default();
-        let logs = entries.into_iter().filter(|entry| {
-            entry.name.rsplit_once('.').is_some_and(|(_, end)| end.eq_ignore_ascii_case("bin"))
-        });
-        logs.filter_map(|entry| {
-            let size = u32::try_from(entry.size?).unwrap_or(u32::MAX);
-            Some((format!("{}/{}", self.folder, entry.name), size))
-        })
-        .collect()
+        let files: BTreeMap<u16, (String, u32)> = entries
+            .into_iter()
+            .filter_map(|entry| {
+                let (stem, end) = entry.name.rsplit_once('.')?;
+                let number = stem.parse().ok().filter(|_| end.eq_ignore_ascii_case("bin"))?;
+                let size = u32::try_from(entry.size?).unwrap_or(u32::MAX);
+                Some((number, (format!("{}/{}", self.folder, entry.name), size)))
+            })
+            .collect();
+        let first_last = files.first_key_value().zip(files.last_key_value());
+        let Some(((&oldest, _), (&newest, _))) = first_last else { return Vec::new() };
+        let file = |id: u16| files.get(&(oldest.saturating_add(id))).cloned().unwrap_or_default();
+        (0..newest).map(file).collect()
     }
 
     /// Takes a message; others than the log messages are not for it.
@@ -127,15 +136,13 @@ impl LogServer {
         }
         for _ in 0..AT_ONCE {
             if self.sending.is_none() {
+                self.meter.idle(now);
                 return Micros::MAX;
             }
-            if now < self.next_send {
-                return self.next_send;
+            if now < self.meter.next() {
+                return self.meter.next();
             }
-            if self.packets_per_s > 0.0 {
-                let pause = (1e6 / self.packets_per_s) as Micros;
-                self.next_send = self.next_send.max(now.saturating_sub(pause)) + pause;
-            }
+            self.meter.count(now, self.packets_per_s);
             self.step(storage, out);
         }
         now

@@ -14,5 +14,6 @@ pub mod lossy;
 mod post;
 pub mod server;
 pub mod storage;
+pub mod transfers;
 pub mod vehicle;
 pub mod world;

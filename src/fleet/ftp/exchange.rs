@@ -86,7 +86,8 @@ impl Exchange {
         let timeout = caller.timeout();
         let pause = timeout.saturating_mul(1 << self.tries.min(6)) / 2;
         let most = MOST_PAUSE.min(self.patience / TRIES).max(LEAST_PAUSE).max(timeout);
-        let pause = pause.max(timeout).min(most) + self.work;
+        // While it works it keeps what is asked again, and answers it with the answer.
+        let pause = pause.max(timeout).min(most) + self.work.min(MOST_PAUSE);
         if self.tries > 0 && now < self.sent + pause {
             return Wish::Wait((self.sent + pause).min(first + self.patience));
         }

@@ -34,8 +34,12 @@ const WORTH_A_BURST: u64 = 300;
 const WORTH_A_TAIL: u64 = 8;
 /// With more separate ranges, gaps are repaired before more is asked for.
 const MOST_RANGES: usize = 50_000;
+/// A burst shows its speed with so many packets.
+const TELLING: u64 = 8;
+/// A burst is not worth it that would keep the link for longer: nothing ends it early.
+const MOST_OCCUPIED: Micros = 6 * S;
 /// Reads at once, at most.
-const MOST_READS: usize = 48;
+const MOST_READS: usize = 256;
 /// Another station's file is given up by the vehicle after 3 s.
 const BUSY_PAUSE: Micros = S;
 /// The vehicle contradicts itself about the end of the file so often before it is not believed.
@@ -54,16 +58,18 @@ pub struct GetOptions {
     pub up_to: u64,
     /// What the link may be asked to carry; none: anything.
     pub budget: Option<Budget>,
+    /// Time between two packets of a burst, us, where it is known.
+    pub spacing: Option<f64>,
 }
 
 impl Default for GetOptions {
     fn default() -> Self {
-        Self { patience: 60 * S, most_size: 2 << 30, up_to: u64::MAX, budget: None }
+        Self { patience: 60 * S, most_size: 2 << 30, up_to: u64::MAX, budget: None, spacing: None }
     }
 }
 
 /// What a download cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
     /// Data bytes that were new.
     pub new_bytes: u64,
@@ -75,6 +81,8 @@ pub struct Tally {
     pub reads: u64,
     /// How often the file was opened.
     pub opened: u64,
+    /// Data bytes per second of the last burst, or 0.
+    pub burst_bytes_per_s: f64,
 }
 
 /// What is left of a [`Get`].
@@ -102,6 +110,9 @@ pub struct Get<S> {
     burst_packets: Option<u64>,
     /// No range is worth a burst.
     no_bursts: bool,
+    /// Time between two packets of a burst, us.
+    spacing: Option<f64>,
+    is_pausing: bool,
     reads: Reads,
     /// Single reads by number, for refusals, which name no offset.
     numbers: VecDeque<(u16, u64)>,
@@ -130,7 +141,9 @@ struct Burst {
     /// Nothing was on its way when it was asked for, so that its first packet tells the time to
     /// an answer.
     is_first: bool,
-    /// Of the last packet: when, and its number in the burst.
+    /// Of the first packet that came: when, and its number in the burst.
+    first: Option<(Micros, u64)>,
+    /// Of the last one.
     heard: Option<(Micros, u64)>,
     /// Smoothed time between packets, us.
     spacing: f64,
@@ -139,23 +152,26 @@ struct Burst {
 impl<S: Sink> Get<S> {
     /// Brings the file `path`, or what the sink lacks of it.
     pub fn new(caller: Caller, path: &str, sink: S, options: GetOptions) -> Self {
-        let reads = Reads::new(PIECE, MOST_READS, options.patience);
+        let mut reads = Reads::new(PIECE, MOST_READS, options.patience);
+        reads.pace(options.spacing.unwrap_or(0.0));
         Self {
             caller,
             path: path.to_owned(),
-            options,
             sink: Some(sink),
             size: None,
             stage: Stage::Closed(0),
             bursts: VecDeque::new(),
             burst_packets: None,
             no_bursts: false,
+            spacing: options.spacing,
+            is_pausing: false,
             reads,
             numbers: VecDeque::new(),
             heard: None,
             lies: 0,
             failures: 0,
             tally: Tally::default(),
+            options,
         }
     }
 
@@ -172,6 +188,11 @@ impl<S: Sink> Get<S> {
     /// The sink, wherever the download is.
     pub fn sink(&self) -> Option<&S> {
         self.sink.as_ref()
+    }
+
+    /// Ends it, once what is on its way has come, with what there is, as [`FtpError::Paused`].
+    pub fn pause(&mut self) {
+        self.is_pausing = true;
     }
 
     fn close(&mut self, result: Result<u64, FtpError>) {

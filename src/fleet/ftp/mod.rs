@@ -85,6 +85,9 @@ pub enum FtpError {
     /// The file's bytes could not be kept.
     #[error("{0}")]
     Sink(String),
+    /// It was ended from here, to go on in another way.
+    #[error("it was ended from here")]
+    Paused,
 }
 
 /// Numbers requests to one drone. Clones count on together.
@@ -138,6 +141,11 @@ impl Caller {
 
     fn left_open(&self) -> Option<u8> {
         self.numbers.borrow().open
+    }
+
+    /// How long its answers take.
+    pub(in crate::fleet) fn rtt(&self) -> Rtt {
+        self.numbers.borrow().rtt
     }
 
     fn timeout(&self) -> Micros {

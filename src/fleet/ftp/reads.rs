@@ -12,8 +12,23 @@ const LOOK: u32 = 24;
 /// With so large a share lost, the window was too large for the link, not only the link bad.
 const TOO_LOSSY: f64 = 0.65;
 
+/// Never fewer because of a queue: the reads of others may be what waits in it.
+const FEWEST: f64 = 4.0;
+
+/// They are asked for so much faster than a burst came.
+const SPARES: f64 = 0.9;
+/// So many may follow each other at once: autopilots keep five that wait.
+const AT_ONCE: f64 = 3.0;
+/// More lost than usual by this share: they were asked for too fast.
+const WORSE: f64 = 0.2;
+
 /// Longest wait for an answer.
 const MOST_PAUSE: Micros = 4 * S;
+/// Reads that wait in queues for longer than this are too many: more would bring nothing, and only
+/// be lost where a queue ends.
+const QUEUES: f64 = 120e3;
+/// The shortest time to an answer is forgotten at this rate per answer: a link may get longer.
+const FORGETS: f64 = 1.0 + 1.0 / 1024.0;
 /// Within the patience of whoever asks, a probe is repeated at least so often: with a fifth of the
 /// frames lost each way, one in 200,000 drones that are there is given up.
 const TRIES: Micros = 12;
@@ -30,6 +45,14 @@ pub(crate) struct Reads {
     lost: u32,
     /// Losses in a row, for the pause.
     silent: u32,
+    /// Time to an answer, us: the shortest of late, and smoothed.
+    least: f64,
+    smooth: f64,
+    /// Time between two of them, us, and when the next may go.
+    spacing: f64,
+    next_at: f64,
+    /// Share that is lost as a rule.
+    usual: f64,
     cursor: u64,
     piece: u64,
     /// Reads that were asked for.
@@ -48,10 +71,30 @@ impl Reads {
             answered: 0,
             lost: 0,
             silent: 0,
+            least: f64::MAX,
+            smooth: 0.0,
+            spacing: 0.0,
+            next_at: 0.0,
+            usual: 0.3,
             cursor: 0,
             piece,
             asked: 0,
         }
+    }
+
+    /// The vehicle takes so long for each, us: it keeps few that wait, and drops more.
+    pub(crate) fn pace(&mut self, spacing: f64) {
+        self.spacing = SPARES * spacing;
+    }
+
+    /// So many at once have been seen to be right.
+    pub(crate) fn at_least(&mut self, window: f64) {
+        self.window = self.window.max(window).min(self.most);
+    }
+
+    /// When the next may go.
+    pub(crate) fn not_before(&self) -> Micros {
+        self.next_at as Micros
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -69,15 +112,23 @@ impl Reads {
         let (_, asked) = self.on_way.remove(&offset)?;
         self.silent = 0;
         self.answered += 1;
-        self.window = (self.window + 0.5).min(self.most);
+        let took = now.saturating_sub(asked);
+        self.least = (self.least * FORGETS).min(took as f64);
+        let weight = if self.smooth > 0.0 { 0.125 } else { 1.0 };
+        self.smooth += (took as f64 - self.smooth) * weight;
+        if self.smooth < self.least + QUEUES {
+            self.window = (self.window + 0.5).min(self.most);
+        } else if self.smooth > self.least + 2.0 * QUEUES {
+            self.window = (self.window - 0.5).max(FEWEST.min(self.most));
+        }
         self.look();
-        Some(now.saturating_sub(asked))
+        Some(took)
     }
 
     /// Forgets what is late; returns when the next one will be. When `probing`, one read stands
     /// for all, and is repeated less and less often.
     pub(crate) fn expire(&mut self, now: Micros, timeout: Micros, probing: bool) -> Micros {
-        let losses = if probing { self.silent } else { self.silent / 16 };
+        let losses = if probing { self.silent } else { self.silent / self.many(16) };
         let pause = (timeout << losses.min(4)).min(self.most_pause.max(timeout)).min(MOST_PAUSE);
         let before = self.on_way.len();
         let mut next = Micros::MAX;
@@ -95,12 +146,23 @@ impl Reads {
         next
     }
 
+    /// Losses in a row that are no sign of anything: a window's worth, or so many.
+    fn many(&self, least: u32) -> u32 {
+        least.max(self.window as u32)
+    }
+
     fn look(&mut self) {
         let all = self.answered + self.lost;
-        if all >= LOOK {
+        // What is late is found late together.
+        if all >= self.many(LOOK) {
             if f64::from(self.lost) > TOO_LOSSY * f64::from(all) {
                 self.window = (self.window / 2.0).max(2.0);
             }
+            let share = f64::from(self.lost) / f64::from(all);
+            let is_worse = share > self.usual + WORSE;
+            // Others may have left the link since it was measured.
+            self.spacing *= if is_worse { 1.5 } else { 0.95 };
+            self.usual += (share - self.usual) / 8.0;
             (self.answered, self.lost) = (0, 0);
         }
     }
@@ -116,10 +178,10 @@ impl Reads {
         // Many drones at once that hear nothing ask less each.
         let room = match self.silent {
             _ if probing => 1.0,
-            0..=48 => self.window,
+            silent if silent <= self.many(48) => self.window,
             _ => 2.0,
         };
-        if self.on_way.len() as f64 >= room {
+        if self.on_way.len() as f64 >= room || (!probing && now < self.not_before()) {
             return None;
         }
         let mut wrapped = false;
@@ -140,6 +202,8 @@ impl Reads {
             let end = end.min(start + self.piece);
             let end = self.on_way.range(start..end).next().map_or(end, |(&next, _)| next.min(end));
             self.cursor = end;
+            let earliest = now as f64 - AT_ONCE * self.spacing;
+            self.next_at = self.next_at.max(earliest) + self.spacing;
             self.on_way.insert(start, (end, now));
             self.asked += 1;
             return Some((start, end));

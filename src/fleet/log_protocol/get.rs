@@ -1,34 +1,41 @@
 //! Brings a log by LOG_REQUEST_DATA.
 //!
-//! Requests of 46,080 bytes (512 packets) while large parts are missing; what was lost of them is
-//! asked for in the same way, a gap at a time. An autopilot drops what it is asked while it
-//! sends, so that only small requests go out side by side.
+//! Two ways of asking alternate. A *window* is one request for many packets, as large as comes in
+//! less than half a second, so that it suits a serial radio of 57,600 baud as well as a cable, and
+//! a station that dies keeps the vehicle from arming for no longer. An autopilot drops without a
+//! word what it is asked while it sends: where the way there and back is long, the next window is
+//! asked for so that the request arrives when the last packet leaves; where packets are lost, twice.
+//! What was lost of windows is then asked for a gap at a time, many on their way at once: each is
+//! served as it is heard.
 
+mod window;
+
+use self::window::Windows;
 use super::{LogProtocolError, data_message, end_message};
 use crate::fleet::budget::Budget;
 use crate::fleet::ftp::get::Tally;
 use crate::fleet::ftp::reads::Reads;
 use crate::fleet::rtt::Rtt;
 use crate::fleet::sink::Sink;
-use crate::link::clock::{MS, Micros, S};
+use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
 
 /// Bytes in one LOG_DATA.
 const PIECE: u64 = 90;
-/// Bytes of one request: 512 packets, as other stations ask.
-const REQUEST: u64 = 46_080;
-/// A gap that is worth a request of its own kind, bytes.
-const WORTH_A_REQUEST: u64 = 32 * PIECE;
+/// A gap that is worth a window.
+const WORTH_A_WINDOW: u64 = 32 * PIECE;
 /// With more separate ranges, gaps are repaired first.
 const MOST_RANGES: usize = 50_000;
 /// Small requests at once, at most.
-const MOST_READS: usize = 8;
+const MOST_READS: usize = 1024;
 /// A frame's bytes around the data.
 const OVERHEAD: u64 = 19;
 /// The vehicle contradicts itself about the end so often before it is not believed.
 const MOST_LIES: u32 = 3;
+/// Longest pause between repetitions.
+const MOST_PAUSE: Micros = 4 * S;
 
 /// What is left of a [`LogGet`].
 #[derive(Debug)]
@@ -51,21 +58,20 @@ pub struct LogGet<S> {
     budget: Option<Budget>,
     sink: Option<S>,
     rtt: Rtt,
-    request: Option<Request>,
+    windows: Windows,
+    /// The last window's request goes out once more.
+    copy: Option<(u64, u64)>,
     reads: Reads,
+    /// Where windows go on.
+    cursor: u64,
+    /// No gap is worth a window any more.
+    only_small: bool,
     heard: Option<Micros>,
     lies: u32,
+    is_pausing: bool,
     over: Option<Result<u64, LogProtocolError>>,
     ends_said: u32,
     tally: Tally,
-}
-
-#[derive(Debug)]
-struct Request {
-    start: u64,
-    end: u64,
-    asked: Micros,
-    heard: Option<Micros>,
 }
 
 impl<S: Sink> LogGet<S> {
@@ -79,10 +85,14 @@ impl<S: Sink> LogGet<S> {
             budget: None,
             sink: Some(sink),
             rtt: Rtt::default(),
-            request: None,
+            windows: Windows::default(),
+            copy: None,
             reads: Reads::new(PIECE, MOST_READS, patience),
+            cursor: 0,
+            only_small: false,
             heard: None,
             lies: 0,
+            is_pausing: false,
             over: None,
             ends_said: 0,
             tally: Tally::default(),
@@ -96,6 +106,18 @@ impl<S: Sink> LogGet<S> {
         self
     }
 
+    /// How long answers take, from other conversations with the vehicle.
+    #[must_use]
+    pub fn with_rtt(mut self, rtt: Rtt) -> Self {
+        self.rtt = rtt;
+        self
+    }
+
+    /// Whether other drones use the link as well.
+    pub fn share(&mut self, is_shared: bool) {
+        self.windows.is_shared = is_shared;
+    }
+
     /// What it has cost so far.
     pub fn tally(&self) -> Tally {
         self.tally
@@ -104,6 +126,11 @@ impl<S: Sink> LogGet<S> {
     /// When the vehicle said something of use last.
     pub fn heard(&self) -> Option<Micros> {
         self.heard
+    }
+
+    /// Ends it, with what has come, as [`LogProtocolError::Paused`].
+    pub fn pause(&mut self) {
+        self.is_pausing = true;
     }
 
     fn on_data(&mut self, now: Micros, offset: u64, data: &[u8]) {
@@ -130,33 +157,37 @@ impl<S: Sink> LogGet<S> {
         if let Some(took) = self.reads.answered(now, offset) {
             self.rtt.add(took);
         }
-        if let Some(request) = &mut self.request
-            && (request.start..request.end).contains(&offset)
-        {
-            if request.heard.is_none() && offset == request.start {
-                self.rtt.add(now.saturating_sub(request.asked));
-            }
-            request.heard = Some(now);
-            if offset + data.len() as u64 >= request.end.min(self.size) {
-                self.request = None;
-            }
+        if let Some(took) = self.windows.heard(now, offset, offset + data.len() as u64) {
+            self.rtt.add(took);
         }
     }
 
-    /// The first gap that is worth a request.
-    fn large_gap(&self) -> Option<(u64, u64)> {
+    /// The next gap that is worth a window, behind those that are on their way; once around.
+    fn large_gap(&mut self) -> Option<(u64, u64)> {
         let have = self.sink.as_ref()?.have();
-        if have.count() > MOST_RANGES {
+        if self.only_small || have.count() > MOST_RANGES {
             return None;
         }
-        let mut from = 0;
-        while let Some((start, end)) = have.gap(from, self.size) {
-            if end - start >= WORTH_A_REQUEST {
-                return Some((start, end.min(start + REQUEST)));
+        loop {
+            let mut from = self.cursor;
+            while let Some((start, end)) = have.gap(from, self.size) {
+                if end - start >= WORTH_A_WINDOW {
+                    return Some((start, end));
+                }
+                from = end;
             }
-            from = end;
+            // What is late of the last windows is not asked for again with them.
+            if !self.windows.is_empty() {
+                return None;
+            }
+            if self.cursor == 0 {
+                // Gaps only shrink.
+                self.only_small = true;
+                self.reads.at_least(self.windows.pipe() / PIECE as f64);
+                return None;
+            }
+            self.cursor = 0;
         }
-        None
     }
 
     fn allowed(&self, now: Micros, bytes: u64) -> Result<(), Micros> {
@@ -167,36 +198,61 @@ impl<S: Sink> LogGet<S> {
         data_message(self.drone, self.id, start as u32, (end - start) as u32)
     }
 
+    fn pause_after(&self, silent: u32) -> Micros {
+        let timeout = self.rtt.timeout();
+        let most = MOST_PAUSE.min(self.patience / 12).max(timeout);
+        timeout.saturating_mul(1 << (silent / 2).min(6)).min(most)
+    }
+
     fn next(&mut self, now: Micros, gives_up: Micros) -> Step<LogGot<S>> {
-        let wake = gives_up.min(self.reads.expire(now, self.rtt.timeout(), false));
-        if let Some(request) = &self.request {
-            let timeout = self.rtt.timeout().max(150 * MS);
-            let until = request.heard.map_or(request.asked + 2 * timeout, |at| at + timeout);
-            if now < until {
-                return Step::Wait(wake.min(until));
-            }
-            self.request = None;
+        if let Some((start, end)) = self.copy.take() {
+            return Step::send(self.ask(start, end));
         }
-        if self.reads.is_empty()
-            && let Some((start, end)) = self.large_gap()
-        {
-            let bytes = end - start;
-            match self.allowed(now, bytes + bytes.div_ceil(PIECE) * OVERHEAD) {
-                Ok(()) => {
-                    self.request = Some(Request { start, end, asked: now, heard: None });
-                    self.tally.bursts += 1;
-                    return Step::send(self.ask(start, end));
+        let mut wake = gives_up.min(self.reads.expire(now, self.rtt.timeout(), false));
+        let last = self.heard.unwrap_or(0);
+        let timeout = self.rtt.timeout();
+        loop {
+            let pause = self.pause_after(self.windows.silent());
+            match self.windows.silent_at(pause, timeout, last) {
+                Some(until) if now < until => {
+                    wake = wake.min(until);
+                    break;
                 }
-                Err(later) => return Step::Wait(wake.min(later)),
+                Some(_) => {
+                    // Nothing came of it: again.
+                    if let Some(start) = self.windows.give_up_first() {
+                        self.cursor = start;
+                    }
+                }
+                None => break,
             }
+        }
+        if self.windows.wants_another()
+            && self.reads.is_empty()
+            && let Some((start, gap_end)) = self.large_gap()
+        {
+            let end = gap_end.min(start + self.windows.size());
+            let bytes = end - start;
+            return match self.allowed(now, bytes + bytes.div_ceil(PIECE) * OVERHEAD) {
+                Ok(()) => {
+                    self.cursor = end;
+                    if self.windows.ask(now, start, end) {
+                        self.copy = Some((start, end));
+                    }
+                    self.tally.bursts += 1;
+                    Step::send(self.ask(start, end))
+                }
+                Err(later) => Step::Wait(wake.min(later)),
+            };
+        }
+        if !self.windows.is_empty() || self.large_gap().is_some() {
+            return Step::Wait(wake);
         }
         if let Err(later) = self.allowed(now, 0) {
             return Step::Wait(wake.min(later));
         }
         let Some(sink) = &self.sink else { return Step::Wait(wake) };
-        if self.large_gap().is_none()
-            && let Some((start, end)) = self.reads.next(now, sink.have(), self.size, false)
-        {
+        if let Some((start, end)) = self.reads.next(now, sink.have(), self.size, false) {
             let _ = self.allowed(now, end - start + OVERHEAD);
             self.tally.reads += 1;
             return Step::send(self.ask(start, end));
@@ -223,6 +279,8 @@ impl<S: Sink> Machine for LogGet<S> {
         if self.over.is_none() {
             if sink.have().gap(0, self.size).is_none() {
                 self.over = Some(Ok(self.size));
+            } else if self.is_pausing {
+                self.over = Some(Err(LogProtocolError::Paused));
             } else if now >= heard + self.patience {
                 let seconds = self.patience / S;
                 self.over = Some(Err(LogProtocolError::Silent { seconds }));

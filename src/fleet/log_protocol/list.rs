@@ -27,6 +27,8 @@ pub struct Entry {
 pub struct LogList {
     drone: DroneId,
     patience: Micros,
+    /// Only this one.
+    only: Option<u16>,
     /// How many logs there are, once an entry has said so.
     count: Option<u16>,
     entries: BTreeMap<u16, Entry>,
@@ -42,6 +44,7 @@ impl LogList {
         Self {
             drone,
             patience,
+            only: None,
             count: None,
             entries: BTreeMap::new(),
             asked: None,
@@ -51,8 +54,17 @@ impl LogList {
         }
     }
 
+    /// Only log `id` of `drone`, if it has that.
+    pub fn only(drone: DroneId, id: u16, patience: Micros) -> Self {
+        Self { only: Some(id), ..Self::new(drone, patience) }
+    }
+
     /// The first run of numbers without an entry.
     fn missing(&self) -> Option<(u16, u16)> {
+        if let Some(id) = self.only {
+            let is_there = self.count.is_none_or(|count| id <= count);
+            return (is_there && !self.entries.contains_key(&id)).then_some((id, id));
+        }
         let Some(count) = self.count else { return Some((0, u16::MAX)) };
         let first = (1..=count).find(|id| !self.entries.contains_key(id))?;
         let last = (first..=count).take_while(|id| !self.entries.contains_key(id)).last();

@@ -1,5 +1,5 @@
-//! MAVLink's own log messages (LOG_REQUEST_LIST and so on): slower than MAVFTP, and without a
-//! checksum, but every autopilot has them.
+//! MAVLink's own log messages (LOG_REQUEST_LIST and so on). They have no checksum, but every
+//! autopilot has them, and most serve them faster than MAVFTP: by cable 30 times as fast.
 
 pub mod get;
 pub mod list;
@@ -46,9 +46,13 @@ pub enum LogProtocolError {
     /// The bytes could not be kept.
     #[error("{0}")]
     Sink(String),
+    /// It was ended from here, to go on in another way.
+    #[error("it was ended from here")]
+    Paused,
 }
 
-fn end_message(drone: DroneId) -> MavMessage {
+/// Frees the vehicle, which does not arm while it sends a log.
+pub fn end_message(drone: DroneId) -> MavMessage {
     MavMessage::LOG_REQUEST_END(dialect::LOG_REQUEST_END_DATA {
         target_system: drone.system,
         target_component: AUTOPILOT,
@@ -64,7 +68,8 @@ fn list_message(drone: DroneId, start: u16, end: u16) -> MavMessage {
     })
 }
 
-fn data_message(drone: DroneId, id: u16, ofs: u32, count: u32) -> MavMessage {
+/// Asks for `count` bytes of log `id` from `ofs` on.
+pub fn data_message(drone: DroneId, id: u16, ofs: u32, count: u32) -> MavMessage {
     MavMessage::LOG_REQUEST_DATA(dialect::LOG_REQUEST_DATA_DATA {
         ofs,
         count,

@@ -121,6 +121,9 @@ pub enum Method {
     Mavftp,
     /// LOG_REQUEST_DATA.
     LogMessages,
+    /// Named and proved by MAVFTP; the bytes came, wholly or partly, by LOG_REQUEST_DATA, which was
+    /// faster.
+    Mixed,
     /// Through Skybrush Server.
     SkybrushServer,
     /// Copied from a card.

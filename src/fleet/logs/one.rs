@@ -7,6 +7,7 @@ mod home;
 mod options;
 mod prove;
 mod settle;
+mod ways;
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -14,6 +15,7 @@ use std::rc::Rc;
 use self::flight::Retired;
 use self::home::Begun;
 pub use self::options::{Failure, OneDone, OneOptions, Which};
+use self::ways::{Tail, Ways};
 use super::manifest::{AtHome, LogFlight, Shelf};
 use super::part::{PartFile, Sample, Sums};
 use crate::fleet::budget::Budget;
@@ -21,6 +23,7 @@ use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::get::{Get, Tally};
 use crate::fleet::ftp::list::List;
 use crate::fleet::ftp::sum::Sum;
+use crate::fleet::log_protocol::end_message;
 use crate::fleet::log_protocol::get::LogGet;
 use crate::fleet::log_protocol::list::LogList;
 use crate::link::clock::{Micros, S};
@@ -97,6 +100,15 @@ pub struct PullOne {
     tally: Tally,
     done: OneDone,
     held: u64,
+    /// Numbers of the oldest and of the newest file on the drone.
+    oldest: Option<u32>,
+    newest: Option<u32>,
+    /// The two ways to the target's bytes.
+    ways: Ways,
+    /// Other drones use the link as well.
+    is_shared: bool,
+    /// The drone is freed of a log that it sends, so often yet.
+    frees: u8,
 }
 
 #[derive(Debug)]
@@ -106,6 +118,12 @@ enum Stage {
     /// A part of an earlier run: is it of the same file?
     Probe(Box<Get<Sample>>, PartFile),
     Get(Box<Get<PartFile>>),
+    /// The log's end, by MAVFTP, to see how fast that is.
+    Try(Box<Get<Tail>>),
+    /// Its number for the log messages.
+    Number(LogList, PartFile),
+    /// Whether what has that number ends as the file does.
+    IsIt(Box<LogGet<Sample>>, PartFile),
     /// All bytes came: will its size stay?
     Settle(PartFile),
     Relist(List, PartFile),
@@ -167,6 +185,11 @@ impl PullOne {
             tally: Tally::default(),
             done: OneDone::default(),
             held: 0,
+            oldest: None,
+            newest: None,
+            ways: Ways::default(),
+            is_shared: false,
+            frees: 0,
             options,
         }
     }
@@ -182,6 +205,7 @@ impl PullOne {
         let now = match &self.stage {
             Stage::Get(get) => get.tally().new_bytes,
             Stage::LogGet(get) => get.tally().new_bytes,
+            Stage::Try(get) => get.tally().new_bytes,
             _ => 0,
         };
         self.tally.new_bytes + now
@@ -199,6 +223,7 @@ impl PullOne {
         let now = match &self.stage {
             Stage::Get(get) => get.heard(),
             Stage::LogGet(get) => get.heard(),
+            Stage::Try(get) => get.heard(),
             _ => None,
         };
         now.max(self.heartbeat)
@@ -207,6 +232,26 @@ impl PullOne {
     /// Whether it only lets time pass, and needs nothing of its link.
     pub fn is_idle(&self) -> bool {
         matches!(self.stage, Stage::Settle(_))
+    }
+
+    /// Tells whether other drones use the link as well.
+    pub fn share(&mut self, is_shared: bool) {
+        self.is_shared = is_shared;
+    }
+
+    /// What frees the drone of a log that it may be sending: it does not arm meanwhile.
+    pub fn farewell(&self) -> Option<MavMessage> {
+        let sends = matches!(
+            self.stage,
+            Stage::LogGet(_)
+                | Stage::IsIt(..)
+                | Stage::LogProbe(..)
+                | Stage::LogSample(..)
+                | Stage::Number(..)
+                | Stage::LogList(_)
+                | Stage::LogRelist(..)
+        );
+        sends.then(|| end_message(self.drone))
     }
 
     fn fail(&mut self, reason: String, advice: &'static str) -> Stage {
@@ -288,6 +333,13 @@ impl PullOne {
                 machine!(get, got => self.on_probed(part, &got.sink, got.result), Stage::Probe(get, part))
             }
             Stage::Get(mut get) => machine!(get, got => self.on_got(got), Stage::Get(get)),
+            Stage::Try(mut get) => machine!(get, got => self.on_tried(got), Stage::Try(get)),
+            Stage::Number(mut list, part) => {
+                machine!(list, done => self.on_numbered(part, done), Stage::Number(list, part))
+            }
+            Stage::IsIt(mut get, part) => {
+                machine!(get, got => self.on_is_it(part, &got), Stage::IsIt(get, part))
+            }
             Stage::Settle(part) => match self.settles() {
                 Some(until) => (Stage::Settle(part), Next::Step(Step::Wait(until))),
                 None => (Stage::Over, Next::Go(Box::new(self.relist(part)))),
@@ -347,6 +399,7 @@ impl Machine for PullOne {
             if beat.base_mode.contains(armed) && !matches!(self.stage, Stage::Over) {
                 // A link is not loaded while anything flies on it.
                 // The open log grows, and its checksum is right for a moment only.
+                self.frees = if self.farewell().is_some() { 2 } else { 0 };
                 self.stage = self.fail_for_sure(
                     "the drone is armed and gives no logs until it has landed".to_owned(),
                     "then run again",
@@ -360,6 +413,9 @@ impl Machine for PullOne {
                 machine.on_message(now, message);
             }
             Stage::Get(machine) => machine.on_message(now, message),
+            Stage::Try(machine) => machine.on_message(now, message),
+            Stage::Number(machine, _) => machine.on_message(now, message),
+            Stage::IsIt(machine, _) => machine.on_message(now, message),
             Stage::Sum(machine, ..) => machine.on_message(now, message),
             Stage::LogList(machine) | Stage::LogRelist(machine, _) => {
                 machine.on_message(now, message);
@@ -375,6 +431,11 @@ impl Machine for PullOne {
     fn poll(&mut self, now: Micros) -> Step<Self::Done> {
         self.started.get_or_insert(now);
         self.now = now;
+        if self.frees > 0 {
+            self.frees -= 1;
+            return Step::send(end_message(self.drone));
+        }
+        self.watch_ways(now);
         loop {
             let stage = std::mem::replace(&mut self.stage, Stage::Over);
             let (stage, next) = self.advance(now, stage);
@@ -392,6 +453,10 @@ impl Machine for PullOne {
         match &self.stage {
             Stage::Get(get) => self.with_finished(get.progress()),
             Stage::LogGet(get) => self.with_finished(get.progress()),
+            Stage::Try(get) => {
+                let done = self.held + get.tally().new_bytes;
+                self.with_finished(Progress { done, total: self.size })
+            }
             _ => self.with_finished(Progress { done: self.held, total: self.size }),
         }
     }

@@ -12,17 +12,18 @@ use sha2::{Digest as _, Sha256};
 
 use crate::base::crc::{ApCrc32, ap_crc32};
 use crate::base::file::FileError;
-use crate::base::plain::Shown as _;
 use crate::fleet::intervals::Intervals;
 use crate::fleet::sink::Sink;
 use crate::link::clock::{Micros, S};
 
 const HEAD: &str = "updraft.part/1";
 /// What may be lost of a download by a power loss: bytes, or time.
-const SYNC_BYTES: u64 = 4 << 20;
+const SYNC_BYTES: u64 = 16 << 20;
 const SYNC_EVERY: Micros = 5 * S;
 /// A journal is never longer, bytes.
 const MOST_JOURNAL: u64 = 256 << 20;
+/// Bytes that are written at once: packets are small.
+const AT_ONCE: usize = 64 << 10;
 /// Ranges in one line.
 const RANGES_PER_LINE: usize = 256;
 
@@ -37,6 +38,9 @@ pub struct PartFile {
     /// Written, but not yet in the journal.
     fresh: Intervals,
     position: u64,
+    /// Bytes that follow each other and are not in the file yet, and where they begin.
+    pending: Vec<u8>,
+    pending_at: u64,
     synced: Option<Micros>,
     /// Whether it survives a power loss.
     is_durable: bool,
@@ -97,6 +101,8 @@ impl PartFile {
             have: Intervals::default(),
             fresh: Intervals::default(),
             position: u64::MAX,
+            pending: Vec::new(),
+            pending_at: 0,
             synced: None,
             is_durable: true,
         };
@@ -125,6 +131,7 @@ impl PartFile {
         self.have = Intervals::default();
         self.fresh = Intervals::default();
         self.position = u64::MAX;
+        self.pending.clear();
         let line = line(&format!("{HEAD} {}", self.identity));
         // What an older journal says must not come back with what is written now.
         let was_empty = self.journal.metadata().is_ok_and(|data| data.len() == 0);
@@ -181,10 +188,11 @@ impl PartFile {
 
     /// Writes everything so far into the journal: what it names is on the disk, it itself will be.
     fn note(&mut self) -> Result<(), FileError> {
-        let fail = |source| FileError::new("write", &part_path(&self.path), source);
         if self.fresh.count() == 0 {
             return Ok(());
         }
+        self.flush()?;
+        let fail = |source| FileError::new("write", &part_path(&self.path), source);
         if self.is_durable {
             self.file.sync_data().map_err(fail)?;
         }
@@ -196,6 +204,21 @@ impl PartFile {
             .write_all(text.as_bytes())
             .map_err(|source| FileError::new("write", &journal_path(&self.path), source))?;
         self.fresh = Intervals::default();
+        Ok(())
+    }
+
+    /// Puts what is in memory into the file.
+    pub fn flush(&mut self) -> Result<(), FileError> {
+        if self.pending.is_empty() {
+            return Ok(());
+        }
+        let fail = |source| FileError::new("write", &part_path(&self.path), source);
+        if self.position != self.pending_at {
+            self.file.seek(SeekFrom::Start(self.pending_at)).map_err(fail)?;
+        }
+        self.file.write_all(&self.pending).map_err(fail)?;
+        self.position = self.pending_at + self.pending.len() as u64;
+        self.pending.clear();
         Ok(())
     }
 
@@ -228,6 +251,14 @@ impl PartFile {
     }
 }
 
+/// What came until an interruption is kept as well.
+impl Drop for PartFile {
+    fn drop(&mut self) {
+        // What cannot be written comes again.
+        let _ = self.note();
+    }
+}
+
 impl Sink for PartFile {
     fn have(&self) -> &Intervals {
         &self.have
@@ -238,14 +269,14 @@ impl Sink for PartFile {
         if self.have.contains(offset, end) {
             return Ok(0);
         }
-        let explain = |error: &dyn std::fmt::Display| {
-            format!("cannot write {}: {error}", part_path(&self.path).shown())
-        };
-        if self.position != offset {
-            self.file.seek(SeekFrom::Start(offset)).map_err(|error| explain(&error))?;
+        let follows = self.pending_at + self.pending.len() as u64 == offset;
+        if !follows || self.pending.len() >= AT_ONCE {
+            if let Err(error) = self.flush() {
+                return Err(format!("{error}: {}", error.source));
+            }
+            self.pending_at = offset;
         }
-        self.file.write_all(data).map_err(|error| explain(&error))?;
-        self.position = end;
+        self.pending.extend_from_slice(data);
         let new = self.have.insert(offset, end);
         self.fresh.insert(offset, end);
         let synced = *self.synced.get_or_insert(now);
@@ -380,7 +411,8 @@ mod tests {
         part.put(S, 100, b"xyz").unwrap();
         part.sync().unwrap();
         part.put(S, 200, b"not in the journal").unwrap();
-        drop(part);
+        // As a kill does.
+        std::mem::forget(part);
         let mut journal = OpenOptions::new().append(true).open(journal_path(&path)).unwrap();
         journal.write_all(b"200-218 *0000").unwrap();
         for _ in 0..2 {
@@ -415,7 +447,8 @@ mod tests {
         let path = folder.path().join("01.BIN");
         let mut part = PartFile::open(&path, "a").unwrap();
         part.file = File::open(part_path(&path)).unwrap();
-        let said = part.put(0, 0, &[7; 100]).unwrap_err();
+        part.put(0, 0, &[7; 100]).unwrap();
+        let said = part.put(0, 500, &[7; 100]).unwrap_err();
         assert!(said.starts_with("cannot write ") && !said.contains(';'), "{said}");
     }
 

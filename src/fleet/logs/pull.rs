@@ -119,6 +119,7 @@ fn pull_onto(
     loop {
         let now = net.now();
         if watch.stop(now) {
+            lanes.values().try_for_each(|lane| lane.free(net))?;
             return Ok(outcomes);
         }
         for lane in lanes.values_mut() {
@@ -179,6 +180,18 @@ impl Lane {
         }
     }
 
+    /// Ends what drones send: nobody listens any more, and they do not arm meanwhile.
+    fn free(&self, net: &mut dyn Net) -> Result<(), NetError> {
+        for (drone, running) in &self.running {
+            if let Some(end) = running.machine.farewell() {
+                // It has no answer.
+                net.send(*drone, &end)?;
+                net.send(*drone, &end)?;
+            }
+        }
+        Ok(())
+    }
+
     fn is_over(&self) -> bool {
         self.waiting.is_empty() && self.running.is_empty()
     }
@@ -199,6 +212,9 @@ impl Lane {
         let mut busy = self.running.values().filter(is_busy).count();
         let bytes: u64 = self.running.values().map(|one| one.machine.new_bytes()).sum();
         self.pace.look(now, self.bytes + bytes, busy);
+        for running in self.running.values_mut() {
+            running.machine.share(busy > 1);
+        }
         while busy < self.pace.at_once() {
             let Some((drone, machine)) = self.waiting.pop_front() else { return };
             self.running.insert(drone, Running { machine, wakes: now, started: now });

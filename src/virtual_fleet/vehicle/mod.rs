@@ -87,8 +87,8 @@ impl<'w> VirtualVehicle<'w> {
     ) -> Self {
         Self {
             params: Params::new(world.vehicle, setup.system, setup.stock),
-            ftp: FtpServer::new(setup.packets_per_s),
-            logs: LogServer::new(&setup.log_folder, setup.packets_per_s),
+            ftp: FtpServer::new(setup.transfers.ftp_per_s),
+            logs: LogServer::new(&setup.log_folder, setup.transfers.logs_per_s),
             logbook: Logbook::new(&setup.log_folder),
             streams: Streams::new(now + setup.boot.heartbeat, setup.stock),
             stands_m: setup.stands_m,
@@ -179,8 +179,8 @@ impl<'w> VirtualVehicle<'w> {
         self.show.orientation_deg = before.orientation_deg;
         self.breached = false;
         self.station_heard = None;
-        self.ftp = FtpServer::new(self.setup.packets_per_s);
-        self.logs = LogServer::new(&self.setup.log_folder, self.setup.packets_per_s);
+        self.ftp = FtpServer::new(self.setup.transfers.ftp_per_s);
+        self.logs = LogServer::new(&self.setup.log_folder, self.setup.transfers.logs_per_s);
         self.logbook.flush(self.storage.as_mut());
         self.logbook = Logbook::new(&self.setup.log_folder);
         self.streams = Streams::new(now + self.setup.boot.heartbeat, self.setup.stock);

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::link::clock::{MS, Micros, S};
+use crate::virtual_fleet::transfers::Transfers;
 
 /// When a vehicle is how far after it was switched on.
 #[derive(Clone, Copy, Debug)]
@@ -48,8 +49,8 @@ pub struct VehicleSetup {
     pub stock: bool,
     /// Where its logs are: `/APM/LOGS`, or `logs`.
     pub log_folder: String,
-    /// Packets per second of its file and log transfers; 0: no limit.
-    pub packets_per_s: f64,
+    /// How fast it sends files and logs.
+    pub transfers: Transfers,
     /// When it is switched off for good.
     pub gone_at: Option<Micros>,
     /// When it reboots by itself, once.
@@ -67,7 +68,7 @@ impl VehicleSetup {
             boot: BootTimes::default(),
             stock: false,
             log_folder: "logs".to_owned(),
-            packets_per_s: 0.0,
+            transfers: Transfers::FIRMWARE,
             gone_at: None,
             reboot_at: None,
         }

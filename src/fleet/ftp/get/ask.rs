@@ -1,8 +1,8 @@
 //! What a download asks for next: a burst, a single read, or nothing yet.
 
 use super::{
-    Burst, Get, Got, MOST_RANGES, MOST_READS, OVERHEAD, PIECE, USUAL_BURST, WORTH_A_BURST,
-    WORTH_A_TAIL,
+    Burst, Get, Got, MOST_OCCUPIED, MOST_RANGES, MOST_READS, OVERHEAD, PIECE, USUAL_BURST,
+    WORTH_A_BURST, WORTH_A_TAIL,
 };
 use crate::fleet::ftp::FtpError;
 use crate::fleet::sink::Sink;
@@ -22,14 +22,24 @@ impl<S: Sink> Get<S> {
         })
     }
 
+    fn is_silent(&self, now: Micros) -> bool {
+        self.suspicious_at().is_some_and(|at| now >= at)
+    }
+
     pub(super) fn burst_length(&self) -> u64 {
         self.burst_packets.unwrap_or(USUAL_BURST) * PIECE
     }
 
+    /// A burst would keep the link for too long.
+    fn is_slow(&self) -> bool {
+        let packets = self.burst_packets.unwrap_or(USUAL_BURST) as f64;
+        self.spacing.is_some_and(|each| each * packets > MOST_OCCUPIED as f64)
+    }
+
     /// Where the next burst is worth its packets.
-    pub(super) fn burst_start(&self) -> Option<u64> {
+    pub(super) fn burst_start(&mut self) -> Option<u64> {
         let (sink, size) = (self.sink.as_ref()?, self.size?);
-        if self.no_bursts || sink.have().count() > MOST_RANGES {
+        if self.no_bursts || self.is_slow() || sink.have().count() > MOST_RANGES {
             return None;
         }
         // Behind what is on its way.
@@ -41,6 +51,8 @@ impl<S: Sink> Get<S> {
             }
             from = end;
         }
+        // Gaps only shrink.
+        self.no_bursts = self.bursts.is_empty();
         None
     }
 
@@ -68,6 +80,7 @@ impl<S: Sink> Get<S> {
             offset,
             since: now,
             is_first: self.bursts.is_empty(),
+            first: None,
             heard: None,
             spacing,
         });
@@ -89,11 +102,18 @@ impl<S: Sink> Get<S> {
             self.close(Err(FtpError::Silent { seconds }));
             return self.poll(now);
         }
+        if self.is_pausing && (self.bursts.is_empty() || self.is_silent(now)) {
+            self.close(Err(FtpError::Paused));
+            return self.poll(now);
+        }
         let suspicious_at = self.suspicious_at();
         let is_silent = suspicious_at.is_some_and(|at| now >= at);
         let mut wake = gives_up.min(self.reads.expire(now, self.caller.timeout(), is_silent));
         if let Some(at) = suspicious_at.filter(|_| !is_silent) {
             wake = wake.min(at);
+        }
+        if self.is_pausing {
+            return Step::Wait(wake);
         }
         if !is_silent
             && self.wants_burst()
@@ -110,6 +130,9 @@ impl<S: Sink> Get<S> {
                 return Step::Wait(wake.min(later));
             }
             let Some(sink) = &self.sink else { return Step::Wait(wake) };
+            if !is_silent && now < self.reads.not_before() {
+                return Step::Wait(wake.min(self.reads.not_before() + 1));
+            }
             if let Some((start, end)) = self.reads.next(now, sink.have(), size, is_silent) {
                 let _ = self.allowed(now, end - start + OVERHEAD);
                 return Step::send(self.send_read(start, end));

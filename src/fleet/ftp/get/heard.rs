@@ -1,6 +1,6 @@
 //! What the vehicle's packets mean for a download: data, the end of a burst, refusals.
 
-use super::{BUSY_PAUSE, Burst, Get, MOST_LIES, USUAL_BURST};
+use super::{BUSY_PAUSE, Burst, Get, MOST_LIES, PIECE, TELLING, USUAL_BURST};
 use crate::fleet::ftp::{FtpError, NUMBERS_PER_BURST};
 use crate::fleet::sink::Sink;
 use crate::link::clock::Micros;
@@ -53,7 +53,22 @@ impl<S: Sink> Get<S> {
         {
             self.burst_packets = Some(USUAL_BURST);
         }
+        if let Some(burst) = self.bursts.front() {
+            self.learn(burst.first, burst.heard);
+        }
         self.bursts.clear();
+    }
+
+    /// How fast a burst came.
+    fn learn(&mut self, first: Option<(Micros, u64)>, last: Option<(Micros, u64)>) {
+        if let Some(((began, from), (ended, to))) = first.zip(last)
+            && to >= from + TELLING - 1
+        {
+            let spacing = ended.saturating_sub(began) as f64 / (to - from) as f64;
+            self.spacing = Some(spacing);
+            self.reads.pace(spacing);
+            self.tally.burst_bytes_per_s = PIECE as f64 * 1e6 / spacing.max(1.0);
+        }
     }
 
     pub(super) fn on_burst_packet(&mut self, now: Micros, packet: &Packet, at_end: bool) {
@@ -64,7 +79,10 @@ impl<S: Sink> Get<S> {
         };
         let Some(index) = self.bursts.iter().position(is_of) else { return };
         // The vehicle serves one after another: those before it are over.
-        self.bursts.drain(..index);
+        let over = self.bursts.drain(..index).next_back();
+        if let Some(over) = over {
+            self.learn(over.first, over.heard);
+        }
         let Some(burst) = self.bursts.front_mut() else { return };
         let number = number(burst);
         if let Some((at, highest)) = &mut burst.heard {
@@ -79,6 +97,7 @@ impl<S: Sink> Get<S> {
             if number == 0 && burst.is_first {
                 self.caller.add_rtt(now.saturating_sub(burst.since));
             }
+            burst.first = Some((now, number));
             burst.heard = Some((now, number));
         }
         if packet.burst_complete {
@@ -147,7 +166,9 @@ impl<S: Sink> Get<S> {
     }
 
     pub(super) fn end_burst(&mut self, now: Micros) {
-        self.bursts.pop_front();
+        if let Some(burst) = self.bursts.pop_front() {
+            self.learn(burst.first, burst.heard);
+        }
         if let Some(next) = self.bursts.front_mut() {
             next.since = now;
         }

@@ -2,6 +2,7 @@
 //! by MAVFTP or by the log messages.
 
 use super::home::Begun;
+use super::ways::MUTE;
 use super::{MOST_RESTARTS, PullOne, SAMPLE_BYTES, Stage};
 use crate::fleet::ftp::FtpError;
 use crate::fleet::ftp::get::{Get, GetOptions, Got};
@@ -35,12 +36,7 @@ impl PullOne {
                 Ok(sample) => Stage::LogProbe(Box::new(self.log_get(sample)), part),
             };
         }
-        if self.reason.is_none() {
-            let get = Get::new(self.caller.another(), &target.source, part, self.get());
-            Stage::Get(Box::new(get))
-        } else {
-            Stage::LogGet(Box::new(self.log_get(part)))
-        }
+        self.bring(part)
     }
 
     pub(super) fn get(&self) -> GetOptions {
@@ -48,6 +44,7 @@ impl PullOne {
             patience: self.options.patience,
             most_size: self.options.most_size,
             budget: self.budget.clone(),
+            spacing: self.spacing(),
             ..GetOptions::default()
         }
     }
@@ -58,9 +55,14 @@ impl PullOne {
     }
 
     pub(super) fn log_get<S: Sink>(&self, sink: S) -> LogGet<S> {
-        let id = self.target.as_ref().map_or(0, |target| target.number) as u16;
-        LogGet::new(self.drone, id, self.size, sink, self.options.patience)
+        let number = self.target.as_ref().map_or(0, |target| target.number) as u16;
+        let (id, patience) = match self.ways.id {
+            Some(id) => (id, self.options.patience.min(MUTE)),
+            None => (number, self.options.patience),
+        };
+        LogGet::new(self.drone, id, self.size, sink, patience)
             .with_budget(self.budget.clone())
+            .with_rtt(self.caller.rtt())
     }
 
     /// The part is of another file.
@@ -81,6 +83,8 @@ impl PullOne {
         match part.clear() {
             Ok(()) => {
                 self.rounds = 0;
+                // What it was by the log messages may have been another log.
+                self.close_log_messages();
                 self.begin(part, false)
             }
             Err(error) => self.fail(error.to_string(), "make room and run again"),
@@ -126,6 +130,7 @@ impl PullOne {
         self.attempts += got.tally.opened.saturating_sub(1) as u32;
         let part = got.sink;
         match got.result {
+            Err(FtpError::Paused) => self.bring(part),
             Err(error) => self.on_ftp_failed(part, error),
             Ok(size) => {
                 self.held = part.have().total();
@@ -153,6 +158,12 @@ impl PullOne {
             Ok(_) => {
                 self.held = got.sink.have().total();
                 Stage::Settle(got.sink)
+            }
+            Err(LogProtocolError::Paused) => self.bring(got.sink),
+            // MAVFTP goes on, and finds out whether the drone is there at all.
+            Err(error) if self.reason.is_none() && !matches!(error, LogProtocolError::Sink(_)) => {
+                self.close_log_messages();
+                self.bring(got.sink)
             }
             Err(error) => self.on_log_failed(got.sink, &error),
         }

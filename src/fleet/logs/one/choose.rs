@@ -1,6 +1,7 @@
 //! Which of a drone's logs are brought home, and into which files.
 
 use super::home::Needed;
+use super::ways::Ways;
 use super::{FTP_PATIENCE, Failure, PullOne, Stage, Target, Which};
 use crate::base::file::create_folder;
 use crate::fleet::ftp::FtpError;
@@ -49,6 +50,8 @@ impl PullOne {
             })
             .collect();
         logs.sort();
+        self.oldest = logs.first().map(|(number, ..)| *number);
+        self.newest = logs.last().map(|(number, ..)| *number);
         self.choose(&logs)
     }
 
@@ -56,7 +59,9 @@ impl PullOne {
         let advice = "run again; or take its card and import";
         match outcome {
             Ok(entries) => {
-                let logs = entries.iter();
+                // Firmware counts from the oldest log that is there, and on beyond the newest by
+                // as many as were deleted: those have no bytes.
+                let logs = entries.iter().filter(|entry| entry.size > 0);
                 let logs: Vec<_> = logs
                     .map(|entry| (entry.id.into(), format!("log {}", entry.id), entry.size))
                     .collect();
@@ -154,6 +159,7 @@ impl PullOne {
             return self.fail(error.to_string(), "allow more (--max-size), if that is its size");
         }
         (self.rounds, self.restarts, self.grows) = (0, 0, None);
+        self.ways = Ways::default();
         self.resize(target.size);
         self.is_outgrown |= self.begun.is_seeded();
         let identity = format!("drone={} source={}", self.drone, target.source);

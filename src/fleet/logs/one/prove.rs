@@ -78,7 +78,11 @@ impl PullOne {
             source: target.source,
             size_bytes: sums.size,
             sha256: sums.sha256,
-            method: if self.reason.is_none() { Method::Mavftp } else { Method::LogMessages },
+            method: match &self.reason {
+                Some(_) => Method::LogMessages,
+                None if self.ways.is_mixed => Method::Mixed,
+                None => Method::Mavftp,
+            },
             method_reason: self.reason.clone(),
             verified,
             incomplete: self.incomplete.take(),

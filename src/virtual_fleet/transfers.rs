@@ -1,0 +1,57 @@
+//! How fast a vehicle sends files and logs.
+
+use crate::link::clock::{MS, Micros};
+
+/// A computer that serves virtual vehicles looks at them less often than an autopilot at its
+/// links: packets that are late by up to this are made up for.
+const LATE: f64 = (20 * MS) as f64;
+
+/// An autopilot's loop.
+const LOOP: f64 = 2_500.0;
+
+/// Packets per second at most; 0: as many as are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transfers {
+    /// Of MAVFTP.
+    pub ftp_per_s: f64,
+    /// Of the log messages.
+    pub logs_per_s: f64,
+}
+
+impl Transfers {
+    /// ArduCopter 4.4's simulator, measured: one packet of MAVFTP in each loop of 400 Hz (94 kB/s
+    /// of data), 40 of the log messages for each of two links (2.8 MB/s).
+    pub const FIRMWARE: Self = Self { ftp_per_s: 394.0, logs_per_s: 32_000.0 };
+
+    /// Both as many.
+    pub fn both(packets_per_s: f64) -> Self {
+        Self { ftp_per_s: packets_per_s, logs_per_s: packets_per_s }
+    }
+}
+
+/// Meters the packets of a server.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Meter {
+    next: f64,
+}
+
+impl Meter {
+    /// Nothing was to be sent until now. What comes then is served as it is heard, with the packets
+    /// of a loop.
+    pub(super) fn idle(&mut self, now: Micros) {
+        self.next = self.next.max(now as f64 - LOOP);
+    }
+
+    /// When the next packet may go.
+    pub(super) fn next(self) -> Micros {
+        self.next as Micros
+    }
+
+    /// A packet has gone.
+    pub(super) fn count(&mut self, now: Micros, per_s: f64) {
+        if per_s > 0.0 {
+            let pause = 1e6 / per_s;
+            self.next = self.next.max(now as f64 - LATE.max(pause)) + pause;
+        }
+    }
+}
