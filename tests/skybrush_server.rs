@@ -149,6 +149,33 @@ fn nobody_starts_without_a_person() {
     insta::assert_snapshot!(format!("{ended}\n{short}"));
 }
 
+/// Aborted or not: every start has its own logs, and a log of another start is none of it.
+#[test]
+fn the_logs_of_a_second_flight_do_not_stay_those_of_the_first() {
+    let bench = planned();
+    let at_home = |name: &str| fs::read(bench.path("campaign/logs").join(name)).unwrap();
+    let (first, _) = fly(&bench, Fault::None);
+    assert_eq!(first.code, Some(0), "{first}");
+    let logs = [at_home("01.BIN"), at_home("02.BIN")];
+    let (second, server) = fly(&bench, Fault::None);
+    assert_eq!(second.code, Some(0), "{second}");
+    assert!(second.err.contains("Moved 2 logs of an earlier flight to"), "{second}");
+    assert_eq!([at_home("flight-1/01.BIN"), at_home("flight-1/02.BIN")], logs);
+    let asked = server.asked();
+    let starts =
+        asked.iter().filter_map(|body| body.pointer("/configuration/start/time")?.as_i64());
+    let start = starts.last().unwrap();
+    assert!(at_home("01.BIN") == skybrush_server_support::log_of("02", start));
+    bench.expect(0, &["logs", "verify", "campaign"]);
+    // Drones with cards of another day: what is home stays, and what they have is named.
+    let others = Fake::start(&plan(&bench), Fault::None);
+    let pulled = run(&bench, &others, &["logs", "pull", "campaign", "--again"]);
+    assert_eq!(pulled.code, Some(3), "{pulled}");
+    assert!(pulled.err.contains("log 2 of the drone is of another flight: its show"), "{pulled}");
+    assert!(at_home("01.BIN") == skybrush_server_support::log_of("02", start));
+    bench.expect(0, &["logs", "verify", "campaign"]);
+}
+
 /// What the real server said, word for word.
 #[test]
 fn a_recorded_flight_through_the_real_server_is_flown_again() {
