@@ -218,7 +218,7 @@ fn damage_never_panics() {
     };
     for _ in 0..300 {
         let mut bytes = whole.clone();
-        for _ in 0..1 + below(60) {
+        for _ in 0..=below(60) {
             let at = below(bytes.len());
             match below(3) {
                 0 => bytes[at] ^= 1 << below(8),

@@ -55,9 +55,8 @@ impl PullOne {
         let is_wanted = match self.options.which {
             Which::Flight => true,
             // Which one that is the drone must say.
-            Which::Newest => false,
+            Which::Newest | Which::All => false,
             Which::Number(number) => entry.boot == Some(number),
-            Which::All => false,
         };
         (is_wanted && !self.options.again).then_some(entry)
     }
