@@ -52,12 +52,10 @@ pub(super) struct Ways {
     /// Bytes per second of data.
     ftp_per_s: f64,
     logs_per_s: f64,
-    /// Since when the present way is used, and looked at; the bytes then.
+    /// Since when the present way is used.
     leg_since: Option<Micros>,
-    look_since: Micros,
-    look_bytes: u64,
-    /// The beginning is over.
-    is_warm: bool,
+    /// When it was looked at last, and the bytes then.
+    looked: Option<(Micros, u64)>,
     least_leg: Micros,
     /// The log messages brought some of it.
     pub(super) is_mixed: bool,
@@ -73,9 +71,7 @@ impl Default for Ways {
             ftp_per_s: 0.0,
             logs_per_s: 0.0,
             leg_since: None,
-            look_since: 0,
-            look_bytes: 0,
-            is_warm: false,
+            looked: None,
             least_leg: LEAST_LEG,
             is_mixed: false,
         }
@@ -85,23 +81,20 @@ impl Default for Ways {
 impl Ways {
     fn begin_leg(&mut self, now: Micros) {
         self.leg_since = Some(now);
-        self.look_since = now + WARMS;
-        self.is_warm = false;
+        self.looked = None;
     }
 
     /// Bytes per second since the last look, if it is time for one.
     fn look(&mut self, now: Micros, bytes: u64) -> Option<f64> {
-        if !self.is_warm && now >= self.look_since {
-            self.is_warm = true;
-            (self.look_since, self.look_bytes) = (now, bytes);
-        }
-        if now < self.look_since + LOOK {
+        if now < self.leg_since? + WARMS {
             return None;
         }
-        let passed_s = (now - self.look_since) as f64 / 1e6;
-        let rate = bytes.saturating_sub(self.look_bytes) as f64 / passed_s;
-        (self.look_since, self.look_bytes) = (now, bytes);
-        Some(rate)
+        let (since, before) = *self.looked.get_or_insert((now, bytes));
+        if now < since + LOOK {
+            return None;
+        }
+        self.looked = Some((now, bytes));
+        Some(bytes.saturating_sub(before) as f64 / ((now - since) as f64 / 1e6))
     }
 
     fn may_change(&self, now: Micros) -> bool {
