@@ -88,7 +88,11 @@ fn a_map_of_moving_air_is_the_truth() {
     let refused = updraft(&other, folder);
     assert_eq!(refused.status.code(), Some(2));
     run("simulate c --flight hover --drones 1 --air drone-constant:sd=0.5 --force", folder);
-    assert!(hover.log(1, 4).exists() && !hover.log(2, 4).exists() && !hover.truth(1, 4).exists());
+    assert!(
+        hover.simulated_log(1, 4).exists()
+            && !hover.simulated_log(2, 4).exists()
+            && !hover.truth(1, 4).exists()
+    );
     // The truth of flown logs can be had later, and a broken file is named.
     run("simulate c --flight hover --drones 1 --air drone-constant:sd=0.5 --truth", folder);
     let truth = read(&hover.truth(1, 4)).unwrap();

@@ -12,6 +12,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::base::crc::{ApCrc32, ap_crc32};
 use crate::base::file::FileError;
+use crate::base::plain::Shown as _;
 use crate::fleet::intervals::Intervals;
 use crate::fleet::sink::Sink;
 use crate::link::clock::{Micros, S};
@@ -259,6 +260,13 @@ impl Drop for PartFile {
     }
 }
 
+impl PartFile {
+    /// In words, without what to do: whoever asked for the log knows that.
+    fn cannot_write(&self, error: &FileError) -> String {
+        format!("cannot write {}: {}", part_path(&self.path).shown(), error.source)
+    }
+}
+
 impl Sink for PartFile {
     fn have(&self) -> &Intervals {
         &self.have
@@ -271,9 +279,7 @@ impl Sink for PartFile {
         }
         let follows = self.pending_at + self.pending.len() as u64 == offset;
         if !follows || self.pending.len() >= AT_ONCE {
-            if let Err(error) = self.flush() {
-                return Err(format!("{error}: {}", error.source));
-            }
+            self.flush().map_err(|error| self.cannot_write(&error))?;
             self.pending_at = offset;
         }
         self.pending.extend_from_slice(data);
@@ -282,9 +288,7 @@ impl Sink for PartFile {
         let synced = *self.synced.get_or_insert(now);
         if self.fresh.total() >= SYNC_BYTES || now >= synced + SYNC_EVERY {
             self.synced = Some(now);
-            if let Err(error) = self.sync() {
-                return Err(format!("{error}: {}", error.source));
-            }
+            self.sync().map_err(|error| self.cannot_write(&error))?;
         }
         Ok(new)
     }
