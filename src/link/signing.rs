@@ -8,7 +8,7 @@
 //! networks: what was heard in one is refused in another. And there is one signer with one link id:
 //! to a drone, another link id would be a new stream, for which it takes frames of up to a minute ago.
 //! Vehicles that share a system id in different networks share a stream: their clocks may differ by
-//! [`REORDER`] (the firmware takes them from GPS).
+//! `REORDER` (the firmware takes them from GPS).
 //!
 //! What was heard last is kept beside the key file, see `stamps.rs`.
 

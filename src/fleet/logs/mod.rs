@@ -1,4 +1,4 @@
-//! Bringing logs home: [`pull::pull`] from many drones over the air, [`import::import`] from
+//! Bringing logs home: [`pull::pull`] from many drones over the air, [`import`] from
 //! cards, [`verify::verify`] what is there.
 
 pub mod import;
