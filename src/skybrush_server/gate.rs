@@ -151,6 +151,7 @@ fn clock_obstacle(clock: ShowClock, unix_s: i64, now_unix_s: f64) -> Option<Stri
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
+    use std::fmt::Write as _;
 
     use super::super::state::ShowLine;
     use super::*;
@@ -199,7 +200,7 @@ mod tests {
             for (name, step) in ["ready", "set", "authorized"].iter().zip(steps) {
                 let why = of(&drone(line), step);
                 let why = if why.is_empty() { "goes on" } else { &why };
-                said += &format!("{line} | {name}: {why}\n");
+                let _ = writeln!(said, "{line} | {name}: {why}");
             }
         }
         insta::assert_snapshot!(said);
@@ -213,7 +214,7 @@ mod tests {
         let mut with = |change: &dyn Fn(&mut State)| {
             let mut state = good.clone();
             change(&mut state);
-            said += &format!("{}\n", of(&state, Step::Ready));
+            let _ = writeln!(said, "{}", of(&state, Step::Ready));
         };
         with(&|state| state.mode = "rth".to_owned());
         with(&|state| state.mode = String::new());

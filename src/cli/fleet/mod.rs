@@ -76,7 +76,7 @@ enum FleetCommand {
     /// Put back the parameters that were changed; the fence stays on, unless --fence-off is given
     Restore(RestoreArgs),
     /// Virtual drones at the plan's slots, to practise with
-    Virtual(virtual_drones::VirtualArgs),
+    Virtual(Box<virtual_drones::VirtualArgs>),
 }
 
 /// What every step needs.

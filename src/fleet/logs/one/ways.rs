@@ -40,7 +40,6 @@ pub(super) const MUTE: Micros = 6 * S;
 
 /// What is known of the two ways.
 #[derive(Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "each is found out by itself")]
 pub(super) struct Ways {
     /// MAVFTP has shown its speed, or the log is too short.
     is_tried: bool,
