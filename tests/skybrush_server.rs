@@ -162,9 +162,9 @@ fn the_logs_of_a_second_flight_do_not_stay_those_of_the_first() {
     assert!(second.err.contains("Moved 2 logs of an earlier flight to"), "{second}");
     assert_eq!([at_home("flight-1/01.BIN"), at_home("flight-1/02.BIN")], logs);
     let asked = server.asked();
-    let starts =
+    let mut starts =
         asked.iter().filter_map(|body| body.pointer("/configuration/start/time")?.as_i64());
-    let start = starts.last().unwrap();
+    let start = starts.next_back().unwrap();
     assert!(at_home("01.BIN") == skybrush_server_support::log_of("02", start));
     bench.expect(0, &["logs", "verify", "campaign"]);
     // Drones with cards of another day: what is home stays, and what they have is named.
