@@ -78,16 +78,18 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(&mission.name));
     let mut reports = Vec::new();
     let mut safe = true;
+    // Who reads only the beginning of the timetable gets the whole campaign.
+    let mut read = Ok(());
     for flight in &mission.flights {
         let show = Show::of_plan(&flight.plan);
         let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few);
-        if !context.json {
+        if !context.json && read.is_ok() {
             let is_example = args.mission.is_example(&flight.plan.site)?;
-            context.print(&words::wrap(
-                &timetable::describe(&flight.plan, context.width, is_example),
-                context.width,
-            ))?;
-            context.print("\n")?;
+            let told = timetable::describe(&flight.plan, context.width, is_example);
+            read = context.print(&format!("{}\n", words::wrap(&told, context.width)));
+            if !matches!(read, Ok(()) | Err(CommandError::BrokenPipe)) {
+                return read.map(|()| Exit::Done);
+            }
         }
         say_findings(context, &report, &args.allow);
         safe &= is_safe(&report, &args.allow);
@@ -98,6 +100,7 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         let _lock = context.lock(&folder)?;
         write(context, &mission, &reports, &folder, args.force)?;
     }
+    read?;
     if context.json {
         context.print_json(&PlanOutput {
             schema: "updraft.plan-output/1",

@@ -180,3 +180,18 @@ fn the_timetable_has_no_gaps_where_ramps_are() {
     assert!(planned.out.contains("to +3.50"), "{planned}");
     assert!(planned.err.contains("hovers (group all) are too short"), "{planned}");
 }
+
+#[test]
+#[cfg(unix)]
+fn who_reads_only_the_beginning_gets_the_whole_campaign() {
+    let bench = Bench::new();
+    let program = env!("CARGO_BIN_EXE_updraft");
+    let line = format!("'{program}' plan campaign --grid 1x2 -o campaign | head -1");
+    let mut shell = std::process::Command::new("sh");
+    let ended = shell.args(["-c", &line]).current_dir(bench.path("")).output().unwrap();
+    assert!(ended.status.success());
+    assert!(
+        bench.path("campaign/campaign.json").exists(),
+        "the reader has gone, and so has the plan"
+    );
+}

@@ -76,6 +76,7 @@ pub(in crate::cli) fn fly_now(
     crew.on_interrupt = lead.interrupt.on_interrupt;
     context.say(AUTHORIZED);
     let alarms = crew.watch(&mut start)?;
+    crew.clear_start(&mut start)?;
     Ok((landed(context, crew, &alarms), alarms))
 }
 

@@ -97,6 +97,23 @@ impl<'a> Crew<'a> {
 
     /// Takes a start back, for as long as it takes everyone to hear it.
     pub(in crate::cli) fn cancel(&mut self, start: &mut Start) -> Result<(), CommandError> {
+        self.tell_of_no_start(start)?;
+        self.finish_orders()?;
+        self.withdraw_start();
+        self.try_note("cancelled", &BTreeMap::new());
+        Ok(())
+    }
+
+    /// Clears a start that was flown once everyone is down: an authorization that stays on a drone
+    /// stands in the way of the next flight.
+    pub(in crate::cli) fn clear_start(&mut self, start: &mut Start) -> Result<(), CommandError> {
+        if self.drones().into_iter().all(|drone| self.ended(drone).is_down()) {
+            self.tell_of_no_start(start)?;
+        }
+        Ok(())
+    }
+
+    fn tell_of_no_start(&mut self, start: &mut Start) -> Result<(), CommandError> {
         start.cancel(self.net.now());
         for _ in 0..5 {
             self.net.broadcast(&start.packet())?;
@@ -105,9 +122,6 @@ impl<'a> Crew<'a> {
                 self.telemetry.on_message(self.net.now(), &received);
             }
         }
-        self.finish_orders()?;
-        self.withdraw_start();
-        self.try_note("cancelled", &BTreeMap::new());
         Ok(())
     }
 
