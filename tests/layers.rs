@@ -16,7 +16,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("log", &["base"]),
     ("link", &["base"]),
     ("protocol", &["base"]),
-    ("skybrush_server", &["base", "link"]),
+    ("skybrush_server", &["base", "link", "protocol"]),
     ("campaign", &["base", "vehicle", "mission", "show", "check"]),
     (
         "fleet",
