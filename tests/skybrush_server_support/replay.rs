@@ -109,7 +109,9 @@ impl Replay {
     /// What was not asked for as recorded; nothing: all was.
     pub(crate) fn surprises(&self) -> Vec<String> {
         let recording = self.recording.lock().unwrap();
-        let left = recording.steps.iter().map(|step| format!("not asked: {}", step.request));
+        // How often lists of logs are asked for hangs on when the downloads end.
+        let left = recording.steps.iter().filter(|step| step.request["type"] != "LOG-INF");
+        let left = left.map(|step| format!("not asked: {}", step.request));
         recording.surprises.iter().cloned().chain(left).collect()
     }
 }
