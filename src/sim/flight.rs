@@ -125,7 +125,7 @@ pub fn fly_beyond<W: Write>(
     let takeoff_s = takeoff_time_s(setup.trajectory, setup.vehicle.autopilot.wpnav_speed_up_mps)
         .ok_or(SimError::NoTakeoff { drone: setup.drone, height_m: p::SHOW_TAKEOFF_ALT })?;
     let mut recorder =
-        LogRecorder::new(out, setup, armed_at_us(takeoff_s), false).map_err(log_error)?;
+        LogRecorder::new(out, setup, armed_at_us(takeoff_s), false, None).map_err(log_error)?;
     let mut flight = Flight::beyond(setup, beyond)?;
     flight.step_until(f64::INFINITY, &mut recorder)?;
     let mut summary = flight.finish()?;

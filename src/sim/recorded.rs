@@ -7,6 +7,7 @@ use super::error::SimError;
 use super::flight::{FlightSetup, FlightSummary};
 use super::flying::Flight;
 use super::recorder::LogRecorder;
+use crate::base::time::GpsTime;
 
 /// A flight whose log is taken away as it grows. All its pieces together are what
 /// [`super::fly`] writes, for a flight that nobody disturbed.
@@ -34,25 +35,35 @@ impl Write for Tap {
 }
 
 impl<'a> RecordedFlight<'a> {
-    /// Arms at this show time (s), or when the firmware does by itself, whichever is later.
+    /// Arms at this show time (s), or when the firmware does by itself, whichever is later. Board time
+    /// in its log counts from `booted`, or from a time of the seed's.
     ///
     /// # Errors
     /// See [`SimError`].
-    pub fn armed(setup: &FlightSetup<'a>, armed_s: Option<f64>) -> Result<Self, SimError> {
-        Self::of(setup, Flight::armed(setup, armed_s)?)
+    pub fn armed(
+        setup: &FlightSetup<'a>,
+        armed_s: Option<f64>,
+        booted: Option<GpsTime>,
+    ) -> Result<Self, SimError> {
+        Self::of(setup, Flight::armed(setup, armed_s)?, booted)
     }
 
-    /// Arms at show time 0 in GUIDED: see [`Flight::guided`].
+    /// Arms at show time 0 in GUIDED: see [`Flight::guided`]; `booted` as in [`Self::armed`].
     ///
     /// # Errors
     /// See [`SimError`].
-    pub fn guided(setup: &FlightSetup<'a>) -> Result<Self, SimError> {
-        Self::of(setup, Flight::guided(setup)?)
+    pub fn guided(setup: &FlightSetup<'a>, booted: Option<GpsTime>) -> Result<Self, SimError> {
+        Self::of(setup, Flight::guided(setup)?, booted)
     }
 
-    fn of(setup: &FlightSetup<'a>, flight: Flight<'a>) -> Result<Self, SimError> {
+    fn of(
+        setup: &FlightSetup<'a>,
+        flight: Flight<'a>,
+        booted: Option<GpsTime>,
+    ) -> Result<Self, SimError> {
         let tap = Tap::default();
-        let recorder = LogRecorder::new(tap.clone(), setup, flight.armed_us(), flight.is_guided())
+        let (armed_us, is_guided) = (flight.armed_us(), flight.is_guided());
+        let recorder = LogRecorder::new(tap.clone(), setup, armed_us, is_guided, booted)
             .map_err(|source| SimError::Log { drone: setup.drone, source })?;
         Ok(Self { flight, recorder: Some(recorder), tap, drone: setup.drone })
     }

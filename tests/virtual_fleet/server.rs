@@ -13,7 +13,6 @@ use updraft::link::net::Net as _;
 use updraft::link::station::{STATION, Setup, Station};
 use updraft::protocol::show::{LEAVE_TIME, SHOW_FILE, StartConfig, Status, TO_DRONE};
 use updraft::show::ShowDrone;
-use updraft::sim::fly;
 use updraft::virtual_fleet::broadcast::Broadcasts;
 use updraft::virtual_fleet::lossy::Faults;
 use updraft::virtual_fleet::server::{
@@ -23,7 +22,7 @@ use updraft::virtual_fleet::storage::MemoryStorage;
 use updraft::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use updraft::virtual_fleet::world::World;
 
-use super::support::{Field, file, gps_at, ladder, read, show_of, tow_at};
+use super::support::{Field, file, gps_at, ladder, log_of, read, show_of, tow_at};
 
 pub(crate) struct Wall(Instant);
 
@@ -145,9 +144,9 @@ fn fly_fleet(count: u8, show: impl Fn([f64; 2]) -> ShowDrone, pace: Pace, faults
         if system == 1 || faults.loss == 0.0 && count < 10 {
             let [x, y] = slot_m(system);
             let flown = updraft::show::skyb::read(&file(&show([x, y]))).unwrap().drone;
-            let mut log = Vec::new();
             let home_m = Vector3::new(x, y, 0.0);
-            fly(&field.flight(&flown, system.into(), home_m, gps_at(start_s)), &mut log).unwrap();
+            let setup = field.flight(&flown, system.into(), home_m, gps_at(start_s));
+            let log = log_of(&setup, vehicle.booted().unwrap());
             let written = read(vehicle.storage.as_ref(), "logs/00000001.BIN");
             assert!(log == written, "drone {system}: the logs differ");
         }

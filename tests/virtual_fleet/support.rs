@@ -12,7 +12,7 @@ use updraft::link::net::Net as _;
 use updraft::protocol::show::{FROM_DRONE, SHOW_FILE, StartConfig, Status, TO_DRONE};
 use updraft::show::skyb::{self, SkybOptions};
 use updraft::show::{Path, Segment, ShowDrone, Trajectory};
-use updraft::sim::{FlightSetup, Hooks, Uniform};
+use updraft::sim::{FlightSetup, Hooks, RecordedFlight, Uniform};
 use updraft::vehicle::Vehicle;
 use updraft::vehicle::library::builtin;
 use updraft::virtual_fleet::lossy::{Faults, LossyNet};
@@ -21,7 +21,7 @@ use updraft::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use updraft::virtual_fleet::world::World;
 
 const TOW_AT_0: u32 = 100_000;
-const GPS_AT_0: GpsTime = GpsTime { week: 2445, tow_ms: TOW_AT_0 * 1000 };
+pub(crate) const GPS_AT_0: GpsTime = GpsTime { week: 2445, tow_ms: TOW_AT_0 * 1000 };
 
 pub(crate) struct Field {
     vehicle: Vehicle,
@@ -64,6 +64,13 @@ impl Field {
             hooks: Hooks::default(),
         }
     }
+}
+
+/// The log of a flight without any radio.
+pub(crate) fn log_of(setup: &FlightSetup<'_>, booted: GpsTime) -> Vec<u8> {
+    let mut flight = RecordedFlight::armed(setup, None, Some(booted)).unwrap();
+    assert!(flight.step_until(600.0).unwrap(), "it has not landed");
+    flight.take_log()
 }
 
 /// Climbs at 1 m/s, waits 3 s, and comes down to 2.5 m in 5 s.

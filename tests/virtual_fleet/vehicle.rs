@@ -1,14 +1,15 @@
 //! One vehicle, and nine, in simulated time.
 
 use nalgebra::Vector3;
+use updraft::flight::identity::identify;
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavResult};
 use updraft::link::net::Net as _;
+use updraft::log::Log;
 use updraft::protocol::show::{self, Stage, flag, preflight};
-use updraft::sim::fly;
 use updraft::virtual_fleet::vehicle::BootTimes;
 
-use super::support::{Crew, Field, file, show_of, sideways};
+use super::support::{Crew, Field, GPS_AT_0, file, log_of, show_of, sideways};
 
 #[test]
 fn it_boots_as_the_firmware_does() {
@@ -148,10 +149,12 @@ fn it_flies_the_stages_of_the_firmware_and_logs_what_simulate_does() {
     // The same flight without any radio.
     let show = show_of([0.0, 0.0], 12.0);
     let flown = updraft::show::skyb::read(&file(&show)).unwrap().drone;
-    let mut log = Vec::new();
     let setup = field.flight(&flown, 1, Vector3::zeros(), crew.start_time(start));
-    fly(&setup, &mut log).unwrap();
+    let log = log_of(&setup, GPS_AT_0);
     assert!(crew.log(1, "00000001.BIN") == log, "the logs differ");
+    // Its board time counts from when it was switched on, as its messages do.
+    let booted = identify(&Log::from_bytes(log)).boots[0].booted.unwrap();
+    assert!((booted.total_ms() - GPS_AT_0.total_ms()).abs() < 50, "{booted:?}");
 }
 
 #[test]

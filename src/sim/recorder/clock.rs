@@ -22,12 +22,24 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// The clocks of one drone that arms at a show time; boot time is drawn from the seed.
-    pub(super) fn new(seed: u64, drone: u16, armed_us: i64, start: GpsTime) -> Self {
+    /// The clocks of one drone that arms at a show time. When it was switched on is drawn from the seed
+    /// unless it is known.
+    pub(super) fn new(
+        seed: u64,
+        drone: u16,
+        armed_us: i64,
+        start: GpsTime,
+        booted: Option<GpsTime>,
+    ) -> Self {
+        let start_ms = start.total_ms();
+        if let Some(booted) = booted {
+            let offset_us = (start_ms - booted.total_ms()).saturating_mul(1000);
+            return Self { offset_us, start_ms };
+        }
         let mut rng = stream(seed, u64::from(drone), Purpose::Spread);
         let (least, most) = BOOT_BEFORE_ARMING_US;
         let since_boot_us = least + rng.next_u64() % (most - least);
-        Self { offset_us: since_boot_us as i64 - armed_us, start_ms: start.total_ms() }
+        Self { offset_us: since_boot_us as i64 - armed_us, start_ms }
     }
 
     /// Board time (TimeUS) of a show time, us.
@@ -55,7 +67,7 @@ mod tests {
     #[test]
     fn gives_five_fixes_a_second_also_over_the_end_of_a_week() {
         let start = GpsTime { week: 2445, tow_ms: 604_798_001 };
-        let clock = Clock::new(1, 1, -8_000_000, start);
+        let clock = Clock::new(1, 1, -8_000_000, start, None);
         let fixes: Vec<_> =
             (0..1600).filter_map(|step| clock.fix(i64::from(step) * 2_500, 2_500)).collect();
         assert_eq!(fixes.len(), 20);
@@ -67,8 +79,16 @@ mod tests {
     #[test]
     fn boots_differ_between_drones() {
         let start = GpsTime { week: 2445, tow_ms: 0 };
-        let boot = |drone| Clock::new(1, drone, 0, start).board_us(0);
+        let boot = |drone| Clock::new(1, drone, 0, start, None).board_us(0);
         assert_ne!(boot(1), boot(2));
         assert!(boot(1) >= 60_000_000);
+    }
+
+    #[test]
+    fn a_boot_that_is_known_is_board_time_0() {
+        let start = GpsTime { week: 2445, tow_ms: 30_000 };
+        let booted = GpsTime { week: 2444, tow_ms: WEEK_MS as u32 - 1_500 };
+        let clock = Clock::new(1, 1, -8_000_000, start, Some(booted));
+        assert_eq!(clock.board_us(0), 31_500_000);
     }
 }

@@ -9,6 +9,7 @@ use super::full::{self, Full};
 use super::lights::Lights;
 use super::view::View;
 use super::{Moment, Recorder, control, navigation, start};
+use crate::base::time::GpsTime;
 use crate::log::{LogWriter, MessageDef, catalog};
 use crate::sim::flight::{FlightSetup, STEP_S, STEP_US};
 
@@ -32,14 +33,16 @@ pub struct LogRecorder<'a, W: Write> {
 
 impl<'a, W: Write> LogRecorder<'a, W> {
     /// Starts the log of a flight that arms at this show time (us): definitions and first rows. A
-    /// guided vehicle's log knows no show.
+    /// guided vehicle's log knows no show. Its board time counts from `booted`, or from a time of the
+    /// seed's.
     pub(in crate::sim) fn new(
         out: W,
         setup: &FlightSetup<'a>,
         armed_us: i64,
         is_guided: bool,
+        booted: Option<GpsTime>,
     ) -> io::Result<Self> {
-        let clock = Clock::new(setup.seed, setup.drone, armed_us, setup.start);
+        let clock = Clock::new(setup.seed, setup.drone, armed_us, setup.start, booted);
         let view = View::new(&setup.frame, setup.home_m);
         let board_us = clock.board_us(armed_us);
         let mut log = LogWriter::with_time(

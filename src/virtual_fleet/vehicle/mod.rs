@@ -195,6 +195,11 @@ impl<'w> VirtualVehicle<'w> {
         now.saturating_sub(self.boot_at)
     }
 
+    /// When it was switched on: what its messages count from, and its log.
+    pub fn booted(&self) -> Option<GpsTime> {
+        GpsTime::from_total_ms(self.world.gps_us(self.boot_at).div_euclid(1000))
+    }
+
     fn gps(&self, now: Micros) -> Option<GpsTime> {
         let gps_ms = self.world.gps_us(now).div_euclid(1000);
         (self.age(now) >= self.setup.boot.gps).then(|| GpsTime::from_total_ms(gps_ms))?
