@@ -66,5 +66,8 @@ mod scan;
 mod simulate;
 #[path = "cli/tables.rs"]
 mod tables;
+#[cfg(unix)]
+#[path = "cli/terminal.rs"]
+mod terminal;
 #[path = "cli/words.rs"]
 mod words;

@@ -17,7 +17,8 @@ use updraft::link::station::{Setup, Station};
 use crate::drones::Wall;
 use crate::fleet::free_port;
 use crate::guided::{Flight, flown, modes, stage};
-use crate::support::{Bench, Ended};
+use crate::support::Bench;
+use crate::terminal::on_a_terminal;
 
 /// A flight of some minutes.
 const LONG: &[&str] = &["--speeds", "1,2", "--leg", "12", "--hover", "60", "--baseline", "20"];
@@ -238,41 +239,6 @@ fn signals_end_every_command_and_nohup_is_respected() {
     assert_eq!(child.wait().unwrap().code(), Some(5), "it goes on and hears nobody");
 }
 
-/// Types into the program's terminal what `script` is given; `None`: there is no such program.
-#[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
-fn on_a_terminal(bench: &Bench, args: &[&str], typed: &str) -> Option<Ended> {
-    use std::io::Write as _;
-    let words: Vec<String> = args.iter().map(|word| format!("'{word}'")).collect();
-    let program = env!("CARGO_BIN_EXE_updraft");
-    let line = format!("trap : INT; '{program}' {}; echo ended with $?", words.join(" "));
-    let mut command = Command::new("script");
-    command.args(["-q", "-e", "-f", "-c", &line, "typescript"]).current_dir(bench.path(""));
-    let child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-    let Ok(mut child) = child else { return None };
-    let mut keys = child.stdin.take().unwrap();
-    let said = || {
-        let bytes = fs::read(bench.path("typescript")).unwrap_or_default();
-        String::from_utf8_lossy(&bytes).into_owned()
-    };
-    let begun = Instant::now();
-    let wait = |text: &str| {
-        while !said().contains(text) {
-            assert!(begun.elapsed() < Duration::from_mins(2), "no {text:?}:\n{}", said());
-            std::thread::sleep(Duration::from_millis(50));
-        }
-    };
-    wait("drone 2: performing");
-    keys.write_all(b"\x03").unwrap();
-    wait("be left flying (f)?");
-    keys.write_all(typed.as_bytes()).unwrap();
-    // Its first line shows the command.
-    wait("ended with 1");
-    drop(keys);
-    let _ = child.kill();
-    let _ = child.wait();
-    Some(Ended { code: None, out: String::new(), err: said() })
-}
-
 #[test]
 fn on_a_terminal_ctrl_c_asks_what_the_drones_do() {
     for (typed, said, wanted) in [
@@ -281,11 +247,12 @@ fn on_a_terminal_ctrl_c_asks_what_the_drones_do() {
         ("f\n", "the drones fly on by themselves", "DRONE_SHOW"),
     ] {
         let (bench, _fleet, link) = stage(&["--speed", "5"]);
-        let Some(ended) = on_a_terminal(&bench, &shown(&link, &["--no-logs"]), typed) else {
+        let talk = [("drone 2: performing", "\x03"), ("be left flying (f)?", typed)];
+        let Some((code, told)) = on_a_terminal(&bench, &shown(&link, &["--no-logs"]), &talk) else {
             return;
         };
-        assert!(ended.err.contains(said), "{typed:?}: {ended}");
-        assert!(ended.err.contains("ended with 130"), "{ended}");
+        assert!(told.contains(said), "{typed:?}: {told}");
+        assert_eq!(code, 130, "{told}");
         assert_eq!(modes(&bench, &link), [wanted; 2], "{typed:?}");
     }
 }

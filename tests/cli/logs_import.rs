@@ -8,6 +8,8 @@ use updraft::flight::Identity;
 
 use crate::analyze_inputs::campaign;
 use crate::support::{Bench, Ended};
+#[cfg(unix)]
+use crate::terminal::on_a_terminal;
 
 /// The campaign of the other tests, with its logs as if real drones had flown it.
 fn flown() -> Bench {
@@ -210,6 +212,42 @@ fn cards_are_imported_into_the_flights_they_are_of() {
     let json = bench.expect(0, &[&import[..], &["--json"]].concat()).json("updraft.import/1");
     assert_eq!(json["there"].as_array().unwrap().len(), 4, "{json}");
     assert_eq!(json["flights"][1]["logs"][0]["card"], "cards/drone-2/00000009.BIN");
+}
+
+#[cfg(unix)]
+#[test]
+fn on_a_terminal_doubts_are_asked() {
+    let bench = flown();
+    let hover = bench.path("campaign/hover");
+    let start = start_of(&hover.join("logs/01.BIN"));
+    cards(&bench);
+    let import = ["logs", "import", "campaign", "cards", "--color", "never"];
+    // What is no answer is asked again; none leaves the doubt.
+    let question = "When did hover begin?";
+    let talk = [(question, ""), ("Type 1 to 2, or none:", "3\nnone\n")];
+    let Some((code, told)) = on_a_terminal(&bench, &import, &talk) else { return };
+    assert_eq!(told.matches("Type 1 to 2, or none:").count(), 2, "{told}");
+    assert_eq!(code, 3, "{told}");
+    assert!(told.contains("hover was flown several times"), "{told}");
+    assert!(!hover.join("logs/01.BIN").exists());
+    let (code, told) = on_a_terminal(&bench, &import, &[("or none:", "2\n")]).unwrap();
+    assert!(told.contains(question) && told.contains("2: "), "{told}");
+    assert_eq!(code, 0, "{told}");
+    for log in ["01.BIN", "02.BIN"] {
+        assert_eq!(start_of(&hover.join("logs").join(log)), start);
+    }
+    // Two logs of one drone and start: which is meant?
+    fs::remove_file(hover.join("logs/01.BIN")).unwrap();
+    let card = bench.path("cards/drone-2");
+    let mut other = fs::read(card.join("00000009.BIN")).unwrap();
+    *other.last_mut().unwrap() ^= 1;
+    fs::write(card.join("00000010.BIN"), other).unwrap();
+    let named = [&import[..], &["--flight", "hover"]].concat();
+    let talk = [("or none:", "2\n"), ("of slot 1 of hover?", "1\n")];
+    let (code, told) = on_a_terminal(&bench, &named, &talk).unwrap();
+    assert!(told.contains("1: cards/drone-2/00000009.BIN, drone 1, from "), "{told}");
+    assert_eq!(code, 0, "{told}");
+    assert!(hover.join("logs/01.BIN").exists());
 }
 
 #[test]

@@ -224,7 +224,7 @@ impl Work<'_> {
         }
     }
 
-    /// Of several logs of one start the one that flew the plan, if the others flew something else.
+    /// Of several logs of one start those that flew the plan, if the others flew something else.
     fn fittest(&self, flight: usize, logs: Vec<usize>) -> Vec<usize> {
         let Some((start, _)) = self.decision.starts[flight].filter(|_| logs.len() > 1) else {
             return logs;
@@ -237,7 +237,7 @@ impl Work<'_> {
         };
         let whole: Vec<usize> = logs.iter().copied().filter(|log| share(log) >= WHOLE).collect();
         let rest = logs.iter().filter(|log| !whole.contains(log)).map(share).fold(0.0, f64::max);
-        if whole.len() == 1 && rest < WHOLE - 0.25 { whole } else { logs }
+        if !whole.is_empty() && rest < WHOLE - 0.25 { whole } else { logs }
     }
 
     /// The slot of a log that flew a flight's plan, nobody knows when.
