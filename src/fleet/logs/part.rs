@@ -13,6 +13,7 @@ use sha2::{Digest as _, Sha256};
 use crate::base::crc::{ApCrc32, ap_crc32};
 use crate::base::file::FileError;
 use crate::base::plain::Shown as _;
+use crate::base::private::open_own;
 use crate::fleet::intervals::Intervals;
 use crate::fleet::sink::Sink;
 use crate::link::clock::{Micros, S};
@@ -81,14 +82,14 @@ impl PartFile {
     /// # Errors
     /// When the files cannot be opened or written.
     pub fn open(path: &Path, identity: &str) -> Result<Self, FileError> {
-        let open = |path: &Path| {
-            let mut options = OpenOptions::new();
-            options.read(true).write(true).create(true).truncate(false);
-            options.open(path).map_err(|source| FileError::new("open", path, source))
-        };
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).create(true).truncate(false);
+        let fail = |path: &Path, source| FileError::new("open", path, source);
         let identity = identity.replace(['\n', '\r'], " ");
-        let file = open(&part_path(path))?;
-        let mut journal = open(&journal_path(path))?;
+        let (part, journal) = (part_path(path), journal_path(path));
+        let file = options.open(&part).map_err(|source| fail(&part, source))?;
+        let mut journal =
+            open_own(&journal, &mut options).map_err(|source| fail(&journal, source))?;
         let read = |source| FileError::new("read", &journal_path(path), source);
         let mut bytes = Vec::new();
         (&mut journal).take(MOST_JOURNAL).read_to_end(&mut bytes).map_err(read)?;
@@ -431,6 +432,23 @@ mod tests {
         assert_eq!(part.have().total(), 13);
         let other = PartFile::open(&path, "drone=2 source=a").unwrap();
         assert_eq!(other.have().total(), 0);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn its_journal_is_its_users_alone() {
+        use std::os::unix::fs::{PermissionsExt as _, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("01.BIN");
+        PartFile::open(&path, "drone 1 log 1").unwrap();
+        let mode = fs::metadata(journal_path(&path)).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode, 0o600);
+        let (victim, path) = (folder.path().join("victim"), folder.path().join("02.BIN"));
+        fs::write(&victim, "precious").unwrap();
+        symlink(&victim, journal_path(&path)).unwrap();
+        let error = PartFile::open(&path, "drone 2 log 1").unwrap_err();
+        assert!(error.to_string().contains("open"), "{error}");
+        assert_eq!(fs::read(&victim).unwrap(), b"precious");
     }
 
     #[test]
