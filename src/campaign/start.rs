@@ -46,7 +46,8 @@ pub struct StartedDrone {
     pub slot: u16,
     /// The drone: system id, network:system, or Skybrush Server's name of it.
     pub drone: String,
-    /// Checksum of the show that it was given, as ArduPilot computes it; absent: it has no file.
+    /// Checksum of the show that it was given, as ArduPilot computes it; absent: it has no file, or one
+    /// that Skybrush Server made of our show, with bytes of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub show_crc32: Option<u32>,
     /// When it was switched on, by its own clock; absent: it has not said so.

@@ -3,6 +3,8 @@
 use std::time::{Duration, Instant};
 
 use crate::link::clock::{Clock, Micros};
+#[cfg(debug_assertions)]
+use crate::link::clock::{MS, S};
 
 /// Measures how long a step takes, for people.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +26,16 @@ impl Stopwatch {
 /// Prints the time since the start: `340 ms`, `12.3 s`, `2 min 5 s`.
 impl std::fmt::Display for Stopwatch {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let seconds = self.elapsed().as_secs_f64();
+        Spent(self.elapsed()).fmt(f)
+    }
+}
+
+/// A time that was spent, for people.
+pub(super) struct Spent(pub(super) Duration);
+
+impl std::fmt::Display for Spent {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let seconds = self.0.as_secs_f64();
         if seconds < 1.0 {
             write!(f, "{:.0} ms", seconds * 1000.0)
         } else if seconds < 60.0 {
@@ -56,5 +67,60 @@ impl Clock for SystemClock {
     fn unix_us(&self) -> u64 {
         let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         since.map_or(0, |since| since.as_micros() as u64)
+    }
+}
+
+/// A clock that stands still while the program works, and for which all waiting is over at once: for
+/// tests of what takes minutes. It begins at a time of its own, and is shared by all programs of a test:
+/// it is as many milliseconds further as its file is long.
+#[cfg(debug_assertions)]
+#[derive(Clone, Debug)]
+pub(super) struct TrialClock {
+    unix_s: u64,
+    file: std::sync::Arc<std::fs::File>,
+    begun_ms: u64,
+}
+
+#[cfg(debug_assertions)]
+impl TrialClock {
+    /// From `UNIX_S:FILE`.
+    ///
+    /// # Errors
+    /// When there is no such file, or no time before it.
+    pub(super) fn parse(text: &str) -> Result<Self, String> {
+        let (unix_s, path) = text.split_once(':').ok_or("UNIX_S:FILE is meant")?;
+        let unix_s = unix_s.parse().map_err(|_| "its time is no number of seconds".to_owned())?;
+        let file = std::fs::File::options().write(true).open(path);
+        let file = std::sync::Arc::new(file.map_err(|error| format!("{path}: {error}"))?);
+        let begun_ms = length(&file);
+        Ok(Self { unix_s, file, begun_ms })
+    }
+}
+
+#[cfg(debug_assertions)]
+fn length(file: &std::fs::File) -> u64 {
+    file.metadata().map_or(0, |data| data.len())
+}
+
+#[cfg(debug_assertions)]
+impl Clock for TrialClock {
+    fn now(&self) -> Micros {
+        (length(&self.file).saturating_sub(self.begun_ms)) * MS
+    }
+
+    fn unix_us(&self) -> u64 {
+        self.unix_s * S + length(&self.file) * MS
+    }
+
+    fn pause(&self, time: Duration) {
+        let further = length(&self.file) + time.as_millis() as u64;
+        if self.file.set_len(further).is_err() {
+            std::thread::sleep(time);
+        }
+    }
+
+    fn waited(&self, time: Duration) {
+        // Somebody else has worked meanwhile, for as long as it took.
+        let _ = self.file.set_len(length(&self.file) + time.as_millis() as u64);
     }
 }

@@ -8,11 +8,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::Serialize;
 
 use super::Global;
+use super::clock::SystemClock;
 use super::exit::CommandError;
 use super::signals::Signals;
 use crate::base::file::sweep_below;
 use crate::base::plain::{Shown as _, for_terminal, json_for_terminal};
 use crate::campaign::lock::FolderLock;
+use crate::link::clock::Clock;
 
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
@@ -31,6 +33,36 @@ pub(super) struct Context {
     signals: Signals,
     /// Whether something was said that must be said even when quiet.
     insisted: Arc<AtomicBool>,
+    clock: RunClock,
+}
+
+/// The clock of a run.
+#[derive(Clone)]
+struct RunClock(Arc<dyn Clock>);
+
+impl std::fmt::Debug for RunClock {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("RunClock")
+    }
+}
+
+impl Default for RunClock {
+    fn default() -> Self {
+        Self(Arc::new(SystemClock::start()))
+    }
+}
+
+impl RunClock {
+    #[cfg(debug_assertions)]
+    fn of(global: &Global) -> Self {
+        let trial = global.trial_clock.clone();
+        trial.map_or_else(Self::default, |clock| Self(Arc::new(clock)))
+    }
+
+    #[cfg(not(debug_assertions))]
+    fn of(_global: &Global) -> Self {
+        Self::default()
+    }
 }
 
 impl Context {
@@ -52,6 +84,7 @@ impl Context {
             width: columns(),
             signals,
             insisted: Arc::default(),
+            clock: RunClock::of(global),
         };
         if let Err(error) = installed {
             context.warn(&format!("Ctrl-C ends the program at once ({error})"));
@@ -70,7 +103,13 @@ impl Context {
             width: None,
             signals: Signals::default(),
             insisted: Arc::default(),
+            clock: RunClock::default(),
         }
+    }
+
+    /// The time of this run.
+    pub(super) fn clock(&self) -> &Arc<dyn Clock> {
+        &self.clock.0
     }
 
     /// Ctrl-C and its like.

@@ -112,6 +112,10 @@ pub struct Global {
         hide_env_values = true
     )]
     no_progress: bool,
+    /// For tests: what goes through Skybrush Server goes by this clock
+    #[cfg(debug_assertions)]
+    #[arg(long, global = true, hide = true, value_parser = clock::TrialClock::parse)]
+    trial_clock: Option<clock::TrialClock>,
 }
 
 /// When to use colours.

@@ -1,5 +1,7 @@
 //! Time on the link: microseconds since the program's start, from an injected clock.
 
+use std::time::Duration;
+
 /// Microseconds of link time; never goes back.
 pub type Micros = u64;
 
@@ -15,4 +17,12 @@ pub trait Clock: Send + Sync {
 
     /// Unix time, us; may be set back by the user.
     fn unix_us(&self) -> u64;
+
+    /// Waits.
+    fn pause(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
+
+    /// So long was waited for somebody else: a clock that goes by itself knows.
+    fn waited(&self, _time: Duration) {}
 }

@@ -133,9 +133,8 @@ impl Client {
                     self.lines.push(&buffer[..size]).map_err(|_| ServerError::TooLong { most })?;
                 }
                 Err(error) => match error.kind() {
-                    io::ErrorKind::WouldBlock
-                    | io::ErrorKind::TimedOut
-                    | io::ErrorKind::Interrupted => {}
+                    io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => self.clock.waited(LOOK),
+                    io::ErrorKind::Interrupted => {}
                     _ => return Err(broken(error)),
                 },
             }

@@ -95,16 +95,17 @@ pub fn obstacles(state: &State, step: Step, now_unix_s: f64, needs: &Needs) -> V
 /// Mode, stage, show and start time.
 fn of_show_mode(state: &State, step: Step, now_unix_s: f64) -> Option<String> {
     let mode = state.mode.as_str();
-    if mode != "show" {
-        return Some(match mode {
-            "" => {
-                "does not tell its flight mode: is it heard, and has it show firmware?".to_owned()
-            }
-            _ => format!(
-                "is not in show mode, but in mode {mode}: switch it to show mode (its remote \
-                 control, or Skybrush Live)"
-            ),
-        });
+    if !state.is_in_show_mode() {
+        if mode.is_empty() {
+            let silent = "does not tell its flight mode: is it heard, and has it show firmware?";
+            return Some(silent.to_owned());
+        }
+        // The server tells the number of a mode that it has no name for: "mode 5".
+        let word = if mode.starts_with("mode ") { "" } else { "mode " };
+        return Some(format!(
+            "is not in show mode, but in {word}{mode}: switch it to show mode (its remote control, or \
+             Skybrush Live)"
+        ));
     }
     let Some(show) = &state.show else {
         return Some("tells nothing of its show: it sends no show status".to_owned());
@@ -217,6 +218,7 @@ mod tests {
             let _ = writeln!(said, "{}", of(&state, Step::Ready));
         };
         with(&|state| state.mode = "rth".to_owned());
+        with(&|state| state.mode = "mode 5".to_owned());
         with(&|state| state.mode = String::new());
         with(&|state| state.show = None);
         with(&|state| state.codes = BTreeSet::new());
@@ -232,6 +234,17 @@ mod tests {
         with(&|state| state.battery_percent = Some(40.0));
         with(&|state| *state = State::default());
         insta::assert_snapshot!(said);
+    }
+
+    /// The server has no names for the modes of a firmware that it does not know yet.
+    #[test]
+    fn the_number_of_the_show_mode_is_the_show_mode() {
+        let by_number = |mode: &str, line: &str| State { mode: mode.to_owned(), ..drone(line) };
+        let waits = "[-00:00:25] Not authorized to start";
+        assert_eq!(of(&by_number("mode 127", waits), Step::Set(START)), "");
+        assert!(of(&by_number("mode 12", waits), Step::Set(START)).contains("but in mode 12:"));
+        assert!(of(&by_number("mode ", waits), Step::Set(START)).contains("is not in show mode"));
+        assert_eq!(of(&by_number("mode 127", "[---:--:--] Landed"), Step::Ready), "");
     }
 
     #[test]

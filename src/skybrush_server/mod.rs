@@ -20,6 +20,6 @@ mod work;
 pub use client::Client;
 pub use error::ServerError;
 pub use logs::{LogEntry, fetch_log, list_logs, log_bytes, log_entries};
-pub use show::{StartConfig, end_flight, mode, show_mode};
+pub use show::{Authorized, StartConfig, end_flight, mode, show_mode};
 pub use upload::{Fence, ShowUpload, upload};
 pub use work::{Foreman, Job, Outcome, Running};

@@ -53,11 +53,31 @@ impl Client {
         self.ask(&start.body()).map(|_| ())
     }
 
-    /// What the server would start, as it tells it.
-    pub fn start(&mut self) -> Result<Value, ServerError> {
-        let mut answer = self.ask(&json!({ "type": "SHOW-CFG" }))?;
-        Ok(answer.get_mut("configuration").map(Value::take).unwrap_or_default())
+    /// The start that is authorized, if one is.
+    ///
+    /// # Errors
+    /// When the server does not say whether there is one.
+    pub fn authorized(&mut self) -> Result<Option<Authorized>, ServerError> {
+        let answer = self.ask(&json!({ "type": "SHOW-CFG" }))?;
+        let start = answer.pointer("/configuration/start");
+        let is_authorized = start.and_then(|start| start.get("authorized")?.as_bool());
+        let is_authorized = is_authorized.ok_or_else(|| ServerError::Answer {
+            what: "SHOW-CFG".to_owned(),
+            problem: "it does not say whether a start is authorized".to_owned(),
+        })?;
+        let unix_s = start.and_then(|start| start.get("time")?.as_f64());
+        let when = unix_s.map_or(Authorized::Anyhow, |unix_s| Authorized::At(unix_s as i64));
+        Ok(is_authorized.then_some(when))
     }
+}
+
+/// A start that the server lets the drones take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Authorized {
+    /// At this Unix time, s.
+    At(i64),
+    /// By hand, or by a clock of the server's own.
+    Anyhow,
 }
 
 /// The request that sends drones home, or lets them land where they are.

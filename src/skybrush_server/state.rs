@@ -7,6 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use super::watch::codes;
+use crate::protocol::show::SHOW_MODE;
 
 /// A drone as the server sees it. What it does not tell is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,11 +49,22 @@ impl State {
         }
     }
 
+    /// Whether it is in show mode.
+    pub fn is_in_show_mode(&self) -> bool {
+        is_show_mode(&self.mode)
+    }
+
     /// One of the server's own virtual drones: it flies whatever it was sent, in a mode that a
     /// show drone never has, and says nothing about it.
     pub fn is_make_believe(&self) -> bool {
         self.mode == "mission" && self.show.is_none()
     }
+}
+
+/// Whether the server's word for a flight mode is the show mode: it tells numbers of modes that it has
+/// no name for, as long as it has not found out which firmware a drone has.
+pub(super) fn is_show_mode(mode: &str) -> bool {
+    mode == "show" || mode.strip_prefix("mode ").is_some_and(|it| it.parse() == Ok(SHOW_MODE))
 }
 
 /// What a drone in show mode says of its show, as Skybrush Live shows it.

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::state::{State, is_show_mode};
 use crate::link::clock::{Micros, S};
 
 /// Codes below are states of a healthy drone.
@@ -162,6 +163,12 @@ struct Watched {
     landed: bool,
     /// On the ground when it was heard last.
     down: bool,
+    /// Another station has watched it before.
+    attached: bool,
+    /// On the ground when it was seen first, after the start.
+    found_down: bool,
+    /// The flight mode for which it left the show mode in the air.
+    left: Option<String>,
 }
 
 /// Watches a show: statuses in, events out. It does nothing on its own.
@@ -180,6 +187,13 @@ impl Monitor {
     ) -> Self {
         let watched = |id| (id, Watched { heard: now, ..Watched::default() });
         Self { battery_percent, drones: drones.into_iter().map(watched).collect() }
+    }
+
+    /// The flight may have begun before: who is found on the ground may have landed.
+    pub fn attach(&mut self) {
+        for watched in self.drones.values_mut() {
+            watched.attached = true;
+        }
     }
 
     /// Takes what the server says of its drones. `started`: the start is over, so that who has
@@ -203,7 +217,7 @@ impl Monitor {
 
     /// Whether everyone has landed after the start.
     pub fn is_over(&self) -> bool {
-        self.drones.values().all(|watched| watched.landed)
+        self.drones.values().all(|watched| watched.landed || watched.is_found_down())
     }
 
     /// Whether nobody is in the air, as far as the server tells.
@@ -218,7 +232,18 @@ impl Monitor {
 
     /// Who has not left the ground.
     pub fn not_flown(&self) -> Vec<&str> {
-        self.named(|watched| !watched.landed && watched.stayed_down())
+        self.named(|watched| !watched.landed && watched.stayed_down() && !watched.is_found_down())
+    }
+
+    /// Who was on the ground already when the watch over a flight on its way began, and still is.
+    pub fn found_down(&self) -> Vec<&str> {
+        self.named(Watched::is_found_down)
+    }
+
+    /// Who has left the show mode in the air, and for which flight mode.
+    pub fn left_the_show(&self) -> BTreeMap<String, String> {
+        let left = |(id, watched): (&String, &Watched)| Some((id.clone(), watched.left.clone()?));
+        self.drones.iter().filter_map(left).collect()
     }
 
     fn named(&self, which: impl Fn(&Watched) -> bool) -> Vec<&str> {
@@ -231,6 +256,10 @@ impl Watched {
     /// It never left the ground, and is heard to be there.
     fn stayed_down(&self) -> bool {
         self.down && !self.flown && !self.silent
+    }
+
+    fn is_found_down(&self) -> bool {
+        self.found_down && !self.landed && self.stayed_down()
     }
 
     /// A drone that is gone has no status, or one that does not get newer.
@@ -258,7 +287,13 @@ impl Watched {
         started: bool,
         tell: &mut dyn FnMut(Event),
     ) {
+        let is_first = self.codes.is_none();
         if let Some(mode) = status.get("mode").and_then(Value::as_str) {
+            let was_in_show = self.mode.as_deref().is_some_and(is_show_mode);
+            let flies = started && !self.landed && (self.flown || !is_on_ground(status));
+            if was_in_show && !is_show_mode(mode) && flies {
+                self.left.get_or_insert(mode.to_owned());
+            }
             if self.mode.as_deref().is_some_and(|old| old != mode) {
                 tell(Event::Mode { mode: mode.to_owned() });
             }
@@ -283,6 +318,12 @@ impl Watched {
         // Not every driver of the server says that a drone has landed: those of ArduPilot are on
         // the ground again.
         let runs = now.contains(&MOTORS_RUN);
+        if is_first && self.attached && started && is_on_ground(status) {
+            // The show mode says who has flown; who has left it says nothing.
+            let says_landed = State::of(status).show.is_some_and(|show| show.text == "Landed");
+            self.flown |= says_landed;
+            self.found_down = !says_landed;
+        }
         self.flown |= started && !is_on_ground(status) && !runs;
         self.landed = started && (now.contains(&LANDED) || self.flown && now.contains(&ON_GROUND));
         self.down = is_on_ground(status);
@@ -291,6 +332,8 @@ impl Watched {
 
 #[cfg(test)]
 mod tests {
+    use base64::Engine as _;
+    use base64::engine::general_purpose::STANDARD;
     use serde_json::json;
 
     use super::*;
@@ -333,6 +376,24 @@ mod tests {
         for (second, code, over) in [(0, 1, false), (1, 8, false), (2, 5, false), (3, 1, true)] {
             look(&mut other, second, true, status("show", &[code], 90.0, second));
             assert_eq!(other.is_over(), over, "{second}");
+        }
+        // One that was found on the ground by who came late, and one that says that it has flown.
+        let landed = STANDARD.encode("[ 00:01:00] Landed");
+        for (debug, found) in [("", &["01"][..]), (&landed, &[])] {
+            let mut late = Monitor::new(["01".to_owned()], 25.0, 0);
+            late.attach();
+            let status = |mode: &str, codes: &[u64], time: u64| json!({ "mode": mode, "errors": codes, "debug": debug, "timestamp": time });
+            look(&mut late, 1, true, status("show", &[1], 1));
+            assert_eq!(late.found_down(), found);
+            assert!(late.is_over());
+            assert_eq!((late.not_flown().len(), late.in_the_air().len()), (0, 0));
+            look(&mut late, 2, true, status("show", &[5], 2));
+            assert_eq!(late.in_the_air(), ["01"]);
+            assert_eq!(late.left_the_show(), BTreeMap::new());
+            look(&mut late, 3, true, status("rth", &[63], 3));
+            look(&mut late, 4, true, status("rth", &[1], 4));
+            assert!(late.is_over() && late.found_down().is_empty());
+            assert_eq!(late.left_the_show()["01"], "rth");
         }
         // One that the server does not know any more.
         let told = monitor.look(16 * S, true, &BTreeMap::new());

@@ -1,5 +1,6 @@
 //! A server that speaks as Skybrush Server does, with two drones and one fault.
 
+pub(crate) mod clock;
 pub(crate) mod replay;
 
 use std::collections::BTreeSet;
@@ -9,7 +10,7 @@ use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -19,6 +20,8 @@ use updraft::base::time::GpsTime;
 use updraft::campaign::parse_plan;
 use updraft::flight::identity::identify;
 use updraft::log::Log;
+
+use self::clock::TrialClock;
 
 /// What the server or one of its drones does wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +91,25 @@ pub(crate) enum Fault {
     LogHangs,
     /// Drone 01 misses the first request for a log.
     LogOnce,
+    /// The server says nothing more once the start is authorized, or once everyone is in the air, until it
+    /// is let go; then they stay there.
+    HoldsBeforeStart,
+    HoldsInFlight,
+    /// The server knows no drone.
+    NoDrones,
+    /// Drone 01 stands where drone 02 does; it does not say where it stands.
+    SameSlot,
+    NoPlace,
+    /// The server forgets drone 01 once everyone is where they belong.
+    Forgets,
+    /// Drone 01 takes the start time late.
+    LateStartTime,
+    /// The start cannot be cleared.
+    NakClear,
+    /// Drone 01 obeys no order to come down.
+    Disobeys,
+    /// The server has not found out what firmware the drones have, and has no name for the show mode.
+    ModeByNumber,
 }
 
 /// How long work takes, so that there can be more of it at once.
@@ -115,11 +137,17 @@ struct State {
     busy: Vec<String>,
     most_busy: usize,
     downloads: u64,
+    let_go: bool,
+    /// Everyone lands, in this mode if they were ordered to; looks since then.
+    lands: bool,
+    ordered: Option<&'static str>,
+    looks_since_order: u64,
 }
 
 /// The server, on a port of its own.
 pub(crate) struct Fake {
     pub(crate) address: SocketAddr,
+    pub(crate) clock: TrialClock,
     state: Arc<Mutex<State>>,
     over: Arc<AtomicBool>,
 }
@@ -199,7 +227,8 @@ impl Fake {
     /// Its drones stand on the plan's first two slots: 01 on the second, 02 on the first.
     pub(crate) fn start(plan: &Value, fault: Fault) -> Self {
         let plan = parse_plan(plan.to_string().as_bytes()).unwrap();
-        let places = [1, 0].map(|index: usize| {
+        let slots = if fault == Fault::SameSlot { [0, 0] } else { [1, 0] };
+        let places = slots.map(|index: usize| {
             let [x, y] = plan.slots[index].home_m[..2] else { panic!("a slot without a home") };
             let off = if index == 1 && fault == Fault::StandsWrong { 3.0 } else { 0.2 };
             let place = plan.site.frame().to_geodetic(Vector3::new(x + off, y, 0.0));
@@ -209,25 +238,30 @@ impl Fake {
         let address = listener.local_addr().unwrap();
         let state = Arc::new(Mutex::new(State::default()));
         let over = Arc::new(AtomicBool::new(false));
-        let (shared, ended) = (Arc::clone(&state), Arc::clone(&over));
+        let clock = TrialClock::start();
+        let (shared, ended, time) = (Arc::clone(&state), Arc::clone(&over), clock.clone());
         std::thread::spawn(move || {
             for stream in listener.incoming() {
                 if ended.load(Ordering::SeqCst) {
                     return;
                 }
                 let stream = stream.unwrap();
+                stream.set_nodelay(true).unwrap();
                 let visit = Visit {
                     reader: stream.try_clone().unwrap(),
                     out: Out(Arc::new(Mutex::new(stream))),
                     fault,
                     places,
                     state: Arc::clone(&shared),
+                    clock: time.clone(),
                     receipts: 0,
+                    looks_in_flight: 0,
+                    asks_for_start: 0,
                 };
                 std::thread::spawn(move || visit.serve());
             }
         });
-        Self { address, state, over }
+        Self { address, clock, state, over }
     }
 
     /// Nobody listens any more.
@@ -246,6 +280,23 @@ impl Fake {
     /// How many drones have had an upload or a download at the same time.
     pub(crate) fn most_at_once(&self) -> usize {
         self.state.lock().unwrap().most_busy
+    }
+
+    /// When the flight began, if one was flown.
+    pub(crate) fn flown_unix_s(&self) -> Option<i64> {
+        self.state.lock().unwrap().flown
+    }
+
+    /// Lets it answer again.
+    pub(crate) fn let_go(&self) {
+        self.state.lock().unwrap().let_go = true;
+    }
+
+    /// The drones land.
+    pub(crate) fn land(&self) {
+        let mut state = self.state.lock().unwrap();
+        (state.lands, state.let_go) = (true, true);
+        state.looks_in_flight = state.looks_in_flight.min(2);
     }
 
     pub(crate) fn is_authorized(&self) -> bool {
@@ -270,16 +321,16 @@ struct Visit {
     fault: Fault,
     places: [[i64; 2]; 2],
     state: Arc<Mutex<State>>,
+    clock: TrialClock,
     receipts: u32,
+    /// Looks of this visit since the start.
+    looks_in_flight: u64,
+    /// How often it has asked for the start.
+    asks_for_start: u64,
 }
 
 /// The connection is closed.
 struct Closed;
-
-#[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
-fn unix_s() -> i64 {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_secs() as i64
-}
 
 fn ids(body: &Value) -> Vec<String> {
     let ids = body["ids"].as_array().unwrap();
@@ -370,6 +421,7 @@ impl Visit {
                 drop(state);
                 // In no order.
                 let ids = match self.fault {
+                    Fault::NoDrones => &[][..],
                     Fault::Remembers => &["77", "02", "01"][..],
                     _ => &["02", "01"][..known.min(2) as usize],
                 };
@@ -377,6 +429,10 @@ impl Visit {
             }
             "UAV-INF" => {
                 let status = self.status(&ids(body))?;
+                if self.fault == Fault::HoldsInFlight {
+                    let looks = self.looks_in_flight;
+                    self.hold(|_| looks >= 3);
+                }
                 let body = json!({ "type": kind, "status": status });
                 // Others are told, too.
                 self.send(None, &body)?;
@@ -391,13 +447,19 @@ impl Visit {
                 self.send(Some(id), &json!({ "type": kind, "result": result }))
             }
             "SHOW-CFG" => {
-                let set = self.state.lock().unwrap().start.is_some();
+                let state = self.state.lock().unwrap();
+                let start = state.start.filter(|_| !state.cleared);
+                drop(state);
+                self.asks_for_start += 1;
+                if self.fault == Fault::HoldsBeforeStart && self.asks_for_start > 1 {
+                    self.hold(|state| state.start.is_some());
+                }
                 let authorized = match self.fault {
                     Fault::AuthorizedAlready => true,
                     Fault::TakenBack => false,
-                    _ => set,
+                    _ => start.is_some(),
                 };
-                let configuration = json!({ "start": { "authorized": authorized } });
+                let configuration = json!({ "start": { "authorized": authorized, "time": start } });
                 self.send(Some(id), &json!({ "type": kind, "configuration": configuration }))
             }
             "SHOW-SETCFG" => self.configure(id, &body["configuration"]["start"]),
@@ -408,11 +470,29 @@ impl Visit {
                 self.send(Some(id), &body)
             }
             "UAV-RTH" | "UAV-LAND" => {
-                let result: Map<String, Value> =
-                    ids(body).into_iter().map(|id| (id, json!(true))).collect();
-                self.send(Some(id), &json!({ "type": kind, "result": result }))
+                let (deaf, obey): (Vec<String>, Vec<String>) = ids(body)
+                    .into_iter()
+                    .partition(|id| self.fault == Fault::Disobeys && id == "01");
+                let of = |ids: Vec<String>, what: Value| -> Map<String, Value> {
+                    ids.into_iter().map(|id| (id, what.clone())).collect()
+                };
+                let (result, error) = (of(obey, json!(true)), of(deaf, json!("no response")));
+                let mut state = self.state.lock().unwrap();
+                state.ordered = Some(if kind == "UAV-RTH" { "rth" } else { "land" });
+                drop(state);
+                self.send(Some(id), &json!({ "type": kind, "result": result, "error": error }))
             }
             _ => self.nak(id, "no such message"),
+        }
+    }
+
+    /// Waits to be let go, if that is so.
+    fn hold(&self, is_so: impl Fn(&State) -> bool) {
+        while {
+            let state = self.state.lock().unwrap();
+            is_so(&state) && !state.let_go
+        } {
+            std::thread::sleep(Duration::from_millis(5));
         }
     }
 
@@ -425,10 +505,14 @@ impl Visit {
         let mut state = self.state.lock().unwrap();
         state.looks += 1;
         let looks = state.looks;
-        let flying = state.start.is_some_and(|start| unix_s() > start);
+        let now_s = (self.clock.unix_ms() / 1000) as i64;
+        let flying = state.start.is_some_and(|start| now_s > start);
         state.looks_in_flight += u64::from(flying);
         let step = state.looks_in_flight;
         state.looks_since_set += u64::from(state.set.is_some());
+        self.looks_in_flight += u64::from(flying);
+        state.looks_since_order += u64::from(state.ordered.is_some());
+        let (lands, ordered, since_order) = (state.lands, state.ordered, state.looks_since_order);
         let known = (state.looks_since_set, state.set, state.start);
         let (loaded, in_show_mode) = (state.loaded.clone(), state.in_show_mode.clone());
         drop(state);
@@ -436,9 +520,16 @@ impl Visit {
         if trouble && step == 3 {
             return Err(Closed);
         }
-        let status = ids.iter().map(|id| {
+        let forgotten = |id: &str| self.fault == Fault::Forgets && looks > 1 && id == "01";
+        let ids = ids.iter().filter(|id| !forgotten(id));
+        let status = ids.map(|id| {
             let first = id == "01";
-            let step = if first && self.fault == Fault::NeverTakesOff { 0 } else { step };
+            let step = match self.fault {
+                Fault::NeverTakesOff if first => 0,
+                Fault::HoldsInFlight | Fault::Disobeys if ordered.is_some() => 3 + since_order,
+                Fault::HoldsInFlight | Fault::Disobeys if !lands => step.min(3),
+                _ => step,
+            };
             let (since_set, set, authorized) = known;
             let left = first && self.fault == Fault::LeavesShowMode && since_set > 2;
             let in_show_mode = in_show_mode.contains(id) && !left;
@@ -448,12 +539,18 @@ impl Visit {
                 1 => ("show", vec![8]),
                 2 => ("show", vec![5]),
                 3 => ("show", vec![]),
-                4 => ("land", vec![6]),
+                4 => ("show", vec![6]),
                 // One driver says that it has landed, the other that it is on the ground.
-                _ => ("land", vec![if first { 7 } else { 1 }]),
+                _ => ("show", vec![if first { 7 } else { 1 }]),
+            };
+            let mode = match (mode, ordered) {
+                ("show", Some(ordered)) if step >= 3 => ordered,
+                ("show", _) if self.fault == Fault::ModeByNumber => "mode 127",
+                (mode, _) => mode,
             };
             let set = match self.fault {
                 Fault::NoStartTime if first => None,
+                Fault::LateStartTime if first => set.filter(|_| since_set > 16),
                 Fault::OtherStartTime if first => set.map(|set| set + 60),
                 _ => set,
             };
@@ -465,6 +562,7 @@ impl Visit {
                     in_show_mode,
                     set,
                     authorized.is_some(),
+                    now_s,
                 )),
                 _ => STANDARD.encode("[ 00:00:01] Performing show"),
             };
@@ -484,7 +582,8 @@ impl Visit {
             };
             let silent = first && self.fault == Fault::Silent;
             let late = self.fault == Fault::Late && looks < 5;
-            let [lat, lon] = if late { [0, 0] } else { self.places[usize::from(!first)] };
+            let lost = first && self.fault == Fault::NoPlace;
+            let [lat, lon] = if late || lost { [0, 0] } else { self.places[usize::from(!first)] };
             let status = json!({
                 "id": id,
                 "mode": mode,
@@ -509,10 +608,13 @@ impl Visit {
     }
 
     fn mode(&mut self, id: &str, drone: &str, args: &Value) -> Result<(), Closed> {
-        assert_eq!(args, &json!(["127"]));
+        let is_show = args == &json!(["127"]);
+        assert!(is_show || [json!(["6"]), json!(["9"])].contains(args), "{args}");
         let receipt = self.receipt();
         self.send(Some(id), &json!({ "type": "OBJ-CMD", "receipt": { drone: receipt } }))?;
-        let end = if drone == "01" && self.fault == Fault::StaysOutOfShowMode {
+        let end = if drone == "01" && self.fault == Fault::Disobeys && !is_show {
+            json!({ "type": "ASYNC-TIMEOUT", "ids": [receipt] })
+        } else if drone == "01" && self.fault == Fault::StaysOutOfShowMode {
             json!({ "type": "ASYNC-RESP", "id": receipt, "error": "UAV rejected flight mode 127" })
         } else {
             self.state.lock().unwrap().in_show_mode.insert(drone.to_owned());
@@ -549,6 +651,9 @@ impl Visit {
             return self.nak(id, "not now");
         }
         let time = start["time"].as_i64();
+        if time.is_none() && self.fault == Fault::NakClear {
+            return self.nak(id, "not now");
+        }
         let mut state = self.state.lock().unwrap();
         // The flight is not over when its start is cleared.
         let flies = time.is_none() && state.looks_in_flight > 0;
@@ -638,11 +743,17 @@ impl Visit {
 }
 
 /// What a drone on the ground says of its show, with a clock in another time zone.
-fn show_line(loaded: bool, in_show_mode: bool, set: Option<i64>, authorized: bool) -> String {
+fn show_line(
+    loaded: bool,
+    in_show_mode: bool,
+    set: Option<i64>,
+    authorized: bool,
+    now_s: i64,
+) -> String {
     let clock = match set {
         None => "---:--:--".to_owned(),
         Some(start) => {
-            let elapsed = unix_s() - start;
+            let elapsed = now_s - start;
             let sign = if elapsed < 0 { '-' } else { ' ' };
             let (sign, shown) = match elapsed {
                 -30.. => (sign, elapsed.abs()),

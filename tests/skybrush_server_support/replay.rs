@@ -8,12 +8,13 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
+use super::clock::TrialClock;
 use super::log_of;
 
 /// Requests that are asked again and again: answered with what the server said by then.
@@ -34,8 +35,9 @@ struct Recording {
     steps: VecDeque<Step>,
     /// Answers to looks, by kind, with their times.
     looks: BTreeMap<String, Vec<(f64, Value)>>,
-    /// The last step that was asked for: its time then and now.
-    anchor: (f64, Instant),
+    clock: TrialClock,
+    /// The last step that was asked for: its time then, and now, ms.
+    anchor: (f64, u64),
     start_unix_s: i64,
     surprises: Vec<String>,
 }
@@ -43,10 +45,11 @@ struct Recording {
 /// The server, on a port of its own.
 pub(crate) struct Replay {
     pub(crate) address: SocketAddr,
+    pub(crate) clock: TrialClock,
     recording: Arc<Mutex<Recording>>,
 }
 
-fn read(name: &str) -> Recording {
+fn read(name: &str, clock: TrialClock) -> Recording {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
     let text = fs::read_to_string(path).unwrap();
     let mut steps: VecDeque<Step> = VecDeque::new();
@@ -86,14 +89,14 @@ fn read(name: &str) -> Recording {
             }
         }
     }
-    #[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
-    let now = Instant::now();
-    Recording { steps, looks, anchor: (0.0, now), start_unix_s: 0, surprises: Vec::new() }
+    let anchor = (0.0, clock.unix_ms());
+    Recording { steps, looks, clock, anchor, start_unix_s: 0, surprises: Vec::new() }
 }
 
 impl Replay {
     pub(crate) fn start(name: &str) -> Self {
-        let recording = Arc::new(Mutex::new(read(name)));
+        let clock = TrialClock::start();
+        let recording = Arc::new(Mutex::new(read(name, clock.clone())));
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let shared = Arc::clone(&recording);
@@ -103,7 +106,7 @@ impl Replay {
                 serve(&stream.unwrap(), &shared);
             }
         });
-        Self { address, recording }
+        Self { address, clock, recording }
     }
 
     /// What was not asked for as recorded; nothing: all was.
@@ -117,6 +120,7 @@ impl Replay {
 }
 
 fn serve(stream: &TcpStream, recording: &Arc<Mutex<Recording>>) {
+    stream.set_nodelay(true).unwrap();
     let out = Arc::new(Mutex::new(stream.try_clone().unwrap()));
     let send = |out: &Mutex<TcpStream>, refs: Option<&str>, body: &Value| {
         let mut message = json!({ "$fw.version": "1.0", "id": "s", "body": body });
@@ -158,7 +162,8 @@ impl Recording {
     fn look(&self, kind: &str) -> Value {
         let (at_s, since) = self.anchor;
         let end_s = self.steps.front().map_or(f64::INFINITY, |step| step.at_s);
-        let now_s = (at_s + since.elapsed().as_secs_f64()).min(end_s);
+        let passed_ms = self.clock.unix_ms().saturating_sub(since);
+        let now_s = (at_s + passed_ms as f64 / 1000.0).min(end_s);
         let all = self.looks.get(kind).map(Vec::as_slice).unwrap_or_default();
         let found = all.iter().rev().find(|(said_s, _)| *said_s <= now_s).or(all.first());
         found.unwrap_or_else(|| panic!("{kind} was never asked")).1.clone()
@@ -177,9 +182,7 @@ impl Recording {
         };
         let index = self.steps.iter().position(same)?;
         let mut step = self.steps.remove(index)?;
-        #[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
-        let now = Instant::now();
-        self.anchor = (step.at_s, now);
+        self.anchor = (step.at_s, self.clock.unix_ms());
         if let Some(start) = body.pointer("/configuration/start/time").and_then(Value::as_i64) {
             self.start_unix_s = start;
         }

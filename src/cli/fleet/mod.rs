@@ -234,9 +234,8 @@ fn step_station(args: &StepArgs) -> Result<Station, CommandError> {
                 .to_owned(),
         )),
         Target::Server(_) => Err(CommandError::Usage(
-            "through Skybrush Server the start is a part of `updraft fly`, and parameters are put \
-             back in Skybrush Live; there are `fleet status`, `upload`, `preflight`, `abort` and \
-             `land`"
+            "through Skybrush Server the start is a part of `updraft fly`; there are `fleet status`, \
+             `upload`, `preflight`, `watch`, `abort` and `land`"
                 .to_owned(),
         )),
     }
@@ -367,6 +366,14 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
 }
 
 fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> {
+    if let Target::Server(_) = args.step.connect.target()? {
+        return Err(CommandError::Usage(
+            "no parameter is put back through Skybrush Server, as none is set through it: those in \
+             fleet-changes.json were set over the drones' own links, and are put back over these \
+             (--connect); nothing was sent"
+                .to_owned(),
+        ));
+    }
     if args.step.dry_run {
         return dry::restore(context, &args.step, args.fence_off);
     }

@@ -2,9 +2,10 @@
 
 use clap::Args;
 
+use super::connect::Target;
 use super::interrupt::InterruptArgs;
 use super::start::landed;
-use super::{StepArgs, bring, dry, lock, with_desk};
+use super::{StepArgs, bring, dry, lock, one_flight, server, with_desk};
 use crate::base::plain::Shown as _;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
@@ -15,8 +16,10 @@ use crate::fleet::slots::FleetTable;
 #[command(after_long_help = "Examples:
   updraft fleet watch my-campaign --flight calibration
   updraft fleet watch my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --no-logs
+  updraft fleet watch my-campaign --flight calibration --connect skybrush://localhost:5001
 
-Who flies which slot is in fleet.json; the start is what the drones say, or logs/start.json. Drones that
+Who flies which slot is in fleet.json; the start is what the drones say, or logs/start.json, which through
+Skybrush Server tells both. Drones that
 were flown with --guided have lost who flew them: they are watched as they come down. `fleet abort` and
 `fleet land` of other terminals are carried out. Exit codes: 3 somebody has not landed, gave an alarm, or
 a log is missing; 5 nobody flies, and no start is set.")]
@@ -34,7 +37,28 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
     if args.step.dry_run {
         return dry::status(context, &args.step);
     }
+    let server = match args.step.connect.target()? {
+        Target::Server(address) => {
+            server::refuse(&args.step.connect, &[])?;
+            Some(address)
+        }
+        _ => None,
+    };
     let _lock = lock(context, &args.step.campaign)?;
+    if let Some(address) = server {
+        let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())?;
+        let (wait_s, on_interrupt) = (args.step.connect.wait, args.interrupt.on_interrupt);
+        let with_logs = !args.no_logs;
+        return server::take_over(
+            context,
+            &address,
+            &folder,
+            &plan,
+            wait_s,
+            on_interrupt,
+            with_logs,
+        );
+    }
     with_desk(context, &args.step, |crew| {
         if !FleetTable::path(&crew.folder.0).exists() {
             return Err(CommandError::Nothing(format!(

@@ -10,6 +10,7 @@ mod settle;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
+use std::time::Duration;
 
 use self::one::One;
 use super::stopped;
@@ -17,7 +18,7 @@ use crate::base::file::create_folder;
 use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::campaign::start::StartRecord;
-use crate::cli::clock::Stopwatch;
+use crate::cli::clock::Spent;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::fleet::bring::Wish;
@@ -25,11 +26,12 @@ use crate::cli::fly_output::LogOutput;
 use crate::cli::simulate::made_by;
 use crate::cli::words;
 use crate::fleet::logs::manifest::{LogFlight, Shelf};
+use crate::link::clock::{Micros, S};
 use crate::mission::Plan;
 use crate::skybrush_server::{Client, Foreman, Job, Outcome, list_logs};
 
-/// A word to who waits, s.
-const SAY_EVERY_S: u64 = 10;
+/// A word to who waits.
+const SAY_EVERY: Micros = 10 * S;
 
 /// Brings logs of these slots and the server's names of their drones.
 pub(super) fn bring(
@@ -44,7 +46,6 @@ pub(super) fn bring(
     create_folder(&folder.logs())?;
     let shelf = Shelf::open(&folder.logs(), &made_by())?;
     let start = StartRecord::read(folder)?;
-    let watch = Stopwatch::start();
     let mut puller = Puller {
         context,
         address,
@@ -53,7 +54,7 @@ pub(super) fn bring(
         ones: BTreeMap::new(),
         error: None,
         shares: BTreeMap::new(),
-        watch,
+        begun: context.clock().now(),
         said: 0,
     };
     for (slot, id) in wanted {
@@ -120,7 +121,7 @@ struct Puller<'a> {
     /// The campaign's folder cannot be written.
     error: Option<CommandError>,
     shares: BTreeMap<String, f64>,
-    watch: Stopwatch,
+    begun: Micros,
     said: u64,
 }
 
@@ -138,7 +139,8 @@ impl Foreman for Puller<'_> {
         if share > 0.0 {
             self.shares.insert(drone.to_owned(), share);
         }
-        let periods = self.watch.elapsed().as_secs() / SAY_EVERY_S;
+        let spent = self.context.clock().now().saturating_sub(self.begun);
+        let periods = spent / SAY_EVERY;
         if periods > self.said {
             self.said = periods;
             let over = self.ones.values().filter(|one| one.over).count();
@@ -150,7 +152,7 @@ impl Foreman for Puller<'_> {
             self.context.say(&format!(
                 "bringing logs home: {over} of {} drones done after {}; {}",
                 self.ones.len(),
-                self.watch,
+                Spent(Duration::from_micros(spent)),
                 parts.join(", ")
             ));
         }

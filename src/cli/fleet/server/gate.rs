@@ -10,11 +10,10 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{Flight, stopped};
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::fleet::preflight::{Limits, charge_needed};
-use crate::link::clock::{Clock as _, Micros, S};
+use crate::link::clock::{Micros, S};
 use crate::mission::Plan;
 use crate::skybrush_server::Client;
 use crate::skybrush_server::gate::{Needs, Step, obstacles};
@@ -171,18 +170,18 @@ pub(super) fn gate(
     step: Step,
     patience: Micros,
 ) -> Result<Table, CommandError> {
-    let clock = SystemClock::start();
+    let clock = context.clock();
     let until = clock.now() + patience.max(MOMENT);
     let ids: Vec<String> = flight.drones.values().cloned().collect();
     let first = client.status(&ids)?;
     let mut said = false;
     loop {
         // What was told before is not taken for what is.
-        std::thread::sleep(EVERY);
+        clock.pause(EVERY);
         if stopped(context) {
             return Err(CommandError::Interrupted);
         }
-        let table = look(flight, &client.status(&ids)?, &first, step, &clock);
+        let table = look(flight, &client.status(&ids)?, &first, step, clock.unix_us());
         let now = clock.now();
         if table.go() {
             return Ok(table);
@@ -208,10 +207,10 @@ fn look(
     status: &BTreeMap<String, Value>,
     first: &BTreeMap<String, Value>,
     step: Step,
-    clock: &SystemClock,
+    unix_us: u64,
 ) -> Table {
     let needs = needs(flight.plan);
-    let unix_s = clock.unix_us() as f64 * 1e-6;
+    let unix_s = unix_us as f64 * 1e-6;
     let row = |(slot, drone): (&u16, &String)| {
         let told = status.get(drone);
         let state = told.map(State::of).unwrap_or_default();

@@ -5,20 +5,22 @@ use super::Flight;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
 use crate::campaign::start::{Flying, StartRecord, StartedDrone};
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::simulate::made_by;
-use crate::link::clock::Clock as _;
 
 /// The record of a start, if one could be written.
 #[derive(Default)]
 pub(super) struct Begun(Option<StartRecord>);
 
 impl Begun {
-    /// Writes down who starts when, before anybody is told to. The files on the drones are made by
-    /// the server, so that their checksums are not known.
-    pub(super) fn write(flight: &Flight<'_>, unix_s: i64) -> Result<Self, CommandError> {
+    /// Writes down who starts when, before anybody is told to. The files on the drones are made by the
+    /// server, which scales and splits trajectories otherwise than we do: their checksums are not known.
+    pub(super) fn write(
+        context: &Context,
+        flight: &Flight<'_>,
+        unix_s: i64,
+    ) -> Result<Self, CommandError> {
         let start = GpsTime::from_unix_ms(unix_s * 1000).ok_or_else(|| {
             CommandError::Failed("this computer's clock is not set to any GPS time".to_owned())
         })?;
@@ -29,9 +31,14 @@ impl Begun {
             booted: None,
         };
         let drones = flight.drones.iter().map(drone).collect();
-        let now_s = SystemClock::start().unix_us() / 1_000_000;
+        let now_s = context.clock().unix_us() / 1_000_000;
         let record = StartRecord::new(made_by(), start, now_s, Flying::SkybrushServer, drones);
         Ok(Self(Some(record.begin(flight.folder)?)))
+    }
+
+    /// The one of a flight that is taken over.
+    pub(super) fn of(record: StartRecord) -> Self {
+        Self(Some(record))
     }
 
     /// Nobody took off: the start before it is the latest again.

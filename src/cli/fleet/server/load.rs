@@ -25,11 +25,11 @@ pub(super) fn not_authorized_yet(
     client: &mut Client,
     flight: &Flight<'_>,
 ) -> Result<(), CommandError> {
-    let start = client.start()?;
-    if start.pointer("/start/authorized").and_then(serde_json::Value::as_bool) == Some(true) {
+    if client.authorized()?.is_some() {
         return Err(CommandError::Unsafe(format!(
             "a start is authorized on this server already, by Skybrush Live or another updraft: \
-             nothing was sent; if nobody flies, `{}` takes it back",
+             nothing was sent; `updraft fleet watch` follows a flight of this folder to its end, and if \
+             nobody flies, `{}` takes the start back",
             flight.abort()
         )));
     }
@@ -82,7 +82,7 @@ fn enter_show_mode(
     let status = client.status(&ids)?;
     let jobs = status.iter().filter_map(|(id, status)| {
         let state = State::of(status);
-        let is_there = state.mode == "show" || state.is_make_believe();
+        let is_there = state.is_in_show_mode() || state.is_make_believe();
         (!is_there).then(|| show_mode(id))
     });
     let jobs: Vec<Job> = jobs.collect();

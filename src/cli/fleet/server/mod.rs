@@ -1,5 +1,6 @@
 //! Flights through a running Skybrush Server.
 
+mod attach;
 mod bring;
 mod down;
 mod dry;
@@ -30,16 +31,16 @@ use super::bring::Wish;
 use super::start::{LeadArgs, needs_person};
 use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit, with_reasons};
-use crate::cli::fly_output::{FlightEnd, FlightOutput};
+use crate::cli::fly_output::{FlightEnd, FlightOutput, LogOutput};
 use crate::fleet::abort::Action;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
 use crate::skybrush_server::gate::Step;
 use crate::skybrush_server::{Client, ServerError, StartConfig};
 
+pub(in crate::cli) use attach::take_over;
 pub(in crate::cli) use dry::{dry_end, dry_fly, dry_look, dry_upload};
 pub(in crate::cli) use logs::{list, pull};
 pub(in crate::cli) use options::{of_air, refuse};
@@ -47,8 +48,6 @@ pub(in crate::cli) use steps::{preflight, status, upload};
 
 /// Distance of the fence's circle beyond the farthest corner, m.
 const BEYOND_M: f64 = 10.0;
-/// Shortest lead, s, as over MAVLink.
-const LEAST_LEAD_S: f64 = 20.0;
 
 /// A flight through a server.
 struct Flight<'a> {
@@ -75,7 +74,7 @@ impl From<ServerError> for CommandError {
 }
 
 fn connect(context: &Context, address: &str) -> Result<Client, CommandError> {
-    let mut client = Client::connect(address, Arc::new(SystemClock::start()))?;
+    let mut client = Client::connect(address, Arc::clone(context.clock()))?;
     context.say(&format!("{} at {address}", client.version()?));
     Ok(client)
 }
@@ -91,13 +90,6 @@ pub(in crate::cli) fn fly(
     wait_s: f64,
 ) -> Result<(FlightOutput, Exit), CommandError> {
     needs_person(lead)?;
-    if lead.lead < LEAST_LEAD_S {
-        return Err(CommandError::Usage(format!(
-            "a lead of {} s is not possible: give at least {LEAST_LEAD_S} s; the drones set their \
-             home and arm in the last 10 s",
-            lead.lead
-        )));
-    }
     let shows = Shows::of(plan)?;
     let mut client = connect(context, address)?;
     let drones = assign(context, &mut client, plan, wait_s)?;
@@ -148,18 +140,30 @@ pub(in crate::cli) fn fly(
     if !with_logs {
         return Ok((output, flown));
     }
-    let wanted: Vec<(u16, String)> = drones.into_iter().collect();
-    let brought = bring(context, &mut client, address, folder, plan, &wanted, &Wish::default())?;
+    let exit;
+    (output.logs, exit) = bring_home(context, &mut client, &flight, flown)?;
+    Ok((output, exit))
+}
+
+/// Brings the logs of a flight that ended so.
+fn bring_home(
+    context: &Context,
+    client: &mut Client,
+    flight: &Flight<'_>,
+    flown: Exit,
+) -> Result<(Vec<LogOutput>, Exit), CommandError> {
+    let Flight { address, folder, plan, drones } = flight;
+    let wanted: Vec<(u16, String)> = drones.iter().map(|(slot, id)| (*slot, id.clone())).collect();
+    let brought = bring(context, client, address, folder, plan, &wanted, &Wish::default())?;
     sum_up(context, &brought);
-    output.logs.clone_from(&brought);
     if brought.iter().all(|row| row.state != "missing") {
-        return Ok((output, flown));
+        return Ok((brought, flown));
     }
     let campaign = folder.0.shown();
     context.insist(&format!(
         "To try again: updraft logs pull {campaign} --connect skybrush://{address}"
     ));
-    Ok((output, Exit::Losses))
+    Ok((brought, Exit::Losses))
 }
 
 fn stopped(context: &Context) -> bool {

@@ -7,11 +7,10 @@ use serde_json::Value;
 
 use super::stopped;
 use crate::base::frame::Geodetic;
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::fleet::slots::{Stand, allowed_m};
-use crate::link::clock::{Clock as _, S};
+use crate::link::clock::S;
 use crate::mission::Plan;
 use crate::skybrush_server::Client;
 
@@ -55,7 +54,7 @@ pub(super) fn standing(
     wanted: usize,
     wait_s: f64,
 ) -> Result<Standing, CommandError> {
-    let clock = SystemClock::start();
+    let clock = context.clock();
     let until = clock.now() + (wait_s * S as f64) as u64;
     let mut said = false;
     loop {
@@ -79,7 +78,7 @@ pub(super) fn standing(
         if stopped(context) {
             return Err(CommandError::Interrupted);
         }
-        std::thread::sleep(EVERY);
+        clock.pause(EVERY);
     }
 }
 

@@ -1,13 +1,14 @@
 //! The two steps of a start, each with a look at every drone, and the way back.
 
+use std::sync::Arc;
+
 use super::Flight;
 use super::gate::{MOMENT, gate};
 use super::identity::Begun;
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::fleet::start::{LeadArgs, asked};
-use crate::link::clock::{Clock as _, Micros, S};
+use crate::link::clock::{Micros, S};
 use crate::skybrush_server::gate::Step;
 use crate::skybrush_server::{Client, StartConfig};
 
@@ -23,6 +24,8 @@ pub(super) struct Started {
     /// When it is, Unix s.
     pub(super) unix_s: i64,
     pub(super) begun: Begun,
+    /// Another station has begun it.
+    pub(super) attached: bool,
 }
 
 /// Sets the start time, has a person (or `--yes`) authorize it, and sees that every drone has it.
@@ -33,7 +36,7 @@ pub(super) fn start(
     flight: &Flight<'_>,
     lead: &LeadArgs,
 ) -> Result<Started, CommandError> {
-    let now_us = SystemClock::start().unix_us();
+    let now_us = context.clock().unix_us();
     let unix_s = (now_us / 1_000_000) as i64 + lead.lead.ceil() as i64;
     let start = StartConfig {
         unix_s: Some(unix_s),
@@ -45,10 +48,10 @@ pub(super) fn start(
     match steps(context, client, flight, lead, start, &mut begun) {
         Ok(()) => {
             let begun = begun.unwrap_or_default();
-            Ok(Started { unix_s, begun })
+            Ok(Started { unix_s, begun, attached: false })
         }
         Err(error) => {
-            let back = take_back(client, flight);
+            let back = take_back(context, client, flight);
             if back.is_ok()
                 && let Some(begun) = begun
             {
@@ -59,8 +62,8 @@ pub(super) fn start(
     }
 }
 
-fn left_s(unix_s: i64) -> f64 {
-    unix_s as f64 - SystemClock::start().unix_us() as f64 * 1e-6
+fn left_s(context: &Context, unix_s: i64) -> f64 {
+    unix_s as f64 - context.clock().unix_us() as f64 * 1e-6
 }
 
 fn steps(
@@ -77,7 +80,7 @@ fn steps(
     if !table.go() {
         return Err(CommandError::Unsafe(format!("not every drone is ready: {}", table.words())));
     }
-    context.say(&format!("Every drone has the start time, in {:.0} s", left_s(unix_s)));
+    context.say(&format!("Every drone has the start time, in {:.0} s", left_s(context, unix_s)));
     if !lead.yes {
         let answer = asked("Authorize the start? Type yes: ", || context.check_stop())?;
         if !answer {
@@ -92,19 +95,19 @@ fn steps(
             table.words()
         )));
     }
-    let left = left_s(unix_s);
+    let left = left_s(context, unix_s);
     if left < AUTHORIZE_BEFORE_S {
         return Err(CommandError::Usage(format!(
             "{left:.0} s before the start it is too late to authorize it: the drones set their \
              home and arm in the last 10 s; give a longer --lead"
         )));
     }
-    *begun = Some(Begun::write(flight, unix_s)?);
+    *begun = Some(Begun::write(context, flight, unix_s)?);
     start.authorized = true;
     client.set_start(&start).map_err(|error| {
         CommandError::Failed(format!("the start was not authorized: {}", with_reasons(&error)))
     })?;
-    let patience = ((left_s(unix_s) - TAKEN_BEFORE_S).max(0.0) * S as f64) as Micros;
+    let patience = ((left_s(context, unix_s) - TAKEN_BEFORE_S).max(0.0) * S as f64) as Micros;
     let table = gate(context, client, flight, Step::Authorized(unix_s), TAKE.min(patience))?;
     if !table.go() {
         return Err(CommandError::Unsafe(format!(
@@ -116,13 +119,16 @@ fn steps(
 }
 
 /// Takes a start back, over a new connection if the old one is broken.
-pub(super) fn take_back(client: &mut Client, flight: &Flight<'_>) -> Result<(), CommandError> {
+pub(super) fn take_back(
+    context: &Context,
+    client: &mut Client,
+    flight: &Flight<'_>,
+) -> Result<(), CommandError> {
     if client.set_start(&StartConfig::none()).is_ok() {
         return Ok(());
     }
     let again = || -> Result<(), CommandError> {
-        let clock = std::sync::Arc::new(SystemClock::start());
-        let mut client = Client::connect(flight.address, clock)?;
+        let mut client = Client::connect(flight.address, Arc::clone(context.clock()))?;
         Ok(client.set_start(&StartConfig::none())?)
     };
     again()

@@ -1,5 +1,6 @@
 //! Watching a show through the server, second by second.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -8,13 +9,12 @@ use serde::Serialize;
 use super::down::{LEFT, interrupted};
 use super::start::{Started, take_back};
 use super::{Flight, stopped};
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit, with_reasons};
 use crate::cli::fleet::interrupt::{Choice, Interrupt};
 use crate::cli::fly_output::DroneEnd;
 use crate::fleet::journal::{Entry, Journal};
-use crate::link::clock::{Clock as _, Micros, S};
+use crate::link::clock::{Micros, S};
 use crate::skybrush_server::watch::{Event, Monitor};
 use crate::skybrush_server::{Client, ServerError};
 
@@ -33,12 +33,35 @@ struct Line<'a> {
     event: &'a Event,
 }
 
+/// That a flight was taken over, as the journal has it.
+#[derive(Serialize)]
+struct Note {
+    step: &'static str,
+    text: String,
+}
+
+/// Writes into the journal that a flight was taken over.
+pub(super) fn attached(
+    context: &Context,
+    flight: &Flight<'_>,
+    start_unix_s: i64,
+) -> Result<(), CommandError> {
+    let note = Note { step: "attached", text: format!("start at {start_unix_s} (Unix)") };
+    let unix_us = context.clock().unix_us();
+    let mut journal = Journal::open(&flight.folder.0)?;
+    Ok(journal.write(&Entry { unix_us, drone: None, event: &note })?)
+}
+
 /// How a watched flight ended.
 pub(super) struct Watched {
     /// The server's names of drones that have not been seen to land.
     in_the_air: Vec<String>,
     /// Those of drones that never left the ground.
     not_flown: Vec<String>,
+    /// Those of drones that were on the ground when the watch began, after the start.
+    found_down: Vec<String>,
+    /// Drones that have left the show, and for which flight mode.
+    left: BTreeMap<String, String>,
     /// Somebody else took the start back before it came.
     pub(super) taken_back: bool,
     /// Something was told that a person must look at.
@@ -48,8 +71,14 @@ pub(super) struct Watched {
 impl Watched {
     fn of(monitor: &Monitor, alarms: bool) -> Self {
         let names = |those: Vec<&str>| those.into_iter().map(str::to_owned).collect();
-        let (in_the_air, not_flown) = (names(monitor.in_the_air()), names(monitor.not_flown()));
-        Self { in_the_air, not_flown, taken_back: false, alarms }
+        Self {
+            in_the_air: names(monitor.in_the_air()),
+            not_flown: names(monitor.not_flown()),
+            found_down: names(monitor.found_down()),
+            left: monitor.left_the_show(),
+            taken_back: false,
+            alarms,
+        }
     }
 
     /// How a drone's flight ended.
@@ -76,8 +105,18 @@ impl Watched {
         for id in &self.in_the_air {
             context.warn(&format!("drone {id} has not been seen to land"));
         }
+        for id in &self.found_down {
+            context.warn(&format!(
+                "drone {id} was on the ground when this watch began: whether it has flown, its log \
+                 says"
+            ));
+        }
+        for (id, mode) in &self.left {
+            context.warn(&format!("drone {id} left the show before its end (flight mode {mode})"));
+        }
         let all = flight.drones.len();
-        let landed = all.saturating_sub(self.in_the_air.len() + self.not_flown.len());
+        let others = self.in_the_air.len() + self.not_flown.len() + self.found_down.len();
+        let landed = all.saturating_sub(others);
         context.say(&format!("{landed} of {all} drones have landed"));
         if !self.in_the_air.is_empty() {
             context.insist(&format!(
@@ -87,7 +126,7 @@ impl Watched {
                 flight.abort()
             ));
         }
-        let quiet = self.in_the_air.is_empty() && self.not_flown.is_empty() && !self.alarms;
+        let quiet = others == 0 && self.left.is_empty() && !self.alarms;
         if quiet { Exit::Done } else { Exit::Losses }
     }
 }
@@ -101,11 +140,11 @@ pub(super) fn watch(
     started: Started,
     on_interrupt: Choice,
 ) -> Result<Watched, CommandError> {
-    let Started { unix_s, begun } = started;
+    let Started { unix_s, begun, attached } = started;
     context.signals().set_flies(Some(LEFT));
-    let watched = look_on(context, client, flight, unix_s, on_interrupt);
+    let watched = look_on(context, client, flight, unix_s, attached, on_interrupt);
     context.signals().set_flies(None);
-    let is_before = SystemClock::start().unix_us() / 1_000_000 < unix_s.max(0) as u64;
+    let is_before = context.clock().unix_us() / 1_000_000 < unix_s.max(0) as u64;
     let is_over = match &watched {
         Ok(watched) => {
             if watched.taken_back {
@@ -120,7 +159,7 @@ pub(super) fn watch(
         }
         Err(_) => false,
     };
-    if is_over && let Err(error) = take_back(client, flight) {
+    if is_over && let Err(error) = take_back(context, client, flight) {
         context.warn(&format!(
             "the start is still authorized on the server, as it could not be cleared ({error}): \
              clear it in Skybrush Live before the drones are switched on again"
@@ -139,15 +178,21 @@ fn look_on(
     client: &mut Client,
     flight: &Flight<'_>,
     start_unix_s: i64,
+    attached: bool,
     on_interrupt: Choice,
 ) -> Result<Watched, CommandError> {
     let mut interrupt = Interrupt::new(context, on_interrupt);
-    let clock = SystemClock::start();
+    let clock = Arc::clone(context.clock());
     let ids: Vec<String> = flight.drones.values().cloned().collect();
     let low = 100.0 * flight.plan.limits.endurance_reserve;
     let mut monitor = Monitor::new(ids.iter().cloned(), low, clock.now());
+    if attached {
+        monitor.attach();
+    }
     let mut journal = Journal::open(&flight.folder.0)?;
     let show_end_s = start_unix_s as f64 + flight.plan.duration_ms as f64 / 1000.0;
+    // Who is in the air long after the show is watched for as long.
+    let end_s = show_end_s.max(clock.unix_us() as f64 * 1e-6) + AFTER_S;
     let mut alarms = false;
     let mut away = false;
     let mut unwritten = false;
@@ -163,16 +208,16 @@ fn look_on(
         }
         let over = monitor.is_over()
             || unix_s > show_end_s && !away && monitor.all_are_down()
-            || unix_s > show_end_s + AFTER_S;
+            || unix_s > end_s;
         if over {
             return Ok(Watched::of(&monitor, alarms));
         }
         if clock.now() < next {
-            std::thread::sleep(NAP);
+            clock.pause(NAP);
             continue;
         }
         next = clock.now() + EVERY;
-        match status(client, &ids, flight.address, away) {
+        match status(context, client, &ids, flight.address, away) {
             Err(error) => {
                 if !away {
                     alarms = true;
@@ -216,18 +261,18 @@ fn look_on(
 /// Whether the server has no authorized start any more: `fleet abort` and Skybrush Live take it
 /// back. What the server does not answer is looked at with the next status.
 fn is_taken_back(client: &mut Client) -> bool {
-    let start = client.start().unwrap_or_default();
-    start.pointer("/start/authorized").and_then(serde_json::Value::as_bool) == Some(false)
+    matches!(client.authorized(), Ok(None))
 }
 
 fn status(
+    context: &Context,
     client: &mut Client,
     ids: &[String],
     address: &str,
     away: bool,
-) -> Result<std::collections::BTreeMap<String, serde_json::Value>, ServerError> {
+) -> Result<BTreeMap<String, serde_json::Value>, ServerError> {
     if away {
-        *client = Client::connect(address, Arc::new(SystemClock::start()))?;
+        *client = Client::connect(address, Arc::clone(context.clock()))?;
     }
     client.status(ids)
 }

@@ -4,13 +4,11 @@ use super::Puller;
 use super::choose::older;
 use super::one::{One, Target, number};
 use crate::base::file::{create_folder, read_whole, write_whole};
-use crate::cli::clock::SystemClock;
 use crate::cli::exit::CommandError;
 use crate::fleet::logs::manifest::{AtHome, LogFlight, ManifestEntry, Method, Verified};
 use crate::fleet::logs::one::Which;
 use crate::fleet::logs::part::{Sums, sums_of};
 use crate::flight::identity::{Belongs, Identity, identify, later_s};
-use crate::link::clock::Clock as _;
 use crate::log::Log;
 use crate::skybrush_server::{Job, LogEntry};
 
@@ -218,7 +216,7 @@ impl Puller<'_> {
             verified: Verified::Size,
             incomplete,
             attempts: target.tries,
-            at_unix_s: SystemClock::start().unix_us() / 1_000_000,
+            at_unix_s: self.context.clock().unix_us() / 1_000_000,
             flight: Some(flight),
         })?;
         write_whole(&path, bytes)?;

@@ -7,12 +7,11 @@ use std::time::Duration;
 
 use super::Puller;
 use super::one::number;
-use crate::cli::clock::{Stopwatch, SystemClock};
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::server::stopped;
 use crate::cli::words;
 use crate::fleet::logs::manifest::AtHome;
-use crate::link::clock::Clock as _;
+use crate::link::clock::Micros;
 use crate::skybrush_server::{Client, LogEntry};
 
 /// The firmware closes a log so long after a flight, and a moment.
@@ -35,7 +34,7 @@ impl Puller<'_> {
             return Ok(());
         }
         let mut sizes = self.newest(client, &ids);
-        let now_s = (SystemClock::start().unix_us() / 1_000_000) as i64;
+        let now_s = (self.context.clock().unix_us() / 1_000_000) as i64;
         sizes.retain(|id, log| {
             let is_old = log.unix_s.is_some_and(|time| time + OLD_S < now_s);
             !is_old && (self.wish.again || !self.is_home(id, log))
@@ -49,10 +48,11 @@ impl Puller<'_> {
                 WAIT.as_secs(),
                 words::count(sizes.len(), "log")
             ));
-            let watch = Stopwatch::start();
-            while watch.elapsed() < WAIT {
+            let clock = self.context.clock();
+            let until = clock.now() + WAIT.as_micros() as Micros;
+            while clock.now() < until {
                 self.context.check_stop()?;
-                std::thread::sleep(NAP);
+                clock.pause(NAP);
             }
             let ids: Vec<String> = sizes.keys().cloned().collect();
             let now = self.newest(client, &ids);
