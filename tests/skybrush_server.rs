@@ -396,6 +396,57 @@ fn a_log_that_grew_or_was_missed_comes_home() {
     }
 }
 
+/// What keeps a log of drone 01 from coming, or from being this flight's.
+#[test]
+fn why_a_log_is_not_this_flights_is_said() {
+    let mut said = String::new();
+    for fault in [
+        Fault::LogNewer,
+        Fault::LogNone,
+        Fault::LogHuge,
+        Fault::LogTimeless,
+        Fault::NoList,
+        Fault::NoListAfter,
+        Fault::LogGone,
+    ] {
+        let bench = planned();
+        let (ended, server) = fly(&bench, fault);
+        // The right log is there, and a newer one named.
+        assert_eq!(ended.code, Some(if fault == Fault::LogNewer { 0 } else { 3 }), "{ended}");
+        let start = server.flown_unix_s().unwrap();
+        let came = fs::read(bench.path("campaign/logs/01.BIN")).unwrap();
+        assert!(came == skybrush_server_support::log_of("02", start), "{fault:?} {ended}");
+        if fault == Fault::LogNewer {
+            let came = fs::read(bench.path("campaign/logs/02.BIN")).unwrap();
+            assert!(came == skybrush_server_support::log_of("01", start), "{ended}");
+        }
+        let logs = ended.err.lines().skip_while(|line| !line.contains("have landed")).skip(1);
+        let _ = writeln!(said, "{fault:?}\n{}", logs.collect::<Vec<_>>().join("\n"));
+    }
+    // What is home counts where the drone does not say what it has; and is said not to be compared.
+    let bench = planned();
+    let (first, server) = fly(&bench, Fault::None);
+    assert_eq!(first.code, Some(0), "{first}");
+    drop(server);
+    let pull = |fault| {
+        let other = Fake::start(&plan(&bench), fault);
+        run(&bench, &other, &["logs", "pull", "campaign"])
+    };
+    let _ = writeln!(said, "NoList, home\n{}", pull(Fault::NoList));
+    let _ = writeln!(said, "LogNone, home\n{}", pull(Fault::LogNone));
+    // Without a start nobody knows which of two logs is the flight's.
+    let bench = planned();
+    let pull = |fault| {
+        let other = Fake::start(&plan(&bench), fault);
+        run(&bench, &other, &["logs", "pull", "campaign"])
+    };
+    assert_eq!(pull(Fault::None).code, Some(0));
+    let newer = pull(Fault::LogNewer);
+    assert_eq!(newer.code, Some(3), "{newer}");
+    let _ = writeln!(said, "LogNewer, no start\n{newer}");
+    insta::assert_snapshot!(said);
+}
+
 #[test]
 fn one_drone_without_its_log_keeps_nobody_else_from_theirs() {
     let mut said = String::new();

@@ -108,6 +108,15 @@ pub(crate) enum Fault {
     NakClear,
     /// Drone 01 obeys no order to come down.
     Disobeys,
+    /// Drone 01 has a log of a later flight, too; it has none; a huge one; one without a time.
+    LogNewer,
+    LogNone,
+    LogHuge,
+    LogTimeless,
+    /// Logs of drone 01 are not listed; not once one came; log 2 is gone then.
+    NoList,
+    NoListAfter,
+    LogGone,
     /// The server has not found out what firmware the drones have, and has no name for the show mode.
     ModeByNumber,
 }
@@ -171,6 +180,13 @@ pub(crate) fn log_of(id: &str, start_unix_s: i64) -> Vec<u8> {
     let began = identity.shows().next().expect("the log has a show clock").start;
     let start = GpsTime::from_unix_ms(start_unix_s * 1000).unwrap();
     move_gps(&mut bytes, start.total_ms() - began.total_ms());
+    bytes
+}
+
+/// A log whose satellite messages have a name that nobody knows.
+fn without_gps(mut bytes: Vec<u8>) -> Vec<u8> {
+    let name = bytes.windows(4).position(|name| name == b"GPS\0").unwrap();
+    bytes[name + 2] = b'?';
     bytes
 }
 
@@ -464,7 +480,9 @@ impl Visit {
             }
             "SHOW-SETCFG" => self.configure(id, &body["configuration"]["start"]),
             "LOG-INF" => self.list(id, &ids(body)),
-            "LOG-DATA" => self.log(id, body["uavId"].as_str().unwrap()),
+            "LOG-DATA" => {
+                self.log(id, body["uavId"].as_str().unwrap(), body["logId"].as_str().unwrap())
+            }
             "ASYNC-CANCEL" => {
                 let body = json!({ "type": kind, "success": ids(body) });
                 self.send(Some(id), &body)
@@ -681,14 +699,39 @@ impl Visit {
                 Fault::LogGrows if self.state.lock().unwrap().downloads == 0 => size - 100,
                 _ => size,
             };
-            let logs = json!([
-                { "id": "1", "kind": "ardupilot", "size": 1000, "timestamp": 1_795_143_000 },
-                { "id": "2", "kind": "ardupilot", "size": size, "timestamp": 1_795_143_906 },
-                { "id": "9", "kind": "text", "size": 10 },
-            ]);
-            self.send(None, &json!({ "type": "ASYNC-RESP", "id": receipt, "result": logs }))?;
+            let entry = |id: &str, size: usize, time: u64| json!({ "id": id, "kind": "ardupilot", "size": size, "timestamp": time });
+            let mut logs = vec![
+                entry("1", 1000, 1_795_143_000),
+                entry("2", size, 1_795_143_906),
+                json!({ "id": "9", "kind": "text", "size": 10 }),
+            ];
+            let came = self.state.lock().unwrap().downloads > 0;
+            let is_listed = match self.fault {
+                Fault::NoList => drone != "01",
+                Fault::NoListAfter => drone != "01" || !came,
+                _ => true,
+            };
+            if drone == "01" {
+                match self.fault {
+                    Fault::LogNewer => logs.push(entry("3", size, 1_795_143_999)),
+                    Fault::LogNone => drop(logs.drain(..2)),
+                    Fault::LogHuge => logs[1]["size"] = json!(9_000_000_000_u64),
+                    Fault::LogGone if came => drop(logs.remove(1)),
+                    _ => {}
+                }
+            }
+            let end = if is_listed {
+                json!({ "type": "ASYNC-RESP", "id": receipt, "result": logs })
+            } else {
+                json!({ "type": "ASYNC-RESP", "id": receipt, "error": "log list timed out" })
+            };
+            self.send(None, &end)?;
         }
         Ok(())
+    }
+
+    fn flown_unix_s(&self) -> Option<i64> {
+        self.state.lock().unwrap().flown
     }
 
     /// Of the flight that was flown, if one was.
@@ -697,7 +740,7 @@ impl Visit {
         flown.map_or_else(|| log(drone), |start| log_of(drone, start))
     }
 
-    fn log(&mut self, id: &str, drone: &str) -> Result<(), Closed> {
+    fn log(&mut self, id: &str, drone: &str, number: &str) -> Result<(), Closed> {
         let first = drone == "01";
         if first && self.fault == Fault::LogUnknown {
             // Of a single drone, the error has no key.
@@ -726,14 +769,22 @@ impl Visit {
             }
             _ => {}
         }
-        let bytes = self.newest_log(drone);
+        let bytes = match self.fault {
+            Fault::LogNewer if number == "3" => {
+                let now_s = (self.clock.unix_ms() / 1000) as i64;
+                log_of(drone, self.flown_unix_s().unwrap_or(now_s) + 7200)
+            }
+            Fault::LogTimeless if first => without_gps(self.newest_log(drone)),
+            _ => self.newest_log(drone),
+        };
         let body = match self.fault {
             Fault::LogCut => STANDARD.encode(&bytes[..5000]),
             Fault::LogGarbled => "?".to_owned(),
             Fault::LogIsNone => STANDARD.encode(vec![0; bytes.len()]),
             _ => STANDARD.encode(&bytes),
         };
-        let result = json!({ "id": "2", "kind": "ardupilot", "size": bytes.len(), "body": body });
+        let result =
+            json!({ "id": number, "kind": "ardupilot", "size": bytes.len(), "body": body });
         self.end_later(
             drone,
             vec![json!({ "type": "ASYNC-RESP", "id": receipt, "result": result })],

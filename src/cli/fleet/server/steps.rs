@@ -13,6 +13,7 @@ use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::mission::Plan;
+use crate::skybrush_server::Client;
 use crate::skybrush_server::gate::Step;
 use crate::skybrush_server::state::State;
 use crate::skybrush_server::watch::code_name;
@@ -114,6 +115,22 @@ struct UploadRow {
     reason: Option<String>,
 }
 
+/// Runs a step with the drones that stand on the plan's slots, all of them; who they are, and what came
+/// of it.
+fn on_slots<T>(
+    context: &Context,
+    address: &str,
+    folder: &FlightFolder,
+    plan: &Plan,
+    wait_s: f64,
+    step: impl FnOnce(&mut Client, &Flight<'_>) -> Result<T, CommandError>,
+) -> Result<(BTreeMap<u16, String>, T), CommandError> {
+    let mut client = connect(context, address)?;
+    let drones = assign(context, &mut client, plan, wait_s)?;
+    let done = step(&mut client, &Flight { address, folder, plan, drones: &drones })?;
+    Ok((drones, done))
+}
+
 /// Gives every drone its show, origin and fence, and switches it to show mode.
 pub(in crate::cli) fn upload(
     context: &Context,
@@ -123,10 +140,9 @@ pub(in crate::cli) fn upload(
     wait_s: f64,
 ) -> Result<Exit, CommandError> {
     let shows = Shows::of(plan)?;
-    let mut client = connect(context, address)?;
-    let drones = assign(context, &mut client, plan, wait_s)?;
-    let flight = Flight { address, folder, plan, drones: &drones };
-    let loaded = load(context, &mut client, &flight, &shows, wait_s)?;
+    let (drones, loaded) = on_slots(context, address, folder, plan, wait_s, |client, flight| {
+        load(context, client, flight, &shows, wait_s)
+    })?;
     let refused = loaded.err().unwrap_or_default();
     context.say(&format!(
         "{} of {} drones have the show",
@@ -154,10 +170,9 @@ pub(in crate::cli) fn preflight(
     plan: &Plan,
     wait_s: f64,
 ) -> Result<Exit, CommandError> {
-    let mut client = connect(context, address)?;
-    let drones: BTreeMap<u16, String> = assign(context, &mut client, plan, wait_s)?;
-    let flight = Flight { address, folder, plan, drones: &drones };
-    let table = gate(context, &mut client, &flight, Step::Ready, patience(wait_s))?;
+    let (_, table) = on_slots(context, address, folder, plan, wait_s, |client, flight| {
+        gate(context, client, flight, Step::Ready, patience(wait_s))
+    })?;
     if context.json {
         context.print_json(&table.output())?;
     } else {
