@@ -70,7 +70,7 @@ fn refused(fault: Fault) -> String {
 #[test]
 fn a_flight_is_uploaded_started_watched_and_brings_its_logs_home() {
     let bench = planned();
-    let (ended, server) = fly(&bench, Fault::None);
+    let (ended, server) = fly(&bench, Fault::Patient);
     assert_eq!(ended.code, Some(0), "{ended}");
     // It does not wait for the time at which the show ends, and some.
     let start = server.flown_unix_s().unwrap() as u64;
@@ -694,6 +694,40 @@ fn who_watches_in_place_of_another_station_can_end_the_flight() {
 
 #[test]
 #[cfg(unix)]
+fn drones_that_hover_long_after_their_show_are_watched_as_well() {
+    let (bench, server) = orphaned("take-off", Fault::HoldsInFlight);
+    server.clock.pass(600);
+    let mut watching = Going::start(&bench, &server, &["fleet", "watch", "campaign", "--no-logs"]);
+    watching.until("Watching");
+    server.land();
+    let (said, code) = watching.end();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("2 of 2 drones have landed"), "{said}");
+    assert!(!bench.path("campaign/logs/01.BIN").exists());
+    assert!(!server.asked().iter().any(|body| body["type"] == "LOG-INF"));
+}
+
+#[test]
+#[cfg(unix)]
+fn who_is_on_the_ground_when_the_watch_begins_is_not_said_to_have_landed() {
+    let (bench, server) = orphaned("take-off", Fault::HoldsInFlight);
+    server.land();
+    // It goes on by a state with every look.
+    for _ in 0..3 {
+        run(&bench, &server, &["fleet", "status", "campaign"]);
+    }
+    let ended = run(&bench, &server, &["fleet", "watch", "campaign"]);
+    assert_eq!(ended.code, Some(3), "{ended}");
+    let found =
+        "drone 02 was on the ground when this watch began: whether it has flown, its log says";
+    assert!(ended.err.contains(found), "{ended}");
+    // The other says that it has landed.
+    assert!(ended.err.contains("1 of 2 drones have landed"), "{ended}");
+    assert!(ended.err.contains("Brought 2 of 2 logs home"), "{ended}");
+}
+
+#[test]
+#[cfg(unix)]
 fn a_watch_that_is_of_no_use_says_why() {
     let watch = |bench: &Bench, server: &Fake| {
         run(bench, server, &["fleet", "watch", "campaign", "--wait", "1"]).to_string()
@@ -859,6 +893,20 @@ fn a_signal_in_flight_does_what_was_chosen() {
             }
         }
     }
+}
+
+#[test]
+#[cfg(unix)]
+fn drones_are_ordered_down_over_a_new_connection_when_the_old_one_is_broken() {
+    let more = ["--lead", "60"];
+    let (said, code, server) = ended_at("-INT", "take-off", Fault::GoneWhenOrdered, &more);
+    assert_eq!(code, Some(130), "{said}");
+    assert!(said.contains("drone 01: returns"), "{said}");
+    let orders = server.asked().iter().filter(|body| body["type"] == "UAV-RTH").count();
+    assert_eq!(orders, 2, "once in vain");
+    let (said, code, _) = ended_at("-INT", "take-off", Fault::GoneForOrders, &more);
+    assert_eq!(code, Some(130), "{said}");
+    assert!(said.contains(": use Skybrush Live, or the remote controls"), "{said}");
 }
 
 #[test]

@@ -95,6 +95,11 @@ pub(crate) enum Fault {
     /// is let go; then they stay there.
     HoldsBeforeStart,
     HoldsInFlight,
+    /// The same, and the server is gone when somebody wants them down: once, or for ever.
+    GoneWhenOrdered,
+    GoneForOrders,
+    /// Nothing is wrong, and downloads go on until there are two.
+    Patient,
     /// The server knows no drone.
     NoDrones,
     /// Drone 01 stands where drone 02 does; it does not say where it stands.
@@ -119,6 +124,17 @@ pub(crate) enum Fault {
     LogGone,
     /// The server has not found out what firmware the drones have, and has no name for the show mode.
     ModeByNumber,
+}
+
+impl Fault {
+    fn holds_in_flight(self) -> bool {
+        matches!(self, Self::HoldsInFlight | Self::GoneWhenOrdered | Self::GoneForOrders)
+    }
+
+    /// The drones stay in the air until they are told otherwise.
+    fn stays_up(self) -> bool {
+        self.holds_in_flight() || self == Self::Disobeys
+    }
 }
 
 /// How long work takes, so that there can be more of it at once.
@@ -151,6 +167,7 @@ struct State {
     lands: bool,
     ordered: Option<&'static str>,
     looks_since_order: u64,
+    orders: u64,
 }
 
 /// The server, on a port of its own.
@@ -395,8 +412,13 @@ impl Visit {
         state.most_busy = state.most_busy.max(state.busy.len());
         drop(state);
         let (out, state, drone) = (self.out.clone(), Arc::clone(&self.state), drone.to_owned());
+        let is_patient = self.fault == Fault::Patient;
         std::thread::spawn(move || {
             std::thread::sleep(WORK);
+            let waits = |state: &State| state.downloads > 0 && state.most_busy < 2;
+            while is_patient && waits(&state.lock().unwrap()) {
+                std::thread::sleep(Duration::from_millis(5));
+            }
             state.lock().unwrap().busy.retain(|busy| *busy != drone);
             // Whoever has asked may be gone.
             for message in messages {
@@ -445,7 +467,7 @@ impl Visit {
             }
             "UAV-INF" => {
                 let status = self.status(&ids(body))?;
-                if self.fault == Fault::HoldsInFlight {
+                if self.fault.holds_in_flight() {
                     let looks = self.looks_in_flight;
                     self.hold(|_| looks >= 3);
                 }
@@ -488,6 +510,15 @@ impl Visit {
                 self.send(Some(id), &body)
             }
             "UAV-RTH" | "UAV-LAND" => {
+                let mut state = self.state.lock().unwrap();
+                let is_first = state.orders == 0;
+                state.orders += 1;
+                drop(state);
+                if self.fault == Fault::GoneForOrders
+                    || self.fault == Fault::GoneWhenOrdered && is_first
+                {
+                    return Err(Closed);
+                }
                 let (deaf, obey): (Vec<String>, Vec<String>) = ids(body)
                     .into_iter()
                     .partition(|id| self.fault == Fault::Disobeys && id == "01");
@@ -544,8 +575,8 @@ impl Visit {
             let first = id == "01";
             let step = match self.fault {
                 Fault::NeverTakesOff if first => 0,
-                Fault::HoldsInFlight | Fault::Disobeys if ordered.is_some() => 3 + since_order,
-                Fault::HoldsInFlight | Fault::Disobeys if !lands => step.min(3),
+                fault if fault.stays_up() && ordered.is_some() => 3 + since_order,
+                fault if fault.stays_up() && !lands => step.min(3),
                 _ => step,
             };
             let (since_set, set, authorized) = known;

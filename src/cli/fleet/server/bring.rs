@@ -149,11 +149,12 @@ impl Foreman for Puller<'_> {
                 .iter()
                 .map(|(id, share)| format!("{id} {:.0} %", share * 100.0))
                 .collect();
+            let parts =
+                if parts.is_empty() { String::new() } else { format!("; {}", parts.join(", ")) };
             self.context.say(&format!(
-                "bringing logs home: {over} of {} drones done after {}; {}",
+                "bringing logs home: {over} of {} drones done after {}{parts}",
                 self.ones.len(),
                 Spent(Duration::from_micros(spent)),
-                parts.join(", ")
             ));
         }
     }

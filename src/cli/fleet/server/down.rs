@@ -1,7 +1,9 @@
 //! Drones in the air are brought down through the server.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use super::Flight;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::interrupt::Choice;
@@ -88,12 +90,20 @@ impl Foreman for Again<'_> {
 pub(super) fn interrupted(
     context: &Context,
     client: &mut Client,
-    drones: &[String],
+    flight: &Flight<'_>,
     choice: Choice,
 ) -> CommandError {
     context.signals().next_ends();
     if let Some(action) = choice.action() {
-        match bring_down(client, drones.to_vec(), action, &|| true) {
+        let drones: Vec<String> = flight.drones.values().cloned().collect();
+        let mut down = bring_down(client, drones.clone(), action, &|| true);
+        // The connection may have broken some time ago, and the server be back.
+        if down.is_err()
+            && let Ok(mut again) = Client::connect(flight.address, Arc::clone(context.clock()))
+        {
+            down = bring_down(&mut again, drones, action, &|| true);
+        }
+        match down {
             Ok(down) => {
                 for (id, text) in &down.told {
                     context.insist(&format!("drone {id}: {text}"));

@@ -204,7 +204,7 @@ fn look_on(
             return Err(CommandError::Interrupted);
         }
         if let Some(choice) = interrupt.poll(clock.now()) {
-            return Err(interrupted(context, client, &ids, choice));
+            return Err(interrupted(context, client, flight, choice));
         }
         let over = monitor.is_over()
             || unix_s > show_end_s && !away && monitor.all_are_down()
