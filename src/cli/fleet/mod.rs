@@ -370,7 +370,7 @@ fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> 
         return Err(CommandError::Usage(
             "no parameter is put back through Skybrush Server, as none is set through it: those in \
              fleet-changes.json were set over the drones' own links, and are put back over these \
-             (--connect); nothing was sent"
+             (--connect), or one by one in Skybrush Live; nothing was sent"
                 .to_owned(),
         ));
     }
