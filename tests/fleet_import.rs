@@ -146,7 +146,7 @@ fn each_log_goes_to_the_flight_that_it_flew() {
     // Again: they are home.
     let again = Tried::of(&cards, &flights, &CARRY());
     assert_eq!(again.outcomes.len(), 8);
-    assert!(again.outcomes.iter().all(|(_, outcome)| *outcome == Carried::There));
+    assert!(again.outcomes.iter().all(|(_, outcome)| *outcome == Carried::There(None)));
 }
 
 #[test]
@@ -370,7 +370,7 @@ fn logs_at_home_of_another_start_make_room_and_nothing_is_overwritten() {
         assert_eq!(fs::read(home.join("flight-1/01.BIN")).unwrap(), first_log);
         let outcome = &tried.outcomes[0].1;
         if again {
-            assert_eq!(*outcome, Carried::There, "the same log is not copied again");
+            assert_eq!(*outcome, Carried::There(None), "the same log is not copied again");
         } else {
             let Carried::Taken(_, moved) = outcome else { panic!("{outcome:?}") };
             assert_eq!(moved.as_deref(), Some(home.join("flight-1/01.BIN").as_path()));

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{CampaignError, FlightFolder, read_json, to_json};
 use crate::base::file::{FileError, create_folder, write_whole};
+use crate::base::plain::plain;
 use crate::base::time::GpsTime;
 
 /// Name and version of the format.
@@ -168,7 +169,7 @@ impl StartRecord {
         if !path.exists() {
             return Ok(None);
         }
-        let record: Self = read_json(path)?;
+        let record: Self = read_json(path).map_err(or_move_it_away)?;
         if ![START_SCHEMA, FIRST_SCHEMA].contains(&record.schema.as_str()) {
             let reason =
                 format!("this program reads \"{START_SCHEMA}\", not \"{}\"", record.schema);
@@ -176,6 +177,25 @@ impl StartRecord {
         }
         Ok(Some(record))
     }
+}
+
+/// The starts of a campaign's other flights that were written down, earlier ones as well: name of the
+/// flight and GPS time of its show time 0. What cannot be read is left out.
+pub fn other_starts(folder: &FlightFolder) -> Vec<(String, GpsTime)> {
+    let siblings = folder.0.parent().filter(|parent| super::index_path(parent).is_file());
+    let flights = siblings.and_then(|parent| super::flights(parent).ok()).unwrap_or_default();
+    let mut found = Vec::new();
+    for flight in flights.iter().filter(|flight| flight.0 != folder.0) {
+        let name = flight.0.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let logs = flight.logs();
+        let earlier = earlier_folders(&logs).unwrap_or_default().into_iter();
+        for logs in earlier.map(|(_, folder)| folder).chain([logs]) {
+            if let Ok(Some(record)) = StartRecord::read_in(&logs) {
+                found.push((plain(&name).into_owned(), record.start));
+            }
+        }
+    }
+    found
 }
 
 /// The folder of the logs of start `number`, once there is a later one.
@@ -205,6 +225,19 @@ pub fn earlier_folders(logs: &Path) -> Result<Vec<(u32, PathBuf)>, FileError> {
     }
     found.sort();
     Ok(found)
+}
+
+/// What to do about a record that cannot be read.
+fn or_move_it_away(error: CampaignError) -> CampaignError {
+    match error {
+        CampaignError::Json { path, reason } => {
+            let reason = format!(
+                "{reason}; mend it, or move it away: the start of this flight is then not known"
+            );
+            CampaignError::Json { path, reason }
+        }
+        error => error,
+    }
 }
 
 fn last_number(logs: &Path) -> Result<u32, FileError> {

@@ -19,7 +19,9 @@ use super::fly_output::{FlightEnd, FlightOutput, FlyOutput, LogOutput};
 use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
 use crate::base::time::GpsTime;
 use crate::campaign::origin::LogOrigin;
+use crate::campaign::start::StartRecord;
 use crate::campaign::{self, FlightFolder};
+use crate::fleet::logs::manifest::Shelf;
 use crate::fleet::preflight::Preflight;
 use crate::fleet::start::StartOptions;
 use crate::link::id::DroneId;
@@ -130,6 +132,13 @@ fn refuse_of_server(args: &FlyArgs) -> Result<(), CommandError> {
     )
 }
 
+/// Refuses to fly while records that the flight needs when it is over cannot be read.
+fn readable(folder: &FlightFolder) -> Result<(), CommandError> {
+    StartRecord::read(folder)?;
+    Shelf::open(&folder.logs(), "")?;
+    Ok(())
+}
+
 fn fly_target(
     context: &Context,
     args: &FlyArgs,
@@ -138,6 +147,7 @@ fn fly_target(
     match target {
         Target::Links(links) => {
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
+            readable(&folder)?;
             let mut station = args.connect.open(links)?;
             let mut desk = end::desk(context, &mut station, &folder);
             let mut crew = Crew::new(context, &mut desk, &folder, &plan);
@@ -169,6 +179,7 @@ fn fly_target(
         Target::Server(address) => {
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             let (with_logs, wait_s) = (!args.no_logs, args.connect.wait);
+            readable(&folder)?;
             let (flight, exit) =
                 server::fly(context, &address, &folder, &plan, &args.lead, with_logs, wait_s)?;
             Ok((vec![flight], exit))

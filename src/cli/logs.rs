@@ -25,7 +25,7 @@ use crate::campaign;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::start::earlier_folders;
 use crate::fleet::logs::one::Which;
-use crate::fleet::logs::verify::verify;
+use crate::fleet::logs::verify::{unknown, verify};
 use crate::mission::Plan;
 
 pub(super) use listing::{ListRow, ListedLog};
@@ -363,6 +363,10 @@ fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
             for checked in verify(&logs)? {
                 let faults = checked.faults.iter().map(ToString::to_string).collect();
                 rows.push(row(&logs, &checked.entry.file, faults));
+            }
+            for file in unknown(&logs)? {
+                let fault = "has no record of how it came (manifest.json): it cannot be verified";
+                rows.push(row(&logs, &file, vec![fault.to_owned()]));
             }
         }
     }

@@ -44,6 +44,8 @@ pub struct Identity {
     pub boots: Vec<Boot>,
     /// What tells that it is only the beginning of a log.
     pub cut: Option<&'static str>,
+    /// Bytes in it that are no message: it was damaged on its way or on its card.
+    pub damaged_bytes: u64,
     /// Why the clocks of its boots cannot be told apart, if they cannot.
     pub doubt: Option<&'static str>,
 }
@@ -85,6 +87,21 @@ pub enum Belongs {
 }
 
 impl Identity {
+    /// Why it may not hold all of its flight, as a clause; `None`: nothing says so.
+    pub fn incomplete(&self) -> Option<String> {
+        let damaged = || {
+            let bytes = self.damaged_bytes;
+            (bytes > 0).then(|| format!("{bytes} bytes of it are damaged"))
+        };
+        self.cut.map(str::to_owned).or_else(damaged)
+    }
+
+    /// Name of the flight that it is of, of flights by name and start.
+    pub fn of_any<'a>(&self, starts: &'a [(String, GpsTime)]) -> Option<&'a str> {
+        let found = starts.iter().find(|(_, start)| self.belongs_to(*start) == Belongs::Yes);
+        found.map(|(name, _)| name.as_str())
+    }
+
     /// Reads a log file; see [`identify`].
     ///
     /// # Errors
@@ -260,15 +277,18 @@ pub fn identify(log: &Log) -> Identity {
         flew: flight.is_some(),
         boots,
         cut: last.as_ref().and_then(cut),
+        damaged_bytes: all.scan.bad_bytes,
         doubt,
     }
 }
 
 /// What tells that a log is only the beginning of one.
 fn cut(last: &Messages) -> Option<&'static str> {
-    // The firmware writes of disarming before it closes its log.
+    // The firmware writes of disarming before it closes its log. What is begun after that and not
+    // ended is nothing of the flight: logs of the real firmware often end so.
     let ends_armed = match pick::last_event(last) {
-        Some(is_armed) => is_armed,
+        Some(false) => return None,
+        Some(true) => true,
         // It logs nothing but armed time: without a word of disarming it was still armed.
         None => last.logs_only_armed() && last.rows("RCOU").is_some(),
     };

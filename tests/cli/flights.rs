@@ -5,8 +5,9 @@
 use std::fs;
 use std::time::Duration;
 
+use crate::fleet::free_port;
 use crate::guided::{Flight, stage};
-use crate::support::Bench;
+use crate::support::{Bench, SHORT};
 
 fn fly(link: &str) -> Vec<&str> {
     let args = ["fly", "campaign", "--connect", link, "--set-params", "--yes"];
@@ -86,18 +87,125 @@ fn drones_that_were_switched_off_in_between_have_other_logs_under_the_same_numbe
 #[test]
 fn a_start_that_was_taken_back_is_no_flight() {
     let (bench, _fleet, link) = stage(&["--speed", "1"]);
-    let mut args = fly(&link);
+    let mut flight = in_the_countdown(&bench, &link);
+    bench.expect(0, &["fleet", "abort", "campaign", "--connect", &link, "--wait", "10"]);
+    assert_eq!(flight.end(), Some(3), "{}", flight.said());
+    assert!(!bench.path("campaign/logs/start.json").exists());
+}
+
+/// Authorizes a start long before its time.
+fn in_the_countdown<'a>(bench: &'a Bench, link: &str) -> Flight<'a> {
+    let mut args = fly(link);
     for word in &mut args {
         if *word == "25" {
             *word = "600";
         }
     }
-    let mut flight = Flight::of(&bench, &args);
+    let mut flight = Flight::of(bench, &args);
     flight.hear("Authorized.");
     assert!(bench.path("campaign/logs/start.json").exists());
-    bench.expect(0, &["fleet", "abort", "campaign", "--connect", &link, "--wait", "10"]);
-    assert_eq!(flight.end(), Some(3), "{}", flight.said());
-    assert!(!bench.path("campaign/logs/start.json").exists());
+    flight
+}
+
+#[test]
+fn a_start_that_a_signal_or_another_station_took_back_is_no_flight_either() {
+    let (bench, _fleet, link) = stage(&["--speed", "1"]);
+    let mut flight = in_the_countdown(&bench, &link);
+    flight.signal("-INT");
+    assert_eq!(flight.end(), Some(130), "{}", flight.said());
+    assert!(!bench.path("campaign/logs/start.json").exists(), "{}", flight.said());
+    // The station died, and nobody takes its place.
+    let mut flight = in_the_countdown(&bench, &link);
+    flight.signal("-KILL");
+    flight.end();
+    let ended =
+        bench.expect(0, &["fleet", "abort", "campaign", "--connect", &link, "--wait", "10"]);
+    assert!(ended.out.contains("drone 2: on the ground, its start is taken back"), "{ended}");
+    assert!(!bench.path("campaign/logs/start.json").exists(), "{ended}");
+}
+
+#[test]
+fn the_logs_of_one_flight_never_stand_for_those_of_another_that_nobody_flew() {
+    let bench = Bench::new();
+    for folder in ["campaign", "drones"] {
+        let hover = ["--grid", "1x2", "--duration", "10", "-o", folder];
+        bench.expect(0, &[&["plan", "campaign"][..], SHORT, &hover].concat());
+    }
+    let station = free_port();
+    let link = format!("udpin:{station}");
+    let flights = |name: &'static str| ["--flight", name];
+    let with = [&flights("hover")[..], &["--speed", "10"]].concat();
+    let _fleet = bench.fleet(&station, &with);
+    let ended = bench.expect(0, &[&fly(&link)[..], &flights("hover")].concat());
+    assert!(ended.err.contains("Brought 2 of 2 logs home"), "{ended}");
+    let pull = ["logs", "pull", "campaign", "--connect", &link, "--flight", "calibration"];
+    for _ in 0..2 {
+        let ended = bench.expect(3, &pull);
+        let why = "log 1 of the drone is of another flight: it is of hover";
+        assert!(ended.err.contains(why), "{ended}");
+        assert!(!bench.path("campaign/calibration/logs/01.BIN").exists(), "{ended}");
+    }
+}
+
+#[test]
+fn who_flew_a_slot_is_what_was_written_down_at_its_start() {
+    let (bench, _fleet, link) = stage(&["--speed", "10"]);
+    bench.expect(0, &[&fly(&link)[..], &["--no-logs"]].concat());
+    let table = bench.path("campaign/fleet.json");
+    let swapped = fs::read_to_string(&table).unwrap();
+    let mut swapped: serde_json::Value = serde_json::from_str(&swapped).unwrap();
+    for (index, system) in [2, 1].into_iter().enumerate() {
+        swapped["drones"][index]["drone"]["system"] = system.into();
+    }
+    fs::write(&table, swapped.to_string()).unwrap();
+    let pulled = bench.expect(0, &["logs", "pull", "campaign", "--connect", &link]);
+    let warning = "slot 1 was flown by drone 1; fleet.json says 2 now: the log of drone 1 is the \
+                   flight's";
+    assert!(pulled.err.contains(warning), "{pulled}");
+    let manifest = json(&bench, "logs/manifest.json");
+    for entry in manifest["logs"].as_array().unwrap() {
+        assert_eq!(entry["slot"], entry["drone"]["system"], "{entry}");
+    }
+}
+
+#[test]
+fn records_that_cannot_be_read_are_told_before_anybody_flies() {
+    let (bench, _fleet, link) = stage(&["--speed", "10"]);
+    fs::create_dir_all(bench.path("campaign/logs")).unwrap();
+    for (file, hint) in [
+        ("manifest.json", "or move it away: `updraft logs pull --again` brings the logs again"),
+        ("start.json", "or move it away: the start of this flight is then not known"),
+    ] {
+        let path = bench.path(&format!("campaign/logs/{file}"));
+        fs::write(&path, "{").unwrap();
+        let pull = ["logs", "pull", "campaign", "--connect", &link, "--wait", "10"];
+        for args in [&fly(&link)[..], &pull] {
+            let ended = bench.expect(2, args);
+            assert!(ended.err.contains(file) && ended.err.contains(hint), "{ended}");
+            assert!(!ended.err.contains("Loaded"), "nothing was sent: {ended}");
+        }
+        fs::remove_file(path).unwrap();
+    }
+}
+
+#[test]
+fn logs_of_an_aborted_flight_that_stay_on_the_drones_are_told() {
+    let (bench, _fleet, link) = stage(&["--speed", "10"]);
+    let mut flight = Flight::of(&bench, &fly(&link));
+    flight.hear("drone 2: armed");
+    std::thread::sleep(Duration::from_secs(4));
+    flight.signal("-TERM");
+    assert_eq!(flight.end(), Some(130), "{}", flight.said());
+    let told = "Nothing of flight 1 (";
+    let again = bench.expect(0, &fly(&link));
+    assert!(again.err.contains(told), "{again}");
+    let pulled = bench.expect(0, &["logs", "pull", "campaign", "--connect", &link]);
+    assert!(pulled.err.contains(told), "{pulled}");
+    // What no manifest knows was not verified.
+    fs::remove_file(bench.path("campaign/logs/manifest.json")).unwrap();
+    let verified = bench.expect(3, &["logs", "verify", "campaign"]);
+    let why = "logs/01.BIN has no record of how it came (manifest.json): it cannot be verified";
+    assert!(verified.err.contains(why), "{verified}");
 }
 
 #[test]

@@ -251,6 +251,37 @@ fn on_a_terminal_doubts_are_asked() {
 }
 
 #[test]
+fn logs_that_are_cut_or_damaged_are_taken_and_never_passed_over_in_silence() {
+    let bench = flown();
+    let hover = bench.path("campaign/hover/logs");
+    let start = start_of(&hover.join("01.BIN"));
+    let mut cut = fs::read(hover.join("01.BIN")).unwrap();
+    cut.truncate(cut.len() * 2 / 3);
+    let mut damaged = fs::read(hover.join("02.BIN")).unwrap();
+    let middle = damaged.len() / 2;
+    damaged[middle..middle + 3_000].fill(0);
+    let card = bench.path("card");
+    fs::create_dir(&card).unwrap();
+    fs::write(card.join("1.BIN"), cut).unwrap();
+    fs::write(card.join("2.BIN"), damaged).unwrap();
+    fs::remove_dir_all(&hover).unwrap();
+    fs::create_dir(&hover).unwrap();
+    write_start(&bench.path("campaign/hover"), start);
+    let import = ["logs", "import", "campaign", "card", "--flight", "hover"];
+    for took in ["Took 2 logs from cards", "Took 0 logs from cards (2 had come before)"] {
+        let ended = bench.expect(3, &import);
+        assert!(ended.err.contains(took), "{ended}");
+        assert!(
+            ended.err.contains("warning: 01.BIN is not known to be whole: it ends "),
+            "{ended}"
+        );
+        assert!(ended.err.contains("warning: 02.BIN is not known to be whole: "), "{ended}");
+        assert!(ended.err.contains(" bytes of it are damaged"), "{ended}");
+    }
+    bench.expect(3, &["logs", "verify", "campaign"]);
+}
+
+#[test]
 fn a_card_that_is_not_there_and_starts_that_contradict_are_refused() {
     let bench = flown();
     let hover = bench.path("campaign/hover");

@@ -4,26 +4,27 @@ mod bar;
 mod shares;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use self::bar::Bar;
 use super::connect::run_number;
+use super::tables::time_of_day;
 use crate::base::file::create_folder;
 use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::campaign::origin::LogOrigin;
-use crate::campaign::start::StartRecord;
+use crate::campaign::start::{StartRecord, earlier_folders, other_starts};
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::simulate::made_by;
 use crate::cli::words;
-use crate::fleet::logs::manifest::LogFlight;
+use crate::fleet::logs::manifest::{LogFlight, ManifestEntry, Shelf};
 use crate::fleet::logs::one::{OneOptions, Which};
-use crate::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
-use crate::fleet::slots::FleetTable;
+use crate::fleet::logs::pull::{Outcome, PullError, PullOptions, Wanted, pull};
+use crate::fleet::slots::{Assignment, FleetTable};
 use crate::link::clock::{Clock as _, Micros, S};
 use crate::link::id::DroneId;
 use crate::link::net::Net;
@@ -114,6 +115,32 @@ fn say_moved(context: &Context, outcomes: &BTreeMap<DroneId, Outcome>) {
     }
 }
 
+/// Names the earlier starts whose logs never came home: they may still be on the drones.
+fn say_left_behind(context: &Context, logs: &Path) {
+    for (number, folder) in earlier_folders(logs).unwrap_or_default() {
+        let Ok(Some(record)) = StartRecord::read_in(&folder) else { continue };
+        let has_logs = Shelf::open(logs, "").is_ok_and(|shelf| {
+            let is_of = |entry: &&ManifestEntry| {
+                entry.flight.as_ref().is_some_and(|flight| flight.number == number)
+            };
+            shelf.manifest.logs.iter().any(|entry| is_of(&entry))
+        });
+        if !has_logs && !has_bin(&folder) {
+            context.say(&format!(
+                "Nothing of flight {number} ({}) is at home: its logs may still be on the drones \
+                 (`updraft logs pull --log all`)",
+                time_of_day(record.start)
+            ));
+        }
+    }
+}
+
+/// Whether a folder has a log.
+fn has_bin(folder: &Path) -> bool {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    files.into_iter().any(|file| file.path().extension().is_some_and(|end| end == "BIN"))
+}
+
 /// Names the drones that have newer logs than those of this flight: somebody may want them.
 fn say_newer(context: &Context, outcomes: &BTreeMap<DroneId, Outcome>) {
     let newer = outcomes.iter().filter_map(|(drone, outcome)| {
@@ -153,11 +180,29 @@ pub(in crate::cli) fn bring(
     };
     let start = StartRecord::read_in(&at.folder)?;
     let flight = |slot: u16| start.as_ref().map(|start| LogFlight::wanted(start, slot));
+    let other_starts = if start.is_none() { other_starts(folder) } else { Vec::new() };
+    // Who flew a slot was written down at its start; the table may have changed since.
+    let flew = |line: &Assignment| {
+        let record = start.as_ref().filter(|_| wish.which == Which::Flight)?;
+        let drone: DroneId = record.drone(line.slot)?.drone.parse().ok()?;
+        (drone != line.drone).then_some(drone)
+    };
+    for line in table.drones.iter().filter(|_| !quiet) {
+        if let Some(drone) = flew(line) {
+            context.warn(&format!(
+                "slot {} was flown by drone {drone}; {} says {} now: the log of drone {drone} is the \
+                 flight's",
+                line.slot,
+                crate::fleet::slots::FLEET_FILE,
+                line.drone
+            ));
+        }
+    }
     let wanted: Vec<Wanted> = table
         .drones
         .iter()
         .map(|line| Wanted {
-            drone: line.drone,
+            drone: flew(line).unwrap_or(line.drone),
             slot: line.slot,
             file: file(line.slot),
             flight: flight(line.slot),
@@ -173,6 +218,7 @@ pub(in crate::cli) fn bring(
             is_durable: wish.is_durable,
             start_number: run_number(),
             unix_s: SystemClock::start().unix_us() / 1_000_000,
+            other_starts,
             ..OneOptions::default()
         },
         at_once: wish.at_once,
@@ -183,8 +229,11 @@ pub(in crate::cli) fn bring(
     let absent = wanted.iter().filter(|one| !heard.contains(&one.drone));
     let absent = absent.map(|one| (one.drone, one.slot)).collect();
     let mut bar = Bar::new(context, absent, quiet);
-    let outcomes = pull(net, &at.folder, &wanted, &options, &mut bar)
-        .map_err(|error| CommandError::Failed(with_reasons(&error)))?;
+    let outcomes =
+        pull(net, &at.folder, &wanted, &options, &mut bar).map_err(|error| match error {
+            PullError::Shelf(error) => CommandError::from(error),
+            error => CommandError::Failed(with_reasons(&error)),
+        })?;
     bar.finish();
     let brought: Vec<Brought> = wanted
         .iter()
@@ -217,6 +266,7 @@ pub(in crate::cli) fn bring(
         .collect();
     if !quiet {
         say_moved(context, &outcomes);
+        say_left_behind(context, &at.folder);
         say_newer(context, &outcomes);
     }
     let unchecked = brought

@@ -233,6 +233,7 @@ pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<E
     crew.hear_anyone(args.step.connect.wait, only.as_ref())?;
     let left_s = args.step.connect.wait - crew.net.now() as f64 * 1e-6;
     let done = crew.abort(only.as_ref(), action, left_s.max(0.0))?;
+    crew.withdraw_unflown(&done);
     let exit = print(context, &done)?;
     if context.check_stop().is_err() {
         return Err(CommandError::Stopped(

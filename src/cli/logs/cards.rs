@@ -39,7 +39,7 @@ A card holds the logs of a day, or of a month. A log is taken if it is of the st
 that was written down when it was authorized (logs/start.json), else --start, else the one at which most
 drones flew the plan. Its drone is that of its system id and of the place where it stood, whatever folder
 or file it lies in. What is taken, and what is left and why, is printed. Where two logs fit equally, or a
-log contradicts itself, it asks on a terminal, else leaves them: exit code 3. Logs of another start that
+log contradicts itself, it asks on a terminal, else leaves them: exit code 3. So does a log that is cut or damaged, which is taken. Logs of another start that
 are home go to logs/flight-K/, those that --again replaces to logs/older/; nothing is overwritten.
 A card that is not there is exit code 1.")]
 pub(super) struct ImportArgs {
@@ -239,6 +239,10 @@ fn about(found: &Survey, log: usize) -> String {
     text
 }
 
+fn is_there(outcome: &Carried) -> bool {
+    matches!(outcome, Carried::There(_))
+}
+
 struct Report<'a> {
     context: &'a Context,
     found: &'a Survey,
@@ -272,15 +276,13 @@ impl Report<'_> {
         left.extend(decision.left.iter().map(|(log, why)| (path(*log), why.clone())));
         let mut doubts: Vec<String> =
             decision.doubts.iter().map(|doubt| self.doubt(doubt)).collect();
-        let mut taken = 0;
+        let (mut taken, mut in_part) = (0, false);
         for (take, outcome) in outcomes {
             match outcome {
                 Carried::Taken(entry, moved) => {
                     taken += 1;
                     self.say_taken(take, &entry.file, "")?;
-                    if let Some(why) = &entry.incomplete {
-                        context.warn(&format!("{} is not known to be whole: {why}", entry.file));
-                    }
+                    in_part |= self.say_incomplete(&entry.file, entry.incomplete.as_deref());
                     if let Some(moved) = moved {
                         context.say(&format!(
                             "{} was of another start, and is {} now",
@@ -289,9 +291,11 @@ impl Report<'_> {
                         ));
                     }
                 }
-                Carried::There => {
+                Carried::There(incomplete) => {
                     let file = flights[take.flight].files.get(&take.slot);
-                    self.say_taken(take, file.map_or("", String::as_str), ", had come before")?;
+                    let file = file.map_or("", String::as_str);
+                    self.say_taken(take, file, ", had come before")?;
+                    in_part |= self.say_incomplete(file, incomplete.as_deref());
                 }
                 Carried::Left(why) => doubts.push(format!("{}: {why}", path(take.log).shown())),
             }
@@ -307,7 +311,7 @@ impl Report<'_> {
             context.warn(doubt);
         }
         let lost = self.say_missing(outcomes, missing);
-        let there = outcomes.iter().filter(|(_, outcome)| *outcome == Carried::There).count();
+        let there = outcomes.iter().filter(|(_, outcome)| is_there(outcome)).count();
         context.say(&format!(
             "Took {} from cards{}",
             words::count(taken, "log"),
@@ -316,7 +320,15 @@ impl Report<'_> {
         if context.json {
             context.print_json(&self.output(outcomes, missing, &left, doubts.clone()))?;
         }
-        Ok(if lost || !doubts.is_empty() { Exit::Losses } else { Exit::Done })
+        Ok(if lost || in_part || !doubts.is_empty() { Exit::Losses } else { Exit::Done })
+    }
+
+    /// Warns of a log that may not hold all of its flight; whether it is one.
+    fn say_incomplete(&self, file: &str, why: Option<&str>) -> bool {
+        if let Some(why) = why {
+            self.context.warn(&format!("{file} is not known to be whole: {why}"));
+        }
+        why.is_some()
     }
 
     /// `cards/3/00000012.BIN -> drone 3 -> slot 3 -> hover (03.BIN)`.
@@ -417,7 +429,6 @@ impl Report<'_> {
             let file = flight.files.get(&take.slot).cloned().unwrap_or_default();
             if several { format!("{}/{file}", flight.name) } else { file }
         };
-        let is_there = |outcome: &Carried| *outcome == Carried::There;
         let is_taken = |outcome: &Carried| matches!(outcome, Carried::Taken(..));
         let named = |is: &dyn Fn(&Carried) -> bool| {
             outcomes
@@ -435,7 +446,7 @@ impl Report<'_> {
                 file: self.flights[take.flight].files.get(&take.slot)?.clone(),
                 state: match outcome {
                     Carried::Taken(..) => "taken",
-                    Carried::There => "there",
+                    Carried::There(_) => "there",
                     Carried::Left(_) => return None,
                 },
             })

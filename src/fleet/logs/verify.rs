@@ -1,9 +1,12 @@
 //! Whether a folder of logs is still what its manifest says.
 
+use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use super::manifest::{ManifestEntry, Shelf};
 use super::part::sums;
+use crate::base::file::FileError;
 use crate::campaign::CampaignError;
 use crate::log::Log;
 
@@ -67,4 +70,29 @@ pub fn verify(folder: &Path) -> Result<Vec<Checked>, CampaignError> {
         Checked { entry: entry.clone(), faults }
     };
     Ok(shelf.manifest.logs.iter().map(check).collect())
+}
+
+/// Logs in `folder` that its manifest does not know, by name.
+///
+/// # Errors
+/// When the folder or its manifest cannot be read; a folder that is not there has none.
+pub fn unknown(folder: &Path) -> Result<Vec<String>, CampaignError> {
+    let shelf = Shelf::open(folder, "")?;
+    let fail = |error| FileError::new("read", folder, error);
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(fail(error).into()),
+    };
+    let mut found = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(fail)?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let is_log = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bin"));
+        if is_log && path.is_file() && shelf.entry(&name).is_none() {
+            found.push(name);
+        }
+    }
+    found.sort();
+    Ok(found)
 }

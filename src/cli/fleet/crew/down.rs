@@ -6,7 +6,7 @@ use super::eyes::Eyes;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::interrupt::Choice;
-use crate::fleet::abort::{ALL_AT_ONCE, Abort, Action};
+use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
 use crate::link::clock::MS;
 use crate::link::drive::{Watch as _, drive};
 use crate::link::id::DroneId;
@@ -29,7 +29,7 @@ pub(super) fn bring_down(
     eyes: &mut Eyes<'_>,
     drones: &BTreeSet<DroneId>,
     action: Action,
-) -> BTreeMap<DroneId, String> {
+) -> BTreeMap<DroneId, Aborted> {
     context.insist(match action {
         Action::Return => "Stopped: the drones are sent home. Ctrl-C again ends it at once",
         Action::Land => "Stopped: the drones land where they are. Ctrl-C again ends it at once",
@@ -41,10 +41,8 @@ pub(super) fn bring_down(
     let machines: BTreeMap<DroneId, Abort> =
         drones.iter().filter(|drone| !ordered.contains_key(drone)).map(end).collect();
     let done = drive(net, machines, ALL_AT_ONCE, eyes).unwrap_or_default();
-    let mut ended = BTreeMap::new();
-    for (drone, end) in done {
+    for (drone, end) in &done {
         context.insist(&format!("drone {drone}: {end}"));
-        ended.insert(drone, end.to_string());
     }
     while net.ordered_down().into_values().any(|going_on| going_on) {
         let until = net.now() + 100 * MS;
@@ -52,7 +50,12 @@ pub(super) fn bring_down(
             eyes.on_message(net.now(), &received);
         }
     }
-    ended
+    done
+}
+
+/// For the journal.
+pub(super) fn in_words(ended: &BTreeMap<DroneId, Aborted>) -> BTreeMap<DroneId, String> {
+    ended.iter().map(|(drone, end)| (*drone, end.to_string())).collect()
 }
 
 /// How a command ends that was interrupted while drones were in the air.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::down::{GUIDED_LEFT, bring_down, stopped};
+use super::down::{GUIDED_LEFT, bring_down, in_words, stopped};
 use super::eyes::Eyes;
 use super::stubborn::Stubborn;
 use super::{AT_ONCE, Crew};
@@ -189,7 +189,7 @@ impl<'a> Crew<'a> {
             eyes.stop(net.now());
         }
         if let Some(action) = eyes.choice(net.now()).and_then(Choice::action) {
-            ended = bring_down(context, &mut net, &mut eyes, &drones, action);
+            ended = in_words(&bring_down(context, &mut net, &mut eyes, &drones, action));
         }
         (eyes, net.failed, ended)
     }

@@ -1,5 +1,7 @@
 //! The identity of a flight: written when its start is authorized, taken back when nobody took off.
 
+use std::collections::BTreeMap;
+
 use super::Crew;
 use crate::base::crc::ap_crc32;
 use crate::base::file::read_whole;
@@ -7,8 +9,11 @@ use crate::campaign::start::{Flying, StartRecord, StartedDrone};
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::crew::load::MOST_SKYB;
 use crate::cli::simulate::made_by;
+use crate::fleet::abort::Aborted;
 use crate::fleet::start::Start;
 use crate::link::clock::Clock as _;
+use crate::link::id::DroneId;
+use crate::link::net::Net as _;
 
 impl Crew<'_> {
     /// Writes down who starts when, and with which show, before anybody is told to: logs are held
@@ -38,6 +43,23 @@ impl Crew<'_> {
             }
         };
         self.table.drones.iter().map(drone).collect()
+    }
+
+    /// After an order from outside of the station that started them: the start that was written down is
+    /// taken back if it is still to come, and none of its drones flies it any more.
+    pub(in crate::cli) fn withdraw_unflown(&mut self, done: &BTreeMap<DroneId, Aborted>) {
+        let Ok(Some(record)) = StartRecord::read(self.folder) else { return };
+        let now = self.net.now();
+        let is_off = |line: &StartedDrone| {
+            let drone: Option<DroneId> = line.drone.parse().ok();
+            let clock = drone.and_then(|drone| self.telemetry.get(drone)?.clock.gps_ms(now));
+            let is_ahead = clock.is_some_and(|now_ms| now_ms < record.start.total_ms() as f64);
+            is_ahead && drone.and_then(|drone| done.get(&drone)) == Some(&Aborted::Grounded)
+        };
+        if !record.drones.is_empty() && record.drones.iter().all(is_off) {
+            self.begun = Some(record);
+            self.withdraw_start();
+        }
     }
 
     /// The start was taken back before anybody took off: the one before it is the latest again.

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 
 use super::Crew;
-use super::down::{SHOW_LEFT, bring_down, stopped};
+use super::down::{SHOW_LEFT, bring_down, in_words, stopped};
 use super::eyes::Eyes;
 use crate::base::time::GpsTime;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::interrupt::Interrupt;
+use crate::fleet::abort::Aborted;
 use crate::fleet::journal::Journal;
 use crate::fleet::start::{Phase, Start, StartOptions};
 use crate::fleet::telemetry::Drone;
@@ -188,7 +189,10 @@ impl<'a> Crew<'a> {
                 if let Some(action) = choice.action() {
                     let (context, net) = (self.context, &mut self.net);
                     let ended = bring_down(context, net, &mut eyes, &drones, action);
-                    self.try_note("abort", &ended);
+                    self.try_note("abort", &in_words(&ended));
+                    if before && ended.values().all(|end| *end == Aborted::Grounded) {
+                        self.withdraw_start();
+                    }
                 }
                 break Err(if self.is_virtual {
                     CommandError::Interrupted

@@ -16,8 +16,9 @@ use self::one::One;
 use super::stopped;
 use crate::base::file::create_folder;
 use crate::base::plain::Shown as _;
+use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
-use crate::campaign::start::StartRecord;
+use crate::campaign::start::{StartRecord, other_starts};
 use crate::cli::clock::Spent;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
@@ -56,6 +57,7 @@ pub(super) fn bring(
         shares: BTreeMap::new(),
         begun: context.clock().now(),
         said: 0,
+        other_starts: if start.is_none() { other_starts(folder) } else { Vec::new() },
     };
     for (slot, id) in wanted {
         let path = folder.log(*slot, plan.slots.len());
@@ -123,6 +125,8 @@ struct Puller<'a> {
     shares: BTreeMap<String, f64>,
     begun: Micros,
     said: u64,
+    /// Starts of the campaign's other flights, where none of this one was written down.
+    other_starts: Vec<(String, GpsTime)>,
 }
 
 impl Foreman for Puller<'_> {

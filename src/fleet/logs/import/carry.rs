@@ -33,8 +33,8 @@ pub struct Carry {
 pub enum Carried {
     /// It is home now. Where a log of another start that lay there lies now.
     Taken(Box<ManifestEntry>, Option<PathBuf>),
-    /// It was home before.
-    There,
+    /// It was home before; why it may not hold all of its flight.
+    There(Option<String>),
     /// It is not, and why.
     Left(String),
 }
@@ -114,7 +114,7 @@ impl Home<'_> {
         };
         let moved = match self.make_room(&file, log)? {
             Room::Free(moved) => moved,
-            Room::There => return Ok(Carried::There),
+            Room::There => return Ok(Carried::There(log.identity.incomplete())),
             Room::Kept(why) => return Ok(Carried::Left(why)),
         };
         let sums = match copy(&log.path, &self.shelf.path(&file)) {
@@ -132,7 +132,7 @@ impl Home<'_> {
             method: Method::Import,
             method_reason: None,
             verified: Verified::Copy,
-            incomplete: log.identity.cut.map(str::to_owned),
+            incomplete: log.identity.incomplete(),
             attempts: 1,
             at_unix_s: self.how.unix_s,
             flight: self.flight_of(slot, log),

@@ -301,15 +301,27 @@ impl Work<'_> {
     /// Why a log is of none of the flights.
     fn why_left(&self, index: usize) -> String {
         let Some(log) = self.logs.get(index) else { return String::new() };
-        let mut nearest: Option<(f64, String)> = None;
+        // The flight whose plan it flew most of, else the flights that were asked for, else all.
+        let shares = |number: usize| {
+            let of_flight = log.flown.iter().filter_map(move |flown| flown.shares.get(number));
+            of_flight.copied().fold(0.0, f64::max)
+        };
+        let best = (0..self.flights.len()).max_by(|a, b| shares(*a).total_cmp(&shares(*b)));
+        let best = best.filter(|number| shares(*number) >= PART);
+        let mut nearest: Option<(bool, f64, String)> = None;
         for (number, flight) in self.flights.iter().enumerate() {
             let Some((start, _)) = &self.decision.starts[number] else { continue };
             match log.identity.belongs_to(*start) {
                 Belongs::No(why) => {
                     let away_s = log.identity.away_s(*start);
-                    if nearest.as_ref().is_none_or(|(least, _)| away_s < *least) {
+                    let is_meant = best.map_or(flight.is_wanted, |best| best == number);
+                    let is_nearer = nearest
+                        .as_ref()
+                        .is_none_or(|(meant, least_s, _)| (is_meant, *least_s) > (*meant, away_s));
+                    if is_nearer {
                         let name = format!("{}'s start", flight.name);
-                        nearest = Some((away_s, why.replace("this flight's start", &name)));
+                        let why = why.replace("this flight's start", &name);
+                        nearest = Some((is_meant, away_s, why));
                     }
                 }
                 Belongs::Yes | Belongs::Unknown(_) => {
@@ -336,15 +348,14 @@ impl Work<'_> {
         if !log.identity.flew {
             return "it holds no flight".to_owned();
         }
-        let share = log.flown.iter().flat_map(|flown| {
-            flown.shares.iter().zip(self.flights).map(|(share, flight)| (*share, &flight.name))
+        let flew = best.map(|number| {
+            let name = &self.flights[number].name;
+            format!("it flew {:.0} % of {name}'s plan", shares(number) * 100.0)
         });
-        let best = share.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(share, _)| *share >= PART);
-        match (nearest, best) {
-            (Some((_, why)), _) => why,
-            (None, Some((share, name))) => {
-                format!("it flew {:.0} % of {name}'s plan", share * 100.0)
-            }
+        match (nearest, flew) {
+            (Some((true, _, why)), Some(flew)) => format!("{flew}, but {why}"),
+            (Some((_, _, why)), None) => why,
+            (_, Some(flew)) => flew,
             (None, None) => "it flew none of the plans".to_owned(),
         }
     }

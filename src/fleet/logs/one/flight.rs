@@ -46,7 +46,12 @@ impl PullOne {
         };
         let Some((wanted, start)) = wanted.and_then(|of| Some((of, of.authorized_start?))) else {
             let of_none = LogFlight { number: 0, ..LogFlight::of(&identity, None) };
-            return (Found::Ours, Some(of_none));
+            let found = match identity.of_any(&self.options.other_starts) {
+                // The one before it may be of this flight.
+                Some(name) => Found::Others { why: format!("it is of {name}"), is_later: true },
+                None => Found::Ours,
+            };
+            return (found, Some(of_none));
         };
         let said = LogFlight::of(&identity, Some(start));
         match identity.belongs_to(start) {
@@ -172,7 +177,8 @@ impl PullOne {
 
     /// Whether only a log of the flight will do.
     pub(super) fn wants_flight(&self) -> bool {
-        let is_known = self.flight.as_ref().is_some_and(|of| of.authorized_start.is_some());
+        let is_known = self.flight.as_ref().is_some_and(|of| of.authorized_start.is_some())
+            || !self.options.other_starts.is_empty();
         is_known && self.options.which == Which::Flight
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::base::time::GpsTime;
 use crate::fleet::logs::manifest::ManifestEntry;
 use crate::link::clock::{Micros, S};
 
@@ -41,6 +42,9 @@ pub struct OneOptions {
     pub start_number: u32,
     /// For the manifest, Unix seconds.
     pub unix_s: u64,
+    /// Starts of the campaign's other flights: where no start of this one was written down, a log of
+    /// one of them is not this one's.
+    pub other_starts: Vec<(String, GpsTime)>,
 }
 
 impl Default for OneOptions {
@@ -55,6 +59,7 @@ impl Default for OneOptions {
             is_durable: true,
             start_number: 0,
             unix_s: 0,
+            other_starts: Vec::new(),
         }
     }
 }

@@ -109,6 +109,13 @@ impl Puller<'_> {
         let said = LogFlight::of(&identity, start);
         let mut file = target.file.clone();
         let mut flight = said.clone();
+        let of_other = identity.of_any(&self.other_starts).filter(|_| start.is_none());
+        if let Some(name) = of_other.filter(|_| self.wish.which == Which::Flight) {
+            file = older(one, &target.log);
+            one.newer.get_or_insert(number(&target.log));
+            one.not_it =
+                Some(format!("log {id} of the drone is of another flight: it is of {name}"));
+        }
         if let (Some(wanted), Some(start)) = (wanted, start) {
             let is_wanted = self.wish.which == Which::Flight;
             match identity.belongs_to(start) {
