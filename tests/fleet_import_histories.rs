@@ -118,7 +118,7 @@ fn identity(
     };
     let system_id = [Some(slot as u8), Some(slot as u8), None, Some(1)][chance.below(4)];
     let flew = seen.iter().any(|event| events[*event].share > 0.0);
-    Identity { system_id, home_deg: None, flew, boots: vec![boot], cut: None, doubt: None }
+    Identity { system_id, flew, boots: vec![boot], ..Identity::default() }
 }
 
 fn flight(plan: &Plan, start: Option<GpsTime>) -> ImportFlight {
