@@ -162,6 +162,7 @@ fn reads_that_are_always_wrong_do_not_matter_where_none_is_needed() {
     assert!(bytes.unwrap() == content(1, 200_000));
     let [entry] = &done.pulled[..] else { panic!("{:?}", done.pulled) };
     assert_eq!((entry.method, entry.verified), (Method::Mixed, Verified::Checksum), "{entry:?}");
+    assert!((2..=4).contains(&entry.attempts), "{entry:?}");
 }
 
 #[test]

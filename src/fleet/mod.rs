@@ -20,6 +20,7 @@ pub mod greet;
 pub mod guided;
 pub mod intervals;
 pub mod journal;
+pub mod load;
 pub mod log_protocol;
 pub mod logs;
 pub mod messages;

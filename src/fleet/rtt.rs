@@ -26,6 +26,11 @@ impl Rtt {
         });
     }
 
+    /// Whether any answer was timed.
+    pub fn is_known(&self) -> bool {
+        self.seen.is_some()
+    }
+
     /// An answer is lost when it takes longer.
     pub fn timeout(&self) -> Micros {
         let time = self

@@ -65,6 +65,8 @@ impl<S: Storage> Endpoint for FileVehicle<S> {
         if let Some(ftp) = &mut self.ftp {
             ftp.on_message(STATION, message);
         }
+        // Until now.
+        self.logs.poll(now, self.is_armed, &self.storage, out);
         self.logs.on_message(message, self.is_armed, &self.storage, out);
         // Served as it is heard.
         self.logs.poll(now, self.is_armed, &self.storage, out);

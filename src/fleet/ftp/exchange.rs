@@ -13,6 +13,9 @@ const LEAST_PAUSE: Micros = 2_500 * MS;
 /// A request is repeated so often within its patience, at least, unless the link itself is slower.
 const TRIES: Micros = 12;
 
+/// Before any answer has come: a short link must not wait for its first loss as long as a long one.
+const FIRST_PAUSE: Micros = 500 * MS;
+
 /// A vehicle gives up a session of somebody else when it has been idle for 3 s.
 const BUSY: Micros = 3_300 * MS;
 /// After one of ours was closed.
@@ -84,10 +87,17 @@ impl Exchange {
             return Wish::Wait(self.not_before.min(first + self.patience));
         }
         let timeout = caller.timeout();
-        let pause = timeout.saturating_mul(1 << self.tries.min(6)) / 2;
+        let (timeout, tries) = if caller.knows_rtt() {
+            (timeout, self.tries)
+        } else {
+            (timeout.min(FIRST_PAUSE), self.tries.saturating_sub(1))
+        };
+        let pause = timeout.saturating_mul(1 << tries.min(6)) / 2;
         let most = MOST_PAUSE.min(self.patience / TRIES).max(LEAST_PAUSE).max(timeout);
         // While it works it keeps what is asked again, and answers it with the answer.
-        let pause = pause.max(timeout).min(most) + self.work.min(MOST_PAUSE);
+        // Which may be soon, so that a request or an answer that was lost is not noticed late.
+        let work = self.work.min(MOST_PAUSE) / 8 * Micros::from(self.tries.min(8));
+        let pause = pause.max(timeout).min(most) + work;
         if self.tries > 0 && now < self.sent + pause {
             return Wish::Wait((self.sent + pause).min(first + self.patience));
         }

@@ -60,11 +60,21 @@ pub struct GetOptions {
     pub budget: Option<Budget>,
     /// Time between two packets of a burst, us, where it is known.
     pub spacing: Option<f64>,
+    /// Something else waits for it: its last reads are asked for more than once, and that the
+    /// vehicle has closed the file is left for the next one to see to who asks for one.
+    pub is_left: bool,
 }
 
 impl Default for GetOptions {
     fn default() -> Self {
-        Self { patience: 60 * S, most_size: 2 << 30, up_to: u64::MAX, budget: None, spacing: None }
+        Self {
+            patience: 60 * S,
+            most_size: 2 << 30,
+            up_to: u64::MAX,
+            budget: None,
+            spacing: None,
+            is_left: false,
+        }
     }
 }
 
@@ -300,7 +310,12 @@ impl<S: Sink> Machine for Get<S> {
                 let is_silent = matches!(result, Err(FtpError::Silent { .. }));
                 let wish = waiting.as_mut().filter(|_| !is_silent);
                 match wish.map(|exchange| exchange.poll(now, &self.caller)) {
-                    Some(Wish::Send(message)) => Step::Send(message),
+                    Some(Wish::Send(message)) => {
+                        if self.options.is_left {
+                            *waiting = None;
+                        }
+                        Step::Send(message)
+                    }
                     Some(Wish::Wait(until)) => Step::Wait(until),
                     Some(Wish::Silent(_)) | None => match self.sink.take() {
                         Some(sink) => {

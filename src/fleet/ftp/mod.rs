@@ -152,6 +152,10 @@ impl Caller {
         self.numbers.borrow().rtt.timeout()
     }
 
+    fn knows_rtt(&self) -> bool {
+        self.numbers.borrow().rtt.is_known()
+    }
+
     fn add_rtt(&self, took: Micros) {
         self.numbers.borrow_mut().rtt.add(took);
     }

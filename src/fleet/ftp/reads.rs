@@ -22,6 +22,9 @@ const AT_ONCE: f64 = 3.0;
 /// More lost than usual by this share: they were asked for too fast.
 const WORSE: f64 = 0.2;
 
+/// The last ones are asked for so often besides.
+const COPIES: u32 = 2;
+
 /// Longest wait for an answer.
 const MOST_PAUSE: Micros = 4 * S;
 /// Reads that wait in queues for longer than this are too many: more would bring nothing, and only
@@ -37,9 +40,15 @@ const TRIES: Micros = 12;
 #[derive(Clone, Debug)]
 pub(crate) struct Reads {
     /// By offset: end, and when asked.
-    on_way: BTreeMap<u64, (u64, Micros)>,
+    on_way: BTreeMap<u64, Read>,
     window: f64,
     most: f64,
+    /// Never fewer because of a queue.
+    fewest: f64,
+    /// Of the link, where others use it as well.
+    share: f64,
+    /// Copies of the last ones, in order.
+    copied: u64,
     most_pause: Micros,
     answered: u32,
     lost: u32,
@@ -59,6 +68,14 @@ pub(crate) struct Reads {
     pub(crate) asked: u64,
 }
 
+/// One on its way.
+#[derive(Clone, Copy, Debug)]
+struct Read {
+    end: u64,
+    asked: Micros,
+    copies: u32,
+}
+
 impl Reads {
     /// Of at most `piece` bytes each, at most `most` at once; a vehicle that is silent for
     /// `patience` is given up by whoever asks.
@@ -67,6 +84,9 @@ impl Reads {
             on_way: BTreeMap::new(),
             window: 4.0,
             most: most as f64,
+            fewest: FEWEST,
+            share: f64::MAX,
+            copied: 0,
             most_pause: MOST_PAUSE.min(patience / TRIES),
             answered: 0,
             lost: 0,
@@ -97,6 +117,17 @@ impl Reads {
         self.next_at as Micros
     }
 
+    /// So many may be on their way where others use the link as well: their queue is no reason
+    /// for fewer than half of that.
+    pub(crate) fn share(&mut self, share: Option<f64>) {
+        self.share = share.map_or(f64::MAX, |share| share.max(FEWEST));
+        self.fewest = share.map_or(FEWEST, |share| (share / 2.0).max(FEWEST));
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.on_way.len()
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.on_way.is_empty()
     }
@@ -109,7 +140,7 @@ impl Reads {
 
     /// An answer to the read at `offset`; how long it took, if one was waited for.
     pub(crate) fn answered(&mut self, now: Micros, offset: u64) -> Option<Micros> {
-        let (_, asked) = self.on_way.remove(&offset)?;
+        let Read { asked, copies, .. } = self.on_way.remove(&offset)?;
         self.silent = 0;
         self.answered += 1;
         let took = now.saturating_sub(asked);
@@ -119,10 +150,10 @@ impl Reads {
         if self.smooth < self.least + QUEUES {
             self.window = (self.window + 0.5).min(self.most);
         } else if self.smooth > self.least + 2.0 * QUEUES {
-            self.window = (self.window - 0.5).max(FEWEST.min(self.most));
+            self.window = (self.window - 0.5).max(self.fewest.min(self.most));
         }
         self.look();
-        Some(took)
+        (copies == 0).then_some(took)
     }
 
     /// Forgets what is late; returns when the next one will be. When `probing`, one read stands
@@ -132,10 +163,10 @@ impl Reads {
         let pause = (timeout << losses.min(4)).min(self.most_pause.max(timeout)).min(MOST_PAUSE);
         let before = self.on_way.len();
         let mut next = Micros::MAX;
-        self.on_way.retain(|_, (_, asked)| {
-            let is_late = now >= *asked + pause;
+        self.on_way.retain(|_, read| {
+            let is_late = now >= read.asked + pause;
             if !is_late {
-                next = next.min(*asked + pause);
+                next = next.min(read.asked + pause);
             }
             !is_late
         });
@@ -178,6 +209,9 @@ impl Reads {
         // Many drones at once that hear nothing ask less each.
         let room = match self.silent {
             _ if probing => 1.0,
+            silent if silent <= self.many(48) && self.share < f64::MAX => {
+                self.window.max(self.fewest).min(self.share)
+            }
             silent if silent <= self.many(48) => self.window,
             _ => 2.0,
         };
@@ -195,8 +229,8 @@ impl Reads {
                 continue;
             };
             let asked = self.on_way.range(..=start).next_back();
-            if let Some((_, &(asked_end, _))) = asked.filter(|(_, (end, _))| *end > start) {
-                self.cursor = asked_end;
+            if let Some((_, read)) = asked.filter(|(_, read)| read.end > start) {
+                self.cursor = read.end;
                 continue;
             }
             let end = end.min(start + self.piece);
@@ -204,16 +238,47 @@ impl Reads {
             self.cursor = end;
             let earliest = now as f64 - AT_ONCE * self.spacing;
             self.next_at = self.next_at.max(earliest) + self.spacing;
-            self.on_way.insert(start, (end, now));
+            self.on_way.insert(start, Read { end, asked: now, copies: 0 });
+            self.copied = 0;
             self.asked += 1;
             return Some((start, end));
         }
+    }
+
+    /// When nothing else is left to ask for, and few are on their way: the next of them again. One
+    /// that is lost costs a timeout, and then there is nothing to fill it with.
+    pub(crate) fn once_more(&mut self) -> Option<(u64, u64)> {
+        if self.on_way.len() as f64 > self.window / 4.0 {
+            return None;
+        }
+        let (start, read) =
+            self.on_way.range_mut(self.copied..).find(|(_, read)| read.copies < COPIES)?;
+        read.copies += 1;
+        self.copied = *start;
+        Some((*start, read.end))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_last_ones_are_asked_for_again_and_what_is_on_its_way_is_not() {
+        let (mut reads, mut have) = (Reads::new(90, 48, S), Intervals::default());
+        have.insert(90, 1_000);
+        assert_eq!(reads.next(0, &have, 1_000, false), Some((0, 90)));
+        assert_eq!(reads.next(0, &have, 1_000, false), None);
+        let again: Vec<_> = std::iter::from_fn(|| reads.once_more()).collect();
+        assert_eq!(again, [(0, 90), (0, 90)]);
+        // Which of them is answered nobody knows.
+        assert_eq!(reads.answered(50_000, 0), None);
+        assert_eq!(reads.once_more(), None);
+        // Many are on their way: the link has better things to do.
+        let have = Intervals::default();
+        while reads.next(0, &have, 1_000, false).is_some() {}
+        assert_eq!(reads.once_more(), None);
+    }
 
     #[test]
     fn a_silent_vehicle_is_asked_often_enough_before_it_is_given_up() {

@@ -15,9 +15,10 @@ use super::{LogProtocolError, data_message, end_message};
 use crate::fleet::budget::Budget;
 use crate::fleet::ftp::get::Tally;
 use crate::fleet::ftp::reads::Reads;
+use crate::fleet::load::{Load, Place};
 use crate::fleet::rtt::Rtt;
 use crate::fleet::sink::Sink;
-use crate::link::clock::{Micros, S};
+use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
@@ -36,6 +37,10 @@ const OVERHEAD: u64 = 19;
 const MOST_LIES: u32 = 3;
 /// Longest pause between repetitions.
 const MOST_PAUSE: Micros = 4 * S;
+/// A link is as good as empty on which nothing takes longer than this.
+const IDLE: Micros = 50 * MS;
+/// The end has no answer, and is said so often.
+const ENDS: u32 = 2;
 
 /// What is left of a [`LogGet`].
 #[derive(Debug)]
@@ -56,6 +61,7 @@ pub struct LogGet<S> {
     size: u64,
     patience: Micros,
     budget: Option<Budget>,
+    place: Option<Place>,
     sink: Option<S>,
     rtt: Rtt,
     windows: Windows,
@@ -71,6 +77,8 @@ pub struct LogGet<S> {
     is_pausing: bool,
     over: Option<Result<u64, LogProtocolError>>,
     ends_said: u32,
+    /// It is short, and what follows waits for it.
+    is_followed: bool,
     tally: Tally,
 }
 
@@ -83,6 +91,7 @@ impl<S: Sink> LogGet<S> {
             size,
             patience,
             budget: None,
+            place: None,
             sink: Some(sink),
             rtt: Rtt::default(),
             windows: Windows::default(),
@@ -95,6 +104,7 @@ impl<S: Sink> LogGet<S> {
             is_pausing: false,
             over: None,
             ends_said: 0,
+            is_followed: false,
             tally: Tally::default(),
         }
     }
@@ -113,9 +123,35 @@ impl<S: Sink> LogGet<S> {
         self
     }
 
-    /// Whether other drones use the link as well.
-    pub fn share(&mut self, is_shared: bool) {
-        self.windows.is_shared = is_shared;
+    /// The link, which other drones may use as well.
+    #[must_use]
+    pub fn on_link(mut self, load: Option<&Load>) -> Self {
+        self.place = load.map(Load::place);
+        self
+    }
+
+    /// A few bytes for which a download of the same log waits: the vehicle is not freed after it.
+    #[must_use]
+    pub fn followed(mut self) -> Self {
+        self.ends_said = ENDS;
+        self.is_followed = true;
+        self
+    }
+
+    /// Looks at what others do on the link.
+    fn look_at_link(&mut self) {
+        let Some(place) = &self.place else { return };
+        let share = place.share();
+        self.windows.share_of_link = share;
+        self.windows.delay = if share.is_some() { place.delay() } else { 0 };
+        self.reads.share(share.map(|bytes| bytes / PIECE as f64));
+    }
+
+    /// Tells others what is on its way.
+    fn tell_link(&self) {
+        if let Some(place) = &self.place {
+            place.tell(self.windows.on_way() + self.reads.count() as u64 * PIECE);
+        }
     }
 
     /// What it has cost so far.
@@ -151,6 +187,10 @@ impl<S: Sink> LogGet<S> {
             Ok(new) => {
                 self.tally.new_bytes += new;
                 self.tally.again_bytes += data.len() as u64 - new;
+                self.windows.repeated(length - new);
+                if let Some(place) = &self.place {
+                    place.came(now, data.len() as u64);
+                }
             }
             Err(reason) => self.over = Some(Err(LogProtocolError::Sink(reason))),
         }
@@ -208,9 +248,9 @@ impl<S: Sink> LogGet<S> {
         if let Some((start, end)) = self.copy.take() {
             return Step::send(self.ask(start, end));
         }
-        let mut wake = gives_up.min(self.reads.expire(now, self.rtt.timeout(), false));
-        let last = self.heard.unwrap_or(0);
         let timeout = self.rtt.timeout();
+        let mut wake = gives_up.min(self.reads.expire(now, timeout + self.windows.delay, false));
+        let last = self.heard.unwrap_or(0);
         loop {
             let pause = self.pause_after(self.windows.silent());
             match self.windows.silent_at(pause, timeout, last) {
@@ -252,7 +292,13 @@ impl<S: Sink> LogGet<S> {
             return Step::Wait(wake.min(later));
         }
         let Some(sink) = &self.sink else { return Step::Wait(wake) };
-        if let Some((start, end)) = self.reads.next(now, sink.have(), self.size, false) {
+        let next = self.reads.next(now, sink.have(), self.size, false);
+        // The last of them are asked for more than once where packets are lost, and nobody else
+        // has a use for the link.
+        let is_free = self.windows.delay < IDLE;
+        let is_lossy = (self.windows.is_lossy() && is_free) || self.is_followed;
+        let next = next.or_else(|| if is_lossy { self.reads.once_more() } else { None });
+        if let Some((start, end)) = next {
             let _ = self.allowed(now, end - start + OVERHEAD);
             self.tally.reads += 1;
             return Step::send(self.ask(start, end));
@@ -286,10 +332,15 @@ impl<S: Sink> Machine for LogGet<S> {
                 self.over = Some(Err(LogProtocolError::Silent { seconds }));
             }
         }
-        let Some(result) = &self.over else { return self.next(now, heard + self.patience) };
+        let Some(result) = &self.over else {
+            self.look_at_link();
+            let step = self.next(now, heard + self.patience);
+            self.tell_link();
+            return step;
+        };
         // It has no answer, and frees the vehicle for others: said twice.
         self.ends_said += 1;
-        if self.ends_said <= 2 {
+        if self.ends_said <= ENDS {
             return Step::send(end_message(self.drone));
         }
         let result = result.clone();

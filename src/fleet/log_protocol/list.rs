@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{LogProtocolError, list_message, says_armed};
+use crate::fleet::rtt::Rtt;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
@@ -10,6 +11,8 @@ use crate::link::id::DroneId;
 
 /// Entries that may be late are waited for so long.
 const QUIET: Micros = 700 * MS;
+/// Where answers come fast.
+const LEAST_QUIET: Micros = 200 * MS;
 
 /// One log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +26,7 @@ pub struct Entry {
 }
 
 /// Lists the logs; entries that were lost are asked for again, by their numbers.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct LogList {
     drone: DroneId,
     patience: Micros,
@@ -33,6 +36,7 @@ pub struct LogList {
     count: Option<u16>,
     entries: BTreeMap<u16, Entry>,
     asked: Option<Micros>,
+    quiet: Micros,
     pause: Micros,
     heard: Option<Micros>,
     armed: bool,
@@ -48,6 +52,7 @@ impl LogList {
             count: None,
             entries: BTreeMap::new(),
             asked: None,
+            quiet: QUIET,
             pause: QUIET,
             heard: None,
             armed: false,
@@ -57,6 +62,16 @@ impl LogList {
     /// Only log `id` of `drone`, if it has that.
     pub fn only(drone: DroneId, id: u16, patience: Micros) -> Self {
         Self { only: Some(id), ..Self::new(drone, patience) }
+    }
+
+    /// How long answers take, from other conversations with the vehicle.
+    #[must_use]
+    pub fn with_rtt(mut self, rtt: Rtt) -> Self {
+        if rtt.is_known() {
+            self.quiet = (2 * rtt.timeout()).clamp(LEAST_QUIET, QUIET);
+            self.pause = self.quiet;
+        }
+        self
     }
 
     /// The first run of numbers without an entry.
@@ -84,7 +99,7 @@ impl Machine for LogList {
             return;
         }
         self.heard = Some(now);
-        self.pause = QUIET;
+        self.pause = self.quiet;
         self.count = Some(entry.num_logs);
         if entry.id > 0 {
             let listed =

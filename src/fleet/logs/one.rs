@@ -15,7 +15,7 @@ use std::rc::Rc;
 use self::flight::Retired;
 use self::home::Begun;
 pub use self::options::{Failure, OneDone, OneOptions, Which};
-use self::ways::{Tail, Ways};
+use self::ways::{Trial, Ways};
 use super::manifest::{AtHome, LogFlight, Shelf};
 use super::part::{PartFile, Sample, Sums};
 use crate::fleet::budget::Budget;
@@ -23,6 +23,7 @@ use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::get::{Get, Tally};
 use crate::fleet::ftp::list::List;
 use crate::fleet::ftp::sum::Sum;
+use crate::fleet::load::Load;
 use crate::fleet::log_protocol::end_message;
 use crate::fleet::log_protocol::get::LogGet;
 use crate::fleet::log_protocol::list::LogList;
@@ -107,6 +108,8 @@ pub struct PullOne {
     ways: Ways,
     /// Other drones use the link as well.
     is_shared: bool,
+    /// What they have on their way.
+    load: Option<Load>,
     /// The drone is freed of a log that it sends, so often yet.
     frees: u8,
 }
@@ -118,9 +121,9 @@ enum Stage {
     /// A part of an earlier run: is it of the same file?
     Probe(Box<Get<Sample>>, PartFile),
     Get(Box<Get<PartFile>>),
-    /// The log's end, by MAVFTP, to see how fast that is.
-    Try(Box<Get<Tail>>),
-    /// Its number for the log messages.
+    /// The log's end, by MAVFTP, to see how fast that is; its number for the log messages.
+    Try(Box<Trial>),
+    /// Its number, if that comes later.
     Number(LogList, PartFile),
     /// Whether what has that number ends as the file does.
     IsIt(Box<LogGet<Sample>>, PartFile),
@@ -189,6 +192,7 @@ impl PullOne {
             newest: None,
             ways: Ways::default(),
             is_shared: false,
+            load: None,
             frees: 0,
             options,
         }
@@ -200,12 +204,18 @@ impl PullOne {
         Self { flight, ..self }
     }
 
+    /// On a link whose load is known.
+    #[must_use]
+    pub fn on_link(self, load: &Load) -> Self {
+        Self { load: Some(load.clone()), ..self }
+    }
+
     /// New bytes so far.
     pub fn new_bytes(&self) -> u64 {
         let now = match &self.stage {
             Stage::Get(get) => get.tally().new_bytes,
             Stage::LogGet(get) => get.tally().new_bytes,
-            Stage::Try(get) => get.tally().new_bytes,
+            Stage::Try(trial) => trial.get.tally().new_bytes,
             _ => 0,
         };
         self.tally.new_bytes + now
@@ -223,7 +233,7 @@ impl PullOne {
         let now = match &self.stage {
             Stage::Get(get) => get.heard(),
             Stage::LogGet(get) => get.heard(),
-            Stage::Try(get) => get.heard(),
+            Stage::Try(trial) => trial.get.heard(),
             _ => None,
         };
         now.max(self.heartbeat)
@@ -245,6 +255,7 @@ impl PullOne {
             self.stage,
             Stage::LogGet(_)
                 | Stage::IsIt(..)
+                | Stage::Try(_)
                 | Stage::LogProbe(..)
                 | Stage::LogSample(..)
                 | Stage::Number(..)
@@ -333,7 +344,9 @@ impl PullOne {
                 machine!(get, got => self.on_probed(part, &got.sink, got.result), Stage::Probe(get, part))
             }
             Stage::Get(mut get) => machine!(get, got => self.on_got(got), Stage::Get(get)),
-            Stage::Try(mut get) => machine!(get, got => self.on_tried(got), Stage::Try(get)),
+            Stage::Try(mut trial) => {
+                machine!(trial, (got, listed) => self.on_tried(got, listed), Stage::Try(trial))
+            }
             Stage::Number(mut list, part) => {
                 machine!(list, done => self.on_numbered(part, done), Stage::Number(list, part))
             }
@@ -453,8 +466,8 @@ impl Machine for PullOne {
         match &self.stage {
             Stage::Get(get) => self.with_finished(get.progress()),
             Stage::LogGet(get) => self.with_finished(get.progress()),
-            Stage::Try(get) => {
-                let done = self.held + get.tally().new_bytes;
+            Stage::Try(trial) => {
+                let done = self.held + trial.get.tally().new_bytes;
                 self.with_finished(Progress { done, total: self.size })
             }
             _ => self.with_finished(Progress { done: self.held, total: self.size }),

@@ -29,7 +29,7 @@ impl Pace {
     /// At most so many.
     pub fn new(most: usize) -> Self {
         let most = most.max(1) as f64;
-        Self { at_once: most.min(8.0), most, since: None, bytes: 0, rate: 0.0, best: 0.0 }
+        Self { at_once: most.min(12.0), most, since: None, bytes: 0, rate: 0.0, best: 0.0 }
     }
 
     /// So many now.

@@ -10,6 +10,7 @@ use super::one::{OneDone, OneOptions, PullOne};
 use super::pace::Pace;
 use crate::campaign::CampaignError;
 use crate::fleet::budget::Budget;
+use crate::fleet::load::Load;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine as _, Step, Watch};
 use crate::link::error::NetError;
@@ -112,7 +113,8 @@ fn pull_onto(
         let shelf = Rc::clone(shelf);
         let machine =
             PullOne::new(one.drone, one.slot, &one.file, shelf, each, lane.budget.clone())
-                .of_flight(one.flight.clone());
+                .of_flight(one.flight.clone())
+                .on_link(&lane.load);
         lane.waiting.push_back((one.drone, machine));
         outcomes.insert(one.drone, Outcome::Stopped);
     }
@@ -159,6 +161,7 @@ struct Lane {
     running: BTreeMap<DroneId, Running>,
     pace: Pace,
     budget: Option<Budget>,
+    load: Load,
     /// New bytes of drones that are done.
     bytes: u64,
 }
@@ -176,6 +179,7 @@ impl Lane {
             running: BTreeMap::new(),
             pace: Pace::new(options.at_once),
             budget: options.bytes_per_s.map(Budget::new),
+            load: Load::default(),
             bytes: 0,
         }
     }

@@ -92,6 +92,7 @@ impl Endpoint for VirtualVehicle<'_> {
                     self.logbook.close(self.storage.as_mut());
                 }
                 let armed = self.is_armed();
+                self.logs.poll(now, armed, self.storage.as_ref(), out);
                 self.logs.on_message(message, armed, self.storage.as_ref(), out);
                 self.fence.on_message(now, message, out);
                 self.params.put("FENCE_TOTAL", self.fence.len() as f32);

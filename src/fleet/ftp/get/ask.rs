@@ -102,7 +102,8 @@ impl<S: Sink> Get<S> {
             self.close(Err(FtpError::Silent { seconds }));
             return self.poll(now);
         }
-        if self.is_pausing && (self.bursts.is_empty() || self.is_silent(now)) {
+        let is_free = self.bursts.is_empty() || self.options.is_left;
+        if self.is_pausing && (is_free || self.is_silent(now)) {
             self.close(Err(FtpError::Paused));
             return self.poll(now);
         }
@@ -133,7 +134,12 @@ impl<S: Sink> Get<S> {
             if !is_silent && now < self.reads.not_before() {
                 return Step::Wait(wake.min(self.reads.not_before() + 1));
             }
-            if let Some((start, end)) = self.reads.next(now, sink.have(), size, is_silent) {
+            let next = self.reads.next(now, sink.have(), size, is_silent);
+            let next = next.or_else(|| {
+                let waits = self.options.is_left && self.bursts.is_empty();
+                if waits { self.reads.once_more() } else { None }
+            });
+            if let Some((start, end)) = next {
                 let _ = self.allowed(now, end - start + OVERHEAD);
                 return Step::send(self.send_read(start, end));
             }

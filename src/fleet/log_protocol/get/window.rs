@@ -6,22 +6,32 @@ use super::PIECE;
 use crate::link::clock::{MS, Micros};
 
 /// A window is as large as comes in so long.
-const TAKES: Micros = 600 * MS;
-/// Where several drones share a link: together they keep no more than this of it waiting, and the
-/// others fill the time until the next window begins.
-const SHARED: Micros = 250 * MS;
+const TAKES: Micros = 450 * MS;
+/// Of a slow link longer, if it has fewer packets than this, so that little is lost between windows.
+const MANY: f64 = 32.0;
+const MOST_TAKES: Micros = 600 * MS;
 /// The first: a third of a second at 57,600 baud.
 const FIRST: f64 = (16 * PIECE) as f64;
 const LEAST: f64 = (8 * PIECE) as f64;
 const MOST: f64 = (4 << 20) as f64;
 /// The next is larger by this, at most.
 const GROWS: f64 = 8.0;
-/// Windows smaller than this are served before a copy of their request comes.
-const WORTH_A_COPY: u64 = 1024 * PIECE;
+/// Windows smaller than this are served before a copy of their request comes, until one that was
+/// larger has come twice.
+const WORTH_A_COPY: u64 = 256 * PIECE;
+/// A window that lacks so much of its end, bytes, was too large for a queue on its way.
+const CUT: u64 = 32 * PIECE;
+/// Of what came of it so much is asked for from then on.
+const UNCUT: f64 = 0.9;
+/// And more again by this share with each window; by a quarter of it after each that was cut.
+const REGAINS: f64 = 1.0 / 8.0;
+const LEAST_REGAINS: f64 = 1.0 / 512.0;
 /// With less than this share of what was asked for, requests are lost as well.
 const LOSSY: f64 = 0.97;
 /// A stream that stops for less than this does so for want of processor time.
 const HICCUP: Micros = 20 * MS;
+/// Fewer bytes tell nothing of how fast they pass.
+const TELLING: u64 = 8 * PIECE;
 /// And for less than so many packets, by itself.
 const PACKETS: f64 = 8.0;
 
@@ -35,14 +45,26 @@ pub(super) struct Windows {
     least_rtt: Option<Micros>,
     /// Bytes per microsecond, of the last window.
     rate: f64,
+    /// The same with what was lost of it: how fast it passes.
+    passes: f64,
+    /// Larger ones lose their end, and by how much that grows again.
+    uncut: f64,
+    regains: f64,
+    /// Smaller ones are not asked for twice; how large the last one was, and what has come again
+    /// since, bytes.
+    copies_from: u64,
+    before: u64,
+    again: u64,
     /// Share that came of what was asked for, smoothed.
     share: f64,
     /// Windows in a row of which nothing came.
     silent: u32,
     /// Where the last one that was given up begins, and when it was asked for.
     given_up: Option<(u64, Micros)>,
-    /// Other drones use the link as well.
-    pub(super) is_shared: bool,
+    /// What may be on its way of this download where others use the link as well, bytes.
+    pub(super) share_of_link: Option<f64>,
+    /// What is on its way to others takes so long.
+    pub(super) delay: Micros,
 }
 
 #[derive(Debug)]
@@ -56,6 +78,8 @@ struct Window {
     since: Micros,
     /// Nothing was on its way when it was asked for.
     is_alone: bool,
+    /// Its first packet: when, and where that ends.
+    first: Option<(Micros, u64)>,
     heard: Option<Micros>,
     came: u64,
     /// Behind the last byte that came.
@@ -69,10 +93,17 @@ impl Default for Windows {
             size: FIRST,
             least_rtt: None,
             rate: 0.0,
+            passes: 0.0,
+            uncut: MOST,
+            regains: REGAINS,
+            copies_from: WORTH_A_COPY,
+            before: 0,
+            again: 0,
             share: 1.0,
             silent: 0,
             given_up: None,
-            is_shared: false,
+            share_of_link: None,
+            delay: 0,
         }
     }
 }
@@ -89,12 +120,28 @@ impl Windows {
 
     /// Of the next one, bytes.
     pub(super) fn size(&self) -> u64 {
-        (self.size as u64).next_multiple_of(PIECE)
+        let share = self.share_of_link.unwrap_or(MOST);
+        (self.size.min(share.max(LEAST)) as u64).next_multiple_of(PIECE)
+    }
+
+    /// Bytes that may still come.
+    pub(super) fn on_way(&self) -> u64 {
+        self.on_way.iter().map(|window| window.end.saturating_sub(window.reached)).sum()
+    }
+
+    /// Whether packets are lost.
+    pub(super) fn is_lossy(&self) -> bool {
+        self.share < LOSSY
+    }
+
+    /// Bytes came that were there.
+    pub(super) fn repeated(&mut self, bytes: u64) {
+        self.again += bytes;
     }
 
     /// Bytes that fill the way there and back.
     pub(super) fn pipe(&self) -> f64 {
-        self.rate * self.least_rtt.unwrap_or(0) as f64
+        self.passes * self.least_rtt.unwrap_or(0) as f64
     }
 
     /// Asks; whether a copy of the request is worth its bytes.
@@ -106,11 +153,12 @@ impl Windows {
             before: self.given_up.take().filter(|(of, _)| *of == start).map(|(_, asked)| asked),
             since: now,
             is_alone: self.on_way.is_empty(),
+            first: None,
             heard: None,
             came: 0,
             reached: start,
         });
-        self.share < LOSSY && end - start >= WORTH_A_COPY
+        self.is_lossy() && end - start >= self.copies_from
     }
 
     /// Whether the next may be asked for: nothing comes, or what comes is over when the vehicle
@@ -121,8 +169,8 @@ impl Windows {
         // A short way is not worth a request that may be dropped.
         self.on_way.len() == 1
             && first.heard.is_some()
-            && lead >= self.size / 16.0
-            && ((first.end - first.reached) as f64) <= 0.9 * lead
+            && lead >= (first.end - first.start) as f64 / 16.0
+            && ((first.end - first.reached + PIECE) as f64) <= 0.9 * lead
     }
 
     /// A packet; the time to an answer, if it tells one.
@@ -143,6 +191,7 @@ impl Windows {
             took => took,
         };
         let is_first = first.before.is_none();
+        first.first.get_or_insert((now, end));
         first.heard = Some(now);
         first.came += end - start;
         first.reached = first.reached.max(end);
@@ -162,12 +211,12 @@ impl Windows {
         let first = self.on_way.front()?;
         let spacing = if self.rate > 0.0 { PIECE as f64 / self.rate } else { 0.0 };
         let scatter = timeout.saturating_sub(self.least_rtt.unwrap_or(0)).min(timeout / 2);
-        let still = scatter.max(HICCUP) + (PACKETS * spacing) as Micros;
+        let still = scatter.max(HICCUP) + (PACKETS * spacing) as Micros + self.delay;
         Some(match first.heard {
             Some(at) if self.rate > 0.0 => at.max(last) + still,
             Some(at) => at + pause,
             None if first.is_alone => {
-                (first.asked + pause + (PACKETS * spacing) as Micros).max(last + still)
+                (first.asked + pause + (PACKETS * spacing) as Micros + self.delay).max(last + still)
             }
             None => first.since.max(last) + still,
         })
@@ -177,6 +226,11 @@ impl Windows {
     pub(super) fn give_up_first(&mut self) -> Option<u64> {
         let first = self.on_way.front()?;
         if let Some(heard) = first.heard {
+            if first.end - first.reached >= CUT {
+                let came = (first.reached - first.start) as f64;
+                self.uncut = (UNCUT * came).max(LEAST);
+                self.regains = (self.regains / 4.0).max(LEAST_REGAINS);
+            }
             self.end_first(heard);
             return None;
         }
@@ -209,13 +263,26 @@ impl Windows {
         let took = now.saturating_sub(first.since);
         let took = took.saturating_sub(way).max(took / GROWS as u64).max(1) as f64;
         self.rate = came / took;
+        let passed = first.first.zip(first.heard).and_then(|((began, from), ended)| {
+            let passed = first.reached.checked_sub(from).filter(|passed| *passed >= TELLING)?;
+            Some(passed as f64 / ended.saturating_sub(began).max(1) as f64)
+        });
+        self.passes = passed.unwrap_or(self.rate);
+        // What comes twice comes after what came once.
+        if self.before > 0 && 2 * self.again >= self.before {
+            self.copies_from = self.copies_from.max(2 * self.before);
+        }
+        (self.before, self.again) = (first.end - first.start, 0);
         if span >= 16.0 * PIECE as f64 {
             self.share += (came / span - self.share) / 4.0;
         }
-        let takes = if self.is_shared { SHARED } else { TAKES };
-        let next = self.rate * takes as f64;
+        // What others take of the link is no reason for a smaller share of it.
+        let rate = if self.share_of_link.is_some() { self.passes } else { self.rate };
+        let takes = (MANY * PIECE as f64 / rate).clamp(TAKES as f64, MOST_TAKES as f64);
+        let next = rate * takes;
+        self.uncut = (self.uncut * (1.0 + self.regains)).min(MOST);
         // A window that was cut short by a gap's end says nothing of larger ones.
         let (low, high) = (self.size / 2.0, (GROWS * span).max(self.size));
-        self.size = next.clamp(low.min(high), high).clamp(LEAST, MOST);
+        self.size = next.clamp(low.min(high), high).min(self.uncut).clamp(LEAST, MOST);
     }
 }

@@ -63,6 +63,7 @@ impl PullOne {
         LogGet::new(self.drone, id, self.size, sink, patience)
             .with_budget(self.budget.clone())
             .with_rtt(self.caller.rtt())
+            .on_link(self.load.as_ref())
     }
 
     /// The part is of another file.

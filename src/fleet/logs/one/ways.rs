@@ -8,7 +8,7 @@
 
 use super::{PullOne, SAMPLE_BYTES, Stage};
 use crate::fleet::ftp::FtpError;
-use crate::fleet::ftp::get::{Get, Got, Tally};
+use crate::fleet::ftp::get::{Get, GetOptions, Got, Tally};
 use crate::fleet::intervals::Intervals;
 use crate::fleet::log_protocol::LogProtocolError;
 use crate::fleet::log_protocol::get::{LogGet, LogGot};
@@ -16,11 +16,16 @@ use crate::fleet::log_protocol::list::{Entry, LogList};
 use crate::fleet::logs::part::{PartFile, Sample};
 use crate::fleet::sink::Sink;
 use crate::link::clock::{MS, Micros, S};
+use crate::link::drive::{Machine, Step};
+use crate::link::frame::MavMessage;
+use crate::protocol::ftp::MOST_DATA;
 
 /// Less is brought by MAVFTP before the choice is made.
 const WORTH_A_CHOICE: u64 = 32 << 10;
 /// The end of the log that MAVFTP brings to show its speed, bytes.
-const TRIAL: u64 = 24 * 239;
+const TRIAL: u64 = 12 * 239;
+/// It takes no longer than this, if anything has come.
+const MOST_TRIAL: Micros = 500 * MS;
 /// So much of the speed that it shows is counted on: so few packets do not tell what is lost, and
 /// arrive unevenly.
 const TRUSTED: f64 = 0.75;
@@ -132,6 +137,56 @@ impl Sink for Tail {
     }
 }
 
+/// What both ways are asked for at the same time, to choose between them.
+#[derive(Debug)]
+pub(super) struct Trial {
+    /// The log's end by MAVFTP.
+    pub(super) get: Get<Tail>,
+    /// Its number for the log messages.
+    list: LogList,
+    listed: Option<Result<Vec<Entry>, LogProtocolError>>,
+    since: Option<Micros>,
+}
+
+impl Trial {
+    /// Ends when the speed is known; where too much is lost to tell it, with a piece of the end.
+    fn judge(&mut self, now: Micros) {
+        let tally = self.get.tally();
+        let is_enough = now >= *self.since.get_or_insert(now) + MOST_TRIAL;
+        if tally.burst_bytes_per_s > 0.0 || (is_enough && tally.new_bytes > 0) {
+            self.get.pause();
+        }
+    }
+}
+
+impl Machine for Trial {
+    /// The list, if that is not over.
+    type Done = (Got<Tail>, Result<Result<Vec<Entry>, LogProtocolError>, LogList>);
+
+    fn on_message(&mut self, now: Micros, message: &MavMessage) {
+        self.get.on_message(now, message);
+        self.list.on_message(now, message);
+    }
+
+    fn poll(&mut self, now: Micros) -> Step<Self::Done> {
+        let mut wake = Micros::MAX;
+        if self.listed.is_none() {
+            match self.list.poll(now) {
+                Step::Send(message) => return Step::Send(message),
+                Step::Wait(until) => wake = until,
+                Step::Done(listed) => self.listed = Some(listed),
+            }
+        }
+        match self.get.poll(now) {
+            Step::Send(message) => Step::Send(message),
+            Step::Wait(until) => Step::Wait(until.min(wake)),
+            Step::Done(got) => {
+                Step::Done((got, self.listed.take().ok_or_else(|| self.list.clone())))
+            }
+        }
+    }
+}
+
 impl PullOne {
     /// Brings what the part lacks in the way that is faster as far as is known.
     pub(super) fn bring(&mut self, part: PartFile) -> Stage {
@@ -142,9 +197,17 @@ impl PullOne {
         let lacks = self.size.saturating_sub(part.have().total());
         if !self.ways.is_tried && lacks >= WORTH_A_CHOICE && target.number > 0 {
             self.ways.is_tried = true;
-            let tail = Tail::new(part, self.size - TRIAL);
-            let get = Get::new(self.caller.another(), &target.source, tail, self.get_sample());
-            return Stage::Try(Box::new(get));
+            // Where others use the link as well a speed would tell nothing; a piece is needed.
+            let trial = if self.is_shared { MOST_DATA as u64 } else { TRIAL };
+            let tail = Tail::new(part, self.size - trial);
+            let options = GetOptions { is_left: true, ..self.get_sample() };
+            let get = Get::new(self.caller.another(), &target.source, tail, options);
+            // As firmware counts: from the oldest that is there.
+            let id = (target.number + 1).saturating_sub(self.oldest.unwrap_or(target.number));
+            let id = u16::try_from(id).unwrap_or(u16::MAX);
+            self.ways.candidate = Some(id);
+            let list = LogList::only(self.drone, id, MUTE).with_rtt(self.caller.rtt());
+            return Stage::Try(Box::new(Trial { get, list, listed: None, since: None }));
         }
         if self.ways.id.is_some() && self.ways.logs_per_s >= self.ways.ftp_per_s {
             self.ways.is_mixed = true;
@@ -167,19 +230,19 @@ impl PullOne {
         (self.ways.ftp_per_s > 0.0).then(|| 239e6 / self.ways.ftp_per_s)
     }
 
-    pub(super) fn on_tried(&mut self, got: Got<Tail>) -> Stage {
+    pub(super) fn on_tried(
+        &mut self,
+        got: Got<Tail>,
+        listed: Result<Result<Vec<Entry>, LogProtocolError>, LogList>,
+    ) -> Stage {
         self.learn(&got.tally);
         self.ways.ftp_per_s *= TRUSTED;
         let part = got.sink.part;
         match got.result {
-            Ok(_) | Err(FtpError::Paused) => {
-                // As firmware counts: from the oldest that is there.
-                let number = self.target.as_ref().map_or(0, |target| target.number);
-                let id = (number + 1).saturating_sub(self.oldest.unwrap_or(number));
-                let id = u16::try_from(id).unwrap_or(u16::MAX);
-                self.ways.candidate = Some(id);
-                Stage::Number(LogList::only(self.drone, id, MUTE), part)
-            }
+            Ok(_) | Err(FtpError::Paused) => match listed {
+                Ok(listed) => self.on_numbered(part, listed),
+                Err(list) => Stage::Number(list, part),
+            },
             Err(error) => self.on_ftp_failed(part, error),
         }
     }
@@ -216,6 +279,7 @@ impl PullOne {
             Ok(sample) => {
                 let get = LogGet::new(self.drone, id, self.size, sample, MUTE);
                 let get = get.with_budget(self.budget.clone()).with_rtt(self.caller.rtt());
+                let get = get.on_link(self.load.as_ref()).followed();
                 Stage::IsIt(Box::new(get), part)
             }
         }
@@ -241,14 +305,9 @@ impl PullOne {
         let is_shared = self.is_shared;
         let by_logs = match &mut self.stage {
             // Its speed is all that was wanted.
-            Stage::Try(get) if get.tally().burst_bytes_per_s > 0.0 => return get.pause(),
-            Stage::LogGet(get) => {
-                get.share(is_shared);
-                if self.reason.is_some() {
-                    return;
-                }
-                true
-            }
+            Stage::Try(trial) => return trial.judge(now),
+            Stage::LogGet(_) if self.reason.is_some() => return,
+            Stage::LogGet(_) => true,
             Stage::Get(_) if self.ways.id.is_some() => false,
             _ => return,
         };

@@ -1,0 +1,126 @@
+//! What of their logs is on its way to the station, of all drones that share a link, and how fast
+//! it comes: so much that the link is never empty, and no more than it holds, a fair share for
+//! each. Who waits for an answer knows what comes before it.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, VecDeque};
+use std::rc::Rc;
+
+use crate::link::clock::{MS, Micros};
+
+/// All drones together keep what the link carries in so long on its way.
+const ROOM: f64 = (300 * MS) as f64;
+/// The rate is looked at over so long, and the best of so many looks counts.
+const LOOK: Micros = 50 * MS;
+const LOOKS: usize = 20;
+/// Each may have so much on its way while the link is not known yet, bytes: a third of a second at
+/// 57,600 baud.
+const FIRST: f64 = 1_440.0;
+
+/// A link's load; clones share it.
+#[derive(Clone, Debug, Default)]
+pub struct Load(Rc<RefCell<Inner>>);
+
+#[derive(Debug, Default)]
+struct Inner {
+    /// Bytes on their way, of each place.
+    on_way: BTreeMap<u64, u64>,
+    next: u64,
+    since: Micros,
+    came: u64,
+    /// Bytes per microsecond.
+    rates: VecDeque<f64>,
+}
+
+impl Inner {
+    fn rate(&self) -> f64 {
+        self.rates.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+impl Load {
+    /// A place on the link for one download.
+    pub fn place(&self) -> Place {
+        let mut inner = self.0.borrow_mut();
+        inner.next += 1;
+        let number = inner.next;
+        inner.on_way.insert(number, 0);
+        Place { load: self.clone(), number }
+    }
+}
+
+/// A download's place on its link, until it is dropped.
+#[derive(Debug)]
+pub struct Place {
+    load: Load,
+    number: u64,
+}
+
+impl Place {
+    /// So much of this download is on its way now, bytes.
+    pub fn tell(&self, bytes: u64) {
+        self.load.0.borrow_mut().on_way.insert(self.number, bytes);
+    }
+
+    /// So much of it has come now, bytes.
+    pub fn came(&self, now: Micros, bytes: u64) {
+        let mut inner = self.load.0.borrow_mut();
+        inner.came += bytes;
+        let passed = now.saturating_sub(inner.since);
+        if passed >= LOOK {
+            let rate = inner.came as f64 / passed as f64;
+            if inner.rates.len() == LOOKS {
+                inner.rates.pop_front();
+            }
+            inner.rates.push_back(rate);
+            (inner.since, inner.came) = (now, 0);
+        }
+    }
+
+    /// What this download may keep on its way, bytes, where others use the link as well.
+    pub fn share(&self) -> Option<f64> {
+        let inner = self.load.0.borrow();
+        let count = inner.on_way.len();
+        let least = if inner.rates.len() < LOOKS { FIRST } else { 0.0 };
+        (count > 1).then(|| (inner.rate() * ROOM / count as f64).max(least))
+    }
+
+    /// What is on its way to others takes so long.
+    pub fn delay(&self) -> Micros {
+        let inner = self.load.0.borrow();
+        let others = inner.on_way.iter().filter(|(number, _)| **number != self.number);
+        let bytes: u64 = others.map(|(_, bytes)| bytes).sum();
+        let rate = inner.rate();
+        if rate > 0.0 { (bytes as f64 / rate).min(2.0 * ROOM) as Micros } else { 0 }
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.load.0.borrow_mut().on_way.remove(&self.number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_has_a_share_of_what_the_link_carries_and_knows_what_comes_before() {
+        let load = Load::default();
+        let one = load.place();
+        assert_eq!((one.share(), one.delay()), (None, 0));
+        let two = load.place();
+        for step in 1..=20 {
+            one.came(step * 50 * MS, 30_000);
+            two.tell(100_000);
+            two.came(step * 50 * MS, 20_000);
+        }
+        // A megabyte per second, the best of late.
+        let share = one.share().unwrap();
+        assert!((120_000.0..=180_000.0).contains(&share), "{share}");
+        assert!((80 * MS..=120 * MS).contains(&one.delay()), "{}", one.delay());
+        drop(two);
+        assert_eq!((one.share(), one.delay()), (None, 0));
+    }
+}
