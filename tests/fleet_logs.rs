@@ -184,7 +184,9 @@ fn all_but_the_drone_that_is_gone_come_home_whole_through_everything() {
     net.vehicles.clear();
     let outcomes = pull(&mut net, &logs, &wanted[..3], &options(5), &mut NoWatch).unwrap();
     assert_eq!(done(&outcomes, 2).there, ["02.BIN"]);
-    assert!(done(&outcomes, 2).unchecked.as_ref().unwrap().starts_with("no answer for 12 s"));
+    // A heartbeat may have been on its way.
+    let unchecked = done(&outcomes, 2).unchecked.as_ref().unwrap();
+    assert!(["no answer for 11 s", "no answer for 12 s"].iter().any(|a| unchecked.starts_with(a)));
 }
 
 fn one(net: &mut LossyNet<Eventful>, logs: &Path, options: &PullOptions) -> OneDone {

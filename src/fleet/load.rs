@@ -8,7 +8,8 @@ use std::rc::Rc;
 
 use crate::link::clock::{MS, Micros};
 
-/// All drones together keep what the link carries in so long on its way.
+/// All drones together keep what the link carries in so long waiting, besides what fills the way
+/// there and back.
 const ROOM: f64 = (300 * MS) as f64;
 /// The rate is looked at over so long, and the best of so many looks counts.
 const LOOK: Micros = 50 * MS;
@@ -30,6 +31,8 @@ struct Inner {
     came: u64,
     /// Bytes per microsecond.
     rates: VecDeque<f64>,
+    /// Shortest time to an answer.
+    least_rtt: Option<Micros>,
 }
 
 impl Inner {
@@ -82,16 +85,24 @@ impl Place {
         let inner = self.load.0.borrow();
         let count = inner.on_way.len();
         let least = if inner.rates.len() < LOOKS { FIRST } else { 0.0 };
-        (count > 1).then(|| (inner.rate() * ROOM / count as f64).max(least))
+        let room = ROOM + inner.least_rtt.unwrap_or(0) as f64;
+        (count > 1).then(|| (inner.rate() * room / count as f64).max(least))
     }
 
-    /// What is on its way to others takes so long.
+    /// An answer took so long.
+    pub fn took(&self, took: Micros) {
+        let mut inner = self.load.0.borrow_mut();
+        inner.least_rtt = Some(inner.least_rtt.map_or(took, |least| least.min(took)));
+    }
+
+    /// What others are waiting for delays an answer by so much.
     pub fn delay(&self) -> Micros {
         let inner = self.load.0.borrow();
         let others = inner.on_way.iter().filter(|(number, _)| **number != self.number);
         let bytes: u64 = others.map(|(_, bytes)| bytes).sum();
         let rate = inner.rate();
-        if rate > 0.0 { (bytes as f64 / rate).min(2.0 * ROOM) as Micros } else { 0 }
+        let takes = if rate > 0.0 { (bytes as f64 / rate) as Micros } else { 0 };
+        takes.saturating_sub(inner.least_rtt.unwrap_or(0)).min(2 * ROOM as Micros)
     }
 }
 
@@ -120,6 +131,10 @@ mod tests {
         let share = one.share().unwrap();
         assert!((120_000.0..=180_000.0).contains(&share), "{share}");
         assert!((80 * MS..=120 * MS).contains(&one.delay()), "{}", one.delay());
+        // A long way holds as much again.
+        one.took(100 * MS);
+        assert!(two.share().unwrap() > 1.2 * share);
+        assert!(one.delay() < 20 * MS, "{}", one.delay());
         drop(two);
         assert_eq!((one.share(), one.delay()), (None, 0));
     }

@@ -194,11 +194,13 @@ impl<S: Sink> LogGet<S> {
             }
             Err(reason) => self.over = Some(Err(LogProtocolError::Sink(reason))),
         }
-        if let Some(took) = self.reads.answered(now, offset) {
+        let read = self.reads.answered(now, offset);
+        let window = self.windows.heard(now, offset, offset + data.len() as u64);
+        for took in read.into_iter().chain(window) {
             self.rtt.add(took);
-        }
-        if let Some(took) = self.windows.heard(now, offset, offset + data.len() as u64) {
-            self.rtt.add(took);
+            if let Some(place) = &self.place {
+                place.took(took);
+            }
         }
     }
 
