@@ -272,6 +272,7 @@ fn an_abort_reaches_everyone_at_once() {
                 1..=4 => {
                     assert_eq!(aborted, Aborted::Confirmed(Action::Return), "{id}");
                     assert_eq!(inner.mode, RTL);
+                    assert!(!inner.status.has(flag::AUTHORIZED), "{id}: its start stays");
                 }
                 5 => assert!(!inner.armed || inner.mode == LAND, "{id} {aborted}"),
                 _ => {

@@ -152,8 +152,8 @@ fn fly_target(
             let mut desk = end::desk(context, &mut station, &folder);
             let mut crew = Crew::new(context, &mut desk, &folder, &plan);
             crew.is_guided = args.guided;
-            crew.listen(args.connect.wait)?;
-            let (flight, exit) = fly(context, &mut crew, args)?;
+            let flown = crew.listen(args.connect.wait).and_then(|()| fly(context, &mut crew, args));
+            let (flight, exit) = crew.ending(flown)?;
             Ok((vec![flight], exit))
         }
         Target::Sim => {
@@ -198,10 +198,13 @@ fn fly(
         return Ok((FlightOutput::no_go(&crew.plan.name, Vec::new(), None), Exit::Unsafe));
     }
     crew.greet()?;
-    if !crew.assign(args.assign)? {
+    let stands = crew.assign(args.assign)?;
+    crew.not_ordered_down()?;
+    if !stands {
         context.insist("NO-GO: nothing was sent, as the drones do not stand as planned");
         return Ok((FlightOutput::no_go(&crew.plan.name, Vec::new(), None), Exit::Unsafe));
     }
+    crew.clear_leftover()?;
     let refused = if args.guided {
         crew.make_guided()?
     } else {
@@ -212,9 +215,12 @@ fn fly(
         }
         crew.upload()?
     };
+    crew.not_ordered_down()?;
     // The fence's own switch is one of the parameters.
     crew.params(args.set_params)?;
+    crew.not_ordered_down()?;
     let table = crew.preflight(args.connect.wait)?;
+    crew.not_ordered_down()?;
     if !refused.is_empty() || !table.go() {
         if context.json {
             context.insist(&table.to_string());

@@ -34,6 +34,8 @@ pub(in crate::cli) enum FlightEnd {
     NoGo,
     /// It was flown; the drones' outcomes say how.
     Flown,
+    /// It was authorized, but no drone was seen in the air.
+    NotFlown,
 }
 
 /// One flight.
@@ -63,6 +65,8 @@ pub(in crate::cli) enum DroneEnd {
     Landed,
     /// It was ordered down from another terminal and has landed.
     OrderedDown,
+    /// It has restarted in the air, and its motors stand still.
+    RestartedInTheAir,
     /// It is on the ground, and was never seen in the air.
     NeverTookOff,
     /// It has not been seen to land.
@@ -147,11 +151,14 @@ impl FlightOutput {
         preflight: Option<PreflightOutput>,
     ) -> Self {
         let ordered = crew.net.ordered_down();
+        let nobody =
+            crew.table.drones.iter().all(|line| crew.ended(line.drone) == Ended::NeverTookOff);
         let drones = crew.table.drones.iter().map(|line| DroneOutput {
             slot: line.slot,
             drone: line.drone.to_string(),
             outcome: match crew.ended(line.drone) {
                 ended if !ended.is_down() => DroneEnd::NotSeenToLand,
+                Ended::Fell => DroneEnd::RestartedInTheAir,
                 _ if ordered.contains_key(&line.drone) => DroneEnd::OrderedDown,
                 Ended::NeverTookOff => DroneEnd::NeverTookOff,
                 _ => DroneEnd::Landed,
@@ -160,7 +167,7 @@ impl FlightOutput {
         });
         Self {
             flight: crew.plan.name.clone(),
-            outcome: FlightEnd::Flown,
+            outcome: if nobody { FlightEnd::NotFlown } else { FlightEnd::Flown },
             preflight,
             drones: drones.collect(),
             logs: Vec::new(),

@@ -28,6 +28,9 @@ const SETTLE: Micros = S;
 const KNOWN_WITHIN: Micros = 3 * S;
 /// The show firmware's status comes within this.
 const STATUS_WITHIN: Micros = 3 * S;
+/// A drone that returns or lands is told for so long more that it has no start any more: an authorization
+/// that stays stands in the way of its next flight.
+const CLEARED_WITHIN: Micros = 5 * S;
 /// A return that is refused so often becomes a landing.
 const REFUSALS: u32 = 3;
 
@@ -64,6 +67,12 @@ pub enum Aborted {
         /// How often.
         told: u32,
     },
+    /// Nothing was confirmed for so long, and nobody waits any more; a running station goes on telling
+    /// it.
+    StillTold {
+        /// How long, s.
+        seconds: u64,
+    },
     /// It was never heard, so that nothing reaches it.
     Unheard,
 }
@@ -84,6 +93,11 @@ impl std::fmt::Display for Aborted {
             Self::Unconfirmed { told } => {
                 write!(f, "NOT CONFIRMED after {told} tries: use its remote control")
             }
+            Self::StillTold { seconds } => write!(
+                f,
+                "NOT CONFIRMED within {seconds} s: use its remote control; the running station goes on \
+                 telling it"
+            ),
             Self::Unheard => {
                 f.write_str("NOT HEARD, so nothing was sent to it: use its remote control")
             }
@@ -109,6 +123,8 @@ pub struct Abort {
     /// A heartbeat and a status that were surely sent after the first word of the abort.
     grounded: bool,
     quiet: Option<bool>,
+    /// Since when it does what it was told.
+    obeys: Option<Micros>,
     told: u32,
     refusals: u32,
 }
@@ -139,6 +155,7 @@ impl Abort {
             status,
             grounded: false,
             quiet: None,
+            obeys: None,
             told: 0,
             refusals: 0,
         }
@@ -148,6 +165,11 @@ impl Abort {
     #[must_use]
     pub fn heard_within(self, heard_within: Micros) -> Self {
         Self { heard_within, ..self }
+    }
+
+    /// How often the drone was told.
+    pub fn told(&self) -> u32 {
+        self.told
     }
 
     /// Armed, but not in the air: there it lands at once, where a return might not disarm. Kept,
@@ -164,10 +186,18 @@ impl Abort {
         }
     }
 
-    fn outcome(&self, now: Micros, begun: Micros) -> Option<Aborted> {
+    fn outcome(&mut self, now: Micros, begun: Micros) -> Option<Aborted> {
+        let obeys = self.armed == Some(true) && self.mode == Some(self.action.mode());
+        let since = if obeys { *self.obeys.get_or_insert(now) } else { now };
+        if !obeys {
+            self.obeys = None;
+        }
         match (self.armed, self.mode) {
-            (Some(true), Some(mode)) if mode == self.action.mode() => {
-                Some(Aborted::Confirmed(self.action))
+            (Some(true), _) if obeys => {
+                // Without show mode it has no start.
+                let cleared = self.status.is_none() || self.quiet == Some(true);
+                (cleared || now >= since + CLEARED_WITHIN)
+                    .then_some(Aborted::Confirmed(self.action))
             }
             (Some(false), mode) if self.grounded && mode != Some(GUIDED) => {
                 // Without show mode there is no status to wait for.
@@ -240,7 +270,7 @@ impl Machine for Abort {
         self.cancel_next = true;
         // A drone on the ground stays in its mode; before it is known, both are said. But one that
         // waits in GUIDED is taken from the station that is about to fly it.
-        if self.armed == Some(false) && self.mode != Some(GUIDED) {
+        if self.obeys.is_some() || self.armed == Some(false) && self.mode != Some(GUIDED) {
             return self.poll(now);
         }
         let confirmation = self.told.min(255) as u8 - 1;

@@ -56,6 +56,9 @@ pub struct Desk<'a> {
     net: &'a mut dyn Net,
     inbox: Option<Inbox>,
     tell: Box<dyn FnMut(&Notice) + 'a>,
+    /// The drones of the flight, as far as they are known: an order to everyone is for them, too,
+    /// heard or not.
+    fleet: Box<dyn Fn() -> BTreeSet<DroneId> + 'a>,
     telemetry: Telemetry,
     next_look: Micros,
     open: Vec<Open>,
@@ -70,12 +73,21 @@ impl<'a> Desk<'a> {
             net,
             inbox,
             tell: Box::new(tell),
+            fleet: Box::new(BTreeSet::new),
             telemetry: Telemetry::default(),
             next_look: 0,
             open: Vec::new(),
             running: BTreeMap::new(),
             ordered: BTreeSet::new(),
         }
+    }
+
+    /// The same for a flight whose drones are known when an order comes: those that are not heard are
+    /// named, too.
+    #[must_use]
+    pub fn with_fleet(mut self, fleet: impl Fn() -> BTreeSet<DroneId> + 'a) -> Self {
+        self.fleet = Box::new(fleet);
+        self
     }
 
     fn look(&mut self, now: Micros) {
@@ -86,7 +98,11 @@ impl<'a> Desk<'a> {
         let orders = self.inbox.as_mut().map(Inbox::take).unwrap_or_default();
         for taken in orders {
             let action = taken.order.action;
-            let drones = taken.order.drones.clone().unwrap_or_else(|| self.net.heard());
+            let drones: BTreeSet<DroneId> = match &taken.order.drones {
+                Some(drones) => drones.iter().copied().collect(),
+                None => self.net.heard().into_iter().chain((self.fleet)()).collect(),
+            };
+            let drones: Vec<DroneId> = drones.into_iter().collect();
             (self.tell)(&Notice::Ordered { action, drones: drones.clone() });
             for drone in &drones {
                 let abort = Abort::new(*drone, action, self.telemetry.get(*drone));
@@ -97,6 +113,11 @@ impl<'a> Desk<'a> {
             let answer = Answer { schema: ANSWER_SCHEMA.to_owned(), beat: 0, drones };
             self.open.push(Open { taken, answer });
         }
+        self.answer();
+    }
+
+    /// Writes down how far the orders are.
+    fn answer(&mut self) {
         for open in &mut self.open {
             open.answer.beat += 1;
             if let Err(error) = open.taken.answer(&open.answer) {
@@ -128,6 +149,9 @@ impl<'a> Desk<'a> {
                 }
             }
         }
+        if ended.is_empty() {
+            return;
+        }
         for (drone, action, done) in ended {
             self.running.remove(&drone);
             (self.tell)(&Notice::Done { action, drone, done });
@@ -138,8 +162,9 @@ impl<'a> Desk<'a> {
                     }
                 }
             }
-            self.next_look = now;
         }
+        // At once: a station that has nothing more to do ends, and is not asked for messages again.
+        self.answer();
     }
 
     fn hear(&mut self, received: &Received) {
@@ -149,6 +174,19 @@ impl<'a> Desk<'a> {
             abort.on_message(now, &received.message);
             *next = now;
         }
+    }
+}
+
+impl Drop for Desk<'_> {
+    /// Who waits for an answer is told what was not confirmed when the station ended.
+    fn drop(&mut self) {
+        for open in &mut self.open {
+            for (drone, answer) in &mut open.answer.drones {
+                let told = self.running.get(drone).map_or(0, |(abort, ..)| abort.told());
+                answer.get_or_insert(Aborted::Unconfirmed { told });
+            }
+        }
+        self.answer();
     }
 }
 

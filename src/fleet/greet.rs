@@ -41,10 +41,15 @@ impl Greet {
     pub fn new(drone: DroneId) -> Self {
         Self { drone, heard: Greeted::default(), tries: 0, to_send: Vec::new(), next: 0 }
     }
+}
 
-    fn ask(&self, command: MavCmd, first: f32, second: f32) -> MavMessage {
-        command_long(self.drone, command, [first, second, 0.0, 0.0, 0.0, 0.0, 0.0], 0)
-    }
+fn ask(drone: DroneId, command: MavCmd, first: f32, second: f32) -> MavMessage {
+    command_long(drone, command, [first, second, 0.0, 0.0, 0.0, 0.0, 0.0], 0)
+}
+
+/// Asks a vehicle to tell its time from now on: one that has restarted has forgotten that it should.
+pub fn ask_time(drone: DroneId) -> MavMessage {
+    ask(drone, MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, SYSTEM_TIME, TIME_EVERY_US)
 }
 
 impl Machine for Greet {
@@ -72,10 +77,9 @@ impl Machine for Greet {
         }
         if !self.heard.version {
             let command = MavCmd::MAV_CMD_REQUEST_MESSAGE;
-            self.to_send.push(self.ask(command, AUTOPILOT_VERSION, 0.0));
+            self.to_send.push(ask(self.drone, command, AUTOPILOT_VERSION, 0.0));
         }
-        let command = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL;
-        self.to_send.push(self.ask(command, SYSTEM_TIME, TIME_EVERY_US));
+        self.to_send.push(ask_time(self.drone));
         self.tries += 1;
         self.next = now + S;
         Step::Wait(now)

@@ -19,6 +19,8 @@ use crate::protocol::show::{CAPABILITY, FROM_DRONE, Status};
 pub const TEXTS: usize = 16;
 /// Longest text, characters: those of several pieces end here.
 const TEXT: usize = 250;
+/// A board's time that is older by so much is that of another boot; by less it was overtaken, ms.
+const RESTARTED_MS: u32 = 10_000;
 /// Positions that the link's quality is taken from.
 const BEATS: usize = 20;
 
@@ -118,6 +120,10 @@ pub struct Drone {
     pub texts: VecDeque<Text>,
     /// Texts ever said; larger than `texts` once some are forgotten.
     pub texts_said: u64,
+    /// Restarts that were seen: its board's time went back.
+    pub restarts: u32,
+    /// The board's time that was heard last, ms.
+    board_ms: Option<u32>,
     beats: VecDeque<u32>,
 }
 
@@ -170,6 +176,7 @@ impl Drone {
                 self.status = Some((now, Status::from_data(&data.data[..length])));
             }
             MavMessage::GLOBAL_POSITION_INT(at) => {
+                self.board_time(at.time_boot_ms);
                 self.beat(at.time_boot_ms);
                 self.position = Some((now, position(at)));
             }
@@ -180,6 +187,7 @@ impl Drone {
             }
             MavMessage::SYS_STATUS(status) => self.health = Some((now, health(status))),
             MavMessage::SYSTEM_TIME(time) => {
+                self.board_time(time.time_boot_ms);
                 self.clock.read(now, time.time_unix_usec);
                 self.clock.read_board(time.time_boot_ms, time.time_unix_usec);
                 let unix_ms = (time.time_unix_usec / 1000) as i64 - i64::from(time.time_boot_ms);
@@ -197,12 +205,25 @@ impl Drone {
         }
     }
 
+    /// Takes a time of its board. After a restart nothing that its old clock has said holds: what was
+    /// measured at a time of the new boot would be put at one of the old.
+    fn board_time(&mut self, boot_ms: u32) {
+        let last_ms = self.board_ms.unwrap_or(boot_ms);
+        if last_ms.saturating_sub(boot_ms) >= RESTARTED_MS {
+            self.restarts += 1;
+            self.clock = VehicleClock::default();
+            self.booted = None;
+            self.beats.clear();
+            self.board_ms = Some(boot_ms);
+        } else {
+            self.board_ms = Some(last_ms.max(boot_ms));
+        }
+    }
+
     fn beat(&mut self, boot_ms: u32) {
-        match self.beats.back() {
-            // Reordered or repeated; after a restart the clock begins anew.
-            Some(last) if boot_ms <= *last && last - boot_ms < 10_000 => return,
-            Some(last) if boot_ms <= *last => self.beats.clear(),
-            _ => {}
+        // Reordered or repeated.
+        if self.beats.back().is_some_and(|last| boot_ms <= *last) {
+            return;
         }
         self.beats.push_back(boot_ms);
         if self.beats.len() > BEATS {
@@ -272,6 +293,14 @@ pub struct Telemetry {
 pub const SILENT_AFTER: Micros = 5 * S;
 
 impl Telemetry {
+    /// Those that have restarted and have not told their time since.
+    pub fn timeless(&self, now: Micros) -> Vec<DroneId> {
+        let all = self.drones.iter();
+        all.filter(|(_, of)| of.restarts > 0 && of.clock.gps_ms(now).is_none())
+            .map(|(drone, _)| *drone)
+            .collect()
+    }
+
     /// One vehicle, if it was ever heard.
     pub fn get(&self, drone: DroneId) -> Option<&Drone> {
         self.drones.get(&drone)

@@ -62,6 +62,11 @@ pub enum Event {
         /// Which.
         armed: bool,
     },
+    /// It was switched off and on, or its autopilot has failed and begun anew.
+    Restarted {
+        /// It was in the air then.
+        in_the_air: bool,
+    },
     /// Nothing has been heard of it for too long.
     Silent {
         /// How long, s.
@@ -101,6 +106,7 @@ impl Event {
             Self::Silent { .. }
             | Self::Far { .. }
             | Self::BatteryLow { .. }
+            | Self::Restarted { in_the_air: true }
             | Self::FenceBreached => true,
             Self::Says { severity, .. } => *severity <= 3,
             Self::Stage { number, .. } => Stage::from_number(*number) == Stage::Error,
@@ -116,6 +122,8 @@ impl std::fmt::Display for Event {
             Self::Mode { mode } => write!(f, "flight mode {mode}"),
             Self::Armed { armed: true } => f.write_str("armed"),
             Self::Armed { armed: false } => f.write_str("disarmed"),
+            Self::Restarted { in_the_air: true } => f.write_str("restarted in the air"),
+            Self::Restarted { in_the_air: false } => f.write_str("restarted"),
             Self::Silent { seconds } => write!(f, "not heard for {seconds} s"),
             Self::HeardAgain => f.write_str("heard again"),
             Self::Far { distance_m, show_s } => {
@@ -151,6 +159,8 @@ pub struct Flying {
     pub over: bool,
     /// Whether it was seen in the air.
     pub flew: bool,
+    /// Whether it has restarted there, and was not seen to fly on: it has not landed, but come down.
+    pub fell: bool,
 }
 
 #[expect(clippy::struct_excessive_bools, reason = "what was told, each on its own")]
@@ -163,6 +173,12 @@ struct Watched {
     mode: Option<u32>,
     armed: Option<bool>,
     was_armed: bool,
+    /// Restarts that were told.
+    restarts: u32,
+    /// Whether it was in the air when its board's time was heard last.
+    was_in_the_air: bool,
+    /// When it has restarted last.
+    restarted: Micros,
     silent: bool,
     low: bool,
     breached: bool,
@@ -211,7 +227,9 @@ impl Monitor {
     pub fn new(plan: &Plan, table: &FleetTable, telemetry: Telemetry, limits: Limits) -> Self {
         let watched = table.drones.iter().filter_map(|line| {
             let trajectory = Trajectory::of_slot(plan, plan.slot(line.slot)?);
-            let texts = telemetry.get(line.drone).map_or(0, |of| of.texts_said);
+            let known = telemetry.get(line.drone);
+            let texts = known.map_or(0, |of| of.texts_said);
+            let restarts = known.map_or(0, |of| of.restarts);
             let watched = Watched {
                 course: Course::new(trajectory),
                 flying: Flying::default(),
@@ -220,6 +238,9 @@ impl Monitor {
                 mode: None,
                 armed: None,
                 was_armed: false,
+                restarts,
+                was_in_the_air: false,
+                restarted: 0,
                 silent: false,
                 low: false,
                 breached: false,
@@ -298,7 +319,10 @@ impl Monitor {
                 told.push_back(Told { at: now, drone: *drone, event });
             };
             match telemetry.drones.get(drone) {
-                Some(of) => watched.look((now, *listened), of, limits, *start_gps_ms, &mut tell),
+                Some(of) => {
+                    let of_all = (*start_gps_ms, show_s);
+                    watched.look((now, *listened), of, limits, of_all, &mut tell);
+                }
                 None => watched.miss(now.saturating_sub(begun), limits, show_s, &mut tell),
             }
         }
@@ -311,8 +335,14 @@ impl Watch for Monitor {
         self.telemetry.on_message(now, received);
         let of = self.telemetry.drones.get(&received.from);
         if let (Some(watched), Some(of)) = (self.watched.get_mut(&received.from), of) {
-            watched.flying.flew |= is_in_the_air(of);
             watched.heard = self.listened;
+            if let Some(event) = watched.restart(now, of, &received.message) {
+                let drone = received.from;
+                if self.told.len() >= MOST_EVENTS {
+                    self.told.pop_front();
+                }
+                self.told.push_back(Told { at: now, drone, event });
+            }
         }
         if matches!(received.message, MavMessage::GLOBAL_POSITION_INT(_)) {
             self.place(now, received.from);
@@ -344,6 +374,35 @@ fn is_in_the_air(of: &Drone) -> bool {
 }
 
 impl Watched {
+    /// Takes note of whether it is in the air, and whether it has restarted there.
+    fn restart(&mut self, now: Micros, of: &Drone, message: &MavMessage) -> Option<Event> {
+        let restarted = of.restarts != self.restarts;
+        let flies = is_in_the_air(of);
+        if !restarted {
+            // What the old boot has said says nothing of the new.
+            let fresh = |at: Option<Micros>| at.is_none_or(|at| at > self.restarted);
+            let flies = flies
+                && (self.restarted == 0
+                    || of.armed.is_some_and(|(at, armed)| armed && at > self.restarted)
+                        && fresh(of.status.map(|(at, _)| at)));
+            self.flying.flew |= flies;
+            self.flying.fell &= !flies;
+        }
+        // What else it says may be of the new boot, before its board's time is.
+        let tells_time =
+            matches!(message, MavMessage::GLOBAL_POSITION_INT(_) | MavMessage::SYSTEM_TIME(_));
+        if !tells_time {
+            return None;
+        }
+        let in_the_air = std::mem::replace(&mut self.was_in_the_air, flies && !restarted);
+        if !restarted {
+            return None;
+        }
+        (self.restarts, self.restarted) = (of.restarts, now);
+        self.flying.fell |= in_the_air;
+        Some(Event::Restarted { in_the_air })
+    }
+
     /// Nothing was ever heard of it, for so long.
     fn miss(
         &mut self,
@@ -367,7 +426,7 @@ impl Watched {
         (now, listened): (Micros, Micros),
         of: &Drone,
         limits: &Limits,
-        start_gps_ms: Option<i64>,
+        (start_gps_ms, fleet_s): (Option<i64>, Option<f64>),
         tell: &mut dyn FnMut(Event),
     ) {
         self.states(of, tell);
@@ -396,7 +455,8 @@ impl Watched {
             None => {
                 self.was_armed && self.armed == Some(false) || now.saturating_sub(of.heard) > 60 * S
             }
-            Some(_) => self.over(),
+            // One that has restarted may never know the time again.
+            Some(_) => self.over(self.flying.show_s.or(fleet_s)),
         };
     }
 
@@ -474,11 +534,11 @@ impl Watched {
         })
     }
 
-    fn over(&self) -> bool {
+    fn over(&self, show_s: Option<f64>) -> bool {
         if self.armed == Some(true) && !self.silent {
             return false;
         }
-        let Some(show_s) = self.flying.show_s else { return false };
+        let Some(show_s) = show_s else { return false };
         let end_s = self.course.trajectory().duration_ms() as f64 / 1000.0;
         match self.stage {
             _ if self.silent => show_s > end_s + SILENT_UNTIL_S,
@@ -551,26 +611,61 @@ mod tests {
 
         /// What a drone says at a show time, off its trajectory by so much, m; heard at `now`.
         fn say(&mut self, now: Micros, system: u8, show_ms: u64, off_m: f64) {
-            let boot_ms = (START_MS + show_ms) as u32;
-            let clock = dialect::SYSTEM_TIME_DATA {
-                time_unix_usec: ON_US + u64::from(boot_ms) * 1000,
-                time_boot_ms: boot_ms,
+            self.says(now, system, (START_MS + show_ms, 0), off_m, true);
+        }
+
+        /// What it says so long after all were switched on, and its last boot after that, ms; before
+        /// the start from the ground.
+        fn says(
+            &mut self,
+            now: Micros,
+            system: u8,
+            (on_ms, boot_at_ms): (u64, u64),
+            off_m: f64,
+            clock: bool,
+        ) {
+            if clock {
+                let clock = dialect::SYSTEM_TIME_DATA {
+                    time_unix_usec: ON_US + on_ms * 1000,
+                    time_boot_ms: (on_ms - boot_at_ms) as u32,
+                };
+                self.hear(now, system, MavMessage::SYSTEM_TIME(clock));
+            }
+            let flies = on_ms >= START_MS;
+            self.beat(now, system, flies);
+            self.status(now, system, if flies { Stage::Performing } else { Stage::WaitForStart });
+            self.is_at(now, system, (on_ms, boot_at_ms), off_m);
+        }
+
+        fn beat(&mut self, now: Micros, system: u8, armed: bool) {
+            let base_mode = if armed {
+                dialect::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED
+            } else {
+                dialect::MavModeFlag::empty()
             };
-            self.hear(now, system, MavMessage::SYSTEM_TIME(clock));
-            let status = Status { stage: Stage::Performing, ..Status::from_data(&[]) };
+            let beat = dialect::HEARTBEAT_DATA { base_mode, ..Default::default() };
+            self.hear(now, system, MavMessage::HEARTBEAT(beat));
+        }
+
+        fn status(&mut self, now: Micros, system: u8, stage: Stage) {
+            let status = Status { stage, ..Status::from_data(&[]) };
             let data = dialect::DATA16_DATA {
                 mavtype: FROM_DRONE,
                 len: Status::LENGTH,
                 data: status.to_data(),
             };
             self.hear(now, system, MavMessage::DATA16(data));
+        }
+
+        fn is_at(&mut self, now: Micros, system: u8, (on_ms, boot_at_ms): (u64, u64), off_m: f64) {
+            let show_ms = on_ms.saturating_sub(START_MS);
             let slot = self.plan.slot(system.into()).unwrap();
             let trajectory = Trajectory::of_slot(&self.plan, slot);
             let mut place = trajectory.state_at(show_ms as f64 / 1000.0).position_m;
             place.x += off_m;
             let at = self.plan.site.frame().to_geodetic(place);
             let position = dialect::GLOBAL_POSITION_INT_DATA {
-                time_boot_ms: boot_ms,
+                time_boot_ms: (on_ms - boot_at_ms) as u32,
                 lat: (at.lat_deg * 1e7).round() as i32,
                 lon: (at.lon_deg * 1e7).round() as i32,
                 relative_alt: ((place.z - trajectory.start_m.z) * 1000.0) as i32,
@@ -631,6 +726,70 @@ mod tests {
         // 3 m are reached at 33 s.
         assert!(text.contains(" m from its trajectory at 3"), "{text}");
         assert!((33 * S..38 * S).contains(at), "{at}: {text}");
+    }
+
+    #[test]
+    fn a_drone_that_restarts_on_the_ground_is_not_held_against_its_old_clock() {
+        let mut field = Field::new();
+        let mut told = Vec::new();
+        for half_s in 60..500_u64 {
+            let on_ms = 500 * half_s;
+            let now = on_ms * MS;
+            // Drone 2 restarts 50 s after it was switched on, is back 5 s later, and says nothing of
+            // its clock until the show has run for 80 s. From 100 s on it is far away.
+            let boot = if on_ms < 50_000 { 0 } else { 50_000 };
+            let clock = boot == 0 || on_ms >= START_MS + 80_000;
+            let off_m = if on_ms < START_MS + 100_000 { 0.3 } else { 9.0 };
+            field.says(now, 1, (on_ms, 0), 0.3, true);
+            if boot == 0 || on_ms >= 55_000 {
+                field.says(now, 2, (on_ms, boot), off_m, clock);
+            }
+            told.extend(
+                field.monitor.take_events().into_iter().filter(|told| {
+                    matches!(told.event, Event::Restarted { .. } | Event::Far { .. })
+                }),
+            );
+        }
+        let texts: Vec<String> = told.iter().map(|told| told.event.to_string()).collect();
+        assert_eq!(texts.len(), 2, "{texts:?}");
+        assert_eq!((told[0].drone.system, texts[0].as_str()), (2, "restarted"));
+        assert!(texts[1].contains("from its trajectory at 10"), "{texts:?}");
+        let flying: BTreeMap<_, _> = field.monitor.flying().collect();
+        assert!(flying.values().all(|of| of.flew && !of.fell), "{flying:?}");
+    }
+
+    #[test]
+    fn a_drone_that_restarts_in_the_air_has_not_landed_unless_it_flies_on() {
+        for flies_on in [false, true] {
+            let mut field = Field::new();
+            for half_s in 0..40_u64 {
+                let show_ms = 20_000 + 500 * half_s;
+                let now = show_ms * MS;
+                field.say(now, 1, show_ms, 0.3);
+                if half_s < 20 {
+                    field.say(now, 2, show_ms, 0.3);
+                } else if half_s >= 24 {
+                    // Its heartbeat comes first, and nobody knows its clock.
+                    field.beat(now, 2, flies_on);
+                    let stage = if flies_on { Stage::Performing } else { Stage::Off };
+                    field.status(now, 2, stage);
+                    let on_ms = START_MS + show_ms;
+                    field.is_at(
+                        now,
+                        2,
+                        (on_ms, START_MS + 30_000),
+                        if flies_on { 0.3 } else { 40.0 },
+                    );
+                }
+            }
+            let alarms = field.alarms();
+            let texts: Vec<&str> = alarms.iter().map(|(_, text)| text.as_str()).collect();
+            assert_eq!(texts, ["restarted in the air"], "{flies_on}");
+            let flying: BTreeMap<_, _> = field.monitor.flying().collect();
+            let fell: Vec<bool> = flying.values().map(|of| of.fell).collect();
+            assert_eq!(fell, [false, !flies_on]);
+            assert!(flying.values().all(|of| of.flew));
+        }
     }
 
     #[test]

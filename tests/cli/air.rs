@@ -24,8 +24,9 @@ use crate::terminal::on_a_terminal;
 const LONG: &[&str] = &["--speeds", "1,2", "--leg", "12", "--hover", "60", "--baseline", "20"];
 
 fn shown<'a>(link: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    let args = ["fly", "campaign", "--connect", link, "--set-params", "--yes", "--lead", "25"];
-    [&args[..], &["--wait", "20"], more].concat()
+    let args = ["fly", "campaign", "--connect", link, "--set-params", "--yes", "--wait", "20"];
+    let lead = if more.contains(&"--lead") { &[][..] } else { &["--lead", "25"] };
+    [&args[..], lead, more].concat()
 }
 
 fn step<'a>(words: &[&'a str], link: &'a str) -> Vec<&'a str> {
@@ -272,10 +273,16 @@ fn a_station_that_died_is_replaced_and_the_logs_come_home() {
     let (_, after) = journal.split_once("\"step\":\"attached\"").unwrap();
     assert!(after.contains("\"event\":\"armed\",\"armed\":false"), "{after}");
     assert!(bench.path("campaign/logs/02.BIN").exists());
-    // Nobody is in the air any more: that is said, and there is nothing to watch.
-    let ended = bench.run(&step(&["fleet", "watch"], &link));
-    assert!(!ended.err.contains("2 of 2 drones have landed"), "{ended}");
-    assert_ne!(ended.code, Some(0), "{ended}");
+    // Nobody is in the air any more: that is said, and the logs are looked for.
+    for again in [false, true] {
+        if again {
+            fs::remove_file(bench.path("campaign/logs/02.BIN")).unwrap();
+        }
+        let ended = bench.expect(0, &step(&["fleet", "watch"], &link));
+        assert!(!ended.err.contains("have landed"), "{ended}");
+        assert!(ended.err.contains("UTC is over; its logs are at home"), "{ended}");
+        assert!(bench.path("campaign/logs/02.BIN").exists());
+    }
 }
 
 #[test]
@@ -312,6 +319,25 @@ fn nobody_has_landed_who_is_gone_or_never_took_off() {
     assert_eq!(flight.end(), Some(3), "{}", flight.said());
     let said = "0 of 2 drones have landed; drone 1 (slot 1) never took off; drone 2 (slot 2) never took off";
     assert!(flight.said().contains(said), "{}", flight.said());
+}
+
+#[test]
+fn a_drone_that_restarts_in_the_air_has_not_landed() {
+    let (bench, _fleet, link) = stage(&["--speed", "5", "--reboot", "2", "--after", "60"]);
+    let ended = bench.expect(3, &shown(&link, &["--no-logs"]));
+    assert!(ended.err.contains("warning: drone 2: restarted in the air"), "{ended}");
+    let said = "1 of 2 drones have landed; drone 2 (slot 2) restarted in the air and did not land";
+    assert!(ended.err.contains(said), "{ended}");
+    assert!(ended.err.contains("not seen to land: drones 2"), "{ended}");
+}
+
+#[test]
+fn a_drone_that_restarts_before_the_start_is_named_and_flies_without_an_alarm() {
+    let (bench, _fleet, link) = stage(&["--speed", "5", "--reboot", "2", "--after", "110"]);
+    let ended = bench.expect(0, &shown(&link, &["--no-logs", "--lead", "160"]));
+    assert!(ended.err.contains("drone 2: restarted\n"), "{ended}");
+    assert!(!ended.err.contains("from its trajectory"), "{ended}");
+    assert!(ended.err.contains("2 of 2 drones have landed"), "{ended}");
 }
 
 #[test]

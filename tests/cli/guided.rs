@@ -4,7 +4,7 @@
 #![cfg(unix)]
 
 use std::fs;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
 use crate::fleet::{Fleet, free_port};
@@ -31,8 +31,14 @@ impl<'a> Flight<'a> {
     pub(crate) fn of(bench: &'a Bench, args: &[&str]) -> Self {
         let mut command = bench.command(args);
         let err = fs::File::create(bench.path("err.txt")).unwrap();
-        let child = command.stdout(Stdio::null()).stderr(err).spawn().unwrap();
+        let out = fs::File::create(bench.path("out.txt")).unwrap();
+        let child = command.stdout(out).stderr(err).spawn().unwrap();
         Self { bench, child }
+    }
+
+    /// What it has printed, as JSON.
+    pub(crate) fn printed(&self) -> serde_json::Value {
+        serde_json::from_slice(&fs::read(self.bench.path("out.txt")).unwrap()).unwrap()
     }
 
     pub(crate) fn said(&self) -> String {

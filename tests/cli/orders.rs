@@ -5,8 +5,10 @@
 use std::fs;
 use std::time::Duration;
 
+use crate::fleet::free_port;
 use crate::guided::{Flight, flown, modes, stage};
 use crate::support::Bench;
+use crate::terminal::on_a_terminal;
 
 /// A show that is in the air, and its link.
 fn shown(link: &str) -> Vec<&str> {
@@ -83,6 +85,147 @@ fn an_abort_before_the_start_takes_the_start_back_for_everyone() {
         assert_eq!(flight.end(), Some(3), "{}", flight.said());
         assert!(flight.said().contains("taken back for everyone"), "{}", flight.said());
     }
+}
+
+/// Waits until a file has this, for two minutes at most.
+fn wait_for(bench: &Bench, file: &str, text: &str) -> bool {
+    let has = || {
+        let bytes = fs::read(bench.path(file)).unwrap_or_default();
+        String::from_utf8_lossy(&bytes).contains(text)
+    };
+    (0..2400).any(|_| {
+        let there = has();
+        if !there {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        there
+    })
+}
+
+#[test]
+fn an_abort_at_the_question_is_confirmed_in_both_terminals() {
+    let (bench, _fleet, link) = stage(&["--speed", "5"]);
+    let fly = ["fly", "campaign", "--connect", &link, "--set-params", "--no-logs"];
+    let fly = [&fly[..], &["--lead", "120", "--wait", "20"]].concat();
+    let question = "Authorize the start?";
+    let (shown, ended) = std::thread::scope(|scope| {
+        let order =
+            || wait_for(&bench, "typescript", question).then(|| bench.run(&ends("abort", &link)));
+        let order = scope.spawn(order);
+        (on_a_terminal(&bench, &fly, &[(question, "")]), order.join().unwrap())
+    });
+    let (Some((code, shown)), Some(ended)) = (shown, ended) else { return };
+    let down = "on the ground, its start is taken back";
+    assert_eq!(ended.out, format!("drone 1: {down}\ndrone 2: {down}\n"), "{ended}");
+    assert_eq!(ended.code, Some(0), "{ended}");
+    assert_eq!(code, 4, "{shown}");
+    assert!(shown.contains(&format!("drone 2: {down}")), "{shown}");
+    assert!(!bench.path("campaign/fleet-orders").exists(), "nothing is left");
+}
+
+#[test]
+fn an_abort_before_anything_is_loaded_ends_the_flight() {
+    let (bench, _fleet, link) = stage(&["--speed", "2"]);
+    let mut flight = Flight::of(&bench, &shown(&link));
+    assert!(wait_for(&bench, "campaign/fleet-orders/station.json", "station"));
+    bench.expect(0, &ends("abort", &link));
+    assert_eq!(flight.end(), Some(4), "{}", flight.said());
+    let said = flight.said();
+    assert!(said.contains("nothing was started: `fleet abort`"), "{said}");
+    assert!(!said.contains("Loaded") && !said.contains("Changed"), "{said}");
+}
+
+#[test]
+fn an_order_reaches_the_flight_that_is_in_the_air_whichever_is_named() {
+    let bench = Bench::new();
+    for folder in ["both", "drones"] {
+        let plan = ["plan", "campaign", "--grid", "1x2", "--duration", "60", "--speeds", "1"];
+        bench.expect(0, &[&plan[..], &["-o", folder]].concat());
+    }
+    let station = free_port();
+    let _fleet = bench.fleet(&station, &["--flight", "calibration", "--speed", "5"]);
+    let link = format!("udpin:{station}");
+    let fly = ["fly", "both", "--flight", "calibration", "--connect", &link, "--set-params"];
+    let fly = [&fly[..], &["--yes", "--no-logs", "--lead", "25", "--wait", "20"]].concat();
+    let mut flight = Flight::of(&bench, &fly);
+    flight.hear("drone 1: performing");
+    flight.hear("drone 2: performing");
+    // Another flight of the campaign, without the link, and from within the campaign.
+    let abort = ["fleet", "abort", "both", "--flight", "hover", "--drones", "1"];
+    let ended = bench.expect(0, &abort);
+    assert_eq!(ended.out, "drone 1: returns\n", "{ended}");
+    assert!(
+        ended.err.contains("calibration is flying: its station carries the order out"),
+        "{ended}"
+    );
+    let ended = bench.expect(0, &["fleet", "land", "both/hover", "--drones", "2"]);
+    assert_eq!(ended.out, "drone 2: lands\n", "{ended}");
+    assert_eq!(flight.end(), Some(3), "{}", flight.said());
+}
+
+#[test]
+fn a_drone_that_does_not_confirm_is_left_to_its_remote_control_in_time() {
+    let (bench, _fleet, link) = stage(&["--speed", "5", "--gone", "2", "--after", "60"]);
+    let mut flight = Flight::of(&bench, &shown(&link));
+    flight.hear("drone 2: not heard for");
+    let order =
+        ["fleet", "land", "campaign", "--connect", &link, "--drones", "2,77", "--wait", "15"];
+    let ended = bench.expect(3, &order);
+    let told =
+        "drone 2: NOT CONFIRMED within 15 s: use its remote control; the running station goes on";
+    assert!(ended.out.contains(told), "{ended}");
+    assert!(ended.out.contains("drone 77: NOT HEARD"), "{ended}");
+    assert!(ended.err.contains("not confirmed after 10 s: 2. Use the remote controls"), "{ended}");
+    flight.signal("-INT");
+    flight.hear("Ctrl-C again ends it at once");
+    flight.signal("-INT");
+    flight.end();
+}
+
+#[test]
+fn a_drone_of_the_flight_that_is_not_heard_is_named() {
+    let bench = Bench::new();
+    bench.planned("1x2", "campaign");
+    let mut drones = bench.drones();
+    let station = free_port();
+    let link = format!("udpin:{station}");
+    let upload = ["fleet", "upload", "campaign", "--connect", &link, "--wait", "10"];
+    drones.fly(station.parse().unwrap(), || bench.expect(0, &upload), |_| {});
+    // The station is gone, and drone 2 says nothing.
+    drones.setups[1].gone_at = Some(0);
+    let abort = ["fleet", "abort", "campaign", "--connect", &link, "--wait", "5"];
+    let ended = drones.fly(station.parse().unwrap(), || bench.expect(3, &abort), |_| {});
+    assert!(ended.out.contains("drone 1: on the ground"), "{ended}");
+    let unheard = "drone 2: NOT HEARD, so nothing was sent to it: use its remote control";
+    assert!(ended.out.contains(unheard), "{ended}");
+}
+
+#[test]
+fn a_start_that_was_left_on_drones_stands_in_nobodys_way() {
+    let (bench, _fleet, link) = stage(&["--speed", "5"]);
+    let mut args = shown(&link);
+    for word in &mut args {
+        if *word == "25" {
+            *word = "3000";
+        }
+    }
+    let mut flight = Flight::of(&bench, &args);
+    flight.hear("Authorized.");
+    flight.signal("-KILL");
+    flight.end();
+    // Aborted before anybody takes off: that is no flight.
+    let mut flight = Flight::of(&bench, &[&shown(&link)[..], &["--json"]].concat());
+    flight.hear("Authorized.");
+    let said = flight.said();
+    assert!(
+        said.contains("Took back a start that an earlier flight has left: drones 1, 2"),
+        "{said}"
+    );
+    assert!(said.contains("Loaded 2 of 2 drones (they had the file)"), "{said}");
+    bench.expect(0, &[&ends("abort", &link)[..], &["--drones", "2"]].concat());
+    assert_eq!(flight.end(), Some(3), "{}", flight.said());
+    let printed = flight.printed();
+    assert_eq!(printed["flights"][0]["outcome"], "not_flown", "{printed}");
 }
 
 #[test]

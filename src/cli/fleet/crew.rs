@@ -13,6 +13,7 @@ mod start;
 mod stubborn;
 mod troubles;
 
+pub(in crate::cli) use self::attach::Found;
 pub(in crate::cli) use self::ends::Ended;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,7 +29,7 @@ use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::interrupt::Choice;
 use crate::fleet::gate::Gate;
-use crate::fleet::greet::Greet;
+use crate::fleet::greet::{Greet, ask_time};
 use crate::fleet::journal::{Entry, Journal};
 use crate::fleet::log_protocol::LogProtocolError;
 use crate::fleet::log_protocol::list::{Entry as LogOnDrone, LogList};
@@ -88,6 +89,8 @@ pub(in crate::cli) struct Crew<'a> {
     held: BTreeMap<DroneId, String>,
     /// Drones that were seen in the air.
     flew: BTreeSet<DroneId>,
+    /// Drones that have restarted there, and were not seen to fly on.
+    fell: BTreeSet<DroneId>,
     /// The flight was on its way before this program looked.
     attached: bool,
 }
@@ -162,6 +165,7 @@ impl<'a> Crew<'a> {
             on_interrupt: Choice::Return,
             held: BTreeMap::new(),
             flew: BTreeSet::new(),
+            fell: BTreeSet::new(),
             attached: false,
         }
     }
@@ -194,9 +198,7 @@ impl<'a> Crew<'a> {
         }
         self.tell_troubles();
         if self.telemetry.drones.is_empty() {
-            return Err(CommandError::Nothing(format!(
-                "no drone was heard within {wait_s:.0} s: are they on, and is --connect right?"
-            )));
+            return Err(CommandError::Nothing(nobody(wait_s)));
         }
         Ok(())
     }
@@ -276,6 +278,9 @@ impl<'a> Crew<'a> {
             if found.go() || now >= until {
                 return Ok(found);
             }
+            for drone in self.telemetry.timeless(now) {
+                drop(self.net.send(drone, &ask_time(drone)));
+            }
             let next = now + 200 * MS;
             while let Some(received) = self.net.recv(next)? {
                 self.telemetry.on_message(self.net.now(), &received);
@@ -325,6 +330,18 @@ impl<'a> Crew<'a> {
         self.drones().into_iter().map(of).collect()
     }
 
+    /// Ends a step: what another terminal has ordered meanwhile is carried out first, however the step
+    /// has ended. Who was interrupted does not wait.
+    pub(in crate::cli) fn ending<T>(
+        &mut self,
+        ended: Result<T, CommandError>,
+    ) -> Result<T, CommandError> {
+        if self.context.check_stop().is_ok() {
+            self.finish_orders()?;
+        }
+        ended
+    }
+
     fn note(&mut self, step: &str, text: Option<String>) -> Result<(), CommandError> {
         self.note_each(step, text, &BTreeMap::new())
     }
@@ -348,6 +365,11 @@ impl<'a> Crew<'a> {
             self.context.warn(&format!("not in the journal: {error}"));
         }
     }
+}
+
+/// What is said when nobody is heard.
+pub(in crate::cli) fn nobody(wait_s: f64) -> String {
+    format!("no drone was heard within {wait_s:.0} s: are they on, and is --connect right?")
 }
 
 fn outcomes(drones: &BTreeMap<DroneId, String>) -> Vec<NoteOf<'_>> {

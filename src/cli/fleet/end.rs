@@ -9,6 +9,7 @@ use super::crew::Crew;
 use super::{EndArgs, StepArgs, dry, one_flight, server, tables};
 use crate::base::causes::with_causes;
 use crate::campaign::lock::FolderLock;
+use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::cli::clock::{Stopwatch, SystemClock};
 use crate::cli::context::Context;
@@ -16,6 +17,7 @@ use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::{Aborted, Action};
 use crate::fleet::desk::{Desk, Notice};
 use crate::fleet::orders::{Given, Inbox, give, has_station};
+use crate::fleet::slots::FleetTable;
 use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
 use crate::link::net::Net;
@@ -25,6 +27,10 @@ use crate::mission::Plan;
 const ANSWERS_WITHIN: Duration = Duration::from_secs(3);
 /// One that has answered and says nothing more for so long has died.
 const DEAD_AFTER: Duration = Duration::from_secs(6);
+/// Who has not confirmed for so long is named with what to do, once.
+pub(super) const PATIENCE: Duration = Duration::from_secs(10);
+/// A running station is given so long at least to hear everyone; it goes on when nobody waits any more.
+const FOLLOWED: Duration = Duration::from_secs(15);
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// What is to be done where the drones cannot be reached from here.
@@ -38,6 +44,9 @@ pub(super) fn word(action: Action) -> &'static str {
         Action::Land => "land",
     }
 }
+
+/// Nobody is heard whom an order could reach.
+const NOBODY: &str = "no drone was heard: use their remote controls";
 
 fn own_name() -> String {
     format!("{:020}-{}", SystemClock::start().unix_us(), std::process::id())
@@ -57,7 +66,16 @@ pub(in crate::cli) fn desk<'a>(
             with_causes(error, ": ")
         ));
     }
-    Desk::new(net, inbox.ok(), move |notice| tell(context, folder, notice))
+    // An order needs no disk: without the table it is for those who are heard.
+    let fleet = || table_of(folder);
+    Desk::new(net, inbox.ok(), move |notice| tell(context, folder, notice)).with_fleet(fleet)
+}
+
+/// The drones of a flight's table, if it has one that can be read.
+fn table_of(folder: &FlightFolder) -> BTreeSet<DroneId> {
+    FleetTable::read(&folder.0)
+        .map(|table| table.by_drone().into_keys().collect())
+        .unwrap_or_default()
 }
 
 fn tell(context: &Context, folder: &FlightFolder, notice: &Notice) {
@@ -89,17 +107,42 @@ fn is_busy(campaign: &Path) -> bool {
     campaign.is_dir() && matches!(FolderLock::take(campaign), Err(CampaignError::Busy { .. }))
 }
 
-/// The flights of a campaign that a station is flying.
-pub(super) fn flying(campaign: &Path, name: Option<&str>) -> Vec<FlightFolder> {
-    if !is_busy(campaign) {
+/// The flights of the campaign that a station is flying, with their names, wherever in it the folder
+/// is. In truth that is one; others are of stations that have died.
+pub(super) fn flying(folder: &Path) -> Vec<(FlightFolder, String)> {
+    if !is_busy(folder) {
         return Vec::new();
     }
-    let mut folders = campaign::flights(campaign).unwrap_or_default();
+    let full = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let whole = full.parent().filter(|above| campaign::index_path(above).is_file());
+    let mut folders = campaign::flights(whole.unwrap_or(folder)).unwrap_or_default();
     folders.retain(|folder| has_station(&folder.0));
-    if let Some(name) = name {
+    let name =
+        |folder: &FlightFolder| folder.read_plan().map_or_else(|_| String::new(), |plan| plan.name);
+    folders
+        .into_iter()
+        .map(|folder| {
+            let name = name(&folder);
+            (folder, name)
+        })
+        .collect()
+}
+
+/// The drones that somebody ordering everyone down means, heard or not: those of the flight, or where
+/// none is named of the one that was started last.
+fn meant(campaign: &Path, flight: Option<&str>) -> BTreeSet<DroneId> {
+    let mut folders = campaign::flights(campaign).unwrap_or_default();
+    if let Some(name) = flight {
         folders.retain(|folder| folder.read_plan().is_ok_and(|plan| plan.name == name));
     }
-    folders
+    let started = |folder: &FlightFolder| {
+        StartRecord::read(folder).ok().flatten().map(|record| record.authorized_unix_s)
+    };
+    let last = folders.iter().filter_map(|folder| Some((started(folder)?, folder)));
+    match last.max_by_key(|(at, _)| *at) {
+        Some((_, folder)) => table_of(folder),
+        None => folders.iter().flat_map(table_of).collect(),
+    }
 }
 
 fn any_flight(campaign: &Path) -> Option<(FlightFolder, Plan)> {
@@ -112,29 +155,36 @@ fn any_flight(campaign: &Path) -> Option<(FlightFolder, Plan)> {
 /// nobody has taken it.
 fn order(
     context: &Context,
-    folders: &[FlightFolder],
+    flights: &[(FlightFolder, String)],
+    wanted: Option<&str>,
     only: Option<&BTreeSet<DroneId>>,
     action: Action,
+    patience: Duration,
 ) -> Result<Option<BTreeMap<DroneId, Aborted>>, CommandError> {
     let name = own_name();
     let drones = only.map(|only| only.iter().copied().collect::<Vec<_>>());
-    let mut given: Vec<Given> = Vec::new();
-    for folder in folders {
+    let mut given: Vec<(Given, &str)> = Vec::new();
+    for (folder, flight) in flights {
         match give(&folder.0, &name, action, drones.clone()) {
-            Ok(order) => given.extend(order),
+            Ok(order) => given.extend(order.map(|order| (order, flight.as_str()))),
             Err(error) => context
                 .warn(&format!("no order to the running station: {}", with_causes(&error, ": "))),
         }
     }
     let watch = Stopwatch::start();
     loop {
-        if let Some(place) = given.iter().position(|given| given.answer().is_some()) {
-            let taken = given.swap_remove(place);
-            for other in &given {
+        if let Some(place) = given.iter().position(|(given, _)| given.answer().is_some()) {
+            let (taken, flight) = given.swap_remove(place);
+            for (other, _) in &given {
                 other.withdraw();
             }
-            context.say("The link is held by a running station: it carries the order out");
-            return follow(context, taken).map(Some);
+            if wanted.is_some_and(|wanted| wanted != flight) {
+                // Whoever orders drones down in a hurry means those that fly.
+                context.insist(&format!("{flight} is flying: its station carries the order out"));
+            } else {
+                context.say("The link is held by a running station: it carries the order out");
+            }
+            return follow(context, taken, patience).map(Some);
         }
         if given.is_empty() || watch.elapsed() >= ANSWERS_WITHIN {
             break;
@@ -142,18 +192,27 @@ fn order(
         std::thread::sleep(PAUSE);
     }
     // One that was taken at the last moment is waited for.
-    let mut taken: Vec<Given> = given.into_iter().filter(|given| !given.withdraw()).collect();
-    match taken.pop() {
-        Some(taken) => follow(context, taken).map(Some),
+    let mut taken = given.into_iter().filter(|(given, _)| !given.withdraw());
+    match taken.next() {
+        Some((taken, _)) => follow(context, taken, patience).map(Some),
         None => Ok(None),
     }
 }
 
-/// Tells what a station answers until everyone has confirmed.
-fn follow(context: &Context, given: Given) -> Result<BTreeMap<DroneId, Aborted>, CommandError> {
+/// Tells what a station answers until everyone has confirmed, or for so long.
+fn follow(
+    context: &Context,
+    given: Given,
+    patience: Duration,
+) -> Result<BTreeMap<DroneId, Aborted>, CommandError> {
     let mut beat = (None, Stopwatch::start());
+    let watch = Stopwatch::start();
+    let (mut seen, mut named): (BTreeMap<_, _>, bool) = (BTreeMap::new(), false);
     loop {
         let answer = given.answer();
+        if let Some(answer) = &answer {
+            seen = answer.drones.iter().copied().collect();
+        }
         if let Some(answer) = answer.as_ref().filter(|answer| answer.is_over()) {
             let done = answer.drones.iter().filter_map(|(drone, done)| Some((*drone, (*done)?)));
             let done = done.collect();
@@ -166,6 +225,16 @@ fn follow(context: &Context, given: Given) -> Result<BTreeMap<DroneId, Aborted>,
                 let open = answer.drones.iter().filter(|(_, done)| done.is_none());
                 context.say(&waiting(open.map(|(drone, _)| *drone)));
             }
+        }
+        if !named && watch.elapsed() >= PATIENCE {
+            named = true;
+            let open = seen.iter().filter(|(_, done)| done.is_none()).map(|(drone, _)| *drone);
+            context.insist(&by_hand(open));
+        }
+        if watch.elapsed() >= patience {
+            let seconds = watch.elapsed().as_secs();
+            let end = |done: Option<Aborted>| done.unwrap_or(Aborted::StillTold { seconds });
+            return Ok(seen.into_iter().map(|(drone, done)| (drone, end(done))).collect());
         }
         if beat.1.elapsed() >= DEAD_AFTER {
             return Err(CommandError::Failed(format!(
@@ -185,6 +254,17 @@ fn follow(context: &Context, given: Given) -> Result<BTreeMap<DroneId, Aborted>,
 pub(super) fn waiting(drones: impl Iterator<Item = DroneId>) -> String {
     let names: Vec<String> = drones.map(|drone| drone.to_string()).collect();
     format!("not confirmed yet, told again and again: {}", names.join(", "))
+}
+
+/// What people do about drones that have not confirmed for a while.
+pub(super) fn by_hand(drones: impl Iterator<Item = DroneId>) -> String {
+    let names: Vec<String> = drones.map(|drone| drone.to_string()).collect();
+    format!(
+        "warning: not confirmed after {} s: {}. Use the remote controls of these drones; they are told \
+         on",
+        PATIENCE.as_secs(),
+        names.join(", ")
+    )
 }
 
 /// Ends flights.
@@ -208,10 +288,11 @@ pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<E
             ));
         }
     };
-    let stations = flying(campaign, flight);
+    let stations = flying(campaign);
     let mut unanswered = "";
     if !stations.is_empty() {
-        if let Some(done) = order(context, &stations, only.as_ref(), action)? {
+        let patience = Duration::from_secs_f64(args.step.connect.wait).max(FOLLOWED);
+        if let Some(done) = order(context, &stations, flight, only.as_ref(), action, patience)? {
             return print(context, &done);
         }
         unanswered = "no station answered within 3 s";
@@ -230,9 +311,10 @@ pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<E
         other => other,
     })?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    crew.hear_anyone(args.step.connect.wait, only.as_ref())?;
+    crew.hear_anyone(args.step.connect.wait, only.as_ref(), NOBODY)?;
     let left_s = args.step.connect.wait - crew.net.now() as f64 * 1e-6;
-    let done = crew.abort(only.as_ref(), action, left_s.max(0.0))?;
+    let meant = meant(campaign, flight);
+    let done = crew.abort(only.as_ref(), &meant, action, left_s.max(0.0))?;
     crew.withdraw_unflown(&done);
     let exit = print(context, &done)?;
     if context.check_stop().is_err() {

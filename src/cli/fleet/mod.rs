@@ -222,7 +222,9 @@ fn with_desk(
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     let mut station = step_station(args)?;
     let mut desk = end::desk(context, &mut station, &folder);
-    body(&mut Crew::new(context, &mut desk, &folder, &plan))
+    let mut crew = Crew::new(context, &mut desk, &folder, &plan);
+    let ended = body(&mut crew);
+    crew.ending(ended)
 }
 
 fn step_station(args: &StepArgs) -> Result<Station, CommandError> {
@@ -253,6 +255,11 @@ fn prepare(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<(), CommandError> {
 /// The table of drones that were loaded by an earlier command.
 fn look(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<Preflight, CommandError> {
     prepare(crew, args)?;
+    look_at(crew, args)
+}
+
+/// The same for drones whose slots are known.
+fn look_at(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<Preflight, CommandError> {
     crew.params(args.set_params)?;
     crew.look_at_files()?;
     crew.preflight(args.step.connect.wait)
@@ -336,7 +343,7 @@ fn open(
     links: Vec<Address>,
 ) -> Result<Station, CommandError> {
     connect.open(links).map_err(|error| match error {
-        CommandError::Failed(text) if !end::flying(campaign, None).is_empty() => {
+        CommandError::Failed(text) if !end::flying(campaign).is_empty() => {
             CommandError::Failed(format!(
                 "{text}\n  the link is held by the command that flies this campaign: it tells what \
                  happens and writes it into fleet-journal.ndjson; `fleet abort` and `fleet land` \
@@ -357,7 +364,10 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
         if let Some(words) = crew.in_flight() {
             return Err(CommandError::Unsafe(words));
         }
-        let table = look(crew, &args.upload)?;
+        prepare(crew, &args.upload)?;
+        crew.clear_leftover()?;
+        let table = look_at(crew, &args.upload)?;
+        crew.not_ordered_down()?;
         if !table.go() {
             return tables::preflight(context, &table);
         }

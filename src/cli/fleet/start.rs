@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::crew::Crew;
+use super::crew::{Crew, Ended};
 use super::interrupt::InterruptArgs;
 use super::tables;
 use crate::cli::context::{Context, prompt};
@@ -132,14 +132,20 @@ pub(in crate::cli) fn say_landed(context: &Context, crew: &Crew<'_>) -> bool {
 /// How the flight ends; what was lost is said.
 pub(super) fn landed(context: &Context, crew: &Crew<'_>, alarms: &Alarms) -> Exit {
     let all = say_landed(context, crew);
+    let is_missing = |drone: &DroneId| !matches!(crew.ended(*drone), Ended::Landed);
+    let missing: Vec<DroneId> =
+        crew.table.drones.iter().map(|line| line.drone).filter(is_missing).collect();
     let ordered = crew.net.ordered_down();
     let mut why = Vec::new();
     let named = |drones: Vec<DroneId>| {
         let names: Vec<String> = drones.iter().map(ToString::to_string).collect();
         names.join(", ")
     };
+    // Others were heard, too, and obey: they are none of this flight.
+    let of_flight = |drone: &DroneId| crew.table.slot_of(*drone).is_some();
+    let ordered: Vec<DroneId> = ordered.into_keys().filter(of_flight).collect();
     if !ordered.is_empty() {
-        why.push(format!("ordered down: drones {}", named(ordered.keys().copied().collect())));
+        why.push(format!("ordered down: drones {}", named(ordered)));
     }
     if !alarms.is_empty() {
         let told: Vec<String> = alarms
@@ -152,9 +158,12 @@ pub(super) fn landed(context: &Context, crew: &Crew<'_>, alarms: &Alarms) -> Exi
             .collect();
         why.push(format!("alarms of {}", told.join(", ")));
     }
+    if !all {
+        // In which way each has not is said above.
+        why.push(format!("not seen to land: drones {}", named(missing)));
+    }
     if why.is_empty() {
-        // Who has not landed is named above.
-        return if all { Exit::Done } else { Exit::Losses };
+        return Exit::Done;
     }
     context.warn(&format!("not a flight without loss: {}", why.join("; ")));
     Exit::Losses

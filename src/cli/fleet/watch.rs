@@ -3,8 +3,10 @@
 use clap::Args;
 
 use super::connect::Target;
+use super::crew::{Found, nobody};
 use super::interrupt::InterruptArgs;
 use super::start::landed;
+use super::tables::time_of_day;
 use super::{StepArgs, bring, dry, lock, one_flight, server, with_desk};
 use crate::base::plain::Shown as _;
 use crate::cli::context::Context;
@@ -69,17 +71,38 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
             )));
         }
         crew.on_interrupt = args.interrupt.on_interrupt;
-        crew.hear_anyone(args.step.connect.wait, None)?;
-        let mut start = crew.attach()?;
-        let alarms = crew.watch(&mut start)?;
-        let exit = landed(context, crew, &alarms);
+        let wait_s = args.step.connect.wait;
+        crew.hear_anyone(wait_s, None, &nobody(wait_s))?;
+        let (exit, over) = match crew.attach(wait_s)? {
+            Found::Flight(mut start) => {
+                let alarms = crew.watch(&mut start)?;
+                crew.clear_start(&mut start)?;
+                (landed(context, crew, &alarms), None)
+            }
+            Found::Over(start) => {
+                crew.clear_leftover()?;
+                let over = format!("The flight of {} is over", time_of_day(start));
+                context.say(&format!("{over}: everyone is on the ground"));
+                (Exit::Done, Some(over))
+            }
+        };
         if args.no_logs {
             return Ok(exit);
         }
         let wish = bring::Wish::default();
         let brought =
             bring::bring(context, &mut crew.net, crew.folder, crew.plan, &crew.table, &wish)?;
-        let lost = brought.iter().any(|one| one.state == "missing");
-        Ok(if lost { Exit::Losses } else { exit })
+        let lost: Vec<String> = brought
+            .iter()
+            .filter(|one| one.state == "missing")
+            .map(|one| one.slot.to_string())
+            .collect();
+        match over {
+            Some(over) if lost.is_empty() => context.say(&format!("{over}; its logs are at home")),
+            Some(over) => context
+                .warn(&format!("{over}; not at home are the logs of slots {}", lost.join(", "))),
+            None => {}
+        }
+        Ok(if lost.is_empty() { exit } else { Exit::Losses })
     })
 }

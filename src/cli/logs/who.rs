@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
-use crate::cli::fleet::crew::Crew;
+use crate::cli::fleet::crew::{Crew, nobody};
 use crate::cli::simulate::SlotSet;
 use crate::fleet::slots::{FleetTable, SlotProblem, picture, propose, propose_clear};
 use crate::link::clock::{MS, Micros, S};
@@ -30,7 +30,7 @@ pub(super) fn find(
     if FleetTable::path(&crew.folder.0).exists() {
         crew.table = FleetTable::read(&crew.folder.0)?;
         // Drones that are off are waited for while the others' logs come.
-        crew.hear_anyone(wait_s, None)?;
+        crew.hear_anyone(wait_s, None, &nobody(wait_s))?;
     } else {
         let meant: Vec<u16> =
             crew.plan.slots.iter().map(|slot| slot.slot).filter(|slot| is_meant(*slot)).collect();
@@ -96,9 +96,9 @@ fn listen(
         }
     }
     if crew.telemetry.drones.is_empty() {
-        return Err(CommandError::Nothing(format!(
-            "no drone was heard within {wait_s:.0} s: are they on, and is --connect right?"
-        )));
+        return Err(CommandError::Nothing(nobody(wait_s)));
     }
+    // Who is heard, but refuses what this station says, is asked in vain: the reason is known.
+    crew.tell_troubles();
     Ok(())
 }

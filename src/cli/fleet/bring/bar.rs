@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::shares::Shares;
 use crate::cli::clock::Stopwatch;
 use crate::cli::context::Context;
+use crate::cli::words;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Progress as Share, Watch};
 use crate::link::id::DroneId;
@@ -87,10 +88,10 @@ impl Watch for Bar<'_> {
         if !self.context.interactive && tens > self.said {
             self.said = tens;
             self.context.say(&format!(
-                "bringing logs home: {:.1} of {:.1} MB, {} drones done after {}",
+                "bringing logs home: {:.1} of {:.1} MB, {} done after {}",
                 sum.done as f64 / 1e6,
                 sum.total as f64 / 1e6,
-                self.shares.over(),
+                words::count(self.shares.over(), "drone"),
                 self.watch
             ));
         }

@@ -7,6 +7,7 @@ use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::interrupt::Choice;
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
+use crate::fleet::telemetry::Drone;
 use crate::link::clock::MS;
 use crate::link::drive::{Watch as _, drive};
 use crate::link::id::DroneId;
@@ -30,7 +31,12 @@ pub(super) fn bring_down(
     drones: &BTreeSet<DroneId>,
     action: Action,
 ) -> BTreeMap<DroneId, Aborted> {
+    let is_down =
+        |drone: &DroneId| eyes.telemetry().get(*drone).and_then(Drone::is_armed) == Some(false);
     context.insist(match action {
+        _ if drones.iter().all(is_down) => {
+            "Stopped: nobody is in the air; the start is taken back. Ctrl-C again ends it at once"
+        }
         Action::Return => "Stopped: the drones are sent home. Ctrl-C again ends it at once",
         Action::Land => "Stopped: the drones land where they are. Ctrl-C again ends it at once",
     });
@@ -58,9 +64,31 @@ pub(super) fn in_words(ended: &BTreeMap<DroneId, Aborted>) -> BTreeMap<DroneId, 
     ended.iter().map(|(drone, end)| (*drone, end.to_string())).collect()
 }
 
-/// How a command ends that was interrupted while drones were in the air.
-pub(super) fn stopped(choice: Choice, is_guided: bool) -> CommandError {
+/// How a command ends that was interrupted while these drones may have been in the air. `ended`: how
+/// that ended for those that this program has told.
+pub(super) fn stopped(
+    choice: Choice,
+    is_guided: bool,
+    drones: &BTreeSet<DroneId>,
+    ended: &BTreeMap<DroneId, Aborted>,
+) -> CommandError {
+    let all = |is: fn(Aborted) -> bool| {
+        drones.iter().all(|drone| ended.get(drone).is_some_and(|ended| is(*ended)))
+    };
+    let grounded = all(|ended| ended == Aborted::Grounded);
+    let confirmed = all(Aborted::is_confirmed);
     CommandError::Stopped(match (choice, is_guided) {
+        (Choice::Return | Choice::Land, _) if grounded => {
+            "stopped: everyone is on the ground, and nobody has a start any more"
+        }
+        (Choice::Return, _) if confirmed => {
+            "stopped: this program has sent them home, and all have confirmed it; `updraft fleet \
+             watch` follows them"
+        }
+        (Choice::Land, _) if confirmed => {
+            "stopped: this program has told them to land, and all have confirmed it; `updraft fleet \
+             watch` follows them"
+        }
         (Choice::Return, _) => {
             "stopped: this program has sent them home; those above that have not confirmed it need \
              their remote controls; `updraft fleet watch` follows them"
@@ -81,4 +109,31 @@ pub(super) fn stopped(choice: Choice, is_guided: bool) -> CommandError {
              where they are"
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remote_controls_are_named_only_while_somebody_has_not_confirmed() {
+        let drone = |system| DroneId { network: 0, system };
+        let drones = BTreeSet::from([drone(1), drone(2)]);
+        let says = |ended: &[(u8, Aborted)]| {
+            let ended = ended.iter().map(|(of, ended)| (drone(*of), *ended)).collect();
+            stopped(Choice::Return, false, &drones, &ended).to_string()
+        };
+        let (home, down) = (Aborted::Confirmed(Action::Return), Aborted::Grounded);
+        for (ended, wanted, by_hand) in [
+            (&[(1, down), (2, down)][..], "everyone is on the ground", false),
+            (&[(1, home), (2, down)], "all have confirmed it", false),
+            (&[(1, home), (2, Aborted::Unheard)], "sent them home", true),
+            // Somebody else was told by another terminal.
+            (&[(1, home)], "sent them home", true),
+        ] {
+            let said = says(ended);
+            assert!(said.contains(wanted), "{said}");
+            assert_eq!(said.contains("remote controls"), by_hand, "{said}");
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Crew;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
-use crate::cli::fleet::end::{waiting, word};
+use crate::cli::fleet::end::{PATIENCE, by_hand, waiting, word};
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Progress, Watch, drive};
@@ -13,11 +13,13 @@ use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 
 impl Crew<'_> {
-    /// Listens until one of these drones (or anyone, and a moment more) is heard.
+    /// Listens until one of these drones (or anyone, and a moment more) is heard. `nobody`: what is
+    /// said when nobody is.
     pub(in crate::cli) fn hear_anyone(
         &mut self,
         wait_s: f64,
         only: Option<&BTreeSet<DroneId>>,
+        nobody: &str,
     ) -> Result<(), CommandError> {
         let begun = self.net.now();
         let until = begun + (wait_s * 1e6) as Micros;
@@ -30,15 +32,10 @@ impl Crew<'_> {
                 Some(only) => !only.is_disjoint(&heard),
                 None => !heard.is_empty() && now >= begun + 1500 * MS,
             };
-            if enough {
-                return Ok(());
-            }
-            if now >= until {
+            if enough || now >= until {
                 self.tell_troubles();
                 return if heard.is_empty() {
-                    Err(CommandError::Nothing(
-                        "no drone was heard: use their remote controls".to_owned(),
-                    ))
+                    Err(CommandError::Nothing(nobody.to_owned()))
                 } else {
                     Ok(())
                 };
@@ -49,24 +46,26 @@ impl Crew<'_> {
         }
     }
 
-    /// Ends the flight of these drones (all: of everyone who is heard), giving up those that are
-    /// not heard within `wait_s`. What is done by Ctrl-C is there then.
+    /// Ends the flight of these drones (all: of the `fleet` and of everyone else who is heard), giving
+    /// up those that are not heard within `wait_s`. What is done by Ctrl-C is there then.
     pub(in crate::cli) fn abort(
         &mut self,
         only: Option<&BTreeSet<DroneId>>,
+        fleet: &BTreeSet<DroneId>,
         action: Action,
         wait_s: f64,
     ) -> Result<BTreeMap<DroneId, Aborted>, CommandError> {
-        let heard: BTreeSet<DroneId> =
-            self.net.heard().into_iter().chain(self.telemetry.drones.keys().copied()).collect();
-        let drones = only.unwrap_or(&heard);
+        let heard = self.net.heard().into_iter().chain(self.telemetry.drones.keys().copied());
+        let all: BTreeSet<DroneId> = heard.chain(fleet.iter().copied()).collect();
+        let drones = only.unwrap_or(&all);
         let end = |drone: &DroneId| {
             let abort = Abort::new(*drone, action, self.telemetry.get(*drone));
             (*drone, abort.heard_within((wait_s * 1e6) as Micros))
         };
         let machines: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
-        let next = self.net.now() + TELL;
-        let mut ears = Waiting { context: self.context, open: drones.clone(), next };
+        let now = self.net.now();
+        let (next, by_hand) = (now + TELL, Some(now + PATIENCE.as_micros() as Micros));
+        let mut ears = Waiting { context: self.context, open: drones.clone(), next, by_hand };
         let done = drive(&mut self.net, machines, ALL_AT_ONCE, &mut ears)?;
         let outcomes = drones.iter().map(|drone| {
             (*drone, done.get(drone).map_or("not confirmed".to_owned(), Aborted::to_string))
@@ -84,6 +83,8 @@ struct Waiting<'a> {
     context: &'a Context,
     open: BTreeSet<DroneId>,
     next: Micros,
+    /// When it is said what people do about them.
+    by_hand: Option<Micros>,
 }
 
 impl Watch for Waiting<'_> {
@@ -97,6 +98,10 @@ impl Watch for Waiting<'_> {
         if now >= self.next && !self.open.is_empty() {
             self.next = now + TELL;
             self.context.say(&waiting(self.open.iter().copied()));
+        }
+        if self.by_hand.is_some_and(|at| now >= at) && !self.open.is_empty() {
+            self.by_hand = None;
+            self.context.insist(&by_hand(self.open.iter().copied()));
         }
         self.context.check_stop().is_err()
     }

@@ -11,6 +11,8 @@ use crate::link::id::DroneId;
 pub(in crate::cli) enum Ended {
     /// It was seen in the air, and is on the ground and disarmed.
     Landed,
+    /// It has restarted in the air: its motors stand still, and it lies where it fell.
+    Fell,
     /// It is on the ground, and was not in the air.
     NeverTookOff,
     /// It is on the ground; whether it was in the air nobody has seen.
@@ -30,6 +32,9 @@ impl std::fmt::Display for Ended {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Landed => f.write_str("has landed"),
+            Self::Fell => {
+                f.write_str("restarted in the air and did not land by itself: look for it")
+            }
             Self::NeverTookOff => f.write_str("never took off"),
             Self::OnGround => f.write_str("is on the ground, its flight was not seen"),
             Self::NotSeen(words) => f.write_str(words),
@@ -43,6 +48,8 @@ impl Crew<'_> {
         // The show's own status may be behind the heartbeat: the motors decide.
         if !self.net.is_disarmed(drone) {
             Ended::NotSeen(self.net.words(drone))
+        } else if self.fell.contains(&drone) {
+            Ended::Fell
         } else if self.flew.contains(&drone) {
             Ended::Landed
         } else if self.attached {

@@ -6,14 +6,15 @@ use crate::base::file::FileError;
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::fleet::interrupt::{Choice, Interrupt};
+use crate::fleet::greet::ask_time;
 use crate::fleet::journal::{Entry, Journal};
 use crate::fleet::telemetry::Telemetry;
 use crate::fleet::watch::Monitor;
-use crate::link::clock::{Clock as _, Micros};
+use crate::link::clock::{Clock as _, Micros, S};
 use crate::link::drive::Watch;
 use crate::link::error::Refusal;
 use crate::link::id::DroneId;
-use crate::link::net::Received;
+use crate::link::net::{Net, Received};
 
 /// A [`Monitor`] whose events are told to people and to the journal.
 pub(super) struct Eyes<'a> {
@@ -28,6 +29,8 @@ pub(super) struct Eyes<'a> {
     /// Goes on although Ctrl-C was pressed: somebody is being brought down.
     pub(super) finishes: bool,
     interrupt: Interrupt<'a>,
+    /// When drones that have restarted are asked for their time again.
+    next_ask: Micros,
 }
 
 impl<'a> Eyes<'a> {
@@ -41,7 +44,18 @@ impl<'a> Eyes<'a> {
         let journal = None;
         let (alarms, failed) = (BTreeMap::new(), None);
         let finishes = false;
-        Self { context, monitor, is_virtual, journal, clock, alarms, failed, finishes, interrupt }
+        Self {
+            context,
+            monitor,
+            is_virtual,
+            journal,
+            clock,
+            alarms,
+            failed,
+            finishes,
+            interrupt,
+            next_ask: 0,
+        }
     }
 
     /// Writes what happens into a journal, if there is one.
@@ -66,6 +80,24 @@ impl<'a> Eyes<'a> {
     /// Drones that were seen in the air.
     pub(super) fn flew(&self) -> BTreeSet<DroneId> {
         self.monitor.flying().filter(|(_, of)| of.flew).map(|(drone, _)| drone).collect()
+    }
+
+    /// Drones that have restarted in the air and were not seen to fly on.
+    pub(super) fn fell(&self) -> BTreeSet<DroneId> {
+        self.monitor.flying().filter(|(_, of)| of.fell).map(|(drone, _)| drone).collect()
+    }
+
+    /// Asks drones that have restarted for their time: without it nobody knows where they should be.
+    pub(super) fn ask_times(&mut self, net: &mut dyn Net) {
+        let now = net.now();
+        if now < self.next_ask {
+            return;
+        }
+        self.next_ask = now + S;
+        for drone in self.monitor.telemetry.timeless(now) {
+            // It is asked again.
+            drop(net.send(drone, &ask_time(drone)));
+        }
     }
 
     /// What Ctrl-C means, once there was one and somebody has said it.

@@ -9,7 +9,7 @@ use super::{AT_ONCE, Crew};
 use crate::base::time::GpsTime;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::interrupt::Choice;
-use crate::fleet::abort::ALL_AT_ONCE;
+use crate::fleet::abort::{ALL_AT_ONCE, Aborted};
 use crate::fleet::command::Command;
 use crate::fleet::fence::PutFence;
 use crate::fleet::guided::{Flight, Guided, GuidedError};
@@ -149,13 +149,13 @@ impl<'a> Crew<'a> {
         let (mut eyes, failed, ended) = self.stream(machines, eyes);
         self.context.signals().set_flies(None);
         if !ended.is_empty() {
-            self.try_note("abort", &ended);
+            self.try_note("abort", &in_words(&ended));
         }
         let choice = eyes.choice(self.net.now());
         let written = failed.map_or(Ok(()), |reason| self.note("link", Some(reason)));
         let alarms = self.close(eyes);
         if let Some(choice) = choice {
-            return Err(stopped(choice, true));
+            return Err(stopped(choice, true, &self.drones(), &ended));
         }
         written?;
         alarms
@@ -166,7 +166,7 @@ impl<'a> Crew<'a> {
         &mut self,
         machines: BTreeMap<DroneId, Guided>,
         mut eyes: Eyes<'a>,
-    ) -> (Eyes<'a>, Option<String>, BTreeMap<DroneId, String>) {
+    ) -> (Eyes<'a>, Option<String>, BTreeMap<DroneId, Aborted>) {
         let drones = self.drones();
         let context = self.context;
         let mut ended = BTreeMap::new();
@@ -187,9 +187,10 @@ impl<'a> Crew<'a> {
                 eyes.on_message(net.now(), &received);
             }
             eyes.stop(net.now());
+            eyes.ask_times(&mut net);
         }
         if let Some(action) = eyes.choice(net.now()).and_then(Choice::action) {
-            ended = in_words(&bring_down(context, &mut net, &mut eyes, &drones, action));
+            ended = bring_down(context, &mut net, &mut eyes, &drones, action);
         }
         (eyes, net.failed, ended)
     }

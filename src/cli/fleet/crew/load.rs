@@ -165,11 +165,7 @@ impl Crew<'_> {
             }
         }
         if !self.is_virtual {
-            self.context.say(&format!(
-                "Loaded {} of {count} drones ({} written, the others had the file)",
-                count - refused.len(),
-                written.len()
-            ));
+            self.context.say(&loaded(count - refused.len(), count, written.len()));
         }
         let fine = |drone: &DroneId| {
             let file = if written.contains(drone) { "file written" } else { "file was there" };
@@ -198,5 +194,32 @@ impl Crew<'_> {
         self.known.loaded.extend(same.iter().copied());
         self.known.fenced.extend(same);
         Ok(())
+    }
+}
+
+/// How many drones have the show now, and how many had it before.
+fn loaded(loaded: usize, count: usize, written: usize) -> String {
+    let how = match (written, loaded - written.min(loaded)) {
+        (_, 0) => "",
+        (0, _) => " (they had the file)",
+        (_, 1) => " (1 of them had the file)",
+        (_, had) => {
+            return format!("Loaded {loaded} of {count} drones ({had} of them had the file)");
+        }
+    };
+    format!("Loaded {loaded} of {count} drones{how}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::loaded;
+
+    #[test]
+    fn who_had_the_file_is_said_where_there_is_somebody() {
+        assert_eq!(loaded(0, 2, 0), "Loaded 0 of 2 drones");
+        assert_eq!(loaded(2, 2, 2), "Loaded 2 of 2 drones");
+        assert_eq!(loaded(2, 2, 0), "Loaded 2 of 2 drones (they had the file)");
+        assert_eq!(loaded(3, 4, 2), "Loaded 3 of 4 drones (1 of them had the file)");
+        assert_eq!(loaded(9, 9, 4), "Loaded 9 of 9 drones (5 of them had the file)");
     }
 }

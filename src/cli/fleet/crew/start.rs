@@ -20,6 +20,11 @@ use crate::link::error::NetError;
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 
+/// That there is no start is said so often, with 200 ms between, whatever is heard; and on until
+/// everyone knows, but no more often than this.
+const TOLD_AT_LEAST: u32 = 5;
+const TOLD_AT_MOST: u32 = 50;
+
 impl<'a> Crew<'a> {
     /// Sets a start and waits until every drone has taken it.
     pub(in crate::cli) fn announce(
@@ -116,7 +121,11 @@ impl<'a> Crew<'a> {
 
     fn tell_of_no_start(&mut self, start: &mut Start) -> Result<(), CommandError> {
         start.cancel(self.net.now());
-        for _ in 0..5 {
+        for round in 0..TOLD_AT_MOST {
+            let all_know = start.late(&self.telemetry, self.net.now()).is_empty();
+            if round >= TOLD_AT_LEAST && all_know {
+                break;
+            }
             self.net.broadcast(&start.packet())?;
             let until = self.net.now() + 200 * MS;
             while let Some(received) = self.net.recv(until)? {
@@ -176,6 +185,7 @@ impl<'a> Crew<'a> {
                 eyes.on_message(self.net.now(), &received);
             }
             eyes.stop(self.net.now());
+            eyes.ask_times(&mut self.net);
             let going_on = ordered.values().any(|going_on| *going_on);
             let down = |drone: &DroneId| {
                 let armed = eyes.telemetry().get(*drone).and_then(Drone::is_armed);
@@ -186,9 +196,10 @@ impl<'a> Crew<'a> {
                 break Ok(());
             }
             if let Some(choice) = eyes.choice(self.net.now()) {
+                let mut ended = BTreeMap::new();
                 if let Some(action) = choice.action() {
                     let (context, net) = (self.context, &mut self.net);
-                    let ended = bring_down(context, net, &mut eyes, &drones, action);
+                    ended = bring_down(context, net, &mut eyes, &drones, action);
                     self.try_note("abort", &in_words(&ended));
                     if before && ended.values().all(|end| *end == Aborted::Grounded) {
                         self.withdraw_start();
@@ -197,7 +208,7 @@ impl<'a> Crew<'a> {
                 break Err(if self.is_virtual {
                     CommandError::Interrupted
                 } else {
-                    stopped(choice, false)
+                    stopped(choice, false, &drones, &ended)
                 });
             }
         };
@@ -232,6 +243,7 @@ impl<'a> Crew<'a> {
         eyes: Eyes<'_>,
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
         self.flew.extend(eyes.flew());
+        self.fell.extend(eyes.fell());
         let (telemetry, alarms) = eyes.close();
         self.telemetry = telemetry;
         self.tell_troubles();

@@ -6,7 +6,7 @@ use crate::link::traffic::troubles;
 
 impl Crew<'_> {
     /// Tells what people must know about their links and has not been told yet.
-    pub(super) fn tell_troubles(&mut self) {
+    pub(in crate::cli) fn tell_troubles(&mut self) {
         for trouble in troubles(&self.net.traffic(), &self.net.doubled()) {
             if self.told.insert(trouble.key) {
                 self.context.warn(&trouble.text);
