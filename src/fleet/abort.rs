@@ -277,3 +277,66 @@ impl Machine for Abort {
         Step::send(set_mode(self.drone, self.action.mode(), confirmation))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beat() -> MavMessage {
+        MavMessage::HEARTBEAT(dialect::HEARTBEAT_DATA {
+            custom_mode: RTL,
+            base_mode: MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED,
+            ..Default::default()
+        })
+    }
+
+    fn status(flags: u8, start_tow_s: i32) -> MavMessage {
+        let status =
+            Status { stage: Stage::ReturnToLaunch, flags, start_tow_s, ..Status::from_data(&[]) };
+        MavMessage::DATA16(dialect::DATA16_DATA {
+            mavtype: FROM_DRONE,
+            len: Status::LENGTH,
+            data: status.to_data(),
+        })
+    }
+
+    /// What is sent until it waits, or how it ends.
+    fn round(abort: &mut Abort, now: Micros) -> Result<Vec<MavMessage>, Aborted> {
+        let mut sent = Vec::new();
+        loop {
+            match abort.poll(now) {
+                Step::Send(message) => sent.push(*message),
+                Step::Wait(_) => return Ok(sent),
+                Step::Done(done) => return Err(done),
+            }
+        }
+    }
+
+    #[test]
+    fn a_drone_that_returns_is_told_on_until_it_has_no_start() {
+        for gives_up in [false, true] {
+            let mut abort = Abort::new(DroneId { network: 0, system: 1 }, Action::Return, None);
+            let done = Err(Aborted::Confirmed(Action::Return));
+            assert_eq!(
+                round(&mut abort, 0).unwrap().len(),
+                2,
+                "the mode, and that there is no start"
+            );
+            abort.on_message(2 * S, &beat());
+            abort.on_message(2 * S, &status(flag::AUTHORIZED, 443_029));
+            let sent = round(&mut abort, 2 * S).unwrap();
+            // It is not put into its mode again.
+            assert!(matches!(sent[..], [MavMessage::DATA16(_)]), "{sent:?}");
+            if gives_up {
+                assert_eq!(
+                    round(&mut abort, 2 * S + CLEARED_WITHIN),
+                    done,
+                    "that it returns is more"
+                );
+            } else {
+                abort.on_message(3 * S, &status(0, -1));
+                assert_eq!(round(&mut abort, 3 * S), done);
+            }
+        }
+    }
+}

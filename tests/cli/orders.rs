@@ -104,23 +104,26 @@ fn wait_for(bench: &Bench, file: &str, text: &str) -> bool {
 
 #[test]
 fn an_abort_at_the_question_is_confirmed_in_both_terminals() {
-    let (bench, _fleet, link) = stage(&["--speed", "5"]);
-    let fly = ["fly", "campaign", "--connect", &link, "--set-params", "--no-logs"];
-    let fly = [&fly[..], &["--lead", "120", "--wait", "20"]].concat();
-    let question = "Authorize the start?";
-    let (shown, ended) = std::thread::scope(|scope| {
-        let order =
-            || wait_for(&bench, "typescript", question).then(|| bench.run(&ends("abort", &link)));
-        let order = scope.spawn(order);
-        (on_a_terminal(&bench, &fly, &[(question, "")]), order.join().unwrap())
-    });
-    let (Some((code, shown)), Some(ended)) = (shown, ended) else { return };
-    let down = "on the ground, its start is taken back";
-    assert_eq!(ended.out, format!("drone 1: {down}\ndrone 2: {down}\n"), "{ended}");
-    assert_eq!(ended.code, Some(0), "{ended}");
-    assert_eq!(code, 4, "{shown}");
-    assert!(shown.contains(&format!("drone 2: {down}")), "{shown}");
-    assert!(!bench.path("campaign/fleet-orders").exists(), "nothing is left");
+    for (stock, guided) in [(&[][..], &[][..]), (&["--stock"], &["--guided"])] {
+        let (bench, _fleet, link) = stage(&[&["--speed", "5"][..], stock].concat());
+        let fly = ["fly", "campaign", "--connect", &link, "--set-params", "--no-logs"];
+        let fly = [&fly[..], &["--lead", "120", "--wait", "20"], guided].concat();
+        let question = "Authorize the start?";
+        let (shown, ended) = std::thread::scope(|scope| {
+            let order = || {
+                wait_for(&bench, "typescript", question).then(|| bench.run(&ends("abort", &link)))
+            };
+            let order = scope.spawn(order);
+            (on_a_terminal(&bench, &fly, &[(question, "")]), order.join().unwrap())
+        });
+        let (Some((code, shown)), Some(ended)) = (shown, ended) else { return };
+        let down = "on the ground, its start is taken back";
+        assert_eq!(ended.out, format!("drone 1: {down}\ndrone 2: {down}\n"), "{ended}");
+        assert_eq!(ended.code, Some(0), "{ended}");
+        assert_eq!(code, 4, "{shown}");
+        assert!(shown.contains(&format!("drone 2: {down}")), "{shown}");
+        assert!(!bench.path("campaign/fleet-orders").exists(), "nothing is left");
+    }
 }
 
 #[test]
