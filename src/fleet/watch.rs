@@ -179,6 +179,8 @@ struct Watched {
     was_in_the_air: bool,
     /// When it has restarted last.
     restarted: Micros,
+    /// Since when its motors have stood still.
+    disarmed: Option<Micros>,
     silent: bool,
     low: bool,
     breached: bool,
@@ -241,6 +243,7 @@ impl Monitor {
                 restarts,
                 was_in_the_air: false,
                 restarted: 0,
+                disarmed: None,
                 silent: false,
                 low: false,
                 breached: false,
@@ -363,6 +366,8 @@ impl Watch for Monitor {
 
 /// Above home by so much a drone is in the air, m.
 const IN_THE_AIR_M: f64 = 0.5;
+/// A drone whose motors have stopped in the air is given so long to say where it is.
+const PLACELESS: Micros = 15 * S;
 /// A drone that is silent is waited for until so long after it should have landed, s.
 const SILENT_UNTIL_S: f64 = 60.0;
 
@@ -458,6 +463,17 @@ impl Watched {
             // One that has restarted may never know the time again.
             Some(_) => self.over(self.flying.show_s.or(fleet_s)),
         };
+        // Motors that stop in the air: whether that was a landing or a restart, its next place says.
+        let stopped = *match self.armed {
+            Some(false) => self.disarmed.get_or_insert(now),
+            _ => self.disarmed.insert(now),
+        };
+        if self.was_in_the_air && self.armed == Some(false) && !self.silent {
+            let placeless = now >= stopped + PLACELESS;
+            let high = of.position.is_some_and(|(_, at)| at.above_home_m > IN_THE_AIR_M);
+            self.flying.over &= placeless;
+            self.flying.fell |= placeless && high;
+        }
     }
 
     fn states(&mut self, of: &Drone, tell: &mut dyn FnMut(Event)) {
@@ -789,6 +805,37 @@ mod tests {
             let fell: Vec<bool> = flying.values().map(|of| of.fell).collect();
             assert_eq!(fell, [false, !flies_on]);
             assert!(flying.values().all(|of| of.flew));
+        }
+    }
+
+    #[test]
+    fn motors_that_stop_in_the_air_are_no_landing_before_the_drone_says_where_it_is() {
+        for says_again in [false, true] {
+            let mut field = Field::new();
+            let flying = |field: &Field| field.monitor.flying().nth(1).unwrap().1;
+            let end_ms = 30_000;
+            for half_s in 40..60_u64 {
+                field.say(500 * half_s * MS, 1, 500 * half_s, 0.3);
+                field.say(500 * half_s * MS, 2, 500 * half_s, 0.3);
+            }
+            // Its heartbeat is the first that comes of the new boot.
+            field.beat(end_ms * MS, 2, false);
+            field.status(end_ms * MS, 2, Stage::Off);
+            field.monitor.stop((end_ms + 200) * MS);
+            assert!(!flying(&field).over && !flying(&field).fell, "nobody knows yet");
+            let mut now_ms = end_ms + 1_000;
+            if says_again {
+                field.is_at(now_ms * MS, 2, (START_MS + now_ms, START_MS + end_ms), 0.3);
+            }
+            while now_ms < end_ms + 17_000 {
+                now_ms += 500;
+                field.beat(now_ms * MS, 2, false);
+                if says_again {
+                    break;
+                }
+            }
+            field.monitor.stop((now_ms + 200) * MS);
+            assert!(flying(&field).over && flying(&field).fell, "{says_again}");
         }
     }
 
