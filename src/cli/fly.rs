@@ -357,6 +357,7 @@ fn launch(
         air: &ready.air,
         seed: simulation.seed,
         full_logs: simulation.full_logs,
+        boots_by_seed: true,
         switched_on,
         pace: Pace::Fast { ground: GROUND_PACE },
         faults: Faults::default(),

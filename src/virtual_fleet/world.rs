@@ -21,6 +21,9 @@ pub struct World<'w> {
     pub seed: u64,
     /// Whether logs have the firmware's whole default set.
     pub full_logs: bool,
+    /// Board time in logs counts from a time of the seed's, as in simulated flights without a link, and
+    /// not from when a vehicle is switched on.
+    pub boots_by_seed: bool,
     /// GPS time at link time 0.
     pub gps_at_0: GpsTime,
     shows: Shelf<LoadedShow>,
@@ -41,6 +44,7 @@ impl<'w> World<'w> {
             frame,
             seed,
             full_logs: false,
+            boots_by_seed: false,
             gps_at_0,
             shows: Shelf::default(),
         }

@@ -37,6 +37,8 @@ pub(in crate::cli) struct Hangar<'a> {
     pub(in crate::cli) air: &'a dyn Atmosphere,
     pub(in crate::cli) seed: u64,
     pub(in crate::cli) full_logs: bool,
+    /// Their logs are those of `simulate`, to the byte.
+    pub(in crate::cli) boots_by_seed: bool,
     /// GPS time when they are switched on.
     pub(in crate::cli) switched_on: GpsTime,
     pub(in crate::cli) pace: Pace,
@@ -101,6 +103,7 @@ impl Hangar<'_> {
         let mut world =
             World::new(self.vehicle, self.air, self.plan.site.frame(), self.seed, self.switched_on);
         world.full_logs = self.full_logs;
+        world.boots_by_seed = self.boots_by_seed;
         let vehicles = self
             .slots
             .iter()

@@ -178,6 +178,7 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
         air: &air,
         seed: args.air.seed,
         full_logs: args.air.full_logs,
+        boots_by_seed: false,
         switched_on,
         pace: Pace::Speed(args.speed),
         faults: Faults {

@@ -86,7 +86,7 @@ impl<'w> VirtualVehicle<'w> {
         let late_s = time_s - (show.takeoff_s - ARM_BEFORE_TAKEOFF_S);
         let setup = self.flight_setup(show, start);
         let armed_s = (late_s >= ON_TIME_S).then_some(time_s);
-        match RecordedFlight::armed(&setup, armed_s, self.booted()) {
+        match RecordedFlight::armed(&setup, armed_s, self.booted_in_log()) {
             Ok(flight) => {
                 // A log that is still being written ends here.
                 self.logbook.open(self.storage.as_mut());

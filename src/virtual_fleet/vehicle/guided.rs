@@ -36,7 +36,7 @@ impl VirtualVehicle<'_> {
         let mut nothing = LoadedShow::default();
         nothing.trajectory.start_m = self.stands_m;
         let setup = self.flight_setup(self.world.keep(nothing), start);
-        match RecordedFlight::guided(&setup, self.booted()) {
+        match RecordedFlight::guided(&setup, self.booted_in_log()) {
             Ok(flight) => {
                 self.logbook.open(self.storage.as_mut());
                 self.airborne = Some(Airborne::guided(flight, start_us));

@@ -200,6 +200,11 @@ impl<'w> VirtualVehicle<'w> {
         GpsTime::from_total_ms(self.world.gps_us(self.boot_at).div_euclid(1000))
     }
 
+    /// Time 0 of its logs; `None`: one of the seed's.
+    fn booted_in_log(&self) -> Option<GpsTime> {
+        self.booted().filter(|_| !self.world.boots_by_seed)
+    }
+
     fn gps(&self, now: Micros) -> Option<GpsTime> {
         let gps_ms = self.world.gps_us(now).div_euclid(1000);
         (self.age(now) >= self.setup.boot.gps).then(|| GpsTime::from_total_ms(gps_ms))?
