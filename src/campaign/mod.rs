@@ -177,6 +177,19 @@ pub enum CampaignError {
     },
 }
 
+impl CampaignError {
+    /// The same, with what to do about a file that cannot be understood.
+    #[must_use]
+    pub fn with_remedy(self, remedy: &str) -> Self {
+        match self {
+            Self::Json { path, reason } => {
+                Self::Json { path, reason: format!("{reason}; {remedy}") }
+            }
+            error => error,
+        }
+    }
+}
+
 /// The folder of one flight.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlightFolder(pub PathBuf);

@@ -152,7 +152,8 @@ fn has_logs(folder: &Path) -> bool {
     })
 }
 
-fn logs_in(folder: &Path) -> Vec<PathBuf> {
+/// The logs in a folder, not in those below it; none where it cannot be read.
+pub fn logs_in(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     entries.flatten().map(|entry| entry.path()).filter(|path| is_log(path)).collect()
 }

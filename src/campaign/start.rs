@@ -169,7 +169,10 @@ impl StartRecord {
         if !path.exists() {
             return Ok(None);
         }
-        let record: Self = read_json(path).map_err(or_move_it_away)?;
+        let record: Self = read_json(path).map_err(|error: CampaignError| {
+            error
+                .with_remedy("mend it, or move it away: the start of this flight is then not known")
+        })?;
         if ![START_SCHEMA, FIRST_SCHEMA].contains(&record.schema.as_str()) {
             let reason =
                 format!("this program reads \"{START_SCHEMA}\", not \"{}\"", record.schema);
@@ -225,19 +228,6 @@ pub fn earlier_folders(logs: &Path) -> Result<Vec<(u32, PathBuf)>, FileError> {
     }
     found.sort();
     Ok(found)
-}
-
-/// What to do about a record that cannot be read.
-fn or_move_it_away(error: CampaignError) -> CampaignError {
-    match error {
-        CampaignError::Json { path, reason } => {
-            let reason = format!(
-                "{reason}; mend it, or move it away: the start of this flight is then not known"
-            );
-            CampaignError::Json { path, reason }
-        }
-        error => error,
-    }
 }
 
 fn last_number(logs: &Path) -> Result<u32, FileError> {

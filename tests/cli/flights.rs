@@ -201,6 +201,12 @@ fn logs_of_an_aborted_flight_that_stay_on_the_drones_are_told() {
     assert!(again.err.contains(told), "{again}");
     let pulled = bench.expect(0, &["logs", "pull", "campaign", "--connect", &link]);
     assert!(pulled.err.contains(told), "{pulled}");
+    // As it advised.
+    let pull = ["logs", "pull", "campaign", "--connect", &link];
+    let all = bench.expect(0, &[&pull[..], &["--log", "all"]].concat());
+    assert!(!all.err.contains(told), "{all}");
+    let pulled = bench.expect(0, &pull);
+    assert!(!pulled.err.contains(told), "{pulled}");
     // What no manifest knows was not verified.
     fs::remove_file(bench.path("campaign/logs/manifest.json")).unwrap();
     let verified = bench.expect(3, &["logs", "verify", "campaign"]);

@@ -13,18 +13,20 @@ use super::connect::run_number;
 use super::tables::time_of_day;
 use crate::base::file::create_folder;
 use crate::base::plain::Shown as _;
+use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
-use crate::campaign::origin::LogOrigin;
+use crate::campaign::origin::{LogOrigin, logs_in};
 use crate::campaign::start::{StartRecord, earlier_folders, other_starts};
 use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::simulate::made_by;
 use crate::cli::words;
-use crate::fleet::logs::manifest::{LogFlight, ManifestEntry, Shelf};
+use crate::fleet::logs::manifest::{LogFlight, Shelf};
 use crate::fleet::logs::one::{OneOptions, Which};
 use crate::fleet::logs::pull::{Outcome, PullError, PullOptions, Wanted, pull};
-use crate::fleet::slots::{Assignment, FleetTable};
+use crate::fleet::slots::{Assignment, FLEET_FILE, FleetTable};
+use crate::flight::identity::{SAME_START_S, later_s};
 use crate::link::clock::{Clock as _, Micros, S};
 use crate::link::id::DroneId;
 use crate::link::net::Net;
@@ -117,15 +119,15 @@ fn say_moved(context: &Context, outcomes: &BTreeMap<DroneId, Outcome>) {
 
 /// Names the earlier starts whose logs never came home: they may still be on the drones.
 fn say_left_behind(context: &Context, logs: &Path) {
+    let shelf = Shelf::open(logs, "").ok();
+    let entries = shelf.iter().flat_map(|shelf| &shelf.manifest.logs);
+    // Those that were asked for by `--log` lie among the older ones.
+    let began: Vec<GpsTime> =
+        entries.filter_map(|entry| entry.flight.as_ref()?.gps_start).collect();
     for (number, folder) in earlier_folders(logs).unwrap_or_default() {
         let Ok(Some(record)) = StartRecord::read_in(&folder) else { continue };
-        let has_logs = Shelf::open(logs, "").is_ok_and(|shelf| {
-            let is_of = |entry: &&ManifestEntry| {
-                entry.flight.as_ref().is_some_and(|flight| flight.number == number)
-            };
-            shelf.manifest.logs.iter().any(|entry| is_of(&entry))
-        });
-        if !has_logs && !has_bin(&folder) {
+        let is_of = |began: &GpsTime| later_s(*began, record.start).abs() <= SAME_START_S;
+        if logs_in(&folder).is_empty() && !began.iter().any(is_of) {
             context.say(&format!(
                 "Nothing of flight {number} ({}) is at home: its logs may still be on the drones \
                  (`updraft logs pull --log all`)",
@@ -133,12 +135,6 @@ fn say_left_behind(context: &Context, logs: &Path) {
             ));
         }
     }
-}
-
-/// Whether a folder has a log.
-fn has_bin(folder: &Path) -> bool {
-    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    files.into_iter().any(|file| file.path().extension().is_some_and(|end| end == "BIN"))
 }
 
 /// Names the drones that have newer logs than those of this flight: somebody may want them.
@@ -193,7 +189,7 @@ pub(in crate::cli) fn bring(
                 "slot {} was flown by drone {drone}; {} says {} now: the log of drone {drone} is the \
                  flight's",
                 line.slot,
-                crate::fleet::slots::FLEET_FILE,
+                FLEET_FILE,
                 line.drone
             ));
         }

@@ -162,15 +162,11 @@ impl Shelf {
         let made_by = made_by.to_owned();
         let schema = MANIFEST_SCHEMA.to_owned();
         let manifest = if path.exists() {
-            let mut manifest: Manifest = read_json(&path).map_err(|error| match error {
-                CampaignError::Json { path, reason } => {
-                    let reason = format!(
-                        "{reason}; mend it, or move it away: `updraft logs pull --again` brings the \
-                         logs again and makes a new one"
-                    );
-                    CampaignError::Json { path, reason }
-                }
-                error => error,
+            let mut manifest: Manifest = read_json(&path).map_err(|error: CampaignError| {
+                error.with_remedy(
+                    "mend it, or move it away: `updraft logs pull --again` brings the logs again and \
+                     makes a new one",
+                )
             })?;
             let wrong = if manifest.schema == schema {
                 let outside = |entry: &&ManifestEntry| !is_inside(&entry.file);

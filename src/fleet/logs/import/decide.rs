@@ -331,11 +331,8 @@ impl Work<'_> {
                             "not chosen".to_owned()
                         }
                         Ok(slot) => {
-                            let shares =
-                                log.flown.iter().filter_map(|flown| flown.shares.get(number));
-                            let share = shares.copied().fold(0.0, f64::max);
                             let own = format!("slot {slot} of {} has another log", flight.name);
-                            if log.flown.is_empty() || share >= WHOLE {
+                            if log.flown.is_empty() || shares(number) >= WHOLE {
                                 own
                             } else {
                                 format!("{own}, which flew more of its plan")
