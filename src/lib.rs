@@ -43,7 +43,7 @@ pub mod fleet;
 pub mod flight;
 pub mod gap;
 pub mod link;
-pub mod log;
+pub use dataflash as log;
 pub mod mission;
 pub mod protocol;
 pub mod report;

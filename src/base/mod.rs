@@ -4,12 +4,10 @@ pub mod air;
 pub mod causes;
 pub mod crc;
 pub mod estimate;
-pub mod file;
 pub mod frame;
 pub mod json;
 pub mod number;
-pub mod parse;
-pub mod plain;
-pub mod private;
 pub mod rng;
 pub mod time;
+
+pub use untrusted_io::{file, parse, plain, private};

@@ -14,7 +14,7 @@ use updraft::vehicle::Limits;
 
 /// A committed fixture.
 pub(crate) fn fixture(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("crates/dataflash/tests/data").join(name)
 }
 
 /// GPS time of week of the start of the fixtures' shows, s (week 2445).

@@ -55,7 +55,10 @@ fn a_log_that_is_not_as_it_was_flown_is_flown_again() {
     let again = bench.expect(0, &["simulate", "campaign"]);
     assert!(again.err.contains("02.BIN is not as it was flown"), "{again}");
     // A real drone's log in its place is not the simulator's to replace.
-    let real = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/ladder-still.trimmed.BIN");
+    let real = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/crates/dataflash/tests/data/ladder-still.trimmed.BIN"
+    );
     fs::copy(real, logs.join("02.BIN")).unwrap();
     let refused = bench.expect(2, &["simulate", "campaign"]);
     assert_eq!(

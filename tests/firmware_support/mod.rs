@@ -3,7 +3,7 @@
 
 #![allow(dead_code, clippy::allow_attributes, reason = "each test binary uses a part of it")]
 
-use std::path::{Path as FilePath, PathBuf};
+use std::path::Path as FilePath;
 
 use nalgebra::Vector3;
 use updraft::analysis::result::WindowStats;
@@ -20,7 +20,7 @@ use updraft::vehicle::library::builtin;
 
 /// A log of the firmware in `tests/data`.
 pub(crate) fn fixture(name: &str) -> Log {
-    let folder: PathBuf = [env!("CARGO_MANIFEST_DIR"), "tests", "data"].iter().collect();
+    let folder = FilePath::new(env!("CARGO_MANIFEST_DIR")).join("crates/dataflash/tests/data");
     Log::open(&folder.join(name)).expect("a fixture")
 }
 

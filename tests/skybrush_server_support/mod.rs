@@ -180,7 +180,8 @@ pub(crate) struct Fake {
 
 /// The newest log of a drone, of no flight of today.
 pub(crate) fn log(id: &str) -> Vec<u8> {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ladder-still.trimmed.BIN");
+    let data = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("crates/dataflash/tests/data/ladder-still.trimmed.BIN");
     let mut bytes = fs::read(data).unwrap();
     bytes.truncate(SIZE);
     bytes.extend_from_slice(id.as_bytes());

@@ -39,6 +39,7 @@ pub fn survey(
                 Err(LogError::Open { source, .. }) => {
                     Err((path, format!("cannot be read: {source}")))
                 }
+                Err(error) => Err((path, format!("cannot be read: {error}"))),
             };
             progress(count);
             read

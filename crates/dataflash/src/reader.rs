@@ -13,8 +13,8 @@ use super::format::{FMT_ID, Format};
 use super::inventory::{self, Count, Inventory};
 use super::scan::{Scan, ScanStats, Visitor, scan, scan_file};
 use super::writer::MAGIC;
-use crate::base::file::open_regular;
-use crate::base::plain::Shown as _;
+use untrusted_io::file::open_regular;
+use untrusted_io::plain::Shown as _;
 
 /// A log must start within this many bytes.
 const SEARCHED_BYTES: usize = 4096;

@@ -20,9 +20,9 @@
 
 use std::path::PathBuf;
 
+use dataflash::{Log, LogWriter, MessageDef, Select, Value, catalog};
 use divan::Bencher;
 use divan::counter::{BytesCount, ItemsCount};
-use updraft::log::{Log, LogWriter, MessageDef, Select, Value, catalog};
 
 /// What an analysis wants: 10 types, 38 columns.
 const WANTED: [Select<'static>; 10] = [

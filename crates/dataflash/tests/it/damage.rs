@@ -1,8 +1,6 @@
 //! Damage: nothing panics, every byte is accounted for, and what is whole is found.
 
-#![expect(clippy::unwrap_used, reason = "a helper that fails must fail its test")]
-
-use updraft::log::{Log, LogWriter, MessageDef, ScanStats, Select, Table, Value, catalog};
+use dataflash::{Log, LogWriter, MessageDef, ScanStats, Select, Table, Value, catalog};
 
 /// splitmix64: a few reproducible bytes without a generator's set-up.
 struct Noise(u64);
@@ -376,6 +374,6 @@ fn what_is_no_file_is_refused_and_not_waited_for() {
     assert!(made.success());
     for path in [pipe.as_path(), "/dev/zero".as_ref(), folder.path()] {
         let error = Log::open(path).unwrap_err();
-        assert!(matches!(error, updraft::log::LogError::Open { .. }), "{error}");
+        assert!(matches!(error, dataflash::LogError::Open { .. }), "{error}");
     }
 }

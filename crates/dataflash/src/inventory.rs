@@ -1,6 +1,8 @@
 //! What is in a log: every message type with its count, fields and times, and who wrote it.
 
+#[cfg(feature = "schemars")]
 use schemars::JsonSchema;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::format::{Field, Format};
@@ -16,7 +18,9 @@ const FIRMWARES: [&str; 6] =
     ["ArduCopter", "ArduPlane", "ArduRover", "ArduSub", "APM:Copter", "Blimp"];
 
 /// Summary of a log.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "schemars", derive(JsonSchema))]
 pub struct Inventory {
     /// Size of the log.
     pub size_bytes: u64,
@@ -44,7 +48,9 @@ pub struct Inventory {
 }
 
 /// One message type of a log.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "schemars", derive(JsonSchema))]
 pub struct MessageInventory {
     /// `ATT`.
     pub name: String,
@@ -69,7 +75,9 @@ impl MessageInventory {
 }
 
 /// One field of a message type.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "schemars", derive(JsonSchema))]
 pub struct FieldInventory {
     /// `DesRoll`.
     pub label: String,

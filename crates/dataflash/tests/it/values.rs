@@ -1,12 +1,10 @@
 //! Values: against another parser's reading of real logs, and through the writer and back.
 
-#![expect(clippy::unwrap_used, reason = "a helper that fails must fail its test")]
-
 use std::fs;
 use std::path::Path;
 
+use dataflash::{Log, LogError, LogWriter, MessageDef, Select, Value, catalog};
 use proptest::prelude::*;
-use updraft::log::{Log, LogError, LogWriter, MessageDef, Select, Value, catalog};
 
 const NAN: u64 = 0x7ff8 << 48;
 
@@ -108,8 +106,8 @@ fn catalog_is_what_the_firmware_defines() {
     let (firmware, _) = log.select(&wanted);
     let own = LogWriter::new(Vec::new(), catalog::ALL).unwrap().finish().unwrap();
     let (own, _) = Log::from_bytes(own).select(&wanted);
-    let rows = |tables: &[updraft::log::Table]| -> Vec<Vec<String>> {
-        let cell = |table: &updraft::log::Table, field: &str, row: usize| match table.text(field) {
+    let rows = |tables: &[dataflash::Table]| -> Vec<Vec<String>> {
+        let cell = |table: &dataflash::Table, field: &str, row: usize| match table.text(field) {
             Some(texts) => texts[row].clone(),
             None => table.number(field).unwrap()[row].to_string(),
         };
@@ -199,7 +197,7 @@ fn cell(letter: u8) -> BoxedStrategy<Cell> {
 fn log() -> impl Strategy<Value = (String, Vec<Vec<Cell>>)> {
     proptest::collection::vec(proptest::sample::select(b"bBMhHiIqQcCeELfdnNZ".to_vec()), 1..=12)
         .prop_filter("fits", |letters| {
-            let size = |&letter: &u8| updraft::log::definition::letter_size(letter).unwrap();
+            let size = |&letter: &u8| dataflash::definition::letter_size(letter).unwrap();
             letters.iter().map(size).sum::<usize>() <= 252
         })
         .prop_flat_map(|letters| {
@@ -237,7 +235,7 @@ proptest! {
         }
         let log = Log::from_bytes(writer.finish().unwrap());
         let (tables, stats) = log.select(&[Select { message: "ANY", fields: &labels }]);
-        prop_assert_eq!(stats, updraft::log::ScanStats::default());
+        prop_assert_eq!(stats, dataflash::ScanStats::default());
         prop_assert_eq!(tables[0].rows, rows.len());
         for (column, label) in labels.iter().enumerate() {
             for (index, row) in rows.iter().enumerate() {
@@ -250,7 +248,7 @@ proptest! {
                     }
                     Cell::Text(text) => {
                         // What acts on a terminal is shown instead.
-                        let plain = updraft::base::plain::plain(text);
+                        let plain = untrusted_io::plain::plain(text);
                         prop_assert_eq!(&tables[0].text(label).unwrap()[index], &*plain);
                     }
                 }

@@ -42,7 +42,7 @@ fn picture(c: char) -> char {
 /// One line of text that does nothing but be read: `GO\r\u{1b}[2J` becomes `GO␍␛[2J`.
 ///
 /// ```
-/// use updraft::base::plain::plain;
+/// use untrusted_io::plain::plain;
 ///
 /// assert_eq!(plain("Drone 1"), "Drone 1");
 /// assert_eq!(plain("GO\r\u{1b}[2J\u{202e}"), "GO␍␛[2J\u{fffd}");

@@ -4,7 +4,7 @@
 //! double nearest to the decimal value, and other parsers do the same.
 
 use super::writer::Value;
-use crate::base::plain::plain_string;
+use untrusted_io::plain::plain_string;
 
 /// A field's storage, one variant per letter that differs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,6 @@
-//! ArduPilot's DataFlash logs (`.BIN`): reader and writer.
+#![doc = include_str!("../README.md")]
+//!
+//! # Values
 //!
 //! Engineering values on both sides: format letters that imply a scale (`c C e E` hundredths, `L`
 //! 1e-7 degrees) are applied by the reader and undone by the writer; FMTU multipliers are never

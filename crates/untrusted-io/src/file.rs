@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 use thiserror::Error;
 
-use super::plain::Shown as _;
+use crate::plain::Shown as _;
 
 /// Marks our unfinished files, so that a later step can recognise and sweep them.
 pub const PARTIAL_PREFIX: &str = ".partial-";

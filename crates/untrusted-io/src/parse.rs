@@ -10,7 +10,7 @@ use serde::de::{
     VariantAccess, Visitor,
 };
 
-use super::plain::{plain, plain_string};
+use crate::plain::{plain, plain_string};
 
 /// A value from its JSON.
 pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Result<T> {
@@ -261,7 +261,7 @@ mod tests {
     use serde::Deserialize;
 
     use super::*;
-    use crate::base::plain::acts;
+    use crate::plain::acts;
 
     #[derive(Debug, PartialEq, Deserialize)]
     #[serde(tag = "kind", rename_all = "snake_case")]

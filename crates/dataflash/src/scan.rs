@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Read};
 
+#[cfg(feature = "schemars")]
 use schemars::JsonSchema;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::format::{FMT_ID, Format};
@@ -22,7 +24,9 @@ const DISORDER_US: u64 = 1_000_000;
 const KEPT_JUMPS: usize = 32;
 
 /// What a scan met besides good messages.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "schemars", derive(JsonSchema))]
 pub struct ScanStats {
     /// Bytes skipped because no known message started there.
     pub bad_bytes: u64,
@@ -38,7 +42,9 @@ pub struct ScanStats {
 }
 
 /// A place where `TimeUS` jumped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "schemars", derive(JsonSchema))]
 pub struct TimeJump {
     /// Of the message after the jump, from the start of the file.
     pub offset_bytes: u64,
