@@ -18,7 +18,6 @@ use updraft::flight::{Flight, FlightOptions};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve};
 use updraft::report::{Provenance, render};
-use updraft::show::Show;
 use updraft::sim::{FlightSetup, Hooks, Uniform, fly_to_file};
 use updraft::vehicle::library::builtin;
 
@@ -47,7 +46,7 @@ fn flown() -> Campaign {
     let (mut logs, mut bytes) = (Vec::new(), 0);
     for (number, plan) in plans.iter().enumerate() {
         let updraft_mps = number as f64;
-        let show = Show::of_plan(plan);
+        let show = plan.to_show();
         let flown = plan.slots.iter().zip(&show.drones).map(|(slot, drone)| {
             let path = folder.path().join(format!("{number}-{:03}.BIN", slot.slot));
             let setup = FlightSetup {

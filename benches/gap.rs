@@ -23,7 +23,6 @@ use updraft::log::Log;
 use updraft::mission::Plan;
 use updraft::mission::plan::Slot;
 use updraft::mission::resolve::{Override, resolve};
-use updraft::show::Trajectory;
 use updraft::sim::{FlightSetup, Hooks, fly};
 use updraft::vehicle::{Vehicle, library::builtin};
 
@@ -80,7 +79,7 @@ fn flown(inflow_share: f64) -> Fleet {
     let mut vehicle = base();
     set(&mut vehicle, "rotor-inflow", "inflow_share", inflow_share);
     let one = |slot: &Slot| {
-        let trajectory = Trajectory::of_slot(&plan, slot);
+        let trajectory = plan.trajectory(slot);
         let setup = FlightSetup {
             vehicle: &vehicle,
             trajectory: &trajectory,

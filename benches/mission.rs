@@ -34,14 +34,14 @@ fn plan(bencher: divan::Bencher<'_, '_>, count: i64) {
 #[divan::bench(args = COUNTS, sample_count = 5)]
 fn safety(bencher: divan::Bencher<'_, '_>, count: i64) {
     let mission = mission("calibration", count);
-    let show = Show::of_plan(&mission.flights[0].plan);
+    let show = mission.flights[0].plan.to_show();
     bencher.bench(|| checked(&mission, &show));
 }
 
 #[divan::bench(args = COUNTS, sample_count = 5)]
 fn files(bencher: divan::Bencher<'_, '_>, count: i64) {
     let mission = mission("calibration", count);
-    let show = Show::of_plan(&mission.flights[0].plan);
+    let show = mission.flights[0].plan.to_show();
     bencher.bench(|| FlightFiles::of(&mission.flights[0], &show).expect("it is safe"));
 }
 
@@ -59,7 +59,7 @@ fn counter_phase(bencher: divan::Bencher<'_, '_>, count: i64) {
 
 fn whole(template: &str, count: i64) -> (CheckReport, FlightFiles) {
     let mission = mission(template, count);
-    let show = Show::of_plan(&mission.flights[0].plan);
+    let show = mission.flights[0].plan.to_show();
     let report = checked(&mission, &show);
     (report, FlightFiles::of(&mission.flights[0], &show).expect("it is safe"))
 }

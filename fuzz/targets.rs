@@ -347,6 +347,6 @@ fn plan(bytes: &[u8]) {
 fn use_plan(plan: &Plan) {
     let segments: usize = plan.groups.iter().map(|group| group.segments.len()).sum();
     if plan.slots.len() <= MAX_DRONES && segments <= MAX_SEGMENTS {
-        checked(&Show::of_plan(plan), plan);
+        checked(&plan.to_show(), plan);
     }
 }

@@ -14,7 +14,6 @@ use updraft::flight::{Flight, FlightOptions, Series};
 use updraft::log::Log;
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve};
-use updraft::show::Trajectory;
 use updraft::sim::{Beyond, FlightSetup, Hooks, Uniform, fly, fly_beyond};
 use updraft::vehicle::Vehicle;
 
@@ -37,7 +36,7 @@ fn quiet_vehicle() -> Vehicle {
 fn log(vehicle: &Vehicle, extra: &[Extra], plant_steps: u16, plain: bool) -> Vec<u8> {
     let plan = plan();
     let slot = &plan.slots[0];
-    let trajectory = Trajectory::of_slot(&plan, slot);
+    let trajectory = plan.trajectory(slot);
     let air = Uniform(Vector3::new(4.0, 0.0, 0.0));
     let setup = FlightSetup {
         vehicle,

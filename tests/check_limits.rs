@@ -394,7 +394,8 @@ fn the_climb_speed_of_the_vehicle_decides_when_it_takes_off() {
         let mut autopilot =
             updraft::vehicle::library::builtin("airsim-generic-quad").unwrap().autopilot;
         autopilot.wpnav_speed_up_mps = mps;
-        let report = check(&CheckInput::new(&show, &limits).with_autopilot(&autopilot));
+        let report =
+            check(&CheckInput::new(&show, &limits).with_speed_up(autopilot.wpnav_speed_up_mps));
         report.margin("firmware-takeoff").unwrap().value
     };
     assert_eq!((takeoff(2.5), takeoff(5.0)), (1.5, 2.0));

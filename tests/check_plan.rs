@@ -18,10 +18,10 @@ fn planned(template: &str, overrides: &[&str]) -> ResolvedFlight {
 }
 
 fn of_plan(flight: &ResolvedFlight) -> CheckReport {
-    let show = Show::of_plan(&flight.plan);
+    let show = flight.plan.to_show();
     check(
         &CheckInput::new(&show, &flight.plan.limits)
-            .with_plan(&flight.plan)
+            .with_rule(&flight.plan)
             .with_stock(&flight.vehicle.limits),
     )
 }
@@ -164,7 +164,7 @@ fn an_end_away_from_home_is_told_unless_it_is_meant() {
 #[test]
 fn limits_of_a_show_file_survive_it() {
     let flight = planned("calibration-counterphase", &["limits.endurance_reserve=0"]);
-    let show = Show::of_plan(&flight.plan);
+    let show = flight.plan.to_show();
     let bytes = updraft::show::skyc::write(&show).unwrap();
     let recovered = Plan::of_show(&updraft::show::skyc::read(&bytes).unwrap(), &flight.vehicle);
     assert_eq!(recovered.limits, flight.plan.limits);

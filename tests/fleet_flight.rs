@@ -22,7 +22,7 @@ use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve};
-use updraft::show::{Show, skyb};
+use updraft::show::skyb;
 use updraft::sim::Uniform;
 use updraft::vehicle::Vehicle;
 use updraft::vehicle::library::builtin;
@@ -94,7 +94,7 @@ fn bad() -> Faults {
 
 /// Everything up to an authorized start.
 fn started(net: &mut Net<'_>, plan: &Plan) -> (Monitor, Start) {
-    let show = Show::of_plan(plan);
+    let show = plan.to_show();
     let fence = Fence::of(plan, &show).unwrap();
     let all: BTreeSet<DroneId> = plan.slots.iter().map(|slot| drone(slot.slot)).collect();
     let mut telemetry = Telemetry::default();

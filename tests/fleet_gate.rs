@@ -44,7 +44,6 @@ use updraft::protocol::ftp::{Op, Packet};
 use updraft::protocol::show::{
     CLEAR_TIME, FROM_DRONE, LEAVE_TIME, SHOW_FILE, Stage, StartConfig, Status, flag,
 };
-use updraft::show::{Show, Trajectory};
 use updraft::virtual_fleet::endpoint::Endpoint;
 use updraft::virtual_fleet::lossy::{Faults, LossyNet};
 
@@ -164,7 +163,7 @@ fn vehicle(plan: &Plan, show: bool) -> Obliging {
 fn flight(plan: &Plan, system: u8, vehicle: &Obliging) -> Guided {
     let start = GpsTime::from_unix_ms((vehicle.unix_us / 1000) as i64 + 15_000).unwrap();
     let flight = Flight {
-        trajectory: Trajectory::of_slot(plan, plan.slot(system.into()).unwrap()),
+        trajectory: plan.trajectory(plan.slot(system.into()).unwrap()),
         frame: plan.site.frame(),
         start_gps_ms: start.total_ms(),
         yaw_rad: None,
@@ -176,7 +175,7 @@ fn flight(plan: &Plan, system: u8, vehicle: &Obliging) -> Guided {
 /// The messages of every subcommand.
 fn subcommands(plan: &Plan) -> BTreeMap<&'static str, Vec<MavMessage>> {
     let (shown, stock) = (|| vehicle(plan, true), || vehicle(plan, false));
-    let fence = Fence::of(plan, &Show::of_plan(plan)).unwrap();
+    let fence = Fence::of(plan, &plan.to_show()).unwrap();
     let names = || fence.params().into_iter().map(|(name, _)| name);
     let greet = sends(Greet::new(drone(1)), &mut shown());
     let read = |may| {

@@ -336,7 +336,7 @@ fn a_drone_that_waits_in_guided_is_taken_from_its_station() {
     assert_eq!(aborted, Aborted::Grounded);
     assert_eq!(net.vehicles[&drone(1)].inner.mode, LAND);
     // The station that was about to fly it sends nothing more.
-    let trajectory = Trajectory::of_slot(&plan, &plan.slots[0]);
+    let trajectory = plan.trajectory(&plan.slots[0]);
     let mut clock = VehicleClock::default();
     clock.read(0, 1_795_143_537_000_000);
     let start_gps_ms = clock.gps_ms(0).unwrap() as i64 + 60_000;
@@ -494,7 +494,7 @@ fn a_greeting_gives_clock_and_version() {
 #[test]
 fn a_stock_vehicle_is_guided_along_its_trajectory() {
     let plan = plan();
-    let trajectory = Trajectory::of_slot(&plan, &plan.slots[1]);
+    let trajectory = plan.trajectory(&plan.slots[1]);
     let frame = plan.site.frame();
     let mut vehicle = Obliging::new(drone(2), false, frame.to_geodetic(trajectory.start_m));
     let start_gps_ms =
@@ -528,7 +528,7 @@ fn stock_vehicles_are_guided_over_a_slow_link_and_watched() {
     let start_gps_ms = (now_ms / 1000.0).ceil() as i64 * 1000 + 20_000;
     let guided = |id: DroneId| {
         let flight = Flight {
-            trajectory: Trajectory::of_slot(&plan, plan.slot(id.system.into()).unwrap()),
+            trajectory: plan.trajectory(plan.slot(id.system.into()).unwrap()),
             frame: plan.site.frame(),
             start_gps_ms,
             yaw_rad: Some(0.0),
@@ -550,7 +550,7 @@ fn stock_vehicles_are_guided_over_a_slow_link_and_watched() {
 #[test]
 fn every_refusal_of_a_guided_flight_is_said() {
     let plan = plan();
-    let trajectory = Trajectory::of_slot(&plan, &plan.slots[1]);
+    let trajectory = plan.trajectory(&plan.slots[1]);
     let frame = plan.site.frame();
     let place = frame.to_geodetic(trajectory.start_m);
     let start = |ahead_s: i64| {

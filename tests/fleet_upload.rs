@@ -17,7 +17,6 @@ use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{MavCmd, MavResult};
 use updraft::protocol::ftp::{Op, Packet};
 use updraft::protocol::show::{SHOW_FILE, Stage, flag};
-use updraft::show::Show;
 use updraft::virtual_fleet::lossy::Faults;
 
 const READY: u8 = flag::LOADED | flag::ORIGIN_SET | flag::ORIENTATION_SET | flag::FENCE_ON;
@@ -174,7 +173,7 @@ fn a_late_answer_to_a_reload_is_no_answer_to_clearing() {
 #[test]
 fn a_fence_that_is_smaller_than_the_show_is_refused() {
     let good = plan();
-    let show = Show::of_plan(&good);
+    let show = good.to_show();
     let text = |change: &dyn Fn(&mut updraft::mission::plan::Fence)| {
         let mut plan = good.clone();
         change(&mut plan.fence);

@@ -12,7 +12,6 @@ use updraft::gap::next::{Elements, Flight, Known, Legs, Order, Question, Sought,
 use updraft::gap::verdict::{Detectable, Finding, Noise};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve, resolve_text};
-use updraft::show::Show;
 use updraft::vehicle::{Vehicle, library};
 
 const VEHICLE: &str = "airsim-generic-quad";
@@ -84,9 +83,9 @@ fn every_set_of_elements_is_a_template_that_plans_and_passes_the_check() {
         assert_eq!(flight.plan.slots.len(), present.slots.len());
         assert_eq!(flight.plan.site, present.site);
         assert_eq!(flight.plan.groups.len(), if elements.counter_phase { 2 } else { 1 });
-        let show = Show::of_plan(&flight.plan);
-        let input =
-            CheckInput::new(&show, &flight.plan.limits).with_autopilot(&flight.vehicle.autopilot);
+        let show = flight.plan.to_show();
+        let input = CheckInput::new(&show, &flight.plan.limits)
+            .with_speed_up(flight.vehicle.autopilot.wpnav_speed_up_mps);
         let report = check(&input);
         let limits = &flight.plan.limits;
         let lasts_s = limits.endurance_s * (1.0 - limits.endurance_reserve);

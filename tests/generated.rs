@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 use updraft::campaign::write::{FlightFiles, folders, write_index};
 use updraft::cli::tools::Format;
 use updraft::mission::resolve::resolve;
-use updraft::show::Show;
 
 fn update() -> bool {
     std::env::var_os("UPDATE").is_some()
@@ -65,7 +64,7 @@ fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
 fn plan_into(template: &str, folder: &Path) {
     let mission = resolve(template, &[]).unwrap();
     for (flight, folder) in mission.flights.iter().zip(folders(folder, &mission)) {
-        let show = Show::of_plan(&flight.plan);
+        let show = flight.plan.to_show();
         FlightFiles::of(flight, &show).unwrap().write(&folder).unwrap();
     }
     write_index(folder, &mission).unwrap();

@@ -106,13 +106,13 @@ proptest! {
         let again = resolve_text("again.toml", &flight.template_text, &[]).unwrap();
         prop_assert_eq!(&again.flights[0].plan, plan);
 
-        let show = Show::of_plan(plan);
+        let show = plan.to_show();
         let read = skyc::read(&skyc::write(&show).unwrap()).unwrap();
         same(&read, &show, SKYC_UNIT_M)?;
 
         let vehicle = library::builtin("airsim-generic-quad").unwrap();
         let recovered = Plan::of_show(&read, &vehicle);
-        same(&Show::of_plan(&recovered), &show, SKYC_UNIT_M)?;
+        same(&recovered.to_show(), &show, SKYC_UNIT_M)?;
         prop_assert_eq!(recovered.duration_ms, plan.duration_ms);
         for drone in &show.drones {
             let file = skyb::write(drone, &skyb::SkybOptions::default()).unwrap();

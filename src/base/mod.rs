@@ -2,12 +2,10 @@
 
 pub mod air;
 pub mod causes;
-pub mod crc;
 pub mod estimate;
-pub mod frame;
 pub mod json;
-pub mod number;
 pub mod rng;
 pub mod time;
 
-pub use untrusted_io::{file, parse, plain, private};
+pub use skybrush_show::{crc, frame};
+pub use untrusted_io::{file, number, parse, plain, private};

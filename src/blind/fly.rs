@@ -16,8 +16,8 @@ use crate::campaign::{FlightFolder, to_json};
 use crate::effects::Extra;
 use crate::mission::Plan;
 use crate::mission::resolve::{Override, ResolvedFlight, resolve};
+use crate::show::ShowDrone;
 use crate::show::quantise::as_flown;
-use crate::show::{Show, ShowDrone};
 use crate::sim::{Beyond, FlightSetup, Hooks, SimError, fly_beyond_to_file};
 use crate::vehicle::Vehicle;
 
@@ -107,7 +107,7 @@ pub(super) fn fly_into(
 ) -> Result<Flown, BlindError> {
     let folder = FlightFolder(folder.to_owned());
     let &Setting { plan, seed, missing, .. } = setting;
-    let show = Show::of_plan(plan);
+    let show = plan.to_show();
     create_folder(&folder.logs())?;
     sweep_partial(&folder.logs())?;
     let text = |what, reason: String| BlindError::Text { what, reason };

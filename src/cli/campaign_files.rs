@@ -60,7 +60,7 @@ pub(super) fn open(folder: &FlightFolder) -> FlightFiles {
     let Some(plan) = plan else {
         return FlightFiles { plan: None, show: Show::default(), vehicle, problems };
     };
-    let planned = Show::of_plan(&plan);
+    let planned = plan.to_show();
     let compiled = archived(&folder.skyc(), &mut problems);
     if let Some(show) = &compiled {
         compare(&folder.skyc(), show, &planned, SKYC_M, true, &mut problems);

@@ -17,6 +17,7 @@ use crate::base::plain::Shown as _;
 use crate::campaign::{self, FlightFolder};
 use crate::check::{CheckInput, CheckReport, NAMES, Options, Severity, check};
 use crate::mission::Plan;
+use crate::mission::measurable;
 use crate::show::Show;
 use crate::vehicle::{Vehicle, library};
 
@@ -235,10 +236,12 @@ pub(super) fn few(context: &Context, verbose: bool) -> usize {
 
 /// Refuses names of checks that there are not.
 pub(super) fn known(allow: &[String]) -> Result<(), CommandError> {
-    match allow.iter().find(|name| !NAMES.contains(&name.as_str())) {
+    let mut names: Vec<&str> = NAMES.iter().chain(&measurable::NAMES).copied().collect();
+    names.sort_unstable();
+    match allow.iter().find(|name| !names.contains(&name.as_str())) {
         Some(unknown) => Err(CommandError::Usage(format!(
             "there is no check \"{unknown}\"; there are {}",
-            NAMES.join(", ")
+            names.join(", ")
         ))),
         None => Ok(()),
     }
@@ -255,10 +258,10 @@ pub(super) fn checked(
     let fence = (plan.fence.polygon_m.len() >= 3).then_some(&plan.fence);
     let options = Options { findings_per_check, ..Options::default() };
     let input = CheckInput { options, ..CheckInput::new(show, &plan.limits) }
-        .with_autopilot(&vehicle.autopilot)
+        .with_speed_up(vehicle.autopilot.wpnav_speed_up_mps)
         .with_stock(&vehicle.limits);
     let mut report = check(&match origin {
-        Origin::Plan => input.with_fence(fence).with_plan(plan),
+        Origin::Plan => input.with_fence(fence).with_rule(plan),
         Origin::Beside(_) => input.with_fence(fence),
         Origin::Show if show.fence_altitude_m.is_some() => input.with_fence(fence),
         Origin::Show => input.with_polygon(fence),

@@ -153,7 +153,7 @@ fn foreign(path: &Path, show: Show, vehicle: &Vehicle) -> Loaded {
 fn load_flight(folder: &FlightFolder) -> Result<Loaded, LoadError> {
     let plan = folder.read_plan()?;
     let show = read_skyc(&folder.skyc())?;
-    let planned = Show::of_plan(&plan);
+    let planned = plan.to_show();
     let mut mismatches = Vec::new();
     if show.drones.len() == planned.drones.len() {
         for (here, there) in show.drones.iter().zip(&planned.drones) {

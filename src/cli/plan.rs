@@ -81,7 +81,7 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
     // Who reads only the beginning of the timetable gets the whole campaign.
     let mut read = Ok(());
     for flight in &mission.flights {
-        let show = Show::of_plan(&flight.plan);
+        let show = flight.plan.to_show();
         let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few);
         if !context.json && read.is_ok() {
             let is_example = args.mission.is_example(&flight.plan.site)?;

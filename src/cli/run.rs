@@ -23,7 +23,6 @@ use crate::base::rng::{Purpose as Chance, stream};
 use crate::campaign;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
-use crate::show::Show;
 
 /// The template that is the paper's campaign.
 const CAMPAIGN: &str = "campaign";
@@ -101,7 +100,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     let mission = args.mission_args().resolve(&args.template)?;
     let mut shows = Vec::new();
     for flight in &mission.flights {
-        let show = Show::of_plan(&flight.plan);
+        let show = flight.plan.to_show();
         let report =
             checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, few(context, false));
         say_findings(context, &report, &[]);

@@ -19,8 +19,8 @@ use crate::campaign::{self, FlightFolder, FlightRecord};
 use crate::effects;
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
+use crate::show::ShowDrone;
 use crate::show::quantise::as_flown;
-use crate::show::{Show, ShowDrone, Trajectory};
 use crate::sim::air::spec::{self, Air, AirSpec};
 use crate::sim::air::truth;
 use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, fly_to_file};
@@ -336,7 +336,7 @@ pub(super) fn make_ready<'a>(
     if simulation.truth {
         wanted.par_iter().try_for_each(|slot| {
             let path = folder.truth(slot.slot, count);
-            truth::write(&path, &air, &Trajectory::of_slot(plan, slot), slot.slot, &frame)
+            truth::write(&path, &air, &plan.trajectory(slot), slot.slot, &frame)
         })?;
     }
     Ok(Ready { vehicle, record, wanted, open, air })
@@ -353,7 +353,7 @@ pub(super) fn simulate(
     let ready = make_ready(context, folder, plan, simulation)?;
     let Ready { vehicle, record, open, air, .. } = &ready;
     let (start, frame, count) = (record.start, plan.site.frame(), plan.slots.len());
-    let show = Show::of_plan(plan);
+    let show = plan.to_show();
     let drones: BTreeMap<u16, &ShowDrone> =
         plan.slots.iter().zip(&show.drones).map(|(slot, drone)| (slot.slot, drone)).collect();
     let progress = Progress::new(context, "flying", open.len() as u64);

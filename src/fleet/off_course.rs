@@ -162,7 +162,7 @@ mod tests {
     /// Of the ladder: steps of up to 3.5 m/s, and of 7 m/s where a leg turns around.
     fn course() -> Course {
         let plan = resolve("calibration", &[]).unwrap().flights.remove(0).plan;
-        let mut course = Course::new(Trajectory::of_slot(&plan, &plan.slots[0]));
+        let mut course = Course::new(plan.trajectory(&plan.slots[0]));
         // It has joined its trajectory.
         fly(&mut course, 5.0, 12.0, |_| Vector3::zeros());
         course

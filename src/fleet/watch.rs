@@ -20,7 +20,6 @@ use crate::link::id::DroneId;
 use crate::link::net::Received;
 use crate::mission::Plan;
 use crate::protocol::show::{Stage, flag};
-use crate::show::Trajectory;
 
 /// When something is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -228,7 +227,7 @@ impl Monitor {
     /// known already.
     pub fn new(plan: &Plan, table: &FleetTable, telemetry: Telemetry, limits: Limits) -> Self {
         let watched = table.drones.iter().filter_map(|line| {
-            let trajectory = Trajectory::of_slot(plan, plan.slot(line.slot)?);
+            let trajectory = plan.trajectory(plan.slot(line.slot)?);
             let known = telemetry.get(line.drone);
             let texts = known.map_or(0, |of| of.texts_said);
             let restarts = known.map_or(0, |of| of.restarts);
@@ -676,7 +675,7 @@ mod tests {
         fn is_at(&mut self, now: Micros, system: u8, (on_ms, boot_at_ms): (u64, u64), off_m: f64) {
             let show_ms = on_ms.saturating_sub(START_MS);
             let slot = self.plan.slot(system.into()).unwrap();
-            let trajectory = Trajectory::of_slot(&self.plan, slot);
+            let trajectory = self.plan.trajectory(slot);
             let mut place = trajectory.state_at(show_ms as f64 / 1000.0).position_m;
             place.x += off_m;
             let at = self.plan.site.frame().to_geodetic(place);

@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 use super::bins::{Bin, BinValues};
 use crate::base::time::GpsTime;
 use crate::mission::plan::{Plan, Slot};
-use crate::show::Trajectory;
 use crate::sim::recorder::{Moment, Recorder, STEPS_10_HZ};
 use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly_with};
 use crate::vehicle::Vehicle;
@@ -42,7 +41,7 @@ pub(super) fn refly(
     wind_mps: [f64; 2],
     thrust_exponent: f64,
 ) -> Result<Vec<Option<BinValues>>, SimError> {
-    let trajectory = Trajectory::of_slot(plan, slot);
+    let trajectory = plan.trajectory(slot);
     let air = Uniform(Vector3::new(wind_mps[0], wind_mps[1], 0.0));
     let setup = FlightSetup {
         vehicle,

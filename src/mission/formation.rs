@@ -5,8 +5,7 @@ use super::plan::{Grid, Slot};
 use super::source::Source;
 use super::template::{Selection, span_of};
 
-/// Most drones in a show: the Skybrush loader's limit.
-pub const MAX_DRONES: usize = 5_000;
+pub use crate::show::MAX_DRONES;
 
 /// The grid and its slots, centred on the show origin, filled row by row.
 pub(super) fn lay_out(source: &Source<'_>) -> Result<(Grid, Vec<Slot>), TemplateError> {

@@ -8,11 +8,14 @@ pub mod build;
 pub mod error;
 pub mod formation;
 mod keys;
+pub mod measurable;
+pub mod of_show;
 pub mod plan;
 pub mod resolve;
 mod source;
 pub mod steps;
 pub mod template;
+pub mod to_show;
 pub mod window;
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //!
 //! Written as `plan.json`; its JSON schema is `docs/schema/plan.schema.json`.
 
+pub use crate::check::Fence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -85,18 +86,6 @@ impl Site {
             orientation_deg: self.orientation_deg,
         }
     }
-}
-
-/// The fence around the show: a box of the show frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Fence {
-    /// Corners of the inclusion polygon, show x and y, m, counter-clockwise, not repeated.
-    pub polygon_m: Vec<[f64; 2]>,
-    /// Highest altitude above ground, m.
-    pub max_altitude_m: f64,
-    /// Distance that trajectories must keep from the fence, m.
-    pub margin_m: f64,
 }
 
 /// Layout of a rectangular grid.

@@ -65,7 +65,7 @@ fn every_segment_starts_where_the_last_one_ended() {
 fn ramps_change_velocity_without_jumps_and_keep_the_heights() {
     let plan = plan_of("calibration", &["motion.ramp_mps2=1.0"]);
     let slot = &plan.slots[0];
-    let trajectory = crate::show::Trajectory::of_slot(&plan, slot);
+    let trajectory = plan.trajectory(slot);
     let mut before = nalgebra::Vector3::zeros();
     for piece in trajectory.pieces() {
         let jump = (piece.state(0.0).velocity_mps - before).norm();

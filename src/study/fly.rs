@@ -13,7 +13,6 @@ use crate::analysis::windows::{Tilt, WindowOptions, correct_tilt, measure, plann
 use crate::base::time::GpsTime;
 use crate::flight::{Flight, FlightError, FlightOptions};
 use crate::log::Log;
-use crate::show::Trajectory;
 use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly};
 
 /// Name and version of the format of a finished flight.
@@ -72,7 +71,7 @@ pub(super) fn fly_cell(
     seed: u64,
     stop: &AtomicBool,
 ) -> Result<(CellRecord, Log), FlyError> {
-    let trajectory = Trajectory::of_slot(&study.plan, &study.slot);
+    let trajectory = study.plan.trajectory(&study.slot);
     let frame = study.plan.site.frame();
     let air_mps = cell.air_mps();
     let [east, north, up] = air_mps;

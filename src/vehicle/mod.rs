@@ -8,6 +8,7 @@ mod rotor;
 
 use std::collections::BTreeMap;
 
+pub use crate::check::Limits;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,30 +35,6 @@ pub struct Vehicle {
     /// Physics beyond AirSim's that this vehicle has, by name (`updraft effects` lists them).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub effects: BTreeMap<String, EffectTable>,
-}
-
-/// What a vehicle may be asked to do; plans are checked against it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Limits {
-    /// Largest horizontal speed, m/s.
-    pub max_speed_xy_mps: f64,
-    /// Largest upward speed, m/s.
-    pub max_speed_up_mps: f64,
-    /// Largest downward speed, m/s.
-    pub max_speed_down_mps: f64,
-    /// Largest acceleration within a piece, m/s².
-    pub max_acceleration_mps2: f64,
-    /// Largest jump of velocity between two pieces, m/s.
-    pub max_velocity_step_mps: f64,
-    /// Highest altitude above ground, m.
-    pub max_altitude_m: f64,
-    /// Smallest distance between any two drones in the air, m.
-    pub min_distance_m: f64,
-    /// Time a full battery carries the vehicle in hover, s.
-    pub endurance_s: f64,
-    /// Share of the endurance that must be left after landing, 0..1.
-    pub endurance_reserve: f64,
 }
 
 /// Mass, geometry, rotors and drag of AirSim's multirotor model.

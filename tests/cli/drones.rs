@@ -12,7 +12,6 @@ use updraft::fleet::upload::Load;
 use updraft::link::clock::{Clock, Micros};
 use updraft::link::signing::Key;
 use updraft::mission::Plan;
-use updraft::show::Show;
 use updraft::sim::Uniform;
 use updraft::vehicle::library::builtin;
 use updraft::virtual_fleet::lossy::Faults;
@@ -69,7 +68,7 @@ impl Drones {
     /// What a slot's drone must get.
     pub(crate) fn load(&self, slot: u16) -> Load {
         let skyb = std::fs::read(self.folder.skyb(slot, self.plan.slots.len())).unwrap();
-        let fence = Fence::of(&self.plan, &Show::of_plan(&self.plan)).unwrap();
+        let fence = Fence::of(&self.plan, &self.plan.to_show()).unwrap();
         Load { skyb, site: self.plan.site, fence }
     }
 

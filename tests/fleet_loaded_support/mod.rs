@@ -12,7 +12,7 @@ use updraft::link::id::DroneId;
 use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve};
 use updraft::protocol::show::SHOW_FILE;
-use updraft::show::{Show, skyb};
+use updraft::show::skyb;
 use updraft::virtual_fleet::lossy::Faults;
 use updraft::virtual_fleet::vehicle::VirtualVehicle;
 
@@ -34,7 +34,7 @@ pub(crate) fn hover(rows: u16, columns: u16) -> Plan {
 
 /// What slot `slot` of a plan gets.
 pub(crate) fn load(plan: &Plan, slot: u16) -> Load {
-    let show = Show::of_plan(plan);
+    let show = plan.to_show();
     let drone = &show.drones[usize::from(slot) - 1];
     let skyb = skyb::write(drone, &skyb::SkybOptions::default()).unwrap().bytes;
     Load { skyb, site: plan.site, fence: Fence::of(plan, &show).unwrap() }

@@ -19,7 +19,7 @@ use updraft::mission::Plan;
 use updraft::mission::resolve::{Override, resolve};
 use updraft::protocol::ftp::{Op, Packet};
 use updraft::protocol::show::{FROM_DRONE, Stage, Status};
-use updraft::show::{Show, skyb};
+use updraft::show::skyb;
 use updraft::virtual_fleet::endpoint::Endpoint;
 use updraft::virtual_fleet::lossy::{Faults, LossyNet};
 
@@ -42,7 +42,7 @@ pub(crate) fn plan() -> Plan {
 }
 
 pub(crate) fn load(plan: &Plan, slot: u16) -> Load {
-    let show = Show::of_plan(plan);
+    let show = plan.to_show();
     let drone = &show.drones[usize::from(slot) - 1];
     let skyb = skyb::write(drone, &skyb::SkybOptions::default()).unwrap().bytes;
     Load { skyb, site: plan.site, fence: Fence::of(plan, &show).unwrap() }

@@ -80,7 +80,7 @@ fn root_of(show: &Show) -> Value {
 #[test]
 fn limits_place_and_fence_have_the_names_that_others_read() {
     let flight = updraft::mission::resolve::resolve("calibration", &[]).unwrap().flights.remove(0);
-    let root = root_of(&Show::of_plan(&flight.plan));
+    let root = root_of(&flight.plan.to_show());
     let validation = root["settings"]["validation"].as_object().unwrap();
     let keys: Vec<&str> = validation.keys().map(String::as_str).collect();
     for key in ["maxAltitude", "maxVelocityXY", "maxVelocityZ", "maxVelocityZUp", "minDistance"] {
@@ -96,7 +96,7 @@ fn limits_place_and_fence_have_the_names_that_others_read() {
     // Nobody knows the ground there: no altitude is made up.
     let mut elsewhere = flight.plan;
     elsewhere.site.ground_assumed = true;
-    let root = root_of(&Show::of_plan(&elsewhere));
+    let root = root_of(&elsewhere.to_show());
     assert_eq!(root["environment"]["location"]["origin"].as_array().unwrap().len(), 2);
 }
 

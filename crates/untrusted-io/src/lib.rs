@@ -10,12 +10,14 @@
 //! assert_eq!(plain("GO\r\u{1b}[2J"), "GO␍␛[2J");
 //! ```
 //!
+//! * [`number`]: numbers in sentences, however large.
 //! * [`plain`]: text that drives no terminal, and output that does neither.
 //! * [`file`](mod@file): reading within a limit (no pipes, no devices), writing whole or not at all.
 //! * [`parse`]: JSON and TOML whose texts and keys arrive plain (feature `parse`, on by default).
 //! * [`private`]: folders and files that only their user can look into.
 
 pub mod file;
+pub mod number;
 #[cfg(feature = "parse")]
 pub mod parse;
 pub mod plain;

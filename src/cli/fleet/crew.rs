@@ -151,7 +151,7 @@ impl<'a> Crew<'a> {
             context,
             net: Gate::new(net, plan),
             folder,
-            show: Show::of_plan(plan),
+            show: plan.to_show(),
             plan,
             telemetry: Telemetry::default(),
             table: FleetTable::new([]),

@@ -33,7 +33,6 @@ use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
-use crate::show::Trajectory;
 
 /// Most messages shown of a conversation.
 const MOST: usize = 20_000;
@@ -146,7 +145,7 @@ impl Dry {
         let mut vehicle = Obliging::new(drone, false, place(&self.plan, Some(slot)));
         let authorized_ms = (vehicle.unix_us / 1000) as i64 + (lead_s * 1000.0) as i64;
         let flight = Flight {
-            trajectory: Trajectory::of_slot(&self.plan, slot),
+            trajectory: self.plan.trajectory(slot),
             frame: self.plan.site.frame(),
             start_gps_ms: GpsTime::from_unix_ms(authorized_ms).map_or(0, GpsTime::total_ms),
             yaw_rad: None,

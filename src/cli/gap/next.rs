@@ -25,7 +25,6 @@ use crate::gap::verdict::VERDICT_SCHEMA;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 use crate::mission::resolve::{ResolvedFlight, resolve_text};
-use crate::show::Show;
 use crate::vehicle::{Vehicle, library};
 
 /// Name of the proposal, as template and as JSON.
@@ -133,7 +132,7 @@ pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandErr
     let text = choice.elements.template(&choice.plan, &before.word, &head(&next), &next.briefing);
     let path = folder.join(TEMPLATE);
     let flight = planned(&path, &text)?;
-    let show = Show::of_plan(&flight.plan);
+    let show = flight.plan.to_show();
     let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, 1);
     if !is_safe(&report, &[]) {
         next.notes.push(

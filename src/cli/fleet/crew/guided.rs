@@ -20,7 +20,6 @@ use crate::link::clock::MS;
 use crate::link::drive::{Watch as _, drive};
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
-use crate::show::Trajectory;
 
 #[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
 fn refused(error: StartRefusal) -> CommandError {
@@ -136,7 +135,7 @@ impl<'a> Crew<'a> {
                 continue;
             };
             let flight = Flight {
-                trajectory: Trajectory::of_slot(self.plan, slot),
+                trajectory: self.plan.trajectory(slot),
                 frame,
                 start_gps_ms,
                 yaw_rad: None,

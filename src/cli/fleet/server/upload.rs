@@ -25,7 +25,7 @@ pub(super) struct Shows<'a> {
 impl<'a> Shows<'a> {
     /// With the same fence and the same refusal as over MAVLink.
     pub(super) fn of(plan: &'a Plan) -> Result<Self, CommandError> {
-        let show = Show::of_plan(plan);
+        let show = plan.to_show();
         let checked =
             Checked::of(plan, &show).map_err(|error| CommandError::Usage(error.to_string()))?;
         let corners = &plan.fence.polygon_m;

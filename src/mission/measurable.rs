@@ -1,0 +1,135 @@
+//! Whether a plan can measure what it is flown for: windows to look at, and speeds to tell apart.
+
+use std::collections::BTreeSet;
+
+use super::plan::{Group, Kind, Plan, Purpose, Segment};
+use crate::check::{Collector, Finding, Rule, Severity};
+
+/// Speeds that a law needs at least: one gives one equation for two unknowns.
+const MIN_SPEEDS: usize = 2;
+/// Speeds closer than this are the same, m/s.
+const SAME_SPEED_MPS: f64 = 0.01;
+
+/// Names of its findings.
+pub const NAMES: [&str; 2] = ["ladder-speeds", "ladder-window"];
+
+/// Warns of segments that the analysis will leave out, and of ladders from which no law can come.
+impl Rule for Plan {
+    fn check(&self, collector: &mut Collector) {
+        for group in &self.groups {
+            windows(self, group, collector);
+            if !counts(self.purpose, Kind::Hover) {
+                eaten_hovers(group, collector);
+            }
+        }
+        if self.purpose == Purpose::Calibration {
+            speeds(self, collector);
+        }
+    }
+}
+
+/// Whether a segment is flown to be looked at.
+fn counts(purpose: Purpose, kind: Kind) -> bool {
+    match purpose {
+        Purpose::Calibration => kind.is_leg() || kind == Kind::Horizontal,
+        Purpose::Measurement => kind == Kind::Hover || kind.is_leg() || kind == Kind::Horizontal,
+    }
+}
+
+/// One warning for all segments of a group without a window.
+fn windows(plan: &Plan, group: &Group, collector: &mut Collector) {
+    let wanted: Vec<&Segment> =
+        group.segments.iter().filter(|segment| counts(plan.purpose, segment.kind)).collect();
+    let blind: Vec<&&Segment> = wanted.iter().filter(|segment| segment.window.is_none()).collect();
+    let Some(first) = blind.first() else { return };
+    let lasts_s = (first.end_ms - first.start_ms) as f64 / 1000.0;
+    let message = format!(
+        "{} of {} segments to be analysed (group {}) are too short for an analysis window, first \"{}\" of {lasts_s:.1} s: they will not count",
+        blind.len(),
+        wanted.len(),
+        group.name,
+        first.label,
+    );
+    collector.add(
+        0,
+        Finding {
+            time_s: Some(first.start_ms as f64 / 1000.0),
+            value: Some(lasts_s),
+            unit: "s",
+            ..warning("ladder-window", message, "fly them longer, or settle and trim less")
+        },
+    );
+}
+
+/// One warning for all hovers of a group that have no window because of the ramp they begin with.
+fn eaten_hovers(group: &Group, collector: &mut Collector) {
+    let of_transfer = |kind| matches!(kind, Kind::Takeoff | Kind::Climb | Kind::Descend);
+    let mut eaten = Vec::new();
+    let mut before: [Option<&Segment>; 2] = [None, None];
+    for segment in &group.segments {
+        // The ramp at the end of a transfer is the transfer's own time.
+        if let [Some(flown), Some(ramp)] = before
+            && segment.kind == Kind::Hover
+            && segment.window.is_none()
+            && ramp.kind == Kind::Ramp
+            && !of_transfer(flown.kind)
+        {
+            eaten.push((ramp, segment));
+        }
+        before = [before[1], Some(segment)];
+    }
+    let Some((ramp, first)) = eaten.first() else { return };
+    let hovers = group.segments.iter().filter(|segment| segment.kind == Kind::Hover).count();
+    let lasts_s = |segment: &Segment| (segment.end_ms - segment.start_ms) as f64 / 1000.0;
+    let message = format!(
+        "{} of {hovers} hovers (group {}) are too short for an analysis window after the ramps they begin with, first \"{}\": {:.1} s are left after a ramp of {:.1} s",
+        eaten.len(),
+        group.name,
+        first.label,
+        lasts_s(first),
+        lasts_s(ramp),
+    );
+    collector.add(
+        0,
+        Finding {
+            time_s: Some(first.start_ms as f64 / 1000.0),
+            value: Some(lasts_s(first)),
+            unit: "s",
+            ..warning("ladder-window", message, "hover longer, or take a larger ramp acceleration")
+        },
+    );
+}
+
+/// A ladder of one speed, or of none that can be looked at.
+fn speeds(plan: &Plan, collector: &mut Collector) {
+    let speeds: BTreeSet<i64> = plan
+        .groups
+        .iter()
+        .flat_map(|group| &group.segments)
+        .filter(|segment| segment.kind.is_leg() && segment.window.is_some())
+        .map(|segment| (segment.velocity_mps[2].abs() / SAME_SPEED_MPS).round() as i64)
+        .collect();
+    if speeds.len() >= MIN_SPEEDS {
+        return;
+    }
+    let message = match speeds.first() {
+        None => "the ladder has no leg with an analysis window: no law can be fitted".to_owned(),
+        Some(speed) => format!(
+            "all legs of the ladder have the same speed, {:.2} m/s: no law can be fitted to fewer than {MIN_SPEEDS} speeds",
+            *speed as f64 * SAME_SPEED_MPS
+        ),
+    };
+    let remedy = "fly legs at two speeds or more; the paper's ladder has seven";
+    collector.add(
+        0,
+        Finding {
+            value: Some(speeds.len() as f64),
+            limit: Some(MIN_SPEEDS as f64),
+            ..warning("ladder-speeds", message, remedy)
+        },
+    );
+}
+
+fn warning(check: &'static str, message: String, remedy: &'static str) -> Finding {
+    Finding::new(Severity::Warning, check, message, remedy)
+}
