@@ -9,15 +9,12 @@ use std::path::{Path, PathBuf};
 /// Each room and those it may use.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("base", &[]),
-    ("vehicle", &["base"]),
     ("mission", &["base", "vehicle"]),
     ("link", &["base"]),
     ("protocol", &["base"]),
     ("skybrush_server", &["base", "link", "protocol"]),
     ("campaign", &["base", "vehicle", "mission", "check"]),
     ("fleet", &["base", "vehicle", "mission", "link", "protocol", "campaign", "flight"]),
-    ("effects", &["base", "vehicle"]),
-    ("sim", &["base", "vehicle", "mission", "effects"]),
     ("virtual_fleet", &["base", "vehicle", "mission", "sim", "link", "protocol"]),
     ("flight", &["base", "vehicle", "mission"]),
     ("analysis", &["base", "vehicle", "mission", "flight"]),

@@ -14,6 +14,7 @@ mod inventory;
 mod letter;
 pub mod reader;
 mod scan;
+pub mod time;
 pub mod units;
 mod window;
 pub mod writer;

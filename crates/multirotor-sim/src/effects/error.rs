@@ -1,0 +1,68 @@
+//! What can be wrong with a choice of effects.
+
+use thiserror::Error;
+
+use untrusted_io::plain::plain;
+
+/// An effect or its parameter cannot be used.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum EffectError {
+    /// No effect of this name.
+    #[error("there is no effect \"{}\"; `updraft effects` lists them{hint}", plain(name))]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// A name that is near, as text.
+        hint: String,
+    },
+    /// The effect has no such parameter.
+    #[error("the effect {effect} has no parameter \"{}\"; it has: {known}", plain(name))]
+    Parameter {
+        /// The effect.
+        effect: &'static str,
+        /// What was asked for.
+        name: String,
+        /// What exists.
+        known: String,
+    },
+    /// A parameter outside of what makes sense.
+    #[error(
+        "effects.{effect}.{name} = {value} is not allowed; it must be {low} to {high}{}",
+        spaced(unit)
+    )]
+    Bounds {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        name: &'static str,
+        /// What was asked for.
+        value: f64,
+        /// Smallest allowed.
+        low: f64,
+        /// Largest allowed.
+        high: f64,
+        /// Unit.
+        unit: &'static str,
+    },
+    /// A parameter that is within its bounds, but with which nothing can be flown.
+    #[error("effects.{effect}.{name} = {value} is not allowed; {why}")]
+    Nonsense {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        name: &'static str,
+        /// What was asked for.
+        value: f64,
+        /// What it must be, or what comes of it.
+        why: String,
+    },
+    /// Not `NAME`, `NAME=on`, `NAME=off` or `NAME.PARAMETER=NUMBER`.
+    #[error("\"{0}\" is not NAME, NAME=on, NAME=off or NAME.PARAMETER=NUMBER")]
+    Syntax(String),
+}
+
+/// A unit behind its number; nothing for a pure number.
+fn spaced(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+}

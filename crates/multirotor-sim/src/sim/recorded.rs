@@ -1,0 +1,93 @@
+//! A flight with its log, step by step.
+
+use std::io::{self, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::error::SimError;
+use super::flight::{FlightSetup, FlightSummary};
+use super::flying::Flight;
+use super::recorder::LogRecorder;
+use dataflash::time::GpsTime;
+
+/// A flight whose log is taken away as it grows. All its pieces together are what
+/// [`super::fly`] writes, for a flight that nobody disturbed.
+pub struct RecordedFlight<'a> {
+    /// The flight.
+    pub flight: Flight<'a>,
+    recorder: Option<LogRecorder<'a, Tap>>,
+    tap: Tap,
+    drone: u16,
+}
+
+/// Bytes that wait to be taken away.
+#[derive(Clone, Debug, Default)]
+struct Tap(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Tap {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl<'a> RecordedFlight<'a> {
+    /// Arms at this show time (s), or when the firmware does by itself, whichever is later. Board time
+    /// in its log counts from `booted`, or from a time of the seed's.
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn armed(
+        setup: &FlightSetup<'a>,
+        armed_s: Option<f64>,
+        booted: Option<GpsTime>,
+    ) -> Result<Self, SimError> {
+        Self::of(setup, Flight::armed(setup, armed_s)?, booted)
+    }
+
+    /// Arms at show time 0 in GUIDED: see [`Flight::guided`]; `booted` as in [`Self::armed`].
+    ///
+    /// # Errors
+    /// See [`SimError`].
+    pub fn guided(setup: &FlightSetup<'a>, booted: Option<GpsTime>) -> Result<Self, SimError> {
+        Self::of(setup, Flight::guided(setup)?, booted)
+    }
+
+    fn of(
+        setup: &FlightSetup<'a>,
+        flight: Flight<'a>,
+        booted: Option<GpsTime>,
+    ) -> Result<Self, SimError> {
+        let tap = Tap::default();
+        let (armed_us, is_guided) = (flight.armed_us(), flight.is_guided());
+        let recorder = LogRecorder::new(tap.clone(), setup, armed_us, is_guided, booted)
+            .map_err(|source| SimError::Log { drone: setup.drone, source })?;
+        Ok(Self { flight, recorder: Some(recorder), tap, drone: setup.drone })
+    }
+
+    /// Flies on; whether the flight and its log have ended.
+    ///
+    /// # Errors
+    /// See [`SimError`]; the flight cannot go on then.
+    pub fn step_until(&mut self, time_s: f64) -> Result<bool, SimError> {
+        let Some(recorder) = &mut self.recorder else { return Ok(true) };
+        let is_over = self.flight.step_until(time_s, recorder)?;
+        if is_over && let Some(recorder) = self.recorder.take() {
+            recorder.finish().map_err(|source| SimError::Log { drone: self.drone, source })?;
+        }
+        Ok(is_over)
+    }
+
+    /// What the log has grown by since the last call.
+    pub fn take_log(&mut self) -> Vec<u8> {
+        std::mem::take(&mut *self.tap.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// What became of the flight so far.
+    pub fn summary(&self) -> FlightSummary {
+        self.flight.summary()
+    }
+}
