@@ -109,7 +109,7 @@ pub struct CheckInput<'a> {
     pub options: Options,
 }
 
-/// What a vehicle may be asked to do.
+/// What a vehicle may be asked to do; plans are checked against it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
@@ -133,7 +133,7 @@ pub struct Limits {
     pub endurance_reserve: f64,
 }
 
-/// The fence around a show: a box of the show frame.
+/// The fence around the show: a box of the show frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fence {
