@@ -1,8 +1,8 @@
-//! Errors with everything that caused them, in one text.
+//! Errors together with their causes in one text.
 
 use std::error::Error;
 
-/// The error and its causes, each said once, with `between` them.
+/// Text of an error and its causes, each said once, joined by `between`.
 ///
 /// ```
 /// use updraft::base::causes::with_causes;

@@ -1,4 +1,5 @@
-//! What every room uses: frames, time, checksums, estimates, random streams, whole files.
+//! Foundations that every room uses: frames, time, checksums, estimates, random streams, whole
+//! files.
 
 pub mod causes;
 pub mod estimate;

@@ -1,4 +1,4 @@
-//! What can go wrong with a blind flight.
+//! Errors of blind flights.
 
 use std::path::PathBuf;
 
@@ -36,21 +36,21 @@ pub enum BlindError {
     /// A drone's show does not fit into its file.
     #[error("slot {slot} has no .skyb file")]
     Skyb {
-        /// The slot.
+        /// Number of the slot.
         slot: u16,
-        /// Why.
+        /// Reason why its show does not fit into a file.
         #[source]
         source: SkybError,
     },
     /// A drone could not be flown.
     #[error(transparent)]
     Sim(#[from] SimError),
-    /// There is nothing of this name to hide.
+    /// The name to hide is neither an effect nor a group of effects.
     #[error("nothing is called \"{}\" that could be hidden; there are {known}", plain(name))]
     Unknown {
-        /// As asked for.
+        /// Name as asked for.
         name: String,
-        /// What there is.
+        /// Names that can be hidden, for the message.
         known: String,
     },
     /// A base does not take an effect.
@@ -59,17 +59,17 @@ pub enum BlindError {
          another base with --base"
     )]
     NotEligible {
-        /// What was to be hidden.
+        /// Name of the effect that was to be hidden.
         name: String,
-        /// The base.
+        /// Name of the base vehicle from which it cannot be hidden.
         base: &'static str,
     },
-    /// The same thing twice.
+    /// The effect was asked for twice, perhaps under two names.
     #[error("\"{name}\" cannot be hidden together with \"{other}\": they are one effect")]
     Twice {
-        /// What was to be hidden.
+        /// Name of the effect that was to be hidden.
         name: String,
-        /// With what.
+        /// Name of the effect that it equals.
         other: String,
     },
     /// A seed of the wrong range.
@@ -78,7 +78,7 @@ pub enum BlindError {
          tuned with; give --tuning to score with it all the same, and the table will say so"
     )]
     TuningSeed {
-        /// As asked for.
+        /// Seed as asked for.
         seed: u64,
         /// The first seed for scoring.
         first: u64,
@@ -88,7 +88,7 @@ pub enum BlindError {
         "seed {seed} is for scoring: whoever tunes with it spoils it; tune with seeds below {first}"
     )]
     ScoringSeed {
-        /// As asked for.
+        /// Seed as asked for.
         seed: u64,
         /// The first seed for scoring.
         first: u64,
@@ -96,11 +96,11 @@ pub enum BlindError {
     /// Too large a number.
     #[error("{what} {value} is too large; at most {most}")]
     TooLarge {
-        /// Of what.
+        /// Name of the number, with its article: "the seed".
         what: &'static str,
-        /// As asked for.
+        /// Value as asked for.
         value: u64,
-        /// The most.
+        /// Largest value allowed.
         most: u64,
     },
     /// The truth was asked for too early.
@@ -109,9 +109,9 @@ pub enum BlindError {
         sealed.shown(), verdict.shown()
     )]
     NoVerdict {
-        /// The sealed folder.
+        /// Path of the folder that holds the sealed truth.
         sealed: PathBuf,
-        /// Where the verdict was expected.
+        /// Path at which the verdict was expected.
         verdict: PathBuf,
     },
     /// The truth is not what was sealed.
@@ -120,30 +120,30 @@ pub enum BlindError {
         path.shown()
     )]
     Tampered {
-        /// The truth's file.
+        /// Path of the truth's file.
         path: PathBuf,
-        /// Its hash.
+        /// SHA-256 of the file, hexadecimal.
         found: String,
-        /// The published one.
+        /// SHA-256 that was published when it was sealed, hexadecimal.
         published: String,
     },
-    /// The search failed.
+    /// The search for missing physics failed.
     #[error("no verdict on {}", flight.shown())]
     Explain {
-        /// The flight's folder.
+        /// Path of the flight's folder.
         flight: PathBuf,
-        /// Why.
+        /// Reason why the search failed.
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A file is of another program.
     #[error("{} has the format \"{found}\", this program reads \"{wanted}\"", path.shown())]
     Schema {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its format.
+        /// Format that the file states.
         found: String,
-        /// What this program reads.
+        /// Format that this program reads.
         wanted: &'static str,
     },
     /// The folder holds flights of other settings.
@@ -152,19 +152,19 @@ pub enum BlindError {
         folder.shown()
     )]
     Other {
-        /// The folder.
+        /// Path of the folder.
         folder: PathBuf,
-        /// The flight.
+        /// Index of the flight in its table.
         index: usize,
-        /// How it differs.
+        /// Difference from the flight that was expected, in words.
         why: String,
     },
     /// JSON or TOML could not be made.
     #[error("failed to write {what} as text: {reason}")]
     Text {
-        /// What.
+        /// Name of the content, for the message.
         what: &'static str,
-        /// Why not.
+        /// Reason why it has no text form.
         reason: String,
     },
     /// Stopped by the user.

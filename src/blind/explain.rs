@@ -9,7 +9,7 @@ use crate::effects::Reference;
 use crate::gap::{SteadyPulse, There, Verdict};
 use crate::vehicle::Vehicle;
 
-/// Why a search has no verdict.
+/// Error of a search for missing physics.
 pub type Cause = Box<dyn std::error::Error + Send + Sync>;
 
 /// A search for missing physics. Every `Fn(&Path) -> Result<Verdict, Cause>` is one.
@@ -20,9 +20,9 @@ pub trait Explain: Sync {
     /// When the search finds nothing to work on, or fails.
     fn explain(&self, flight: &Path) -> Result<Verdict, Cause>;
 
-    /// Fisher z of each hidden effect of the truth under that flight: its size over its error with
-    /// air, intercepts and the other hidden effects free. Asked for after the verdict is on the disk
-    /// and the seal is open. `None`: not known.
+    /// Fisher z of each hidden effect of the truth in that flight: the ratio of its size to its
+    /// standard error with air, intercepts and the other hidden effects free. Asked for after the
+    /// verdict is on disk and the seal is open. `None` where it is not known.
     fn fisher_z(&self, _flight: &Path, truth: &Scenario) -> Vec<Option<f64>> {
         vec![None; truth.hidden.len()]
     }
@@ -37,7 +37,8 @@ where
     }
 }
 
-/// What is hidden, for the question how difficult it was to find; `vehicle` is the true one.
+/// Hidden effects of a truth, in the form that the calculation of their Fisher z takes; `vehicle`
+/// is the true one.
 pub fn there<'a>(truth: &'a Scenario, vehicle: &Vehicle) -> Vec<There<'a>> {
     let foreign = |hidden: &Hidden| -> Option<SteadyPulse<'a>> {
         let effect = foreign::find(&hidden.effect)?;

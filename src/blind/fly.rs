@@ -27,14 +27,14 @@ pub const PLANT_STEPS: u16 = 2;
 /// When blind flights start: 2026-06-01 12:00 UTC. Fixed, so that the same seed gives the same bytes.
 const START: GpsTime = GpsTime { week: 2421, tow_ms: 129_618_000 };
 
-/// What became of a blind flight.
+/// Logs of a blind flight, and the drones that it lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flown {
-    /// Logs written.
+    /// Number of logs that were written.
     pub logs: usize,
-    /// Their size together, bytes.
+    /// Total size of the logs, bytes.
     pub bytes: u64,
-    /// Drones that were lost in flight.
+    /// Number of drones that were lost in flight.
     pub lost: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What can be hidden, and how large it is drawn: log-uniform over the ranges of what is usual.
+//! Effects that can be hidden; their sizes are drawn log-uniformly over usual ranges.
 
 use std::collections::BTreeMap;
 
@@ -42,10 +42,10 @@ impl Hidden {
     }
 }
 
-/// Something that can be hidden.
+/// An effect that can be hidden, and the range from which its size is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
-    /// Its name for `--effects`.
+    /// Name of the effect for `--effects`.
     pub name: &'static str,
     /// The effect in the library, or the foreign one.
     pub effect: &'static str,
@@ -53,9 +53,9 @@ pub struct Kind {
     pub foreign: bool,
     /// The parameter that says how large it is.
     pub size: &'static str,
-    /// Smallest and largest magnitude that is drawn ...
+    /// Smallest and largest magnitude that is drawn, in [`Kind::unit`].
     pub range: (f64, f64),
-    /// ... of what.
+    /// Unit of [`Kind::range`], for people.
     pub unit: &'static str,
     /// Bases that it can be hidden from.
     pub bases: &'static [Base],

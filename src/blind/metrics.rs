@@ -1,4 +1,4 @@
-//! What a table measures, with what is demanded of it.
+//! Metrics of a table of blind flights, and the demands on them.
 
 use super::interval::{clopper_pearson, median};
 use super::scenario::{AirClass, Base, Protocol};

@@ -12,7 +12,7 @@ use super::seal::{self, Opened};
 use crate::base::file::FileError;
 use crate::gap::Verdict;
 
-/// What has just been done.
+/// A completed step of a blind flight, for a progress display.
 #[derive(Clone, Copy, Debug)]
 pub enum Act<'a> {
     /// The truth is sealed under this hash.
@@ -23,16 +23,16 @@ pub enum Act<'a> {
     Explained(&'a Verdict),
 }
 
-/// How it ended.
+/// A blind flight that was flown, searched and scored.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// What became of the flight.
+    /// Logs of the flight.
     pub flown: Flown,
-    /// The verdict.
+    /// Verdict of the search.
     pub verdict: Verdict,
-    /// The truth, opened.
+    /// The truth, opened after the verdict.
     pub opened: Opened,
-    /// The one against the other.
+    /// Score of the verdict against the truth.
     pub outcome: Outcome,
 }
 
@@ -41,7 +41,7 @@ pub fn flight(folder: &Path) -> PathBuf {
     folder.join("flight")
 }
 
-/// Where the verdict must be before the seal is opened: as `updraft gap` writes it.
+/// Path at which the verdict must lie before the seal is opened: where `updraft gap` writes it.
 pub fn verdict(folder: &Path) -> PathBuf {
     flight(folder).join("gap").join("verdict.json")
 }

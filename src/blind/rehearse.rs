@@ -28,9 +28,9 @@ const RESISTANCE_OHM: f64 = 0.03;
 /// A flight that is to be rehearsed.
 #[derive(Clone, Copy, Debug)]
 pub struct Rehearsal<'a> {
-    /// Its plan with its template.
+    /// Plan of the flight, with its template.
     pub flight: &'a ResolvedFlight,
-    /// What it is made of.
+    /// Elements that the flight is made of: payloads, charges, legs.
     pub elements: Elements,
     /// Noise and air as they were found.
     pub noise: &'a Noise,
@@ -43,11 +43,11 @@ pub struct Rehearsal<'a> {
 /// An answer: an effect of some size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// The effect.
+    /// Name of the effect.
     pub effect: String,
     /// The parameter that says how large it is.
     pub parameter: String,
-    /// Its value.
+    /// Value of the parameter, in its own unit.
     pub size: f64,
     /// The vehicle without it, which is held against the logs.
     pub without: Vehicle,

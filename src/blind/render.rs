@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 
 use super::table::{Demand, Group, Metric, Table};
 
-/// How it is drawn.
+/// Form in which a table is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// Columns of spaces.
+    /// Columns aligned by spaces.
     Text,
-    /// Markdown.
+    /// A Markdown table.
     Markdown,
 }
 

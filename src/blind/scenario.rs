@@ -47,7 +47,7 @@ pub enum Protocol {
 }
 
 impl Protocol {
-    /// Its name.
+    /// Name of the protocol in files and options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
@@ -87,7 +87,7 @@ pub enum AirClass {
 }
 
 impl AirClass {
-    /// Its name.
+    /// Name of the class of air in files and options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Calm => "calm",
@@ -121,7 +121,7 @@ pub enum Base {
 }
 
 impl Base {
-    /// Its name.
+    /// Name of the base vehicle in files and options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Airsim => "airsim",
@@ -233,7 +233,7 @@ impl Scenario {
         Ok(Self { schema: SCENARIO_SCHEMA.to_owned(), seed, cell: cell.clone(), hidden, nuisance })
     }
 
-    /// Slots in all.
+    /// Number of slots in the formation.
     pub fn slots(&self) -> u16 {
         self.cell.side * self.cell.side
     }
@@ -253,7 +253,7 @@ impl Scenario {
         (1..=self.slots()).find(|slot| !self.nuisance.warm.contains(slot))
     }
 
-    /// What is hidden, in a few words.
+    /// Hidden effects and their sizes in a few words; "nothing" if there are none.
     pub fn words(&self) -> String {
         if self.hidden.is_empty() {
             return "nothing".to_owned();

@@ -31,9 +31,9 @@ pub struct Sealed {
 /// A truth that was opened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opened {
-    /// The truth.
+    /// The truth, as it was sealed before the flight.
     pub truth: Scenario,
-    /// Its published hash.
+    /// SHA-256 of the truth as published before the flight, hexadecimal.
     pub truth_sha256: String,
     /// Hash of the verdict that was on the disk when it was opened.
     pub verdict_sha256: String,
@@ -44,12 +44,12 @@ pub fn folder(beside: &Path) -> PathBuf {
     beside.join("sealed")
 }
 
-/// The published hash.
+/// Path of the published hash, in the folder of the sealed truth.
 pub fn hash_path(beside: &Path) -> PathBuf {
     folder(beside).join("SHA256")
 }
 
-/// The sealed truth.
+/// Path of the sealed truth.
 pub fn truth_path(beside: &Path) -> PathBuf {
     folder(beside).join("truth.json")
 }

@@ -21,7 +21,7 @@ use crate::campaign::{read_json, to_json};
 
 /// Name and version of the format of one finished flight.
 pub const RESULT_SCHEMA: &str = "updraft.blind-flight/1";
-/// Seeds below this are for tuning, the others for scoring.
+/// First seed that is used for scoring; smaller ones are for tuning.
 pub const FIRST_SCORING_SEED: u64 = 1_000_000;
 /// Bits of a flight's seed that number the flights of one table.
 const FLIGHT_BITS: u32 = 20;
@@ -159,10 +159,10 @@ impl Settings {
     }
 }
 
-/// Where a table's files are.
+/// Folder of a table of blind flights.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// The table's folder.
+    /// Folder that holds the table's files.
     pub folder: PathBuf,
     /// Whether flights are kept when they are scored.
     pub keep: bool,

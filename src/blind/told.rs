@@ -1,4 +1,4 @@
-//! How a blind flight ended, in plain words and as one object.
+//! Outcome of a blind flight, in plain words and as one object.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

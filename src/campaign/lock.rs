@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use super::{CampaignError, index_path};
 use crate::base::file::{FileError, create_folder};
 
-/// A folder that this process alone writes into, until it is dropped.
+/// Lock on a folder, which this process alone writes into until the lock is dropped.
 #[derive(Debug)]
 pub struct FolderLock {
     path: PathBuf,
@@ -24,8 +24,8 @@ pub struct FolderLock {
 
 impl FolderLock {
     /// Locks the campaign that a folder belongs to: the folder itself, or the one above when the
-    /// folder is a flight of it. The folder is made if it is not there, and removed again if nothing
-    /// was written into it.
+    /// folder is a flight of it. The folder is created if it does not exist, and removed again if
+    /// nothing was written into it.
     ///
     /// # Errors
     ///
@@ -49,12 +49,12 @@ impl FolderLock {
         Ok(Self { path: full, locked: path, file, made })
     }
 
-    /// The folder that is locked: that of the whole campaign.
+    /// Folder that is locked: that of the whole campaign.
     pub fn folder(&self) -> &Path {
         &self.locked
     }
 
-    /// Whether the file system could lock the folder.
+    /// Whether the file system supports the lock; if not, the folder is not protected.
     pub fn is_held(&self) -> bool {
         self.file.is_some()
     }

@@ -1,4 +1,4 @@
-//! Names of the files in a campaign folder, and how its flights are found again.
+//! Names of the files in a campaign folder, and the list of its flights.
 //!
 //! A folder with one flight holds `plan.json` and its show files directly. A campaign of several
 //! flights holds `campaign.json` and one such folder per flight:
@@ -100,20 +100,29 @@ pub struct LogRecord {
 }
 
 impl LogRecord {
-    /// Takes down a log as it is on the disk.
+    /// Makes the record of a log from its file.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read.
     pub fn of(slot: u16, path: &Path) -> Result<Self, FileError> {
         let (bytes, crc32) = file_crc32(path)?;
         let file = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
         Ok(Self { slot, file, bytes, crc32: Some(crc32) })
     }
 
-    /// How a file differs from what was taken down, in words; `None`: it is the same.
+    /// Difference of a file from this record (size or CRC-32), in words; `None` if it has not
+    /// changed.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read.
     pub fn difference(&self, path: &Path) -> Result<Option<String>, FileError> {
         self.difference_by(path, || file_crc32(path).map(|(_, crc32)| crc32))
     }
 
-    /// As [`LogRecord::difference`], with the file's CRC-32 from `crc32`, which is asked only if it
-    /// matters.
+    /// Difference of a file from this record as by [`LogRecord::difference`], with the CRC-32 from
+    /// `crc32`, which is called only if the size leaves the question open.
     pub fn difference_by(
         &self,
         path: &Path,
@@ -131,25 +140,25 @@ impl LogRecord {
 /// Name and version of the flight record format.
 pub const FLIGHT_SCHEMA: &str = "updraft.flight/1";
 
-/// A campaign folder cannot be used.
+/// Error of using a campaign folder.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CampaignError {
     /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A JSON file is wrong.
+    /// A JSON file is not valid.
     #[error("{} is not valid: {reason}", path.shown())]
     Json {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Where and why.
+        /// Place and nature of the problem.
         reason: String,
     },
-    /// There is neither a plan nor a campaign.
+    /// The folder holds neither a plan nor a campaign.
     #[error("{} holds no plan.json and no campaign.json; make one with `updraft plan`", path.shown())]
     NoPlan {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
     /// Another process is writing into the folder.
@@ -158,27 +167,28 @@ pub enum CampaignError {
         path.shown()
     )]
     Busy {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
-    /// A file where a folder is expected.
+    /// The path is a file, not a folder.
     #[error("{} is not a campaign folder", path.shown())]
     NotFolder {
-        /// The file.
+        /// Path that is no folder.
         path: PathBuf,
     },
-    /// The folder already holds something else.
+    /// The folder already holds other content.
     #[error("{} already holds {what}; choose another folder or give --force", path.shown())]
     Occupied {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
-        /// What is there.
+        /// What the folder already holds, as an object of the sentence: "a campaign".
         what: String,
     },
 }
 
 impl CampaignError {
-    /// The same, with what to do about a file that cannot be understood.
+    /// Adds to the error of a file that cannot be understood what the user can do about it; other
+    /// errors stay as they are.
     #[must_use]
     pub fn with_remedy(self, remedy: &str) -> Self {
         match self {
@@ -190,72 +200,76 @@ impl CampaignError {
     }
 }
 
-/// The folder of one flight.
+/// Folder of one flight; its methods give the paths of the flight's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlightFolder(pub PathBuf);
 
 impl FlightFolder {
-    /// The files of a flight in this folder.
+    /// Takes a path as the folder of a flight; nothing is checked.
     pub fn at(folder: &Path) -> Self {
         Self(folder.to_owned())
     }
 
-    /// The template as resolved.
+    /// Path of the resolved template, `template.toml`.
     pub fn template(&self) -> PathBuf {
         self.0.join("template.toml")
     }
 
-    /// The vehicle it was planned for.
+    /// Path of the vehicle that the flight was planned for, `vehicle.toml`.
     pub fn vehicle(&self) -> PathBuf {
         self.0.join("vehicle.toml")
     }
 
-    /// The plan.
+    /// Path of the plan, `plan.json`.
     pub fn plan(&self) -> PathBuf {
         self.0.join("plan.json")
     }
 
-    /// The compiled show.
+    /// Path of the compiled show, `show.skyc`.
     pub fn skyc(&self) -> PathBuf {
         self.0.join("show.skyc")
     }
 
-    /// Folder of the binary shows.
+    /// Path of the folder of the binary shows.
     pub fn skyb_folder(&self) -> PathBuf {
         self.0.join("skyb")
     }
 
-    /// The binary show of a slot, among `count` slots.
+    /// Path of the binary show of a slot, among `count` slots.
     pub fn skyb(&self, slot: u16, count: usize) -> PathBuf {
         self.skyb_folder().join(numbered(slot, count, "skyb"))
     }
 
-    /// The CSV exchange format.
+    /// Path of the show in the CSV exchange format.
     pub fn csv(&self) -> PathBuf {
         self.0.join("show.csv.zip")
     }
 
-    /// Folder of the logs of real drones; see [`origin`] for simulated ones.
+    /// Path of the folder of real drones' logs; see [`origin`] for simulated ones.
     pub fn logs(&self) -> PathBuf {
         self.0.join("logs")
     }
 
-    /// The log of a slot's real drone, among `count` slots.
+    /// Path of the log of a slot's real drone, among `count` slots.
     pub fn log(&self, slot: u16, count: usize) -> PathBuf {
         self.logs().join(numbered(slot, count, "BIN"))
     }
 
-    /// Folder of the true air, for simulated flights.
+    /// Path of the folder that holds the true air of simulated flights.
     pub fn truth_folder(&self) -> PathBuf {
         self.0.join("truth")
     }
 
-    /// The true air that a slot met, among `count` slots.
+    /// Path of the true air that a slot met in simulation, among `count` slots.
     pub fn truth(&self, slot: u16, count: usize) -> PathBuf {
         self.truth_folder().join(numbered(slot, count, "csv"))
     }
 
     /// Reads the plan.
+    ///
+    /// # Errors
+    ///
+    /// If `plan.json` is missing, unreadable or not a plan.
     pub fn read_plan(&self) -> Result<Plan, CampaignError> {
         read_plan(&self.plan())
     }
@@ -267,7 +281,7 @@ fn numbered(slot: u16, count: usize, extension: &str) -> String {
     format!("{slot:0width$}.{extension}")
 }
 
-/// The index of a campaign.
+/// Path of a campaign's index, `campaign.json`.
 pub fn index_path(folder: &Path) -> PathBuf {
     folder.join("campaign.json")
 }
@@ -308,22 +322,22 @@ pub fn flights(folder: &Path) -> Result<Vec<FlightFolder>, CampaignError> {
     Err(CampaignError::NoPlan { path: folder.to_owned() })
 }
 
-/// The measured fields as CSV, in the folder of an analysis.
+/// Path of the measured fields as CSV, in the folder of an analysis.
 pub fn fields_csv(folder: &Path) -> PathBuf {
     folder.join("fields").join("updraft.csv")
 }
 
-/// The measured fields as Parquet, in the folder of an analysis.
+/// Path of the measured fields as Parquet, in the folder of an analysis.
 pub fn fields_parquet(folder: &Path) -> PathBuf {
     folder.join("fields").join("updraft.parquet")
 }
 
-/// The simulation study that belongs to a campaign.
+/// Path of the simulation study that belongs to a campaign.
 pub fn study_folder(folder: &Path) -> PathBuf {
     folder.join("study")
 }
 
-/// The results of the simulation study that a campaign may hold.
+/// Path of the results of the simulation study that a campaign may hold.
 pub fn study_result(folder: &Path) -> PathBuf {
     study_folder(folder).join("study.json")
 }
@@ -340,20 +354,20 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CampaignError> {
         .map_err(|error| CampaignError::Json { path: path.to_owned(), reason: error.to_string() })
 }
 
-/// Reads a plan's file; errors name the file and what is wrong.
+/// Reads a plan's file; errors name the file and the problem.
 pub fn read_plan(path: &Path) -> Result<Plan, CampaignError> {
     let bytes = read_whole(path, MAX_JSON_BYTES)?;
     parse_plan(&bytes).map_err(|reason| CampaignError::Json { path: path.to_owned(), reason })
 }
 
-/// A plan from its JSON, if its parts fit together; else why not.
+/// Reads a plan from its JSON and checks that its parts fit together; the error says what is wrong.
 pub fn parse_plan(bytes: &[u8]) -> Result<Plan, String> {
     let plan: Plan = parse::json(bytes).map_err(|error| error.to_string())?;
     validate_plan(&plan)?;
     Ok(plan)
 }
 
-/// Pretty JSON with a final newline.
+/// Serialises a value as indented JSON with a final newline.
 pub fn to_json<T: Serialize>(value: &T) -> io::Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(value)?;
     bytes.push(b'\n');

@@ -1,4 +1,5 @@
-//! Which logs of a flight: those of real drones in `logs/`, or those of a simulation in `simulated/`.
+//! Choice of a flight's logs: those of real drones in `logs/`, or those of a simulation in
+//! `simulated/`.
 //!
 //! They never share a folder, so that practice cannot stand in the field's place, nor the other way
 //! round. Campaigns of older versions kept simulated logs in `logs/`, with their record: they are
@@ -26,7 +27,7 @@ pub enum LogOrigin {
 }
 
 impl LogOrigin {
-    /// In a sentence: `Using the <words>`.
+    /// Name of the origin for the sentence `Using the <words>`.
     pub fn words(self) -> &'static str {
         match self {
             Self::Real => "logs of real drones (logs/)",
@@ -35,27 +36,27 @@ impl LogOrigin {
     }
 }
 
-/// The logs of a flight.
+/// Logs of a flight: their folder and their origin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogsAt {
-    /// Their folder, which may not be there yet.
+    /// Folder of the logs, which need not exist yet.
     pub folder: PathBuf,
-    /// Where they come from.
+    /// Source of the logs: real drones, or a simulation.
     pub origin: LogOrigin,
 }
 
 impl LogsAt {
-    /// The log of a slot, among `count` slots.
+    /// Path of the log of a slot, among `count` slots.
     pub fn log(&self, slot: u16, count: usize) -> PathBuf {
         self.folder.join(super::numbered(slot, count, "BIN"))
     }
 
-    /// How simulated logs came to be.
+    /// Path of the record of how simulated logs were made.
     pub fn record(&self) -> PathBuf {
         self.folder.join(RECORD_FILE)
     }
 
-    /// Reads how simulated logs came to be, if that is written down.
+    /// Reads the record of how simulated logs were made, if there is one.
     ///
     /// # Errors
     /// When the record cannot be read.
@@ -66,22 +67,22 @@ impl LogsAt {
 }
 
 impl FlightFolder {
-    /// Folder of simulated logs.
+    /// Path of the folder of simulated logs.
     pub fn simulated(&self) -> PathBuf {
         self.0.join("simulated")
     }
 
-    /// The simulated log of a slot, among `count` slots.
+    /// Path of the simulated log of a slot, among `count` slots.
     pub fn simulated_log(&self, slot: u16, count: usize) -> PathBuf {
         self.simulated().join(super::numbered(slot, count, "BIN"))
     }
 
-    /// How the simulated logs came to be.
+    /// Path of the record of how the flight's simulated logs were made.
     pub fn record(&self) -> PathBuf {
         self.simulated().join(RECORD_FILE)
     }
 
-    /// Reads how the simulated logs came to be, if there are any.
+    /// Reads the record of how the flight's simulated logs were made, if there is one.
     ///
     /// # Errors
     /// When the record cannot be read.
@@ -89,12 +90,12 @@ impl FlightFolder {
         self.simulated_at().read_record()
     }
 
-    /// The folder that a simulation writes into.
+    /// Logs that a simulation writes.
     pub fn simulated_at(&self) -> LogsAt {
         LogsAt { folder: self.simulated(), origin: LogOrigin::Simulated }
     }
 
-    /// The logs of one origin.
+    /// Logs of one origin.
     pub fn logs_of(&self, origin: LogOrigin) -> LogsAt {
         let old = LogsAt { folder: self.logs(), origin };
         match origin {
@@ -105,12 +106,12 @@ impl FlightFolder {
         }
     }
 
-    /// Whether logs of real drones are there.
+    /// Whether there are logs of real drones.
     pub fn has_real_logs(&self) -> bool {
         has_logs(&self.logs()) && !self.holds_simulated()
     }
 
-    /// Whether simulated logs are there.
+    /// Whether there are simulated logs.
     pub fn has_simulated_logs(&self) -> bool {
         has_logs(&self.simulated()) || self.holds_simulated()
     }
@@ -130,15 +131,15 @@ impl FlightFolder {
     }
 }
 
-/// Which logs of a campaign's flights are meant without a choice: those of real drones, if any flight
-/// has some; a practice flight never fills in for a flight of the field.
+/// Logs that are meant where the user does not choose: those of real drones, if any flight has
+/// some. A practice flight never stands in for a flight in the field.
 pub fn default_of(flights: &[FlightFolder]) -> LogOrigin {
     let is_real = flights.iter().any(FlightFolder::has_real_logs);
     let is_simulated = flights.iter().any(FlightFolder::has_simulated_logs);
     if is_simulated && !is_real { LogOrigin::Simulated } else { LogOrigin::Real }
 }
 
-/// The names of folders in a folder of logs that hold what is not of this flight.
+/// Whether a folder in a folder of logs holds what is not of this flight, by its name.
 pub fn is_set_aside(name: &str) -> bool {
     name == "older" || name.starts_with("flight-")
 }
@@ -152,7 +153,7 @@ fn has_logs(folder: &Path) -> bool {
     })
 }
 
-/// The logs in a folder, not in those below it; none where it cannot be read.
+/// Paths of the logs in a folder, without those in its subfolders; empty if it cannot be read.
 pub fn logs_in(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     entries.flatten().map(|entry| entry.path()).filter(|path| is_log(path)).collect()

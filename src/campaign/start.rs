@@ -21,7 +21,7 @@ use crate::base::time::GpsTime;
 pub const START_SCHEMA: &str = "updraft.start/2";
 /// The version before: only flights by streaming had a record, and of those only the time.
 const FIRST_SCHEMA: &str = "updraft.start/1";
-/// Name of the file in a folder of logs.
+/// Name of the start record's file in a folder of logs.
 pub const START_FILE: &str = "start.json";
 /// Beginning of the names of folders with the logs of earlier starts.
 const EARLIER: &str = "flight-";
@@ -85,7 +85,7 @@ fn first() -> u32 {
 }
 
 impl StartRecord {
-    /// A start; its number is given when it is written.
+    /// The record of a start; its number is given when it is written.
     pub fn new(
         made_by: String,
         start: GpsTime,
@@ -98,12 +98,12 @@ impl StartRecord {
         Self { schema, made_by, start, number: first(), authorized_unix_s, flying, drones }
     }
 
-    /// Where it is kept.
+    /// Path of the start record of a flight, in its folder of logs.
     pub fn path(folder: &FlightFolder) -> PathBuf {
         folder.logs().join(START_FILE)
     }
 
-    /// The drone of a slot.
+    /// Drone that flew a slot in this start, if one did.
     pub fn drone(&self, slot: u16) -> Option<&StartedDrone> {
         self.drones.iter().find(|drone| drone.slot == slot)
     }
@@ -132,7 +132,7 @@ impl StartRecord {
         Ok(self)
     }
 
-    /// Takes it back: nobody took off. The start before it is the latest again.
+    /// Withdraws this start, as nobody took off; the start before it is the latest again.
     ///
     /// # Errors
     /// When the folder cannot be read or written.
@@ -149,7 +149,7 @@ impl StartRecord {
         .map_err(|error| FileError::new("take back", &path, error).into())
     }
 
-    /// Reads the one of a flight's folder, if there is one.
+    /// Reads the start record of a flight's folder; `None` if there is none.
     ///
     /// # Errors
     /// When it cannot be read, or is none of this version.
@@ -157,7 +157,7 @@ impl StartRecord {
         Self::read_from(&Self::path(folder))
     }
 
-    /// Reads the one of a folder of logs, if there is one.
+    /// Reads the start record of a folder of logs; `None` if there is none.
     ///
     /// # Errors
     /// When it cannot be read, or is none of this version.
@@ -182,8 +182,8 @@ impl StartRecord {
     }
 }
 
-/// The starts of a campaign's other flights that were written down, earlier ones as well: name of the
-/// flight and GPS time of its show time 0. What cannot be read is left out.
+/// Recorded starts of a campaign's other flights, including earlier ones: name of the flight and
+/// GPS time of show time 0. Unreadable records are left out.
 pub fn other_starts(folder: &FlightFolder) -> Vec<(String, GpsTime)> {
     let siblings = folder.0.parent().filter(|parent| super::index_path(parent).is_file());
     let flights = siblings.and_then(|parent| super::flights(parent).ok()).unwrap_or_default();
@@ -201,12 +201,12 @@ pub fn other_starts(folder: &FlightFolder) -> Vec<(String, GpsTime)> {
     found
 }
 
-/// The folder of the logs of start `number`, once there is a later one.
+/// Path of the folder that holds the logs of start `number` once a later start exists.
 pub fn earlier_folder(logs: &Path, number: u32) -> PathBuf {
     logs.join(format!("{EARLIER}{number}"))
 }
 
-/// The folders of earlier starts below a folder of logs, in the order of their numbers.
+/// Folders of earlier starts below a folder of logs, in the order of their numbers.
 ///
 /// # Errors
 /// When the folder cannot be read; one that is not there has none.
@@ -241,7 +241,7 @@ fn earlier_starts(logs: &Path) -> Result<Vec<(u32, PathBuf)>, FileError> {
     Ok(starts.filter(|(_, path)| path.is_file()).collect())
 }
 
-/// `stem.extension`, or the first of `stem-2.extension`, ... that is free in a folder.
+/// First free path of `stem.extension`, `stem-2.extension` and so on in a folder.
 pub fn free_name(folder: &Path, stem: &str, extension: &str) -> PathBuf {
     let name = |number: u32| match number {
         1 => folder.join(format!("{stem}.{extension}")),

@@ -1,4 +1,4 @@
-//! Writes a flight's folder: template, vehicle, plan and the show in its three formats.
+//! Writer of a flight's folder: template, vehicle, plan and the show in its three formats.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use crate::base::file::{FileError, create_folder, sweep_partial, write_whole};
 use crate::mission::resolve::{Mission, ResolvedFlight};
 use crate::show::{Show, csv, skyb, skyc};
 
-/// A flight's files could not be made.
+/// Error of making or writing the files of a flight.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WriteError {
@@ -23,9 +23,9 @@ pub enum WriteError {
     /// The show does not fit into a `.skyb` file.
     #[error("{drone} does not fit into a .skyb file")]
     Skyb {
-        /// The drone.
+        /// Label of the drone.
         drone: String,
-        /// Why.
+        /// Reason why its show does not fit.
         #[source]
         source: skyb::SkybError,
     },
@@ -35,17 +35,17 @@ pub enum WriteError {
     /// The show does not fit into the CSV format.
     #[error("the show does not fit into the CSV format")]
     Csv(#[from] csv::CsvError),
-    /// JSON or TOML could not be made.
+    /// Content has no form as JSON or TOML.
     #[error("failed to write {what} as text: {reason}")]
     Text {
-        /// What.
+        /// Name of the content, for the message.
         what: &'static str,
-        /// Why not.
+        /// Reason why it has no text form.
         reason: String,
     },
 }
 
-/// The files of one flight, made but not yet written.
+/// Contents of the files of one flight, made but not yet written.
 #[derive(Clone, Debug)]
 pub struct FlightFiles {
     template: Vec<u8>,
@@ -57,7 +57,7 @@ pub struct FlightFiles {
 }
 
 impl FlightFiles {
-    /// Makes the files; drones in parallel, bytes independent of the number of threads.
+    /// Makes the contents, drones in parallel; the bytes do not depend on the number of threads.
     pub fn of(flight: &ResolvedFlight, show: &Show) -> Result<Self, WriteError> {
         let text = |what, reason: String| WriteError::Text { what, reason };
         let skyb = show
@@ -80,17 +80,17 @@ impl FlightFiles {
         })
     }
 
-    /// The compiled show.
+    /// Content of the compiled show, a `.skyc` file.
     pub fn skyc(&self) -> &[u8] {
         &self.skyc
     }
 
-    /// The plan's JSON.
+    /// Content of the plan's JSON file.
     pub fn plan(&self) -> &[u8] {
         &self.plan
     }
 
-    /// The binary shows, in slot order.
+    /// Contents of the binary shows, in slot order.
     pub fn skyb(&self) -> &[skyb::SkybFile] {
         &self.skyb
     }
@@ -130,7 +130,7 @@ fn remove_others(folder: &FlightFolder, count: usize) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Folder of each flight of a mission below `root`: `root` itself for a single flight.
+/// Folders of the flights of a mission below `root`: `root` itself for a single flight.
 pub fn folders(root: &std::path::Path, mission: &Mission) -> Vec<FlightFolder> {
     if mission.campaign_text.is_none() {
         return vec![FlightFolder(root.to_owned())];

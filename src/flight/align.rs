@@ -1,4 +1,4 @@
-//! From board time to show time.
+//! Conversion of board time to show time.
 
 use super::channels::Messages;
 use super::pick::PERFORMING;

@@ -1,4 +1,4 @@
-//! Message rows to channels over board time: names, signs and units of all firmwares.
+//! Channels over board time from the rows of messages: names, signs and units of all firmwares.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

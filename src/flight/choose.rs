@@ -1,5 +1,5 @@
-//! Which flight of a log is analysed, where it holds several: two boots in one file, or two take-offs
-//! in one boot. The firmware goes on in the same file when it is armed again.
+//! Choice of the flight to analyse in a log that holds several: two boots in one file, or two
+//! take-offs in one boot. The firmware continues the file when it is armed again.
 
 use std::path::Path;
 

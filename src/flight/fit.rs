@@ -1,4 +1,4 @@
-//! How much of a plan a flight flew.
+//! Share of a plan that a flight flew.
 
 use super::Flight;
 use super::align::planned_up_mps;

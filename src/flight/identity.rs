@@ -1,5 +1,5 @@
-//! What a log says of itself: who wrote it, in which boots, and when its shows began. Whether it is of
-//! a given start is asked here, and nowhere else.
+//! Identity of a log: who wrote it, in which boots, and when its shows began. Whether it belongs to
+//! a given start is decided here and nowhere else.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use crate::base::frame::Geodetic;
 use crate::base::time::GpsTime;
 use crate::log::{Log, LogError};
 
-/// A show that began within this of a start is the show of that start, s. A start is told to the drones
-/// in whole seconds, and the clocks of logs are known to some tenths.
+/// Largest difference between the start of a show and a given start at which they are one start, s.
+/// The drones get a start in whole seconds, and the clocks of logs are known to some tenths.
 pub const SAME_START_S: f64 = 5.0;
 /// A first fix this long after arming is still near home, s.
 const SOON_S: f64 = 10.0;
@@ -29,65 +29,68 @@ const FLOWN_STAGES: [f64; 2] = [3.0, 4.0];
 /// ORGN rows of this type are of the place where the vehicle was armed.
 const HOME: f64 = 1.0;
 
-/// What a log says of itself.
+/// Identity of a log: its drone, its boots and their shows, and what casts doubt on them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Identity {
     /// MAVLink system id, if the log has the parameter.
     pub system_id: Option<u8>,
-    /// Where the vehicle stood when it was armed for its flight: (latitude, longitude), degrees.
-    /// Without a flight, the first place with a 3-D fix; `None` as well if it was in the air before
-    /// it had one.
+    /// Place where the vehicle stood when it was armed for its flight: (latitude, longitude),
+    /// degrees. Without a flight, the first place with a 3-D fix; `None` as well if it was in the
+    /// air before it had one.
     pub home_deg: Option<(f64, f64)>,
     /// Whether the log holds a flight: motors armed for some seconds, with their outputs.
     pub flew: bool,
     /// The boots that the log holds, in its order; nearly always one.
     pub boots: Vec<Boot>,
-    /// What tells that it is only the beginning of a log.
+    /// Sign that the log is only the beginning of one, as a clause; `None` if there is none.
     pub cut: Option<&'static str>,
-    /// Bytes in it that are no message: it was damaged on its way or on its card.
+    /// Bytes in the log that belong to no message: damage on the way or on the card.
     pub damaged_bytes: u64,
-    /// Why the clocks of its boots cannot be told apart, if they cannot.
+    /// Reason why the clocks of several boots cannot be told apart, as a clause; `None` if they
+    /// can.
     pub doubt: Option<&'static str>,
 }
 
 /// One boot of the autopilot, as far as the log holds it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Boot {
-    /// When its board clock was 0, by its satellites.
+    /// Instant at which the board clock was 0, by the satellites.
     pub booted: Option<GpsTime>,
-    /// First and last time by its satellites.
+    /// First and last time of the boot, by the satellites.
     pub span: Option<(GpsTime, GpsTime)>,
-    /// The home that the autopilot set, or the first fix.
+    /// Home that the autopilot set, or the first fix.
     pub home: Option<Geodetic>,
     /// Starts that the show clock ran for, in the order of their first rows; empty where there are no
     /// SHOW rows with a clock.
     pub shows: Vec<Show>,
-    /// When its motors were armed for some seconds.
+    /// Intervals in which the motors were armed for some seconds, (start, end).
     pub armed: Vec<(GpsTime, GpsTime)>,
 }
 
-/// A start that a drone knew of.
+/// A start that a drone knew.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Show {
     /// GPS time of show time 0.
     pub start: GpsTime,
-    /// Whether it took off for it.
+    /// Whether the drone took off for the start.
     pub flown: bool,
 }
 
-/// Whether a log is of a start.
+/// Answer to the question whether a log belongs to a start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Belongs {
-    /// It holds that time, and nothing in it contradicts.
+    /// The log covers the start, and nothing in it contradicts.
     Yes,
-    /// It is of something else; what it is, as a clause: `its show began 1,204 s before this flight's start`.
+    /// The log is of something else, named by a clause: `its show began 1,204 s before this
+    /// flight's start`.
     No(String),
-    /// The log does not say enough; why, as a clause.
+    /// The log does not say enough, for the reason given as a clause.
     Unknown(String),
 }
 
 impl Identity {
-    /// Why it may not hold all of its flight, as a clause; `None`: nothing says so.
+    /// Reason to think that the log does not hold all of its flight, as a clause; `None` if there
+    /// is none.
     pub fn incomplete(&self) -> Option<String> {
         let damaged = || {
             let bytes = self.damaged_bytes;
@@ -96,7 +99,7 @@ impl Identity {
         self.cut.map(str::to_owned).or_else(damaged)
     }
 
-    /// Name of the flight that it is of, of flights by name and start.
+    /// Name of the flight that the log belongs to, among flights given by name and start.
     pub fn of_any<'a>(&self, starts: &'a [(String, GpsTime)]) -> Option<&'a str> {
         let found = starts.iter().find(|(_, start)| self.belongs_to(*start) == Belongs::Yes);
         found.map(|(name, _)| name.as_str())
@@ -115,14 +118,14 @@ impl Identity {
         self.boots.iter().flat_map(|boot| &boot.shows)
     }
 
-    /// First and last time by its satellites.
+    /// First and last time of the log, by the satellites.
     pub fn span(&self) -> Option<(GpsTime, GpsTime)> {
         let spans = || self.boots.iter().filter_map(|boot| boot.span);
         let first = spans().map(|(first, _)| first).min()?;
         Some((first, spans().map(|(_, last)| last).max()?))
     }
 
-    /// The home of the boot that knows of this start, else of the last one that has any.
+    /// Home of the boot that knows a start, otherwise of the last boot that has one.
     pub fn home(&self, start: Option<GpsTime>) -> Option<Geodetic> {
         let knows =
             |boot: &&Boot| start.is_some_and(|start| boot.belongs_to(start, None) == Belongs::Yes);
@@ -130,12 +133,13 @@ impl Identity {
         of_start.or_else(|| self.boots.iter().rev().find_map(|boot| boot.home))
     }
 
-    /// The boot that is of a start.
+    /// Boot that belongs to a start.
     pub fn boot_of(&self, start: GpsTime) -> Option<&Boot> {
         self.boots.iter().find(|boot| boot.belongs_to(start, None) == Belongs::Yes)
     }
 
-    /// How far a start is from what the log is of, s: from its nearest show, else from its time.
+    /// Time between a start and the nearest show of the log, s; without a show, between the start
+    /// and the time that the log covers.
     pub fn away_s(&self, start: GpsTime) -> f64 {
         self.boots.iter().map(|boot| boot.away_s(start)).fold(f64::INFINITY, f64::min)
     }
@@ -236,7 +240,7 @@ pub(crate) fn how(later_s: f64) -> String {
     format!("{amount} {side}")
 }
 
-/// Reads what a log says of itself. Only the columns that are needed are decoded: a log of 20 MB takes
+/// Reads the identity of a log. Only the columns that are needed are decoded: a log of 20 MB takes
 /// some tens of milliseconds.
 pub fn identify(log: &Log) -> Identity {
     let all = Messages::read_identity(log);

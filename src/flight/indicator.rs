@@ -1,4 +1,4 @@
-//! What stands for rotor effort.
+//! Indicators of rotor effort: pulse width, rotor speed, electrical power.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,7 @@ pub enum Indicator {
 }
 
 impl Indicator {
-    /// In words.
+    /// Name of the indicator for people: "rotor speed".
     pub fn words(self) -> &'static str {
         match self {
             Self::Pulse => "rotor control pulse width",
@@ -30,7 +30,7 @@ impl Indicator {
         }
     }
 
-    /// Its unit.
+    /// Symbol of the indicator's unit: us, rpm or W.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Pulse => "us",
@@ -39,7 +39,7 @@ impl Indicator {
         }
     }
 
-    /// Its value without thrust, in its unit.
+    /// Value of the indicator at which a rotor gives no thrust, in the indicator's unit.
     pub fn without_thrust(self) -> f64 {
         match self {
             Self::Pulse => 1000.0,
@@ -61,7 +61,8 @@ impl Indicator {
         }
     }
 
-    /// Rounding of one sample: a standard deviation, in its unit. No window is known better.
+    /// Standard deviation of the rounding of one sample, in the indicator's unit. No window is
+    /// known better.
     pub fn quantum(self) -> f64 {
         match self {
             Self::Pulse => 1.0 / 12.0_f64.sqrt(),

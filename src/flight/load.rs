@@ -1,4 +1,4 @@
-//! Puts a flight together from the channels of a log.
+//! Assembly of a flight from the channels of a log.
 
 use std::path::Path;
 

@@ -46,28 +46,28 @@ pub use indicator::Indicator;
 pub struct Series {
     /// Show time of each sample, s, increasing.
     pub time_s: Vec<f64>,
-    /// The samples.
+    /// Value of each sample, in the unit of the series.
     pub value: Vec<f64>,
 }
 
-/// What one drone's log says about one flight.
+/// One drone's flight as its log tells it: time series in show time.
 #[derive(Clone, Debug, Default)]
 pub struct Flight {
-    /// The log file.
+    /// Path of the log file.
     pub source: PathBuf,
     /// MAVLink system id (`SYSID_THISMAV`), if the log has it.
     pub system_id: Option<u8>,
-    /// How board time became show time.
+    /// Conversion from board time to show time.
     pub clock: Clock,
     /// Vertical velocity V_U, m/s, up positive (EKF).
     pub velocity_up_mps: Series,
     /// Height above home (EKF origin), m, up positive.
     pub height_m: Series,
-    /// Position north and east of the EKF origin, m.
+    /// Position north of the EKF origin, m.
     pub north_m: Series,
-    /// See [`Flight::north_m`].
+    /// Position east of the EKF origin, m.
     pub east_m: Series,
-    /// What [`Flight::pulse_us`] holds.
+    /// Indicator of rotor effort that [`Flight::pulse_us`] holds.
     pub indicator: Indicator,
     /// Rotor control pulse width: mean over the motors, us; or another [`Indicator`] in its unit.
     pub pulse_us: Series,
@@ -75,9 +75,9 @@ pub struct Flight {
     pub pulse_max_us: Series,
     /// Smallest motor output over time, us.
     pub pulse_min_us: Series,
-    /// Roll, radians.
+    /// Roll, rad, right side down positive.
     pub roll_rad: Series,
-    /// Pitch, radians.
+    /// Pitch, rad, nose up positive.
     pub pitch_rad: Series,
     /// Heading, degrees clockwise from north; empty if the log has none. It jumps at north.
     pub yaw_deg: Series,
@@ -85,9 +85,9 @@ pub struct Flight {
     pub desired_up_mps: Option<Series>,
     /// Desired horizontal speed, m/s, where the log has it (tells horizontal legs from hovers).
     pub desired_horizontal_mps: Option<Series>,
-    /// Battery voltage, V.
+    /// Battery voltage, V, if the log has it.
     pub voltage_v: Option<Series>,
-    /// Battery current, A.
+    /// Battery current, A, if the log has it.
     pub current_a: Option<Series>,
     /// True vertical velocity of the air, m/s, up positive, where something beside the drone measured
     /// it.
@@ -99,30 +99,31 @@ pub struct Flight {
     pub resistance_ohm: Option<f64>,
     /// Show stage (0..9), at its changes: (show time s, stage).
     pub stages: Vec<(f64, u8)>,
-    /// When motors were armed, (start, end) show time s.
+    /// Intervals in which the motors were armed, (start, end) show time, s.
     pub armed_s: Vec<(f64, f64)>,
     /// Pulse widths between which the autopilot keeps a spinning motor, us: (lowest, highest).
     pub pulse_limits_us: (f64, f64),
     /// Place where the vehicle was armed or first had a fix: (latitude, longitude), degrees.
     pub first_fix_deg: Option<(f64, f64)>,
-    /// How high above its home the vehicle was when the log ended with its motors running, m;
-    /// `None`: the log goes on until the vehicle is on the ground.
+    /// Height above home at which the vehicle was when the log ended with its motors running, m;
+    /// `None` if the log goes on until the vehicle is on the ground.
     pub cut_off_at_m: Option<f64>,
-    /// What the reader met besides good messages.
+    /// Statistics of the log's reader: messages, damage, unknown types.
     pub scan: ScanStats,
-    /// What is doubtful about this log, one sentence each.
+    /// Doubts about this log, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// What is known about a flight besides its log.
+/// Knowledge about a flight from beside its log.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlightOptions<'a> {
     /// GPS time of show time 0: which flight of a log with several is meant, and when it began in
     /// logs without SHOW rows.
     pub start: Option<GpsTime>,
-    /// What stands for rotor effort.
+    /// Indicator of rotor effort to read.
     pub indicator: Indicator,
-    /// What the drone was to fly, for logs without SHOW rows and a start time.
+    /// Planned segments, which give the show time of logs that have neither SHOW rows nor a start
+    /// time.
     pub segments: Option<&'a [Segment]>,
 }
 
@@ -139,19 +140,19 @@ pub enum FlightError {
         source_path.shown()
     )]
     Empty {
-        /// The log file.
+        /// Path of the log file.
         source_path: PathBuf,
     },
     /// A message that the analysis cannot do without is missing.
     #[error("{}: the log has no {what} ({messages}); {remedy}", source_path.shown())]
     Missing {
-        /// The log file.
+        /// Path of the log file.
         source_path: PathBuf,
-        /// What is missing, for people.
+        /// Name of the missing quantity, for people.
         what: &'static str,
         /// Message names that would carry it.
         messages: &'static str,
-        /// What to do.
+        /// Remedy, as a clause.
         remedy: &'static str,
     },
     /// A column that the analysis cannot do without has no number in it.
@@ -161,7 +162,7 @@ pub enum FlightError {
         source_path.shown()
     )]
     NoNumbers {
-        /// The log file.
+        /// Path of the log file.
         source_path: PathBuf,
         /// The columns, as `MESSAGE.FIELD`.
         columns: String,
@@ -173,26 +174,26 @@ pub enum FlightError {
         source_path.shown()
     )]
     OutOfRange {
-        /// The log file.
+        /// Path of the log file.
         source_path: PathBuf,
         /// The message or column.
         columns: String,
-        /// What would be believed, for people.
+        /// Range of believable values, for people.
         range: &'static str,
     },
     /// The vehicle never armed or never left the ground.
     #[error("{}: no flight in this log: {reason}", source_path.shown())]
     NoFlight {
-        /// The log file.
+        /// Path of the log file.
         source_path: PathBuf,
-        /// What was seen instead.
+        /// Observation that the log offers instead of a flight, as a clause.
         reason: String,
     },
 }
 
 impl Flight {
-    /// What of the flight or of its log is lost, one phrase each, as in [`Flight::warnings`]: the
-    /// log ends in the air, or its reader skipped damage. Empty: nothing.
+    /// Losses of this flight, one phrase each as in [`Flight::warnings`]: a log that ends in the
+    /// air, or damage that its reader skipped. Empty if nothing is lost.
     pub fn losses(&self) -> Vec<String> {
         let cut_off = self.cut_off_at_m.map(load::cut_off);
         cut_off.into_iter().chain(load::damage(&self.scan)).collect()

@@ -3,7 +3,7 @@
 use super::Series;
 
 impl Series {
-    /// Number of samples.
+    /// Number of samples in the series.
     pub fn len(&self) -> usize {
         self.time_s.len().min(self.value.len())
     }

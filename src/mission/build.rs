@@ -1,4 +1,4 @@
-//! Puts a plan together from a template and a vehicle.
+//! Building of a plan from a template and a vehicle.
 
 use super::error::TemplateError;
 use super::formation::{assign_groups, lay_out};

@@ -1,4 +1,4 @@
-//! Errors of templates, drawn with the line they are about.
+//! Errors of templates, drawn with the line that they point at.
 
 use std::fmt;
 use std::ops::Range;
@@ -7,23 +7,23 @@ use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
 use crate::base::plain::plain;
 
-/// A template cannot be used: where, why, and what is allowed.
+/// Error of a template: its place, its reason, and what is allowed there.
 #[derive(Clone, Debug)]
 pub struct TemplateError {
-    /// File name, as given by the user.
+    /// Name of the template's file, as given by the user.
     pub path: String,
-    /// The text the span points into.
+    /// Text of the template.
     pub text: String,
     /// Bytes of `text` that the error is about.
     pub span: Option<Range<usize>>,
-    /// What is wrong.
+    /// Statement of the problem, one sentence.
     pub message: String,
-    /// What to do or what is allowed.
+    /// Remedy, or the values that are allowed.
     pub help: Option<String>,
 }
 
 impl TemplateError {
-    /// An error about a place in a text.
+    /// An error at a place in a template's text.
     pub fn new(
         path: &str,
         text: &str,
@@ -39,7 +39,7 @@ impl TemplateError {
         }
     }
 
-    /// Adds what to do or what is allowed.
+    /// Adds the remedy, or the values that are allowed.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());

@@ -1,4 +1,4 @@
-//! Lays the fleet out on the ground.
+//! Layout of the fleet on the ground.
 
 use super::error::TemplateError;
 use super::plan::{Grid, Slot};

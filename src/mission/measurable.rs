@@ -1,4 +1,4 @@
-//! Whether a plan can measure what it is flown for: windows to look at, and speeds to tell apart.
+//! Check that a plan can measure what it is flown for: it needs windows, and speeds that differ.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ const MIN_SPEEDS: usize = 2;
 /// Speeds closer than this are the same, m/s.
 const SAME_SPEED_MPS: f64 = 0.01;
 
-/// Names of its findings.
+/// Names of the findings of this check.
 pub const NAMES: [&str; 2] = ["ladder-speeds", "ladder-window"];
 
 /// Warns of segments that the analysis will leave out, and of ladders from which no law can come.

@@ -75,7 +75,7 @@ pub struct Site {
 }
 
 impl Site {
-    /// The show frame of this site.
+    /// The show frame at this site.
     pub fn frame(&self) -> ShowFrame {
         ShowFrame {
             origin: Geodetic {
@@ -207,19 +207,19 @@ pub struct Window {
 }
 
 impl Window {
-    /// Duration, s.
+    /// Duration of the window, s.
     pub fn duration_s(self) -> f64 {
         self.end_ms.saturating_sub(self.start_ms) as f64 / 1000.0
     }
 }
 
 impl Plan {
-    /// The slot with this number (slots count from 1).
+    /// Slot by its number, from 1; `None` if the plan has no such slot.
     pub fn slot(&self, slot: u16) -> Option<&Slot> {
         self.slots.iter().find(|candidate| candidate.slot == slot)
     }
 
-    /// The segments that a slot flies.
+    /// Segments that a slot flies: those of its group.
     pub fn segments(&self, slot: &Slot) -> &[Segment] {
         self.groups.get(usize::from(slot.group)).map_or(&[], |group| &group.segments)
     }

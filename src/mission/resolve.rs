@@ -1,4 +1,4 @@
-//! Finds template files, applies overrides, and resolves a mission into plans.
+//! Resolution of a template's name and overrides into a mission with its plans.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ use crate::vehicle::{Vehicle, VehicleError};
 /// Largest template file that is read, bytes.
 const MAX_TEMPLATE_BYTES: u64 = 4 << 20;
 
-/// The templates that come with the program: file name and text.
+/// Templates that come with the program: file name and text.
 pub const BUILTIN: &[(&str, &str)] = &[
     ("calibration.toml", include_str!("../../templates/calibration.toml")),
     (
@@ -33,50 +33,50 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("scan-campaign.toml", include_str!("../../templates/scan-campaign.toml")),
 ];
 
-/// Where the built-in templates are, latitude and longitude in degrees: a field in Hungary, which is
-/// an example and nobody's own.
+/// Origin of the built-in templates, latitude and longitude in degrees: a field in Hungary, which
+/// is an example and nobody's own.
 pub const EXAMPLE_ORIGIN: [f64; 2] = [47.4733, 19.0621];
 
-/// One `KEY=VALUE` that replaces a value of a template.
+/// A `KEY=VALUE` that replaces a value of a template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Override {
     /// Dotted path (`grid.rows`, `steps.2.speed_mps`) or the name of a parameter (`leg_s`).
     pub key: String,
-    /// The new value, or `None` to remove the key.
+    /// The new value; `None` removes the key.
     pub value: Option<Toml>,
 }
 
-/// Why a mission could not be resolved.
+/// Error of making a mission out of a template, its overrides and a vehicle.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum MissionError {
     /// The template itself is wrong.
     #[error(transparent)]
     Template(#[from] TemplateError),
-    /// A file could not be read.
+    /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
     /// The vehicle is unknown or its file is wrong.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
-    /// There is no such template.
+    /// The name is neither a file nor a built-in template.
     #[error("there is no template {}; built in are {}", plain(name), names().join(", "))]
     NoTemplate {
-        /// As asked for.
+        /// Name of the template, as asked for.
         name: String,
     },
-    /// A template file is not text.
+    /// A template file is not UTF-8 text.
     #[error("{} is not UTF-8 text", path.shown())]
     NotText {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// An override does not fit the template.
     #[error("cannot set {}: {}", plain(key), plain(reason))]
     Override {
-        /// As asked for.
+        /// Key of the override, as asked for.
         key: String,
-        /// Why not.
+        /// Reason why it cannot be set.
         reason: String,
     },
 }
@@ -84,24 +84,24 @@ pub enum MissionError {
 /// A mission: one flight, or a campaign of several.
 #[derive(Clone, Debug)]
 pub struct Mission {
-    /// Short name.
+    /// Short name of the mission, used for folders.
     pub name: String,
-    /// Title for people.
+    /// Title of the mission, for people.
     pub title: String,
-    /// Text of the campaign template, when there are several flights.
+    /// Text of the campaign template; `None` for a single flight.
     pub campaign_text: Option<String>,
-    /// The flights.
+    /// Flights of the mission, in the order of the campaign; one if there is no campaign.
     pub flights: Vec<ResolvedFlight>,
 }
 
 /// A flight's template after overrides, and its plan.
 #[derive(Clone, Debug)]
 pub struct ResolvedFlight {
-    /// The template as resolved: reading it again gives the same plan.
+    /// Text of the template with all overrides applied: reading it again gives the same plan.
     pub template_text: String,
-    /// The vehicle it was planned for.
+    /// Vehicle that the flight was planned for.
     pub vehicle: Vehicle,
-    /// The plan.
+    /// Plan of the flight.
     pub plan: Plan,
 }
 
@@ -123,12 +123,12 @@ impl Override {
         Ok(Self { key: key.to_owned(), value: Some(parsed) })
     }
 
-    /// An override by path and value.
+    /// An override of the key by a value.
     pub fn new(key: &str, value: impl Into<Toml>) -> Self {
         Self { key: key.to_owned(), value: Some(value.into()) }
     }
 
-    /// Removes a key if it is there.
+    /// An override that removes the key, if it is there.
     pub fn remove(key: &str) -> Self {
         Self { key: key.to_owned(), value: None }
     }

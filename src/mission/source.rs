@@ -1,4 +1,4 @@
-//! Reads values from a template, with errors that point at them.
+//! Values of a template, read with errors that point at them.
 
 use std::ops::{Range, RangeInclusive};
 

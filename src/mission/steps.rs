@@ -1,4 +1,4 @@
-//! Expands a template's steps into the segments of a timetable.
+//! Expansion of a template's steps into the segments of a timetable.
 
 use std::ops::Range;
 

@@ -21,21 +21,21 @@ pub const TEMPLATE_SCHEMA: &str = "updraft.template/1";
 /// A template file: one flight, or a campaign of several.
 #[derive(Clone, Debug)]
 pub enum Template {
-    /// One flight.
+    /// A template of a single flight.
     Flight(Box<FlightTemplate>),
-    /// Several flights of the same fleet.
+    /// A template of several flights with one fleet.
     Campaign(CampaignTemplate),
 }
 
-/// Several flights of the same fleet, each from its own template.
+/// A campaign: several flights with one fleet, each from its own template.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignTemplate {
-    /// Format name and version.
+    /// Name and version of the format: `updraft.template/1`.
     pub schema: Spanned<String>,
-    /// Short name.
+    /// Short name of the campaign, used for folders.
     pub name: Spanned<String>,
-    /// Title for people.
+    /// Title of the campaign, for people.
     pub title: String,
     /// Overrides applied to every flight: key path to value.
     #[serde(default)]
@@ -55,37 +55,37 @@ pub struct FlightReference {
     pub set: toml::Table,
 }
 
-/// What one flight's TOML file states.
+/// A flight, as its TOML file states it.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlightTemplate {
-    /// Format name and version: `updraft.template/1`.
+    /// Name and version of the format: `updraft.template/1`.
     pub schema: Spanned<String>,
     /// Short name, used for folders.
     pub name: Spanned<String>,
-    /// Title for people.
+    /// Title of the flight, for people.
     pub title: String,
-    /// What the flight is for.
+    /// Purpose of the flight, which decides what the analysis makes of it.
     pub purpose: Purpose,
     /// Vehicle: a built-in name or a path to a vehicle file.
     pub vehicle: Spanned<String>,
-    /// Where.
+    /// Place of the show.
     pub site: SiteTemplate,
-    /// Who stands where.
+    /// Start positions of the drones, and their spacing.
     pub grid: GridTemplate,
-    /// First climb.
+    /// Climb from the ground to the height at which the steps begin.
     #[serde(default)]
     pub takeoff: TakeoffTemplate,
-    /// Last descent.
+    /// Descent at the end, from the last step to the height at which the show ends.
     #[serde(default)]
     pub landing: LandingTemplate,
-    /// How velocities change.
+    /// Changes of velocity between the segments.
     #[serde(default)]
     pub motion: MotionTemplate,
     /// Fence around the show.
     #[serde(default)]
     pub fence: FenceTemplate,
-    /// Where the analysis looks.
+    /// Part of each segment that the analysis looks at.
     #[serde(default)]
     pub window: WindowTemplate,
     /// Limits that differ from the vehicle's.
@@ -94,17 +94,17 @@ pub struct FlightTemplate {
     /// Named numbers, used in steps as `"$name"`.
     #[serde(default)]
     pub parameters: BTreeMap<String, Spanned<Quantity>>,
-    /// Drones that fly the same steps with a time offset; absent: all together.
+    /// Groups that fly the steps at different times; if empty, all drones fly together.
     #[serde(default)]
     pub groups: Vec<GroupTemplate>,
-    /// What is flown between take-off and landing.
+    /// Steps between take-off and landing, in order.
     pub steps: Vec<Spanned<StepTemplate>>,
-    /// What the crew must prepare or know.
+    /// Preparations and warnings for the crew, one sentence each.
     #[serde(default)]
     pub briefing: Vec<String>,
 }
 
-/// Where the show frame is.
+/// Place and orientation of the show frame.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SiteTemplate {
@@ -112,7 +112,7 @@ pub struct SiteTemplate {
     pub origin: Spanned<[f64; 2]>,
     /// Ground height above mean sea level, m.
     pub ground_amsl_m: Spanned<f64>,
-    /// Whether that height is another place's, as nobody gave the one of this origin.
+    /// Whether the ground height is that of another place, because none was given for this origin.
     #[serde(default)]
     pub ground_assumed: bool,
     /// Degrees clockwise from north to the show's x axis.
@@ -141,7 +141,7 @@ pub struct GridTemplate {
 pub struct TakeoffTemplate {
     /// Height at which the steps begin, m.
     pub altitude_m: Spanned<f64>,
-    /// Climb speed, m/s.
+    /// Climb speed of the take-off, m/s.
     pub speed_mps: Spanned<f64>,
 }
 
@@ -151,11 +151,11 @@ pub struct TakeoffTemplate {
 pub struct LandingTemplate {
     /// Height at which the show ends, m.
     pub end_altitude_m: Spanned<f64>,
-    /// Descent speed, m/s.
+    /// Descent speed of the landing, m/s.
     pub speed_mps: Spanned<f64>,
 }
 
-/// How velocities change between segments.
+/// Changes of velocity between segments.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionTemplate {
@@ -182,9 +182,9 @@ pub struct FenceTemplate {
 pub struct WindowTemplate {
     /// Length counted back from the end of a leg, s.
     pub length_s: Spanned<f64>,
-    /// Left out at the end, s.
+    /// Time left out at the end of a segment, s.
     pub trim_s: Spanned<f64>,
-    /// Left out at the start, s.
+    /// Time left out at the start of a segment, s.
     pub settle_s: Spanned<f64>,
 }
 
@@ -212,7 +212,7 @@ pub struct LimitsTemplate {
     pub endurance_reserve: Option<Spanned<f64>>,
 }
 
-/// Drones that fly the same steps with a time offset.
+/// A group of drones that fly all steps with one time offset.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GroupTemplate {
@@ -221,12 +221,12 @@ pub struct GroupTemplate {
     /// Which drones: `all`, `checkerboard-even`, `checkerboard-odd`, `rows-even`, `rows-odd`,
     /// `columns-even`, `columns-odd`, or a list of slot numbers.
     pub select: Spanned<Selection>,
-    /// How much later this group flies, s.
+    /// Delay of the group's steps, s.
     #[serde(default = "zero_quantity")]
     pub offset_s: Spanned<Quantity>,
 }
 
-/// Which drones belong to a group.
+/// Choice of the drones that belong to a group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Selection {
     /// A named pattern of the grid.
@@ -239,14 +239,14 @@ pub enum Selection {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepTemplate {
-    /// What to do.
+    /// Manoeuvre of the step; it decides which of the other keys apply.
     pub kind: Spanned<StepKind>,
     /// `climb`: target height above home, m.
     pub to_m: Option<Spanned<Quantity>>,
     /// `climb`, `leg`, `horizontal`: speed, m/s. Inside a `repeat` over speeds, absent means that
     /// speed.
     pub speed_mps: Option<Spanned<Quantity>>,
-    /// `leg`, `hover`, `horizontal`: how long, s.
+    /// `leg`, `hover`, `horizontal`: duration, s.
     pub duration_s: Option<Spanned<Quantity>>,
     /// `leg`: up or down.
     pub direction: Option<Spanned<Direction>>,
@@ -260,7 +260,7 @@ pub struct StepTemplate {
     pub steps: Option<Vec<Spanned<StepTemplate>>>,
 }
 
-/// The kinds of steps.
+/// Kinds of steps, as `kind` names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StepKind {
@@ -280,22 +280,22 @@ pub enum StepKind {
     Rejoin,
 }
 
-/// Up or down.
+/// Sense of a vertical leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
-    /// Upwards.
+    /// A climb, towards positive z.
     Up,
-    /// Downwards.
+    /// A descent, towards negative z.
     Down,
 }
 
 /// A number, a list of numbers, or the name of a parameter (`"$name"`).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Quantity {
-    /// A number.
+    /// A single number, as written.
     Number(f64),
-    /// Numbers.
+    /// A list of numbers.
     List(Vec<f64>),
     /// Reference to `[parameters]`, without the `$`.
     Reference(String),

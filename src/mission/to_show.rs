@@ -7,7 +7,7 @@ use crate::show::lights::{self, LightStep, Rgb};
 use crate::show::{Cue, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation};
 
 impl Plan {
-    /// What a slot flies.
+    /// Trajectory of a slot, in the show frame.
     ///
     /// Constant velocities become lines, ramps of constant acceleration become cubic Bézier pieces
     /// that are exactly that parabola.
@@ -75,7 +75,7 @@ fn lights(segments: &[plan::Segment]) -> Vec<u8> {
 }
 
 impl Plan {
-    /// Its show.
+    /// The show of this plan: a trajectory and a light program for every slot, cues, and the fence.
     pub fn to_show(&self) -> Show {
         let plan = self;
         let programs: Vec<_> = plan.groups.iter().map(|group| lights(&group.segments)).collect();

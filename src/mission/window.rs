@@ -1,4 +1,4 @@
-//! Where the analysis looks within a segment.
+//! The window rule: the part of each segment that the analysis looks at.
 
 use super::plan::{Kind, Window};
 
@@ -9,11 +9,11 @@ use super::plan::{Kind, Window};
 /// and 3 s of settling for hovers, the measured length of the autopilot's transient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WindowRule {
-    /// Counted back from the end of a leg, ms.
+    /// Time of a leg that is used, counted back from its end, ms.
     pub length_ms: u64,
-    /// Left out at the end, ms.
+    /// Time left out at the end of a segment, ms.
     pub trim_ms: u64,
-    /// Left out at the start of any segment, ms.
+    /// Time left out at the start of any segment, ms.
     pub settle_ms: u64,
 }
 
@@ -27,7 +27,8 @@ impl Default for WindowRule {
 }
 
 impl WindowRule {
-    /// Window of a segment; none for kinds that are not analysed or if it were shorter than 2 s.
+    /// Window of a segment; `None` for kinds that are not analysed, and where it would be shorter
+    /// than 2 s.
     pub fn of(self, kind: Kind, start_ms: u64, end_ms: u64) -> Option<Window> {
         let earliest = start_ms + self.settle_ms;
         let start_ms = match kind {

@@ -32,29 +32,29 @@ pub const COLUMNS: [&str; 13] = [
 pub struct FieldRow {
     /// Name of the flight.
     pub flight: String,
-    /// Show time, s.
+    /// Show time of the second, s.
     pub time_s: f64,
     /// Slot number, if planned.
     pub slot: Option<u16>,
     /// Label of the drone.
     pub drone: String,
-    /// Place at that time, m: forward and left, if known; up above home.
+    /// Distance forward of the show's origin (x) at that time, m, if known.
     pub x_m: Option<f64>,
-    /// To the left, m.
+    /// Distance to the left of the show's origin (y) at that time, m, if known.
     pub y_m: Option<f64>,
-    /// Above home, m.
+    /// Height above home at that time (z), m, if known.
     pub z_m: Option<f64>,
-    /// Running 10 s estimate of the vertical air speed.
+    /// Running 10 s estimate of the vertical air speed, m/s, up positive.
     pub w_mps: Option<f64>,
-    /// Statistical error of the estimate alone.
+    /// Statistical standard error of the estimate alone, m/s.
     pub sd_mps: Option<f64>,
-    /// Interval that holds the true value with a probability of 95 %, all errors included.
+    /// Lower end of the 95 % interval for the true vertical air speed, all errors included, m/s.
     pub low_mps: Option<f64>,
-    /// Its upper end.
+    /// Upper end of the 95 % interval for the true vertical air speed, all errors included, m/s.
     pub high_mps: Option<f64>,
-    /// What is doubtful, by name, separated by semicolons.
+    /// Doubts about the estimate, by name, separated by semicolons.
     pub flags: String,
-    /// True vertical air speed, where known.
+    /// True vertical air speed, m/s, up positive, where it is known.
     pub truth_mps: Option<f64>,
 }
 

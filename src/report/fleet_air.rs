@@ -1,4 +1,4 @@
-//! What a map says about the fleet as a whole: its mean with all of its error, and the spread.
+//! Results of a map for the fleet as a whole: the mean with all of its error, and the spread.
 
 use crate::analysis::result::{DroneUpdraft, UpdraftMap};
 

@@ -67,18 +67,19 @@ pub const PAGE_FILE: &str = "index.html";
 /// Folder of the figures in the report's folder.
 pub const FIGURES_FOLDER: &str = "figures";
 
-/// Where a report came from, printed in it.
+/// Origin of a report, printed in it: program, command, seed, settings, input files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
-    /// Program and version.
+    /// Name and version of the program.
     pub program: String,
     /// The command line that made the report, as people would type it.
     pub command: String,
     /// Seed of the simulation, if there was one.
     pub seed: Option<u64>,
-    /// When it was made, as text; the library has no clock. May be empty.
+    /// Date and time at which the report was made, as text; empty if the caller gives none, as the
+    /// library has no clock.
     pub made_at: String,
-    /// How it was analysed: (what, how).
+    /// Settings of the analysis, (name, value) for people.
     pub settings: Vec<(String, String)>,
     /// The files that the analysis read.
     pub inputs: Vec<InputFile>,
@@ -132,7 +133,7 @@ pub fn render(analysis: &Analysis, provenance: &Provenance) -> Result<Report, Re
     page::render(analysis, None, provenance)
 }
 
-/// The same with the paper's Fig. 2 and Table I, from a finished simulation study.
+/// Renders the report with the paper's Fig. 2 and Table I from a finished simulation study.
 ///
 /// # Errors
 /// [`ReportError::Page`], a bug of this program.

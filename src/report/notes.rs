@@ -1,4 +1,4 @@
-//! What is doubtful about drones, with equal remarks told once.
+//! Doubts about drones, with equal remarks merged.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! Requests, receipts and notifications.
+//! Client of a Skybrush Server: requests, receipts and notifications.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read as _, Write as _};
@@ -37,7 +37,11 @@ pub struct Client {
 }
 
 impl Client {
-    /// Connects to `host:port`.
+    /// Connects to a server at `host:port`.
+    ///
+    /// # Errors
+    ///
+    /// [`ServerError::Connect`] if the name has no address or none of its addresses answers.
     pub fn connect(address: &str, clock: Arc<dyn Clock>) -> Result<Self, ServerError> {
         let port = address.rsplit_once(':').and_then(|(_, port)| port.parse().ok()).unwrap_or(0);
         let fail = |source| ServerError::Connect { address: address.to_owned(), port, source };
@@ -64,7 +68,7 @@ impl Client {
         Err(fail(last))
     }
 
-    /// The same with another limit for the server's lines, bytes.
+    /// Sets the longest line that is accepted from the server, bytes.
     #[must_use]
     pub fn with_longest_line(mut self, bytes: usize) -> Self {
         self.lines = Lines::new(bytes);
@@ -72,7 +76,11 @@ impl Client {
         self
     }
 
-    /// Asks, and waits for the answer's body.
+    /// Sends a request and waits for the body of its answer.
+    ///
+    /// # Errors
+    ///
+    /// If the server refuses, does not answer, or the connection breaks.
     pub fn ask(&mut self, body: &Value) -> Result<Value, ServerError> {
         self.ask_within(body, ANSWER)
     }
@@ -179,7 +187,7 @@ impl Client {
         }
     }
 
-    /// Ids of the drones that the server knows.
+    /// Identifiers of the drones that the server knows.
     pub fn drones(&mut self) -> Result<Vec<String>, ServerError> {
         let answer = self.ask(&json!({ "type": "UAV-LIST" }))?;
         let ids = answer.get("ids").and_then(Value::as_array).ok_or_else(|| {
@@ -188,14 +196,14 @@ impl Client {
         Ok(ids.iter().filter_map(Value::as_str).map(str::to_owned).collect())
     }
 
-    /// The server's name and version.
+    /// Name and version of the server.
     pub fn version(&mut self) -> Result<String, ServerError> {
         let answer = self.ask(&json!({ "type": "SYS-VER" }))?;
         let part = |key| text(&answer, key).unwrap_or("?").to_owned();
         Ok(format!("{} {}", part("software"), part("version")))
     }
 
-    /// Status of drones by id, as the server tells it (UAV-INF).
+    /// Status of drones by identifier, as the server reports it (UAV-INF).
     pub fn status(&mut self, drones: &[String]) -> Result<BTreeMap<String, Value>, ServerError> {
         let answer = self.ask(&json!({ "type": "UAV-INF", "ids": drones }))?;
         Ok(entries(&answer, "status").collect())
@@ -203,7 +211,7 @@ impl Client {
 }
 
 impl Client {
-    /// What the autopilots of drones last said of arming checks that fail.
+    /// Reports of the drones' autopilots on failing arming checks, by drone.
     ///
     /// # Errors
     /// When the server refuses, or is not there.

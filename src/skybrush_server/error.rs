@@ -1,53 +1,53 @@
-//! What goes wrong with a server.
+//! Errors of a Skybrush Server and of the connection to it.
 
 use std::io;
 
-/// The server cannot be used. What goes wrong with one drone is told per drone.
+/// Error of using a Skybrush Server. Problems of single drones are reported drone by drone.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServerError {
-    /// No connection.
+    /// The server cannot be connected to.
     #[error(
         "cannot reach Skybrush Server at {address}: is it running, and is its TCP port {port}?"
     )]
     Connect {
-        /// Where.
+        /// Address, as `host:port`.
         address: String,
-        /// The port, which is the server's base port + 1.
+        /// Port that was tried, which is the server's base port + 1.
         port: u16,
-        /// What the system says.
+        /// Reason given by the operating system.
         source: io::Error,
     },
-    /// The connection broke.
+    /// The connection broke during a request.
     #[error("the connection to Skybrush Server broke while waiting for {what}")]
     Broken {
-        /// What was being waited for.
+        /// Request whose answer was awaited.
         what: String,
-        /// What the system says.
+        /// Reason given by the operating system.
         source: io::Error,
     },
-    /// No answer in time.
+    /// The server did not answer in time.
     #[error("Skybrush Server did not answer {what} within {seconds} s")]
     Silent {
-        /// What was asked.
+        /// Request that stayed without an answer.
         what: String,
-        /// How long it was waited for.
+        /// Time waited for the answer, s.
         seconds: u64,
     },
-    /// The server said no.
+    /// The server refused the request.
     #[error("Skybrush Server refuses {what}: {reason}")]
     Refused {
-        /// What was asked.
+        /// Request that was refused.
         what: String,
-        /// The server's words.
+        /// Reason, in the server's words.
         reason: String,
     },
-    /// An answer that is none.
+    /// The server's answer is not valid.
     #[error("Skybrush Server's answer to {what} cannot be understood: {problem}")]
     Answer {
-        /// What was asked.
+        /// Request that was answered.
         what: String,
-        /// What is wrong with the answer.
+        /// Description of the problem with the answer.
         problem: String,
     },
     /// A line longer than anything the server has reason to send.
@@ -56,13 +56,13 @@ pub enum ServerError {
          through it: take them from the drone's card and `updraft logs import` them"
     )]
     TooLong {
-        /// The limit.
+        /// Longest line that is accepted, bytes.
         most: usize,
     },
     /// The show cannot be expressed for the server.
     #[error("the show cannot be uploaded through Skybrush Server: {problem}")]
     Show {
-        /// Why.
+        /// Reason why it cannot be uploaded.
         problem: String,
     },
 }

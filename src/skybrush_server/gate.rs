@@ -1,30 +1,30 @@
-//! Whether a drone behind the server may be started: the same as over its own link, as far as the
-//! server tells it. What it does not tell is not taken for good.
+//! Check whether a drone behind the server may be started: as over its own link, as far as the
+//! server reports its state. Missing information counts against the drone.
 
 use super::state::{ShowClock, State};
 use super::watch::{FIRST_WARNING, code_name, is_down};
 
-/// How far a start has come.
+/// Stage of a start, which decides what a drone's state must be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// It is about to be given a show: it must be on the ground.
+    /// The drone is about to be given a show: it must be on the ground.
     Grounded,
-    /// It has its show; there is no start yet.
+    /// The drone has its show; no start time is set yet.
     Ready,
-    /// This start time (Unix, s) must be set, and not be authorized.
+    /// This start time (Unix, s) must be set and not yet authorized.
     Set(i64),
-    /// This start time must be set and authorized: the drone counts down.
+    /// This start time (Unix, s) must be set and authorized: the drone counts down.
     Authorized(i64),
 }
 
-/// What counts as good enough.
+/// Least quality of position and battery with which a drone may start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Needs {
-    /// Fewest satellites.
+    /// Fewest satellites that its position is to be based on.
     pub satellites: u64,
-    /// Worst horizontal accuracy, m.
+    /// Largest estimated error of the horizontal position, m.
     pub h_acc_m: f64,
-    /// Least charge, % of a full battery, where the server tells it.
+    /// Least charge, % of a full battery, where the server reports it.
     pub battery_percent: f64,
 }
 
@@ -42,7 +42,8 @@ const CLOCK_S: f64 = 3.0;
 /// Time zones differ by multiples of this, s: the server's need not be ours.
 const ZONES_S: i64 = 900;
 
-/// Why a drone must not go on; nothing: it may. `now_unix_s`: when its state was told.
+/// Reasons why a drone must not go on, one clause each; empty if it may. `now_unix_s` is the time
+/// of the drone's state.
 pub fn obstacles(state: &State, step: Step, now_unix_s: f64, needs: &Needs) -> Vec<String> {
     let has = |code| state.codes.contains(&code);
     let aloft = if has(4) {

@@ -1,6 +1,6 @@
 //! Lines of text that arrive in pieces.
 
-/// Takes bytes, gives lines; a line is bounded.
+/// Splitter of a stream of bytes into lines of bounded length.
 #[derive(Debug)]
 pub struct Lines {
     bytes: Vec<u8>,
@@ -11,17 +11,17 @@ pub struct Lines {
     most: usize,
 }
 
-/// The line is longer than allowed.
+/// Error of a line that is longer than allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLong;
 
 impl Lines {
-    /// Lines of at most `most` bytes.
+    /// A splitter for lines of at most `most` bytes.
     pub fn new(most: usize) -> Self {
         Self { bytes: Vec::new(), searched: 0, begun: 0, most }
     }
 
-    /// Takes what has arrived. It is looked at once, however long its line is.
+    /// Takes bytes that have arrived. Each is examined once, however long its line becomes.
     ///
     /// # Errors
     /// When a line is too long; it is of no use to go on then.
@@ -42,7 +42,7 @@ impl Lines {
         Ok(())
     }
 
-    /// The next whole line, without its end.
+    /// Takes the next whole line, without its end.
     pub fn next_line(&mut self) -> Option<Vec<u8>> {
         let found = self.bytes[self.searched..].iter().position(|byte| *byte == b'\n');
         let Some(found) = found else {

@@ -1,4 +1,4 @@
-//! Logs through the server. Only one download per drone at a time.
+//! Logs through the server, one download per drone at a time.
 
 use std::collections::BTreeMap;
 
@@ -13,16 +13,17 @@ use super::work::Job;
 /// A log on a drone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogEntry {
-    /// Its name on the server.
+    /// Identifier of the log on the server.
     pub id: String,
-    /// Bytes.
+    /// Size of the log, bytes.
     pub size: u64,
-    /// Unix time, s; `None` when the autopilot had no clock.
+    /// Date of the log, Unix time, s; `None` when the autopilot had no clock.
     pub unix_s: Option<i64>,
 }
 
 impl Client {
-    /// The logs of drones; what went wrong with one is its value. `go_on`: false ends the waiting.
+    /// Lists the logs of drones; the value of a drone is its list, or what went wrong with it. The
+    /// wait ends when `go_on` returns false.
     ///
     /// # Errors
     /// When the server refuses, or is not there.
@@ -44,18 +45,18 @@ fn list_body(drones: &[String]) -> Value {
     json!({ "type": "LOG-INF", "ids": drones })
 }
 
-/// The request for a list of a drone's logs; [`log_entries`] reads what it ends with.
+/// The request for a list of a drone's logs; [`log_entries`] reads its result.
 pub fn list_logs(drone: &str) -> Job {
     Job { drone: drone.to_owned(), body: list_body(&[drone.to_owned()]) }
 }
 
-/// The request for a log; [`log_bytes`] reads what it ends with.
+/// The request for a log; [`log_bytes`] reads its result.
 pub fn fetch_log(drone: &str, log: &str) -> Job {
     let body = json!({ "type": "LOG-DATA", "uavId": drone, "logId": log });
     Job { drone: drone.to_owned(), body }
 }
 
-/// The logs in the end of a LOG-INF request.
+/// Reads the list of logs in the result of a LOG-INF request.
 ///
 /// # Errors
 /// When it is no list.
@@ -74,7 +75,7 @@ pub fn log_entries(value: &Value) -> Result<Vec<LogEntry>, String> {
         .collect())
 }
 
-/// The bytes of a downloaded log, of the size that was promised.
+/// Reads the bytes of a downloaded log, and checks that their number is as announced.
 ///
 /// # Errors
 /// When they are not all there.

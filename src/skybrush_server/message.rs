@@ -1,4 +1,4 @@
-//! The server's envelope.
+//! Envelope of the server's messages: version, identifier, body.
 
 use serde_json::{Value, json};
 
@@ -10,11 +10,11 @@ const VERSION: &str = "1.0";
 /// A message from the server.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Incoming {
-    /// The request that it answers.
+    /// Identifier of the request that the message answers, if it answers one.
     pub refers_to: Option<String>,
-    /// Kind of the body.
+    /// Type of the body.
     pub kind: String,
-    /// The body.
+    /// Body of the message, with its `type`.
     pub body: Value,
 }
 
@@ -25,7 +25,7 @@ pub(super) fn request(id: &str, body: &Value) -> String {
     line
 }
 
-/// A line from the server; `None`: it is none of its messages.
+/// Reads a line from the server; `None` if it is not one of its messages.
 pub fn parse(line: &[u8]) -> Option<Incoming> {
     let mut value: Value = parse::json(line).ok()?;
     let refers_to = value.get("refs").and_then(Value::as_str).map(str::to_owned);

@@ -1,4 +1,4 @@
-//! Starting and ending a show through the server.
+//! Start and end of a show through the server.
 
 use serde_json::{Value, json};
 
@@ -7,28 +7,28 @@ use super::error::ServerError;
 use super::work::Job;
 use crate::protocol::show::SHOW_MODE;
 
-/// When the show starts.
+/// Start of a show: time, authorization, and the drones that take part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartConfig {
-    /// Unix time, whole seconds; `None`: no start.
+    /// Start time, Unix, whole seconds; `None`: no start.
     pub unix_s: Option<i64>,
-    /// Whether it is allowed to.
+    /// Whether the start is authorized.
     pub authorized: bool,
     /// Drones that take part, as the server names them.
     pub drones: Vec<String>,
-    /// How long the show takes, s.
+    /// Duration of the show, s.
     pub duration_s: f64,
 }
 
 impl StartConfig {
-    /// No start.
+    /// A configuration without a start: no time, no authorization, no drones.
     pub fn none() -> Self {
         Self { unix_s: None, authorized: false, drones: Vec::new(), duration_s: 0.0 }
     }
 }
 
 impl StartConfig {
-    /// The request that sets it.
+    /// The request that sets this start.
     pub fn body(&self) -> Value {
         json!({
             "type": "SHOW-SETCFG",
@@ -48,12 +48,12 @@ impl StartConfig {
 }
 
 impl Client {
-    /// Tells the server when to start; it tells the drones once a second.
+    /// Gives the server the start; it passes it on to the drones once a second.
     pub fn set_start(&mut self, start: &StartConfig) -> Result<(), ServerError> {
         self.ask(&start.body()).map(|_| ())
     }
 
-    /// The start that is authorized, if one is.
+    /// Start that is authorized at the server, if one is.
     ///
     /// # Errors
     /// When the server does not say whether there is one.
@@ -71,12 +71,12 @@ impl Client {
     }
 }
 
-/// A start that the server lets the drones take.
+/// A start that the server has authorized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Authorized {
-    /// At this Unix time, s.
+    /// A start at this Unix time, s.
     At(i64),
-    /// By hand, or by a clock of the server's own.
+    /// A start by hand, or by a clock of the server's own.
     Anyhow,
 }
 
@@ -90,8 +90,8 @@ pub fn show_mode(drone: &str) -> Job {
     mode(drone, SHOW_MODE)
 }
 
-/// The request that switches a drone to a flight mode. The server knows names of its own; what is a
-/// number goes to the drone as it is.
+/// The request that switches a drone to a flight mode, as a number: the server passes numbers on as
+/// they are, while it has its own names for modes.
 pub fn mode(drone: &str, number: u32) -> Job {
     let body = json!({
         "type": "OBJ-CMD",

@@ -1,4 +1,4 @@
-//! What the server tells of one drone (UAV-INF), understood.
+//! State of one drone as the server reports it (UAV-INF).
 
 use std::collections::BTreeSet;
 
@@ -9,29 +9,29 @@ use serde_json::Value;
 use super::watch::codes;
 use crate::protocol::show::SHOW_MODE;
 
-/// A drone as the server sees it. What it does not tell is `None`.
+/// State of a drone as the server sees it; `None` where the server does not report it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
     /// Flight mode, in the server's words.
     pub mode: String,
-    /// States and errors.
+    /// States and errors, by the server's numbers; see [`super::watch::code_name`].
     pub codes: BTreeSet<u64>,
-    /// What the show mode says.
+    /// Report of the show mode, if the drone sends one.
     pub show: Option<ShowLine>,
-    /// GPS fix: 3 and better know a height.
+    /// Type of the GPS fix; a height is known from 3 on.
     pub fix: Option<u64>,
-    /// Satellites.
+    /// Number of satellites in use.
     pub satellites: Option<u64>,
-    /// Horizontal accuracy, m.
+    /// Estimated horizontal accuracy of the position, m.
     pub h_acc_m: Option<f64>,
-    /// Battery, V.
+    /// Battery voltage, V.
     pub battery_v: Option<f64>,
-    /// Battery, %: the server tells it where the autopilot's own figure can be relied on.
+    /// Battery charge, %; the server reports it where the autopilot's own figure can be relied on.
     pub battery_percent: Option<f64>,
 }
 
 impl State {
-    /// From a status of UAV-INF.
+    /// Reads the state from a status of UAV-INF.
     pub fn of(status: &Value) -> Self {
         let number = |pointer| status.pointer(pointer).and_then(Value::as_f64);
         let whole = |pointer| status.pointer(pointer).and_then(Value::as_u64);
@@ -49,13 +49,13 @@ impl State {
         }
     }
 
-    /// Whether it is in show mode.
+    /// Whether the drone is in show mode.
     pub fn is_in_show_mode(&self) -> bool {
         is_show_mode(&self.mode)
     }
 
-    /// One of the server's own virtual drones: it flies whatever it was sent, in a mode that a
-    /// show drone never has, and says nothing about it.
+    /// Whether this is one of the server's own virtual drones: it flies whatever it was sent, in a
+    /// mode that a show drone never has, and reports nothing about it.
     pub fn is_make_believe(&self) -> bool {
         self.mode == "mission" && self.show.is_none()
     }
@@ -67,28 +67,30 @@ pub(super) fn is_show_mode(mode: &str) -> bool {
     mode == "show" || mode.strip_prefix("mode ").is_some_and(|it| it.parse() == Ok(SHOW_MODE))
 }
 
-/// What a drone in show mode says of its show, as Skybrush Live shows it.
+/// Report of a drone in show mode about its show, as Skybrush Live displays it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ShowLine {
-    /// When it starts.
+    /// Start of the show, by the drone's own clock.
     pub clock: ShowClock,
-    /// What keeps it, or what it does; empty: it is not in show mode.
+    /// Obstacle to the start, or present stage of the show, in the drone's words; empty outside
+    /// show mode.
     pub text: String,
 }
 
-/// When a drone's show starts.
+/// Start of a drone's show, as the drone reports it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShowClock {
-    /// It has no start time.
+    /// The drone has no start time.
     Unset,
-    /// At this time of day, s, in the server's time zone.
+    /// Time of day of the start, s, in the server's time zone.
     At(i64),
-    /// It began so many seconds ago; below 0: it begins in so many.
+    /// Seconds since the start of the show; negative before the start.
     Elapsed(i64),
 }
 
 impl ShowLine {
-    /// From `[@12:34:56] Not authorized to start`, `[-00:00:12] ...` or `[---:--:--] ...`.
+    /// Reads `[@12:34:56] Not authorized to start`, `[-00:00:12] ...` or `[---:--:--] ...`; `None`
+    /// for anything else.
     pub fn parse(line: &str) -> Option<Self> {
         let (clock, text) = line.strip_prefix('[')?.split_once(']')?;
         let clock = match clock.split_at_checked(1)? {

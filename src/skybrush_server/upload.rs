@@ -6,11 +6,11 @@ use super::error::ServerError;
 use super::work::Job;
 use crate::base::frame::ShowFrame;
 
-/// The fence that goes with a show. There is no show without one: a server that is told nothing
-/// switches the fence of the drone off.
+/// Fence that is uploaded with a show. There is no show without one: a server that is given no
+/// fence switches that of the drone off.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fence {
-    /// Corners, show x and y, m.
+    /// Corners of the polygon, show x and y, m.
     pub polygon_m: Vec<[f64; 2]>,
     /// Highest altitude above home, m; the server takes 10 to 3000.
     pub max_altitude_m: f64,
@@ -18,18 +18,18 @@ pub struct Fence {
     pub max_distance_m: f64,
 }
 
-/// What all drones of a show have in common.
+/// Parts of an upload that all drones of a show have in common.
 #[derive(Clone, Debug)]
 pub struct ShowUpload {
-    /// Short name.
+    /// Short name of the show.
     pub id: String,
-    /// Title for people.
+    /// Title of the show, for people.
     pub title: String,
-    /// Drones in the show.
+    /// Number of drones in the show.
     pub drones: usize,
-    /// Where the show is.
+    /// Position and orientation of the show frame.
     pub frame: ShowFrame,
-    /// The fence.
+    /// Fence that is uploaded with the show.
     pub fence: Fence,
 }
 

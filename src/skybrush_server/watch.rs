@@ -1,4 +1,4 @@
-//! What a show looks like from the server: states, errors and batteries of its drones (UAV-INF).
+//! Progress of a show as the server sees it: states, errors and batteries of its drones (UAV-INF).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,7 +16,7 @@ const MOTORS_RUN: u64 = 8;
 /// The server forgets drones that are silent for so long.
 const SILENT: Micros = 5 * S;
 
-/// What the server's number for a state or an error means.
+/// Meaning of the server's number for a state or an error, for people.
 pub fn code_name(code: u64) -> &'static str {
     match code {
         1 => "on the ground",
@@ -90,37 +90,37 @@ pub(super) fn is_down(codes: &BTreeSet<u64>) -> bool {
     codes.contains(&ON_GROUND) || codes.contains(&LANDED)
 }
 
-/// What happened to a drone.
+/// Change in the state of a drone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Event {
-    /// It is in another flight mode.
+    /// The drone has changed to another flight mode.
     Mode {
-        /// Its name, as the server has it.
+        /// Name of the flight mode, as the server has it.
         mode: String,
     },
-    /// It has come into a state, or has an error.
+    /// The drone has entered a state, or has an error.
     Code {
-        /// The server's number.
+        /// The server's number of the state or error.
         code: u64,
     },
-    /// An error is gone.
+    /// An error has gone.
     CodeGone {
-        /// The server's number.
+        /// The server's number of the error.
         code: u64,
     },
-    /// Its battery is low.
+    /// The battery is low.
     BatteryLow {
-        /// What is left, %.
+        /// Remaining charge, %.
         percent: f64,
     },
     /// The server has heard nothing of it for too long.
     Silent {
-        /// How long, s.
+        /// Time since the server last heard from the drone, s.
         seconds: u64,
     },
-    /// It is heard again.
+    /// The server hears from the drone again.
     HeardAgain,
 }
 
@@ -225,22 +225,23 @@ impl Monitor {
         self.drones.values().all(|watched| watched.landed || watched.stayed_down())
     }
 
-    /// Who has flown, or may have, and has not been seen to land.
+    /// Drones that have flown, or may have, and have not been seen to land.
     pub fn in_the_air(&self) -> Vec<&str> {
         self.named(|watched| !watched.landed && !watched.stayed_down())
     }
 
-    /// Who has not left the ground.
+    /// Drones that have not left the ground.
     pub fn not_flown(&self) -> Vec<&str> {
         self.named(|watched| !watched.landed && watched.stayed_down() && !watched.is_found_down())
     }
 
-    /// Who was on the ground already when the watch over a flight on its way began, and still is.
+    /// Drones that were on the ground when the watch over a flight in progress began, and still
+    /// are.
     pub fn found_down(&self) -> Vec<&str> {
         self.named(Watched::is_found_down)
     }
 
-    /// Who has left the show mode in the air, and for which flight mode.
+    /// Drones that have left the show mode in the air, with the flight mode they changed to.
     pub fn left_the_show(&self) -> BTreeMap<String, String> {
         let left = |(id, watched): (&String, &Watched)| Some((id.clone(), watched.left.clone()?));
         self.drones.iter().filter_map(left).collect()

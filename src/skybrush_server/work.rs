@@ -15,7 +15,7 @@ const TURN: Micros = S / 5;
 /// Whoever cancels is about to leave.
 const CANCEL: Micros = 2 * S;
 
-/// How one drone's part of a request ended; in words, why it failed.
+/// Result of one drone's part of a request: the server's value, or the reason why it failed.
 pub type Outcome = Result<Value, String>;
 
 /// Work that goes on at the server, by drone.
@@ -39,16 +39,16 @@ struct Waited {
 pub struct Job {
     /// The server's name of the drone.
     pub drone: String,
-    /// The request's body.
+    /// Body of the request.
     pub body: Value,
 }
 
-/// Who has work done.
+/// Source of the jobs that [`Client`] runs at the server, and receiver of their results.
 pub trait Foreman {
     /// A drone's work is over; what to do with it next, if anything.
     fn over(&mut self, drone: &str, outcome: Outcome) -> Option<Job>;
 
-    /// How far a drone's work is, 0..1.
+    /// Progress of a drone's work, as a share from 0 to 1.
     fn progress(&mut self, _drone: &str, _share: f64) {}
 
     /// Whether to leave everything as it is.

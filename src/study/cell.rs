@@ -1,4 +1,4 @@
-//! One flight of a study: in which air it is flown, what it is called, what it depends on.
+//! One flight of a study: its air, its name, and what its result depends on.
 
 use std::fmt::Write as _;
 
@@ -22,10 +22,10 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// No wind.
+    /// Still air: no horizontal wind.
     pub const STILL: Self = Self { wind_mps: 0.0, from_deg: None };
 
-    /// For people: `still air`, `2.5 m/s from 060°`.
+    /// Name of the condition for people: `still air`, `2.5 m/s from 060°`.
     pub fn label(&self) -> String {
         match self.from_deg {
             Some(from_deg) => format!("{} m/s from {from_deg:03}°", self.wind_mps),
@@ -37,7 +37,7 @@ impl Condition {
 /// One flight of a study.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// The wind.
+    /// Horizontal wind of the flight.
     pub condition: Condition,
     /// Vertical air speed, m/s, up positive.
     pub updraft_mps: f64,
@@ -58,7 +58,7 @@ struct Settings<'a> {
 }
 
 impl Cell {
-    /// Name of its files: `wind2.5-from060-updraft+0.7`.
+    /// Name of the flight's files: `wind2.5-from060-updraft+0.7`.
     pub fn name(&self) -> String {
         let updraft = self.updraft_mps;
         match self.condition.from_deg {
@@ -77,13 +77,13 @@ impl Cell {
         [-wind_mps * sin + 0.0, -wind_mps * cos + 0.0, self.updraft_mps]
     }
 
-    /// Whether A and u0 come from this flight.
+    /// Whether A and u0 are taken from this flight: it has neither wind nor updraft.
     pub fn is_reference(&self) -> bool {
         self.condition == Condition::STILL && self.updraft_mps == 0.0
     }
 
-    /// The flight's own seed: noise of its own, whatever else is in the study. Below 2^48, so that
-    /// every JSON reader gets it whole.
+    /// Seed of the flight, which depends on its air but not on the rest of the study. Below 2^48,
+    /// so that every JSON reader reads it exactly.
     pub fn seed(&self, study_seed: u64) -> u64 {
         let digest = Sha256::digest(format!("{study_seed} {}", self.name()));
         digest.iter().take(6).fold(0, |seed, byte| (seed << 8) | u64::from(*byte))

@@ -1,4 +1,4 @@
-//! Why a study could not be read, flown or evaluated.
+//! Errors of reading, flying and evaluating a study.
 
 use thiserror::Error;
 
@@ -8,7 +8,7 @@ use crate::mission::error::TemplateError;
 use crate::mission::resolve::MissionError;
 use crate::vehicle::VehicleError;
 
-/// A study cannot go on.
+/// Error of a study.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyError {
@@ -24,30 +24,30 @@ pub enum StudyError {
     /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// There is no such file, and no built-in study of that name.
+    /// The name is neither a file nor a built-in study.
     #[error("there is no study {}; built in is study.toml", plain(name))]
     NoStudy {
-        /// As asked for.
+        /// Name of the study, as asked for.
         name: String,
     },
-    /// A finished flight could not be put into words; a bug of this program.
+    /// A finished flight has no form as JSON; a bug of this program.
     #[error("failed to make the record of {cell}: {source}")]
     Record {
-        /// Which flight.
+        /// Name of the flight.
         cell: String,
-        /// Why.
+        /// Reason given by the serialiser.
         #[source]
         source: serde_json::Error,
     },
     /// The user asked to stop.
     #[error("the study was stopped; finished flights are kept")]
     Stopped,
-    /// A and u0 cannot be had.
+    /// The reference flight gave neither A nor u0.
     #[error("A and u0 come from the flight {cell}, which gave none: {reason}")]
     NoReference {
-        /// The flight without wind and updraft.
+        /// Name of the flight without wind and updraft.
         cell: String,
-        /// Why it gave none.
+        /// Reason why that flight gave no fit.
         reason: String,
     },
 }

@@ -1,4 +1,5 @@
-//! From the windows of all flights to Table I, the fitted updrafts and the correlations.
+//! Evaluation of a study: from the windows of all flights to Table I, the fitted updrafts and the
+//! correlations.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +21,7 @@ use crate::base::estimate::Estimate;
 /// A cell with its record, if it was flown.
 type Entry<'a> = (Cell, Option<&'a CellRecord>);
 
-/// Fits every flight, with A and u0 held from the one without wind and updraft.
+/// Fits every flight, with A and u0 held at the values of the flight without wind and updraft.
 ///
 /// # Errors
 /// [`StudyError::NoReference`] if that flight is lost or gives no law.

@@ -1,4 +1,4 @@
-//! Flies one cell and measures its windows, all in memory.
+//! Flight of one cell and measurement of its windows, all in memory.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;

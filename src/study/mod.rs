@@ -1,4 +1,4 @@
-//! A study: the same speed ladder flown in many airs, to see how well the updraft is found.
+//! A study: one ladder of vertical speeds flown in many airs, to see how well the updraft is found.
 //!
 //! [`StudyPlan`] reads what is to be flown, [`Work`] flies what is not there yet, one drone for each
 //! [`Cell`] (a wind condition and an updraft), and keeps each finished flight as a whole file;

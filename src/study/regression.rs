@@ -1,4 +1,4 @@
-//! Pearson's correlation and the straight line through the points.
+//! Pearson's correlation and the regression line.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! What a study says, as written to `study.json` and drawn by the report.
+//! Results of a study, as written to `study.json` and drawn by the report.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -124,17 +124,17 @@ impl<'de> Deserialize<'de> for Updrafts {
 /// A study, read and resolved: what is flown, and in which airs.
 #[derive(Clone, Debug)]
 pub struct StudyPlan {
-    /// Title for people.
+    /// Title of the study, for people.
     pub title: String,
     /// The mission template, as the study names it.
     pub template: String,
-    /// The vehicle.
+    /// Vehicle that flies the study.
     pub vehicle: Vehicle,
     /// The plan; its first slot is flown.
     pub plan: Plan,
     /// The slot that is flown.
     pub slot: Slot,
-    /// What it flies.
+    /// Segments that the slot flies, in order.
     pub segments: Vec<Segment>,
     /// Wind conditions, in the order of the file: still air once, each wind in every direction.
     pub conditions: Vec<Condition>,
@@ -214,7 +214,7 @@ impl StudyPlan {
         })
     }
 
-    /// All flights: the updrafts of each condition.
+    /// Flights of the study: every updraft in every wind condition.
     pub fn cells(&self) -> Vec<Cell> {
         let of = |&condition: &Condition| {
             self.updrafts_mps.iter().map(move |&updraft_mps| Cell { condition, updraft_mps })

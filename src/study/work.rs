@@ -1,4 +1,4 @@
-//! Flies what is not there yet, and keeps every finished flight as one whole file.
+//! Flight of the cells that are not finished yet; every finished flight is kept as one whole file.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -16,14 +16,14 @@ use crate::sim::SimError;
 /// Largest record that is read back, bytes.
 const MAX_RECORD_BYTES: u64 = 16 << 20;
 
-/// How a study is flown.
+/// Settings of flying a study that do not belong to its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Settings {
     /// Seed of the study; every flight has its own from it.
     pub seed: u64,
-    /// Keep the log of every flight.
+    /// Whether the log of every flight is kept.
     pub keep_logs: bool,
-    /// Fly again what is there.
+    /// Whether finished flights are flown again.
     pub force: bool,
 }
 
@@ -32,22 +32,22 @@ pub struct Settings {
 pub struct Lost {
     /// Index in the study's cells.
     pub cell: usize,
-    /// Why.
+    /// Reason why the flight failed, one sentence.
     pub reason: String,
 }
 
-/// The flights of a study.
+/// Flights of a study: finished and lost ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flown {
-    /// One per cell of the study, in its order; `None`: lost.
+    /// Record of each cell of the study, in its order; `None` for a lost flight.
     pub records: Vec<Option<CellRecord>>,
-    /// Why flights are missing.
+    /// Flights that failed, with their reasons.
     pub lost: Vec<Lost>,
-    /// How many were flown now; the others were there.
+    /// Number of cells flown by this call; the records of the rest were already there.
     pub flown: usize,
 }
 
-/// A study and what of it is finished in a folder.
+/// A study with the flights that are already finished in its folder.
 #[derive(Debug)]
 pub struct Work<'a> {
     study: &'a StudyPlan,
@@ -63,18 +63,18 @@ struct Item {
     record: Option<CellRecord>,
 }
 
-/// Where the records of finished flights are.
+/// Folder of the records of finished flights, in a study's folder.
 pub fn cells_folder(folder: &Path) -> PathBuf {
     folder.join("cells")
 }
 
-/// Where kept logs are.
+/// Folder of the logs that were kept, in a study's folder.
 pub fn logs_folder(folder: &Path) -> PathBuf {
     folder.join("logs")
 }
 
 impl<'a> Work<'a> {
-    /// Looks which flights are finished in a study's folder, flown with the same settings.
+    /// Opens a study's folder and finds the flights that are already finished with these settings.
     ///
     /// # Errors
     /// [`StudyError::File`] if the folder cannot be made or read.
@@ -105,18 +105,18 @@ impl<'a> Work<'a> {
         Ok(Self { study, folder, settings, cells })
     }
 
-    /// Flights of the study.
+    /// Number of flights of the study.
     pub fn total(&self) -> usize {
         self.cells.len()
     }
 
-    /// Flights that are not finished.
+    /// Number of flights that are not finished.
     pub fn open_flights(&self) -> usize {
         self.cells.iter().filter(|item| item.record.is_none()).count()
     }
 
-    /// Flies what is open, on all threads of the current pool; a flight that fails is lost and does
-    /// not stop the others. `done` is told after each flight. Each thread holds one log.
+    /// Flies the open cells on all threads of the current pool; a flight that fails is lost and
+    /// does not stop the others. `done` is called after each flight. Each thread holds one log.
     ///
     /// # Errors
     /// [`StudyError::Stopped`] when `stop` was raised (what is finished is kept), and

@@ -1,4 +1,4 @@
-//! What a ground station broadcasts to a whole fleet, at one port.
+//! Broadcasts of a ground station to a whole fleet, received at one port.
 //!
 //! Skybrush Server answers each drone where it speaks from, but sends starts, lights and remote
 //! control to one UDP port that all drones of a network listen to. Virtual drones share a

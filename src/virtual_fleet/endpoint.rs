@@ -8,7 +8,7 @@ pub trait Endpoint {
     /// A message from a ground station has come; answers go to `out`.
     fn on_message(&mut self, now: Micros, message: &MavMessage, out: &mut Vec<MavMessage>);
 
-    /// The same, with who sent it: some answers go to the sender alone.
+    /// Handles a message whose sender is known, as some answers go to the sender alone.
     fn on_frame(
         &mut self,
         now: Micros,
@@ -20,6 +20,7 @@ pub trait Endpoint {
         self.on_message(now, message, out);
     }
 
-    /// What it says on its own; returns when it wants to be asked again.
+    /// Adds the messages that the vehicle sends unasked to `out`; returns the time at which it
+    /// wants to be polled again.
     fn poll(&mut self, now: Micros, out: &mut Vec<MavMessage>) -> Micros;
 }

@@ -12,11 +12,11 @@ use crate::link::station::STATION;
 /// Storage with its MAVFTP and log servers.
 #[derive(Debug)]
 pub struct FileVehicle<S> {
-    /// The files.
+    /// Storage that holds the vehicle's files and logs.
     pub storage: S,
     /// MAVFTP; `None`: the vehicle does not speak it.
     pub ftp: Option<FtpServer>,
-    /// The log messages.
+    /// Server of the MAVLink log messages.
     pub logs: LogServer,
     /// Whether it is armed.
     pub is_armed: bool,
@@ -35,7 +35,7 @@ impl<S: Storage> FileVehicle<S> {
         Self::with_transfers(storage, log_folder, Transfers::both(packets_per_s))
     }
 
-    /// The same, each protocol with a speed of its own.
+    /// Makes a vehicle with an explicit packet rate for each of the two protocols.
     pub fn with_transfers(storage: S, log_folder: &str, transfers: Transfers) -> Self {
         Self {
             storage,

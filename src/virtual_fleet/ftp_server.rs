@@ -23,7 +23,7 @@ const IDLE: Micros = 3 * S;
 /// Packets sent in one go when nothing paces them.
 const AT_ONCE: usize = 32;
 
-/// The server.
+/// Server of MAVFTP: one session, one burst at a time, packets at a limited rate.
 #[derive(Debug, Default)]
 pub struct FtpServer {
     /// Packets per second at most; 0: as many as are taken.

@@ -15,7 +15,8 @@ const PIECE: u32 = 90;
 /// Packets sent in one go when nothing paces them.
 const AT_ONCE: usize = 32;
 
-/// The server.
+/// Server of the MAVLink log messages (`LOG_REQUEST_LIST`, `LOG_REQUEST_DATA`), with packets at a
+/// limited rate.
 #[derive(Debug)]
 pub struct LogServer {
     /// Packets per second at most; 0: as many as are taken.

@@ -16,7 +16,7 @@ use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
 use crate::link::station::{AUTOPILOT, STATION, heartbeat};
 
-/// How bad the network is. The default is perfect.
+/// Faults of a simulated network; the default is a perfect one.
 #[derive(Clone, Copy, Debug)]
 pub struct Faults {
     /// Share of frames lost, each way.
@@ -27,8 +27,8 @@ pub struct Faults {
     pub delay: Micros,
     /// Largest addition to the delay, us; more than the time between frames reorders.
     pub jitter: Micros,
-    /// What all vehicles of a network together can send, bytes per second; 0: no limit. What
-    /// does not fit waits, and is lost when it would have to wait for longer than `queue`.
+    /// Data that all vehicles of a network together can send, bytes per second; 0: no limit. Frames
+    /// beyond it wait, and are lost when they would have to wait for longer than `queue`.
     pub bytes_per_s: f64,
     /// Longest wait for the air, us.
     pub queue: Micros,
@@ -48,14 +48,14 @@ impl Faults {
     }
 }
 
-/// What went through, bytes.
+/// Traffic of a simulated network, bytes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Carried {
-    /// From vehicles, put on the air.
+    /// Bytes that vehicles put on the air.
     pub down: u64,
-    /// From vehicles, arrived.
+    /// Bytes from vehicles that arrived at the station.
     pub down_arrived: u64,
-    /// To vehicles, put on the air.
+    /// Bytes that the station put on the air.
     pub up: u64,
 }
 
@@ -63,9 +63,9 @@ pub struct Carried {
 pub struct LossyNet<E> {
     /// The vehicles; one that is taken out is gone for good.
     pub vehicles: BTreeMap<DroneId, E>,
-    /// How bad it is; may change at any time.
+    /// Present faults of the network; may be changed at any time.
     pub faults: Faults,
-    /// What went through.
+    /// Traffic since the network was made.
     pub carried: Carried,
     now: Micros,
     wake: BTreeMap<DroneId, Micros>,

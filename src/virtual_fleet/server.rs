@@ -31,47 +31,47 @@ const SMOOTH_SPEED: f64 = 20.0;
 /// Largest datagram.
 const DATAGRAM: usize = 65_536;
 
-/// How fast the vehicles' time goes.
+/// Speed of the vehicles' time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// So many times as fast as the clock on the wall.
+    /// A fixed multiple of the speed of wall time.
     Speed(f64),
     /// As fast as the computer allows while a vehicle counts down, flies, or its log is being
     /// written; so many times as fast as the clock on the wall else.
     Fast {
-        /// On the ground.
+        /// Multiple of the speed of wall time while nothing flies.
         ground: f64,
     },
 }
 
-/// How a fleet is served.
+/// Options for serving a virtual fleet over sockets.
 #[derive(Clone, Debug)]
 pub struct ServerOptions {
-    /// Where the station listens, network by network; every vehicle sends to the port of its
-    /// network, from a socket of its own.
+    /// Addresses at which the station listens, network by network; every vehicle sends to the
+    /// address of its network from a socket of its own.
     pub stations: Vec<SocketAddr>,
     /// With a key vehicles sign what they say, and refuse what is not signed with it.
     pub key: Option<Key>,
-    /// How fast time goes.
+    /// Speed of the vehicles' time.
     pub pace: Pace,
-    /// How bad each network's link is, each way, in wall time.
+    /// Faults of each network's link, each way, in wall time.
     pub faults: Faults,
     /// Seed of the link's faults.
     pub seed: u64,
 }
 
-/// Why a fleet cannot be served.
+/// Error of serving a virtual fleet.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ServerError {
     /// A vehicle got no socket.
     #[error("no socket for virtual vehicle {system} to speak to {station}")]
     Socket {
-        /// Its system id.
+        /// MAVLink system id of the vehicle.
         system: u8,
-        /// Where the station is.
+        /// Address of the station.
         station: SocketAddr,
-        /// The system's reason.
+        /// Reason given by the operating system.
         #[source]
         source: io::Error,
     },
@@ -81,9 +81,9 @@ pub enum ServerError {
          give one for each network"
     )]
     Network {
-        /// Its system id.
+        /// MAVLink system id of the vehicle.
         system: u8,
-        /// Its network.
+        /// Network of the vehicle, from 0.
         network: u16,
         /// Networks that there are.
         stations: usize,
@@ -94,7 +94,7 @@ pub enum ServerError {
     /// The pace is none.
     #[error("a speed of {0} is none: give a number above 0 and at most 1000")]
     Pace(f64),
-    /// The thread died.
+    /// The thread of the fleet panicked.
     #[error("the virtual fleet has stopped: its thread panicked")]
     Died,
 }
@@ -109,7 +109,7 @@ pub struct Running {
 }
 
 impl Running {
-    /// The vehicles' time.
+    /// Present time of the vehicles, us.
     pub fn now(&self) -> Micros {
         self.now.load(Ordering::Relaxed)
     }
@@ -143,7 +143,7 @@ pub fn serve<'w, T>(
     serve_with(vehicles, None, options, clock, body)
 }
 
-/// The same for a fleet that also hears what is broadcast at a port.
+/// Serves a fleet whose vehicles also hear what a station broadcasts at one port.
 ///
 /// # Errors
 /// As [`serve`].

@@ -1,14 +1,14 @@
-//! What a virtual vehicle's files are kept in.
+//! Storage of a virtual vehicle's files: in memory, or in a folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
 
-/// Why a file operation failed, as a vehicle would tell it.
+/// Error of a file operation, as a vehicle would report it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StorageError {
-    /// There is no such file or folder.
+    /// The file or folder does not exist.
     NotFound,
     /// The name leaves the storage, or is none.
     BadName,
@@ -19,9 +19,9 @@ pub enum StorageError {
 /// One name in a folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// Its name, without a folder.
+    /// Name of the file or folder, without the path to it.
     pub name: String,
-    /// Its size, bytes; `None`: a folder.
+    /// Size of the file, bytes; `None` for a folder.
     pub size: Option<u64>,
 }
 
@@ -38,9 +38,9 @@ pub trait Storage {
     fn write_at(&mut self, name: &str, offset: u64, data: &[u8]) -> Result<(), StorageError>;
     /// Creates a file or empties it; its folder must be there.
     fn create(&mut self, name: &str) -> Result<(), StorageError>;
-    /// Removes a file.
+    /// Removes a file, which must exist.
     fn remove(&mut self, name: &str) -> Result<(), StorageError>;
-    /// Creates a folder.
+    /// Creates a folder; the one above it must exist.
     fn create_folder(&mut self, name: &str) -> Result<(), StorageError>;
 }
 
@@ -55,7 +55,7 @@ pub fn plain_name(name: &str) -> Result<String, StorageError> {
     Ok(parts.join("/"))
 }
 
-/// Files in memory.
+/// Storage in memory, which is gone with the vehicle.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryStorage {
     files: BTreeMap<String, Vec<u8>>,
@@ -78,7 +78,7 @@ impl MemoryStorage {
         Ok(())
     }
 
-    /// A file's content.
+    /// Content of a file; `None` if there is no such file.
     pub fn get(&self, name: &str) -> Option<&[u8]> {
         self.files.get(&plain_name(name).ok()?).map(Vec::as_slice)
     }

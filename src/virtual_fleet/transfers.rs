@@ -1,4 +1,4 @@
-//! How fast a vehicle sends files and logs.
+//! Rates at which a vehicle sends files and logs.
 
 use crate::link::clock::{MS, Micros};
 
@@ -12,9 +12,9 @@ const LOOP: f64 = 2_500.0;
 /// Packets per second at most; 0: as many as are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transfers {
-    /// Of MAVFTP.
+    /// Rate of MAVFTP packets, 1/s.
     pub ftp_per_s: f64,
-    /// Of the log messages.
+    /// Rate of log data packets, 1/s.
     pub logs_per_s: f64,
 }
 
@@ -23,7 +23,7 @@ impl Transfers {
     /// of data), 40 of the log messages for each of two links (2.8 MB/s).
     pub const FIRMWARE: Self = Self { ftp_per_s: 394.0, logs_per_s: 32_000.0 };
 
-    /// Both as many.
+    /// One rate for both protocols, packets per second.
     pub fn both(packets_per_s: f64) -> Self {
         Self { ftp_per_s: packets_per_s, logs_per_s: packets_per_s }
     }

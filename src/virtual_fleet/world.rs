@@ -1,4 +1,4 @@
-//! What the vehicles of a fleet have in common: the place, the air, the time.
+//! The world that the vehicles of a fleet share: the place, the air, the time.
 
 use std::sync::OnceLock;
 
@@ -15,7 +15,7 @@ pub struct World<'w> {
     pub vehicle: &'w Vehicle,
     /// Motion of the air.
     pub atmosphere: &'w dyn Atmosphere,
-    /// Where the show is, exactly; the wire rounds it.
+    /// Exact position and orientation of the show frame; the wire rounds it.
     pub frame: ShowFrame,
     /// Seed of the fleet.
     pub seed: u64,
@@ -64,9 +64,9 @@ impl<'w> World<'w> {
 /// A show file as a vehicle has understood it.
 #[derive(Clone, Debug, Default)]
 pub struct LoadedShow {
-    /// What to fly.
+    /// Trajectory to fly, show frame.
     pub trajectory: Trajectory,
-    /// The light program.
+    /// Light program, as Skybrush bytecode.
     pub lights: Vec<u8>,
     /// Take-off time, show time s.
     pub takeoff_s: f64,

@@ -40,10 +40,11 @@ pub static VER: MessageDef = def(
     "s----------",
     "F----------",
 );
-/// Arming or disarming.
+/// Arming and disarming: the new state, the arming checks that were on, how it was done and whether
+/// it was forced.
 pub static ARM: MessageDef =
     def(185, "ARM", "QBIBB", "TimeUS,ArmState,ArmChecks,Forced,Method", "s----", "F----");
-/// An event by number.
+/// An event, by ArduPilot's number.
 pub static EV: MessageDef = def(180, "EV", "QB", "TimeUS,Id", "s-", "F-");
 /// An error: subsystem and code.
 pub static ERR: MessageDef = def(183, "ERR", "QBB", "TimeUS,Subsys,ECode", "s--", "F--");
@@ -86,7 +87,8 @@ pub static GPS: MessageDef = def(
     "s#---SmDUmnhnh-",
     "F----0BGGB000--",
 );
-/// Receiver's accuracy.
+/// Accuracy of a satellite receiver: dilution of precision, standard errors of position (m), speed
+/// (m/s) and yaw (degrees), and age of the fix.
 pub static GPA: MessageDef = def(
     90,
     "GPA",
@@ -160,7 +162,8 @@ pub static XKF2: MessageDef = def(
     "s#---nnGGGGGGoor",
     "F----BBCCCCCC000",
 );
-/// EKF3 core's innovations.
+/// Innovations of an EKF3 core: velocity (m/s) and position (m) in north-east-down, magnetic field
+/// and yaw.
 pub static XKF3: MessageDef = def(
     46,
     "XKF3",
@@ -195,7 +198,7 @@ pub static XKFS: MessageDef =
 /// Position controller north: targets, desired and actual position, velocity, acceleration.
 pub static PSCN: MessageDef =
     def(187, "PSCN", "Qffffffff", "TimeUS,TPN,PN,DVN,TVN,VN,DAN,TAN,AN", "smmnnnooo", "F00000000");
-/// Position controller east.
+/// Position controller east: targets, desired and actual position, velocity, acceleration.
 pub static PSCE: MessageDef =
     def(188, "PSCE", "Qffffffff", "TimeUS,TPE,PE,DVE,TVE,VE,DAE,TAE,AE", "smmnnnooo", "F00000000");
 /// Position controller down; every value is positive down.
@@ -222,7 +225,7 @@ pub static IMU: MessageDef = def(
 /// Vibration levels and clipping.
 pub static VIBE: MessageDef =
     def(165, "VIBE", "QBfffI", "TimeUS,IMU,VibeX,VibeY,VibeZ,Clip", "s#ooo-", "F-000-");
-/// Barometer.
+/// Barometer: altitude (m), pressure (Pa), temperature (°C) and climb rate (m/s, positive up).
 pub static BARO: MessageDef = def(
     64,
     "BARO",
@@ -231,7 +234,7 @@ pub static BARO: MessageDef = def(
     "s#mPOnsmO-",
     "F-00B0C?0-",
 );
-/// Magnetometer.
+/// Magnetometer: field, offsets and motor compensation about the body axes, milligauss.
 pub static MAG: MessageDef = def(
     108,
     "MAG",
@@ -249,7 +252,7 @@ pub static CTRL: MessageDef = def(
     "s?????",
     "F?????",
 );
-/// Backup attitude estimate.
+/// Attitude (degrees), altitude (m) and position of the backup estimator, a DCM filter.
 pub static AHR2: MessageDef = def(
     68,
     "AHR2",
@@ -282,7 +285,8 @@ pub static SIM: MessageDef = def(
 /// Simulated truth: position, velocity (NED) and air speed.
 pub static SIM2: MessageDef =
     def(254, "SIM2", "Qdddffff", "TimeUS,PN,PE,PD,VN,VE,VD,As", "s???????", "F???????");
-/// Motor controller's telemetry.
+/// Telemetry of a motor controller: speed (rpm), voltage, current, temperatures (°C), charge (mAh)
+/// and error rate (%).
 pub static ESC: MessageDef = def(
     84,
     "ESC",
@@ -293,10 +297,11 @@ pub static ESC: MessageDef = def(
 );
 /// A 32-bit status word of the vehicle.
 pub static DU32: MessageDef = def(4, "DU32", "QBI", "TimeUS,Id,Value", "s--", "F--");
-/// Telemetry link's counters.
+/// Traffic of a telemetry link: packets sent, received and lost, and the link's state.
 pub static MAV: MessageDef =
     def(182, "MAV", "QBHHHBHH", "TimeUS,chan,txp,rxp,rxdp,flags,ss,tf", "s#----s-", "F-000-C-");
-/// Smart return-to-launch path.
+/// Path that the smart return to launch would fly back: a point in north-east-down, m, and the
+/// number of points kept.
 pub static SRTL: MessageDef = def(
     177,
     "SRTL",
@@ -305,7 +310,7 @@ pub static SRTL: MessageDef = def(
     "s----mmm",
     "F----000",
 );
-/// EKF3 core's timing.
+/// Time steps of an EKF3 core: shortest and longest interval between its inputs and its updates, s.
 pub static XKT: MessageDef = def(
     53,
     "XKT",
@@ -356,7 +361,7 @@ pub static XKY1: MessageDef = def(
 pub static FILE: MessageDef =
     def(196, "FILE", "NIBZ", "FileName,Offset,Length,Data", "----", "----");
 
-/// Every message of this catalog except the four that define the others.
+/// All messages of this catalog except the four that define others (FMT, FMTU, UNIT, MULT).
 pub static ALL: &[&MessageDef] = &[
     &PARM, &MSG, &VER, &ARM, &EV, &ERR, &MODE, &ORGN, &SHOW, &ATT, &RATE, &POS, &GPS, &GPA, &CTUN,
     &BAT, &RCOU, &RCO2, &RCIN, &MOTB, &XKF1, &XKF2, &XKF3, &XKF4, &XKF5, &XKQ, &XKFS, &PSCN, &PSCE,
@@ -364,7 +369,8 @@ pub static ALL: &[&MessageDef] = &[
     &SRTL, &XKT, &XKTV, &XKV1, &XKV2, &XKY0, &XKY1, &FILE, &ESC,
 ];
 
-/// What the firmware logs in a simulated show by default; `ESC` only with telemetry.
+/// Messages that the show firmware logs by default in simulation; [`ESC`] comes only from motor
+/// controllers with telemetry.
 pub static FULL_SET: &[&MessageDef] = &[
     &PARM, &MSG, &VER, &ARM, &EV, &ERR, &MODE, &ORGN, &SHOW, &ATT, &RATE, &POS, &GPS, &GPA, &CTUN,
     &BAT, &RCOU, &RCO2, &RCIN, &MOTB, &XKF1, &XKF2, &XKF3, &XKF4, &XKF5, &XKQ, &XKFS, &PSCN, &PSCE,
@@ -372,7 +378,8 @@ pub static FULL_SET: &[&MessageDef] = &[
     &SRTL, &XKT, &XKTV, &XKV1, &XKV2, &XKY0, &XKY1, &FILE,
 ];
 
-/// What the analysis and a human in a log viewer need, at a quarter of the size.
+/// Messages that an analysis and a person in a log viewer need: a quarter of the size of
+/// [`FULL_SET`].
 pub static DEFAULT_SET: &[&MessageDef] = &[
     &PARM, &MSG, &VER, &ARM, &EV, &ERR, &MODE, &ORGN, &SHOW, &ATT, &POS, &GPS, &CTUN, &BAT, &RCOU,
     &MOTB, &XKF1, &PSCN, &PSCE, &PSCD,

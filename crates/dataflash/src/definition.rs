@@ -1,4 +1,4 @@
-//! What a DataFlash message is: name, field letters, labels, units and multipliers.
+//! Definition of a DataFlash message: name, field letters, labels, units and multipliers.
 
 use super::letter::Letter;
 
@@ -7,19 +7,19 @@ use super::letter::Letter;
 pub struct MessageDef {
     /// Type byte in this project's logs (other logs assign their own).
     pub id: u8,
-    /// Up to 4 characters: `ATT`.
+    /// Name of the message, up to 4 characters: `ATT`.
     pub name: &'static str,
-    /// One letter per field: `QccccCCCCB`.
+    /// Format letters, one per field: `QccccCCCCB`.
     pub format: &'static str,
-    /// Comma-separated labels: `TimeUS,DesRoll,...`.
+    /// Comma-separated labels of the fields: `TimeUS,DesRoll,...`.
     pub fields: &'static str,
-    /// One unit letter per field.
+    /// Unit letters, one per field.
     pub units: &'static str,
-    /// One multiplier letter per field.
+    /// Multiplier letters, one per field.
     pub multipliers: &'static str,
 }
 
-/// Bytes that a field letter takes; `None` for an unknown letter.
+/// Size of a field by its format letter, bytes; `None` for an unknown letter.
 pub fn letter_size(letter: u8) -> Option<usize> {
     Letter::from_byte(letter).map(Letter::size)
 }

@@ -1,4 +1,4 @@
-//! What is in a log: every message type with its count, fields and times, and who wrote it.
+//! Contents of a log: every message type with its count, fields and times, and who wrote it.
 
 #[cfg(feature = "schemars")]
 use schemars::JsonSchema;
@@ -67,7 +67,8 @@ pub struct MessageInventory {
 }
 
 impl MessageInventory {
-    /// Mean rate between the earliest and the latest message (all instances together).
+    /// Mean rate between the earliest and the latest message, Hz, all instances together; `None` if
+    /// they give none.
     pub fn rate_hz(&self) -> Option<f64> {
         let span_us = self.last_us?.checked_sub(self.first_us?)?;
         (span_us > 0 && self.count > 1).then(|| (self.count - 1) as f64 * 1e6 / span_us as f64)

@@ -1,4 +1,4 @@
-//! Reading: one pass, only the wanted columns are decoded.
+//! Reader: one pass through the log, in which only the wanted columns are decoded.
 
 use std::fmt;
 use std::fs::{File, Metadata};
@@ -40,7 +40,7 @@ enum Bytes {
 /// One message type and the fields wanted of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Select<'a> {
-    /// Message name: `ATT`.
+    /// Name of the message to read: `ATT`.
     pub message: &'a str,
     /// Field labels; those that the log does not have are absent from the table.
     pub fields: &'a [&'a str],
@@ -52,24 +52,24 @@ pub struct Select<'a> {
 /// field have NaN or an empty text in its column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// Message name.
+    /// Name of the message, as in the log: `ATT`.
     pub message: String,
-    /// Rows in every column.
+    /// Number of rows, the same in every column.
     pub rows: usize,
     /// Number columns by label, in engineering units.
     pub numbers: Vec<(String, Vec<f64>)>,
     /// Text columns by label.
     pub texts: Vec<(String, Vec<String>)>,
-    /// What the log says about the columns that were found, in the order of the selection.
+    /// Unit and multiplier that the log gives each column found, in the order of the selection.
     pub columns: Vec<Column>,
 }
 
 /// Unit and multiplier of a column, from the log's UNIT, MULT and FMTU rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Column {
-    /// Label.
+    /// Label of the field: `DesRoll`.
     pub field: String,
-    /// `m`, `deg`, ...; absent in old logs and for plain numbers.
+    /// Unit label, such as `m` or `deg`; absent in old logs and for plain numbers.
     pub unit: Option<String>,
     /// Scale of the stored number. Already applied for the letters `c C e E L`, never applied for
     /// others, and wrong for some fields (`SHOW.HDist`).
@@ -77,12 +77,12 @@ pub struct Column {
 }
 
 impl Table {
-    /// A number column.
+    /// Values of a column of numbers, by its label; `None` if the table has no such column.
     pub fn number(&self, field: &str) -> Option<&[f64]> {
         self.numbers.iter().find(|(name, _)| name == field).map(|(_, column)| column.as_slice())
     }
 
-    /// A text column.
+    /// Values of a column of text, by its label; `None` if the table has no such column.
     pub fn text(&self, field: &str) -> Option<&[String]> {
         self.texts.iter().find(|(name, _)| name == field).map(|(_, column)| column.as_slice())
     }
@@ -102,25 +102,25 @@ impl Table {
     }
 }
 
-/// A log could not be read.
+/// Error of opening a log.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LogError {
     /// The file could not be opened.
     #[error("failed to open the log {}", path.shown())]
     Open {
-        /// The file.
+        /// Path that was to be opened.
         path: PathBuf,
-        /// The operating system's reason.
+        /// Reason given by the operating system.
         #[source]
         source: std::io::Error,
     },
-    /// Not a DataFlash log at all.
+    /// The file is not a DataFlash log.
     #[error("{} is not a DataFlash log: {reason}", path.shown())]
     NotALog {
-        /// The file.
+        /// Path of the file that is no log.
         path: PathBuf,
-        /// What was found instead.
+        /// Description of what the file holds instead.
         reason: String,
     },
 }
@@ -146,7 +146,7 @@ impl Log {
         }
     }
 
-    /// A log in memory; anything goes, also bytes that are no log.
+    /// A log in memory. Any bytes are accepted, also those of no log.
     pub fn from_bytes(bytes: Vec<u8>) -> Self {
         Self { bytes: Bytes::Held(bytes) }
     }
@@ -159,7 +159,7 @@ impl Log {
         (notes.tables(&scan.units), scan.stats)
     }
 
-    /// What is in the log: messages, times, firmware, damage.
+    /// Inventory of the log: message types with their counts and times, firmware, damage.
     pub fn inventory(&self) -> Inventory {
         let (count, scan) = self.walk(Count::default);
         inventory::take(self.size_bytes(), &count, scan)
@@ -177,7 +177,7 @@ impl Log {
         (visitor, scan)
     }
 
-    /// Size of the log.
+    /// Size of the log, bytes.
     pub fn size_bytes(&self) -> u64 {
         match &self.bytes {
             Bytes::File { size, .. } => *size as u64,
@@ -185,7 +185,7 @@ impl Log {
         }
     }
 
-    /// The bytes of a log that is held in memory.
+    /// Bytes of a log that is held in memory; `None` if it is read from a file.
     pub fn held(&self) -> Option<&[u8]> {
         match &self.bytes {
             Bytes::File { .. } => None,
@@ -193,7 +193,8 @@ impl Log {
         }
     }
 
-    /// The log as it was written, from its start; what cannot be read any more is not there.
+    /// Reader of the log's bytes from its start; it ends early where the file cannot be read any
+    /// more.
     pub fn reader(&self) -> Box<dyn Read + '_> {
         match &self.bytes {
             Bytes::Held(bytes) => Box::new(bytes.as_slice()),
@@ -204,7 +205,7 @@ impl Log {
         }
     }
 
-    /// What is there instead of a log; `None`: it begins as one.
+    /// Description of what the file holds if it is not a DataFlash log; `None` if it begins as one.
     pub fn why_not_a_log(&self) -> Option<String> {
         let bytes = match &self.bytes {
             Bytes::File { start, .. } => start,

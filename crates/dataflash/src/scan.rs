@@ -1,4 +1,4 @@
-//! The way through a log: message by message, over damage, with the formats that it defines.
+//! Walk through a log: message by message, over damage, with the formats that the log defines.
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -1,4 +1,4 @@
-//! GPS time, which is what drones agree on.
+//! GPS time, the clock that all drones share.
 
 use std::fmt;
 
@@ -33,19 +33,20 @@ impl GpsTime {
         i64::from(self.week) * WEEK_MS as i64 + i64::from(self.tow_ms)
     }
 
-    /// From milliseconds since the GPS epoch; `None` before the epoch or after week 65535.
+    /// GPS time from milliseconds since the GPS epoch; `None` before the epoch or after week 65535.
     pub fn from_total_ms(total_ms: i64) -> Option<Self> {
         let total = u64::try_from(total_ms).ok()?;
         let week = u16::try_from(total / WEEK_MS).ok()?;
         Some(Self { week, tow_ms: (total % WEEK_MS) as u32 })
     }
 
-    /// From Unix time in milliseconds, with today's 18 leap seconds.
+    /// GPS time from Unix time in milliseconds, with today's 18 leap seconds; `None` outside weeks
+    /// 0 to 65535.
     pub fn from_unix_ms(unix_ms: i64) -> Option<Self> {
         Self::from_total_ms(unix_ms - GPS_EPOCH_UNIX_S * 1000 + LEAP_S * 1000)
     }
 
-    /// Unix time in milliseconds.
+    /// Unix time in milliseconds, with today's 18 leap seconds.
     pub fn to_unix_ms(self) -> i64 {
         self.total_ms() + GPS_EPOCH_UNIX_S * 1000 - LEAP_S * 1000
     }

@@ -19,11 +19,11 @@ const BUFFER_BYTES: usize = 64 * 1024;
 /// One field's value in engineering units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value<'a> {
-    /// For whole-number letters.
+    /// A whole number, for the integer letters.
     Int(i64),
-    /// For float letters and scaled letters (`c C e E L`).
+    /// A number, for the float letters and the scaled letters (`c C e E L`), in engineering units.
     Float(f64),
-    /// For text letters; cut at the field's size.
+    /// Text, for the text letters; cut at the field's size.
     Text(&'a str),
 }
 
@@ -57,7 +57,7 @@ impl<W: Write> LogWriter<W> {
         Self::with_time(out, messages, 0)
     }
 
-    /// Like [`LogWriter::new`], with the `TimeUS` of the defining rows in microseconds.
+    /// Starts a log as [`LogWriter::new`] does; `time_us` is the `TimeUS` of the defining rows, us.
     pub fn with_time(out: W, messages: &[&'static MessageDef], time_us: u64) -> io::Result<Self> {
         let defining = [&catalog::FMT, &catalog::UNIT, &catalog::FMTU, &catalog::MULT];
         let mut layouts: Vec<Option<Layout>> = vec![None; 256];

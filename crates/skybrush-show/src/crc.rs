@@ -28,7 +28,7 @@ impl Default for ApCrc32 {
 }
 
 impl ApCrc32 {
-    /// Adds the next bytes.
+    /// Adds the next bytes to the checksum.
     pub fn update(&mut self, data: &[u8]) {
         self.0.update(data);
     }

@@ -22,14 +22,14 @@ use super::{Show, ShowDrone};
 
 const HEADER: &str = "Time [msec],x [m],y [m],z [m],Red,Green,Blue";
 
-/// Choices for [`write()`].
+/// Options of [`write()`]: how densely a show is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CsvOptions {
-    /// Straight lines between samples may miss a curve by this much, m.
+    /// Largest distance of a curve from the straight lines between its samples, m.
     pub tolerance_m: f64,
-    /// Rows on curves are at most this far apart, ms.
+    /// Longest time between two rows on a curve, ms.
     pub longest_step_ms: u32,
-    /// Rows for the lights besides those of the trajectory: at most one in this many ms.
+    /// Shortest time between two rows that are there for the lights alone, ms.
     pub light_step_ms: u32,
 }
 
@@ -39,7 +39,7 @@ impl Default for CsvOptions {
     }
 }
 
-/// Why a zipped CSV could not be written or read.
+/// Error of writing or reading a show as zipped CSV.
 #[derive(Debug, Error)]
 pub enum CsvError {
     /// The archive is unusable.
@@ -50,17 +50,17 @@ pub enum CsvError {
     Row {
         /// Name of the entry.
         entry: String,
-        /// Line in it, from 1.
+        /// Number of the line in the entry, from 1.
         line: usize,
-        /// What is wrong.
+        /// Description of the problem in that line.
         problem: String,
     },
     /// The show cannot be written.
     #[error("cannot write {what}: {problem}")]
     Unwritable {
-        /// What: the show or a drone.
+        /// Subject that has no representation in CSV: the show, or a drone by its label.
         what: String,
-        /// Why.
+        /// Reason why it cannot be written.
         problem: String,
     },
 }

@@ -1,5 +1,5 @@
-//! What a drone's firmware derives from its trajectory: when to take off, when to land, and whether
-//! it accepts the show at all.
+//! Quantities that a drone's firmware derives from its trajectory: the instants of take-off and
+//! landing, and whether it accepts the show at all.
 //!
 //! Two generations of the show fork differ. 4.4 samples the altitude at 1/16 s and lands at the end
 //! of the trajectory; 4.6 finds the exact instant, reckons with a finite acceleration and the spool-up
@@ -11,14 +11,14 @@ use serde::Serialize;
 use super::bezier::Scalar;
 use super::trajectory::{Piece, Trajectory};
 
-/// Firmware generation.
+/// Generation of the show firmware, which decides how a trajectory is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Firmware {
-    /// CMCopter-4.4 (libskybrush 1.9).
+    /// CMCopter-4.4, with libskybrush 1.9.
     #[default]
     #[serde(rename = "4.4")]
     V44,
-    /// CMCopter-4.6 (libskybrush 4).
+    /// CMCopter-4.6, with libskybrush 4.
     #[serde(rename = "4.6")]
     V46,
 }
@@ -27,15 +27,16 @@ pub enum Firmware {
 /// launcher's parameter file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeriveParams {
-    /// `SHOW_TAKEOFF_ALT`, m.
+    /// Height above its start to which a drone climbs by itself (`SHOW_TAKEOFF_ALT`), m.
     pub takeoff_alt_m: f64,
-    /// `WPNAV_SPEED_UP`, m/s.
+    /// Climb rate of the take-off (`WPNAV_SPEED_UP`), m/s.
     pub speed_up_mps: f64,
-    /// `WPNAV_ACCEL_Z`, m/s² (4.6).
+    /// Vertical acceleration of the take-off (`WPNAV_ACCEL_Z`), m/s²; used by 4.6 only.
     pub accel_z_mps2: f64,
-    /// `MOT_SPOOL_TIME`, s (4.6).
+    /// Time that the motors need to spool up (`MOT_SPOOL_TIME`), s; used by 4.6 only.
     pub spool_s: f64,
-    /// How far a descent may wander sideways and still count as vertical, m (4.6).
+    /// Largest sideways displacement along x or y in a piece that still counts as a vertical
+    /// descent, m; used by 4.6 only.
     pub vertical_within_m: f64,
 }
 
@@ -51,22 +52,23 @@ impl Default for DeriveParams {
     }
 }
 
-/// What the firmware derives.
+/// Schedule and acceptance of one drone's show, as its firmware derives them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Derived {
-    /// When the trajectory is `takeoff_alt_m` above its start, s; `None`: never.
+    /// Instant at which the trajectory is `takeoff_alt_m` above its start, show time, s; `None` if
+    /// it never is.
     pub reaches_takeoff_alt_s: Option<f64>,
-    /// When the drone takes off, show time in s; `None`: the show is refused.
+    /// Instant of take-off, show time, s; `None` if the firmware refuses the show.
     pub takeoff_s: Option<f64>,
-    /// By how much it takes off too late, because the show starts too late for it, s.
+    /// Delay of the take-off because the show starts too late for it, s.
     pub late_s: f64,
-    /// When it goes over to landing, show time in s.
+    /// Instant at which the drone changes over to landing, show time, s.
     pub landing_s: f64,
-    /// Altitude from which it lands by itself, m above the start point.
+    /// Altitude at which the landing begins, m above the start point.
     pub lands_from_m: f64,
     /// Whether the firmware accepts the show.
     pub valid: bool,
-    /// Why not, and what is remarkable otherwise.
+    /// Reasons for a refusal, and remarks on a show that is accepted, one sentence each.
     pub reasons: Vec<String>,
 }
 
@@ -209,7 +211,7 @@ fn first_touch(curve: Scalar, value: f64) -> Option<f64> {
     None
 }
 
-/// Time from rest to rest over a distance with limited speed and acceleration, s.
+/// Time to travel a distance from rest to rest with limited speed and acceleration, s.
 pub fn travel_time_s(distance_m: f64, speed_mps: f64, accel_mps2: f64) -> f64 {
     if !(distance_m >= 0.0 && speed_mps > 0.0 && accel_mps2 > 0.0) {
         return f64::INFINITY;

@@ -1,4 +1,4 @@
-//! Where things are: the show frame, local north-east-up metres, and the globe.
+//! Coordinate frames: the show frame, local north-east-up metres, and latitude and longitude.
 //!
 //! The **show frame** is Skybrush's: right-handed, x along the show's orientation, y to the left of
 //! x, z up from the ground at the origin. With the orientation `o` (degrees clockwise from north to
@@ -34,20 +34,21 @@ pub struct ShowFrame {
 }
 
 impl ShowFrame {
-    /// Show coordinates (x forward, y left, z up) to (north, east, up) metres from the origin.
+    /// Converts show coordinates (x forward, y left, z up) to (north, east, up) metres from the
+    /// origin.
     pub fn to_neu(&self, show_m: Vector3<f64>) -> Vector3<f64> {
         let (sin, cos) = self.orientation_deg.to_radians().sin_cos();
         Vector3::new(cos * show_m.x + sin * show_m.y, sin * show_m.x - cos * show_m.y, show_m.z)
     }
 
-    /// Inverse of [`ShowFrame::to_neu`].
+    /// Converts north-east-up metres to show coordinates, m; the inverse of [`ShowFrame::to_neu`].
     pub fn from_neu(&self, neu_m: Vector3<f64>) -> Vector3<f64> {
         let (sin, cos) = self.orientation_deg.to_radians().sin_cos();
         Vector3::new(cos * neu_m.x + sin * neu_m.y, sin * neu_m.x - cos * neu_m.y, neu_m.z)
     }
 
-    /// Show coordinates to a place on the globe (local tangent plane; arrays are hundreds of metres
-    /// wide, where its error is below a millimetre).
+    /// Converts show coordinates to latitude, longitude and altitude, on the local tangent plane;
+    /// arrays are hundreds of metres wide, where its error is below a millimetre.
     pub fn to_geodetic(&self, show_m: Vector3<f64>) -> Geodetic {
         let neu = self.to_neu(show_m);
         let (north_m_per_deg, east_m_per_deg) = metres_per_degree(self.origin.lat_deg);
@@ -58,7 +59,8 @@ impl ShowFrame {
         }
     }
 
-    /// A place on the globe to show coordinates; inverse of [`ShowFrame::to_geodetic`].
+    /// Converts latitude, longitude and altitude to show coordinates; the inverse of
+    /// [`ShowFrame::to_geodetic`].
     pub fn from_geodetic(&self, place: Geodetic) -> Vector3<f64> {
         let (north_m_per_deg, east_m_per_deg) = metres_per_degree(self.origin.lat_deg);
         self.from_neu(Vector3::new(

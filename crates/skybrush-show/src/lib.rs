@@ -22,7 +22,7 @@ pub use archive::verify as verify_archive;
 use crate::frame::ShowFrame;
 pub use trajectory::{Path, Segment, Trajectory};
 
-/// Most drones in a show: what the Skybrush loader takes.
+/// Largest number of drones in a show that the Skybrush loader accepts.
 pub const MAX_DRONES: usize = 5_000;
 
 /// A show: trajectories, lights and settings of all drones, in the show frame.
@@ -50,7 +50,7 @@ pub struct Show {
     pub fence: Vec<FenceZone>,
     /// Top of the fence, m above the show's ground, if it is stated.
     pub fence_altitude_m: Option<f64>,
-    /// What the file says that is wrong and does no harm to a flight, one sentence each.
+    /// Faults of the file that do no harm to a flight, one sentence each.
     pub doubts: Vec<String>,
     /// End of take-off, start of landing and end of the show, s (`meta.segments`).
     pub phases_s: Option<[f64; 3]>,
@@ -62,7 +62,7 @@ pub struct Show {
 pub struct FenceZone {
     /// Whether drones must stay inside it (else: outside).
     pub is_inclusion: bool,
-    /// Its corners, show x and y, m.
+    /// Corners of the polygon, show x and y, m.
     pub corners_m: Vec<[f64; 2]>,
 }
 
@@ -87,24 +87,24 @@ pub struct ShowDrone {
     pub home_m: Option<Vector3<f64>>,
     /// Planned landing position, show frame, m.
     pub land_at_m: Option<Vector3<f64>>,
-    /// What it flies. Starts at show time 0.
+    /// Trajectory that the drone flies, from show time 0.
     pub trajectory: Trajectory,
     /// Light program in Skybrush bytecode; empty: none.
     pub lights: Vec<u8>,
     /// Yaw program, if any.
     pub yaw: Option<YawControl>,
-    /// What else its file has for it that is not read.
+    /// Parts of the drone's file that are not read, by kind.
     pub extras: Extras,
 }
 
-/// What a file has for a drone besides what is read.
+/// Parts that a file has for a drone and that this crate does not read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Extras {
-    /// Pyro events.
+    /// Number of pyro events.
     pub pyro_events: usize,
-    /// Whether it has a plan for an early return home.
+    /// Whether the file holds a plan for an early return home.
     pub has_rth_plan: bool,
-    /// Places with more than three coordinates.
+    /// Number of points with more than three coordinates.
     pub spare_coordinates: usize,
 }
 
@@ -115,23 +115,24 @@ pub struct YawControl {
     pub auto: bool,
     /// Offset added to all setpoints, degrees clockwise.
     pub offset_deg: f64,
-    /// (show time s, degrees clockwise from the show's x axis), linear in between.
+    /// Headings over time: (show time in s, degrees clockwise from the show's x axis), linear in
+    /// between.
     pub setpoints: Vec<(f64, f64)>,
 }
 
-/// A named instant.
+/// A named instant of the show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cue {
-    /// Show time, s.
+    /// Show time of the cue, s.
     pub time_s: f64,
-    /// Label.
+    /// Name of the cue, as the show's author gave it.
     pub name: String,
 }
 
 /// Limits drawn and checked by Skybrush Live and Viewer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Validation {
-    /// Highest altitude, m.
+    /// Highest altitude that the show may reach, m.
     pub max_altitude_m: Option<f64>,
     /// Largest horizontal speed, m/s.
     pub max_velocity_xy_mps: Option<f64>,
@@ -155,6 +156,7 @@ pub struct Validation {
     pub max_velocity_step_mps: Option<f64>,
     /// Time a full battery carries the vehicle in hover, s (`endurance`; other tools ignore it).
     pub endurance_s: Option<f64>,
-    /// Share of it that must be left (`enduranceReserve`; other tools ignore it).
+    /// Share of the endurance that must be left at the end (`enduranceReserve`; other tools ignore
+    /// it).
     pub endurance_reserve: Option<f64>,
 }

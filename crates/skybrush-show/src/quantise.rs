@@ -1,5 +1,5 @@
-//! What whole units cost: the deviation of each drone's `.skyb` file from its trajectory, and what
-//! is flown of it.
+//! Cost of whole units: the deviation of each drone's `.skyb` file from its trajectory, and the
+//! show as it is flown with it.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -25,7 +25,8 @@ pub struct DroneQuantisation {
     pub deviation: Quantisation,
 }
 
-/// What a drone flies when it is given this show: its `.skyb` file, read as the firmware reads it.
+/// The show of a drone as it is flown: written to a `.skyb` file and read back as the firmware
+/// reads it.
 ///
 /// # Errors
 /// When the show does not fit into a file.

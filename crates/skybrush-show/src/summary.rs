@@ -1,4 +1,4 @@
-//! What is in a show, for people and for `--json`.
+//! Contents of a show in figures, for people and for `--json`.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -17,9 +17,9 @@ const LIGHT_LINES: usize = 20;
 /// A show in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShowSummary {
-    /// Identifier, if any.
+    /// Identifier of the show, if the file has one.
     pub id: Option<String>,
-    /// Title, if any.
+    /// Title of the show, if the file has one.
     pub title: Option<String>,
     /// Duration of the longest trajectory, s.
     pub duration_s: f64,
@@ -36,47 +36,48 @@ pub struct ShowSummary {
     pub orientation_deg: Option<f64>,
     /// Polygons of the proposed fence.
     pub fence: Vec<FenceZone>,
-    /// The drones.
+    /// Summary of each drone, in the order of the show.
     pub drones: Vec<DroneSummary>,
 }
 
 /// Largest speeds, m/s. Exact for straight pieces, an upper bound for curves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Speeds {
-    /// Horizontal.
+    /// Largest horizontal speed, m/s.
     pub horizontal_mps: f64,
-    /// Upward.
+    /// Largest upward speed, m/s.
     pub up_mps: f64,
-    /// Downward.
+    /// Largest downward speed, m/s, as a positive number.
     pub down_mps: f64,
 }
 
 /// One drone in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DroneSummary {
-    /// Label.
+    /// Label of the drone.
     pub name: String,
-    /// First point, m.
+    /// First point of the trajectory, show frame, m.
     pub start_m: [f64; 3],
-    /// Last point, m.
+    /// Last point of the trajectory, show frame, m.
     pub end_m: [f64; 3],
-    /// Duration, s.
+    /// Duration of the trajectory, s.
     pub duration_s: f64,
-    /// How many holds, lines, cubic curves and curves of 7th degree.
+    /// Number of pieces by shape: holds, straight lines, cubic curves, curves of 7th degree.
     pub pieces: [usize; 4],
     /// Smallest and largest x, y, z, m (outer bound for curves).
     pub bounds_m: [[f64; 3]; 2],
-    /// Largest speeds.
+    /// Largest speeds on the trajectory.
     pub speeds: Speeds,
-    /// Size of its light program, bytes.
+    /// Size of the light program, bytes.
     pub light_bytes: usize,
-    /// Its `.skyb` file in numbers, with the finest scale; `None` if the show does not fit.
+    /// Figures of the drone's `.skyb` file, written with the finest scale; `None` if the show does
+    /// not fit.
     pub skyb: Option<DroneQuantisation>,
-    /// Why it does not fit.
+    /// Reason why the show does not fit into a `.skyb` file.
     pub skyb_problem: Option<String>,
-    /// What firmware 4.4 derives.
+    /// Schedule that firmware 4.4 derives from the trajectory.
     pub derived_44: Derived,
-    /// What firmware 4.6 derives.
+    /// Schedule that firmware 4.6 derives from the trajectory.
     pub derived_46: Derived,
 }
 
@@ -85,15 +86,15 @@ pub struct DroneSummary {
 pub struct SkybSummary {
     /// Version of the format.
     pub version: u8,
-    /// Whether it has a checksum.
+    /// Whether the file has a checksum.
     pub has_crc: bool,
     /// Size of the unit, mm.
     pub scale_mm: u8,
-    /// Comment, if any.
+    /// Content of the comment block, if there is one.
     pub comment: Option<String>,
     /// Blocks in the order of the file.
     pub blocks: Vec<BlockInfo>,
-    /// Timed events.
+    /// Timed events (pyro), in the order of the file.
     pub events: Vec<Event>,
     /// Whether there is a return-to-home plan.
     pub has_rth_plan: bool,
@@ -103,7 +104,7 @@ pub struct SkybSummary {
     pub drone: DroneSummary,
 }
 
-/// Summarises a show.
+/// Summarises a show: its drones, their speeds, and the cost of their `.skyb` files.
 pub fn summarise(show: &Show, params: &DeriveParams) -> ShowSummary {
     let files = quantise::report(show, &SkybOptions::default());
     let drones: Vec<DroneSummary> = show

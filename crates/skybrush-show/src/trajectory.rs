@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 /// piece before it. The curve parameter is `t / duration`, so a line is flown at constant speed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Path {
-    /// Stands still.
+    /// Stands still at the start point of the piece.
     Hold,
     /// A straight line to this point at constant speed.
     Line(Vector3<f64>),
@@ -19,19 +19,19 @@ pub enum Path {
 /// One piece: a path flown in a whole number of milliseconds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Segment {
-    /// How long the piece takes, ms. Never 0 in a valid trajectory.
+    /// Duration of the piece, ms; never 0 in a valid trajectory.
     pub duration_ms: u32,
-    /// Its shape.
+    /// Shape of the piece.
     pub path: Path,
 }
 
-/// What one drone flies from show time 0, in the show frame (x forward, y left, z up), metres.
+/// Flight of one drone from show time 0, in the show frame (x forward, y left, z up), metres.
 ///
 /// Before time 0 the drone stands at the start; after the end it stays at the last point with zero
 /// velocity. At a boundary between pieces the earlier piece is in force, as in the firmware.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
-    /// First point.
+    /// First point, show frame, m.
     pub start_m: Vector3<f64>,
     /// The pieces, in order.
     pub segments: Vec<Segment>,
@@ -44,20 +44,20 @@ pub struct Piece<'a> {
     pub start_ms: u64,
     /// End, show time in ms.
     pub end_ms: u64,
-    /// First point, m.
+    /// Start point of the piece, show frame, m.
     pub from_m: Vector3<f64>,
-    /// The shape.
+    /// Shape of the piece.
     pub path: &'a Path,
 }
 
 /// Position, velocity and acceleration at one instant, show frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
-    /// Position, m.
+    /// Position, show frame, m.
     pub position_m: Vector3<f64>,
-    /// Velocity, m/s.
+    /// Velocity, show frame, m/s.
     pub velocity_mps: Vector3<f64>,
-    /// Acceleration, m/s².
+    /// Acceleration, show frame, m/s².
     pub acceleration_mps2: Vector3<f64>,
 }
 
@@ -91,12 +91,12 @@ impl Path {
 }
 
 impl Piece<'_> {
-    /// Duration, s.
+    /// Duration of the piece, s.
     pub fn duration_s(&self) -> f64 {
         (self.end_ms - self.start_ms) as f64 / 1000.0
     }
 
-    /// End point, m.
+    /// End point of the piece, show frame, m.
     pub fn end_m(&self) -> Vector3<f64> {
         self.path.end_m(self.from_m)
     }
@@ -148,12 +148,12 @@ impl Trajectory {
         Self { start_m, segments: Vec::new() }
     }
 
-    /// Total duration, ms.
+    /// Duration of the whole trajectory, ms.
     pub fn duration_ms(&self) -> u64 {
         self.segments.iter().map(|segment| u64::from(segment.duration_ms)).sum()
     }
 
-    /// Last point, m.
+    /// Last point of the trajectory, show frame, m; the start if it has no pieces.
     pub fn end_m(&self) -> Vector3<f64> {
         self.pieces().last().map_or(self.start_m, |piece| piece.end_m())
     }
@@ -175,8 +175,8 @@ impl Trajectory {
         })
     }
 
-    /// How another trajectory differs from this one by more than `tolerance_m`, in words; `None`:
-    /// it does not.
+    /// First difference from another trajectory that exceeds `tolerance_m`, in words; `None` if
+    /// there is none.
     ///
     /// Both are compared at every boundary of either and in between (a file may cut long pieces,
     /// so pieces need not match one to one).
@@ -226,7 +226,7 @@ pub struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    /// At the start of the trajectory.
+    /// A cursor at the start of a trajectory.
     pub fn new(trajectory: &'a Trajectory) -> Self {
         Self { trajectory, next: 0, start_ms: 0, from_m: trajectory.start_m }
     }

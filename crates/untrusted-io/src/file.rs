@@ -1,4 +1,4 @@
-//! Writing files so that nothing half-written is ever taken for whole.
+//! Whole files: nothing half-written is ever taken for a finished file.
 
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, BufWriter, Read, Write};
@@ -9,24 +9,24 @@ use thiserror::Error;
 
 use crate::plain::Shown as _;
 
-/// Marks our unfinished files, so that a later step can recognise and sweep them.
+/// Prefix of the names of unfinished files, by which a later step recognises and sweeps them.
 pub const PARTIAL_PREFIX: &str = ".partial-";
 
 /// A file could not be read or written.
 #[derive(Debug, Error)]
 #[error("failed to {action} {}", path.shown())]
 pub struct FileError {
-    /// What was being done ("read", "write", "create the folder").
+    /// The attempted operation, as a verb phrase: "read", "write", "create the folder".
     pub action: &'static str,
-    /// The file or folder.
+    /// Path of the file or folder.
     pub path: PathBuf,
-    /// The operating system's reason.
+    /// Reason given by the operating system.
     #[source]
     pub source: io::Error,
 }
 
 impl FileError {
-    /// Wraps an I/O error with what was being done to which path.
+    /// Wraps an I/O error with the attempted operation and the path.
     pub fn new(action: &'static str, path: &Path, source: io::Error) -> Self {
         Self { action, path: path.to_owned(), source }
     }
@@ -49,7 +49,7 @@ pub fn write_with(
     write_as(path, 0o644, fill)
 }
 
-/// [`write_whole`] for what only its owner may read.
+/// Writes a whole file as [`write_whole`] does, readable by its owner alone (mode 0600 on Unix).
 pub fn write_private(path: &Path, content: &[u8]) -> Result<(), FileError> {
     write_as(path, 0o600, |out| out.write_all(content))
 }
@@ -90,13 +90,18 @@ fn write_as(
     Ok(())
 }
 
-/// Creates a folder and its parents.
+/// Creates a folder and its parents, if they do not exist.
 pub fn create_folder(path: &Path) -> Result<(), FileError> {
     fs::create_dir_all(path).map_err(|source| FileError::new("create the folder", path, source))
 }
 
-/// Opens a file to read it. What is no file is refused before it is opened: a named pipe may keep
-/// its reader waiting for ever, and a device may never end.
+/// Opens a regular file for reading. Anything else is refused before it is opened: a named pipe may
+/// block its reader for ever, and a device may never end.
+///
+/// # Errors
+///
+/// `IsADirectory` for a folder, `InvalidInput` for a pipe, a socket or a device, otherwise the
+/// operating system's error.
 pub fn open_regular(path: &Path) -> io::Result<(File, Metadata)> {
     let regular = |metadata: &Metadata| match metadata {
         of if of.is_file() => Ok(()),
@@ -114,7 +119,8 @@ pub fn open_regular(path: &Path) -> io::Result<(File, Metadata)> {
     Ok((file, metadata))
 }
 
-/// Opens what a user names: a file, or a pipe that their shell gives below `/dev` (`<(...)`).
+/// Opens a file that a user names: a regular file, or anything below `/dev` that is no folder, such
+/// as the pipe of a shell's `<(...)`.
 pub fn open_named(path: &Path) -> io::Result<File> {
     let is_dir = || fs::metadata(path).is_ok_and(|metadata| metadata.is_dir());
     if path.starts_with("/dev") && !is_dir() {
@@ -123,7 +129,12 @@ pub fn open_named(path: &Path) -> io::Result<File> {
     open_regular(path).map(|(file, _)| file)
 }
 
-/// Reads a whole file, refusing one larger than `limit_bytes`, also one that has no end.
+/// Reads a whole file.
+///
+/// # Errors
+///
+/// `FileTooLarge` if the file holds more than `limit_bytes`, or never ends; otherwise the operating
+/// system's error.
 pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FileError> {
     let fail = |source| FileError::new("read", path, source);
     let file = open_named(path).map_err(fail)?;
@@ -148,7 +159,7 @@ pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FileError> {
 /// Bytes that are read at a time; they stay in the processor's cache.
 const PIECE_BYTES: usize = 1 << 17;
 
-/// Reads a file through, piece by piece; returns its size in bytes.
+/// Reads a regular file from start to end, piece by piece; returns its size in bytes.
 pub fn read_pieces(path: &Path, mut piece: impl FnMut(&[u8])) -> Result<u64, FileError> {
     let fail = |source| FileError::new("read", path, source);
     let (mut file, _) = open_regular(path).map_err(fail)?;
@@ -167,8 +178,8 @@ pub fn read_pieces(path: &Path, mut piece: impl FnMut(&[u8])) -> Result<u64, Fil
     }
 }
 
-/// Removes temporary files that a killed run left in `folder` (not in its subfolders); one that is
-/// still being written is left alone.
+/// Removes the temporary files that a killed run left in `folder` (not in its subfolders) and
+/// returns their number; files that are still being written stay.
 pub fn sweep_partial(folder: &Path) -> Result<usize, FileError> {
     let fail = |source| FileError::new("clean", folder, source);
     let mut swept = 0;
@@ -201,8 +212,8 @@ const SWEPT_DEPTH: usize = 4;
 /// Folders that are looked into.
 const SWEPT_FOLDERS: usize = 10_000;
 
-/// [`sweep_partial`] for a folder and those below it. Links are not followed, and what cannot be read
-/// or removed is left.
+/// Applies [`sweep_partial`] to a folder and those below it, and returns the number of files
+/// removed. Links are not followed, and what cannot be read or removed is left.
 pub fn sweep_below(folder: &Path) -> usize {
     let mut swept = 0;
     let mut left = SWEPT_FOLDERS;

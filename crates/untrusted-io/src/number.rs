@@ -1,4 +1,4 @@
-//! Numbers in sentences: never hundreds of digits, whatever a file or an option says.
+//! Numbers in sentences: never hundreds of digits, whatever a file or an option contains.
 
 /// Sizes from which a number is written with an exponent.
 const LARGE: f64 = 1e12;
@@ -22,7 +22,8 @@ pub fn plain(value: f64) -> String {
     }
 }
 
-/// A number with so many decimals, unless it is so large that they mean nothing.
+/// A number with a fixed count of decimals, or with an exponent if it is so large that decimals
+/// mean nothing.
 ///
 /// ```
 /// use untrusted_io::number::fixed;

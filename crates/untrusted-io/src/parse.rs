@@ -12,7 +12,11 @@ use serde::de::{
 
 use crate::plain::{plain, plain_string};
 
-/// A value from its JSON.
+/// Deserializes JSON; every string and key arrives as [`plain`] text.
+///
+/// # Errors
+///
+/// If the bytes are not JSON, hold anything after the value, or do not fit the type.
 pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Result<T> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value = T::deserialize(Plain(&mut reader))?;
@@ -20,7 +24,11 @@ pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> serde_json::Result<T> {
     Ok(value)
 }
 
-/// A value from its TOML.
+/// Deserializes TOML; every string and key arrives as [`plain`] text.
+///
+/// # Errors
+///
+/// If the text is not TOML, or does not fit the type.
 pub fn toml<T: DeserializeOwned>(text: &str) -> Result<T, toml::de::Error> {
     T::deserialize(Plain(toml::Deserializer::parse(text)?))
 }

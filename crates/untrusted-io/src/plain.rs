@@ -1,4 +1,4 @@
-//! Text of others as text, and nothing else.
+//! Text from others, made harmless.
 //!
 //! Names in shows, words of drones and servers, names of files: whoever wrote them may have put
 //! characters there that drive a terminal (escape sequences, carriage returns), begin a line that
@@ -10,12 +10,12 @@ use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 use std::path::Path;
 
-/// Styles that this program prints: bold, dim, colours, and back.
+/// Escape sequences that this program prints itself: reset, bold, dim and four colours.
 pub const STYLES: [&str; 7] =
     ["\u{1b}[0m", "\u{1b}[1m", "\u{1b}[2m", "\u{1b}[31m", "\u{1b}[32m", "\u{1b}[33m", "\u{1b}[34m"];
 
-/// Whether a character is more than a letter: it moves the cursor, ends the line, turns the
-/// direction of writing, or is not seen at all.
+/// Whether a character does more than show itself: it moves the cursor, ends the line, turns the
+/// direction of writing, or is invisible.
 pub fn acts(c: char) -> bool {
     c.is_control()
         || matches!(c,
@@ -51,7 +51,7 @@ pub fn plain(text: &str) -> Cow<'_, str> {
     replaced(text, |_, c| acts(c).then(|| picture(c).into()))
 }
 
-/// [`plain`], for a text that is owned.
+/// Makes an owned string [`plain`], without copying if it already is.
 pub fn plain_string(text: String) -> String {
     match plain(&text) {
         Cow::Borrowed(_) => text,
@@ -59,7 +59,8 @@ pub fn plain_string(text: String) -> String {
     }
 }
 
-/// What may go to a terminal: lines and tabs, and with `styles` those that this program prints.
+/// Text made safe for a terminal: line feeds and tabs stay, other control characters become
+/// pictures. With `styles`, this program's own escape sequences for colours and weights stay too.
 pub fn for_terminal(text: &str, styles: bool) -> Cow<'_, str> {
     replaced(text, |rest, c| {
         let is_ours = matches!(c, '\n' | '\t')
@@ -68,7 +69,8 @@ pub fn for_terminal(text: &str, styles: bool) -> Cow<'_, str> {
     })
 }
 
-/// JSON that means the same and does not drive a terminal: what [`acts`] is escaped.
+/// JSON text made safe for a terminal without changing its meaning: characters that act on a
+/// terminal ([`acts`]) become `\u` escapes; line feeds stay.
 pub fn json_for_terminal(json: &str) -> Cow<'_, str> {
     replaced(json, |_, c| {
         (c != '\n' && acts(c)).then(|| {
@@ -128,7 +130,8 @@ fn replaced(text: &str, instead: impl Fn(&str, char) -> Option<Instead>) -> Cow<
     out.map_or(Cow::Borrowed(text), Cow::Owned)
 }
 
-/// How a path is shown: [`plain`]. `Path::display` passes on whatever a file is named.
+/// Display of a path as [`plain`] text, in place of `Path::display`, which passes control
+/// characters in a file's name on to the terminal.
 pub trait Shown {
     /// The path as one line of text.
     fn shown(&self) -> ShownPath<'_>;

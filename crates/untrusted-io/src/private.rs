@@ -1,4 +1,5 @@
-//! What belongs to one user: folders and files that others can neither read nor put something into.
+//! Folders and files that belong to one user alone: others can neither read them nor put anything
+//! into them.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -38,10 +39,13 @@ fn close_to_others(path: &Path, before: &fs::Metadata, mode: u32) -> io::Result<
     Ok(())
 }
 
-/// Makes a folder that only this user can look into, or takes one that is there if it is theirs.
+/// Creates a folder that only this user can look into, or accepts one that is there if it is
+/// theirs, and closes it to others.
 ///
 /// # Errors
-/// Also when it is a symbolic link, or of another user.
+///
+/// If the path is a symbolic link, no folder, or belongs to another user, or if the operating
+/// system refuses.
 pub fn own_folder(path: &Path) -> io::Result<()> {
     #[cfg(unix)]
     {
@@ -58,10 +62,11 @@ pub fn own_folder(path: &Path) -> io::Result<()> {
     fs::create_dir_all(path)
 }
 
-/// Whether a folder that is there is this user's.
+/// Checks that a folder exists and belongs to this user.
 ///
 /// # Errors
-/// When it is not there, a symbolic link, or of another user.
+///
+/// If it does not exist, is a symbolic link, or belongs to another user.
 pub fn is_own_folder(path: &Path) -> io::Result<()> {
     #[cfg(unix)]
     return check(path, fs::Metadata::is_dir).map(drop);
@@ -69,10 +74,12 @@ pub fn is_own_folder(path: &Path) -> io::Result<()> {
     fs::metadata(path).map(drop)
 }
 
-/// Opens a file that only this user can read, with these options; makes it if they say so.
+/// Opens a file that only this user can read, with these options; creates it if they say so.
 ///
 /// # Errors
-/// Also when it is a symbolic link, no file, or of another user.
+///
+/// If the path is a symbolic link, no regular file, or belongs to another user, or if the operating
+/// system refuses.
 pub fn open_own(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     #[cfg(unix)]
     {

@@ -10,7 +10,7 @@ mod step;
 
 use crate::effects::{Definition, Effect, Reference, Signals, Values};
 
-/// All of them.
+/// Foreign effects: those that no library lists.
 pub const FOREIGN: &[&dyn Effect] =
     &[&step::Step, &height_wave::HeightWave, &climb_time::ClimbTime, &heading::Heading];
 
@@ -19,7 +19,8 @@ pub fn find(name: &str) -> Option<&'static dyn Effect> {
     FOREIGN.iter().copied().find(|effect| effect.definition().name == name)
 }
 
-/// What a verdict may say that an effect depends on; the first is the plainest.
+/// Words by which a verdict may name the dependence of a foreign effect; the first is the plainest.
+/// Empty for an unknown name.
 pub fn depends_on(name: &str) -> &'static [&'static str] {
     match name {
         "step" => &["step", "time"],
@@ -30,8 +31,8 @@ pub fn depends_on(name: &str) -> &'static [&'static str] {
     }
 }
 
-/// What an effect adds to the pulse of steady flight, with the air from a direction against the nose, rad,
-/// us.
+/// Change in the pulse width of steady flight that an effect causes, us; `heading_rad` is the
+/// direction of the oncoming air against the nose.
 pub fn steady_us(
     effect: &dyn Effect,
     values: &Values,

@@ -19,62 +19,62 @@ const MAX_BYTES: u64 = 1 << 20;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mapping {
-    /// `updraft.csv/1`.
+    /// Format name and version: `updraft.csv/1`.
     pub schema: String,
-    /// Title for people.
+    /// Title of the flights, for people.
     #[serde(default)]
     pub title: String,
     /// Character between the cells.
     #[serde(default = "comma")]
     pub delimiter: char,
-    /// What stands for rotor effort: `pulse`, `rotor_speed` or `power`.
+    /// Indicator of rotor effort that the table holds: `pulse`, `rotor_speed` or `power`.
     pub indicator: Indicator,
-    /// When.
+    /// Column of times, and its format.
     pub time: TimeColumn,
     /// Rotor effort, in the indicator's unit.
     pub effort: Channel,
     /// Vertical velocity, m/s, up positive (a column that points down has the scale -1).
     pub velocity_up: Channel,
-    /// Height, m, up positive; from any level.
+    /// Height above any level, m, up positive.
     pub height: Channel,
-    /// Roll, radians.
+    /// Roll, rad, right side down positive.
     pub roll: Channel,
-    /// Pitch, radians.
+    /// Pitch, rad, nose up positive.
     pub pitch: Channel,
     /// Commanded vertical velocity, m/s, up positive, if there is one: windows come from it.
     pub command_up: Option<Channel>,
     /// True vertical velocity of the air, m/s, up positive, if something measured it.
     pub truth: Option<Channel>,
-    /// How windows are found where there is no command.
+    /// Rules for finding windows where there is no commanded velocity.
     #[serde(default)]
     pub steps: Steps,
-    /// The flights.
+    /// Flights, each with the tables of its drones.
     pub flights: Vec<TableFlight>,
 }
 
-/// The column of times.
+/// Column of times, and its format.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeColumn {
-    /// Its name.
+    /// Name of the column of times.
     pub column: String,
-    /// What it holds.
+    /// Format of the times.
     #[serde(default)]
     pub format: TimeFormat,
 }
 
-/// What a column of times holds.
+/// Format of a column of times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TimeFormat {
-    /// Seconds.
+    /// Seconds since any instant.
     #[default]
     S,
-    /// Milliseconds.
+    /// Milliseconds since any instant.
     Ms,
-    /// Microseconds.
+    /// Microseconds since any instant.
     Us,
-    /// `2021-04-20 09:29:26.100`, with a blank or a T.
+    /// Date and time of day, as `2021-04-20 09:29:26.100`, with a blank or a T.
     Datetime,
 }
 
@@ -84,23 +84,23 @@ pub enum TimeFormat {
 pub struct Channel {
     /// Columns whose mean is taken.
     pub columns: Vec<String>,
-    /// Factor to our unit and sign.
+    /// Factor from the column to our unit and sign.
     #[serde(default = "one")]
     pub scale: f64,
-    /// What is added then.
+    /// Summand to the scaled mean, in our unit.
     #[serde(default)]
     pub offset: f64,
 }
 
-/// Windows from the measured velocity.
+/// Rules for finding windows in the measured velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Steps {
-    /// A step is steady where the velocity stays within this of its mean, m/s.
+    /// Largest deviation of the velocity from its mean within a steady step, m/s.
     pub wobble_mps: f64,
-    /// Cut at a step's start: the controller's transient, s.
+    /// Time left out at the start of a step, s: the controller's transient.
     pub settle_s: f64,
-    /// Shortest window, s.
+    /// Duration of the shortest window that is used, s.
     pub shortest_s: f64,
 }
 
@@ -110,15 +110,15 @@ impl Default for Steps {
     }
 }
 
-/// One flight.
+/// One flight of one or more drones, a table each.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableFlight {
-    /// Short name.
+    /// Short name of the flight.
     pub name: String,
-    /// `calibration` or `measurement`.
+    /// Purpose of the flight: `calibration` or `measurement`.
     pub purpose: Purpose,
-    /// The tables of its drones, relative to the mapping file.
+    /// Tables of the flight's drones, relative to the mapping file.
     pub files: Vec<PathBuf>,
 }
 
@@ -131,12 +131,20 @@ fn one() -> f64 {
 }
 
 impl Mapping {
-    /// Reads a mapping file; its flights' files become relative to where it is read from.
+    /// Reads a mapping file; the paths of its tables become relative to the working directory.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read, or is not a mapping.
     pub fn load(path: &Path) -> Result<Self, TableError> {
         Self::parse(path, &read_whole(path, MAX_BYTES)?)
     }
 
-    /// Takes the bytes of a mapping file for one at `path`.
+    /// Reads a mapping from the content of a file at `path`.
+    ///
+    /// # Errors
+    ///
+    /// If it is not a mapping.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, TableError> {
         let wrong = |reason: String| TableError::Mapping { path: path.to_owned(), reason };
         let text = std::str::from_utf8(bytes).map_err(|error| wrong(error.to_string()))?;

@@ -1,5 +1,5 @@
-//! Flights from other people's tables (CSV): which column is what, in which unit, is told by a mapping
-//! file. This is the border where their signs and units become ours.
+//! Flights from other people's tables (CSV). A mapping file says which column holds which quantity
+//! in which unit; this is the border where their signs and units become ours.
 
 mod mapping;
 mod read;
@@ -15,19 +15,19 @@ use crate::base::plain::Shown as _;
 pub use mapping::{Channel, Mapping, Steps, TableFlight, TimeColumn, TimeFormat};
 pub use read::{read, read_from};
 
-/// A table cannot be used.
+/// Error of reading a flight from tables.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TableError {
     /// A file could not be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The mapping is not what it should be.
+    /// The mapping file is not valid.
     #[error("{}: {reason}", path.shown())]
     Mapping {
-        /// The mapping file.
+        /// Path of the mapping file.
         path: PathBuf,
-        /// What is wrong, with the place.
+        /// Statement of the problem, with its place in the file.
         reason: String,
     },
     /// A column that the mapping names is not in the table.
@@ -36,39 +36,39 @@ pub enum TableError {
         path.shown()
     )]
     Column {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
-        /// The missing column.
+        /// Name of the missing column.
         column: String,
-        /// What it is wanted for.
+        /// Quantity that the column would give.
         channel: &'static str,
-        /// The table's columns.
+        /// Names of the columns that the table has.
         there: String,
     },
-    /// A cell is not what its column holds.
+    /// A cell does not hold what its column should.
     #[error("{}, line {line}, column \"{column}\": {reason}", path.shown())]
     Cell {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
-        /// The line, from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// What is wrong.
+        /// Statement of the problem with the cell.
         reason: String,
     },
-    /// A line cannot be read at all.
+    /// A line cannot be read.
     #[error("{}: {reason}", path.shown())]
     Row {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
-        /// What is wrong, with the line.
+        /// Statement of the problem, with the line.
         reason: String,
     },
-    /// There is not even a header line.
+    /// The table is empty: it has no header line either.
     #[error("{}: the table is empty: there is no line with the columns' names", path.shown())]
     Empty {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
     },
     /// The file is larger than any flight's table.
@@ -77,25 +77,25 @@ pub enum TableError {
         path.shown()
     )]
     Huge {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
-        /// Its size.
+        /// Size of the table, bytes.
         bytes: u64,
-        /// The limit.
+        /// Largest size that is read, bytes.
         most: u64,
     },
-    /// There are too few rows for a flight.
+    /// The table has too few usable rows for a flight.
     #[error(
         "{}: {rows} usable rows are no flight{}",
         path.shown(),
         left_out(*backward)
     )]
     Short {
-        /// The table.
+        /// Path of the table.
         path: PathBuf,
-        /// Rows with a time.
+        /// Number of rows with a time.
         rows: usize,
-        /// Rows that were left out because their time does not go forward.
+        /// Number of rows left out because their time does not increase.
         backward: usize,
     },
 }

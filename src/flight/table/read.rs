@@ -1,4 +1,4 @@
-//! Rows of a table to a flight.
+//! Reader of one drone's table.
 
 use std::borrow::Cow;
 use std::cell::Cell;
@@ -94,7 +94,11 @@ impl<R: Read> Read for Bounded<'_, R> {
     }
 }
 
-/// The same from any bytes; `path` is for messages.
+/// Reads the table of one drone from a stream; `path` stands in messages only.
+///
+/// # Errors
+///
+/// As [`read`].
 pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Flight, TableError> {
     let since_row = Cell::new(0);
     let bytes = Bounded { inner: bytes, since_row: &since_row };

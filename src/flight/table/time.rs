@@ -1,4 +1,4 @@
-//! Dates with times of day, as seconds.
+//! Dates with times of day, in seconds.
 
 /// Seconds since 1970 of `2021-04-20 09:29:26.100` (with a blank or a T, perhaps a Z at the end); the
 /// proleptic Gregorian calendar without leap seconds. `None`: it is none.

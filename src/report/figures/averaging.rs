@@ -1,4 +1,4 @@
-//! How long an average must be: the Allan deviation of the vertical air speed.
+//! Allan deviation of the vertical air speed: the averaging time that a measurement needs.
 
 use kuva::plot::legend::{LegendPosition, LegendShape};
 

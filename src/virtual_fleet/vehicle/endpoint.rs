@@ -1,4 +1,4 @@
-//! Who is spoken to, and what each message sets in motion.
+//! Addressing of messages to a virtual vehicle, and the effect of each of them.
 
 use super::{TICK, VirtualVehicle};
 use crate::link::clock::{MS, Micros};

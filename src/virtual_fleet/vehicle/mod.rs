@@ -46,15 +46,15 @@ const SHOW_FOLDER: &str = "/collmot";
 /// Mode after boot without SHOW_MODE_BOOT: stabilize.
 const STABILIZE: u32 = 0;
 
-/// One vehicle.
+/// A virtual vehicle: it speaks as the show firmware does, keeps files, and flies in simulation.
 pub struct VirtualVehicle<'w> {
-    /// What it is.
+    /// Properties that distinguish the vehicle from others of its world.
     pub setup: VehicleSetup,
-    /// Its files.
+    /// Storage of its shows and logs.
     pub storage: Box<dyn Storage + Send>,
-    /// Its parameters.
+    /// Parameters of its autopilot.
     pub params: Params,
-    /// What became of its flights since it was made.
+    /// Outcomes of its flights, from the first since it was made.
     pub flown: Vec<FlightSummary>,
     world: &'w World<'w>,
     boot_at: Micros,
@@ -134,7 +134,7 @@ impl<'w> VirtualVehicle<'w> {
         }
     }
 
-    /// Where it is, show frame, m.
+    /// Position of the vehicle, show frame, m.
     pub fn position_m(&self) -> Vector3<f64> {
         self.airborne.as_ref().map_or(self.stands_m, Airborne::position_m)
     }
@@ -144,7 +144,7 @@ impl<'w> VirtualVehicle<'w> {
         self.stands_m = stands_m;
     }
 
-    /// Custom mode.
+    /// Flight mode, as ArduPilot's custom mode number.
     pub fn mode(&self) -> u32 {
         self.mode
     }
@@ -195,7 +195,7 @@ impl<'w> VirtualVehicle<'w> {
         now.saturating_sub(self.boot_at)
     }
 
-    /// When it was switched on: what its messages count from, and its log.
+    /// Instant at which it was switched on, from which the times in its messages and its log count.
     pub fn booted(&self) -> Option<GpsTime> {
         GpsTime::from_total_ms(self.world.gps_us(self.boot_at).div_euclid(1000))
     }

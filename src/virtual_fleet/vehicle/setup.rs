@@ -1,20 +1,20 @@
-//! What a vehicle is, and how it differs from the others of its world.
+//! Properties of a virtual vehicle that distinguish it from others of its world.
 
 use nalgebra::Vector3;
 
 use crate::link::clock::{MS, Micros, S};
 use crate::virtual_fleet::transfers::Transfers;
 
-/// When a vehicle is how far after it was switched on.
+/// Milestones of a boot, us after switching on.
 #[derive(Clone, Copy, Debug)]
 pub struct BootTimes {
-    /// First heartbeat.
+    /// Time until the first heartbeat, us.
     pub heartbeat: Micros,
-    /// Files, show mode.
+    /// Time until files and the show mode are available, us.
     pub files: Micros,
-    /// GPS fix and time.
+    /// Time until there are a GPS fix and GPS time, us.
     pub gps: Micros,
-    /// Position estimate; ready to arm.
+    /// Time until there is a position estimate and the vehicle can be armed, us.
     pub position: Micros,
 }
 
@@ -32,28 +32,28 @@ impl BootTimes {
     }
 }
 
-/// How a vehicle differs from the others of its world.
+/// Properties of a virtual vehicle that distinguish it from others of its world.
 #[derive(Clone, Debug)]
 pub struct VehicleSetup {
     /// Slot in the plan, from 1: its sensors' noise and its clock come from it.
     pub drone: u16,
-    /// MAVLink system id.
+    /// MAVLink system id, unique in its network.
     pub system: u8,
     /// Network, from 0: system ids are unique in it.
     pub network: u16,
-    /// Where it stands, show frame, m.
+    /// Place where the vehicle stands at first, show frame, m.
     pub stands_m: Vector3<f64>,
-    /// How long it takes to boot.
+    /// Duration of the stages of booting.
     pub boot: BootTimes,
     /// Without the show mode: stock firmware.
     pub stock: bool,
-    /// Where its logs are: `/APM/LOGS`, or `logs`.
+    /// Folder of the logs in its storage: `/APM/LOGS`, or `logs`.
     pub log_folder: String,
-    /// How fast it sends files and logs.
+    /// Rates at which it sends files and logs.
     pub transfers: Transfers,
-    /// When it is switched off for good.
+    /// Time at which it is switched off for good, us.
     pub gone_at: Option<Micros>,
-    /// When it reboots by itself, once.
+    /// Time at which it reboots by itself, once, us.
     pub reboot_at: Option<Micros>,
 }
 

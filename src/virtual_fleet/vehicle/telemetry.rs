@@ -1,4 +1,4 @@
-//! What a vehicle says on its own, and how often.
+//! Messages that a vehicle sends unasked, and their rates.
 
 use nalgebra::Vector3;
 

@@ -1,4 +1,4 @@
-//! What a vehicle knows of itself, as its messages say it.
+//! State of a vehicle in the words of its messages.
 
 use nalgebra::Vector3;
 

@@ -41,14 +41,14 @@ pub struct Poly {
 /// A minimum or maximum on [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extremum {
-    /// Where.
+    /// Argument at which the polynomial has the extremum, in [0, 1].
     pub u: f64,
-    /// How much.
+    /// Value of the polynomial there.
     pub value: f64,
 }
 
 impl Poly {
-    /// The constant polynomial.
+    /// The polynomial that has this value everywhere.
     pub fn constant(value: f64) -> Self {
         Self::from_iter([value])
     }
@@ -69,12 +69,12 @@ impl Poly {
         &self.coefficients[..=self.degree]
     }
 
-    /// The degree in which it is written.
+    /// Degree in which the polynomial is written, which may be higher than it needs.
     pub fn degree(&self) -> usize {
         self.degree
     }
 
-    /// Value at `u`.
+    /// Value of the polynomial at `u` in [0, 1], by de Casteljau's algorithm.
     pub fn value(&self, u: f64) -> f64 {
         let mut work = self.coefficients;
         for last in (1..=self.degree).rev() {
@@ -95,19 +95,20 @@ impl Poly {
         self.coefficients().iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// The same polynomial plus a constant.
+    /// This polynomial plus a constant.
     #[must_use]
     pub fn plus(&self, constant: f64) -> Self {
         Self::from_values(self.coefficients().iter().map(|c| c + constant))
     }
 
-    /// The same polynomial times a constant.
+    /// This polynomial times a constant.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         Self::from_values(self.coefficients().iter().map(|c| c * factor))
     }
 
-    /// The same polynomial written in a higher degree.
+    /// This polynomial in the basis of a higher degree, at most 14: its values stay, its control
+    /// points come closer.
     #[must_use]
     pub fn elevate(&self, degree: usize) -> Self {
         let mut poly = *self;
@@ -175,7 +176,7 @@ impl Poly {
         (left, right)
     }
 
-    /// The part on [from, to], on its own [0, 1].
+    /// The part of the polynomial on [from, to], as a polynomial on [0, 1].
     #[must_use]
     pub fn restrict(&self, from: f64, to: f64) -> Self {
         let mut part = *self;

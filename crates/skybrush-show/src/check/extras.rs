@@ -1,4 +1,5 @@
-//! What a file has that is not read or not checked: it is named, so that nobody takes it for checked.
+//! Findings on parts of a file that are not read or not checked, so that nobody takes them for
+//! checked.
 
 use super::CheckInput;
 use super::report::{Collector, Finding, Severity};

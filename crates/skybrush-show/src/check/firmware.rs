@@ -1,4 +1,5 @@
-//! What the show firmware will derive from a trajectory on board, and whether it will accept it.
+//! Checks of the firmware's reading of a trajectory: the schedule it derives on board, and whether
+//! it accepts the show.
 //!
 //! Both generations are asked, through [`derive()`]: 4.4 finds the take-off on a grid of 1/16 s and
 //! lands at the end of the trajectory; 4.6 finds it exactly, reckons with acceleration and spool-up,

@@ -53,11 +53,11 @@ use watch::Watch;
 
 /// Height above its ground from which a drone is in the air, m.
 pub const AIRBORNE_ABOVE_M: f64 = 0.5;
-/// What a length may exceed its limit by, m: the resolution of show files.
+/// Excess over its limit that a length is allowed, m: the resolution of show files.
 pub const TOLERANCE_M: f64 = 1e-3;
-/// What a speed may exceed its limit by, m/s: what the rounding of files does to it.
+/// Excess over its limit that a speed is allowed, m/s: the effect of rounding in show files.
 pub const TOLERANCE_MPS: f64 = 1e-3;
-/// What an acceleration may exceed its limit by, m/s².
+/// Excess over its limit that an acceleration is allowed, m/s².
 pub const TOLERANCE_MPS2: f64 = 1e-3;
 /// Time after the last trajectory that is still checked, ms: all drones are then landing.
 const AFTER_SHOW_MS: u64 = 1000;
@@ -91,9 +91,9 @@ impl Default for Options {
 /// A show and what it is checked against.
 #[derive(Clone, Copy, Debug)]
 pub struct CheckInput<'a> {
-    /// The show.
+    /// The show to check.
     pub show: &'a Show,
-    /// What the vehicle may be asked to do.
+    /// Limits of the vehicle that is to fly the show.
     pub limits: &'a Limits,
     /// The fence, if there is one; the show's own zones ([`Show::fence`]) are checked besides it.
     pub fence: Option<&'a Fence>,
@@ -101,11 +101,11 @@ pub struct CheckInput<'a> {
     pub fence_has_top: bool,
     /// The vehicle's own limits, against which [`CheckInput::limits`] may have been loosened.
     pub stock: Option<&'a Limits>,
-    /// Rules of one's own, besides those of this crate.
+    /// A rule of the caller's own, checked besides those of this crate.
     pub rule: Option<&'a dyn Rule>,
-    /// What decides how the firmware reads a trajectory.
+    /// Firmware parameters that decide how a trajectory is read.
     pub firmware: Firmware,
-    /// Everything else.
+    /// Settings that belong neither to the vehicle nor to the firmware.
     pub options: Options,
 }
 
@@ -145,9 +145,9 @@ pub struct Fence {
     pub margin_m: f64,
 }
 
-/// A rule of the caller's own: what it finds stands in the report with the rest.
+/// A rule of the caller's own, whose findings stand in the report with the rest.
 pub trait Rule: std::fmt::Debug + Sync {
-    /// Adds what it finds.
+    /// Adds the rule's findings to the report.
     fn check(&self, collector: &mut Collector);
 }
 
@@ -208,32 +208,33 @@ impl<'a> CheckInput<'a> {
         }
     }
 
-    /// The same for an autopilot with this `WPNAV_SPEED_UP`, m/s.
+    /// This input with another climb rate of the autopilot (`WPNAV_SPEED_UP`), m/s.
     #[must_use]
     pub fn with_speed_up(mut self, wpnav_speed_up_mps: f64) -> Self {
         self.firmware.wpnav_speed_up_mps = wpnav_speed_up_mps;
         self
     }
 
-    /// The same with a fence, if there is one.
+    /// This input with another fence, or with none.
     #[must_use]
     pub fn with_fence(self, fence: Option<&'a Fence>) -> Self {
         Self { fence, ..self }
     }
 
-    /// The same with the polygon of a fence whose top is not known, if there is one.
+    /// This input with the polygon of a fence whose top is unknown, or with no fence.
     #[must_use]
     pub fn with_polygon(self, fence: Option<&'a Fence>) -> Self {
         Self { fence, fence_has_top: false, ..self }
     }
 
-    /// The same with a further rule.
+    /// This input with one rule of the caller's own besides the crate's checks.
     #[must_use]
     pub fn with_rule(self, rule: &'a dyn Rule) -> Self {
         Self { rule: Some(rule), ..self }
     }
 
-    /// The same with the vehicle's own limits: where the limits are looser, the report says so.
+    /// This input with the vehicle's stock limits: where [`CheckInput::limits`] are looser, the
+    /// report says so.
     #[must_use]
     pub fn with_stock(self, stock: &'a Limits) -> Self {
         Self { stock: Some(stock), ..self }

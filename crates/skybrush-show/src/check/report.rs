@@ -1,4 +1,4 @@
-//! What the checks found, for people and for programs.
+//! Findings of the checks, for people and for programs.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -116,17 +116,17 @@ pub struct CheckReport {
 }
 
 impl CheckReport {
-    /// Number of errors, shown or not.
+    /// Number of errors, including those that the report does not list.
     pub fn errors(&self) -> usize {
         self.counts.values().map(|count| count.errors).sum()
     }
 
-    /// Number of warnings, shown or not.
+    /// Number of warnings, including those that the report does not list.
     pub fn warnings(&self) -> usize {
         self.counts.values().map(|count| count.warnings).sum()
     }
 
-    /// Whether the show may be flown: no errors.
+    /// Whether the show may be flown: there are no errors.
     pub fn passed(&self) -> bool {
         self.errors() == 0
     }
@@ -332,7 +332,7 @@ impl Collector {
         false
     }
 
-    /// Says that a check stopped before it had counted everything.
+    /// Marks a check as stopped before it had counted everything.
     pub fn incomplete(&mut self, check: &'static str) {
         self.counts.entry(check).or_default().at_least = true;
     }

@@ -1,5 +1,5 @@
-//! What other programs' shows state besides the limits that every vehicle has: accelerations by
-//! direction, the yaw rate, and the altitude below which nobody moves sideways.
+//! Limits that a show states itself, besides those that every vehicle has: accelerations by
+//! direction, the yaw rate, and the altitude below which no drone moves sideways.
 //!
 //! Studio for Blender writes `maxAccelerationXY`, `maxAccelerationZ`, `maxYawRate` and
 //! `minNavAltitude`, Viewer draws the first three as thresholds. The vehicle's own limit of

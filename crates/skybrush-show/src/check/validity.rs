@@ -1,4 +1,4 @@
-//! Whether the numbers of a show make sense at all; the other checks rely on it.
+//! Check that the numbers of a show make sense at all; every other check relies on it.
 
 use super::fence::{usable, usable_polygon};
 use super::report::{Collector, Finding, Severity};

@@ -14,119 +14,120 @@ use thiserror::Error;
 pub use codec::{Decoder, decode, encode, with_final_set};
 pub use player::{Explanation, Player, color_at, explain};
 
-/// One tick, ms.
+/// Duration of one tick, ms: the unit of time in light programs.
 pub const TICK_MS: u64 = 20;
 /// Highest number of ticks of one command: about ten days, far beyond any show, far below overflow.
 const MAX_TICKS: u64 = 1 << 32;
 
-/// Red, green, blue.
+/// A colour as red, green and blue, 0 to 255 each.
 pub type Rgb = [u8; 3];
 
 /// One step of a simple program, for [`encode`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightStep {
-    /// How long it takes, ms.
+    /// Duration of the step, ms.
     pub duration_ms: u32,
-    /// The colour it shows or ends in.
+    /// Colour that the step shows, or in which its fade ends.
     pub color: Rgb,
-    /// Fades from the colour before instead of switching at once.
+    /// Whether the colour fades from that of the step before; otherwise it switches at once.
     pub fade: bool,
 }
 
 /// One command, as [`decode`] finds it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Ends the program.
+    /// End of the program.
     End,
-    /// Does nothing.
+    /// A command without any effect.
     Nop,
-    /// Waits.
+    /// Keeps the present colour for a time.
     Sleep {
-        /// Ticks.
+        /// Time to wait, ticks of [`TICK_MS`].
         ticks: u64,
     },
-    /// Waits until ticks after the start, or the last clock reset.
+    /// Waits until an instant counted from the start, or from the last clock reset.
     WaitUntil {
-        /// Ticks.
+        /// Instant to wait for, ticks of [`TICK_MS`] since the start or the last clock reset.
         ticks: u64,
     },
     /// Shows a colour, then waits.
     Set {
-        /// The colour.
+        /// Colour that is shown from now on.
         color: Rgb,
-        /// Ticks to wait.
+        /// Time to wait afterwards, ticks of [`TICK_MS`].
         ticks: u64,
     },
     /// Fades to a colour.
     Fade {
-        /// The colour.
+        /// Colour in which the fade ends.
         color: Rgb,
-        /// Ticks it takes.
+        /// Duration of the fade, ticks of [`TICK_MS`].
         ticks: u64,
     },
-    /// Begins a loop.
+    /// Start of a loop.
     LoopBegin {
-        /// Rounds; 0 is without end.
+        /// Number of rounds; 0 is without end.
         rounds: u8,
     },
-    /// Ends a loop.
+    /// End of the innermost loop.
     LoopEnd,
     /// Sets the clock that [`Command::WaitUntil`] looks at to 0.
     ResetClock,
     /// Shows the values of three RC channels (black here), or fades to them.
     FromChannels {
-        /// The channels.
+        /// Numbers of the channels that give red, green and blue.
         channels: [u8; 3],
-        /// Fades.
+        /// Whether the colour fades to the channels' values; otherwise it jumps.
         fade: bool,
-        /// Ticks.
+        /// Duration of the fade, or time to wait, ticks of [`TICK_MS`].
         ticks: u64,
     },
-    /// Goes on elsewhere.
+    /// Continues at another place of the program.
     Jump {
-        /// Offset in the program.
+        /// Offset of the next command in the program, bytes.
         address: u64,
     },
-    /// Goes on elsewhere when an RC channel changes (never, here).
+    /// A jump when an RC channel changes, which never happens here.
     TriggeredJump {
-        /// Parameter byte.
+        /// Parameter byte of the trigger, as in the program.
         params: u8,
-        /// Offset in the program, if any.
+        /// Offset of the next command in the program, bytes, if the trigger has one.
         address: Option<u64>,
     },
     /// Switches some pyro channels.
     SetPyro {
-        /// Bit 7: on; other bits: which.
+        /// Channels to switch, one bit each in bits 0 to 6; bit 7 says whether they are switched
+        /// on.
         mask: u8,
     },
     /// Switches all pyro channels.
     SetPyroAll {
-        /// Which are on.
+        /// Channels to switch on, one bit each; a cleared bit switches its channel off.
         mask: u8,
     },
 }
 
-/// Why a program cannot be written or understood.
+/// Error of writing or decoding a light program.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LightError {
     /// A command that does not exist; players end the program there.
     #[error("byte {offset}: {code:#04x} is no light command; the program ends there")]
     UnknownCommand {
-        /// Where.
+        /// Offset of the command in the program, bytes.
         offset: usize,
-        /// The byte.
+        /// The unknown command byte.
         code: u8,
     },
     /// The program ends within a command.
     #[error("byte {offset}: the last command is cut off")]
     CutOff {
-        /// Where the command starts.
+        /// Offset of the command in the program, bytes.
         offset: usize,
     },
     /// A duration or address that does not fit.
     #[error("byte {offset}: a duration or address is absurdly long")]
     TooLong {
-        /// Where the command starts.
+        /// Offset of the command in the program, bytes.
         offset: usize,
     },
 }

@@ -9,14 +9,14 @@ const MAX_COMMANDS: usize = 1_000_000;
 /// Deepest nesting of loops.
 const MAX_LOOPS: usize = 4;
 
-/// What a light program does, for people.
+/// A light program in words.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Explanation {
     /// One line per command: offset and what it does.
     pub lines: Vec<String>,
-    /// What is wrong or surprising with it.
+    /// Faults and surprises of the program, one sentence each.
     pub problems: Vec<String>,
-    /// When the program ends, ms of show time; `None`: never, or not within a million commands.
+    /// End of the program, ms of show time; `None` if it does not end within a million commands.
     pub ends_ms: Option<u64>,
 }
 
@@ -82,7 +82,7 @@ pub struct Player<'a> {
 }
 
 impl<'a> Player<'a> {
-    /// At show time 0.
+    /// A player at show time 0.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self {
             decoder: Decoder::new(bytes),
@@ -97,7 +97,7 @@ impl<'a> Player<'a> {
         }
     }
 
-    /// Colour at a time that is not before the one asked for last.
+    /// Colour at a show time, which must not be before that of the call before.
     pub fn color_at(&mut self, time_ms: u64) -> Rgb {
         self.run_until(time_ms);
         let Some((start_ms, end_ms)) = self.fade_ms else { return self.to };

@@ -31,24 +31,24 @@ pub(crate) const TRAJECTORY_HEADER: usize = 9;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BlockKind {
-    /// Trajectory.
+    /// The trajectory, one per file.
     Trajectory,
-    /// Light program.
+    /// The light program, as Skybrush bytecode.
     Lights,
-    /// Comment, UTF-8.
+    /// A comment in UTF-8.
     Comment,
     /// Return-to-home plan. Its layout differs between firmware versions; not read or written.
     RthPlan,
-    /// Yaw program.
+    /// The yaw program: headings over time.
     Yaw,
-    /// Timed events (pyro).
+    /// Timed events, such as pyro.
     Events,
-    /// Anything else, skipped as the firmware does.
+    /// A type that this crate does not know; its blocks are skipped, as in the firmware.
     Unknown(u8),
 }
 
 impl BlockKind {
-    /// From the type byte.
+    /// Kind of a block by the byte that marks it.
     pub fn from_code(code: u8) -> Self {
         match code {
             1 => Self::Trajectory,
@@ -61,7 +61,7 @@ impl BlockKind {
         }
     }
 
-    /// The type byte.
+    /// The byte that marks this kind of block in a file.
     pub fn code(self) -> u8 {
         match self {
             Self::Trajectory => 1,
@@ -74,7 +74,7 @@ impl BlockKind {
         }
     }
 
-    /// What people call it.
+    /// Name of the kind for people: "light program".
     pub fn name(self) -> &'static str {
         match self {
             Self::Trajectory => "trajectory",
@@ -88,7 +88,7 @@ impl BlockKind {
     }
 }
 
-/// Why a `.skyb` file could not be written or read. Offsets count bytes from the start of the file.
+/// Error of writing or reading a `.skyb` file. Offsets count bytes from the start of the file.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SkybError {
     /// A piece without duration.
@@ -97,15 +97,15 @@ pub enum SkybError {
          give it a duration"
     )]
     TimeStandsStill {
-        /// Which piece, from 1.
+        /// Number of the piece, from 1.
         piece: usize,
-        /// Where it would start, s.
+        /// Show time at which the piece would start, s.
         at_s: f64,
     },
     /// A coordinate is NaN or infinite.
     #[error("piece {piece} (0: the start point) has a coordinate that is not a finite number")]
     NotFinite {
-        /// Which piece, from 1.
+        /// Number of the piece, from 1.
         piece: usize,
     },
     /// A coordinate is out of reach.
@@ -118,53 +118,53 @@ pub enum SkybError {
         value_m: f64,
         /// The coarsest scale allowed, mm.
         scale_mm: u8,
-        /// What that scale reaches, m.
+        /// Largest coordinate that the coarsest scale reaches, m.
         reach_m: f64,
     },
     /// A fixed scale outside 1..=127.
     #[error("a scale of {0} mm per unit does not exist: it must be 1 to 127")]
     BadScale(u8),
-    /// More pieces than a block holds.
+    /// The trajectory has more pieces than a block holds.
     #[error(
         "the trajectory needs {bytes} bytes, a block holds 65535: the first {fit} of its {pieces} \
          pieces fit, until {fit_s:.3} s (use fewer, longer or curved pieces)"
     )]
     TooManyPieces {
-        /// Bytes needed.
+        /// Size that the trajectory block would need, bytes.
         bytes: usize,
-        /// Pieces, after cutting long ones.
+        /// Number of pieces, after cutting long ones.
         pieces: usize,
-        /// How many would fit.
+        /// Number of pieces that would fit.
         fit: usize,
-        /// Until which time, s.
+        /// End of the last piece that would fit, show time, s.
         fit_s: f64,
     },
     /// Another block is too long.
     #[error("the {block} has {bytes} bytes, a block holds 65535")]
     BlockTooLong {
-        /// Which block.
+        /// Name of the block.
         block: &'static str,
-        /// Its size.
+        /// Size of the block, bytes.
         bytes: usize,
     },
     /// The yaw program cannot be expressed.
     #[error("yaw setpoint {setpoint}: {problem}")]
     Yaw {
-        /// Which setpoint, from 1.
+        /// Number of the setpoint, from 1.
         setpoint: usize,
-        /// What is wrong with it.
+        /// Description of the problem with the setpoint.
         problem: &'static str,
     },
-    /// Not a `.skyb` file.
+    /// The file does not start with the magic of `.skyb`.
     #[error("not a .skyb file: it starts with {found:02x?}, not with \"skyb\" (73 6b 79 62)")]
     BadMagic {
-        /// Its first bytes.
+        /// First bytes of the file.
         found: Vec<u8>,
     },
     /// A version that no firmware reads.
     #[error("byte 4: version {0} is not known; versions 1 and 2 are")]
     BadVersion(u8),
-    /// Larger than any show.
+    /// The file is larger than any show; its size in bytes.
     #[error("the file has {0} bytes; a .skyb file larger than {MAX_FILE} bytes is refused")]
     TooLarge(usize),
     /// The checksum does not match.
@@ -173,41 +173,41 @@ pub enum SkybError {
          {computed:#010x}"
     )]
     BadCrc {
-        /// What the file says.
+        /// Checksum that the file states.
         stored: u32,
-        /// What its content gives.
+        /// Checksum of the content.
         computed: u32,
     },
     /// The file or a block ends early.
     #[error("byte {offset}: {what} is cut off: {needed} bytes are needed, {left} are left")]
     Truncated {
-        /// Where it starts.
+        /// Offset at which the incomplete part starts.
         offset: usize,
-        /// What is incomplete.
+        /// Name of the incomplete part.
         what: &'static str,
-        /// Bytes it needs.
+        /// Size of the part, bytes.
         needed: usize,
-        /// Bytes there are.
+        /// Bytes left in the file.
         left: usize,
     },
-    /// No trajectory block.
+    /// The file has no trajectory block.
     #[error("the file has no trajectory block: a drone would refuse the show")]
     NoTrajectory,
-    /// Pieces with scale 0.
+    /// The trajectory has pieces, but scale 0.
     #[error(
         "byte {offset}: the trajectory has a scale of 0 mm per unit, and pieces: the scale must be \
          1 to 127"
     )]
     ZeroScale {
-        /// Where the scale is.
+        /// Offset of the scale's byte.
         offset: usize,
     },
     /// A piece in the file lasts 0 ms.
     #[error("byte {offset}: piece {piece} lasts 0 ms: time must not stand still")]
     ZeroDuration {
-        /// Where the piece starts.
+        /// Offset at which the piece starts.
         offset: usize,
-        /// Which piece, from 1.
+        /// Number of the piece, from 1.
         piece: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! Reading `.skyb` files.
+//! Reader of `.skyb` files.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -10,7 +10,7 @@ use crate::crc::ApCrc32;
 use crate::{Extras, Path, Segment, ShowDrone, Trajectory};
 use untrusted_io::plain::plain;
 
-/// Everything a `.skyb` file says.
+/// Contents of a `.skyb` file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkybContents {
     /// The show of this drone. Its name is empty: the file has none.
@@ -23,7 +23,7 @@ pub struct SkybContents {
     pub scale_mm: u8,
     /// The comment block, if any; bytes that are not UTF-8 are replaced.
     pub comment: Option<String>,
-    /// Timed events (pyro).
+    /// Timed events (pyro), in the order of the file.
     pub events: Vec<Event>,
     /// Whether there is a return-to-home plan (not decoded: its layout depends on the firmware).
     pub has_rth_plan: bool,
@@ -34,25 +34,25 @@ pub struct SkybContents {
     pub blocks: Vec<BlockInfo>,
 }
 
-/// Where a block is.
+/// Kind and place of a block in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct BlockInfo {
-    /// Its type.
+    /// Kind of the block.
     pub kind: BlockKind,
     /// Offset of its body in the file.
     pub offset: usize,
     /// Size of its body, bytes.
     pub bytes: usize,
-    /// Whether it is used: only the first one of each type is.
+    /// Whether the block is used: only the first one of each kind is.
     pub used: bool,
 }
 
 /// One record of the event list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Event {
-    /// Show time, ms.
+    /// Show time of the event, ms.
     pub time_ms: u32,
-    /// Type; 1 is pyro.
+    /// Type of the event; 1 is pyro.
     pub kind: u8,
     /// Subtype: the pyro channel.
     pub subtype: u8,

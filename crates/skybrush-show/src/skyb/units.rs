@@ -1,4 +1,4 @@
-//! Metres to whole units and back, and what that loses.
+//! Conversion of metres to whole units and back, and its loss of precision.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -12,14 +12,14 @@ const SAME_M: f64 = 1e-9;
 /// (from the control points of the difference).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Quantisation {
-    /// Position, m.
+    /// Largest deviation of position, m.
     pub max_position_m: f64,
-    /// Velocity, m/s.
+    /// Largest deviation of velocity, m/s.
     pub max_speed_mps: f64,
 }
 
 impl Quantisation {
-    /// The larger of both, part by part.
+    /// The larger deviation of each kind.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
         Self {

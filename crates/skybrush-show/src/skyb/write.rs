@@ -1,4 +1,4 @@
-//! Writing `.skyb` files.
+//! Writer of `.skyb` files.
 
 use nalgebra::Vector3;
 
@@ -10,29 +10,30 @@ use crate::bezier::{self, Scalar};
 use crate::crc::ap_crc32;
 use crate::{Segment, ShowDrone, Trajectory};
 
-/// How to choose the size of the unit.
+/// Rule for choosing the size of the unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// The finest one that holds all coordinates without rounding any; if none does, the finest one
-    /// that holds them.
+    /// The finest unit that holds all coordinates without rounding any; if none does, the finest
+    /// one that holds them.
     #[default]
     Exact,
-    /// The finest one that holds all coordinates.
+    /// The finest unit that holds all coordinates.
     Smallest,
-    /// The finest of 1, 2, 5, 10, 20, 50 and 100 mm that holds them: round coordinates stay exact.
+    /// The finest unit of 1, 2, 5, 10, 20, 50 and 100 mm that holds all coordinates: round ones
+    /// stay exact.
     Nice,
-    /// This many mm per unit, 1 to 127.
+    /// A unit of this many millimetres, 1 to 127.
     Fixed(u8),
 }
 
-/// Choices for [`write()`].
+/// Options of [`write()`]: the scale, a comment, and how long a piece may be.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SkybOptions {
     /// Size of the unit.
     pub scale: Scale,
-    /// Comment block, if any.
+    /// Text of the comment block, if there is to be one.
     pub comment: Option<String>,
-    /// Longer pieces are cut into equal parts, ms; at most 65 535.
+    /// Duration above which a piece is cut into equal parts, ms.
     pub longest_piece_ms: u16,
 }
 
@@ -42,10 +43,10 @@ impl Default for SkybOptions {
     }
 }
 
-/// A written file, and what writing it cost.
+/// A written file with its size and precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkybFile {
-    /// The file.
+    /// Content of the file.
     pub bytes: Vec<u8>,
     /// Size of the unit, mm.
     pub scale_mm: u8,
@@ -57,7 +58,7 @@ pub struct SkybFile {
     pub quantisation: Quantisation,
 }
 
-/// What a trajectory costs in a file.
+/// Size and precision of a trajectory in a `.skyb` file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkybCost {
     /// Size of the unit, mm.
@@ -112,7 +113,7 @@ pub fn write(drone: &ShowDrone, options: &SkybOptions) -> Result<SkybFile, SkybE
     Ok(SkybFile { bytes, scale_mm, pieces, trajectory_bytes, quantisation })
 }
 
-/// What [`write()`] would make of a trajectory.
+/// Computes the cost of a trajectory in a file without making the file.
 ///
 /// # Errors
 ///

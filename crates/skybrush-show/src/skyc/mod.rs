@@ -16,12 +16,12 @@ pub use write::{drone_documents, write};
 
 /// Most drones the official loader takes.
 pub use crate::MAX_DRONES;
-/// Largest coordinate that is taken for serious, m.
+/// Largest coordinate that is accepted, m.
 pub const MAX_COORDINATE_M: f64 = 1e5;
-/// Longest show that is taken for serious, s.
+/// Longest show that is accepted, s.
 pub const MAX_TIME_S: f64 = 86_400.0;
 
-/// What a reader spends at most on a file that may be hostile.
+/// Resources that a reader spends at most on a file, which may be hostile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Entries in the archive.
@@ -34,7 +34,7 @@ pub struct Limits {
     pub ratio: u64,
     /// JSON values in one entry.
     pub values: usize,
-    /// Nesting of JSON.
+    /// Nesting of JSON arrays and objects.
     pub depth: usize,
     /// Trajectory points of all drones together.
     pub points: usize,
@@ -54,61 +54,61 @@ impl Default for Limits {
     }
 }
 
-/// Why a `.skyc` file could not be written or read.
+/// Error of writing or reading a `.skyc` file.
 #[derive(Debug, Error)]
 pub enum SkycError {
     /// The archive itself is unusable.
     #[error("not a usable show archive (ZIP): {problem}")]
     Archive {
-        /// What is wrong.
+        /// Description of the problem with the archive.
         problem: String,
     },
     /// An entry of the archive is unusable.
     #[error("{entry}: {problem}")]
     Entry {
-        /// Its name.
+        /// Name of the entry in the archive.
         entry: String,
-        /// What is wrong.
+        /// Description of the problem with the entry.
         problem: String,
     },
     /// The file would take too much memory.
     #[error("the file unpacks to more than the {limit} {unit} allowed here; it may be a ZIP bomb")]
     Bomb {
-        /// How many.
+        /// The limit that was exceeded, in `unit`s.
         limit: u64,
-        /// Of what.
+        /// Unit of the limit, in the plural.
         unit: &'static str,
     },
-    /// Something about the whole show.
+    /// The show as a whole is not valid.
     #[error("{entry}: {place}: {problem}")]
     Show {
-        /// Name of the entry it is in.
+        /// Name of the entry with the problem.
         entry: String,
         /// Key or path in the JSON.
         place: String,
-        /// What is wrong.
+        /// Description of the problem at that place.
         problem: String,
     },
-    /// Something about one drone.
+    /// A drone of the show is not valid.
     #[error("drone {number} ({name}), {entry}: {place}{problem}")]
     Drone {
         /// Number of the drone, from 1.
         number: usize,
-        /// Its label.
+        /// Label of the drone.
         name: String,
-        /// Name of the entry it is in.
+        /// Name of the entry with the problem.
         entry: String,
         /// Key or point, with a colon and a space after it; empty if the problem says it.
         place: String,
-        /// What is wrong.
+        /// Description of the problem with the drone.
         problem: String,
     },
-    /// A show that cannot be written.
+    /// The show has no representation in the format.
     #[error("cannot write {what}: {problem}")]
     Unwritable {
-        /// What: the show, or a drone.
+        /// Subject that the format cannot hold: the show, or a drone by its label.
         what: String,
-        /// Why, and what to do.
+        /// Reason why it cannot be written, and the remedy.
         problem: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Reading `.skyc` files.
+//! Reader of `.skyc` files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

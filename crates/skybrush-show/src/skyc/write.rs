@@ -1,4 +1,4 @@
-//! Writing `.skyc` files.
+//! Writer of `.skyc` files.
 
 use std::io::{Cursor, Write as _};
 
