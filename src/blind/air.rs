@@ -1,5 +1,5 @@
-//! The air of a blind flight: a random updraft field that all drones share, gusts of each drone's
-//! own, and a horizontal wind with slow gusts.
+//! Air of a blind flight: a random updraft field that all drones share, gusts of each drone's own,
+//! and a horizontal wind with slow gusts.
 
 use nalgebra::Vector3;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -46,7 +46,7 @@ pub struct AirScales {
     pub wind_gust_s: f64,
 }
 
-/// The air of one blind flight.
+/// Air of one blind flight.
 pub struct BlindAir {
     seed: u64,
     scales: AirScales,

@@ -1,7 +1,7 @@
 //! Effects that no algorithm can split with the paper's protocol, fixed in advance.
 
-/// The classes; an effect may be in several. Shared drift of the air belongs to the first, but is
-/// never named: it is the noise model's.
+/// Classes of effects that cannot be told apart; an effect may be in several. Shared drift of the
+/// air belongs to the first, but is never named: the noise model explains it.
 pub const CLASSES: &[&[&str]] = &[
     &["battery", "motor-thermal"],
     &["translational-lift", "tilt-formula", "blade-flapping"],
@@ -10,12 +10,12 @@ pub const CLASSES: &[&[&str]] = &[
     &["mass-spread", "thrust-spread"],
 ];
 
-/// Whether two effects are in one class (or are one).
+/// Whether two effects are equal or in one class.
 pub fn equivalent(left: &str, right: &str) -> bool {
     left == right || CLASSES.iter().any(|class| class.contains(&left) && class.contains(&right))
 }
 
-/// Whether an effect is alone in its class.
+/// Whether an effect is in no class with another.
 pub fn is_single(effect: &str) -> bool {
     !CLASSES.iter().any(|class| class.contains(&effect))
 }

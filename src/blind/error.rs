@@ -14,23 +14,23 @@ use crate::show::skyb::SkybError;
 use crate::sim::SimError;
 use crate::vehicle::VehicleError;
 
-/// A blind flight cannot be drawn, flown, sealed, opened or scored.
+/// Error of drawing, flying, sealing, opening or scoring a blind flight.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum BlindError {
     /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A file is not what it should be.
+    /// A file of the campaign folder cannot be used.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
-    /// The protocol's template is wrong.
+    /// The protocol's template is not valid.
     #[error(transparent)]
     Mission(#[from] MissionError),
-    /// A vehicle is wrong.
+    /// A vehicle is not valid.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
-    /// An effect does not take what was drawn for it.
+    /// An effect does not accept the parameters drawn for it.
     #[error(transparent)]
     Effect(#[from] EffectError),
     /// A drone's show does not fit into its file.
@@ -53,7 +53,7 @@ pub enum BlindError {
         /// Names that can be hidden, for the message.
         known: String,
     },
-    /// A base does not take an effect.
+    /// The effect cannot be hidden from the base vehicle.
     #[error(
         "\"{name}\" cannot be hidden from the base {base}, which has it or does not feel it; choose \
          another base with --base"
@@ -72,7 +72,7 @@ pub enum BlindError {
         /// Name of the effect that it equals.
         other: String,
     },
-    /// A seed of the wrong range.
+    /// A seed for scoring was given where flights are for tuning.
     #[error(
         "seed {seed} is for tuning: scores count only with seeds of {first} or more, which nobody has \
          tuned with; give --tuning to score with it all the same, and the table will say so"
@@ -80,20 +80,20 @@ pub enum BlindError {
     TuningSeed {
         /// Seed as asked for.
         seed: u64,
-        /// The first seed for scoring.
+        /// First seed for scoring.
         first: u64,
     },
-    /// A seed of the wrong range.
+    /// A seed for tuning was given where flights are for scoring.
     #[error(
         "seed {seed} is for scoring: whoever tunes with it spoils it; tune with seeds below {first}"
     )]
     ScoringSeed {
         /// Seed as asked for.
         seed: u64,
-        /// The first seed for scoring.
+        /// First seed for scoring.
         first: u64,
     },
-    /// Too large a number.
+    /// A number is too large.
     #[error("{what} {value} is too large; at most {most}")]
     TooLarge {
         /// Name of the number, with its article: "the seed".
@@ -103,7 +103,7 @@ pub enum BlindError {
         /// Largest value allowed.
         most: u64,
     },
-    /// The truth was asked for too early.
+    /// The seal was to be opened before there is a verdict.
     #[error(
         "the truth in {} stays sealed: there is no verdict at {}; write the verdict first",
         sealed.shown(), verdict.shown()
@@ -114,7 +114,7 @@ pub enum BlindError {
         /// Path at which the verdict was expected.
         verdict: PathBuf,
     },
-    /// The truth is not what was sealed.
+    /// The truth is not the one that was sealed.
     #[error(
         "{} was changed after it was sealed: its SHA-256 is {found}, published was {published}",
         path.shown()
@@ -136,7 +136,7 @@ pub enum BlindError {
         #[source]
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// A file is of another program.
+    /// The file has another format, or another version of it.
     #[error("{} has the format \"{found}\", this program reads \"{wanted}\"", path.shown())]
     Schema {
         /// Path of the file.
@@ -159,7 +159,7 @@ pub enum BlindError {
         /// Difference from the flight that was expected, in words.
         why: String,
     },
-    /// JSON or TOML could not be made.
+    /// Content has no form as JSON or TOML.
     #[error("failed to write {what} as text: {reason}")]
     Text {
         /// Name of the content, for the message.
@@ -167,7 +167,7 @@ pub enum BlindError {
         /// Reason why it has no text form.
         reason: String,
     },
-    /// Stopped by the user.
+    /// The user stopped the run.
     #[error("interrupted; the same command goes on where it stopped")]
     Stopped,
 }

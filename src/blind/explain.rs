@@ -1,4 +1,4 @@
-//! The door to the search that is tested.
+//! Interface to the search that is tested.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub type Cause = Box<dyn std::error::Error + Send + Sync>;
 
 /// A search for missing physics. Every `Fn(&Path) -> Result<Verdict, Cause>` is one.
 pub trait Explain: Sync {
-    /// The verdict on a flight folder: template, vehicle, plan and logs.
+    /// Searches a flight folder (template, vehicle, plan and logs) and returns the verdict.
     ///
     /// # Errors
     /// When the search finds nothing to work on, or fails.

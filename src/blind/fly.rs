@@ -1,4 +1,4 @@
-//! Flies a blind flight into a folder that looks like any other flight's.
+//! Flight of a blind scenario into a folder that looks like any other flight's.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -21,8 +21,8 @@ use crate::show::quantise::as_flown;
 use crate::sim::{Beyond, FlightSetup, Hooks, SimError, fly_beyond_to_file};
 use crate::vehicle::Vehicle;
 
-/// Steps of the plant in one control step: 1.25 ms, where the simulator that the search uses has
-/// 2.5 ms.
+/// Number of plant steps in one control step: 1.25 ms each, where the simulator that the search
+/// uses has 2.5 ms.
 pub const PLANT_STEPS: u16 = 2;
 /// When blind flights start: 2026-06-01 12:00 UTC. Fixed, so that the same seed gives the same bytes.
 const START: GpsTime = GpsTime { week: 2421, tow_ms: 129_618_000 };
@@ -38,7 +38,7 @@ pub struct Flown {
     pub lost: usize,
 }
 
-/// The plan of a blind flight.
+/// Plan of a blind flight.
 ///
 /// # Errors
 /// When the template cannot be resolved.
@@ -163,7 +163,7 @@ pub(super) fn fly_into(
     })
 }
 
-/// The hidden effects that no library lists, with their values.
+/// Hidden effects that no library lists, with their values.
 pub fn extra(scenario: &Scenario) -> Vec<Extra> {
     let hidden = scenario.hidden.iter().filter(|hidden| hidden.foreign);
     hidden

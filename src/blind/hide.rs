@@ -36,7 +36,7 @@ pub struct Hidden {
 }
 
 impl Hidden {
-    /// True value of the parameter that says how large it is.
+    /// True value of the parameter that states the size of the effect.
     pub fn value(&self) -> f64 {
         self.parameters.get(&self.size).copied().unwrap_or_default()
     }
@@ -47,17 +47,17 @@ impl Hidden {
 pub struct Kind {
     /// Name of the effect for `--effects`.
     pub name: &'static str,
-    /// The effect in the library, or the foreign one.
+    /// Name of the effect in the library, or of the foreign one.
     pub effect: &'static str,
-    /// Whether no library lists it.
+    /// Whether the effect is foreign: no library lists it.
     pub foreign: bool,
-    /// The parameter that says how large it is.
+    /// Parameter that states the size of the effect.
     pub size: &'static str,
     /// Smallest and largest magnitude that is drawn, in [`Kind::unit`].
     pub range: (f64, f64),
     /// Unit of [`Kind::range`], for people.
     pub unit: &'static str,
-    /// Bases that it can be hidden from.
+    /// Bases from which the effect can be hidden.
     pub bases: &'static [Base],
 }
 
@@ -86,7 +86,7 @@ const fn foreign(
     Kind { name, effect: name, foreign: true, size, range, unit, bases: ANY }
 }
 
-/// Everything that can be hidden; ranges as the literature and the field have them.
+/// Effects that can be hidden, with ranges from the literature and from the field.
 pub const KINDS: &[Kind] = &[
     kind(
         "rotor-inflow",
@@ -137,7 +137,7 @@ pub const KINDS: &[Kind] = &[
     foreign("heading", "amplitude_us", (8.0, 25.0), "us, of either sign"),
 ];
 
-/// The kind of a name.
+/// Finds an effect that can be hidden by its name for `--effects`.
 ///
 /// # Errors
 /// An unknown name.
@@ -173,7 +173,7 @@ const LIFT_MPS: f64 = 5.0;
 const RING_MPS: f64 = -3.5;
 
 impl Kind {
-    /// Draws how large it is, and everything else about it.
+    /// Draws the size of the effect and its other parameters.
     ///
     /// # Errors
     /// When the base does not take it.

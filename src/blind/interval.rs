@@ -1,4 +1,4 @@
-//! Intervals of rates, and the curve that nobody can beat.
+//! Confidence intervals of rates, and the power that no search can exceed.
 
 use statrs::distribution::{Beta, ContinuousCDF as _};
 use statrs::function::erf::erf;
@@ -8,7 +8,7 @@ const ALPHA: f64 = 0.05;
 /// Halvings of the interval in which a bound is looked for.
 const HALVINGS: usize = 60;
 
-/// Clopper and Pearson's 95 % interval of a rate of `count` in `total`; 0 to 1 when there is none.
+/// Clopper-Pearson 95 % interval of the rate `count` of `total`; 0 to 1 if `total` is 0.
 pub fn clopper_pearson(count: usize, total: usize) -> (f64, f64) {
     if total == 0 || count > total {
         return (0.0, 1.0);
@@ -29,12 +29,12 @@ fn beta_quantile(a: f64, b: f64, chance: f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// Chance to find an effect of this Fisher z with a threshold of 8 nats: Phi(z - 4).
+/// Probability of finding an effect of a Fisher z with a threshold of 8 nats: Phi(z - 4).
 pub fn power(z: f64) -> f64 {
     0.5 * (1.0 + erf((z - 4.0) / std::f64::consts::SQRT_2))
 }
 
-/// Median; none of nothing.
+/// Median; `None` of an empty slice.
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
     sorted.sort_by(f64::total_cmp);

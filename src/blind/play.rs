@@ -1,4 +1,4 @@
-//! One blind flight before an audience: sealed, flown, explained, and only then opened.
+//! Play of one blind flight: sealed, flown, explained, and only then opened.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -15,7 +15,7 @@ use crate::gap::Verdict;
 /// A completed step of a blind flight, for a progress display.
 #[derive(Clone, Copy, Debug)]
 pub enum Act<'a> {
-    /// The truth is sealed under this hash.
+    /// The truth is sealed; its SHA-256, hexadecimal.
     Sealed(&'a str),
     /// The flight is flown.
     Flown(Flown),
@@ -36,7 +36,7 @@ pub struct Played {
     pub outcome: Outcome,
 }
 
-/// Folder of the flight: all that the search is given.
+/// Path of the flight's folder: all that the search is given.
 pub fn flight(folder: &Path) -> PathBuf {
     folder.join("flight")
 }
@@ -46,12 +46,12 @@ pub fn verdict(folder: &Path) -> PathBuf {
     flight(folder).join("gap").join("verdict.json")
 }
 
-/// Whether a folder holds a flight that was played.
+/// Whether a flight was played in a folder, at least until its truth was sealed.
 pub fn is_played(folder: &Path) -> bool {
     seal::hash_path(folder).exists()
 }
 
-/// Removes a flight that was played, with its seal; other things in the folder stay.
+/// Removes a flight that was played, with its seal; other files in the folder stay.
 ///
 /// # Errors
 /// When something cannot be removed.

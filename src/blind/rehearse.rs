@@ -1,4 +1,5 @@
-//! A proposed flight rehearsed: simulated with a known answer, to see whether the search would find it.
+//! Rehearsal of a proposed flight: a simulation with a known answer, to see whether the search
+//! would find it.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -25,27 +26,27 @@ const LENGTH_M: f64 = 145.0;
 const CELLS: f64 = 3.0;
 const RESISTANCE_OHM: f64 = 0.03;
 
-/// A flight that is to be rehearsed.
+/// A proposed flight with the air and noise to rehearse it in.
 #[derive(Clone, Copy, Debug)]
 pub struct Rehearsal<'a> {
     /// Plan of the flight, with its template.
     pub flight: &'a ResolvedFlight,
     /// Elements that the flight is made of: payloads, charges, legs.
     pub elements: Elements,
-    /// Noise and air as they were found.
+    /// Noise and air as they were estimated from the logs.
     pub noise: &'a Noise,
     /// Mean horizontal wind, show frame, m/s.
     pub wind_mps: [f64; 2],
-    /// Seed of everything random.
+    /// Seed of all that is random.
     pub seed: u64,
 }
 
-/// An answer: an effect of some size.
+/// A possible answer to the question of a proposed flight: an effect of some size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// Name of the effect.
     pub effect: String,
-    /// The parameter that says how large it is.
+    /// Parameter that states the size of the effect.
     pub parameter: String,
     /// Value of the parameter, in its own unit.
     pub size: f64,
@@ -53,8 +54,8 @@ pub struct Answer {
     pub without: Vehicle,
 }
 
-/// The possible answers to a question that the simulator can fly. `model` has what was found; sizes are
-/// those that look alike.
+/// Possible answers to a question that the simulator can fly. `model` has the effects that were
+/// found; the sizes are those at which the answers look alike.
 pub fn answers(
     question: &Question,
     model: &Vehicle,
@@ -175,11 +176,12 @@ fn drone(rehearsal: &Rehearsal<'_>, answer: &Answer, slot: u16) -> Vehicle {
     vehicle
 }
 
-/// Flies one answer, has it explained, and says whether the search told it. The flight's folder is
+/// Flies one answer, searches it, and checks whether the search named it. The flight's folder is
 /// removed again.
 ///
 /// # Errors
-/// As [`fly_answer`]; [`BlindError::Explain`] when the search fails.
+///
+/// As [`fly_answer`]; [`BlindError::Explain`] if the search fails.
 pub fn rehearse(
     rehearsal: &Rehearsal<'_>,
     answer: &Answer,

@@ -1,4 +1,4 @@
-//! The table as text for a terminal and as Markdown.
+//! Table of blind flights as text for a terminal and as Markdown.
 
 use std::fmt::Write as _;
 
@@ -13,7 +13,7 @@ pub enum Style {
     Markdown,
 }
 
-/// The whole table, with a note in its head (date and commit, say).
+/// Renders the whole table, with a note in its head, such as date and commit.
 pub fn render(table: &Table, style: Style, note: Option<&str>) -> String {
     let mut text = String::new();
     let settings = &table.settings;

@@ -12,7 +12,7 @@ use super::hide::{Hidden, KINDS, between, kind_of, log_between, unit};
 use super::vehicles::hover_a;
 use crate::base::rng::{Purpose, stream};
 
-/// Name and version of the format of the truth.
+/// Name and version of the format of a sealed truth.
 pub const SCENARIO_SCHEMA: &str = "updraft.blind-truth/1";
 /// Drones along each side of the grid, unless a smaller one is asked for.
 pub const FULL_SIDE: u16 = 7;
@@ -55,7 +55,7 @@ impl Protocol {
         }
     }
 
-    /// The built-in template that is flown.
+    /// Name of the built-in template that the protocol flies.
     pub fn template(self) -> &'static str {
         match self {
             Self::Paper => "calibration",
@@ -158,7 +158,7 @@ impl Cell {
         Self { protocol, air, base, hidden: hidden.into_iter().collect(), side: FULL_SIDE }
     }
 
-    /// A short name: `paper-calm-airsim-none`.
+    /// Short name of the cell: `paper-calm-airsim-none`.
     pub fn name(&self) -> String {
         let hidden = if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") };
         format!("{}-{}-{}-{hidden}", self.protocol.name(), self.air.name(), self.base.name())
@@ -214,10 +214,11 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// Draws a flight.
+    /// Draws a blind flight from its seed.
     ///
     /// # Errors
-    /// Something that cannot be hidden, or not from this base, or not together.
+    ///
+    /// If an effect is unknown, cannot be hidden from this base, or not together with another.
     pub fn draw(seed: u64, cell: &Cell) -> Result<Self, BlindError> {
         let width_m = f64::from(cell.side.saturating_sub(1)) * SPACING_M;
         let mut hidden: Vec<Hidden> = Vec::new();
@@ -238,8 +239,8 @@ impl Scenario {
         self.cell.side * self.cell.side
     }
 
-    /// True value of the parameter that says how large something hidden is, in the mean over the fleet: a
-    /// drone whose motors were warm at take-off drifts no more.
+    /// True value of the parameter that states the size of a hidden effect, averaged over the
+    /// fleet: a drone whose motors were warm at take-off drifts no more.
     pub fn fleet_value(&self, hidden: &Hidden) -> f64 {
         if hidden.effect != "motor-thermal" {
             return hidden.value();

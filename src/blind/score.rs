@@ -1,4 +1,4 @@
-//! One verdict against the truth.
+//! Score of one verdict against the truth.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -94,14 +94,14 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether anything was found where nothing is hidden.
+    /// Whether something was found although nothing was hidden.
     pub fn is_false_alarm(&self) -> bool {
         self.hidden.is_empty() && !self.found.is_empty()
     }
 }
 
-/// Compares a verdict with the truth; `fisher_z` has the z of each hidden effect under this flight, in
-/// the truth's order (missing ones are not known).
+/// Scores a verdict against the truth; `fisher_z` has the Fisher z of each hidden effect in this
+/// flight, in the truth's order (unknown where it is shorter).
 pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> Outcome {
     let hidden = truth.hidden.iter().enumerate().map(|(index, hidden)| {
         let z = fisher_z.get(index).copied().flatten();

@@ -1,4 +1,4 @@
-//! The truth, sealed: its hash is published first, and it is opened only when a verdict is there.
+//! Seal of the truth: its hash is published first, and it is opened only when there is a verdict.
 
 use std::path::{Path, PathBuf};
 
@@ -28,18 +28,18 @@ pub struct Sealed {
     pub truth: Scenario,
 }
 
-/// A truth that was opened.
+/// A truth after its seal was opened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opened {
     /// The truth, as it was sealed before the flight.
     pub truth: Scenario,
     /// SHA-256 of the truth as published before the flight, hexadecimal.
     pub truth_sha256: String,
-    /// Hash of the verdict that was on the disk when it was opened.
+    /// SHA-256 of the verdict that was on disk when the seal was opened, hexadecimal.
     pub verdict_sha256: String,
 }
 
-/// Folder of the seal beside a flight.
+/// Path of the folder of the seal, beside a flight.
 pub fn folder(beside: &Path) -> PathBuf {
     beside.join("sealed")
 }

@@ -1,4 +1,4 @@
-//! A table's flights: which there are, flown, explained and scored one by one, and resumed.
+//! Series of blind flights for a table: flown, explained and scored one by one, and resumed.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -70,7 +70,7 @@ pub struct FlightResult {
     pub outcome: Outcome,
 }
 
-/// The seed of one flight of a table; flights of different tables never share one.
+/// Seed of one flight of a table; flights of different tables never share one.
 ///
 /// # Errors
 /// Numbers that are too large.
@@ -88,7 +88,7 @@ pub fn flight_seed(table: u64, index: usize) -> Result<u64, BlindError> {
 }
 
 impl Settings {
-    /// Whether the seed is of the right range: those who tune and those who score never meet.
+    /// Checks that the seed is in the right range: seeds for tuning and for scoring never meet.
     ///
     /// # Errors
     /// A seed of the wrong range, or a number that is too large.
@@ -101,8 +101,9 @@ impl Settings {
         }
     }
 
-    /// The cells, in the order in which flights take them in turn: shuffled by the seed, so that a
-    /// table that was cut short is balanced too. Sets that a base does not take are left out there.
+    /// Cells, in the order in which flights take them in turn: shuffled by the seed, so that a
+    /// table that was cut short is balanced too. A base that does not take a set of effects has no
+    /// cell with it.
     ///
     /// # Errors
     /// An unknown name, or nothing that could be flown.
@@ -147,7 +148,7 @@ impl Settings {
         Ok(keyed.into_iter().map(|(_, cell)| cell).collect())
     }
 
-    /// The truths of all flights.
+    /// Truths of all flights of the table.
     ///
     /// # Errors
     /// As [`Settings::check_seed`] and [`Settings::cells`].
@@ -164,7 +165,7 @@ impl Settings {
 pub struct Place {
     /// Folder that holds the table's files.
     pub folder: PathBuf,
-    /// Whether flights are kept when they are scored.
+    /// Whether flights are kept after they are scored.
     pub keep: bool,
 }
 

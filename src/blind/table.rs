@@ -1,4 +1,4 @@
-//! Many outcomes: the metrics, next to what is demanded.
+//! Table of many outcomes: the metrics, beside the demands on them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use super::metrics::{has_z, is_named, metrics};
 use super::score::{Called, Outcome};
 use super::series::Settings;
 
-/// Name and version of the format.
+/// Name and version of the format of a table.
 pub const TABLE_SCHEMA: &str = "updraft.blind-table/1";
 /// Bins of Fisher z.
 const BINS: &[(f64, f64)] =
@@ -128,7 +128,8 @@ pub struct EffectRow {
 }
 
 impl Demand {
-    /// By how much it is missed; 0: met.
+    /// Amount by which a metric misses the demand, in the metric's unit: 0 if it is
+    /// met, `None` if the metric has no value.
     pub fn missed_by(&self, metric: &Metric) -> Option<f64> {
         let value = metric.value?;
         let by = match *self {
@@ -141,7 +142,8 @@ impl Demand {
         Some(if by <= 0.0 { 0.0 } else { by })
     }
 
-    /// Whether so few flights could have missed it by chance: the interval has what is demanded.
+    /// Whether a metric may have missed the demand by chance: its 95 % interval reaches the
+    /// demanded value.
     pub fn may_be_chance(&self, metric: &Metric) -> bool {
         let Some((from, to)) = metric.interval else { return false };
         match *self {

@@ -41,7 +41,7 @@ pub struct HiddenRun {
 }
 
 impl HiddenRun {
-    /// Of a flight that was played.
+    /// Makes the object from a flight that was played.
     pub fn of(played: &Played, made_by: &str) -> Self {
         let Played { flown, verdict, opened, outcome } = played;
         Self {
@@ -60,7 +60,7 @@ impl HiddenRun {
     }
 }
 
-/// Whether everything that is hidden was called by its name or class, and nothing else was named.
+/// Whether every hidden effect was called by its name or class, and nothing else was named.
 pub fn is_right(outcome: &Outcome) -> bool {
     let called = |one: &HiddenOutcome| matches!(one.called, Called::Named | Called::InClass);
     let others = outcome.wrong_names.len() - outcome.wrong_in_class
@@ -69,7 +69,7 @@ pub fn is_right(outcome: &Outcome) -> bool {
     outcome.hidden.iter().all(called) && others == 0
 }
 
-/// The comparison of verdict and truth, one sentence or two for each thing.
+/// Comparison of verdict and truth, one sentence or two for each effect.
 pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
     let mut words: Vec<String> =
         outcome.hidden.iter().map(|one| of_one(one, outcome, verdict)).collect();

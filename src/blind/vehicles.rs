@@ -1,4 +1,4 @@
-//! The vehicles of a blind flight: the known one that the search is given, and the true one.
+//! Vehicles of a blind flight: the known one that the search is given, and the true one.
 
 use super::error::BlindError;
 use super::scenario::{Base, Scenario};
@@ -17,10 +17,11 @@ const PIXEL_KEEPS: [&str; 2] = ["rotor-inflow", "parasitic-drag"];
 const WARM_S: f64 = 1.0;
 
 impl Base {
-    /// The known vehicle: what is handed to the search.
+    /// Known vehicle, which is handed to the search.
     ///
     /// # Errors
-    /// When a built-in vehicle is not what it should be.
+    ///
+    /// If a built-in vehicle is not valid.
     pub fn known(self) -> Result<Vehicle, BlindError> {
         let mut vehicle = library::builtin(self.vehicle_name())?;
         vehicle.effects.retain(|name, _| PIXEL_KEEPS.contains(&name.as_str()));
@@ -34,7 +35,7 @@ impl Base {
         Ok(vehicle)
     }
 
-    /// Name of the built-in vehicle it is made from.
+    /// Name of the built-in vehicle that the base is made from.
     pub fn vehicle_name(self) -> &'static str {
         match self {
             Self::Airsim | Self::Inflow => "airsim-generic-quad",
@@ -50,11 +51,12 @@ pub(super) fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f
     table.parameters.insert(parameter.to_owned(), value);
 }
 
-/// The vehicle that a slot truly flies: each drone has its own copy, as its battery and its warmth
+/// Vehicle that a slot truly flies: each drone has a copy of its own, as its battery and its warmth
 /// are its own.
 ///
 /// # Errors
-/// When a built-in vehicle is not what it should be.
+///
+/// If a built-in vehicle is not valid.
 pub fn true_vehicle(scenario: &Scenario, slot: u16) -> Result<Vehicle, BlindError> {
     let mut vehicle = scenario.cell.base.known()?;
     let rest = &scenario.nuisance;

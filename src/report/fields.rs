@@ -10,7 +10,7 @@ use crate::analysis::result::{Analysis, DroneUpdraft, QualityFlag};
 
 use super::text::clean;
 
-/// Names of the columns, in order.
+/// Names of the columns, in the order of the file.
 pub const COLUMNS: [&str; 13] = [
     "flight",
     "time_s",
@@ -27,14 +27,14 @@ pub const COLUMNS: [&str; 13] = [
     "truth_mps",
 ];
 
-/// One drone in one second.
+/// A row of the measured fields: one drone in one second.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldRow {
     /// Name of the flight.
     pub flight: String,
     /// Show time of the second, s.
     pub time_s: f64,
-    /// Slot number, if planned.
+    /// Slot of the drone, if it has one in the plan.
     pub slot: Option<u16>,
     /// Label of the drone.
     pub drone: String,
@@ -58,7 +58,7 @@ pub struct FieldRow {
     pub truth_mps: Option<f64>,
 }
 
-/// All rows, flight by flight and drone by drone.
+/// Rows of all flights, flight by flight and drone by drone.
 pub fn rows(analysis: &Analysis) -> impl Iterator<Item = FieldRow> + '_ {
     analysis.flights.iter().flat_map(|flight| {
         let map = flight.map.iter();
@@ -73,7 +73,7 @@ pub fn rows(analysis: &Analysis) -> impl Iterator<Item = FieldRow> + '_ {
     })
 }
 
-/// Whether there is any row.
+/// Whether the analysis has any rows.
 pub fn any(analysis: &Analysis) -> bool {
     rows(analysis).next().is_some()
 }

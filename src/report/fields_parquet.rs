@@ -34,7 +34,7 @@ message updraft {
 /// Rows that are held and written at a time.
 const GROUP: usize = 200_000;
 
-/// The table as the bytes of a Parquet file.
+/// Renders the measured fields as a Parquet file.
 ///
 /// # Errors
 /// A bug of this program: nothing outside of memory is touched.

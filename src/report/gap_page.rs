@@ -18,7 +18,7 @@ use super::{Provenance, Report, ReportError};
 
 const PAGE: &str = include_str!("../../templates/report/gap.html");
 
-/// Makes the page and the figures of a verdict.
+/// Renders the page and the figures of a verdict.
 ///
 /// # Errors
 /// [`ReportError::Page`], a bug of this program.

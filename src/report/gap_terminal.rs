@@ -1,4 +1,4 @@
-//! A verdict as text for a terminal.
+//! Verdict as text for a terminal.
 
 use std::fmt::Write as _;
 
@@ -48,8 +48,8 @@ impl Page {
     }
 }
 
-/// The verdict for a terminal of `width` characters, with ANSI colours if `color`: in words, the
-/// steps, the gap, and what the flight could not have shown.
+/// Renders a verdict for a terminal of `width` characters, with ANSI colours if `color`: in words,
+/// the steps, the gap, and what the flight could not have shown.
 pub fn gap_summary(verdict: &Verdict, width: usize, color: bool) -> String {
     let mut page = Page { text: String::new(), width, color };
     page.say(BOLD, &verdict.summary, 0);

@@ -72,7 +72,7 @@ pub const FIGURES_FOLDER: &str = "figures";
 pub struct Provenance {
     /// Name and version of the program.
     pub program: String,
-    /// The command line that made the report, as people would type it.
+    /// Command line that made the report, as a user would type it.
     pub command: String,
     /// Seed of the simulation, if there was one.
     pub seed: Option<u64>,
@@ -81,7 +81,7 @@ pub struct Provenance {
     pub made_at: String,
     /// Settings of the analysis, (name, value) for people.
     pub settings: Vec<(String, String)>,
-    /// The files that the analysis read.
+    /// Files that the analysis read.
     pub inputs: Vec<InputFile>,
 }
 
@@ -90,20 +90,20 @@ pub struct Provenance {
 pub struct InputFile {
     /// Path, relative to the campaign folder where possible.
     pub path: String,
-    /// SHA-256 of its content, hexadecimal.
+    /// SHA-256 of the file's content, hexadecimal.
     pub sha256: String,
 }
 
 /// A finished report, not yet written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// The page, with all figures inside.
+    /// The HTML page, with all figures inside.
     pub html: String,
-    /// The figures: (name without `.svg`, SVG).
+    /// The figures: (name without `.svg`, content as SVG).
     pub figures: Vec<(String, String)>,
 }
 
-/// A report could not be made or written.
+/// Error of making or writing a report.
 #[derive(Debug, Error)]
 pub enum ReportError {
     /// The page's template failed; a bug of this program.
@@ -125,7 +125,7 @@ struct Figure {
     svg: String,
 }
 
-/// Makes the page and the figures.
+/// Renders the page and the figures of an analysis.
 ///
 /// # Errors
 /// [`ReportError::Page`], a bug of this program.
@@ -145,7 +145,8 @@ pub fn render_with_study(
     page::render(analysis, Some(study), provenance)
 }
 
-/// Writes `index.html` and `figures/*.svg` to `folder`, the page last: where it is, all is.
+/// Writes `index.html` and `figures/*.svg` to `folder`; the page comes last, so that a folder with
+/// a page is complete.
 pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     let figures = folder.join(FIGURES_FOLDER);
     for (name, svg) in &report.figures {

@@ -1,4 +1,4 @@
-//! The flight that would tell, as text for a terminal.
+//! Proposed flight as text for a terminal.
 
 use super::table::{Align, column, lines};
 use super::text::clean;
@@ -8,8 +8,8 @@ use crate::gap::next::result::Asked;
 /// Width of tables, columns.
 const WIDTH: usize = 100;
 
-/// Questions with what the present and the proposed flight tell, what it is made of, and what was
-/// verified.
+/// Renders the open questions with the answers that the present and the proposed flight give, the
+/// elements of the proposed flight, and what was verified.
 pub fn text(next: &Next) -> String {
     let left = |head| column(head, Align::Left, 0);
     let right = |head| column(head, Align::Right, 0);

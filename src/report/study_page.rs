@@ -14,7 +14,7 @@ use super::{Provenance, Report, ReportError};
 
 const PAGE: &str = include_str!("../../templates/report/study.html");
 
-/// Makes the page and the figures of a study.
+/// Renders the page and the figures of a study.
 ///
 /// # Errors
 /// [`ReportError::Page`], a bug of this program.

@@ -14,8 +14,8 @@ const DIM: &str = "\u{1b}[2m";
 const YELLOW: &str = "\u{1b}[33m";
 const RESET: &str = "\u{1b}[0m";
 
-/// The study for a terminal of `width` characters, with ANSI colours if `color`: Table I, the
-/// correlations of all conditions, and what was lost, beside the paper's values.
+/// Renders a study for a terminal of `width` characters, with ANSI colours if `color`: Table I, the
+/// correlations of all conditions, and lost flights, beside the paper's values.
 pub fn study_summary(study: &StudyResult, width: usize, color: bool) -> String {
     let mut text = String::new();
     let mut line = |style: &str, content: &str| {

@@ -28,7 +28,8 @@ const RED: &str = "\u{1b}[31m";
 const BLUE: &str = "\u{1b}[34m";
 const RESET: &str = "\u{1b}[0m";
 
-/// The analysis for a terminal of `width` characters (at least 40), with ANSI colours if `color`.
+/// Renders the analysis for a terminal of `width` characters (at least 40), with ANSI colours if
+/// `color`.
 ///
 /// For each flight: its drones, the fleet's parameters beside the paper's values, the laws of every
 /// drone, the map of the air as a grid of numbers, missing drones and warnings. Text from logs is

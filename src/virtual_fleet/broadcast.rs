@@ -7,16 +7,16 @@
 use std::io;
 use std::net::UdpSocket;
 
-/// The port that Skybrush Server broadcasts to unless told otherwise.
+/// Port that Skybrush Server broadcasts to by default.
 pub const BROADCAST_PORT: u16 = 14_555;
 
-/// The ear of all vehicles at one port.
+/// Socket on which all vehicles hear what a station broadcasts.
 #[derive(Debug)]
 pub struct Broadcasts(UdpSocket);
 
 impl Broadcasts {
-    /// Listens at this port (0: a free one), on every interface: broadcasts of this computer come
-    /// by those to other computers, not by the loopback.
+    /// Listens at a port (0: a free one), on every interface: broadcasts from this computer arrive
+    /// on the interfaces to other computers, not on the loopback.
     ///
     /// # Errors
     /// When the port is taken.
@@ -26,7 +26,7 @@ impl Broadcasts {
         Ok(Self(socket))
     }
 
-    /// The port.
+    /// Number of the port.
     ///
     /// # Errors
     /// When the system does not know it.

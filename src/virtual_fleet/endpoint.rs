@@ -1,11 +1,11 @@
-//! One end of a link, without the link.
+//! One end of a MAVLink conversation, without sockets.
 
 use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, Sender};
 
-/// A vehicle, or a part of one, as it is met on the air.
+/// A vehicle, or a part of one, as the other end of the link meets it.
 pub trait Endpoint {
-    /// A message from a ground station has come; answers go to `out`.
+    /// Handles a message from a ground station; answers go to `out`.
     fn on_message(&mut self, now: Micros, message: &MavMessage, out: &mut Vec<MavMessage>);
 
     /// Handles a message whose sender is known, as some answers go to the sender alone.

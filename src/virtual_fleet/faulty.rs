@@ -1,4 +1,4 @@
-//! A bad link between real sockets: frames are lost, doubled and delayed.
+//! A bad link between real sockets: frames are lost, duplicated and delayed.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! The files of a vehicle and both ways to them: a vehicle that does nothing else.
+//! A vehicle's files behind MAVFTP and the log messages: a vehicle that does nothing else.
 
 use super::endpoint::Endpoint;
 use super::ftp_server::FtpServer;
@@ -9,18 +9,18 @@ use crate::link::clock::{Micros, S};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::station::STATION;
 
-/// Storage with its MAVFTP and log servers.
+/// A vehicle that is only its storage with its MAVFTP and log servers.
 #[derive(Debug)]
 pub struct FileVehicle<S> {
     /// Storage that holds the vehicle's files and logs.
     pub storage: S,
-    /// MAVFTP; `None`: the vehicle does not speak it.
+    /// Server of MAVFTP; `None` if the vehicle does not have one.
     pub ftp: Option<FtpServer>,
     /// Server of the MAVLink log messages.
     pub logs: LogServer,
-    /// Whether it is armed.
+    /// Whether the vehicle is armed, which keeps it from sending logs.
     pub is_armed: bool,
-    /// Silent until then: it boots.
+    /// End of the boot, during which the vehicle is silent, us.
     pub boots_until: Micros,
     /// For servers after a boot.
     transfers: Transfers,
@@ -29,8 +29,8 @@ pub struct FileVehicle<S> {
 }
 
 impl<S: Storage> FileVehicle<S> {
-    /// A vehicle with these files, logs in `log_folder`, sending at most so many packets per
-    /// second (0: no limit).
+    /// A vehicle with these files and its logs in `log_folder`, sending at most `packets_per_s`
+    /// packets per second (0: no limit).
     pub fn new(storage: S, log_folder: &str, packets_per_s: f64) -> Self {
         Self::with_transfers(storage, log_folder, Transfers::both(packets_per_s))
     }
@@ -49,7 +49,7 @@ impl<S: Storage> FileVehicle<S> {
         }
     }
 
-    /// Loses everything but its files, and is silent for a while.
+    /// Reboots: loses everything but the files, and is silent for `lasts`, us.
     pub fn reboot(&mut self, now: Micros, lasts: Micros) {
         self.ftp = self.ftp.as_ref().map(|_| FtpServer::new(self.transfers.ftp_per_s));
         self.logs = LogServer::new(&self.log_folder, self.transfers.logs_per_s);

@@ -14,7 +14,7 @@ use crate::link::clock::{Micros, S};
 use crate::link::frame::{MavMessage, Sender, dialect};
 use crate::protocol::ftp::{MOST_DATA, Op, Packet};
 
-/// Packets in one burst.
+/// Number of packets in one burst.
 pub const BURST: u32 = 500;
 /// Requests that wait while one is served.
 const WAITING: usize = 5;
@@ -26,7 +26,7 @@ const AT_ONCE: usize = 32;
 /// Server of MAVFTP: one session, one burst at a time, packets at a limited rate.
 #[derive(Debug, Default)]
 pub struct FtpServer {
-    /// Packets per second at most; 0: as many as are taken.
+    /// Largest number of packets sent per second; 0: no limit.
     pub packets_per_s: f64,
     waiting: VecDeque<(Sender, Packet)>,
     open: Option<Open>,
@@ -52,12 +52,13 @@ struct Burst {
 }
 
 impl FtpServer {
-    /// A server that sends at most so many packets per second (0: no limit).
+    /// A server that sends at most `packets_per_s` packets per second (0: no limit).
     pub fn new(packets_per_s: f64) -> Self {
         Self { packets_per_s, ..Self::default() }
     }
 
-    /// Takes a message from `station`, which gets the answers; others than MAVFTP's are not for it.
+    /// Handles a message from `station`, which gets the answers; messages other than MAVFTP's are
+    /// ignored.
     pub fn on_message(&mut self, station: Sender, message: &MavMessage) {
         let MavMessage::FILE_TRANSFER_PROTOCOL(message) = message else { return };
         let Some(request) = Packet::from_payload(&message.payload) else { return };
@@ -66,7 +67,7 @@ impl FtpServer {
         }
     }
 
-    /// Serves what waits; returns when it wants to be asked again.
+    /// Serves waiting requests; returns the time at which it wants to be polled again.
     pub fn poll(
         &mut self,
         now: Micros,

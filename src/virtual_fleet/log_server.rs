@@ -19,7 +19,7 @@ const AT_ONCE: usize = 32;
 /// limited rate.
 #[derive(Debug)]
 pub struct LogServer {
-    /// Packets per second at most; 0: as many as are taken.
+    /// Largest number of packets sent per second; 0: no limit.
     pub packets_per_s: f64,
     folder: String,
     sending: Option<Sending>,
@@ -34,8 +34,8 @@ enum Sending {
 }
 
 impl LogServer {
-    /// Serves the logs of a folder (`/APM/LOGS` on an autopilot, `logs` in its simulator), at
-    /// most so many packets per second (0: no limit).
+    /// Serves the logs in a folder (`/APM/LOGS` on an autopilot, `logs` in its simulator), at most
+    /// `packets_per_s` packets per second (0: no limit).
     pub fn new(folder: &str, packets_per_s: f64) -> Self {
         Self {
             packets_per_s,
@@ -46,7 +46,7 @@ impl LogServer {
         }
     }
 
-    /// Whether a list or a download runs; an autopilot does not arm meanwhile.
+    /// Whether a list or a download is being sent; an autopilot does not arm meanwhile.
     pub fn is_sending(&self) -> bool {
         self.sending.is_some()
     }
@@ -70,7 +70,7 @@ impl LogServer {
         (0..newest).map(file).collect()
     }
 
-    /// Takes a message; others than the log messages are not for it.
+    /// Handles a message; those other than the log messages are ignored.
     pub fn on_message(
         &mut self,
         message: &MavMessage,
@@ -124,7 +124,7 @@ impl LogServer {
         }
     }
 
-    /// Sends what is asked for; returns when it wants to be asked again.
+    /// Sends the requested packets; returns the time at which it wants to be polled again.
     pub fn poll(
         &mut self,
         now: Micros,

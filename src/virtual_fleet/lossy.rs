@@ -1,4 +1,4 @@
-//! A radio network that drops, delays, reorders and repeats, in simulated time.
+//! A radio network that drops, delays, reorders and duplicates frames, in simulated time.
 //!
 //! Frames are really encoded and decoded, and everything depends on the seed alone.
 
@@ -19,18 +19,19 @@ use crate::link::station::{AUTOPILOT, STATION, heartbeat};
 /// Faults of a simulated network; the default is a perfect one.
 #[derive(Clone, Copy, Debug)]
 pub struct Faults {
-    /// Share of frames lost, each way.
+    /// Share of frames lost in each direction, 0 to 1.
     pub loss: f64,
-    /// Share of frames that arrive twice.
+    /// Share of frames that arrive twice, 0 to 1.
     pub repeat: f64,
-    /// Delay each way, us.
+    /// Delay in each direction, us.
     pub delay: Micros,
-    /// Largest addition to the delay, us; more than the time between frames reorders.
+    /// Largest addition to the delay, us; if it exceeds the time between frames, they are
+    /// reordered.
     pub jitter: Micros,
     /// Data that all vehicles of a network together can send, bytes per second; 0: no limit. Frames
     /// beyond it wait, and are lost when they would have to wait for longer than `queue`.
     pub bytes_per_s: f64,
-    /// Longest wait for the air, us.
+    /// Longest time that a frame waits to be sent, us.
     pub queue: Micros,
 }
 
@@ -88,7 +89,7 @@ struct Flying {
 }
 
 impl<E: Endpoint> LossyNet<E> {
-    /// A network of vehicles.
+    /// A network of these vehicles with these faults; `seed` determines every loss.
     pub fn new(vehicles: BTreeMap<DroneId, E>, faults: Faults, seed: u64) -> Self {
         Self {
             vehicles,

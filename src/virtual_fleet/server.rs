@@ -37,7 +37,7 @@ pub enum Pace {
     /// A fixed multiple of the speed of wall time.
     Speed(f64),
     /// As fast as the computer allows while a vehicle counts down, flies, or its log is being
-    /// written; so many times as fast as the clock on the wall else.
+    /// written; otherwise a fixed multiple of the speed of wall time.
     Fast {
         /// Multiple of the speed of wall time while nothing flies.
         ground: f64,
@@ -50,7 +50,8 @@ pub struct ServerOptions {
     /// Addresses at which the station listens, network by network; every vehicle sends to the
     /// address of its network from a socket of its own.
     pub stations: Vec<SocketAddr>,
-    /// With a key vehicles sign what they say, and refuse what is not signed with it.
+    /// Key with which vehicles sign their messages, refusing those that are not signed with it;
+    /// `None`: nothing is signed.
     pub key: Option<Key>,
     /// Speed of the vehicles' time.
     pub pace: Pace,
@@ -64,7 +65,7 @@ pub struct ServerOptions {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ServerError {
-    /// A vehicle got no socket.
+    /// No socket could be opened for a vehicle.
     #[error("no socket for virtual vehicle {system} to speak to {station}")]
     Socket {
         /// MAVLink system id of the vehicle.
@@ -75,7 +76,7 @@ pub enum ServerError {
         #[source]
         source: io::Error,
     },
-    /// A vehicle is in a network that the station has no port for.
+    /// A vehicle is in a network for which the station has no port.
     #[error(
         "virtual vehicle {system} is in network {network}, but the station has {stations} ports: \
          give one for each network"
@@ -85,13 +86,13 @@ pub enum ServerError {
         system: u8,
         /// Network of the vehicle, from 0.
         network: u16,
-        /// Networks that there are.
+        /// Number of networks that have a port.
         stations: usize,
     },
     /// The thread could not be started.
     #[error("no thread for the virtual fleet")]
     Thread(#[source] io::Error),
-    /// The pace is none.
+    /// The speed is not a number above 0 and at most 1000.
     #[error("a speed of {0} is none: give a number above 0 and at most 1000")]
     Pace(f64),
     /// The thread of the fleet panicked.
@@ -99,7 +100,7 @@ pub enum ServerError {
     Died,
 }
 
-/// A fleet that is being served.
+/// A fleet while it is being served.
 #[derive(Debug)]
 pub struct Running {
     end: AtomicBool,
@@ -114,26 +115,28 @@ impl Running {
         self.now.load(Ordering::Relaxed)
     }
 
-    /// Vehicles that fly, or whose log is still being written.
+    /// Number of vehicles that fly, or whose log is still being written.
     pub fn busy(&self) -> u64 {
         self.busy.load(Ordering::Relaxed)
     }
 
-    /// Frames that vehicles refused, because they were not signed, or wrongly, or heard before.
+    /// Number of frames that vehicles refused because they were unsigned, wrongly signed, or
+    /// repeated.
     pub fn refused(&self) -> u64 {
         self.refused.load(Ordering::Relaxed)
     }
 
-    /// Ends the service; it is over when [`serve`] returns.
+    /// Ends the service, which is over when [`serve`] returns.
     pub fn stop(&self) {
         self.end.store(true, Ordering::Relaxed);
     }
 }
 
-/// Serves a fleet while `body` runs; returns what it gave, and the vehicles.
+/// Serves a fleet while `body` runs; returns the result of `body`, and the vehicles.
 ///
 /// # Errors
-/// When a socket cannot be opened, or the service died; what `body` gave is lost then.
+///
+/// If a socket cannot be opened, or the service fails; the result of `body` is lost then.
 pub fn serve<'w, T>(
     vehicles: Vec<VirtualVehicle<'w>>,
     options: &ServerOptions,

@@ -10,13 +10,13 @@ use std::path::{Component, Path, PathBuf};
 pub enum StorageError {
     /// The file or folder does not exist.
     NotFound,
-    /// The name leaves the storage, or is none.
+    /// The name leaves the storage, or is not a name.
     BadName,
-    /// Anything else, with the system's number.
+    /// The operation failed with this number of the operating system.
     Failed(u8),
 }
 
-/// One name in a folder.
+/// An entry of a folder: a file or a folder in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
     /// Name of the file or folder, without the path to it.
@@ -25,18 +25,19 @@ pub struct Entry {
     pub size: Option<u64>,
 }
 
-/// Files. Names are as the vehicle is asked: `/APM/LOGS/00000001.BIN`, `logs/00000001.BIN`; a
-/// leading slash means nothing, and no name leads out.
+/// Files of a vehicle. Names are as the vehicle is asked for them: `/APM/LOGS/00000001.BIN`,
+/// `logs/00000001.BIN`; a leading slash means nothing, and no name leads out of the storage.
 pub trait Storage {
-    /// Names in a folder, sorted.
+    /// Entries of a folder, sorted by name.
     fn list(&self, folder: &str) -> Result<Vec<Entry>, StorageError>;
     /// Size of a file, bytes.
     fn size(&self, name: &str) -> Result<u64, StorageError>;
-    /// Reads; fewer bytes than asked for only at the end of the file.
+    /// Reads from an offset and returns the number of bytes; fewer than asked for only at the end
+    /// of the file.
     fn read_at(&self, name: &str, offset: u64, into: &mut [u8]) -> Result<usize, StorageError>;
-    /// Writes; a gap is filled with zeros.
+    /// Writes at an offset; a gap before it is filled with zeros.
     fn write_at(&mut self, name: &str, offset: u64, data: &[u8]) -> Result<(), StorageError>;
-    /// Creates a file or empties it; its folder must be there.
+    /// Creates a file or empties it; its folder must exist.
     fn create(&mut self, name: &str) -> Result<(), StorageError>;
     /// Removes a file, which must exist.
     fn remove(&mut self, name: &str) -> Result<(), StorageError>;
@@ -44,7 +45,11 @@ pub trait Storage {
     fn create_folder(&mut self, name: &str) -> Result<(), StorageError>;
 }
 
-/// A name in its one form: parts joined by `/`, none of them special. Empty: the root.
+/// Normal form of a name: parts joined by `/`, none of them special; empty for the root.
+///
+/// # Errors
+///
+/// [`StorageError::BadName`] if it leaves the storage.
 pub fn plain_name(name: &str) -> Result<String, StorageError> {
     let name = name.trim_end_matches('\0');
     let parts: Vec<&str> = name.split('/').filter(|part| !matches!(*part, "" | ".")).collect();
@@ -66,7 +71,7 @@ pub struct MemoryStorage {
 const MOST_IN_MEMORY: u64 = 1 << 30;
 
 impl MemoryStorage {
-    /// Puts a file in, with its folders.
+    /// Stores a file, and creates the folders above it.
     pub fn put(&mut self, name: &str, content: Vec<u8>) -> Result<(), StorageError> {
         let name = plain_name(name)?;
         let mut folder = parent(&name);
@@ -83,7 +88,7 @@ impl MemoryStorage {
         self.files.get(&plain_name(name).ok()?).map(Vec::as_slice)
     }
 
-    /// Adds to a file's end: a log that still grows.
+    /// Appends to a file, as to a log that still grows.
     pub fn append(&mut self, name: &str, more: &[u8]) -> Result<(), StorageError> {
         let file = self.files.get_mut(&plain_name(name)?).ok_or(StorageError::NotFound)?;
         file.extend_from_slice(more);
@@ -173,14 +178,14 @@ impl Storage for MemoryStorage {
     }
 }
 
-/// Files in a folder of the computer.
+/// Storage in a folder of this computer.
 #[derive(Clone, Debug)]
 pub struct FolderStorage {
     root: PathBuf,
 }
 
 impl FolderStorage {
-    /// Everything below `root`, nothing outside of it.
+    /// Storage of everything below `root`, and nothing outside of it.
     pub fn new(root: &Path) -> Self {
         Self { root: root.to_owned() }
     }

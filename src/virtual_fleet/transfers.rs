@@ -9,7 +9,7 @@ const LATE: f64 = (20 * MS) as f64;
 /// An autopilot's loop.
 const LOOP: f64 = 2_500.0;
 
-/// Packets per second at most; 0: as many as are taken.
+/// Largest rates at which a vehicle sends packets, 1/s; 0: no limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transfers {
     /// Rate of MAVFTP packets, 1/s.
@@ -19,8 +19,8 @@ pub struct Transfers {
 }
 
 impl Transfers {
-    /// ArduCopter 4.4's simulator, measured: one packet of MAVFTP in each loop of 400 Hz (94 kB/s
-    /// of data), 40 of the log messages for each of two links (2.8 MB/s).
+    /// Rates measured with ArduCopter 4.4's simulator: one packet of MAVFTP in each loop of 400 Hz
+    /// (94 kB/s of data), 40 of the log messages for each of two links (2.8 MB/s).
     pub const FIRMWARE: Self = Self { ftp_per_s: 394.0, logs_per_s: 32_000.0 };
 
     /// One rate for both protocols, packets per second.

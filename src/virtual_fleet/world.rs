@@ -9,7 +9,7 @@ use crate::show::Trajectory;
 use crate::sim::Atmosphere;
 use crate::vehicle::Vehicle;
 
-/// The world that vehicles stand and fly in. It outlives them.
+/// The world in which vehicles stand and fly. It outlives them.
 pub struct World<'w> {
     /// The airframe and its autopilot's settings.
     pub vehicle: &'w Vehicle,
@@ -19,10 +19,10 @@ pub struct World<'w> {
     pub frame: ShowFrame,
     /// Seed of the fleet.
     pub seed: u64,
-    /// Whether logs have the firmware's whole default set.
+    /// Whether logs hold the firmware's whole default set of messages.
     pub full_logs: bool,
-    /// Board time in logs counts from a time of the seed's, as in simulated flights without a link, and
-    /// not from when a vehicle is switched on.
+    /// Whether board time in logs counts from an instant that the seed determines, as in simulated
+    /// flights without a link, rather than from when a vehicle is switched on.
     pub boots_by_seed: bool,
     /// GPS time at link time 0.
     pub gps_at_0: GpsTime,
@@ -30,7 +30,7 @@ pub struct World<'w> {
 }
 
 impl<'w> World<'w> {
-    /// A world at this GPS time.
+    /// A world whose link time 0 is at this GPS time.
     pub fn new(
         vehicle: &'w Vehicle,
         atmosphere: &'w dyn Atmosphere,
@@ -61,14 +61,14 @@ impl<'w> World<'w> {
     }
 }
 
-/// A show file as a vehicle has understood it.
+/// A show file as a vehicle has read it.
 #[derive(Clone, Debug, Default)]
 pub struct LoadedShow {
     /// Trajectory to fly, show frame.
     pub trajectory: Trajectory,
     /// Light program, as Skybrush bytecode.
     pub lights: Vec<u8>,
-    /// Take-off time, show time s.
+    /// Take-off time, show time, s.
     pub takeoff_s: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The product of vertical air speed and time.
+//! A foreign effect that grows with the product of vertical air speed and time.
 
 use super::{PULSE_US, TIME_S, lowered};
 use crate::effects::definition::Parameter;

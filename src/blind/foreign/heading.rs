@@ -1,4 +1,4 @@
-//! The direction of the horizontal air velocity against the nose.
+//! A foreign effect of the direction of the horizontal air velocity against the nose.
 
 use super::{PULSE_US, TIME_S, lowered};
 use crate::effects::definition::Parameter;

@@ -1,4 +1,4 @@
-//! A sinusoid along the height.
+//! A foreign effect that is a sinusoid over height.
 
 use super::{PULSE_US, TIME_S, lowered};
 use crate::effects::definition::Parameter;

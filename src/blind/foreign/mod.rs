@@ -14,7 +14,7 @@ use crate::effects::{Definition, Effect, Reference, Signals, Values};
 pub const FOREIGN: &[&dyn Effect] =
     &[&step::Step, &height_wave::HeightWave, &climb_time::ClimbTime, &heading::Heading];
 
-/// The foreign effect of a name.
+/// Foreign effect by its name; `None` if there is none.
 pub fn find(name: &str) -> Option<&'static dyn Effect> {
     FOREIGN.iter().copied().find(|effect| effect.definition().name == name)
 }

@@ -1,4 +1,4 @@
-//! A step of the pulse at a moment.
+//! A foreign effect: a step of the pulse at one instant.
 
 use super::{PULSE_US, TIME_S, lowered};
 use crate::effects::definition::Parameter;

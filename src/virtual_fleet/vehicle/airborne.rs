@@ -1,4 +1,4 @@
-//! The vehicle's flight: arming, what happens on the way, and the log that comes of it.
+//! Flight of a virtual vehicle: arming, stages, landing, and the log of it.
 
 use nalgebra::Vector3;
 

@@ -78,7 +78,7 @@ pub struct VirtualVehicle<'w> {
 }
 
 impl<'w> VirtualVehicle<'w> {
-    /// A vehicle that is switched on at this time.
+    /// A vehicle that is switched on at link time `now`.
     pub fn new(
         world: &'w World<'w>,
         setup: VehicleSetup,
@@ -111,22 +111,22 @@ impl<'w> VirtualVehicle<'w> {
         }
     }
 
-    /// Whether its motors are armed.
+    /// Whether the motors are armed.
     pub fn is_armed(&self) -> bool {
         self.airborne.as_ref().is_some_and(Airborne::is_armed)
     }
 
-    /// Whether it flies, or has just landed.
+    /// Whether the vehicle flies, or has just landed.
     pub fn is_busy(&self) -> bool {
         self.airborne.is_some() || self.show.is_counting_down()
     }
 
-    /// Whether its log still grows, though it has landed.
+    /// Whether the log still grows, though the vehicle has landed.
     pub fn is_writing(&self) -> bool {
         self.logbook.is_growing()
     }
 
-    /// Stage of its show.
+    /// Stage of the show.
     pub fn stage(&self) -> Stage {
         match &self.airborne {
             Some(airborne) if airborne.is_armed() => airborne.stage(),
@@ -139,7 +139,7 @@ impl<'w> VirtualVehicle<'w> {
         self.airborne.as_ref().map_or(self.stands_m, Airborne::position_m)
     }
 
-    /// Puts it somewhere else (show frame, m), as a crew does; not while it flies.
+    /// Carries the vehicle to another place (show frame, m), as a crew does on the ground.
     pub fn carry_to(&mut self, stands_m: Vector3<f64>) {
         self.stands_m = stands_m;
     }
@@ -149,17 +149,17 @@ impl<'w> VirtualVehicle<'w> {
         self.mode
     }
 
-    /// The show that it would fly, as it was when the file was read last.
+    /// Show that the vehicle would fly, as it was when the file was last read.
     pub fn loaded(&self) -> Option<&LoadedShow> {
         self.show.loaded
     }
 
-    /// Corners of the fence that it has: latitude and longitude, 1e-7 degrees.
+    /// Corners of the vehicle's fence: latitude and longitude, 1e-7 degrees.
     pub fn fence_1e7(&self) -> Vec<(i32, i32)> {
         self.fence.corners_1e7()
     }
 
-    /// Takes the battery's charge into its own hands: share that is used, 0..1.
+    /// Sets the share of the battery's charge that is used, 0 to 1, from now on.
     pub fn use_charge(&mut self, share: f64) {
         self.used_share = share.clamp(0.0, 1.0);
     }

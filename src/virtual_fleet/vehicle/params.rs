@@ -68,7 +68,7 @@ const SHOW: &[(&str, Kind, f32)] = &[
     ("SHOW_TAKEOFF_ERR", Real, 3.0), ("SHOW_VEL_FF_GAIN", Real, 1.0),
 ];
 
-/// The parameters of one vehicle.
+/// Parameters of one vehicle.
 #[derive(Clone, Debug)]
 pub struct Params {
     /// In the order of their names, as indices count.
@@ -103,7 +103,7 @@ impl Params {
         params
     }
 
-    /// A value; 0 for a name that is not there.
+    /// Value of a parameter; 0 if the vehicle does not have it.
     pub fn get(&self, name: &str) -> f32 {
         self.values.get(name).map_or(0.0, |(_, value)| *value)
     }
@@ -113,7 +113,7 @@ impl Params {
         self.get(name) as i64
     }
 
-    /// Sets one that is there.
+    /// Sets a parameter, if the vehicle has it.
     pub fn put(&mut self, name: &str, value: f32) {
         if let Some((_, old)) = self.values.get_mut(name) {
             *old = value;

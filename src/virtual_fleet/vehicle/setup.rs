@@ -26,7 +26,7 @@ impl Default for BootTimes {
 }
 
 impl BootTimes {
-    /// For those who do not want to wait.
+    /// A boot of two seconds, for practice and tests.
     pub fn short() -> Self {
         Self { heartbeat: 100 * MS, files: 500 * MS, gps: S, position: 2 * S }
     }
@@ -35,7 +35,7 @@ impl BootTimes {
 /// Properties of a virtual vehicle that distinguish it from others of its world.
 #[derive(Clone, Debug)]
 pub struct VehicleSetup {
-    /// Slot in the plan, from 1: its sensors' noise and its clock come from it.
+    /// Slot in the plan, from 1, which also determines the noise of its sensors and its clock.
     pub drone: u16,
     /// MAVLink system id, unique in its network.
     pub system: u8,
@@ -45,7 +45,7 @@ pub struct VehicleSetup {
     pub stands_m: Vector3<f64>,
     /// Duration of the stages of booting.
     pub boot: BootTimes,
-    /// Without the show mode: stock firmware.
+    /// Whether it has stock firmware, without the show mode.
     pub stock: bool,
     /// Folder of the logs in its storage: `/APM/LOGS`, or `logs`.
     pub log_folder: String,

@@ -1,4 +1,4 @@
-//! The show mode on the ground: what is loaded, when it starts, and whether it may.
+//! The show mode on the ground: the loaded show, its start time, and the conditions of the start.
 
 use super::params::Params;
 use crate::base::frame::{Geodetic, ShowFrame};
