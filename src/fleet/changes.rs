@@ -37,7 +37,7 @@ impl Change {
 
 /// Name and version of the file of changes.
 pub const CHANGES_SCHEMA: &str = "updraft.changes/1";
-/// Its name in a campaign folder.
+/// Name of the file of changes in a campaign folder.
 pub const CHANGES_FILE: &str = "fleet-changes.json";
 
 /// `fleet-changes.json`: every parameter changed on a vehicle, with the value it had at first.

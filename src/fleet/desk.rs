@@ -18,28 +18,28 @@ const LOOK: Micros = 500 * MS;
 /// A station that flies has heard its drones long ago: the others are not waited for.
 const HEARD_WITHIN: Micros = 4 * S;
 
-/// What the station's people are told.
+/// News of orders, for the people at the station.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Notice {
     /// An order has come.
     Ordered {
-        /// What.
+        /// Action that was ordered.
         action: Action,
-        /// Who.
+        /// Drones that are to carry it out.
         drones: Vec<DroneId>,
     },
-    /// It has ended for a drone.
+    /// The order has ended for a drone.
     Done {
-        /// What was ordered.
+        /// Action that was ordered.
         action: Action,
-        /// Who.
+        /// Drone that carried it out, or did not.
         drone: DroneId,
-        /// How it ended.
+        /// Outcome of the action.
         done: Aborted,
     },
-    /// The answer could not be written; the order is carried out all the same.
+    /// The answer to the order could not be written; the order is carried out all the same.
     NoAnswer {
-        /// Why.
+        /// Reason why the answer could not be written.
         reason: String,
     },
 }
@@ -82,8 +82,8 @@ impl<'a> Desk<'a> {
         }
     }
 
-    /// The same for a flight whose drones are known when an order comes: those that are not heard are
-    /// named, too.
+    /// Adds the drones of a flight, as they are known when an order comes: those that are not heard
+    /// are named in the answer, too.
     #[must_use]
     pub fn with_fleet(mut self, fleet: impl Fn() -> BTreeSet<DroneId> + 'a) -> Self {
         self.fleet = Box::new(fleet);

@@ -1,4 +1,4 @@
-//! What a conversation would send, without a vehicle: `--dry-run`.
+//! Messages that a conversation would send, without a vehicle: `--dry-run`.
 //!
 //! A machine talks to an [`Obliging`] vehicle that takes everything and answers at once, so that
 //! the messages are exactly those of a flight on which nothing goes wrong.
@@ -21,27 +21,27 @@ use dialect::{MavCmd, MavMissionResult, MavMissionType, MavModeFlag, MavResult};
 /// A vehicle that does what it is told, at once.
 #[derive(Clone, Debug)]
 pub struct Obliging {
-    /// Its name.
+    /// Identifier of the vehicle.
     pub drone: DroneId,
     /// Whether it has the show firmware.
     pub show: bool,
-    /// Where it is.
+    /// Position of the vehicle.
     pub place: Geodetic,
     /// Height above home, m.
     pub above_home_m: f64,
-    /// Its parameters; others are 0.
+    /// Values of its parameters; others are 0.
     pub params: BTreeMap<String, f32>,
     /// Parameters that are not here do not exist.
     pub only_these_params: bool,
-    /// Files on it.
+    /// Contents of its files, by name.
     pub files: BTreeMap<String, Vec<u8>>,
-    /// Fence corners.
+    /// Corners of its fence: latitude and longitude, 1e-7 degrees.
     pub fence: Vec<(i32, i32)>,
-    /// Flight mode.
+    /// Flight mode, as ArduPilot's custom mode number.
     pub mode: u32,
     /// Whether the motors may run.
     pub armed: bool,
-    /// Its status.
+    /// Status that it reports in show mode.
     pub status: Status,
     /// Unix time at link time 0, us.
     pub unix_us: u64,
@@ -155,7 +155,8 @@ impl Obliging {
         }
     }
 
-    /// What it says on its own; wants to be asked again then.
+    /// Adds the messages that the vehicle sends unasked to `out`; returns the time at which it
+    /// wants to be polled again.
     pub fn poll(&mut self, now: Micros, out: &mut Vec<MavMessage>) -> Micros {
         if now < self.next {
             return self.next;
@@ -352,8 +353,9 @@ fn ack(command: MavCmd) -> MavMessage {
     })
 }
 
-/// What a machine sends to an obliging vehicle, one line each with the time since the first, and
-/// what it ends with; `None`: it did not end within a day of its time or `most` messages.
+/// Runs a conversation with an obliging vehicle: its messages, one line each with the time since
+/// the first, and its result. The result is `None` if it did not end within a day of its time or
+/// `most` messages.
 pub fn dry_run<M: Machine>(
     mut machine: M,
     vehicle: &mut Obliging,

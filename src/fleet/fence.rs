@@ -36,7 +36,7 @@ pub enum FenceRefusal {
          flight again"
     )]
     Unusable {
-        /// What is wrong with it.
+        /// Reason why the fence cannot be used.
         reason: String,
     },
     /// The show leaves the fence or comes too near to it.
@@ -116,30 +116,30 @@ pub fn degrees_1e7(degrees: f64) -> i32 {
 /// A fence that is not on the vehicle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FenceError {
-    /// No answer.
+    /// The drone does not answer.
     #[error(
         "no answer while the fence is {doing}: bring the drone nearer to the radio and try again"
     )]
     Silent {
-        /// What was going on.
+        /// Step during which it fell silent.
         doing: &'static str,
     },
     /// The vehicle does not take it.
     #[error("the drone refuses the fence: {reason}")]
     Refused {
-        /// In words.
+        /// Reason for the refusal, in words.
         reason: String,
     },
-    /// What it has is not what it was given.
+    /// The fence read back differs from the one that was sent.
     #[error("the fence on the drone is not the one that was sent: {difference}; try again")]
     Different {
-        /// Where.
+        /// First difference between the two fences.
         difference: String,
     },
-    /// It was not sent.
+    /// The fence was not sent, because the drone must not be touched.
     #[error("the fence was not sent, as {why}")]
     Held {
-        /// Why.
+        /// Reason why it must not be touched, as a clause.
         why: String,
     },
     /// One of its parameters.

@@ -36,43 +36,43 @@ const LOST: Micros = 30 * S;
 /// A lost drone is told to return for so long.
 const RECALL: Micros = 60 * S;
 
-/// What one drone is to fly.
+/// Flight of one drone under the station's guidance.
 #[derive(Clone, Debug)]
 pub struct Flight {
     /// The trajectory, show frame.
     pub trajectory: Trajectory,
-    /// Where the show is.
+    /// Position and orientation of the show frame.
     pub frame: ShowFrame,
     /// Show time 0, ms since the GPS epoch.
     pub start_gps_ms: i64,
     /// Heading that is kept, rad clockwise from north; `None`: that at take-off.
     pub yaw_rad: Option<f64>,
-    /// What its clock has said so far.
+    /// Clock of the drone, as far as its messages have told it.
     pub clock: VehicleClock,
 }
 
-/// How a guided flight failed.
+/// Error of a guided flight.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GuidedError {
     /// The trajectory cannot be flown.
     #[error("the trajectory cannot be flown: {reason}")]
     Trajectory {
-        /// Why.
+        /// Reason why it cannot be flown.
         reason: String,
     },
-    /// Its clock is not known.
+    /// The GPS time of the drone is not known.
     #[error("the drone's GPS time is not known: wait for its GPS")]
     NoClock,
     /// The start has passed.
     #[error("the start time has passed before the drone could be armed: set a new one")]
     TooLate,
-    /// It does not arm.
+    /// The drone does not arm or take off.
     #[error("the drone did not arm or take off in time and is not flown; it says: {said}")]
     NoTakeoff {
-        /// What it said last.
+        /// Last message of the drone.
         said: String,
     },
-    /// It left GUIDED: its pilot, an abort, its fence or a failsafe has taken over.
+    /// The drone left GUIDED: its pilot, an abort, its fence or a failsafe has taken over.
     #[error("the drone left GUIDED ({mode}) at {show_s} s: nothing more was sent to it")]
     TakenOver {
         /// The mode it went to.
@@ -83,7 +83,7 @@ pub enum GuidedError {
     /// A message to it was held back.
     #[error("the drone is not flown any more: {why}")]
     Held {
-        /// Why.
+        /// Reason why it is not flown any more, as a clause.
         why: String,
     },
     /// Nothing is heard of it, and nothing more is sent.
@@ -91,19 +91,19 @@ pub enum GuidedError {
     Lost {
         /// Show time, whole s.
         show_s: i64,
-        /// What came of it.
+        /// Outcome of the attempt to bring it home.
         then: AfterLoss,
     },
 }
 
-/// What is done about a drone that is lost.
+/// Outcome for a drone whose link was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AfterLoss {
-    /// It stood or was landing: nothing.
+    /// The drone stood or was landing; nothing was sent.
     LeftAlone,
-    /// It was told to return, was heard again, and does.
+    /// The drone was ordered to return, was heard again, and returns.
     Returns,
-    /// It was told to return and has not answered.
+    /// The drone was ordered to return and has not answered.
     Silent,
 }
 
@@ -142,7 +142,7 @@ enum Phase {
     },
 }
 
-/// Flies one drone.
+/// Sans-IO state machine that flies one drone along its trajectory in GUIDED.
 #[derive(Clone, Debug)]
 pub struct Guided {
     drone: DroneId,

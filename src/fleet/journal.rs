@@ -1,4 +1,4 @@
-//! What happened, line by line, in the campaign folder: `fleet-journal.ndjson`.
+//! Journal of a fleet, one event per line, in the campaign folder: `fleet-journal.ndjson`.
 //!
 //! Every line is one JSON object and is on the disk before the next thing is done, so that what
 //! led to an accident is not lost with the station.
@@ -16,15 +16,15 @@ use crate::link::id::DroneId;
 /// Name of the journal in a campaign folder.
 pub const JOURNAL_FILE: &str = "fleet-journal.ndjson";
 
-/// One line.
+/// A line of the journal.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Entry<'a, T> {
     /// Unix time of the station, us.
     pub unix_us: u64,
-    /// The vehicle; absent: the station, or all.
+    /// Vehicle that the event is about; `None` for the station, or all vehicles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drone: Option<DroneId>,
-    /// What happened.
+    /// Event that is recorded.
     #[serde(flatten)]
     pub event: &'a T,
 }
@@ -46,7 +46,11 @@ impl Journal {
         Ok(Self { path, file })
     }
 
-    /// Appends a line.
+    /// Appends a line and flushes it to the file.
+    ///
+    /// # Errors
+    ///
+    /// If the entry has no form as JSON, or the file cannot be written.
     pub fn write<T: Serialize>(&mut self, entry: &Entry<'_, T>) -> Result<(), FileError> {
         let fail = |source| FileError::new("write the journal", &self.path, source);
         let mut line = serde_json::to_vec(entry).map_err(|error| fail(error.into()))?;

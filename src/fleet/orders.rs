@@ -44,29 +44,29 @@ const MOST_FILES: usize = 1_000;
 pub struct StationFile {
     /// Format name and version: [`STATION_SCHEMA`].
     pub schema: String,
-    /// Its name: start time and process.
+    /// Name of the station: its start time and process.
     pub station: String,
 }
 
-/// What a station is ordered to do.
+/// An order to a station, as it lies in the station's inbox.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Order {
     /// Format name and version: [`ORDER_SCHEMA`].
     pub schema: String,
-    /// The station that is meant.
+    /// Name of the station that is meant.
     pub station: String,
-    /// What drones do.
+    /// Action that the drones are to carry out.
     pub action: Action,
-    /// Which; absent: all.
+    /// Drones that are meant; absent: all.
     pub drones: Option<Vec<DroneId>>,
 }
 
-/// How far a station is with an order.
+/// Progress of a station with an order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Answer {
     /// Format name and version: [`ANSWER_SCHEMA`].
     pub schema: String,
-    /// Counts up as long as the station is at it.
+    /// Counter that rises as long as the station works on the order.
     pub beat: u64,
     /// The drones, and how each flight ended; none: not yet.
     pub drones: Vec<(DroneId, Option<Aborted>)>,
@@ -100,7 +100,7 @@ fn get<T: DeserializeOwned>(path: &Path) -> Option<T> {
 /// An order that a station has taken.
 #[derive(Clone, Debug)]
 pub struct Taken {
-    /// What it says.
+    /// Content of the order.
     pub order: Order,
     answer: PathBuf,
 }
@@ -112,7 +112,7 @@ impl Taken {
     }
 }
 
-/// Where a station looks for orders. Gone with the station.
+/// Folder in which a station looks for orders. It is removed with the station.
 #[derive(Debug)]
 pub struct Inbox {
     folder: PathBuf,
@@ -211,7 +211,7 @@ pub fn give(
 }
 
 impl Given {
-    /// What the station has answered so far.
+    /// Present answer of the station, if it has written one.
     pub fn answer(&self) -> Option<Answer> {
         get::<Answer>(&self.answer).filter(|answer| answer.schema == ANSWER_SCHEMA)
     }
@@ -221,7 +221,7 @@ impl Given {
         fs::remove_file(&self.order).is_ok()
     }
 
-    /// Removes the answer.
+    /// Removes the answer and, if it is empty, its folder.
     pub fn forget(self) {
         let _ = fs::remove_file(&self.answer);
         let _ = self.answer.parent().map(fs::remove_dir);

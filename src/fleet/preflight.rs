@@ -14,12 +14,12 @@ use crate::link::id::DroneId;
 use crate::mission::Plan;
 use crate::protocol::show::{Stage, flag, preflight};
 
-/// What counts as good enough.
+/// Least quality with which a drone may start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Fewest satellites.
+    /// Fewest satellites that its position is to be based on.
     pub satellites: u8,
-    /// Worst horizontal accuracy, m.
+    /// Largest estimated error of the horizontal position, m.
     pub h_acc_m: f64,
     /// Least share of messages that must arrive.
     pub link_quality: f64,
@@ -35,14 +35,14 @@ impl Default for Limits {
     }
 }
 
-/// What is known besides telemetry.
+/// Knowledge about the fleet that telemetry does not give.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
     /// Drones whose upload of this flight's show ended well; others may carry an old show.
     pub loaded: BTreeSet<DroneId>,
     /// Drones whose fence was read back, for those whose status does not tell.
     pub fenced: BTreeSet<DroneId>,
-    /// How their parameters stand; drones that are not here were not asked.
+    /// State of the drones' parameters; those that are not in it were not asked.
     pub params: BTreeMap<DroneId, Standing>,
 }
 
@@ -52,9 +52,9 @@ const SILENT: &str = "silent";
 /// One thing that was looked at.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cell {
-    /// What is shown.
+    /// Text of the cell.
     pub text: String,
-    /// Why it is no-go; `None`: it is good.
+    /// Reason why the drone must not start; `None` if the cell is good.
     pub no_go: Option<String>,
 }
 
@@ -64,12 +64,12 @@ pub const COLUMNS: [&str; 11] = [
     "params",
 ];
 
-/// One drone.
+/// A row of the preflight table: one drone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// Its slot.
+    /// Slot that the drone flies.
     pub slot: u16,
-    /// The drone.
+    /// Identifier of the drone.
     pub drone: DroneId,
     /// In the order of [`COLUMNS`].
     pub cells: Vec<Cell>,
@@ -82,17 +82,17 @@ impl Row {
     }
 }
 
-/// The whole table.
+/// The preflight table of a fleet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Preflight {
     /// The drones, by slot.
     pub rows: Vec<Row>,
-    /// What concerns more than one drone.
+    /// Problems that concern more than one drone, one sentence each.
     pub fleet: Vec<String>,
 }
 
 impl Preflight {
-    /// Go or no-go.
+    /// Whether the fleet may start: there are drones, and nothing is no-go.
     pub fn go(&self) -> bool {
         !self.rows.is_empty() && self.fleet.is_empty() && self.rows.iter().all(Row::go)
     }
@@ -114,7 +114,7 @@ pub fn charge_needed(plan: &Plan) -> f64 {
     100.0 * (flight_s / limits.endurance_s.max(1.0) + limits.endurance_reserve)
 }
 
-/// Makes the table.
+/// Makes the preflight table of a fleet at time `now`.
 pub fn preflight(
     plan: &Plan,
     table: &FleetTable,

@@ -16,18 +16,18 @@ use crate::link::id::DroneId;
 use crate::link::station::STATION;
 use crate::mission::Plan;
 
-/// What a parameter must be.
+/// Condition on the value of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wanted {
-    /// This value.
+    /// Exactly this value.
     Is(f32),
-    /// At least this.
+    /// At least this value.
     AtLeast(f32),
-    /// At most this.
+    /// At most this value.
     AtMost(f32),
-    /// These bits are set, whatever the others are.
+    /// A bit mask in which these bits are set, whatever the rest.
     HasBits(u32),
-    /// These bits are not set, whatever the others are.
+    /// A bit mask in which these bits are clear, whatever the rest.
     LacksBits(u32),
 }
 
@@ -70,11 +70,11 @@ impl std::fmt::Display for Wanted {
 /// A parameter that must hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Requirement {
-    /// Its name.
+    /// Name of the parameter.
     pub name: &'static str,
-    /// What it must be.
+    /// Condition on its value.
     pub wanted: Wanted,
-    /// Why, as a sentence's end: "LOG_FILE_DSRMROT must be 1: every flight ...".
+    /// Reason, as the end of the sentence "LOG_FILE_DSRMROT must be 1: every flight ...".
     pub why: &'static str,
 }
 
@@ -83,8 +83,8 @@ const LOG_BITS: u32 = 1 << 1 | 1 << 2 | 1 << 4 | 1 << 5 | 1 << 9 | 1 << 10 | 1 <
 /// A return climbs to at most so much below the top of the fence, m.
 const FENCE_GAP_M: f64 = 5.0;
 
-/// What a plan requires of a vehicle; the fence's own parameters are those of
-/// [`super::fence::Fence::params`].
+/// Parameters that a plan requires of a vehicle, without those of the fence, which
+/// [`super::fence::Fence::params`] gives.
 pub fn requirements(plan: &Plan, show_firmware: bool) -> Vec<Requirement> {
     let require = |name, wanted, why| Requirement { name, wanted, why };
     let mut all = vec![
@@ -152,9 +152,9 @@ pub fn requirements(plan: &Plan, show_firmware: bool) -> Vec<Requirement> {
 /// A parameter that is not what it must be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// The requirement.
+    /// Requirement that is not met.
     pub requirement: Requirement,
-    /// What it is; `None`: the drone did not answer for it.
+    /// Present value; `None` if the drone did not report it.
     pub is: Option<f32>,
 }
 
@@ -173,7 +173,7 @@ impl std::fmt::Display for Difference {
 }
 
 impl Difference {
-    /// What is and what must be, without the reason: one of a list.
+    /// Present value and condition in words, without the reason: an item of a list.
     pub fn brief(&self) -> String {
         let Requirement { name, wanted, .. } = &self.requirement;
         match self.is {
@@ -183,16 +183,16 @@ impl Difference {
     }
 }
 
-/// How the parameters of a vehicle stand.
+/// State of a vehicle's parameters against the requirements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Standing {
-    /// What is still wrong.
+    /// Requirements that are still not met.
     pub wrong: Vec<Difference>,
-    /// What was changed, also when something went wrong afterwards.
+    /// Changes that were made, also when something went wrong afterwards.
     pub changed: Vec<Change>,
-    /// Why a change did not work.
+    /// Reason why a change failed, if one did.
     pub failed: Option<SetError>,
-    /// What was read.
+    /// Values that were read, by name.
     pub values: BTreeMap<String, f32>,
 }
 

@@ -18,7 +18,7 @@ use crate::mission::Plan;
 
 /// Name and version of the table's format.
 pub const FLEET_SCHEMA: &str = "updraft.fleet/1";
-/// Its name in a flight's folder.
+/// Name of the table's file in a flight's folder.
 pub const FLEET_FILE: &str = "fleet.json";
 /// A table is never longer, bytes.
 const MOST_BYTES: u64 = 16 << 20;
@@ -46,7 +46,7 @@ pub struct Assignment {
 }
 
 impl FleetTable {
-    /// A table of these; sorted by slot.
+    /// A table of these pairs of vehicle and slot, sorted by slot.
     pub fn new(drones: impl IntoIterator<Item = (DroneId, u16)>) -> Self {
         let mut drones: Vec<Assignment> =
             drones.into_iter().map(|(drone, slot)| Assignment { slot, drone }).collect();
@@ -54,12 +54,16 @@ impl FleetTable {
         Self { schema: FLEET_SCHEMA.to_owned(), drones }
     }
 
-    /// Where it lies in a flight's folder.
+    /// Path of the table in a flight's folder.
     pub fn path(folder: &Path) -> PathBuf {
         folder.join(FLEET_FILE)
     }
 
-    /// Reads it.
+    /// Reads the table of a flight's folder.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read, or is not a fleet table.
     pub fn read(folder: &Path) -> Result<Self, CampaignError> {
         let path = Self::path(folder);
         let bytes = read_whole(&path, MOST_BYTES)?;
@@ -76,7 +80,11 @@ impl FleetTable {
         }
     }
 
-    /// Writes it.
+    /// Writes the table into a flight's folder.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), CampaignError> {
         let path = Self::path(folder);
         let json = to_json(self).map_err(|error| CampaignError::Json {
@@ -91,130 +99,130 @@ impl FleetTable {
         self.drones.iter().find(|line| line.drone == drone).map(|line| line.slot)
     }
 
-    /// Vehicles by slot.
+    /// Vehicle of each slot.
     pub fn by_slot(&self) -> BTreeMap<u16, DroneId> {
         self.drones.iter().map(|line| (line.slot, line.drone)).collect()
     }
 
-    /// Slots by vehicle.
+    /// Slot of each vehicle.
     pub fn by_drone(&self) -> BTreeMap<DroneId, u16> {
         self.drones.iter().map(|line| (line.drone, line.slot)).collect()
     }
 }
 
-/// Why vehicles and slots do not fit together.
+/// Conflict between vehicles and slots.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SlotProblem {
     /// The table names a slot that the plan does not have.
     #[error("drone {drone} is to fly slot {slot}, but the plan has {slots} slots")]
     NoSuchSlot {
-        /// The vehicle.
+        /// Identifier of the vehicle.
         drone: DroneId,
-        /// The slot.
+        /// Number of the slot in the table.
         slot: u16,
-        /// How many there are.
+        /// Number of slots in the plan.
         slots: usize,
     },
     /// Two vehicles for one slot in the table.
     #[error("slot {slot} is given to drones {first} and {second}: take one of them out")]
     DoubledSlot {
-        /// The slot.
+        /// Number of the slot.
         slot: u16,
-        /// One vehicle.
+        /// First vehicle on the slot.
         first: DroneId,
-        /// The other.
+        /// Second vehicle on the slot.
         second: DroneId,
     },
     /// One vehicle for two slots in the table.
     #[error("drone {drone} is given slots {first} and {second}: it can fly one")]
     DoubledDrone {
-        /// The vehicle.
+        /// Identifier of the vehicle.
         drone: DroneId,
-        /// One slot.
+        /// First slot of the vehicle.
         first: u16,
-        /// The other.
+        /// Second slot of the vehicle.
         second: u16,
     },
     /// A slot without a vehicle.
     #[error("slot {slot} has no drone: put one there, or plan the flight with fewer")]
     Empty {
-        /// The slot.
+        /// Number of the slot.
         slot: u16,
     },
-    /// Its place is not known.
+    /// The position of a vehicle with a slot is not known.
     #[error("drone {drone} (slot {slot}) does not say where it stands: is it on, with GPS?")]
     NoPosition {
-        /// The vehicle.
+        /// Identifier of the vehicle.
         drone: DroneId,
-        /// Its slot.
+        /// Slot of the vehicle.
         slot: u16,
     },
-    /// It stands nearest to another slot.
+    /// The vehicle stands nearest to a slot that is not its own.
     #[error(
         "drone {drone} is to fly slot {slot} but stands on slot {stands}: move it {distance_m:.1} \
          m, or let the table follow where the drones stand"
     )]
     WrongSlot {
-        /// The vehicle.
+        /// Identifier of the vehicle.
         drone: DroneId,
-        /// Its slot.
+        /// Slot that it is to fly.
         slot: u16,
-        /// Where it stands.
+        /// Slot that it stands nearest to.
         stands: u16,
-        /// How far it is from its slot, m.
+        /// Distance from its own slot, m.
         distance_m: f64,
     },
-    /// It stands near its slot, but not near enough.
+    /// The vehicle stands nearest to its slot, but too far from it.
     #[error(
         "drone {drone} stands {distance_m:.1} m from slot {slot}, {allowed_m:.1} m are allowed: \
          move it there"
     )]
     TooFar {
-        /// The vehicle.
+        /// Identifier of the vehicle.
         drone: DroneId,
-        /// The slot.
+        /// Slot of the vehicle.
         slot: u16,
-        /// How far it is, m.
+        /// Distance from its slot, m.
         distance_m: f64,
-        /// How far it may be, m.
+        /// Largest distance allowed, m.
         allowed_m: f64,
     },
     /// Two stand on one slot.
     #[error("drones {first} and {second} both stand on slot {slot}: move one of them")]
     BothOn {
-        /// The slot.
+        /// Number of the slot.
         slot: u16,
-        /// One vehicle.
+        /// First vehicle on the slot.
         first: DroneId,
-        /// The other.
+        /// Second vehicle on the slot.
         second: DroneId,
     },
-    /// Its place is not known, and no table gives it a slot.
+    /// The position of a vehicle is not known, and no table gives it a slot.
     #[error("drone {drone} does not say where it stands: is it on, with GPS?")]
     Nowhere {
-        /// The vehicle.
+        /// Identifier of the vehicle.
         drone: DroneId,
     },
     /// A vehicle that belongs to no slot.
     #[error("drone {drone} is on but has no slot: switch it off, or give it one")]
     Unassigned {
-        /// The vehicle.
+        /// Identifier of the vehicle.
         drone: DroneId,
     },
 }
 
-/// Where a vehicle stands.
+/// Place where a vehicle stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stand {
-    /// The nearest slot.
+    /// Number of the nearest slot.
     pub nearest: u16,
-    /// How far that is, m, horizontally.
+    /// Horizontal distance to the nearest slot, m.
     pub distance_m: f64,
     /// Place in the show frame, m.
     pub at_m: [f64; 2],
 }
 
-/// Where all vehicles with a fresh position stand.
+/// Places of all vehicles with a fresh position.
 pub fn stands(plan: &Plan, telemetry: &Telemetry, now: Micros) -> BTreeMap<DroneId, Stand> {
     let stand = |(drone, known): (&DroneId, &super::telemetry::Drone)| {
         let (at, position) = known.position?;
@@ -243,8 +251,8 @@ fn distance_m(at_m: [f64; 2], home_m: [f64; 3]) -> f64 {
     (at_m[0] - home_m[0]).hypot(at_m[1] - home_m[1])
 }
 
-/// How far a drone may stand from its slot, m: under half the grid's spacing, and under what the
-/// firmware allows ([`Plan`]s keep drones further apart than twice that).
+/// Largest distance between a drone and its slot, m: under half the grid's spacing, and under what
+/// the firmware allows ([`Plan`]s keep drones further apart than twice that).
 pub fn allowed_m(plan: &Plan) -> f64 {
     let spacing_m = plan.grid.map_or(f64::INFINITY, |grid| grid.spacing_m);
     (0.4 * spacing_m).min(2.5)
@@ -332,8 +340,8 @@ pub fn propose(
     if problems.is_empty() { Ok(table) } else { Err(problems) }
 }
 
-/// The vehicles that stand on a slot of their own, each near enough and alone, whatever the others
-/// do; and every vehicle that does not.
+/// Proposes a table of the vehicles that stand near enough to a slot and alone on it, and names
+/// every vehicle that does not.
 pub fn propose_clear(
     plan: &Plan,
     telemetry: &Telemetry,
@@ -372,9 +380,9 @@ pub fn propose_clear(
     (FleetTable::new(clear), problems)
 }
 
-/// Who stands where, as a picture of the grid seen from above: the show's x axis points up, so
-/// that it is as one sees it looking along the show's orientation. `.` is an empty slot, `?` two
-/// drones on one; drones beside the grid are listed below.
+/// Picture of the grid seen from above, with the drones that stand on it: the show's x axis points
+/// up, so that it is as one sees it looking along the show's orientation. `.` is an empty slot, `?`
+/// two drones on one; drones beside the grid are listed below.
 pub fn picture(plan: &Plan, telemetry: &Telemetry, now: Micros) -> String {
     let stands = stands(plan, telemetry, now);
     let allowed_m = allowed_m(plan);

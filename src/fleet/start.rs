@@ -14,14 +14,14 @@ use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
 use crate::protocol::show::{CLEAR_TIME, LEAVE_TIME, StartConfig, flag};
 
-/// How a start is set.
+/// Options for setting a start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartOptions {
-    /// From the decision to the start, s of the vehicles' time.
+    /// Time from the decision to the start, s of the vehicles' clocks.
     pub lead_s: f64,
-    /// The start itself, instead of the lead; whole seconds.
+    /// Time of the start, whole seconds; replaces the lead.
     pub at: Option<GpsTime>,
-    /// Clocks may differ by so much, s.
+    /// Largest difference allowed between the clocks, s.
     pub clock_spread_s: f64,
     /// Authorization after this is refused, s before the start: the firmware sets its home 10 s
     /// and arms 8 s before take-off.
@@ -39,7 +39,7 @@ pub const LEAST_LEAD_S: f64 = 20.0;
 /// Longest: a start is not set for days, s. Times of the past half week read as passed.
 pub const MOST_LEAD_S: f64 = 12.0 * 3600.0;
 
-/// Why no start is set or authorized.
+/// Reason why a start is not set or not authorized.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StartRefusal {
     /// Nobody is to fly.
@@ -51,7 +51,7 @@ pub enum StartRefusal {
          drones set their home and arm in the last 10 s"
     )]
     Lead {
-        /// What was asked for, s.
+        /// Lead that was asked for, s.
         lead_s: f64,
     },
     /// Clocks that are not known or do not agree.
@@ -66,13 +66,13 @@ pub enum StartRefusal {
         /// Which, and what each has.
         late: Vec<(DroneId, Readback)>,
     },
-    /// It is too late for it.
+    /// The time left is too short to authorize the start.
     #[error(
         "not authorized: {left_s:.0} s are left to the start, {needed_s:.0} s are needed; cancel \
          it and set a new one"
     )]
     TooLate {
-        /// Time left, s.
+        /// Time left to the start, s.
         left_s: f64,
         /// Time needed, s.
         needed_s: f64,
@@ -88,26 +88,26 @@ fn names(late: &[(DroneId, Readback)]) -> String {
     late.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
-/// How the clocks of vehicles stand to each other.
+/// Agreement of the vehicles' clocks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ClockSpread {
-    /// They agree: GPS time now, ms since the GPS epoch (the middle one), and the greatest rate.
+    /// The clocks agree.
     Agree {
-        /// GPS time of the vehicles, ms since the GPS epoch.
+        /// GPS time of the vehicles now, the median, ms since the GPS epoch.
         gps_ms: f64,
-        /// Seconds of the vehicles per second of the station.
+        /// Greatest rate of a clock, seconds of the vehicle per second of the station.
         rate: f64,
     },
-    /// They do not, or some are not known.
+    /// The clocks do not agree, or some are not known.
     Apart {
-        /// In words, with the drones and what to do.
+        /// Description of the problem, with the drones and the remedy.
         text: String,
-        /// The drones it is about.
+        /// Drones whose clocks differ or are not known.
         drones: Vec<DroneId>,
     },
 }
 
-/// Compares the clocks of these vehicles.
+/// Compares the clocks of these vehicles at time `now`.
 pub fn clocks(
     telemetry: &Telemetry,
     drones: &BTreeSet<DroneId>,
@@ -159,18 +159,18 @@ pub fn clocks(
     ClockSpread::Apart { text, drones: off }
 }
 
-/// What a drone's status says of its start.
+/// Start as a drone's status reports it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Readback {
     /// Nothing fresh is heard of it.
     Silent,
-    /// It has no start time.
+    /// The drone has no start time.
     NoTime,
-    /// It has another start time: GPS second of week.
+    /// The drone has another start time: GPS second of week.
     OtherTime(i32),
-    /// It has the time, and is not authorized.
+    /// The drone has the start time, and is not authorized.
     Set,
-    /// It has the time and is authorized.
+    /// The drone has the start time and is authorized.
     Authorized,
 }
 
@@ -186,14 +186,14 @@ impl std::fmt::Display for Readback {
     }
 }
 
-/// What is broadcast at present.
+/// Phase of a start, which decides what is broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// The time, without authorization.
     Announced,
-    /// Time and authorization.
+    /// Time and authorization of the start.
     Authorized,
-    /// Neither.
+    /// Neither a time nor an authorization.
     Cancelled,
 }
 
@@ -258,12 +258,12 @@ impl Start {
         }
     }
 
-    /// Show time 0.
+    /// GPS time of show time 0.
     pub fn time(&self) -> Option<GpsTime> {
         GpsTime::from_total_ms(self.at_gps_ms)
     }
 
-    /// The same as the firmware has it: GPS second of week.
+    /// Start as the firmware has it: GPS second of week.
     pub fn second_of_week(&self) -> i32 {
         (self.at_gps_ms / 1000).rem_euclid(i64::from(WEEK_S)) as i32
     }
@@ -273,7 +273,7 @@ impl Start {
         &self.drones
     }
 
-    /// What is broadcast at present.
+    /// Present phase of the start.
     pub fn phase(&self) -> Phase {
         self.phase
     }
@@ -295,7 +295,7 @@ impl Start {
         self.drones.iter().map(rate).fold(1.0, f64::max)
     }
 
-    /// What each drone says of its start, by status packets that are fresh.
+    /// Start as each drone reports it, by status packets that are fresh.
     pub fn readback(&self, telemetry: &Telemetry, now: Micros) -> BTreeMap<DroneId, Readback> {
         let of = |drone: &DroneId| {
             let status = telemetry.get(*drone).and_then(|known| known.status);
@@ -354,7 +354,7 @@ impl Start {
         self.next = now;
     }
 
-    /// What is broadcast in this phase.
+    /// Packet that is broadcast in the present phase.
     pub fn packet(&self) -> MavMessage {
         let start_tow_s = self.second_of_week();
         start_packet(&match self.phase {
@@ -382,7 +382,7 @@ impl Start {
         Some(self.packet())
     }
 
-    /// When [`Start::due`] wants to be asked again.
+    /// Time at which [`Start::due`] wants to be called again, us.
     pub fn next(&self) -> Micros {
         self.next
     }

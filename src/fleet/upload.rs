@@ -29,30 +29,30 @@ const STATUS_WITHIN: Micros = 15 * S;
 /// So many status packets in a row must say that all is well.
 const AGREEING: u32 = 2;
 
-/// What is loaded onto a vehicle.
+/// Show that is loaded onto a vehicle, with its place and fence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Load {
     /// The `.skyb` file of its slot.
     pub skyb: Vec<u8>,
-    /// Where the show is.
+    /// Position and orientation of the show frame.
     pub site: Site,
     /// The fence around it.
     pub fence: Fence,
 }
 
-/// Why a show is not on a vehicle.
+/// Reason why a show is not on a vehicle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UploadError {
-    /// Nothing was heard.
+    /// The drone is not heard.
     #[error("nothing is heard of the drone: is it on, and does the radio reach it?")]
     Silent,
-    /// It says nothing of a show.
+    /// The drone sends no status of a show mode.
     #[error(
         "the drone sends no show status: its firmware has no show mode; fly it in guided mode, or \
          install the show firmware"
     )]
     NotShowFirmware,
-    /// It flies.
+    /// The drone is flying.
     #[error(
         "the drone is flying ({stage}): it is not touched; `updraft fleet watch` follows the \
          flight, `updraft fleet abort` ends it"
@@ -61,13 +61,13 @@ pub enum UploadError {
         /// The stage it is in.
         stage: Stage,
     },
-    /// Its motors may run.
+    /// The drone is armed, so that its motors may run.
     #[error(
         "the drone is armed and may be flying: it is not touched; `updraft fleet abort` ends its \
          flight"
     )]
     Armed,
-    /// It may take off any time.
+    /// The drone's start is authorized: it may take off at any time.
     #[error(
         "the drone's start is authorized: it is not touched; `updraft fleet abort` takes the start \
          back"
@@ -76,10 +76,10 @@ pub enum UploadError {
     /// Something was not sent, as it took off meanwhile.
     #[error("the upload was broken off, as {why}")]
     Held {
-        /// Why.
+        /// Reason why it was broken off, as a clause.
         why: String,
     },
-    /// It does not get to where it waits for a start.
+    /// The drone does not reach the stage in which it waits for a start.
     #[error("the drone does not enter show mode (stage {stage}): restart it")]
     NotReady {
         /// The stage it is in.
@@ -88,45 +88,45 @@ pub enum UploadError {
     /// Show mode was refused.
     #[error("the drone does not enter show mode")]
     Mode(#[source] CommandError),
-    /// The file.
+    /// The show file could not be put on the drone.
     #[error("the show file is not on the drone")]
     File(#[source] FtpError),
-    /// The origin.
+    /// The origin of the show could not be set.
     #[error("the show's origin is not set")]
     Origin(#[source] CommandError),
-    /// The fence.
+    /// The fence could not be put on the drone.
     #[error("the fence is not on the drone")]
     Fence(#[source] FenceError),
-    /// It does not load the file.
+    /// The drone does not load the file.
     #[error(
         "the drone does not load the show: the file or what its firmware derives from it is not \
          accepted; look at `updraft check`, and at the drone's messages"
     )]
     Reload(#[source] CommandError),
-    /// It says that it has no show after having loaded it.
+    /// The drone reports that it has no show after loading the file.
     #[error(
         "the drone says that it has no show, or no valid take-off time, after loading it: look at \
          `updraft check`; a file that is missing on board looks like this, too"
     )]
     NotLoaded,
-    /// It says that the origin is not set.
+    /// The drone reports that its origin is not set.
     #[error("the drone says that its origin is not set: try again")]
     NoOrigin,
-    /// It says that the orientation is not set.
+    /// The drone reports that its orientation is not set.
     #[error("the drone says that its orientation is not set: try again")]
     NoOrientation,
-    /// It says that the fence is off.
+    /// The drone reports that its fence is off.
     #[error("the drone says that its fence is off: look at its FENCE parameters and try again")]
     FenceOff,
-    /// It says nothing more.
+    /// The drone sends no status after loading the show.
     #[error("the drone sends no status after loading the show: bring it nearer and try again")]
     NoStatus,
 }
 
-/// What became of the show on a vehicle after a refusal.
+/// State of a vehicle after a refused upload.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Left {
-    /// Nothing was changed.
+    /// The vehicle is as it was.
     Untouched,
     /// No show is loaded.
     Cleared,
@@ -137,9 +137,9 @@ pub enum Left {
 /// A refusal, and what is on the vehicle now.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refused {
-    /// Why.
+    /// Reason why the upload failed.
     pub why: UploadError,
-    /// What is on the vehicle.
+    /// State in which the vehicle was left.
     pub left: Left,
 }
 

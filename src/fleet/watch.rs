@@ -21,7 +21,7 @@ use crate::link::net::Received;
 use crate::mission::Plan;
 use crate::protocol::show::{Stage, flag};
 
-/// When something is told.
+/// Limits at which events are reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Distance from the trajectory, m; in and after steps of velocity a drone may be further away.
@@ -40,60 +40,60 @@ impl Limits {
     }
 }
 
-/// What is told of one drone.
+/// Event in the flight of one drone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
-    /// It is in another stage of the show.
+    /// The drone has entered another stage of the show.
     Stage {
-        /// The firmware's number.
+        /// Number of the stage in the firmware.
         number: u8,
-        /// In words.
+        /// Name of the stage, for people.
         stage: String,
     },
-    /// It is in another flight mode.
+    /// The drone has changed to another flight mode.
     Mode {
-        /// Its name.
+        /// Name of the flight mode.
         mode: String,
     },
-    /// Its motors may run, or may not any more.
+    /// The drone was armed or disarmed.
     Armed {
-        /// Which.
+        /// Whether it is armed now.
         armed: bool,
     },
-    /// It was switched off and on, or its autopilot has failed and begun anew.
+    /// The drone was switched off and on, or its autopilot has failed and restarted.
     Restarted {
-        /// It was in the air then.
+        /// Whether it was in the air then.
         in_the_air: bool,
     },
     /// Nothing has been heard of it for too long.
     Silent {
-        /// How long, s.
+        /// Time since it was last heard, s.
         seconds: u64,
     },
-    /// It is heard again.
+    /// The drone is heard again.
     HeardAgain,
-    /// It is far from where it should be.
+    /// The drone is far from its trajectory.
     Far {
-        /// How far, m.
+        /// Distance from the trajectory, m.
         distance_m: f64,
-        /// Show time, s.
+        /// Show time of the drone, s.
         show_s: f64,
     },
-    /// It is near its trajectory again.
+    /// The drone is near its trajectory again.
     NearAgain,
-    /// Its battery is low.
+    /// The battery is low.
     BatteryLow {
-        /// What is left, %.
+        /// Remaining charge, %.
         percent: u8,
     },
-    /// It has left its fence.
+    /// The drone has left its fence.
     FenceBreached,
-    /// It says something of weight.
+    /// The drone sends a text of weight.
     Says {
         /// 0 emergency ... 3 error, 4 warning.
         severity: u8,
-        /// In its words.
+        /// Text of the message.
         text: String,
     },
 }
@@ -139,15 +139,15 @@ impl std::fmt::Display for Event {
 /// An event and whose it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Told {
-    /// When it became known.
+    /// Time at which it became known, us.
     pub at: Micros,
-    /// The drone.
+    /// Identifier of the drone.
     pub drone: DroneId,
-    /// What happened.
+    /// Event, as it was observed.
     pub event: Event,
 }
 
-/// How one drone flies at present.
+/// State of one drone's flight at present.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Flying {
     /// Show time by its own clock, s.
@@ -205,9 +205,9 @@ const TOO_LATE_S: f64 = 30.0;
 /// its motors take a while to spin up, s.
 const CLIMB_S: f64 = 8.0;
 
-/// Watches a show.
+/// Monitor of a show: messages in, events out.
 pub struct Monitor {
-    /// What is known of every vehicle, also of those that are not watched.
+    /// Telemetry of every vehicle, including those that are not watched.
     pub telemetry: Telemetry,
     frame: ShowFrame,
     limits: Limits,
@@ -274,7 +274,7 @@ impl Monitor {
         self.told.drain(..).collect()
     }
 
-    /// How each drone flies.
+    /// State of each watched drone's flight.
     pub fn flying(&self) -> impl Iterator<Item = (DroneId, Flying)> {
         self.watched.iter().map(|(drone, watched)| (*drone, watched.flying))
     }

@@ -171,7 +171,7 @@ struct Watched {
     left: Option<String>,
 }
 
-/// Watches a show: statuses in, events out. It does nothing on its own.
+/// Monitor of a show: it takes statuses and returns events, and does no input or output of its own.
 #[derive(Debug)]
 pub struct Monitor {
     battery_percent: f64,
@@ -179,7 +179,7 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Watches these drones. `battery_percent`: told once below.
+    /// A monitor of these drones. A drone whose charge falls below `battery_percent` is reported once.
     pub fn new(
         drones: impl IntoIterator<Item = String>,
         battery_percent: f64,
@@ -189,15 +189,15 @@ impl Monitor {
         Self { battery_percent, drones: drones.into_iter().map(watched).collect() }
     }
 
-    /// The flight may have begun before: who is found on the ground may have landed.
+    /// Prepares for a flight that may have begun before: drones found on the ground may have landed.
     pub fn attach(&mut self) {
         for watched in self.drones.values_mut() {
             watched.attached = true;
         }
     }
 
-    /// Takes what the server says of its drones. `started`: the start is over, so that who has
-    /// landed has flown.
+    /// Takes the statuses of the drones and returns what has changed, by drone. `started`: the start
+    /// has passed, so that a drone that is down has flown.
     pub fn look(
         &mut self,
         now: Micros,
@@ -215,12 +215,12 @@ impl Monitor {
         told
     }
 
-    /// Whether everyone has landed after the start.
+    /// Whether every drone has landed after the start.
     pub fn is_over(&self) -> bool {
         self.drones.values().all(|watched| watched.landed || watched.is_found_down())
     }
 
-    /// Whether nobody is in the air, as far as the server tells.
+    /// Whether no drone is in the air, as far as the server reports.
     pub fn all_are_down(&self) -> bool {
         self.drones.values().all(|watched| watched.landed || watched.stayed_down())
     }

@@ -18,7 +18,7 @@ const CANCEL: Micros = 2 * S;
 /// Result of one drone's part of a request: the server's value, or the reason why it failed.
 pub type Outcome = Result<Value, String>;
 
-/// Work that goes on at the server, by drone.
+/// Work in progress at the server, by drone.
 #[derive(Debug, Default)]
 pub struct Running {
     waited: BTreeMap<String, Waited>,
@@ -34,7 +34,7 @@ struct Waited {
     share: f64,
 }
 
-/// A request for one drone.
+/// Identifier of the drone at the server.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Job {
     /// The server's name of the drone.
@@ -45,13 +45,13 @@ pub struct Job {
 
 /// Source of the jobs that [`Client`] runs at the server, and receiver of their results.
 pub trait Foreman {
-    /// A drone's work is over; what to do with it next, if anything.
+    /// Takes the outcome of a drone's job; returns the next job for the drone, if there is one.
     fn over(&mut self, drone: &str, outcome: Outcome) -> Option<Job>;
 
     /// Progress of a drone's work, as a share from 0 to 1.
     fn progress(&mut self, _drone: &str, _share: f64) {}
 
-    /// Whether to leave everything as it is.
+    /// Whether to stop: running jobs are cancelled then.
     fn stop(&mut self) -> bool;
 }
 
@@ -89,7 +89,7 @@ impl Client {
         Ok(running)
     }
 
-    /// Waits until all of it is over, or `go_on` says no: then the rest is cancelled.
+    /// Waits until all work is over, or until `go_on` returns false: the rest is cancelled then.
     ///
     /// # Errors
     /// When the connection breaks.
@@ -110,13 +110,13 @@ impl Client {
         Ok(over)
     }
 
-    /// Has work done, on at most `at_once` drones at a time and one request per drone. What the
-    /// server refuses for one drone is that drone's outcome. What goes on when the foreman stops
-    /// is cancelled.
+    /// Runs jobs, for at most `at_once` drones at a time and one request per drone, and passes the
+    /// results to `foreman`. A refusal for one drone is that drone's outcome. Jobs that are running
+    /// when the foreman stops are cancelled.
     ///
     /// # Errors
-    /// When the connection breaks or nothing is answered; drones whose work was not over are
-    /// those that the foreman has not been told of.
+    /// If the connection breaks or the server does not answer; the foreman has then had no outcome of
+    /// the drones whose work was not over.
     pub fn work(
         &mut self,
         jobs: impl IntoIterator<Item = Job>,

@@ -1,4 +1,4 @@
-//! What a message can do to a drone.
+//! Classes of messages by what they can do to a drone.
 
 use crate::fleet::messages::{LAND, RTL};
 use crate::link::frame::{MavMessage, dialect};
@@ -6,7 +6,7 @@ use crate::protocol::ftp::{Op, Packet};
 use crate::protocol::show::{StartConfig, TO_DRONE};
 use dialect::MavCmd;
 
-/// What a message can do, and so to whom it may be sent.
+/// Class of a message by what it can do, which decides to whom it may be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
     /// Reads, or asks for reports: to anyone at any time.

@@ -59,17 +59,17 @@ impl<'a> Gate<'a> {
         self.fleet = Some(drones);
     }
 
-    /// What protects the drones of this flight.
+    /// Parameters that protect the drones of this flight.
     pub fn protection(&self) -> &Protection {
         &self.protection
     }
 
-    /// What a drone is at.
+    /// State of a drone, as far as orders are concerned.
     pub fn state(&self, drone: DroneId) -> State {
         self.seen.get(&drone).copied().unwrap_or_default().state(self.net.now())
     }
 
-    /// The same in words, as they follow the drone's name.
+    /// State of a drone in words, as they follow its name.
     pub fn words(&self, drone: DroneId) -> String {
         self.seen.get(&drone).copied().unwrap_or_default().words(self.net.now())
     }
@@ -79,8 +79,8 @@ impl<'a> Gate<'a> {
         self.seen.get(&drone).is_some_and(|seen| seen.is_disarmed(self.net.now()))
     }
 
-    /// Drones of these that are armed or may be flying, with the words; those that are not heard
-    /// are among them only with `unheard`.
+    /// Those of `drones` that are armed or may be flying, with their states in words; drones that
+    /// are not heard are among them only with `unheard`.
     pub fn in_the_air(
         &self,
         drones: impl IntoIterator<Item = DroneId>,
@@ -94,8 +94,8 @@ impl<'a> Gate<'a> {
         drones.into_iter().filter(may_fly).map(|drone| (drone, self.words(drone))).collect()
     }
 
-    /// Why not everyone of the fleet stays on the ground for sure, drone by drone; empty: all do.
-    /// Nobody stays there for sure before it is known who the fleet is.
+    /// Reason why the fleet may not be sure to stay on the ground, drone by drone; `None` if it is.
+    /// Without knowing the fleet's drones it is never sure.
     pub fn not_grounded(&self) -> Option<String> {
         let Some(fleet) = &self.fleet else {
             return Some("it is not known which drones the fleet has".to_owned());

@@ -1,4 +1,4 @@
-//! What keeps a drone safe by itself: its fence and its failsafes.
+//! Protection of a drone that works without the station: its fence and its failsafes.
 
 use crate::fleet::fence::FENCE_TYPE;
 use crate::fleet::messages::chars;
@@ -18,7 +18,7 @@ pub struct Protection {
 }
 
 impl Protection {
-    /// Of a plan.
+    /// Protection that a plan asks for.
     pub fn of(plan: &Plan) -> Self {
         let top_m = plan.fence.max_altitude_m.max(LEAST_TOP_M);
         let mut wanted = vec![

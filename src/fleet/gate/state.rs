@@ -1,11 +1,11 @@
-//! What a drone is at, as far as orders are concerned. What is not known counts as flying.
+//! State of a drone, as far as orders are concerned. An unknown state counts as flying.
 
 use crate::fleet::telemetry::SILENT_AFTER;
 use crate::link::clock::{Micros, S};
 use crate::link::frame::{MavMessage, dialect};
 use crate::protocol::show::{FROM_DRONE, Stage, Status, flag};
 
-/// What a drone is at.
+/// State of a drone, as far as orders are concerned, from the safest on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum State {
     /// Disarmed, and nothing will make it fly by itself.

@@ -26,19 +26,19 @@ pub use survey::survey;
 /// A flight of the campaign.
 #[derive(Clone, Debug)]
 pub struct ImportFlight {
-    /// Short name.
+    /// Short name of the flight.
     pub name: String,
-    /// What was to be flown.
+    /// Plan of the flight.
     pub plan: Plan,
-    /// Its folder of logs.
+    /// Folder of the flight's logs.
     pub logs: PathBuf,
     /// Slot of each system id; empty: the slot's number is the system id.
     pub slots: BTreeMap<u8, u16>,
     /// File name of each slot's log.
     pub files: BTreeMap<u16, String>,
-    /// When it began, if that is known.
+    /// GPS time of show time 0, if it is known.
     pub start: Option<GpsTime>,
-    /// What was written down when its start was authorized.
+    /// Record that was written when the start was authorized, if there is one.
     pub record: Option<StartRecord>,
     /// Whether its logs are imported; those of others are only recognized.
     pub is_wanted: bool,
@@ -47,15 +47,15 @@ pub struct ImportFlight {
 /// A log on a card.
 #[derive(Clone, Debug)]
 pub struct CardLog {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Its size, bytes.
+    /// Size of the file, bytes.
     pub size_bytes: u64,
-    /// What it says of itself.
+    /// Identity of the log: its drone, its boots and their shows.
     pub identity: Identity,
     /// The shows in it that were flown, held against the plans of flights without a known start.
     pub flown: Vec<Flown>,
-    /// The first of the logs that has the very same bytes.
+    /// First of the logs with exactly the same bytes, by index, if this is a copy.
     pub copy_of: Option<usize>,
     /// A longer log that begins with it.
     pub beginning_of: Option<usize>,
@@ -71,7 +71,7 @@ pub struct Flown {
     pub shares: Vec<f64>,
 }
 
-/// What was found on the cards.
+/// Logs found on the cards, and everything else there.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
     /// The logs, by path.
@@ -82,70 +82,70 @@ pub struct Survey {
     pub empty: Vec<PathBuf>,
 }
 
-/// What a person has answered to doubts.
+/// Answers of a person to the doubts.
 #[derive(Clone, Debug, Default)]
 pub struct Answers {
-    /// By flight: when it began.
+    /// GPS time of show time 0, by index of the flight.
     pub starts: BTreeMap<usize, GpsTime>,
-    /// By flight and slot: which log; `None`: none of them.
+    /// Index of the log of a slot, by indices of flight and slot; `None`: none of the logs.
     pub logs: BTreeMap<(usize, u16), Option<usize>>,
 }
 
-/// How the start of a flight is known.
+/// Source from which the start of a flight is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartFrom {
-    /// It was written down, or given, or answered.
+    /// The start was recorded, or given, or answered.
     Known,
-    /// So many drones flew the plan then, by their logs.
+    /// This many drones flew the plan then, by their logs.
     Agreed(usize),
 }
 
 /// A log that is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Take {
-    /// The flight.
+    /// Index of the flight.
     pub flight: usize,
-    /// The slot.
+    /// Number of the slot.
     pub slot: u16,
-    /// The log.
+    /// Index of the log.
     pub log: usize,
 }
 
-/// What cannot be decided without a person.
+/// Question that only a person can decide.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
     /// The plan was flown at several times, by equally many drones.
     Start {
-        /// The flight.
+        /// Index of the flight.
         flight: usize,
         /// The starts, earliest first, each with the number of drones that flew it.
         starts: Vec<(GpsTime, usize)>,
     },
     /// Several logs fit one slot equally, or of the only one it is not known.
     Log {
-        /// The flight.
+        /// Index of the flight.
         flight: usize,
-        /// The slot.
+        /// Number of the slot.
         slot: u16,
-        /// The logs.
+        /// Indices of the logs.
         logs: Vec<usize>,
-        /// Why none is taken, one clause.
+        /// Reason why none is taken, as a clause.
         why: String,
     },
     /// A log of the flight whose slot is not known.
     Slot {
-        /// The flight.
+        /// Index of the flight.
         flight: usize,
-        /// The log.
+        /// Index of the log.
         log: usize,
-        /// Why, one clause.
+        /// Reason why its slot is not known, as a clause.
         why: String,
     },
     /// A log that fits several flights equally.
     Flight {
-        /// The log.
+        /// Index of the log.
         log: usize,
-        /// The flights.
+        /// Indices of the flights.
         flights: Vec<usize>,
     },
 }
@@ -162,15 +162,15 @@ impl Doubt {
     }
 }
 
-/// What is to be done.
+/// Decision about the logs found: which are taken, which are left, and which need a person.
 #[derive(Clone, Debug, Default)]
 pub struct Decision {
-    /// By flight: when it began, and how that is known; `None`: no log on the cards flew it.
+    /// GPS time of show time 0 of each flight, and its source; `None`: no log on the cards flew it.
     pub starts: Vec<Option<(GpsTime, StartFrom)>>,
-    /// What is taken, by flight and slot.
+    /// Logs to take, by flight and slot.
     pub take: Vec<Take>,
-    /// What is left, and why.
+    /// Logs to leave, by index, each with the reason.
     pub left: Vec<(usize, String)>,
-    /// What a person must decide.
+    /// Questions that a person must decide.
     pub doubts: Vec<Doubt>,
 }

@@ -88,7 +88,7 @@ pub struct LogFlight {
     pub show_crc32: Option<u32>,
 }
 
-/// What is at home of a file of a shelf.
+/// State of a shelf's file at home, against the manifest.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AtHome {
     /// Neither a file nor an entry.
@@ -104,7 +104,7 @@ pub enum AtHome {
 }
 
 impl AtHome {
-    /// What the manifest says of it.
+    /// Entry of the manifest, if it has one.
     pub fn entry(&self) -> Option<&ManifestEntry> {
         match self {
             Self::Nothing | Self::Foreign => None,
@@ -148,7 +148,7 @@ pub enum Verified {
 #[derive(Debug)]
 pub struct Shelf {
     folder: PathBuf,
-    /// What is in it.
+    /// Manifest of the folder.
     pub manifest: Manifest,
 }
 
@@ -196,7 +196,7 @@ impl Shelf {
         self.manifest.logs.iter().find(|entry| entry.file == file)
     }
 
-    /// What is there of a file, read through: the manifest's word alone is not taken for it.
+    /// State of a file, which is read through: the manifest alone is not believed.
     pub fn at_home(&self, file: &str) -> AtHome {
         let path = self.path(file);
         let size = std::fs::metadata(&path).map(|about| about.len()).ok();
@@ -266,7 +266,11 @@ impl Shelf {
         write_whole(&path, &bytes)
     }
 
-    /// Writes an entry.
+    /// Adds an entry to the manifest and writes it; an entry of the same file is replaced.
+    ///
+    /// # Errors
+    ///
+    /// If the manifest cannot be written.
     pub fn add(&mut self, entry: ManifestEntry) -> Result<(), FileError> {
         self.manifest.logs.retain(|other| other.file != entry.file);
         self.manifest.logs.push(entry);

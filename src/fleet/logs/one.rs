@@ -228,7 +228,7 @@ impl PullOne {
         Progress { done: done + finished, total: total + finished }
     }
 
-    /// When something of use was heard last.
+    /// Time at which the drone last sent anything of use, us.
     pub fn heard(&self) -> Option<Micros> {
         let now = match &self.stage {
             Stage::Get(get) => get.heard(),
@@ -249,7 +249,8 @@ impl PullOne {
         self.is_shared = is_shared;
     }
 
-    /// What frees the drone of a log that it may be sending: it does not arm meanwhile.
+    /// Message that ends a log transfer in the drone, if one may be running: a drone that sends a
+    /// log does not arm.
     pub fn farewell(&self) -> Option<MavMessage> {
         let sends = matches!(
             self.stage,

@@ -51,20 +51,20 @@ pub struct PartFile {
 /// Checksums of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sums {
-    /// Size, bytes.
+    /// Size of the file, bytes.
     pub size: u64,
-    /// As the vehicle computes it.
+    /// CRC-32 of the file as the vehicle computes it.
     pub crc32: u32,
-    /// Lower case, hexadecimal.
+    /// SHA-256 of the file, lower case, hexadecimal.
     pub sha256: String,
 }
 
-/// Where the part of a final file is kept.
+/// Path of the part file that belongs to a final file.
 pub fn part_path(path: &Path) -> PathBuf {
     with_suffix(path, ".part")
 }
 
-/// Where its journal is kept.
+/// Path of the journal that belongs to a final file.
 pub fn journal_path(path: &Path) -> PathBuf {
     with_suffix(path, ".journal")
 }
@@ -128,7 +128,11 @@ impl PartFile {
         self
     }
 
-    /// Begins anew.
+    /// Discards what has come and starts over.
+    ///
+    /// # Errors
+    ///
+    /// If the files cannot be written.
     pub fn clear(&mut self) -> Result<(), FileError> {
         self.have = Intervals::default();
         self.fresh = Intervals::default();
@@ -357,7 +361,7 @@ pub fn sums(path: &Path) -> Result<Sums, FileError> {
 pub struct Sample {
     file: File,
     have: Intervals,
-    /// Something differs.
+    /// Whether a difference has been found.
     pub differs: bool,
     size: u64,
 }

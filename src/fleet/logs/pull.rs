@@ -25,9 +25,9 @@ const LOOK: Micros = 100 * MS;
 /// A drone whose logs are wanted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// The drone.
+    /// Identifier of the drone.
     pub drone: DroneId,
-    /// Its slot in the plan.
+    /// Slot of the drone in the plan.
     pub slot: u16,
     /// Name of the slot's log file: `07.BIN`.
     pub file: String,
@@ -35,20 +35,20 @@ pub struct Wanted {
     pub flight: Option<LogFlight>,
 }
 
-/// How logs are pulled.
+/// Options for pulling logs from many drones.
 #[derive(Clone, Debug)]
 pub struct PullOptions {
-    /// For each drone.
+    /// Options for each drone.
     pub each: OneOptions,
-    /// Drones of a network at once, at most.
+    /// Largest number of drones of a network that are pulled from at once.
     pub at_once: usize,
-    /// What is asked of each network, bytes per second; none: what it carries.
+    /// Data rate to ask of each network, bytes per second; `None`: all that it carries.
     pub bytes_per_s: Option<f64>,
     /// Program and version, for the manifest.
     pub made_by: String,
 }
 
-/// Why nothing could be pulled at all.
+/// Error that keeps all logs from being pulled.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PullError {
@@ -60,7 +60,7 @@ pub enum PullError {
     Shelf(#[from] CampaignError),
 }
 
-/// What became of a drone's log.
+/// Outcome of pulling a drone's logs.
 #[derive(Clone, Debug)]
 pub enum Outcome {
     /// Home: now, earlier, or partly; see [`OneDone::failure`].
@@ -70,7 +70,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// What became of it, if the run was not stopped before.
+    /// Details of the outcome, if the run was not stopped before.
     pub fn done(&self) -> Option<&OneDone> {
         match self {
             Self::Done(done) => Some(done),

@@ -15,26 +15,26 @@ use crate::log::Log;
 pub struct Checked {
     /// As the manifest has it.
     pub entry: ManifestEntry,
-    /// What is wrong; empty: nothing.
+    /// Faults of the log; empty if it is as it came.
     pub faults: Vec<Fault>,
 }
 
-/// What is wrong with a log.
+/// Fault of a log.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("cannot be read: {0}; pull or import it again")]
     Unreadable(String),
-    /// Another size.
+    /// The file has another size than when it came.
     #[error("has {found} bytes, {right} when it came; pull or import it again")]
     Size {
-        /// Now, bytes.
+        /// Present size, bytes.
         found: u64,
-        /// By the manifest, bytes.
+        /// Size by the manifest, bytes.
         right: u64,
     },
-    /// Another content.
+    /// The file has another content than when it came.
     #[error("has changed since it came (another SHA-256); pull or import it again")]
     Changed,
     /// Not all of it.

@@ -17,10 +17,10 @@ use crate::fleet::logs::manifest::{AtHome, LogFlight, ManifestEntry, Method, She
 use crate::fleet::logs::part::{Sums, sums};
 use crate::flight::{Belongs, Identity};
 
-/// How logs are carried home.
+/// Options for carrying logs home.
 #[derive(Clone, Debug)]
 pub struct Carry {
-    /// Takes the place of logs of the same start that are there.
+    /// Whether logs replace those of the same start that are already at home.
     pub again: bool,
     /// Program and version, for the manifest.
     pub made_by: String,
@@ -28,10 +28,10 @@ pub struct Carry {
     pub unix_s: u64,
 }
 
-/// What came of a log that was to be taken.
+/// Outcome for a log that was to be taken.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Carried {
-    /// It is home now. Where a log of another start that lay there lies now.
+    /// The log is home now, with the new place of a log of another start that lay there before.
     Taken(Box<ManifestEntry>, Option<PathBuf>),
     /// It was home before; why it may not hold all of its flight.
     There(Option<String>),
@@ -39,12 +39,12 @@ pub enum Carried {
     Left(String),
 }
 
-/// What came of all that was decided.
+/// Outcome of carrying out a decision.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CarriedOut {
-    /// Of each log that was to be taken.
+    /// Outcome of each log that was to be taken.
     pub outcomes: Vec<(Take, Carried)>,
-    /// By flight: slots that have no log now.
+    /// Slots that have no log now, by flight.
     pub missing: Vec<BTreeSet<u16>>,
 }
 

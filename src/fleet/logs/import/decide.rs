@@ -18,7 +18,7 @@ const EQUAL: f64 = 0.03;
 /// A boot that differs by more from the one that was written down is another, s.
 const SAME_BOOT_S: f64 = 20.0;
 
-/// What is taken, what is left and why, and what a person must decide.
+/// Decides which logs are taken, which are left and why, and what a person must decide.
 ///
 /// The start of a flight is the one that is known, else that at which most drones flew its plan. A log is
 /// taken if it is of that start and its slot is known; a slot takes one.

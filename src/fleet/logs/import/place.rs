@@ -1,4 +1,4 @@
-//! Whose a log is: by its system id and by where the drone stood.
+//! Slot of a log, by its system id and by where the drone stood.
 
 use nalgebra::Vector3;
 

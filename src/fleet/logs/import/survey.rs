@@ -1,4 +1,4 @@
-//! What is on the cards: each log is read once.
+//! Survey of the cards: each log is read once.
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -184,7 +184,7 @@ impl PullOne {
 }
 
 impl LogFlight {
-    /// What a start wants of the log of a slot.
+    /// Flight that the log of a slot must be of, for a start.
     pub fn wanted(start: &StartRecord, slot: u16) -> Self {
         let drone = start.drone(slot);
         Self {
@@ -196,7 +196,7 @@ impl LogFlight {
         }
     }
 
-    /// What a log says of its flight: of the one that began at `start`, else of its last one.
+    /// Flight that a log is of: the one that began at `start`, otherwise its last one.
     pub fn of(identity: &Identity, start: Option<GpsTime>) -> Self {
         let of_start = start.and_then(|start| identity.show_of(start));
         let show = of_start.or_else(|| identity.shows().last());
@@ -212,7 +212,7 @@ impl LogFlight {
         }
     }
 
-    /// Whether this is the flight that is wanted: the same start of the same folder.
+    /// Whether this is the wanted flight: the same start of the same folder.
     pub fn is(&self, wanted: &Self) -> bool {
         self.number == wanted.number && self.authorized_start == wanted.authorized_start
     }

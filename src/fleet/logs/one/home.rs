@@ -1,5 +1,5 @@
-//! What is at home of a drone's log, held against what the drone has now: a log that is longer on
-//! the drone is continued, one that was damaged at home is brought again.
+//! Comparison of a drone's log at home with what the drone has now: a log that is longer on the
+//! drone is continued, one that was damaged at home is brought again.
 
 use std::cmp::Ordering;
 

@@ -1,4 +1,4 @@
-//! What is wanted of a drone's logs, and what became of them.
+//! Options for bringing a drone's logs home, and the outcome.
 
 use std::path::PathBuf;
 
@@ -14,20 +14,20 @@ pub enum Which {
     Flight,
     /// The newest, whatever it is of.
     Newest,
-    /// The one of this number.
+    /// The log of this number on the drone.
     Number(u32),
-    /// All; the newest becomes the slot's log, the others go to `older/`.
+    /// All logs; the newest becomes the slot's log, older ones go to `older/`.
     All,
 }
 
-/// How logs are brought home.
+/// Options for bringing the logs of a drone home.
 #[derive(Clone, Debug)]
 pub struct OneOptions {
-    /// Which of a drone's logs.
+    /// Choice among the drone's logs.
     pub which: Which,
-    /// A drone is given up after so long without an answer.
+    /// Time without an answer after which a drone is given up, us.
     pub patience: Micros,
-    /// A drone that was never heard is given up after so long.
+    /// Time after which a drone that was never heard is given up, us.
     pub wait: Micros,
     /// Larger logs are refused, bytes.
     pub most_size: u64,
@@ -64,30 +64,31 @@ impl Default for OneOptions {
     }
 }
 
-/// Why a drone's log is not home.
+/// Reason why a drone's log is not home.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// What went wrong.
+    /// Description of the problem.
     pub reason: String,
-    /// What to do.
+    /// Remedy, for the crew.
     pub advice: &'static str,
     /// Bytes that came and are kept for the next run.
     pub kept_bytes: u64,
 }
 
-/// What became of a drone's logs.
+/// Outcome of bringing a drone's logs home.
 #[derive(Clone, Debug, Default)]
 pub struct OneDone {
-    /// Brought home now.
+    /// Logs brought home now.
     pub pulled: Vec<ManifestEntry>,
-    /// There already: file names.
+    /// Names of the logs that were already there.
     pub there: Vec<String>,
-    /// Why what is there could not be compared with what the drone has now.
+    /// Reason why the logs there could not be compared with what the drone has now, if they could
+    /// not.
     pub unchecked: Option<String>,
     /// Logs of earlier flights that were at home, where they lie now.
     pub moved: Vec<PathBuf>,
     /// Number of the drone's newest log, where that is newer than the one of this flight.
     pub newer: Option<u32>,
-    /// Why not all.
+    /// Reason why logs are missing, if they are.
     pub failure: Option<Failure>,
 }
