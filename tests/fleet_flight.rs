@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use updraft::base::time::GpsTime;
 use updraft::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
-use updraft::fleet::fence::Fence;
+use updraft::fleet::fence::fence_of;
 use updraft::fleet::greet::Greet;
 use updraft::fleet::preflight::{Known, Limits, preflight};
 use updraft::fleet::required::{CheckParams, requirements};
@@ -95,7 +95,7 @@ fn bad() -> Faults {
 /// Everything up to an authorized start.
 fn started(net: &mut Net<'_>, plan: &Plan) -> (Monitor, Start) {
     let show = plan.to_show();
-    let fence = Fence::of(plan, &show).unwrap();
+    let fence = fence_of(plan, &show).unwrap();
     let all: BTreeSet<DroneId> = plan.slots.iter().map(|slot| drone(slot.slot)).collect();
     let mut telemetry = Telemetry::default();
     pass(net, 10 * S, &mut telemetry);

@@ -18,7 +18,7 @@ use updraft::fleet::changes::{Change, Changes};
 use updraft::fleet::command::Command;
 use updraft::fleet::desk::{Desk, Notice};
 use updraft::fleet::dry_run::Obliging;
-use updraft::fleet::fence::{Fence, PutFence};
+use updraft::fleet::fence::{PutFence, fence_of};
 use updraft::fleet::ftp::Caller;
 use updraft::fleet::ftp::list::List;
 use updraft::fleet::ftp::sum::Sum;
@@ -175,7 +175,7 @@ fn flight(plan: &Plan, system: u8, vehicle: &Obliging) -> Guided {
 /// The messages of every subcommand.
 fn subcommands(plan: &Plan) -> BTreeMap<&'static str, Vec<MavMessage>> {
     let (shown, stock) = (|| vehicle(plan, true), || vehicle(plan, false));
-    let fence = Fence::of(plan, &plan.to_show()).unwrap();
+    let fence = fence_of(plan, &plan.to_show()).unwrap();
     let names = || fence.params().into_iter().map(|(name, _)| name);
     let greet = sends(Greet::new(drone(1)), &mut shown());
     let read = |may| {

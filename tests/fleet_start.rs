@@ -120,9 +120,9 @@ fn every_no_go_is_said_in_words() {
     case(&of(|of| of.health.as_mut().unwrap().1.battery_percent = Some(20)));
     case(&of(|of| of.health.as_mut().unwrap().1.battery_percent = None));
     case(&of(|of| of.armed.as_mut().unwrap().1 = true));
-    case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 2.4e-5));
-    case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 3e-5));
-    case(&of(|of| of.position.as_mut().unwrap().1.place.lat_deg += 1.0));
+    case(&of(|of| of.position.as_mut().unwrap().1.lat_deg += 2.4e-5));
+    case(&of(|of| of.position.as_mut().unwrap().1.lat_deg += 3e-5));
+    case(&of(|of| of.position.as_mut().unwrap().1.lat_deg += 1.0));
     case(&of(|of| of.position = None));
     case(&of(|of| *of = updraft::fleet::telemetry::Drone::default()));
     case(&of(|of| of.clock = VehicleClock::default()));
@@ -375,7 +375,7 @@ fn slots_are_held_against_where_drones_stand() {
     let doubled = pairs(&[(1, 1), (2, 1), (3, 3), (4, 4), (5, 5), (6, 6), (6, 9)]);
     case("doubled, empty, too many", &doubled, &telemetry);
     let mut moved = telemetry.clone();
-    moved.drones.get_mut(&drone(1)).unwrap().position.as_mut().unwrap().1.place.lat_deg += 3e-5;
+    moved.drones.get_mut(&drone(1)).unwrap().position.as_mut().unwrap().1.lat_deg += 3e-5;
     let second = moved.drones[&drone(2)].position;
     moved.drones.get_mut(&drone(3)).unwrap().position = second;
     moved.drones.remove(&drone(4));

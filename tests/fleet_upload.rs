@@ -10,7 +10,7 @@ use fleet_show_support::{Fault, Net, bad, drone, fleet, load, one, plan};
 use insta::assert_snapshot;
 use updraft::fleet::clear::Clear;
 use updraft::fleet::dry_run::{Obliging, dry_run};
-use updraft::fleet::fence::{Fence, PutFence};
+use updraft::fleet::fence::{PutFence, fence_of};
 use updraft::fleet::upload::Upload;
 use updraft::link::drive::{Machine as _, NoWatch, Step, drive};
 use updraft::link::frame::MavMessage;
@@ -177,7 +177,7 @@ fn a_fence_that_is_smaller_than_the_show_is_refused() {
     let text = |change: &dyn Fn(&mut updraft::mission::plan::Fence)| {
         let mut plan = good.clone();
         change(&mut plan.fence);
-        Fence::of(&plan, &show).unwrap_err().to_string()
+        fence_of(&plan, &show).unwrap_err().to_string()
     };
     let lines = [
         text(&|fence| fence.polygon_m.truncate(2)),

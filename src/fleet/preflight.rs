@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::required::{Difference, Standing};
-use super::slots::{self, FleetTable, SlotProblem};
+use super::slots::{self, FleetTable, SlotProblem, geodetic};
 use super::start::{ClockSpread, clocks};
 use super::telemetry::{Drone, SILENT_AFTER, Telemetry};
 use crate::link::clock::Micros;
@@ -267,7 +267,7 @@ impl Look<'_> {
         let frame = self.plan.site.frame();
         let home = self.plan.slot(slot).map(|slot| slot.home_m);
         let distance_m = self.of.position.zip(home).map(|((_, position), home)| {
-            let at = frame.from_geodetic(position.place);
+            let at = frame.from_geodetic(geodetic(&position));
             (at.x - home[0]).hypot(at.y - home[1])
         });
         let far = |m: f64| if m < 1000.0 { format!("{m:.1} m") } else { "far".to_owned() };

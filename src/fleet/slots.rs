@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::telemetry::Telemetry;
+use super::telemetry::{Position, Telemetry};
 use crate::base::file::{read_whole, write_whole};
 use crate::base::frame::Geodetic;
 use crate::base::parse;
@@ -222,16 +222,19 @@ pub struct Stand {
     pub at_m: [f64; 2],
 }
 
+/// The place that a vehicle reports.
+pub fn geodetic(position: &Position) -> Geodetic {
+    Geodetic { lat_deg: position.lat_deg, lon_deg: position.lon_deg, amsl_m: position.amsl_m }
+}
+
 /// Places of all vehicles with a fresh position.
 pub fn stands(plan: &Plan, telemetry: &Telemetry, now: Micros) -> BTreeMap<DroneId, Stand> {
     let stand = |(drone, known): (&DroneId, &super::telemetry::Drone)| {
         let (at, position) = known.position?;
-        // Without a fix the firmware sends a place of zeros.
-        let nowhere = position.place.lat_deg == 0.0 && position.place.lon_deg == 0.0;
-        if nowhere || now.saturating_sub(at) > FRESH {
+        if !position.has_place() || now.saturating_sub(at) > FRESH {
             return None;
         }
-        Some((*drone, Stand::of(plan, position.place)?))
+        Some((*drone, Stand::of(plan, geodetic(&position))?))
     };
     telemetry.drones.iter().filter_map(stand).collect()
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::messages::mode_name;
 use super::off_course::{Change, Course, Moment};
 use super::preflight::charge_needed;
-use super::slots::FleetTable;
+use super::slots::{FleetTable, geodetic};
 use super::telemetry::{Drone, Telemetry};
 use crate::base::frame::ShowFrame;
 use crate::link::clock::{MS, Micros, S};
@@ -537,7 +537,7 @@ impl Watched {
         if !performs(of) || show_s < 0.0 || show_s > end_s || !joined {
             return None;
         }
-        let mut place = frame.from_geodetic(position.place);
+        let mut place = frame.from_geodetic(geodetic(&position));
         // Heights are above home, wherever the vehicle believes the sea to be.
         place.z = position.above_home_m + self.course.trajectory().start_m.z;
         let at = Moment { show_s, doubt_s };

@@ -7,7 +7,7 @@ use std::time::{Instant, SystemTime};
 use nalgebra::Vector3;
 use updraft::base::time::GpsTime;
 use updraft::campaign::{self, FlightFolder};
-use updraft::fleet::fence::Fence;
+use updraft::fleet::fence::fence_of;
 use updraft::fleet::upload::Load;
 use updraft::link::clock::{Clock, Micros};
 use updraft::link::signing::Key;
@@ -68,7 +68,7 @@ impl Drones {
     /// What a slot's drone must get.
     pub(crate) fn load(&self, slot: u16) -> Load {
         let skyb = std::fs::read(self.folder.skyb(slot, self.plan.slots.len())).unwrap();
-        let fence = Fence::of(&self.plan, &self.plan.to_show()).unwrap();
+        let fence = fence_of(&self.plan, &self.plan.to_show()).unwrap();
         Load { skyb, site: self.plan.site, fence }
     }
 

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 use updraft::base::frame::Geodetic;
-use updraft::fleet::fence::Fence;
+use updraft::fleet::fence::fence_of;
 use updraft::fleet::upload::Load;
 use updraft::link::clock::MS;
 use updraft::link::id::DroneId;
@@ -37,7 +37,7 @@ pub(crate) fn load(plan: &Plan, slot: u16) -> Load {
     let show = plan.to_show();
     let drone = &show.drones[usize::from(slot) - 1];
     let skyb = skyb::write(drone, &skyb::SkybOptions::default()).unwrap().bytes;
-    Load { skyb, site: plan.site, fence: Fence::of(plan, &show).unwrap() }
+    Load { skyb, site: plan.site, fence: fence_of(plan, &show).unwrap() }
 }
 
 /// One frame in five is lost, each way, takes 200 ms, and frames overtake each other.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use updraft::fleet::dry_run::Obliging;
-use updraft::fleet::fence::Fence;
+use updraft::fleet::fence::fence_of;
 use updraft::fleet::slots::FleetTable;
 use updraft::fleet::upload::Load;
 use updraft::link::clock::{MS, Micros, S};
@@ -45,7 +45,7 @@ pub(crate) fn load(plan: &Plan, slot: u16) -> Load {
     let show = plan.to_show();
     let drone = &show.drones[usize::from(slot) - 1];
     let skyb = skyb::write(drone, &skyb::SkybOptions::default()).unwrap().bytes;
-    Load { skyb, site: plan.site, fence: Fence::of(plan, &show).unwrap() }
+    Load { skyb, site: plan.site, fence: fence_of(plan, &show).unwrap() }
 }
 
 pub(crate) fn table(plan: &Plan) -> FleetTable {

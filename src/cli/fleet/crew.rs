@@ -180,10 +180,7 @@ impl<'a> Crew<'a> {
             self.context.check_stop()?;
             let now = self.net.now();
             let ready = self.telemetry.drones.values().filter(|drone| {
-                let here = |place: crate::base::frame::Geodetic| {
-                    place.lat_deg != 0.0 || place.lon_deg != 0.0
-                };
-                drone.position.is_some_and(|(_, position)| here(position.place))
+                drone.position.is_some_and(|(_, position)| position.has_place())
                     && drone.mode.is_some()
             });
             if ready.count() >= slots && complete.is_none() {

@@ -4,7 +4,8 @@
 pub mod import;
 pub mod manifest;
 pub mod one;
-pub mod pace;
 pub mod part;
 pub mod pull;
 pub mod verify;
+
+pub use mavlink_station::pace;

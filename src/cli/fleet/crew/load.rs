@@ -9,7 +9,7 @@ use crate::cli::exit::CommandError;
 use crate::cli::fleet::connect::run_number;
 use crate::cli::words;
 use crate::fleet::changes::{Change, Changes};
-use crate::fleet::fence::Fence;
+use crate::fleet::fence::{Fence, fence_of};
 use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::sum::Sum;
 use crate::fleet::required::{CheckParams, requirements};
@@ -114,7 +114,7 @@ impl Crew<'_> {
 
     /// The plan's fence as drones get it.
     pub(in crate::cli) fn fence(&self) -> Result<Fence, CommandError> {
-        Fence::of(self.plan, &self.show).map_err(|error| CommandError::Usage(error.to_string()))
+        fence_of(self.plan, &self.show).map_err(|error| CommandError::Usage(error.to_string()))
     }
 
     /// The upload of each drone of the table.

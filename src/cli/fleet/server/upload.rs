@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{BEYOND_M, Flight, stopped};
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
-use crate::fleet::fence::Fence as Checked;
+use crate::fleet::fence::fence_of;
 use crate::mission::Plan;
 use crate::show::Show;
 use crate::show::skyc::drone_documents;
@@ -27,7 +27,7 @@ impl<'a> Shows<'a> {
     pub(super) fn of(plan: &'a Plan) -> Result<Self, CommandError> {
         let show = plan.to_show();
         let checked =
-            Checked::of(plan, &show).map_err(|error| CommandError::Usage(error.to_string()))?;
+            fence_of(plan, &show).map_err(|error| CommandError::Usage(error.to_string()))?;
         let corners = &plan.fence.polygon_m;
         let homes = plan.slots.iter().map(|slot| slot.home_m);
         let reach_m = homes

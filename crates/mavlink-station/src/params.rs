@@ -156,7 +156,7 @@ impl SetParams {
     }
 
     /// Whether the next value was sent, so that it may have been taken.
-    pub(super) fn was_sent(&self) -> bool {
+    pub fn was_sent(&self) -> bool {
         self.open.tries > 2
     }
 }

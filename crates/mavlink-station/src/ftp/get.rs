@@ -18,12 +18,12 @@ use std::collections::VecDeque;
 use super::exchange::Wish;
 use super::reads::Reads;
 use super::{Caller, Exchange, FtpError, answer};
-use crate::fleet::budget::Budget;
-use crate::fleet::sink::Sink;
+use crate::budget::Budget;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::{MOST_DATA, Op, Packet, Refusal};
+use crate::sink::Sink;
 
 const PIECE: u64 = MOST_DATA as u64;
 /// Packets of a burst until the vehicle has shown another number.

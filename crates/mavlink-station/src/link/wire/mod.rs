@@ -1,5 +1,6 @@
 //! Sockets and ports that carry frames.
 
+#[cfg(feature = "serial")]
 mod serial;
 mod tcp;
 mod udp;
@@ -54,9 +55,15 @@ pub fn open(address: &Address) -> Result<Halves, NetError> {
         Way::Tcp(host) => {
             (tcp::connect(host), "does anything listen there, and is the host name right?")
         }
+        #[cfg(feature = "serial")]
         Way::Serial(device, baud) => {
             (serial::open(device, *baud), "is the radio plugged in, and may you use the device?")
         }
+        #[cfg(not(feature = "serial"))]
+        Way::Serial(..) => (
+            Err(io::ErrorKind::Unsupported.into()),
+            "this program was built without the feature `serial`",
+        ),
     };
     opened.map_err(|source| {
         let is_udp = matches!(address.way, Way::UdpIn(_));

@@ -3,9 +3,8 @@
 //! Frames are found in a stream of bytes or in a datagram, checked, and turned into messages.
 //! MAVLink 1 is not spoken: its frames are counted, so that the user can be told.
 
-use mavlink::{
-    MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message as _, calculate_crc, consts,
-};
+pub(super) use mavlink::MAVLinkV2MessageRaw;
+use mavlink::{MavHeader, MavlinkVersion, Message as _, calculate_crc, consts};
 
 /// The messages of the ArduPilot dialect and their enums.
 pub use mavlink::dialects::ardupilotmega as dialect;

@@ -12,16 +12,16 @@ mod window;
 
 use self::window::Windows;
 use super::{LogProtocolError, data_message, end_message};
-use crate::fleet::budget::Budget;
-use crate::fleet::ftp::get::Tally;
-use crate::fleet::ftp::reads::Reads;
-use crate::fleet::load::{Load, Place};
-use crate::fleet::rtt::Rtt;
-use crate::fleet::sink::Sink;
+use crate::budget::Budget;
+use crate::ftp::get::Tally;
+use crate::ftp::reads::Reads;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
+use crate::load::{Load, Place};
+use crate::rtt::Rtt;
+use crate::sink::Sink;
 
 /// Bytes in one LOG_DATA.
 const PIECE: u64 = 90;

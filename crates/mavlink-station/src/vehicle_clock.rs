@@ -7,8 +7,8 @@
 
 use std::collections::VecDeque;
 
-use crate::base::time::{GPS_EPOCH_UNIX_S, GpsTime};
 use crate::link::clock::Micros;
+use dataflash::time::{GPS_EPOCH_UNIX_S, GpsTime};
 
 /// Readings kept.
 const KEEP: usize = 16;

@@ -4,12 +4,12 @@ use super::{
     Burst, Get, Got, MOST_OCCUPIED, MOST_RANGES, MOST_READS, OVERHEAD, PIECE, USUAL_BURST,
     WORTH_A_BURST, WORTH_A_TAIL,
 };
-use crate::fleet::ftp::FtpError;
-use crate::fleet::sink::Sink;
+use crate::ftp::FtpError;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine as _, Step};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::{MOST_DATA, Op, Packet};
+use crate::sink::Sink;
 
 impl<S: Sink> Get<S> {
     /// From when on the current burst's silence is suspicious.

@@ -144,7 +144,7 @@ impl Caller {
     }
 
     /// How long its answers take.
-    pub(in crate::fleet) fn rtt(&self) -> Rtt {
+    pub fn rtt(&self) -> Rtt {
         self.numbers.borrow().rtt
     }
 

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::fleet::intervals::Intervals;
+use crate::intervals::Intervals;
 use crate::link::clock::{Micros, S};
 
 /// Answers and losses that are looked at together.

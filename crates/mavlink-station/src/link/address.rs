@@ -4,8 +4,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::base::file::read_whole;
-use crate::base::plain::{Shown as _, acts};
+use untrusted_io::file::read_whole;
+use untrusted_io::plain::{Shown as _, acts};
 
 /// A link and the network it belongs to.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -6,14 +6,13 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::messages::chars;
 use super::vehicle_clock::VehicleClock;
-use crate::base::frame::Geodetic;
-use crate::base::time::GpsTime;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::Watch;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::link::net::Received;
 use crate::protocol::show::{CAPABILITY, FROM_DRONE, Status};
+use dataflash::time::GpsTime;
 
 /// Texts kept per vehicle.
 pub const TEXTS: usize = 16;
@@ -44,8 +43,12 @@ impl std::fmt::Display for Version {
 /// Where a vehicle is and how it moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
-    /// Its place.
-    pub place: Geodetic,
+    /// Latitude, degrees, north positive.
+    pub lat_deg: f64,
+    /// Longitude, degrees, east positive.
+    pub lon_deg: f64,
+    /// Altitude above mean sea level, m.
+    pub amsl_m: f64,
     /// Above home, m.
     pub above_home_m: f64,
     /// Velocity north, east, up, m/s.
@@ -54,6 +57,13 @@ pub struct Position {
     pub heading_deg: Option<f64>,
     /// When it was measured, ms since the vehicle was switched on.
     pub boot_ms: u32,
+}
+
+impl Position {
+    /// Whether it is a place: without a fix the firmware sends zeros.
+    pub fn has_place(&self) -> bool {
+        self.lat_deg != 0.0 || self.lon_deg != 0.0
+    }
 }
 
 /// GPS receiver.
@@ -259,11 +269,9 @@ fn gap((earlier, later): (&u32, &u32)) -> u32 {
 fn position(at: &dialect::GLOBAL_POSITION_INT_DATA) -> Position {
     let mps = |cm: i16| f64::from(cm) / 100.0;
     Position {
-        place: Geodetic {
-            lat_deg: f64::from(at.lat) / 1e7,
-            lon_deg: f64::from(at.lon) / 1e7,
-            amsl_m: f64::from(at.alt) / 1000.0,
-        },
+        lat_deg: f64::from(at.lat) / 1e7,
+        lon_deg: f64::from(at.lon) / 1e7,
+        amsl_m: f64::from(at.alt) / 1000.0,
         above_home_m: f64::from(at.relative_alt) / 1000.0,
         neu_mps: [mps(at.vx), mps(at.vy), -mps(at.vz)],
         heading_deg: (at.hdg != u16::MAX).then(|| f64::from(at.hdg) / 100.0),

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::{LogProtocolError, list_message, says_armed};
-use crate::fleet::rtt::Rtt;
 use crate::link::clock::{MS, Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
+use crate::rtt::Rtt;
 
 /// Entries that may be late are waited for so long.
 const QUIET: Micros = 700 * MS;

@@ -2,13 +2,13 @@
 //!
 //! [`text`] writes a message out as people check it in a dry run: name, fields, units.
 
-use crate::base::plain::{plain, plain_string};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::link::station::AUTOPILOT;
 use crate::protocol::ftp::Packet;
 use crate::protocol::show::{SHOW_MODE, StartConfig, TO_DRONE};
 use dialect::{MavCmd, MavFrame, MavMissionResult, MavMissionType, PositionTargetTypemask};
+use untrusted_io::plain::{plain, plain_string};
 
 /// Flight mode GUIDED of ArduCopter.
 pub const GUIDED: u32 = 4;
@@ -336,7 +336,7 @@ fn command_name(command: MavCmd) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::plain::acts;
+    use untrusted_io::plain::acts;
 
     #[test]
     fn what_a_drone_says_is_text() {

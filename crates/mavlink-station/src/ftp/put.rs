@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::exchange::Wish;
 use super::{Caller, Exchange, FtpError, answer};
-use crate::base::crc::ap_crc32;
+use crate::crc::ap_crc32;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;

@@ -1,10 +1,10 @@
 //! What the vehicle's packets mean for a download: data, the end of a burst, refusals.
 
 use super::{BUSY_PAUSE, Burst, Get, MOST_LIES, PIECE, TELLING, USUAL_BURST};
-use crate::fleet::ftp::{FtpError, NUMBERS_PER_BURST};
-use crate::fleet::sink::Sink;
+use crate::ftp::{FtpError, NUMBERS_PER_BURST};
 use crate::link::clock::Micros;
 use crate::protocol::ftp::{Op, Packet, Refusal};
+use crate::sink::Sink;
 
 impl<S: Sink> Get<S> {
     pub(super) fn on_packet(&mut self, now: Micros, packet: &Packet) {

@@ -4,7 +4,7 @@ use std::io;
 
 use super::address::Address;
 use super::id::DroneId;
-use crate::base::file::FileError;
+use untrusted_io::file::FileError;
 
 /// A message that a gate has held back.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

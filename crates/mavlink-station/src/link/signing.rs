@@ -15,12 +15,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use mavlink::MAVLinkV2MessageRaw;
 use sha2::{Digest, Sha256};
 
+use super::frame::MAVLinkV2MessageRaw;
 use super::stamps::{Shelf, Stamps, Stream as StreamId};
-use crate::base::file::read_whole;
-use crate::base::plain::Shown as _;
+use untrusted_io::file::read_whole;
+use untrusted_io::plain::Shown as _;
 
 /// How far behind the newest of its stream a frame may be: 2 s in units of 10 us.
 const REORDER: u64 = 200_000;

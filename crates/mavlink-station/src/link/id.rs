@@ -3,14 +3,12 @@
 use std::fmt;
 use std::str::FromStr;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A vehicle on the air. A MAVLink system id is one byte, so that 255 vehicles fill a network;
 /// larger fleets are several networks, and only both together name a vehicle.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct DroneId {
     /// The network, counted from 0 in the order of `--connect`.
     pub network: u16,

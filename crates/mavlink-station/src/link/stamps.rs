@@ -13,8 +13,8 @@ use std::thread::JoinHandle;
 
 use serde::{Deserialize, Serialize};
 
-use crate::base::file::{FileError, read_whole, write_private};
-use crate::base::parse;
+use untrusted_io::file::{FileError, read_whole, write_private};
+use untrusted_io::parse;
 
 /// Format of the file.
 const SCHEMA: &str = "updraft.stamps/1";

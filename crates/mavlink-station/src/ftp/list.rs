@@ -2,11 +2,11 @@
 
 use super::exchange::Wish;
 use super::{Caller, Exchange, FtpError};
-use crate::base::plain::acts;
 use crate::link::clock::Micros;
 use crate::link::drive::{Machine, Step};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::{Op, Packet, Refusal};
+use untrusted_io::plain::acts;
 
 /// No folder has more names.
 const MOST_NAMES: usize = 20_000;

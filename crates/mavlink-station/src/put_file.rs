@@ -3,7 +3,7 @@
 use super::ftp::put::Put;
 use super::ftp::sum::Sum;
 use super::ftp::{Caller, FtpError};
-use crate::base::crc::ap_crc32;
+use crate::crc::ap_crc32;
 use crate::link::clock::{Micros, S};
 use crate::link::drive::{Machine, Progress, Step};
 use crate::link::frame::MavMessage;

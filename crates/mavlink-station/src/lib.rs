@@ -1,0 +1,23 @@
+#![doc = include_str!("../README.md")]
+
+pub mod abort;
+pub mod budget;
+pub mod clear;
+pub mod command;
+pub mod crc;
+pub mod fence;
+pub mod ftp;
+pub mod greet;
+pub mod intervals;
+pub mod link;
+pub mod load;
+pub mod log_protocol;
+pub mod messages;
+pub mod pace;
+pub mod params;
+pub mod protocol;
+pub mod put_file;
+pub mod rtt;
+pub mod sink;
+pub mod telemetry;
+pub mod vehicle_clock;
