@@ -1,4 +1,4 @@
-//! Effects against published figures and the physics note's numbers.
+//! Effects against published figures and the numbers of docs/physics.md.
 
 mod effects_support;
 

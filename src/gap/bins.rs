@@ -1,6 +1,6 @@
 //! Steady bins: stretches of constant commanded velocity, cut into pieces of about three seconds.
 //!
-//! Measured and simulated pulses are compared in these (physics note, section 3.2): long enough for
+//! Measured and simulated pulses are compared in these (docs/physics.md, 3.1): long enough for
 //! noise to average, short enough that the air's own time scale shows.
 
 use crate::mission::plan::{Kind, Segment};

@@ -408,7 +408,7 @@ const NODES: [(f64, f64); 7] = [
 ];
 
 /// Mean of the pulse in gusts less the pulse in their mean: known physics, computed and never named
-/// (physics note, section 2.4, number 17).
+/// (docs/physics.md, 2.5).
 fn rectified(
     scene: &Scene,
     vehicle: &Vehicle,

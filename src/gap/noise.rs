@@ -1,6 +1,6 @@
 //! What pulses do besides the model: the shared air, each drone's own air, offsets and scatter.
 //!
-//! The data model of the physics note, section 3.2: drone i in bin k of its group reads
+//! The data model (docs/physics.md, 3.2): drone i in bin k of its group reads
 //!
 //! ```text
 //! y = mean + a_i + b_i r_k + (S_k + s0) (W(t_k) + X_i(t_k) + g_i(t_k)) + H_k h(t_k) + e

@@ -52,7 +52,7 @@ fn comparison(plan: &Plan, vehicle: &Vehicle) -> Comparison {
     .unwrap()
 }
 
-/// A field day (physics note, section 4.4), as far as it is not the median of the priors.
+/// A field day (docs/physics.md, 4.1), as far as it is not the median of the priors.
 fn field_day() -> Hyper {
     let mut hyper = Hyper::default();
     for (place, value) in [(SHARED, 0.42), (SHARED_TIME, 100.0), (GUSTS, 0.28)] {

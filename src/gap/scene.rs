@@ -21,7 +21,7 @@ pub(super) const IDLE_US: f64 = 1000.0;
 
 /// Steady signals of a comparison: what was flown and what the logs say of wind and battery. None of
 /// them follows the pulse: terminal voltage, current and measured acceleration do and are never used
-/// (endogenous regressors, physics note, section 3.2).
+/// (endogenous regressors; docs/physics.md, 3.1).
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// By group and bin.

@@ -317,7 +317,7 @@ pub(super) struct Thresholds {
     pub generic: f64,
 }
 
-/// The least threshold, nats: z = 4 against a single alternative (physics note, section 3.3).
+/// The least threshold, nats: z = 4 against a single alternative (docs/physics.md, 3.3).
 pub(super) const FLOOR_NATS: f64 = 8.0;
 /// The same for free shapes, of which there are dozens.
 pub(super) const FREE_FLOOR_NATS: f64 = 14.0;

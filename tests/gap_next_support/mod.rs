@@ -6,7 +6,7 @@ use updraft::gap::verdict::{Finding, Fitted, Interval, Noise, Step, VERDICT_SCHE
 /// Share of the inflow that the verdicts found: some 20 us/(m/s) on AirSim's quad.
 pub(crate) const INFLOW: f64 = 0.4;
 
-/// A field day's noise (physics note, section 4.4).
+/// A field day's noise (docs/physics.md, 4.1).
 fn noise() -> Noise {
     Noise {
         shared_air_mps: 0.42,

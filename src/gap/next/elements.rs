@@ -1,6 +1,6 @@
 //! What a flight can be made of, and its template.
 //!
-//! Each element breaks a confounding that the paper's ladder has (physics note, section 4.5).
+//! Each element breaks a confounding that the paper's ladder has (docs/physics.md, 4.3).
 
 use std::fmt::Write as _;
 

@@ -133,7 +133,7 @@ mod tests {
             let formula = mean_signed_square(velocity, sigma);
             assert!((formula - mean).abs() < 4.0 * error, "{velocity}: {formula}, {mean}");
         }
-        // Physics note: slope 1.6 A s at hover, A s² far out.
+        // docs/physics.md, 2.5: slope 1.6 A s at hover, A s² far out.
         let slope = mean_signed_square(1e-4, 0.5) / 1e-4;
         assert!((slope - 2.0 * 0.5 * FRAC_2_PI.sqrt()).abs() < 1e-3, "{slope}");
         assert!((mean_signed_square(3.5, 0.5) - 12.25 - 0.25).abs() < 1e-6);
