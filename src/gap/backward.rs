@@ -23,7 +23,9 @@ fn taken_back(vehicle: &Vehicle, effect: &str, original: &Vehicle) -> Vehicle {
     mean_drone(&vehicle)
 }
 
-/// An effect whose trace has a smaller Fisher z is taken back.
+/// An effect whose trace has a Fisher z below this is removed again. Three standard errors by convention;
+/// below the z = 4 of naming (docs/physics.md, 3.3), so that chance does not remove what was just named. Not
+/// measured.
 const KEPT_Z: f64 = 3.0;
 
 impl Found {

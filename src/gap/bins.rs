@@ -5,13 +5,17 @@
 
 use crate::mission::plan::{Kind, Segment};
 
-/// Nothing is compared for so long after a change of the command, s.
+/// Nothing is compared for this long after a change of the command, s. The overshoot of the autopilot's
+/// integral term lasts 2 to 3 s after a step of 3.5 m/s (docs/physics.md, 5.1); the rest is margin, chosen.
 const SETTLE_S: f64 = 5.0;
-/// The same for hovers, which are short, s.
+/// The settling time in hovers, s: shorter than [`SETTLE_S`], because the paper's hovers last only 10 s and
+/// would otherwise leave a single bin. Chosen.
 const SETTLE_HOVER_S: f64 = 4.0;
-/// Cut at the end, s.
+/// Cut at the end of a stretch, s: clocks and commands agree to some tenths of a second. Chosen; the paper
+/// cuts 1 s.
 const TRIM_S: f64 = 0.5;
-/// Shortest bin, s; bins are shorter than twice this.
+/// Shortest bin, s; bins are shorter than twice this. Bins of about 3 s keep gusts (8 s) resolved and leave
+/// each bin some 25 samples at 10 Hz. Chosen, not measured: the noise model takes care of what bins share.
 const SHORTEST_S: f64 = 2.5;
 
 /// One bin of a command group.

@@ -11,7 +11,9 @@ use crate::effects::{EffectError, LIBRARY, Sought};
 use crate::sim::plant::drag::Drag;
 use crate::vehicle::{RotorLaw, Vehicle};
 
-/// Change of a size that is in the model already, for its derivative.
+/// Relative change of a size that is in the model already, for its derivative. Chosen: small against the
+/// sizes that matter, large against the rounding of the closed forms. The sizes themselves come from a later
+/// fit.
 const CHANGE: f64 = 0.15;
 
 /// Something that may be missing.
@@ -129,7 +131,8 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
     Ok(found)
 }
 
-/// Share of the response that a form must change for scatter to show it.
+/// Share of the response that a form must change before the scatter between drones is asked about it.
+/// Chosen, not measured: a smaller change is lost in the estimate of the gusts.
 const FELT: f64 = 0.1;
 
 /// Whether what a form adds to the response is too little for scatter to show it.
@@ -140,7 +143,8 @@ fn is_hardly_felt(felt: &[Vec<Response>], response: &[Vec<Response>]) -> bool {
     sum(felt) < FELT * sum(response)
 }
 
-/// Where responses are compared besides the flown speed: some are flat in hover, m/s.
+/// Speed at which responses are compared besides the flown one, because some are flat in hover, m/s: the
+/// strength of a field day's gusts (docs/physics.md, 4.1).
 const FELT_AT_MPS: f64 = 0.5;
 
 /// Whether a vehicle that lacks an effect can have it with a size. Thrust that grows slower than the pulse is
@@ -155,9 +159,11 @@ fn sizes_usual(name: &str, vehicle: &Vehicle, default: fn(&Vehicle) -> f64) -> f
     if name == "thrust-curve" { 0.5 } else { default(vehicle) }
 }
 
-/// Nominal voltage of a cell, V.
+/// Voltage of a lithium polymer cell at which a vehicle's hover is stated, V: the middle of its plateau.
+/// With another reference the sizes of `battery` came out a tenth low.
 const NOMINAL_V: f64 = 3.85;
-/// A voltage per cell that is so far from it is of another number of cells, V.
+/// A voltage per cell this far from [`NOMINAL_V`] belongs to another number of cells, V: full and empty
+/// cells are within 0.35 V (4.2 and 3.5 V). Convention.
 const OTHER_V: f64 = 0.4;
 
 /// Sets what the logs say of an effect that is to be tried.
@@ -202,12 +208,14 @@ fn sides_of(vehicle: &Vehicle) -> f64 {
     if factor.z > 0.0 && sides > 0.0 { sides / factor.z } else { USUAL_SIDES }
 }
 
-/// The same where nothing is known.
+/// Horizontal over vertical area of a body's drag where the airframe states none. Chosen; the
+/// `parasitic-drag` of the library has the same ratio by default.
 const USUAL_SIDES: f64 = 0.5;
 
-/// The drag of the rotors: effect and size.
+/// Effect and parameter of the rotors' drag (docs/physics.md, 2.6).
 pub(super) const DRAG: (&str, &str) = ("blade-flapping", "drag_per_weight");
-/// Drag of the rotors that is tried where no horizontal leg tells it, s/m.
+/// Drag of the rotors that is tried where no horizontal leg reveals it, s/m: 0.6 to 2 degrees of lean per
+/// m/s, around the 1.0 to 1.5 of small rotors (docs/physics.md, 2.6).
 const DRAGS: [f64; 3] = [0.01, 0.02, 0.035];
 
 /// Rotors that drag, seen through the wind: where the flight has no horizontal legs the wind is read
@@ -237,8 +245,10 @@ pub(super) fn read_otherwise(
     Ok(Some(Candidate { name: effect, was_there: false, size: Some(size), variants }))
 }
 
-/// Sizes that are tried for the drag that fits best, and their step, s/m.
+/// Step between the sizes tried for the drag that fits best, s/m: an eighth of a usual size; the top is then
+/// found by a parabola. Chosen.
 const DRAG_STEP: f64 = 0.0025;
+/// Most of these steps, up to 0.06 s/m: three times the drag of small rotors. Chosen.
 const MOST_DRAG_STEPS: u32 = 24;
 
 /// The drag of the rotors that fits best by the wind that it lets the lean say, with its standard

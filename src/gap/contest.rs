@@ -16,13 +16,16 @@ use super::response::{Response, gusts_mps, settled};
 use super::search::{FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought};
 use crate::vehicle::Vehicle;
 
-/// A product of climb and time is held against so many effects at most, and those that gain at least so much as regressors, nats.
+/// A product of climb and time is compared with at most this many effects. Chosen to bound the time.
 const MOST: usize = 5;
+/// Effects that gain less than this as regressors are not compared with the product, nats: half the
+/// threshold of naming ([`super::search::FLOOR_NATS`]). Chosen.
 const LEAST_NATS: f64 = 4.0;
-/// By how much a product of climb and time must explain more than an effect, nats: it brings a line along,
-/// and a line is much of what any effect of the climb is.
+/// By how much a product of climb and time must explain more than an effect, nats: it contains a line, and a
+/// line is much of what any effect of the climb is (docs/physics.md, 3.5). The rule came after blind flights
+/// in which such responses were taken for drag (4 of 10 wrong names); the value is chosen, not measured.
 const PRODUCT_NATS: f64 = 13.0;
-/// Rounds in which a rival's gusts settle.
+/// Rounds in which a rival's gusts settle. Chosen for time.
 const ROUNDS: usize = 2;
 
 /// The vehicle with a candidate at its fitted size; `None`: it is a motion of the air.

@@ -9,11 +9,13 @@ use crate::flight::Flight;
 use crate::flight::table::Steps;
 use crate::mission::plan::{Plan, Slot};
 
-/// A bin is kept when this share of the drones has it.
+/// A bin is kept when this share of the drones has it. Chosen: a missing bin is imputed, and imputed values
+/// must stay few.
 const BIN_SHARE: f64 = 0.8;
-/// A drone is kept when it has this share of the kept bins; the others are filled.
+/// A drone is kept when it has this share of the kept bins; the others are imputed. Chosen as [`BIN_SHARE`].
 const DRONE_SHARE: f64 = 0.9;
-/// Drones stand next to each other within this many grid spacings.
+/// Drones are neighbours within this many grid spacings: includes the diagonal (1.41), excludes the next but
+/// one (2). Geometry.
 const NEXT_SPACINGS: f64 = 1.5;
 
 /// One drone's log, and who flew it.
@@ -338,11 +340,13 @@ impl Data {
     }
 }
 
-/// Fewest drones of which some are held out, and fewest of each group.
+/// Fewest drones of a fleet of which some are held out: a quarter of eight is two. Convention.
 const FEWEST_TO_HOLD: usize = 8;
+/// Fewest drones of a group of which some are held out: a quarter of four is one. Convention.
 const FEWEST_IN_GROUP: usize = 4;
 
-/// A pulse that moves less than this is a constant, us.
+/// A pulse that moves less than this is a constant, us: a hundredth of the usual noise of a bin (2 us).
+/// Chosen.
 const CONSTANT_US: f64 = 0.02;
 
 /// The constant, if a drone's motors always had the same pulse; what was taken off for its lean is put

@@ -10,11 +10,12 @@ use super::search::FLOOR_NATS;
 use super::verdict::Detectable;
 use crate::effects::{LIBRARY, Sought};
 
-/// Fisher z from which an effect is found nearly always.
+/// Fisher z from which an effect counts as found nearly always: Phi(5 - 4) = 84 % (docs/physics.md, 3.3).
 const SEEN_Z: f64 = 5.0;
-/// Correlation from which two effects leave the same trace.
+/// Correlation from which two effects are listed as leaving the same trace. Chosen.
 const SAME: f64 = 0.9;
-/// A trace this small says nothing, us per usual size.
+/// A trace this small is not excited by the flight, us at the usual size: a fiftieth of the pulse that is
+/// material. Chosen.
 const NOTHING_US: f64 = 0.05;
 
 /// The table for everything in the library, with the final model and noise.

@@ -15,9 +15,10 @@ use crate::effects::{Model, Reference, Signals};
 use crate::vehicle::Vehicle;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-/// Fewest drones from which a correlation is told.
+/// Fewest drones from which a correlation is stated: its standard error is then 0.35. Chosen.
 const FEWEST: usize = 8;
-/// Spread of the hover pulse that is usual, us (the paper's Table II: 6.7).
+/// Spread of the hover pulse above which it is called unusual, us: three times that of the paper's fleet
+/// (6.7 us, Table II).
 const USUAL_US: f64 = 20.0;
 
 /// Offsets and responses of all drones of a comparison against the fleet's model; and, when they
@@ -89,9 +90,11 @@ impl Blup {
     }
 }
 
-/// Spread of thrust or mass between the drones of a usual fleet, relative (the paper's Table II).
+/// Spread of thrust or mass between the drones of a usual fleet, relative: 6.7 us of the paper's Table II
+/// over a sensitivity of 300 us (docs/physics.md, 3.9).
 const USUAL: f64 = 0.023;
-/// Spreads are told from at least so many drones.
+/// Spreads are judged from at least this many drones: the 95 % interval of a standard deviation is then 0.7
+/// to 1.7 times its value. Chosen.
 const FEWEST_FOR_SPREAD: usize = 12;
 
 /// A spread between drones beyond the model's and the usual.
@@ -183,11 +186,12 @@ fn spread(
     })
 }
 
-/// A kind of spread that is this many standard errors off is excluded.
+/// A kind of spread that is this many standard errors off is excluded. Convention.
 const EXCLUDED_Z: f64 = 3.0;
-/// What a drone's response says of its rotors is not exact: rotors differ in their inflow, too.
+/// Standard error of how a drone's response follows its offset, besides noise: rotors differ in their
+/// inflow, too, by 5 to 7 % in the benchmark. Chosen above that.
 const FOLLOWS_DOUBT: f64 = 0.1;
-/// A little more.
+/// A relative change of one per cent, for a derivative.
 const LITTLE: f64 = 1.01;
 
 /// By how much a drone's response to climb differs, as a share, over how much its hover pulse does,
@@ -210,7 +214,7 @@ fn response_follows(vehicle: &Vehicle, change: fn(&mut Vehicle)) -> f64 {
     if follows.is_finite() { follows } else { 0.0 }
 }
 
-/// Half a squared z of 1.96.
+/// Threshold for a spread, nats: half a squared z of 1.96, an interval of 95 %.
 const SPREAD_NATS: f64 = 1.92;
 
 fn correlation(each: &[DroneOffset]) -> f64 {

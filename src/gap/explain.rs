@@ -36,7 +36,10 @@ impl Default for Options {
     }
 }
 
-/// Effects smaller than this are not named in the field, us: 0.1 m/s.
+/// Effects smaller than this are not named in the field, us: 0.1 m/s at the 25 us/(m/s) of a show drone
+/// (docs/physics.md, 3.3). In Monte-Carlo flights warming motors and density were missed mainly because of
+/// it; with less noise than in the field, closed forms that are some microseconds off could be named below
+/// it.
 const MATERIAL_US: f64 = 2.5;
 
 /// Smallest effect that is named, us: where air and noise are much smaller than in the field (a single
@@ -303,7 +306,8 @@ fn lean_parameter(drag: f64, se: f64) -> Fitted {
     }
 }
 
-/// What a lean says of the rotors' drag depends on the body's, which is known to some tenths, s/m.
+/// Standard error of the rotors' drag from a lean, because it depends on the body's drag, which is known to
+/// some tenths, s/m: a quarter of a usual size. Chosen.
 const LEAN_DOUBT: f64 = 0.005;
 
 /// A signal with its label.
@@ -408,14 +412,16 @@ impl Found {
     }
 }
 
-/// A free shape after which a flight is so much less likely is taken back, nats. (With an effect the model is
-/// flown anew, and is another.)
+/// A free shape after which a flight is less likely by this much is taken back, nats. (With an effect the
+/// model is flown again, and is another model.) Chosen, not measured.
 const WORSE_NATS: f64 = 2.0;
-/// Joint fits after each finding, at most.
+/// Joint fits after each finding, at most. Chosen for time; they end earlier by [`SAME_GUSTS_MPS`].
 const REFITS: usize = 4;
-/// Gusts this near to those of the fit before change nothing, m/s.
+/// Gusts this near to those of the previous fit change nothing, m/s: 0.1 us on a curve of 8 us/(m/s)², in
+/// gusts of 0.4 m/s (docs/physics.md, 2.5).
 const SAME_GUSTS_MPS: f64 = 0.02;
-/// Stronger gusts are not believed while the model still lacks its response to them, m/s.
+/// Stronger gusts are not believed while the model still lacks its response to them, m/s: three times those
+/// of a field day (docs/physics.md, 4.1). Chosen.
 pub(super) const MOST_GUSTS_MPS: f64 = 1.5;
 
 #[cfg(test)]

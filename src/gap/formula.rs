@@ -2,7 +2,7 @@
 
 use super::verdict::Shape;
 
-/// A formula must describe this share of the shape's variance.
+/// A formula must describe this share of the shape's variance. Chosen.
 const ENOUGH: f64 = 0.95;
 
 /// A formula in plain text, for example `-12.3 sin(2 pi h / 31 m + 0.4) us`.

@@ -24,19 +24,21 @@ pub(super) struct Generic {
     pub penalty: f64,
 }
 
-/// Wavelengths of height that are tried, m.
+/// Wavelengths of height that are tried, m: a factor of sqrt 2 apart, from the height of a leg to the whole
+/// ladder.
 const WAVES_M: [f64; 7] = [10.0, 15.0, 20.0, 28.0, 40.0, 56.0, 80.0];
-/// Air speed from which a direction alone may count, m/s.
+/// Air speed from which a direction alone may count, m/s. Chosen.
 const KNEE_MPS: f64 = 1.5;
-/// How the effect of a direction depends on the air speed, m/s: it grows with it, or hardly any more
-/// above the knee.
+/// How the effect of a direction depends on the air speed, m/s: it grows with it, or hardly any more above
+/// the knee. The two limits of what a body may do; the second is paid for in the penalty.
 const GROWTHS: [fn(f64) -> f64; 2] =
     [|speed_mps| speed_mps, |speed_mps| KNEE_MPS * speed_mps / speed_mps.hypot(KNEE_MPS)];
-/// Instants at which a step is tried.
+/// Instants at which a step is tried: every ten seconds of a ladder. 15 at first; the finer grid costs a
+/// logarithm of their ratio in the penalty, 1.1 nats.
 const STEPS: usize = 47;
-/// Step of the slope by vertical air speed, m/s.
+/// Step of the derivative by vertical air speed, m/s. Numerical.
 const SLOPE_STEP: f64 = 0.01;
-/// A signal that moves less than this share of its scale says nothing.
+/// A signal that moves less than this share of its scale says nothing. Chosen.
 const LEAST_SPAN: f64 = 0.05;
 
 /// All free shapes that the flight can show.
@@ -232,7 +234,7 @@ impl Generic {
     }
 }
 
-/// Points of a drawn shape.
+/// Points of a drawn shape. For drawing only.
 const POINTS: usize = 40;
 
 /// A curve through points: means in up to forty places.

@@ -17,9 +17,10 @@ use crate::base::rng::{Purpose, stream};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
-/// Draws of the bootstrap.
+/// Draws of the bootstrap, usual for intervals of 95 %.
 const DRAWS: usize = 1000;
-/// Simulated flights for the floor.
+/// Simulated flights for the floor. Chosen for time; that the floor is an estimate is why a share of the gap
+/// can be above 100 %.
 const FLOORS: usize = 40;
 
 /// What the shrink is made from: residuals before and after, by group, drone and bin, of which the

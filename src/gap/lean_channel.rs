@@ -8,11 +8,13 @@ use super::verdict::{Finding, Fitted, Interval, Step, WindFound};
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::select::value_of;
 
-/// Half of a 95 % interval in standard errors.
+/// Half of a 95 % interval in standard errors, rounded up from 1.96.
 const HALF: f64 = 2.0;
-/// A lean that differs from the model's by less is not named, rad/(m/s): a tenth of a degree at 1 m/s.
+/// A lean that differs from the model's by less is not named, rad/(m/s): 0.17 degrees per m/s, a tenth of
+/// what small rotors have (docs/physics.md, 2.6). Chosen.
 const MATERIAL: f64 = 0.003;
-/// Standard errors from which a difference is named.
+/// Standard errors from which a difference is named: those of [`super::detectable`], at which an effect is
+/// found nearly always. Chosen.
 const NAMED_Z: f64 = 5.0;
 
 /// Wind and lean of a comparison with the model that was planned with.

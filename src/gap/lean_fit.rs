@@ -8,31 +8,42 @@ use super::filter::{Filter, Observation, State};
 use super::lean::LeanLaw;
 use super::minimise::minimise;
 
-/// How far the model's own law is doubted: its quadratic part (a share), its linear part, rad/(m/s).
+/// Prior standard deviation of the quadratic part of the model's own lean law, as a share. 0.4 was tried and
+/// taken back when the wind got an uncertainty of its own in the search.
 const SQUARE_DOUBT: f64 = 0.15;
+/// Prior standard deviation of the linear part, rad/(m/s): covers rotors without drag and those of the usual
+/// 1.0 to 1.5 degrees per m/s (docs/physics.md, 2.6). 0.01 before gusts were fitted with the law; chosen.
 const LINEAR_DOUBT: f64 = 0.03;
-/// Linear parts of small rotors, rad/(m/s).
+/// Linear parts from which the search starts besides the model's, rad/(m/s): small rotors have 0.6 to 1.7
+/// degrees per m/s. The fit has several minima.
 const USUAL_LINEAR: [f64; 2] = [0.01, 0.03];
-/// Gusts: usual size, m/s, with its doubt as a factor, and their time scale, s.
+/// Prior median of the gusts, m/s: 15 % of 1 to 6 m/s of wind are 0.15 to 0.9.
 const GUST_MPS: f64 = 0.5;
+/// Prior standard deviation of the gusts, as a factor. Chosen wide.
 const GUST_FACTOR: f64 = 2.5;
+/// Time scale of the gusts, s, as in the benchmark. Not fitted; bins of 3 s hardly show it.
 const GUST_S: f64 = 25.0;
-/// Scatter of a group's mean lean in a bin, rad, with its doubt as a factor.
+/// Prior median of the scatter of a group's mean lean in a bin, rad: a tenth of a degree, what attitudes of
+/// the firmware are off by (docs/firmware.md).
 const SCATTER_RAD: f64 = 0.002;
+/// Prior standard deviation of the scatter, as a factor. Chosen.
 const SCATTER_FACTOR: f64 = 2.0;
 /// What the lean still lacks of its steady value on legs that are too short to settle, beyond what the
-/// simulator lacks there, rad.
+/// simulator lacks there, rad: a quarter of a degree. Chosen.
 const UNSETTLED_RAD: f64 = 0.004;
-/// A law whose linear part is negative costs one nat per so much, rad/(m/s): a lean never goes against the
-/// wind.
+/// A law whose linear part is negative costs one nat for this much and four for twice as much, rad/(m/s): a
+/// lean never goes against the wind. A wall; its steepness does not matter.
 const NEGATIVE: f64 = 1e-4;
-/// The search moves in numbers near 1: mean wind (two), the law's linear and quadratic parts, and the
-/// logarithms of gusts and scatter.
+/// Variables of the search, in numbers near 1: mean wind (two), the law's linear and quadratic parts, and
+/// the logarithms of gusts and scatter.
 const COUNT: usize = 6;
+/// What one unit of each variable is. Numerical.
 const UNITS: [f64; COUNT] = [1.0, 1.0, 0.01, 0.001, 1.0, 1.0];
+/// Place of the law's linear part.
 const LINEAR: usize = 2;
+/// Place of its quadratic part.
 const SQUARE: usize = 3;
-/// Step of the second differences, in units.
+/// Step of the second differences, in units. Numerical.
 const STEP: f64 = 0.02;
 
 /// The mean lean of a group in one bin.

@@ -35,11 +35,11 @@ pub struct Measured<'a> {
     pub truth: &'a BTreeMap<u16, TruthSeries>,
 }
 
-/// Half of the running mean that estimates and truth are compared in, s.
+/// Half of the running mean in which estimates and truth are compared, s: the paper's 10 s.
 const HALF_S: f64 = 5.0;
-/// Vertical air that is looked for, m/s.
+/// Vertical air is looked for up to this speed, m/s: beyond any thermal at show heights. Convention.
 const FASTEST_MPS: f64 = 10.0;
-/// Halvings of that.
+/// Halvings of that interval: down to rounding.
 const HALVINGS: usize = 40;
 
 /// The error of the map before and after what was found; `None`: no drone has both flights and a

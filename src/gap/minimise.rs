@@ -1,11 +1,12 @@
 //! A quasi-Newton search for smooth functions of a few variables without derivatives at hand.
 
-/// Step of the difference quotients; variables are logarithms.
+/// Step of the difference quotients; variables are logarithms. Numerical.
 const STEP: f64 = 1e-4;
-/// The search ends when a step gains less.
+/// The search ends when a step gains less, nats. Numerical: a four-thousandth of the threshold.
 const ENOUGH: f64 = 2e-3;
+/// Steps at most. Numerical; searches end earlier by [`ENOUGH`].
 const MOST_STEPS: usize = 40;
-/// Longest step of any variable.
+/// Longest step of any variable: a factor of e. Numerical.
 const LONGEST: f64 = 1.0;
 
 /// Where a function is least, from a start, and its value there. BFGS with a backtracking line

@@ -21,34 +21,37 @@ pub struct Hyper(pub [f64; COUNT]);
 
 /// Number of parameters.
 pub(super) const COUNT: usize = 11;
-/// Places in [`Hyper`].
+/// Place in [`Hyper`]: updraft that all drones share, m/s.
 pub(super) const SHARED: usize = 0;
-/// Time scale of the shared air.
+/// Place: time scale of the shared air and of the slow own air, s.
 pub(super) const SHARED_TIME: usize = 1;
-/// Slow own air.
+/// Place: slow updraft at one drone, m/s.
 pub(super) const OWN: usize = 2;
-/// Gusts.
+/// Place: gusts at one drone, m/s.
 pub(super) const GUSTS: usize = 3;
-/// Time scale of gusts.
+/// Place: time scale of gusts, s.
 pub(super) const GUST_TIME: usize = 4;
-/// White noise of a bin, us.
+/// Place: white noise of a bin, us.
 pub(super) const WHITE: usize = 5;
-/// Spread of hover pulses, us.
+/// Place: spread of hover pulses, us.
 pub(super) const OFFSETS: usize = 6;
-/// Relative spread of responses.
+/// Place: relative spread of responses.
 pub(super) const SLOPES: usize = 7;
-/// Least response to vertical air speed, us/(m/s).
+/// Place: floor under the response to vertical air speed, us/(m/s).
 pub(super) const LEAST: usize = 8;
-/// How the shared updraft changes with height, m/s per 50 m.
+/// Place: change of the shared updraft with height, m/s per 50 m.
 pub(super) const GRADIENT: usize = 9;
-/// Horizontal gusts beyond those that the leans show, each axis, m/s.
+/// Place: horizontal gusts beyond those that the leans show, each axis, m/s.
 pub(super) const SIDE_GUSTS: usize = 10;
-/// Their time scale, s: gusts of the size of a fleet that drift over it.
+/// Time scale of [`SIDE_GUSTS`], s: gusts of the size of a fleet that drift over it; the benchmark's have
+/// the same. Not fitted.
 const SIDE_GUSTS_S: f64 = 25.0;
 
-/// Prior of each parameter: median, and a standard deviation as a factor. Wide: they keep the search
-/// where weather and drones can be, and decide only what the flight does not say (a record of a few
-/// time scales hardly tells the time scale).
+/// Prior of each parameter (docs/physics.md, 3.2): median, and a standard deviation as a factor. Wide: they
+/// keep the search where weather and drones can be, and decide only what the flight cannot say (a record of
+/// a few time scales hardly determines the time scale). Medians lie between calm and field air; 10 us and 5
+/// % are near the spread of the paper's Table II. Chosen, not measured; the benchmark draws shared updrafts
+/// of 0.1 to 0.42 m/s over 40 to 186 s.
 const PRIOR: [(f64, f64); COUNT] = [
     (0.3, 2.5),
     (60.0, 2.0),
@@ -63,10 +66,13 @@ const PRIOR: [(f64, f64); COUNT] = [
     (0.3, 2.0),
 ];
 
-/// What is of the air, how far above its prior's median it may be, in its standard deviations, and by how
-/// much steeper the prior is beyond.
+/// The parameters that are of the air: their prior ends in a wall, beyond [`STORM`].
 const OF_THE_AIR: [usize; 7] = [SHARED, SHARED_TIME, OWN, GUSTS, LEAST, GRADIENT, SIDE_GUSTS];
+/// How far above its prior's median the air may be, in prior standard deviations, before the wall: a shared
+/// updraft of 3 m/s. Introduced because what is no air at all was taken for a storm that wanders for hours;
+/// the value is chosen.
 const STORM: f64 = 2.5;
+/// By how much steeper the prior is beyond [`STORM`]. Chosen.
 const WALL: f64 = 3.0;
 
 impl Default for Hyper {
@@ -132,13 +138,18 @@ pub(super) struct Whitener {
     pub log_det: f64,
 }
 
+/// States of the filter of the means: shared air, its gradient, the bend, two side gusts, the bend's
+/// wandering, the curvature in height.
 const SHARED_STATES: usize = 7;
+/// States of a drone: slow air, gusts, offset, response.
 const OWN_STATES: usize = 4;
 /// How the gradient itself changes over [`ALOFT_M`], as a share of it: an eddy of 150 m is not straight over
-/// the height of a ladder.
+/// the height of a ladder. Chosen, near the ratio of the two lengths.
 const CURVED: f64 = 0.3;
-/// Heights are taken from here, m, in units of [`ALOFT_M`].
+/// Heights are taken from here, m, in units of [`ALOFT_M`]. Convention: another origin moves variance
+/// between the shared air and its gradient only.
 const MIDDLE_M: f64 = 45.0;
+/// Unit of height of the gradient, m. Convention; the prior of [`GRADIENT`] goes with it.
 const ALOFT_M: f64 = 50.0;
 
 impl GroupPattern {

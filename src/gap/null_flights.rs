@@ -21,8 +21,9 @@ use crate::mission::Plan;
 use crate::mission::resolve::{Override, resolve};
 use crate::vehicle::{Vehicle, library::builtin};
 
+/// Flights with nothing to find: enough to see 97 % against some per cent.
 const FLIGHTS: u64 = 20;
-/// Chance of naming anything that the F test is held to, all effects together.
+/// Chance of naming anything that the F test is held to, all effects together (docs/physics.md, 3.2).
 const ALPHA: f64 = 0.01;
 /// Mean wind, show frame, m/s.
 const WIND_MPS: [f64; 2] = [3.0, 0.0];
@@ -143,7 +144,7 @@ fn independent_errors_name_something_on_most_null_flights_and_the_search_on_hard
     assert!(by_search.len() <= 1, "the search named {by_search:?}");
 }
 
-/// Flights with inflow.
+/// Flights with inflow. Chosen for time.
 const FEW: u64 = 8;
 
 /// Gain of the rotors' inflow over the best other effect on each flight, nats.

@@ -14,18 +14,22 @@ use crate::effects::select::value_of;
 use crate::effects::{Definition, Sought, find};
 use crate::vehicle::Vehicle;
 
-/// Rounds of Gauss-Newton; the forms are nearly linear in their sizes.
+/// Rounds of Gauss-Newton; the forms are nearly linear in their sizes, and a fit ends when no size moves by
+/// a twentieth of its error. Numerical.
 const ROUNDS: usize = 8;
-/// Step of the derivatives, share of a parameter's value or of its usual step.
+/// Step of the derivatives, share of a parameter's value or of its usual step. Numerical.
 const STEP: f64 = 0.02;
-/// A second parameter (the form) is fitted when its own z is at least this.
+/// A second parameter (the form) is fitted when its own z over the range that is tried is at least this: the
+/// z of the threshold (docs/physics.md, 3.3).
 const FORM_Z: f64 = 4.0;
-/// Share of a change that its form is not known by: what closed forms, curves of charge and mean drones leave
-/// out, whatever the noise (standard deviation over blind flights of high z).
+/// Share of a change that its form is not known by: what closed forms, curves of charge and mean drones
+/// leave out, whatever the noise. Measured: standard deviation over blind flights of high z.
 const FORM_SHARE: f64 = 0.03;
-/// Least factor of a 95 % interval.
+/// Least factor of a 95 % interval: Student's with 18 degrees of freedom; longer flights are not believed to
+/// know their air better. Chosen.
 const INTERVAL: f64 = 2.1;
-/// Fewest time scales that a noise is believed to be estimated from.
+/// Fewest time scales that a noise is believed to be estimated from: Student's factor is 3.2 there. Below it
+/// intervals would be arbitrary.
 const FEWEST_SCALES: f64 = 3.0;
 
 /// One fitted parameter of the model.

@@ -11,6 +11,7 @@ use crate::sim::recorder::{Moment, Recorder, STEPS_10_HZ};
 use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly_with};
 use crate::vehicle::Vehicle;
 
+/// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
 
 /// The fleet's mean drone: what makes drones differ is off.

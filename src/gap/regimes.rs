@@ -10,9 +10,9 @@ use super::noise::Whitener;
 use super::verdict::Regime;
 use crate::base::rng::{Purpose, stream};
 
-/// Classes of a continuous regime.
+/// Classes of a continuous regime. For drawing only.
 const CLASSES: usize = 8;
-/// Simulated flights for the standard errors.
+/// Simulated flights for the standard errors: known to 9 %. Chosen for time.
 const DRAWS: usize = 60;
 
 /// The class of a group's drone in a bin: label and place on the axis.

@@ -4,10 +4,13 @@
 use super::gls::{Likelihood, Problem, Solution};
 use super::noise::{GRADIENT, GUSTS, GroupPattern, Hyper, OWN, SHARED};
 
-/// Shifts of the vertical speed that a response is computed for, m/s: so many steps to either side.
+/// Shifts of the vertical speed that a response is computed for: this many steps to either side, to 1 m/s.
+/// Beyond that the last slope is taken.
 const STEPS: usize = 4;
-/// One of them, m/s: as strong as gusts are that a drone does not share.
+/// One step, m/s: as strong as the gusts of a drone on a field day (docs/physics.md, 4.1). The response is
+/// linear between.
 const STEP_MPS: f64 = 0.25;
+/// Values of a response.
 const COUNT: usize = 2 * STEPS + 1;
 
 /// Change of the pulse per vertical speed, us/(m/s), at speeds around the flown one.
@@ -56,8 +59,9 @@ impl Response {
     }
 }
 
-/// Stronger gusts are not reckoned with: what a model lacks looks like gusts, and with gusts strong enough
-/// any curve would look like what it lacks.
+/// Stronger gusts are not reckoned with, m/s: what a model lacks looks like gusts, and with gusts strong
+/// enough any curve would look like what it lacks. About what the benchmark's strongest air has in all;
+/// chosen.
 const MOST_GUSTS_MPS: f64 = 0.5;
 
 /// Adds a multiple of responses to others, by group and bin.
@@ -109,12 +113,13 @@ pub(super) fn settled(
     best
 }
 
-/// Rounds in which that settles, at most, and a change of the log-posterior that is none, nats.
+/// Rounds in which the speed relative to the shared air settles, at most. Chosen for time.
 const SETTLED: usize = 4;
+/// A change of the log-posterior that is none, nats: small against the margins of naming. Chosen.
 const SAME_NATS: f64 = 0.3;
 
-/// The air that all drones share is believed up to so many times what each has for itself: what the model
-/// lacks is shared, too.
+/// The air that all drones share is believed up to this many times what each has for itself: what the model
+/// lacks is shared, too. Field days have 1.5 (docs/physics.md, 4.1); chosen above that.
 const MOST_SHARED: f64 = 2.5;
 
 /// Standard deviation of the vertical air that a noise says a drone meets, m/s.

@@ -11,12 +11,12 @@ use crate::effects::battery::charge_of_cell;
 use crate::effects::{EffectError, Model, Reference, Signals, find, select};
 use crate::vehicle::Vehicle;
 
-/// Open-circuit voltage above which there must be another cell, V.
+/// Open-circuit voltage above which there must be another cell, V: a full lithium polymer cell has 4.20 V.
 const FULL_CELL_V: f64 = 4.25;
 
-/// Bins that tell what a battery started with.
+/// Bins that show what charge a battery started with: the first minute or so. Chosen.
 const EARLY_BINS: usize = 12;
-/// Pulse without thrust, us.
+/// Pulse without thrust, us: the convention of all controllers (docs/physics.md, 1.1).
 pub(super) const IDLE_US: f64 = 1000.0;
 
 /// Steady signals of a comparison: what was flown and what the logs say of wind and battery. None of

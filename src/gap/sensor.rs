@@ -6,23 +6,27 @@ use super::verdict::{Interval, SensorChannel};
 use crate::flight::{Flight, Series};
 use crate::mission::plan::Segment;
 
-/// A bias beyond this is named, m/s (0.5 us of pulse per 0.02 m/s on the show drone).
+/// A bias beyond this is named, m/s: 1.3 us on the show drone, half of what is material in the pulse, and
+/// more than RTK receivers have (0.02 m/s). Chosen.
 const NAMED_BIAS_MPS: f64 = 0.05;
-/// A lag beyond this is named, s.
+/// A lag beyond this is named, s: half of the 0.2 s that cost 5 us at 1 m/s² (docs/physics.md, 2.4). Chosen.
 const NAMED_LAG_S: f64 = 0.1;
-/// A drone's own bias beyond this is told, m/s.
+/// A drone's own bias beyond this is reported, m/s: what barometers have. Chosen.
 const TOLD_BIAS_MPS: f64 = 0.1;
-/// Steady stretches shorter than this tell no rate, s.
+/// Steady stretches shorter than this determine no rate, s. Chosen.
 const SHORTEST_S: f64 = 6.0;
+/// A silence longer than this breaks a stretch, s. As in the analysis; chosen.
 const GAP_S: f64 = 1.0;
-/// What all drones' biases have in common besides: heights and velocities of one filter, m/s.
+/// Standard error that all drones' biases have in common besides, m/s: heights and velocities come from one
+/// filter. Simulated flights showed a millimetre per second.
 const BIAS_DOUBT_MPS: f64 = 0.001;
-/// The same of lags: logs at 10 to 25 Hz and delays of the filter, s.
+/// The common standard error of lags, s: logs at 10 to 25 Hz, and delays of the filter. Chosen.
 const LAG_DOUBT_S: f64 = 0.002;
-/// Lags that are tried, s.
+/// Lags that are tried, from 0 to 1 s, the range that the effect may have.
 const LAGS: usize = 51;
+/// Step between lags, s; a parabola goes through the best three.
 const LAG_STEP_S: f64 = 0.02;
-/// Step of the comparison, s.
+/// Step of the comparison, s: half a row of a log at 10 Hz.
 const STEP_S: f64 = 0.05;
 
 /// What the velocities of a fleet say. `segments` gives what a slot flew.

@@ -6,10 +6,11 @@ use crate::effects::Reference;
 use crate::flight::{Flight, Indicator};
 use crate::vehicle::{RotorLaw, Vehicle};
 
-/// Slower is a hover, m/s.
+/// Slower is a hover, m/s. As in the analysis of tables; chosen.
 const HOVER_MPS: f64 = 0.3;
 
-/// Height above the ground of a table's lowest row, m: tables do not say where the ground is.
+/// Height above the ground of a table's lowest row, m: tables do not say where the ground is. Chosen so that
+/// the ground has no effect.
 const ALOFT_M: f64 = 30.0;
 
 /// A table's flight far above the ground.

@@ -64,27 +64,34 @@ pub struct Elements {
     pub payload: bool,
 }
 
-/// Longest and shortest leg, s.
+/// Longest and shortest leg, s: the paper's, and the shortest that leaves two bins of 3 s after settling.
 const LEG_S: (f64, f64) = (20.0, 13.0);
-/// Hovers between legs, s.
+/// Hovers between legs, s: the paper's.
 const HOVER_S: f64 = 10.0;
-/// Heights of the lower and upper hovers, m.
+/// Height of the lower hovers, m: the paper's baseline.
 const LOW_M: f64 = 20.0;
+/// Height of the upper hovers, m, as in the counter-phase template. Chosen: far from the lower ones, within
+/// what shows may fly.
 const HIGH_M: f64 = 52.0;
-/// Lower hovers of a counter-phase flight: with room for what the halves drift apart, m.
+/// Lower hovers of a counter-phase flight, m: two metres more, for what the halves drift apart in height.
 const LOW_COUNTER_M: f64 = 22.0;
-/// Height and length of the low hover.
+/// Height of the hover near the ground, m: some 8 us of ground effect on a show drone (docs/physics.md,
+/// 2.4), and room for an error of height. Chosen.
 const LOWEST_M: f64 = 0.4;
+/// Length of that hover, s: eight bins. Chosen.
 const LOWEST_S: f64 = 30.0;
-/// Speeds of horizontal legs, m/s, and their length, s.
+/// Speed of slow horizontal legs, m/s, and their length, s, as in the counter-phase template. Chosen.
 const SLOW: (f64, f64) = (3.0, 12.0);
+/// Speed of fast horizontal legs, m/s, and their length, s, as in the counter-phase template. Chosen: lift
+/// is quadratic in the speed, and show limits end not far above.
 const FAST: (f64, f64) = (6.0, 10.0);
-/// Velocity step that turning round at the fast legs' speed takes, m/s.
+/// Velocity step that starting and stopping at the fast legs' speed takes, m/s: the speed with some room.
 const FAST_STEP_MPS: f64 = 6.5;
-/// Least charge of a staggered fleet.
+/// Least charge of a staggered fleet, as in the flights of docs/physics.md, 4.2.
 const LEAST_CHARGE: f64 = 0.62;
-/// Mass of the payload, kg, and who carries it.
+/// Mass of the payload, kg: a tenth of a show drone, 28.6 us (docs/physics.md, 4.3).
 pub(crate) const PAYLOAD_KG: f64 = 0.04;
+/// Every which drone carries it: ten of 42 determine the sensitivity to 5 %.
 pub(crate) const PAYLOAD_EVERY: usize = 4;
 
 impl Elements {

@@ -15,7 +15,7 @@ use crate::gap::verdict::{Finding, Noise, Verdict};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
-/// Least noise of any kind, in its own unit.
+/// Least noise of any kind, in its own unit: keeps logarithms finite. Numerical.
 const LEAST_NOISE: f64 = 1e-3;
 
 /// What is known from the flight before.

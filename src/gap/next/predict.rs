@@ -13,7 +13,8 @@ use crate::gap::refly::mean_drone;
 use crate::gap::verdict::Shape;
 use crate::vehicle::Vehicle;
 
-/// Effects with a smaller trace at their usual size do not matter for the pulse, us: 0.1 m/s.
+/// Effects with a smaller trace at their usual size do not matter for the pulse, us: 0.1 m/s, as in the
+/// search.
 const MATTERS_US: f64 = 2.5;
 /// A new effect of more times its tried form is another effect, as the search has it.
 const MOST_TIMES: f64 = 5.0;

@@ -14,13 +14,16 @@ use crate::gap::GapError;
 use crate::mission::plan::Plan;
 use crate::mission::resolve::resolve_text;
 
-/// Share of what the best flight has that must be left where that does not reach the goal.
+/// Share of the best flight's z that must be left where even that does not reach the goal. Chosen: 5 % of z
+/// is 10 % of the flights.
 const KEEP: f64 = 0.95;
-/// The payload is worth its trouble when it adds this much.
+/// The payload is worth its trouble when it raises z by this factor. Chosen as [`KEEP`].
 const PAYLOAD_ADDS: f64 = 1.05;
-/// What was flown did not tell, whatever its predicted z: the next flight must be this much better.
+/// What was flown did not decide, whatever its predicted z: the next flight must be this much better.
+/// Chosen: at half as much again, a z of 4 becomes 6, and a chance of 50 % becomes 98 % (docs/physics.md,
+/// 3.3).
 const BETTER: f64 = 1.5;
-/// Fast horizontal legs need this, m/s.
+/// Fast horizontal legs need a vehicle that may fly this fast, m/s.
 const FAST_MPS: f64 = 6.0;
 
 /// What is wanted.
