@@ -27,8 +27,8 @@ pub struct Change {
 }
 
 impl Change {
-    /// Whether putting the old value back would leave the vehicle without a fence: switched off,
-    /// of no type, or without consequences.
+    /// Whether restoring the old value would leave the vehicle without a fence: switched off, of no
+    /// type, or without consequences.
     pub fn unfences(&self) -> bool {
         matches!(self.name.as_str(), "FENCE_ENABLE" | "FENCE_TYPE" | "FENCE_ACTION")
             && self.was as i64 == 0
@@ -67,7 +67,7 @@ impl Default for Changes {
 }
 
 impl Changes {
-    /// The file of a folder; empty if there is none.
+    /// Reads the file of changes in a folder; no changes if there is no file.
     ///
     /// # Errors
     /// When it cannot be read.
@@ -86,7 +86,7 @@ impl Changes {
         }
     }
 
-    /// Writes the file of a folder.
+    /// Writes the file of changes into a folder.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -99,8 +99,7 @@ impl Changes {
         Ok(write_whole(&path, &json)?)
     }
 
-    /// Adds changes of a vehicle; of a parameter that was changed before, the first old value is
-    /// kept.
+    /// Adds changes of a vehicle; if a parameter was changed before, its first old value is kept.
     pub fn add(&mut self, drone: DroneId, changes: &[Change]) {
         if changes.is_empty() {
             return;
@@ -131,7 +130,7 @@ impl Changes {
         self.drones.iter().filter_map(machine).collect()
     }
 
-    /// Forgets what [`Changes::restore`] has put back on a vehicle.
+    /// Removes the changes that [`Changes::restore`] has undone on a vehicle.
     pub fn forget(&mut self, drone: DroneId, may: impl Fn(DroneId, &Change) -> bool) {
         for entry in self.drones.iter_mut().filter(|entry| entry.drone == drone) {
             entry.changes.retain(|change| !may(drone, change));
@@ -139,8 +138,8 @@ impl Changes {
         self.drones.retain(|entry| !entry.changes.is_empty());
     }
 
-    /// Vehicles whose fence was off, or without effect, before: it stays on until somebody says
-    /// otherwise.
+    /// Vehicles whose fence was off, or without effect, before the first change: it stays on until
+    /// somebody decides otherwise.
     pub fn unfenced_before(&self) -> Vec<DroneId> {
         let unfenced = |entry: &&DroneChanges| entry.changes.iter().any(Change::unfences);
         self.drones.iter().filter(unfenced).map(|entry| entry.drone).collect()

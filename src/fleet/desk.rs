@@ -21,7 +21,7 @@ const HEARD_WITHIN: Micros = 4 * S;
 /// News of orders, for the people at the station.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Notice {
-    /// An order has come.
+    /// An order has arrived.
     Ordered {
         /// Action that was ordered.
         action: Action,
@@ -67,7 +67,7 @@ pub struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    /// Around a net. `inbox`: where orders come from, if they can.
+    /// Wraps a net. `inbox` is where orders come from, if any can.
     pub fn new(net: &'a mut dyn Net, inbox: Option<Inbox>, tell: impl FnMut(&Notice) + 'a) -> Self {
         Self {
             net,

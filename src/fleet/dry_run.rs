@@ -18,7 +18,7 @@ use crate::protocol::show::{
 };
 use dialect::{MavCmd, MavMissionResult, MavMissionType, MavModeFlag, MavResult};
 
-/// A vehicle that does what it is told, at once.
+/// A vehicle that does what it is ordered to do, at once.
 #[derive(Clone, Debug)]
 pub struct Obliging {
     /// Identifier of the vehicle.
@@ -31,7 +31,7 @@ pub struct Obliging {
     pub above_home_m: f64,
     /// Values of its parameters; others are 0.
     pub params: BTreeMap<String, f32>,
-    /// Parameters that are not here do not exist.
+    /// Whether parameters that are not in `params` do not exist; otherwise they are 0.
     pub only_these_params: bool,
     /// Contents of its files, by name.
     pub files: BTreeMap<String, Vec<u8>>,
@@ -89,7 +89,7 @@ impl Obliging {
         }
     }
 
-    /// A message from the station.
+    /// Handles a message from the station; answers go to `out`.
     pub fn on_message(&mut self, now: Micros, message: &MavMessage, out: &mut Vec<MavMessage>) {
         match message {
             MavMessage::COMMAND_LONG(c) => {

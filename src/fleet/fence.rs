@@ -35,7 +35,12 @@ pub enum FenceRefusal {
     },
 }
 
-/// The plan's fence, if its show fits into it with the plan's margin.
+/// Fence of a plan for its vehicles.
+///
+/// # Errors
+///
+/// [`FenceRefusal`], if it is not a usable polygon, or the show does not fit into it with the plan's
+/// margin.
 pub fn fence_of(plan: &Plan, show: &Show) -> Result<Fence, FenceRefusal> {
     let fence = &plan.fence;
     let unusable = |reason: &str| FenceRefusal::Unusable { reason: reason.to_owned() };

@@ -39,13 +39,13 @@ const RECALL: Micros = 60 * S;
 /// Flight of one drone under the station's guidance.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    /// The trajectory, show frame.
+    /// Trajectory to fly, show frame.
     pub trajectory: Trajectory,
     /// Position and orientation of the show frame.
     pub frame: ShowFrame,
-    /// Show time 0, ms since the GPS epoch.
+    /// Instant of show time 0, ms since the GPS epoch.
     pub start_gps_ms: i64,
-    /// Heading that is kept, rad clockwise from north; `None`: that at take-off.
+    /// Heading to keep, rad clockwise from north; `None`: the heading at take-off.
     pub yaw_rad: Option<f64>,
     /// Clock of the drone, as far as its messages have told it.
     pub clock: VehicleClock,
@@ -63,7 +63,7 @@ pub enum GuidedError {
     /// The GPS time of the drone is not known.
     #[error("the drone's GPS time is not known: wait for its GPS")]
     NoClock,
-    /// The start has passed.
+    /// The start time has passed before the drone could be armed.
     #[error("the start time has passed before the drone could be armed: set a new one")]
     TooLate,
     /// The drone does not arm or take off.
@@ -75,21 +75,21 @@ pub enum GuidedError {
     /// The drone left GUIDED: its pilot, an abort, its fence or a failsafe has taken over.
     #[error("the drone left GUIDED ({mode}) at {show_s} s: nothing more was sent to it")]
     TakenOver {
-        /// The mode it went to.
+        /// Flight mode that the drone changed to.
         mode: String,
-        /// Show time, whole s.
+        /// Show time of the change, whole seconds.
         show_s: i64,
     },
-    /// A message to it was held back.
+    /// A message to the drone was held back.
     #[error("the drone is not flown any more: {why}")]
     Held {
         /// Reason why it is not flown any more, as a clause.
         why: String,
     },
-    /// Nothing is heard of it, and nothing more is sent.
+    /// The drone is not heard any more, and nothing more is sent to it.
     #[error("the drone was lost at {show_s} s: nothing is heard of it any more; {then}")]
     Lost {
-        /// Show time, whole s.
+        /// Show time at which the link was lost, whole seconds.
         show_s: i64,
         /// Outcome of the attempt to bring it home.
         then: AfterLoss,
@@ -172,7 +172,7 @@ pub struct Guided {
 }
 
 impl Guided {
-    /// Flies this with a drone that stands on its slot, disarmed.
+    /// Prepares the flight of a drone that stands on its slot, disarmed.
     pub fn new(drone: DroneId, flight: Flight) -> Self {
         let params = DeriveParams::default();
         let derived = derive(&flight.trajectory, Firmware::V44, &params);

@@ -37,7 +37,11 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a folder, for its user alone; what is there stays.
+    /// Opens the journal of a folder for appending, readable by its user alone.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be opened or created.
     pub fn open(folder: &Path) -> Result<Self, FileError> {
         create_folder(folder)?;
         let path = folder.join(JOURNAL_FILE);

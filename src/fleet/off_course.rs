@@ -1,5 +1,5 @@
-//! Whether a drone is where it should be: each position that it tells, at the time at which it was
-//! measured, against its trajectory.
+//! Check whether a drone is where it should be: each position that it reports is compared with its
+//! trajectory at the time at which it was measured.
 //!
 //! What counts is the drone's own time in the message, so that neither a slow link nor a busy
 //! station moves it. A drone cannot follow a step of velocity at once: after one it is allowed as

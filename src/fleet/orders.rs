@@ -22,13 +22,13 @@ use crate::base::parse;
 use crate::base::private::{is_own_folder, open_own, own_folder};
 use crate::link::id::DroneId;
 
-/// The folder in a flight's folder.
+/// Name of the folder of orders in a flight's folder.
 pub const ORDERS_FOLDER: &str = "fleet-orders";
-/// Format of a station's file.
+/// Name and version of the format of a station's file.
 pub const STATION_SCHEMA: &str = "updraft.fleet-station/1";
-/// Format of an order.
+/// Name and version of the format of an order.
 pub const ORDER_SCHEMA: &str = "updraft.fleet-order/1";
-/// Format of an answer.
+/// Name and version of the format of an answer.
 pub const ANSWER_SCHEMA: &str = "updraft.fleet-answer/1";
 
 const STATION_FILE: &str = "station.json";
@@ -68,12 +68,12 @@ pub struct Answer {
     pub schema: String,
     /// Counter that rises as long as the station works on the order.
     pub beat: u64,
-    /// The drones, and how each flight ended; none: not yet.
+    /// Drones that are meant, each with the end of its flight; `None` as long as it goes on.
     pub drones: Vec<(DroneId, Option<Aborted>)>,
 }
 
 impl Answer {
-    /// Whether nothing more comes.
+    /// Whether the order is carried out, so that no further answer comes.
     pub fn is_over(&self) -> bool {
         self.drones.iter().all(|(_, done)| done.is_some())
     }
@@ -106,7 +106,11 @@ pub struct Taken {
 }
 
 impl Taken {
-    /// Tells how far it is.
+    /// Writes the progress of the order for the process that gave it.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be written.
     pub fn answer(&self, answer: &Answer) -> Result<(), FileError> {
         put(&self.answer, answer)
     }
@@ -120,8 +124,12 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// Opens it for a station, and removes what was left for others. `station`: a name that no
-    /// other station of this flight has had or will have.
+    /// Opens the inbox of a station, and removes what was left for others. `station` is a name that
+    /// no other station of this flight has had or will have.
+    ///
+    /// # Errors
+    ///
+    /// If the folder cannot be made or written.
     pub fn open(flight: &Path, station: String) -> Result<Self, FileError> {
         let folder = flight.join(ORDERS_FOLDER);
         create_folder(flight)?;
@@ -134,7 +142,7 @@ impl Inbox {
         Ok(Self { folder, station })
     }
 
-    /// Orders for this station since the last look, oldest name first.
+    /// Takes the orders to this station since the last call, oldest name first.
     pub fn take(&mut self) -> Vec<Taken> {
         let mut taken = Vec::new();
         for path in files(&self.folder) {
@@ -174,20 +182,20 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     all
 }
 
-/// An order that was given.
+/// An order that was given to a station.
 #[derive(Debug)]
 pub struct Given {
     order: PathBuf,
     answer: PathBuf,
 }
 
-/// Whether a station has said that it takes orders for this flight; it may have died since.
+/// Whether a station has announced that it takes orders for this flight; it may have died since.
 pub fn has_station(flight: &Path) -> bool {
     flight.join(ORDERS_FOLDER).join(STATION_FILE).is_file()
 }
 
-/// Gives an order to the station of a flight; `None`: there is none. `name`: of this order alone,
-/// rising with time.
+/// Gives an order to the station of a flight; `None` if there is no station. `name` belongs to this
+/// order alone and rises with time.
 pub fn give(
     flight: &Path,
     name: &str,
@@ -216,7 +224,7 @@ impl Given {
         get::<Answer>(&self.answer).filter(|answer| answer.schema == ANSWER_SCHEMA)
     }
 
-    /// Takes the order back if the station has not taken it; whether it was still there.
+    /// Withdraws the order if the station has not taken it; returns whether it was still there.
     pub fn withdraw(&self) -> bool {
         fs::remove_file(&self.order).is_ok()
     }

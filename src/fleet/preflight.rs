@@ -1,5 +1,5 @@
-//! The table before a start: per drone everything that must be right, and go or no-go in words
-//! that crews know.
+//! The table before a start: for each drone all that must be right, and go or no-go in words that
+//! crews know.
 //!
 //! What is not known is not taken for good: a drone that does not report something is no-go.
 
@@ -21,11 +21,11 @@ pub struct Limits {
     pub satellites: u8,
     /// Largest estimated error of the horizontal position, m.
     pub h_acc_m: f64,
-    /// Least share of messages that must arrive.
+    /// Least share of messages that must arrive, 0 to 1.
     pub link_quality: f64,
-    /// Clocks may differ by so much, s.
+    /// Largest difference allowed between the clocks, s.
     pub clock_spread_s: f64,
-    /// The station flies them all by streaming: nobody needs the show mode.
+    /// Whether the station flies all drones by streaming, so that none needs the show mode.
     pub guided: bool,
 }
 
@@ -40,7 +40,7 @@ impl Default for Limits {
 pub struct Known {
     /// Drones whose upload of this flight's show ended well; others may carry an old show.
     pub loaded: BTreeSet<DroneId>,
-    /// Drones whose fence was read back, for those whose status does not tell.
+    /// Drones whose fence was read back, as not every drone's status reports it.
     pub fenced: BTreeSet<DroneId>,
     /// State of the drones' parameters; those that are not in it were not asked.
     pub params: BTreeMap<DroneId, Standing>,
@@ -49,7 +49,7 @@ pub struct Known {
 /// The link of a drone that is not heard.
 const SILENT: &str = "silent";
 
-/// One thing that was looked at.
+/// One checked property of a drone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cell {
     /// Text of the cell.
@@ -58,7 +58,7 @@ pub struct Cell {
     pub no_go: Option<String>,
 }
 
-/// Headings of the cells of a [`Row`].
+/// Headings of the cells of a [`Row`], in their order.
 pub const COLUMNS: [&str; 11] = [
     "link", "firmware", "show", "origin", "position", "GPS", "prearm", "battery", "fence", "start",
     "params",
@@ -71,12 +71,12 @@ pub struct Row {
     pub slot: u16,
     /// Identifier of the drone.
     pub drone: DroneId,
-    /// In the order of [`COLUMNS`].
+    /// Checked properties of the drone, in the order of [`COLUMNS`].
     pub cells: Vec<Cell>,
 }
 
 impl Row {
-    /// Whether it may fly.
+    /// Whether the drone may fly.
     pub fn go(&self) -> bool {
         self.cells.iter().all(|cell| cell.no_go.is_none())
     }
@@ -85,7 +85,7 @@ impl Row {
 /// The preflight table of a fleet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Preflight {
-    /// The drones, by slot.
+    /// Rows of the drones, by slot.
     pub rows: Vec<Row>,
     /// Problems that concern more than one drone, one sentence each.
     pub fleet: Vec<String>,
@@ -106,7 +106,7 @@ fn bad(text: impl Into<String>, why: impl Into<String>) -> Cell {
     Cell { text: text.into(), no_go: Some(why.into()) }
 }
 
-/// Charge that a flight needs, % of a full battery: its duration, and the reserve that the
+/// Charge that a flight needs, % of a full battery: for its duration, and the reserve that the
 /// vehicle's limits demand.
 pub fn charge_needed(plan: &Plan) -> f64 {
     let flight_s = plan.duration_ms as f64 / 1000.0;

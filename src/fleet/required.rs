@@ -32,7 +32,7 @@ pub enum Wanted {
 }
 
 impl Wanted {
-    /// Whether a value is right.
+    /// Whether a value meets the condition.
     pub fn holds(self, value: f32) -> bool {
         match self {
             Self::Is(wanted) => same(value, wanted),
@@ -43,7 +43,7 @@ impl Wanted {
         }
     }
 
-    /// The nearest right value.
+    /// Nearest value that meets the condition.
     pub fn mend(self, value: f32) -> f32 {
         match self {
             Self::Is(wanted) => wanted,
@@ -149,7 +149,7 @@ pub fn requirements(plan: &Plan, show_firmware: bool) -> Vec<Requirement> {
     all
 }
 
-/// A parameter that is not what it must be.
+/// A parameter that does not meet its requirement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// Requirement that is not met.
@@ -197,14 +197,14 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// In a sentence what could not be mended.
+    /// Sentence about the parameters that could not be corrected.
     pub fn complaint(&self) -> String {
         let failed = self.failed.iter().map(ToString::to_string);
         let wrong: Vec<String> = failed.chain(self.wrong.iter().map(ToString::to_string)).collect();
         format!("not all parameters could be set: {}", wrong.join("; "))
     }
 
-    /// Whether everything is as it must be.
+    /// Whether all requirements are met.
     pub fn is_right(&self) -> bool {
         self.wrong.is_empty() && self.failed.is_none()
     }
@@ -229,7 +229,7 @@ pub struct CheckParams {
 }
 
 impl CheckParams {
-    /// Checks these; with `may_change` mends what is wrong.
+    /// Checks these requirements; with `may_change` corrects the parameters that do not meet them.
     pub fn new(drone: DroneId, requirements: Vec<Requirement>, may_change: bool) -> Self {
         let patience = Patience { tries: 8, ..Patience::default() };
         let names = requirements.iter().map(|requirement| requirement.name.to_owned());

@@ -1,4 +1,5 @@
-//! Which vehicle flies which slot: the table of a campaign, held against where each one stands.
+//! Assignment of vehicles to slots: the table of a campaign, compared with where each vehicle
+//! stands.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -16,7 +17,7 @@ use crate::link::clock::{Micros, S};
 use crate::link::id::DroneId;
 use crate::mission::Plan;
 
-/// Name and version of the table's format.
+/// Name and version of the format of the table.
 pub const FLEET_SCHEMA: &str = "updraft.fleet/1";
 /// Name of the table's file in a flight's folder.
 pub const FLEET_FILE: &str = "fleet.json";
@@ -70,7 +71,7 @@ impl FleetTable {
         Self::parse(&bytes).map_err(|reason| CampaignError::Json { path, reason })
     }
 
-    /// A table from its JSON; else why not.
+    /// Reads a table from its JSON; the error says what is wrong.
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
         let table: Self = parse::json(bytes).map_err(|error| error.to_string())?;
         if table.schema == FLEET_SCHEMA {
@@ -94,7 +95,7 @@ impl FleetTable {
         Ok(write_whole(&path, &json)?)
     }
 
-    /// The slot of a vehicle.
+    /// Slot of a vehicle, if the table has one.
     pub fn slot_of(&self, drone: DroneId) -> Option<u16> {
         self.drones.iter().find(|line| line.drone == drone).map(|line| line.slot)
     }
@@ -123,7 +124,7 @@ pub enum SlotProblem {
         /// Number of slots in the plan.
         slots: usize,
     },
-    /// Two vehicles for one slot in the table.
+    /// The table gives one slot to two vehicles.
     #[error("slot {slot} is given to drones {first} and {second}: take one of them out")]
     DoubledSlot {
         /// Number of the slot.
@@ -133,7 +134,7 @@ pub enum SlotProblem {
         /// Second vehicle on the slot.
         second: DroneId,
     },
-    /// One vehicle for two slots in the table.
+    /// The table gives two slots to one vehicle.
     #[error("drone {drone} is given slots {first} and {second}: it can fly one")]
     DoubledDrone {
         /// Identifier of the vehicle.
@@ -143,7 +144,7 @@ pub enum SlotProblem {
         /// Second slot of the vehicle.
         second: u16,
     },
-    /// A slot without a vehicle.
+    /// A slot has no vehicle.
     #[error("slot {slot} has no drone: put one there, or plan the flight with fewer")]
     Empty {
         /// Number of the slot.
@@ -187,7 +188,7 @@ pub enum SlotProblem {
         /// Largest distance allowed, m.
         allowed_m: f64,
     },
-    /// Two stand on one slot.
+    /// Two vehicles stand on one slot.
     #[error("drones {first} and {second} both stand on slot {slot}: move one of them")]
     BothOn {
         /// Number of the slot.
@@ -203,7 +204,7 @@ pub enum SlotProblem {
         /// Identifier of the vehicle.
         drone: DroneId,
     },
-    /// A vehicle that belongs to no slot.
+    /// A vehicle is switched on but belongs to no slot.
     #[error("drone {drone} is on but has no slot: switch it off, or give it one")]
     Unassigned {
         /// Identifier of the vehicle.
@@ -218,7 +219,7 @@ pub struct Stand {
     pub nearest: u16,
     /// Horizontal distance to the nearest slot, m.
     pub distance_m: f64,
-    /// Place in the show frame, m.
+    /// Position of the vehicle, show x and y, m.
     pub at_m: [f64; 2],
 }
 
@@ -240,7 +241,7 @@ pub fn stands(plan: &Plan, telemetry: &Telemetry, now: Micros) -> BTreeMap<Drone
 }
 
 impl Stand {
-    /// Of a drone at this place; `None`: the plan has no slots.
+    /// Place of a drone at this position; `None` if the plan has no slots.
     pub fn of(plan: &Plan, place: Geodetic) -> Option<Self> {
         let place = plan.site.frame().from_geodetic(place);
         let at_m = [place.x, place.y];
@@ -261,7 +262,7 @@ pub fn allowed_m(plan: &Plan) -> f64 {
     (0.4 * spacing_m).min(2.5)
 }
 
-/// Everything that is wrong with a table on its own.
+/// Problems of a table on its own, without the vehicles' positions.
 pub fn check_table(plan: &Plan, table: &FleetTable) -> Vec<SlotProblem> {
     let mut problems = Vec::new();
     let (mut slots, mut drones) = (BTreeMap::new(), BTreeMap::new());
@@ -281,7 +282,7 @@ pub fn check_table(plan: &Plan, table: &FleetTable) -> Vec<SlotProblem> {
     problems
 }
 
-/// Everything that is wrong with a table and with where the vehicles stand.
+/// Problems of a table, including those of where the vehicles stand.
 pub fn check_stands(
     plan: &Plan,
     table: &FleetTable,
@@ -320,10 +321,11 @@ pub fn check_stands(
     problems
 }
 
-/// The table that follows from where the vehicles stand: each flies the slot it stands on.
+/// Proposes the table in which each vehicle flies the slot that it stands on.
 ///
 /// # Errors
-/// Every slot without a vehicle, with two, and every vehicle that stands on none.
+///
+/// Every slot without a vehicle or with two, and every vehicle that stands on none.
 pub fn propose(
     plan: &Plan,
     telemetry: &Telemetry,

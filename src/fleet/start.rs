@@ -23,8 +23,8 @@ pub struct StartOptions {
     pub at: Option<GpsTime>,
     /// Largest difference allowed between the clocks, s.
     pub clock_spread_s: f64,
-    /// Authorization after this is refused, s before the start: the firmware sets its home 10 s
-    /// and arms 8 s before take-off.
+    /// Latest time for an authorization, s before the start: the firmware sets its home 10 s and
+    /// arms 8 s before take-off.
     pub authorize_before_s: f64,
 }
 
@@ -34,15 +34,16 @@ impl Default for StartOptions {
     }
 }
 
-/// Shortest lead that leaves time for both steps and the firmware's own, s.
+/// Shortest lead, s: it leaves time for both steps and for the firmware's own.
 pub const LEAST_LEAD_S: f64 = 20.0;
-/// Longest: a start is not set for days, s. Times of the past half week read as passed.
+/// Longest lead, s: a start is not set for days. The firmware reads times of the past half week as
+/// passed.
 pub const MOST_LEAD_S: f64 = 12.0 * 3600.0;
 
 /// Reason why a start is not set or not authorized.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StartRefusal {
-    /// Nobody is to fly.
+    /// There are no drones to start.
     #[error("there is no drone to start")]
     NoDrones,
     /// The lead is too short or too long.
@@ -54,16 +55,16 @@ pub enum StartRefusal {
         /// Lead that was asked for, s.
         lead_s: f64,
     },
-    /// Clocks that are not known or do not agree.
+    /// The clocks of drones are not known or do not agree.
     #[error("{text}")]
     Clocks {
-        /// In words, with the drones.
+        /// Description of the problem, with the drones.
         text: String,
     },
-    /// Not every drone has the start time.
+    /// Some drones do not have the start time.
     #[error("not authorized: {} without the start time: {}", count(.late), names(.late))]
     Late {
-        /// Which, and what each has.
+        /// Those drones, and the start that each reports instead.
         late: Vec<(DroneId, Readback)>,
     },
     /// The time left is too short to authorize the start.
@@ -74,7 +75,7 @@ pub enum StartRefusal {
     TooLate {
         /// Time left to the start, s.
         left_s: f64,
-        /// Time needed, s.
+        /// Time that an authorization needs, s.
         needed_s: f64,
     },
 }
@@ -91,7 +92,7 @@ fn names(late: &[(DroneId, Readback)]) -> String {
 /// Agreement of the vehicles' clocks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ClockSpread {
-    /// The clocks agree.
+    /// The clocks agree, within the limit.
     Agree {
         /// GPS time of the vehicles now, the median, ms since the GPS epoch.
         gps_ms: f64,
@@ -162,7 +163,7 @@ pub fn clocks(
 /// Start as a drone's status reports it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Readback {
-    /// Nothing fresh is heard of it.
+    /// No fresh status of the drone has been heard.
     Silent,
     /// The drone has no start time.
     NoTime,
@@ -189,7 +190,7 @@ impl std::fmt::Display for Readback {
 /// Phase of a start, which decides what is broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// The time, without authorization.
+    /// Time of the start, without an authorization.
     Announced,
     /// Time and authorization of the start.
     Authorized,
@@ -197,7 +198,7 @@ pub enum Phase {
     Cancelled,
 }
 
-/// A start: says what to broadcast and when, and who has taken it.
+/// A start: what to broadcast and when, and which drones have taken it.
 #[derive(Clone, Debug)]
 pub struct Start {
     drones: BTreeSet<DroneId>,
@@ -212,7 +213,7 @@ pub struct Start {
 }
 
 impl Start {
-    /// A start that another station has authorized, at this time, if that is known.
+    /// A start that another station has authorized, at this time if it is known.
     pub fn attached(drones: BTreeSet<DroneId>, at: Option<GpsTime>) -> Self {
         let options = StartOptions { at, ..StartOptions::default() };
         let (phase, next) = (Phase::Authorized, 0);
@@ -222,12 +223,16 @@ impl Start {
         Self { drones, at_gps_ms, options, phase, next, attached: true, known }
     }
 
-    /// Whether the time is known: not that of every start that another station has set.
+    /// Whether the start time is known; that of another station's start may not be.
     pub fn is_known(&self) -> bool {
         self.known
     }
 
-    /// Sets a start so many seconds ahead. Nothing is authorized by it.
+    /// Sets a start the given lead ahead. Nothing is authorized by it.
+    ///
+    /// # Errors
+    ///
+    /// If the lead is out of range, or the clocks are not known or do not agree.
     pub fn announce(
         drones: BTreeSet<DroneId>,
         telemetry: &Telemetry,
@@ -268,7 +273,7 @@ impl Start {
         (self.at_gps_ms / 1000).rem_euclid(i64::from(WEEK_S)) as i32
     }
 
-    /// The drones that are to start.
+    /// Drones that are to start.
     pub fn drones(&self) -> &BTreeSet<DroneId> {
         &self.drones
     }
@@ -278,7 +283,8 @@ impl Start {
         self.phase
     }
 
-    /// Time left to the start by the vehicles' clocks, s (negative after it); `None`: no clock.
+    /// Time left to the start by the vehicles' clocks, s (negative after it); `None` without a
+    /// clock.
     pub fn left_s(&self, telemetry: &Telemetry, now: Micros) -> Option<f64> {
         self.gps_ms(telemetry, now).map(|gps_ms| (self.at_gps_ms as f64 - gps_ms) / 1000.0)
     }
@@ -313,7 +319,7 @@ impl Start {
         self.drones.iter().map(|drone| (*drone, of(drone))).collect()
     }
 
-    /// Drones that have not taken what is broadcast.
+    /// Drones that have not taken what is broadcast, each with what it reports instead.
     pub fn late(&self, telemetry: &Telemetry, now: Micros) -> Vec<(DroneId, Readback)> {
         let taken = |readback| match self.phase {
             Phase::Announced => matches!(readback, Readback::Set | Readback::Authorized),
@@ -324,8 +330,12 @@ impl Start {
         all.filter(|(_, readback)| !taken(*readback)).collect()
     }
 
-    /// Whether there is time left to authorize it. For drones that the station itself flies, which
-    /// hear nothing of the start, that is all there is to it.
+    /// Checks that there is time left to authorize the start. For drones that the station itself
+    /// flies, and which hear nothing of the start, this is the only condition.
+    ///
+    /// # Errors
+    ///
+    /// [`StartRefusal::TooLate`], also if the clocks are not known or the start was cancelled.
     pub fn check_time(&self, telemetry: &Telemetry, now: Micros) -> Result<(), StartRefusal> {
         let needed_s = self.options.authorize_before_s;
         let left_s = self.left_s(telemetry, now).unwrap_or(0.0);
@@ -335,8 +345,11 @@ impl Start {
         Ok(())
     }
 
-    /// Authorizes the start: the second step, on a person's word. Every drone must have the start
-    /// time by then, and there must be time left.
+    /// Authorizes the start: the second step, on a person's command.
+    ///
+    /// # Errors
+    ///
+    /// If a drone does not have the start time, or too little time is left.
     pub fn authorize(&mut self, telemetry: &Telemetry, now: Micros) -> Result<(), StartRefusal> {
         self.check_time(telemetry, now)?;
         let late = self.late(telemetry, now);
@@ -348,7 +361,8 @@ impl Start {
         Ok(())
     }
 
-    /// Takes time and authorization back. Goes on being broadcast until [`Start::late`] is empty.
+    /// Withdraws time and authorization. The withdrawal must be broadcast until [`Start::late`] is
+    /// empty.
     pub fn cancel(&mut self, now: Micros) {
         self.phase = Phase::Cancelled;
         self.next = now;
@@ -370,8 +384,8 @@ impl Start {
         })
     }
 
-    /// The packet to broadcast if it is due, once a second of the vehicles' time; never after the
-    /// start, when a start time would be taken for next week's.
+    /// The packet to broadcast, if it is due: once a second of the vehicles' time, and never after
+    /// the start, when a start time would be taken for next week's.
     pub fn due(&mut self, telemetry: &Telemetry, now: Micros) -> Option<MavMessage> {
         let over = self.left_s(telemetry, now).is_some_and(|left_s| left_s <= 0.0);
         let silent = over || self.attached;

@@ -1,4 +1,5 @@
-//! Loads a show onto a vehicle: file, origin, fence, reload, and a look at what it says then.
+//! Loads a show onto a vehicle: file, origin, fence, reload, and a check of the status that
+//! follows.
 //!
 //! It ends with a show that is loaded whole, or with a refusal that says why and a vehicle whose
 //! show is cleared. A vehicle that is armed or authorized is not touched.
@@ -32,11 +33,11 @@ const AGREEING: u32 = 2;
 /// Show that is loaded onto a vehicle, with its place and fence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Load {
-    /// The `.skyb` file of its slot.
+    /// Content of the slot's `.skyb` file.
     pub skyb: Vec<u8>,
     /// Position and orientation of the show frame.
     pub site: Site,
-    /// The fence around it.
+    /// Fence around the show.
     pub fence: Fence,
 }
 
@@ -58,7 +59,7 @@ pub enum UploadError {
          flight, `updraft fleet abort` ends it"
     )]
     Flying {
-        /// The stage it is in.
+        /// Stage of the show that the drone is in.
         stage: Stage,
     },
     /// The drone is armed, so that its motors may run.
@@ -73,7 +74,7 @@ pub enum UploadError {
          back"
     )]
     Authorized,
-    /// Something was not sent, as it took off meanwhile.
+    /// A message was not sent, because the drone took off meanwhile.
     #[error("the upload was broken off, as {why}")]
     Held {
         /// Reason why it was broken off, as a clause.
@@ -82,10 +83,10 @@ pub enum UploadError {
     /// The drone does not reach the stage in which it waits for a start.
     #[error("the drone does not enter show mode (stage {stage}): restart it")]
     NotReady {
-        /// The stage it is in.
+        /// Stage of the show that the drone is in.
         stage: Stage,
     },
-    /// Show mode was refused.
+    /// The drone refused the show mode.
     #[error("the drone does not enter show mode")]
     Mode(#[source] CommandError),
     /// The show file could not be put on the drone.
@@ -128,13 +129,13 @@ pub enum UploadError {
 pub enum Left {
     /// The vehicle is as it was.
     Untouched,
-    /// No show is loaded.
+    /// The vehicle has no show loaded any more.
     Cleared,
-    /// Nobody knows: clearing was not confirmed.
+    /// The state is unknown: the clearing was not confirmed.
     Unknown,
 }
 
-/// A refusal, and what is on the vehicle now.
+/// A refused upload, and the state in which it left the vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refused {
     /// Reason why the upload failed.
@@ -164,10 +165,10 @@ impl std::fmt::Display for Refused {
 
 impl std::error::Error for Refused {}
 
-/// A show that is loaded whole.
+/// Success of an upload: the show is loaded whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Loaded {
-    /// Whether the file had to be written; it was there already otherwise.
+    /// Whether the file was written; otherwise it was there already.
     pub written: bool,
 }
 
@@ -205,7 +206,7 @@ pub struct Upload {
 const STEPS: u64 = 6;
 
 impl Upload {
-    /// Loads this onto a vehicle. `numbers` should differ from run to run (see
+    /// Prepares the upload of a show to a vehicle. `numbers` should differ from run to run (see
     /// [`Caller::new`]).
     pub fn new(drone: DroneId, load: Load, numbers: u32) -> Self {
         Self {
@@ -225,8 +226,8 @@ impl Upload {
         }
     }
 
-    /// Status packets are not believed until so long after the reload, us (1 s unless told): a
-    /// link that keeps the order needs no longer than the vehicle takes to set its flags.
+    /// Sets the time after the reload during which status packets are not believed, us (default 1
+    /// s): a link that keeps the order needs no longer than the vehicle takes to set its flags.
     #[must_use]
     pub fn settling(mut self, settle: Micros) -> Self {
         self.settle = settle;

@@ -1,4 +1,4 @@
-//! Looks at a running show: where every drone is against its trajectory, and what goes wrong.
+//! Watch over a running show: where every drone is against its trajectory, and what goes wrong.
 //!
 //! A [`Monitor`] takes all messages, keeps the [`Telemetry`], and tells [`Event`]s in the order
 //! in which they become known. It does nothing on its own: aborting is a person's decision.
@@ -24,16 +24,19 @@ use crate::protocol::show::{Stage, flag};
 /// Limits at which events are reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Distance from the trajectory, m; in and after steps of velocity a drone may be further away.
+    /// Distance from the trajectory at which a drone is far, m; in and after steps of velocity it
+    /// may be further away.
     pub far_m: f64,
-    /// Silence while the station listens: a station that is held up hears nobody.
+    /// Silence at which a drone is reported, us. It counts while the station listens: one that is
+    /// held up hears no drone.
     pub silent: Micros,
-    /// Charge, %; told once below the landing reserve by default of the plan.
+    /// Charge below which a drone is reported once, %; by default the plan's landing reserve.
     pub battery_percent: f64,
 }
 
 impl Limits {
-    /// Three metres (as the firmware itself tells), three seconds, the plan's reserve.
+    /// Limits for a plan: three metres (as in the firmware itself), three seconds, the plan's
+    /// reserve.
     pub fn of(plan: &Plan) -> Self {
         let battery_percent = 100.0 * plan.limits.endurance_reserve;
         Self { far_m: 3.0, silent: 3 * S, battery_percent }
@@ -66,7 +69,7 @@ pub enum Event {
         /// Whether it was in the air then.
         in_the_air: bool,
     },
-    /// Nothing has been heard of it for too long.
+    /// The drone has not been heard for too long.
     Silent {
         /// Time since it was last heard, s.
         seconds: u64,
@@ -91,7 +94,7 @@ pub enum Event {
     FenceBreached,
     /// The drone sends a text of weight.
     Says {
-        /// 0 emergency ... 3 error, 4 warning.
+        /// Severity of the text in MAVLink: 0 emergency ... 3 error, 4 warning.
         severity: u8,
         /// Text of the message.
         text: String,
@@ -99,7 +102,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// Whether a person must look at it at once.
+    /// Whether a person must look at the event at once.
     pub fn is_alarm(&self) -> bool {
         match self {
             Self::Silent { .. }
@@ -136,7 +139,7 @@ impl std::fmt::Display for Event {
     }
 }
 
-/// An event and whose it is.
+/// An event, with its time and its drone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Told {
     /// Time at which it became known, us.
@@ -150,15 +153,16 @@ pub struct Told {
 /// State of one drone's flight at present.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Flying {
-    /// Show time by its own clock, s.
+    /// Show time by the drone's own clock, s.
     pub show_s: Option<f64>,
-    /// Distance from where it should be, m; while it performs.
+    /// Distance from the trajectory, m, while the drone performs.
     pub distance_m: Option<f64>,
-    /// Whether it has flown and is on the ground again, or never will.
+    /// Whether the drone has flown and is on the ground again, or never will fly.
     pub over: bool,
-    /// Whether it was seen in the air.
+    /// Whether the drone was seen in the air.
     pub flew: bool,
-    /// Whether it has restarted there, and was not seen to fly on: it has not landed, but come down.
+    /// Whether the drone has restarted in the air, and was not seen to fly on: it has not landed,
+    /// but come down.
     pub fell: bool,
 }
 
@@ -223,8 +227,8 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Watches the drones of a table, each against its slot's trajectory. `telemetry`: what is
-    /// known already.
+    /// A monitor of the drones of a table, each against its slot's trajectory. `telemetry` is what
+    /// is already known of them.
     pub fn new(plan: &Plan, table: &FleetTable, telemetry: Telemetry, limits: Limits) -> Self {
         let watched = table.drones.iter().filter_map(|line| {
             let trajectory = plan.trajectory(plan.slot(line.slot)?);
@@ -264,12 +268,12 @@ impl Monitor {
         }
     }
 
-    /// The start: show time 0, ms since the GPS epoch; `None` takes it back.
+    /// Sets the instant of show time 0, ms since the GPS epoch; `None` removes it.
     pub fn set_start(&mut self, start_gps_ms: Option<i64>) {
         self.start_gps_ms = start_gps_ms;
     }
 
-    /// Events since the last call.
+    /// Takes the events since the last call.
     pub fn take_events(&mut self) -> Vec<Told> {
         self.told.drain(..).collect()
     }
@@ -279,8 +283,8 @@ impl Monitor {
         self.watched.iter().map(|(drone, watched)| (*drone, watched.flying))
     }
 
-    /// Whether every drone has flown and is on the ground again, or never will take off. A drone
-    /// that is silent is waited for until it should have landed.
+    /// Whether every drone has flown and is on the ground again, or never will take off. A silent
+    /// drone counts as flying until it should have landed.
     pub fn is_over(&self) -> bool {
         self.watched.values().all(|watched| watched.flying.over)
     }
@@ -583,7 +587,7 @@ fn performs(of: &Drone) -> bool {
     }
 }
 
-/// The landing reserve and what a flight needs, %: for tables.
+/// Landing reserve of a plan, and the charge that its flight needs, %: for tables.
 pub fn charge(plan: &Plan) -> (f64, f64) {
     (100.0 * plan.limits.endurance_reserve, charge_needed(plan))
 }

@@ -9,19 +9,20 @@ use dialect::MavCmd;
 /// Class of a message by what it can do, which decides to whom it may be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
-    /// Reads, or asks for reports: to anyone at any time.
+    /// Reads, or asks for reports: may go to any drone at any time.
     Harmless,
-    /// Changes what a drone has, or its mode, or arms it: on the ground only, disarmed.
+    /// Changes a drone's files, parameters or mode, or arms it: only on the ground, disarmed.
     Ground,
-    /// Sets or authorizes a start. It has no address: everyone who hears it is on the ground.
+    /// Sets or authorizes a start. It has no address: every drone that hears it must be on the
+    /// ground.
     Start,
-    /// Flies: a take-off, a target. To an armed drone.
+    /// Flies a drone (a take-off, a target): only if it is armed.
     Flight,
-    /// Ends a flight, or takes a start back: to anyone at any time.
+    /// Ends a flight, or withdraws a start: may go to any drone at any time.
     Emergency,
 }
 
-/// The class of a message; `None`: it is none that this program sends.
+/// Class of a message; `None` if this program never sends it.
 pub fn class(message: &MavMessage) -> Option<Class> {
     Some(match message {
         MavMessage::HEARTBEAT(_)

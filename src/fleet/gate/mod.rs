@@ -33,7 +33,7 @@ use crate::link::net::{Net, Received};
 use crate::link::traffic::Traffic;
 use crate::mission::Plan;
 
-/// A net that lets through what the drones' states allow.
+/// A net that passes on only what the drones' states allow.
 pub struct Gate<'a> {
     net: &'a mut dyn Net,
     protection: Protection,
@@ -49,12 +49,12 @@ struct Why {
 }
 
 impl<'a> Gate<'a> {
-    /// Before a net, for the flight of this plan.
+    /// Wraps a net for the flight of a plan.
     pub fn new(net: &'a mut dyn Net, plan: &Plan) -> Self {
         Self { net, protection: Protection::of(plan), fleet: None, seen: BTreeMap::new() }
     }
 
-    /// Says which drones are the fleet: each of them counts as flying until it is heard.
+    /// Sets the drones of the fleet: each of them counts as flying until it is heard.
     pub fn set_fleet(&mut self, drones: BTreeSet<DroneId>) {
         self.fleet = Some(drones);
     }
@@ -74,7 +74,7 @@ impl<'a> Gate<'a> {
         self.seen.get(&drone).copied().unwrap_or_default().words(self.net.now())
     }
 
-    /// Whether its motors stand still, by a heartbeat that is fresh.
+    /// Whether a drone's motors stand still, by a fresh heartbeat.
     pub fn is_disarmed(&self, drone: DroneId) -> bool {
         self.seen.get(&drone).is_some_and(|seen| seen.is_disarmed(self.net.now()))
     }
@@ -110,10 +110,11 @@ impl<'a> Gate<'a> {
         fleet.iter().chain(others.map(|(drone, _)| drone)).copied().collect()
     }
 
-    /// Whether a message may be sent to this drone now (`None`: to everyone).
+    /// Checks whether a message may be sent to a drone now (`None`: to all drones).
     ///
     /// # Errors
-    /// The reason, when it may not.
+    ///
+    /// The reason why it may not be sent.
     pub fn check(&self, to: Option<DroneId>, message: &MavMessage) -> Result<(), Refusal> {
         let held = |why: Why| {
             let Why { words, for_now } = why;

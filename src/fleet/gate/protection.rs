@@ -11,7 +11,7 @@ const GUARDS: [&str; 4] = ["FENCE_", "FS_", "BATT_FS_", "SHOW_HFENCE_"];
 /// Lowest top of a fence that ArduPilot accepts, m.
 const LEAST_TOP_M: f64 = 10.0;
 
-/// A plan's fence and failsafes: what is weaker than that is weaker than the flight needs.
+/// Fence and failsafes that the flight of a plan needs; weaker ones are refused.
 #[derive(Clone, Debug)]
 pub struct Protection {
     wanted: Vec<(&'static str, Wanted)>,
@@ -33,7 +33,7 @@ impl Protection {
         Self { wanted }
     }
 
-    /// Whether this value protects less than the plan needs, or nobody knows what it does.
+    /// Whether a value of a parameter protects less than the plan needs, or its effect is unknown.
     pub fn is_weakened_by(&self, name: &str, value: f32) -> bool {
         let mut known = self.wanted.iter().filter(|(of, _)| *of == name).peekable();
         GUARDS.iter().any(|start| name.starts_with(start))

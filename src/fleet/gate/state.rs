@@ -8,15 +8,15 @@ use crate::protocol::show::{FROM_DRONE, Stage, Status, flag};
 /// State of a drone, as far as orders are concerned, from the safest on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum State {
-    /// Disarmed, and nothing will make it fly by itself.
+    /// Disarmed, and nothing makes the drone take off without an order.
     Ground,
-    /// Disarmed, with an authorized start: it arms by itself any moment.
+    /// Disarmed, with an authorized start: the drone arms at any moment.
     Waiting,
     /// Armed, still waiting for its start.
     Armed,
-    /// Armed: it flies, or may be flying.
+    /// Armed: the drone flies, or may be flying.
     Flying,
-    /// No heartbeat that is fresh: nobody knows. It may be flying.
+    /// No fresh heartbeat: the drone may be flying.
     Unheard,
 }
 

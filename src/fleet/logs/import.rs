@@ -1,4 +1,4 @@
-//! Logs from cards: whose they are and which flight they are of, they say themselves.
+//! Logs from cards: each log itself says which drone and which flight it is of.
 //!
 //! A card holds the logs of a day: both flights, what was aborted, last week's. [`survey`] reads what is
 //! there, [`decide`] says which log is taken for which slot of which flight, and what is left and why,
@@ -23,7 +23,7 @@ pub use carry::{Carried, CarriedOut, Carry, carry_out};
 pub use decide::decide;
 pub use survey::survey;
 
-/// A flight of the campaign.
+/// A flight of the campaign, which logs may be of.
 #[derive(Clone, Debug)]
 pub struct ImportFlight {
     /// Short name of the flight.
@@ -32,7 +32,7 @@ pub struct ImportFlight {
     pub plan: Plan,
     /// Folder of the flight's logs.
     pub logs: PathBuf,
-    /// Slot of each system id; empty: the slot's number is the system id.
+    /// Slot of each system id; if empty, the system id is the slot's number.
     pub slots: BTreeMap<u8, u16>,
     /// File name of each slot's log.
     pub files: BTreeMap<u16, String>,
@@ -40,7 +40,7 @@ pub struct ImportFlight {
     pub start: Option<GpsTime>,
     /// Record that was written when the start was authorized, if there is one.
     pub record: Option<StartRecord>,
-    /// Whether its logs are imported; those of others are only recognized.
+    /// Whether the flight's logs are imported; otherwise they are only recognised.
     pub is_wanted: bool,
 }
 
@@ -53,32 +53,31 @@ pub struct CardLog {
     pub size_bytes: u64,
     /// Identity of the log: its drone, its boots and their shows.
     pub identity: Identity,
-    /// The shows in it that were flown, held against the plans of flights without a known start.
+    /// Shows in the log that were flown, compared with the plans of flights without a known start.
     pub flown: Vec<Flown>,
     /// First of the logs with exactly the same bytes, by index, if this is a copy.
     pub copy_of: Option<usize>,
-    /// A longer log that begins with it.
+    /// A longer log that begins with this one, by index.
     pub beginning_of: Option<usize>,
 }
 
 /// A flight in a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flown {
-    /// GPS time of show time 0; `None`: the log does not say.
+    /// GPS time of show time 0; `None` if the log does not have it.
     pub start: Option<GpsTime>,
-    /// For each flight of the campaign, the share of its plan that was flown, 0..1; 0 where its slot is
-    /// not known.
+    /// Share of each flight's plan that was flown, 0 to 1; 0 where the slot is not known.
     pub shares: Vec<f64>,
 }
 
 /// Logs found on the cards, and everything else there.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
-    /// The logs, by path.
+    /// Logs on the cards, by path.
     pub logs: Vec<CardLog>,
-    /// Files that are no logs or cannot be read, and why.
+    /// Files that are not logs or cannot be read, each with the reason.
     pub unreadable: Vec<(PathBuf, String)>,
-    /// Cards without a log.
+    /// Cards without a log, by path.
     pub empty: Vec<PathBuf>,
 }
 
@@ -100,7 +99,7 @@ pub enum StartFrom {
     Agreed(usize),
 }
 
-/// A log that is taken.
+/// A log that is taken, with its flight and slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Take {
     /// Index of the flight.
@@ -114,14 +113,14 @@ pub struct Take {
 /// Question that only a person can decide.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
-    /// The plan was flown at several times, by equally many drones.
+    /// The plan was flown at several times, by equally many drones each.
     Start {
         /// Index of the flight.
         flight: usize,
-        /// The starts, earliest first, each with the number of drones that flew it.
+        /// Possible starts, earliest first, each with the number of drones that flew it.
         starts: Vec<(GpsTime, usize)>,
     },
-    /// Several logs fit one slot equally, or of the only one it is not known.
+    /// Several logs fit a slot equally, or it is not known whether the only one does.
     Log {
         /// Index of the flight.
         flight: usize,
@@ -151,7 +150,7 @@ pub enum Doubt {
 }
 
 impl Doubt {
-    /// Whether it is about this flight.
+    /// Whether the question is about this flight.
     pub fn is_of(&self, number: usize) -> bool {
         match self {
             Self::Start { flight, .. } | Self::Log { flight, .. } | Self::Slot { flight, .. } => {

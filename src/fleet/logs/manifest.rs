@@ -1,4 +1,5 @@
-//! `logs/manifest.json`: what was brought home, from whom, and how it was verified.
+//! The manifest of a folder of logs, `logs/manifest.json`: what was brought home, from which drone,
+//! and how it was verified.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! One drone's logs: list, download, compare, give the file its name.
+//! Retrieval of one drone's logs: list, download, compare, rename.
 
 mod bring;
 mod choose;
@@ -56,7 +56,7 @@ struct Target {
     size: u64,
 }
 
-/// Brings one drone's logs home.
+/// Sans-IO state machine that brings one drone's logs home.
 #[derive(Debug)]
 pub struct PullOne {
     drone: DroneId,
@@ -147,7 +147,7 @@ enum Next {
 }
 
 impl PullOne {
-    /// Brings logs of `drone` into the shelf's file `file`.
+    /// Prepares to bring logs of `drone` into the shelf's file `file`.
     pub fn new(
         drone: DroneId,
         slot: u16,
@@ -198,19 +198,19 @@ impl PullOne {
         }
     }
 
-    /// Wants the log of this flight.
+    /// Restricts the retrieval to the log of this flight.
     #[must_use]
     pub fn of_flight(self, flight: Option<LogFlight>) -> Self {
         Self { flight, ..self }
     }
 
-    /// On a link whose load is known.
+    /// Tells the retrieval the load of its link.
     #[must_use]
     pub fn on_link(self, load: &Load) -> Self {
         Self { load: Some(load.clone()), ..self }
     }
 
-    /// New bytes so far.
+    /// Number of new bytes so far.
     pub fn new_bytes(&self) -> u64 {
         let now = match &self.stage {
             Stage::Get(get) => get.tally().new_bytes,
@@ -239,12 +239,12 @@ impl PullOne {
         now.max(self.heartbeat)
     }
 
-    /// Whether it only lets time pass, and needs nothing of its link.
+    /// Whether it only waits, and needs nothing of its link.
     pub fn is_idle(&self) -> bool {
         matches!(self.stage, Stage::Settle(_))
     }
 
-    /// Tells whether other drones use the link as well.
+    /// Sets whether other drones use the link as well.
     pub fn share(&mut self, is_shared: bool) {
         self.is_shared = is_shared;
     }

@@ -1,4 +1,4 @@
-//! A download that survives: the bytes so far, and a journal of which they are.
+//! Download that survives interruption: the bytes so far, and a journal of their ranges.
 //!
 //! `NN.BIN.part` holds bytes at their places; `NN.BIN.journal` is only appended to. A range is
 //! written into the journal after its bytes are on the disk, and each line has a checksum, so
@@ -29,7 +29,7 @@ const AT_ONCE: usize = 64 << 10;
 /// Ranges in one line.
 const RANGES_PER_LINE: usize = 256;
 
-/// A download in a file.
+/// Download in progress, in a file.
 #[derive(Debug)]
 pub struct PartFile {
     path: PathBuf,
@@ -76,8 +76,8 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
 }
 
 impl PartFile {
-    /// Continues the download of the final file `path`, or begins it. `identity` says which file
-    /// of which drone it is: a part of another is begun anew.
+    /// Continues the download of the final file `path`, or begins it. `identity` names the file and
+    /// the drone: a part of another file is begun anew.
     ///
     /// # Errors
     /// When the files cannot be opened or written.
@@ -120,8 +120,8 @@ impl PartFile {
         Ok(part)
     }
 
-    /// Waits for the disk no more: for logs that can be had again at any time. A kill is still
-    /// survived, a power loss is not.
+    /// Switches off waiting for the disk, for logs that can be downloaded again at any time. A kill
+    /// is still survived, a power loss is not.
     #[must_use]
     pub fn without_waiting(mut self) -> Self {
         self.is_durable = false;
@@ -152,8 +152,8 @@ impl PartFile {
         result.map_err(|source| FileError::new("write", &journal_path(&self.path), source))
     }
 
-    /// Begins with the bytes of `from`: an earlier log whose beginning this one is thought to have.
-    /// Ranges that came already are kept.
+    /// Begins with the bytes of `from`, an earlier log that this one is thought to begin with.
+    /// Ranges that have already come are kept.
     pub fn seed(&mut self, from: &Path) -> Result<(), FileError> {
         let read = |source| FileError::new("read", from, source);
         let part = part_path(&self.path);
@@ -170,14 +170,14 @@ impl PartFile {
         self.sync()
     }
 
-    /// Removes it: nothing of it is wanted.
+    /// Removes the part file and its journal.
     pub fn discard(self) {
         // What cannot be removed is begun anew by the next download.
         let _ = fs::remove_file(journal_path(&self.path));
         let _ = fs::remove_file(part_path(&self.path));
     }
 
-    /// The final file's path.
+    /// Path of the final file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -213,7 +213,7 @@ impl PartFile {
         Ok(())
     }
 
-    /// Puts what is in memory into the file.
+    /// Writes the bytes in memory to the file.
     pub fn flush(&mut self) -> Result<(), FileError> {
         if self.pending.is_empty() {
             return Ok(());
@@ -228,7 +228,7 @@ impl PartFile {
         Ok(())
     }
 
-    /// Cuts or keeps the file at `size` bytes and reads it through.
+    /// Cuts or keeps the file at `size` bytes and computes its checksums.
     pub fn sums(&mut self, size: u64) -> Result<Sums, FileError> {
         self.note()?;
         let path = part_path(&self.path);
@@ -331,13 +331,13 @@ fn read_journal(bytes: &[u8], identity: &str) -> (u64, Option<Intervals>) {
     (valid, have)
 }
 
-/// Of bytes in memory.
+/// Size and checksums of bytes in memory.
 pub fn sums_of(bytes: &[u8]) -> Sums {
     let sha256 = format!("{:x}", Sha256::digest(bytes));
     Sums { size: bytes.len() as u64, crc32: ap_crc32(bytes), sha256 }
 }
 
-/// Reads a file through.
+/// Size and checksums of a file, which is read through.
 pub fn sums(path: &Path) -> Result<Sums, FileError> {
     let fail = |source| FileError::new("read", path, source);
     let mut file = File::open(path).map_err(fail)?;
@@ -356,7 +356,7 @@ pub fn sums(path: &Path) -> Result<Sums, FileError> {
     Ok(Sums { size, crc32: crc32.value(), sha256 })
 }
 
-/// Compares pieces of the vehicle's file with those of a part, and keeps nothing.
+/// Comparison of pieces of the vehicle's file with those of a part; nothing is kept.
 #[derive(Debug)]
 pub struct Sample {
     file: File,
@@ -367,7 +367,8 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Compares these ranges of the part of `path`, whose file has `size` bytes.
+    /// Prepares to compare these ranges (start and end in bytes) of the part of `path`, whose file
+    /// has `size` bytes.
     pub fn new(path: &Path, size: u64, ranges: &[(u64, u64)]) -> Result<Self, FileError> {
         let part = part_path(path);
         let file = File::open(&part).map_err(|source| FileError::new("open", &part, source))?;

@@ -1,4 +1,4 @@
-//! Many drones' logs at once.
+//! Retrieval of many drones' logs at once.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
@@ -31,7 +31,7 @@ pub struct Wanted {
     pub slot: u16,
     /// Name of the slot's log file: `07.BIN`.
     pub file: String,
-    /// The flight whose log it is to be; none: no start was written down.
+    /// Flight that the log must be of; `None` if no start was recorded.
     pub flight: Option<LogFlight>,
 }
 
@@ -52,10 +52,10 @@ pub struct PullOptions {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PullError {
-    /// The link is gone.
+    /// The link has failed.
     #[error(transparent)]
     Net(#[from] NetError),
-    /// The folder's manifest is wrong.
+    /// The folder's manifest is not valid.
     #[error(transparent)]
     Shelf(#[from] CampaignError),
 }
@@ -63,9 +63,9 @@ pub enum PullError {
 /// Outcome of pulling a drone's logs.
 #[derive(Clone, Debug)]
 pub enum Outcome {
-    /// Home: now, earlier, or partly; see [`OneDone::failure`].
+    /// The log was brought home, now, earlier, or partly; see [`OneDone::failure`].
     Done(OneDone),
-    /// The run was stopped before.
+    /// The run was stopped before the drone's logs were home.
     Stopped,
 }
 
@@ -79,7 +79,7 @@ impl Outcome {
     }
 }
 
-/// Pulls logs into the folder `logs`. One drone's trouble is its own: it is in its outcome.
+/// Pulls logs into the folder `logs`. Problems of one drone are in its own outcome.
 ///
 /// # Errors
 /// When the link is gone, or the folder's manifest cannot be read.

@@ -1,4 +1,4 @@
-//! Whether a folder of logs is still what its manifest says.
+//! Check whether a folder of logs is still what its manifest says.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -10,10 +10,10 @@ use crate::base::file::FileError;
 use crate::campaign::CampaignError;
 use crate::log::Log;
 
-/// One log of a manifest.
+/// A log of the manifest, with its faults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checked {
-    /// As the manifest has it.
+    /// Entry of the log in the manifest.
     pub entry: ManifestEntry,
     /// Faults of the log; empty if it is as it came.
     pub faults: Vec<Fault>,
@@ -37,10 +37,10 @@ pub enum Fault {
     /// The file has another content than when it came.
     #[error("has changed since it came (another SHA-256); pull or import it again")]
     Changed,
-    /// Not all of it.
+    /// The log is incomplete, as the text says.
     #[error("is not known to be whole: {0}; pull it again, or import its card")]
     Incomplete(String),
-    /// Whole, but no log.
+    /// The file is whole, but not a log, as the text says.
     #[error("is what the drone had, but no log that can be read: {0}")]
     NotALog(String),
 }
@@ -72,7 +72,7 @@ pub fn verify(folder: &Path) -> Result<Vec<Checked>, CampaignError> {
     Ok(shelf.manifest.logs.iter().map(check).collect())
 }
 
-/// Logs in `folder` that its manifest does not know, by name.
+/// Names of the logs in `folder` that its manifest does not have.
 ///
 /// # Errors
 /// When the folder or its manifest cannot be read; a folder that is not there has none.

@@ -1,4 +1,4 @@
-//! The files on cards.
+//! Search for the files on cards.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! Copying what was decided. Nothing at home is overwritten: logs of another start go to `flight-K/`,
-//! those that are replaced to `older/`.
+//! Copying of the logs that were decided on. Nothing at home is overwritten: logs of another start
+//! go to `flight-K/`, replaced ones to `older/`.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -24,7 +24,7 @@ pub struct Carry {
     pub again: bool,
     /// Program and version, for the manifest.
     pub made_by: String,
-    /// For the manifest, Unix seconds.
+    /// Time of the import for the manifest, Unix, s.
     pub unix_s: u64,
 }
 
@@ -33,9 +33,9 @@ pub struct Carry {
 pub enum Carried {
     /// The log is home now, with the new place of a log of another start that lay there before.
     Taken(Box<ManifestEntry>, Option<PathBuf>),
-    /// It was home before; why it may not hold all of its flight.
+    /// The log was home before, with a reason to think that it does not hold all of its flight.
     There(Option<String>),
-    /// It is not, and why.
+    /// The log is not home, for this reason.
     Left(String),
 }
 
@@ -48,7 +48,7 @@ pub struct CarriedOut {
     pub missing: Vec<BTreeSet<u16>>,
 }
 
-/// Copies what was decided into the flights' folders.
+/// Copies the logs of a decision into the flights' folders.
 ///
 /// # Errors
 /// When a folder's manifest cannot be read or written. What a card does not give up is an outcome.

@@ -1,4 +1,4 @@
-//! Which log is taken for which slot of which flight. Nothing is read here.
+//! Choice of the log for each slot of each flight. No file is read here.
 
 use std::collections::{BTreeMap, BTreeSet};
 

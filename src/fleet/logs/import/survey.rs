@@ -20,7 +20,7 @@ const MOST_FLOWN: usize = 16;
 /// Logs are compared in pieces of this size.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// Reads all logs on the cards. `progress` is told after each, with their number.
+/// Reads all logs on the cards. `progress` is called after each, with the number of logs.
 ///
 /// # Errors
 /// When a card is not there.

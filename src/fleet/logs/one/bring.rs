@@ -1,5 +1,5 @@
-//! The bytes of a log: continued where an earlier run ended, begun anew when it is another log,
-//! by MAVFTP or by the log messages.
+//! Transfer of a log's bytes: continued where an earlier run ended, begun anew when it is another
+//! log, by MAVFTP or by the log messages.
 
 use super::home::Begun;
 use super::ways::MUTE;

@@ -1,4 +1,4 @@
-//! Which of a drone's logs are brought home, and into which files.
+//! Choice of a drone's logs to bring home, and of the files that they go to.
 
 use super::home::Needed;
 use super::ways::Ways;

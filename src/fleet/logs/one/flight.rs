@@ -1,5 +1,5 @@
-//! Of which flight a log is: by what it says of its own time, held against the start that was
-//! authorized. A log that is intact is not therefore the right one.
+//! Flight that a log is of, by its own account of time, compared with the start that was
+//! authorized. An intact log is not therefore the right one.
 
 use std::path::{Path, PathBuf};
 

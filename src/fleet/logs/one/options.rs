@@ -6,13 +6,13 @@ use crate::base::time::GpsTime;
 use crate::fleet::logs::manifest::ManifestEntry;
 use crate::link::clock::{Micros, S};
 
-/// Which of a drone's logs.
+/// Choice among a drone's logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Which {
-    /// The one of the flight: of its start, if one was written down; else the newest, unless an
+    /// The log of the flight: of its start, if one was recorded; otherwise the newest, unless an
     /// older one is home.
     Flight,
-    /// The newest, whatever it is of.
+    /// The newest log, of whatever flight.
     Newest,
     /// The log of this number on the drone.
     Number(u32),
@@ -29,21 +29,21 @@ pub struct OneOptions {
     pub patience: Micros,
     /// Time after which a drone that was never heard is given up, us.
     pub wait: Micros,
-    /// Larger logs are refused, bytes.
+    /// Size above which a log is refused, bytes.
     pub most_size: u64,
-    /// Folders of logs, as autopilots name them; the first that is there is taken.
+    /// Folders of logs, as autopilots name them; the first that exists is used.
     pub folders: Vec<String>,
-    /// Brings a log again that is there.
+    /// Whether a log that is at home is brought again.
     pub again: bool,
-    /// Waits for the disk, so that a power loss loses little; needless for logs that can be had
-    /// again at any time.
+    /// Whether to wait for the disk, so that a power loss loses little; needless for logs that can
+    /// be downloaded again at any time.
     pub is_durable: bool,
-    /// Differs from run to run.
+    /// First number of the requests, which differs from run to run.
     pub start_number: u32,
-    /// For the manifest, Unix seconds.
+    /// Time of the run for the manifest, Unix, s.
     pub unix_s: u64,
-    /// Starts of the campaign's other flights: where no start of this one was written down, a log of
-    /// one of them is not this one's.
+    /// Starts of the campaign's other flights (name and GPS time of show time 0): if no start of
+    /// this flight was recorded, a log of one of them is not this flight's.
     pub other_starts: Vec<(String, GpsTime)>,
 }
 
@@ -71,7 +71,7 @@ pub struct Failure {
     pub reason: String,
     /// Remedy, for the crew.
     pub advice: &'static str,
-    /// Bytes that came and are kept for the next run.
+    /// Number of bytes that came and are kept for the next run.
     pub kept_bytes: u64,
 }
 
@@ -85,9 +85,9 @@ pub struct OneDone {
     /// Reason why the logs there could not be compared with what the drone has now, if they could
     /// not.
     pub unchecked: Option<String>,
-    /// Logs of earlier flights that were at home, where they lie now.
+    /// Logs of earlier flights that were at home, each with its new path.
     pub moved: Vec<PathBuf>,
-    /// Number of the drone's newest log, where that is newer than the one of this flight.
+    /// Number of the drone's newest log, if it is newer than the one of this flight.
     pub newer: Option<u32>,
     /// Reason why logs are missing, if they are.
     pub failure: Option<Failure>,

@@ -1,5 +1,5 @@
-//! Whether what came is what the drone has: by its checksum, or by pieces that are read again.
-//! Only then the file gets its name.
+//! Proof that what came is what the drone has: by its checksum, or by pieces that are read again.
+//! Only then does the file get its name.
 
 use super::flight::Found;
 use super::{Failure, MOST_ROUNDS, PullOne, SAMPLE_BYTES, SAMPLES, Stage};
