@@ -11,9 +11,9 @@ use crate::base::rng::{Purpose, stream};
 use crate::sim::Atmosphere;
 use crate::sim::air::{AirSampler, FieldScales, RandomField};
 
-/// Random series are drawn for show times from this ...
+/// Show time from which random series are drawn, s.
 const FROM_S: f64 = -180.0;
-/// ... for so long.
+/// Duration for which random series are drawn, s.
 const LENGTH_S: f64 = 2_400.0;
 /// Time between two drawn values of local gusts, and of the wind's slow gusts, s.
 const LOCAL_STEP_S: f64 = 0.5;

@@ -148,7 +148,7 @@ pub fn kind_of(name: &str) -> Result<&'static Kind, BlindError> {
     })
 }
 
-/// Uniform in 0..1.
+/// A number drawn uniformly from 0 to 1.
 pub(super) fn unit(rng: &mut Pcg64) -> f64 {
     StandardUniform.sample(rng)
 }
@@ -165,7 +165,7 @@ pub(super) fn log_between(rng: &mut Pcg64, (low, high): (f64, f64)) -> f64 {
 
 /// Largest share of the inflow that is drawn: beyond it rotors are windmills.
 const MOST_SHARE: f64 = 0.8;
-/// Least share.
+/// Smallest share of the inflow that is drawn.
 const LEAST_SHARE: f64 = 0.005;
 /// Speed at which translational lift is stated, m/s.
 const LIFT_MPS: f64 = 5.0;

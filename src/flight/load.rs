@@ -302,7 +302,7 @@ fn ground_height_m(height: &Series, armed_s: f64) -> f64 {
     first.get(first.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// What a silence is called; `None`: it is too short to speak of.
+/// Sentence about a silence of the log; `None` if it is too short to mention.
 fn silence(silent_s: f64, words: String) -> Option<String> {
     if silent_s > LONGEST_FLIGHT_S {
         return Some(format!(

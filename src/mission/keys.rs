@@ -53,7 +53,7 @@ fn slips(a: &str, b: &str) -> usize {
 /// Digits from which a number is written with an exponent.
 const LONG_NUMBER: usize = 25;
 
-/// The same TOML with numbers of hundreds of digits (1e300) written with an exponent.
+/// TOML with its numbers of hundreds of digits (1e300) written with an exponent.
 pub(super) fn short_numbers(text: &str) -> String {
     let short = |number: &str| match number.parse::<f64>() {
         Ok(value) if number.len() > LONG_NUMBER => format!("{value:e}"),

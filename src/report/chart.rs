@@ -165,7 +165,7 @@ impl Panel {
         self.log_x = true;
     }
 
-    /// Draws the panel.
+    /// Draws the panel into a scene of this size, pixels.
     pub(super) fn draw(self, width: f64, height: f64) -> Scene {
         let mut layout = Layout::new((self.x.min, self.x.max), (self.y.min, self.y.max))
             .with_width(width)

@@ -54,7 +54,7 @@ pub(super) fn diverging(position: f64) -> String {
     hex(blend(&DIVERGING, f64::midpoint(position, 1.0)))
 }
 
-/// The same as red, green and blue.
+/// Diverging colour at `position` of -1..1 as red, green and blue.
 pub(super) fn diverging_rgb(position: f64) -> [u8; 3] {
     blend(&DIVERGING, f64::midpoint(position, 1.0)).map(|c| c.round() as u8)
 }

@@ -28,7 +28,7 @@ pub(super) struct Comparison {
     pub(super) paper: String,
     /// Ours minus the paper's.
     pub(super) difference: String,
-    /// The same over the paper's error.
+    /// Ours minus the paper's, in standard errors of the paper.
     pub(super) in_errors: String,
 }
 
@@ -254,7 +254,7 @@ pub(super) struct DroneLaws {
     pub(super) slope: String,
     pub(super) linear_u0: String,
     pub(super) linear_chi2: String,
-    /// Added scatter, us.
+    /// Scatter added to the errors of the windows, us.
     pub(super) scatter: String,
 }
 

@@ -15,7 +15,7 @@ use super::text::shortened;
 
 /// Most values of one field over all times: 0.5 MB in the page.
 const MOST_VALUES: usize = 200_000;
-/// Most times.
+/// Largest number of times in a film.
 const MOST_TIMES: usize = 3_600;
 /// Stands for no value.
 const NONE: i16 = i16::MIN;

@@ -83,7 +83,7 @@ impl<'a> Frames<'a> {
         self.map.time_s.get(time).copied().unwrap_or(f64::NAN)
     }
 
-    /// The estimate, m/s.
+    /// Estimate of a drone at a time, by their indices, m/s.
     pub(super) fn estimate(&self, drone: usize, time: usize) -> Option<f64> {
         estimate(self.map, drone, time)
     }

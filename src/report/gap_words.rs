@@ -29,7 +29,7 @@ pub(super) fn minus(number: &str) -> String {
     number.replace('-', "−")
 }
 
-/// Three significant digits.
+/// A number with three significant digits.
 pub(super) fn number(value: f64) -> String {
     if usable(value) { minus(&short(value)) } else { fixed(value, 0) }
 }

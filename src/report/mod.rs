@@ -120,7 +120,7 @@ struct Figure {
     name: String,
     /// What it shows, for people who do not see it.
     title: String,
-    /// What one sees.
+    /// Caption: what the figure shows, in full sentences.
     caption: String,
     svg: String,
 }

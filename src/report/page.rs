@@ -73,7 +73,7 @@ pub(super) struct Gallery {
 }
 
 impl Gallery {
-    /// The same for a figure with links to others: those are in a folder, seen from the page.
+    /// Shows a figure with links to others, which lie in a folder as seen from the page.
     pub(super) fn show_linked(&mut self, figure: Figure) -> Value {
         let file = (figure.name.clone(), figure.svg.clone());
         let svg = figure.svg.replace("<a href=\"", &format!("<a href=\"{FIGURES_FOLDER}/"));

@@ -19,7 +19,7 @@ pub(super) enum Pixel {
     Empty,
     /// Position on the diverging scale, -1..1.
     At(f64),
-    /// Grey.
+    /// A grey pixel of a hatched area, which marks doubtful values.
     Hatch,
 }
 

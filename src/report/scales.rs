@@ -10,7 +10,7 @@ use crate::base::estimate::Estimate;
 
 use super::text::{NONE, clean, count, estimate, fixed, sentence, usable};
 
-/// Three significant digits.
+/// A number with three significant digits.
 fn rounded(value: f64) -> String {
     if !usable(value) {
         return fixed(value, 0);
@@ -19,7 +19,7 @@ fn rounded(value: f64) -> String {
     fixed(value, digits.clamp(0, 4) as usize)
 }
 
-/// `98 to 410`.
+/// An interval in words: `98 to 410`.
 pub(super) fn interval(of: Interval) -> String {
     format!("{} to {}", rounded(of.low), rounded(of.high))
 }

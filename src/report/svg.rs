@@ -26,7 +26,7 @@ pub(super) fn escape(text: &str) -> String {
 pub(super) enum Anchor {
     /// At its left end.
     Start,
-    /// In its middle.
+    /// The text is centred on its point.
     Middle,
     /// At its right end.
     End,
@@ -126,7 +126,7 @@ impl Drawing {
         let _ = write!(self.body, "<g><title>{}</title>", escape(&clean(tooltip)));
     }
 
-    /// Closes the group.
+    /// Closes the innermost group.
     pub(super) fn close(&mut self) {
         self.body.push_str("</g>");
     }

@@ -85,7 +85,7 @@ impl Client {
         self.ask_within(body, ANSWER)
     }
 
-    /// The same with another patience.
+    /// Sends a request and waits at most `patience` for the body of its answer.
     pub(super) fn ask_within(
         &mut self,
         body: &Value,

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::base::parse;
 
-/// The protocol's version.
+/// Version of the server's protocol.
 const VERSION: &str = "1.0";
 
 /// A message from the server.

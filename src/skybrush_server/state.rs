@@ -103,7 +103,7 @@ impl ShowLine {
     }
 }
 
-/// `12:34:56` in seconds.
+/// A time of day such as `12:34:56`, in seconds.
 fn seconds(time: &str) -> Option<i64> {
     let mut parts = time.split(':').map(str::parse::<u16>);
     let mut part = || Some(i64::from(parts.next()?.ok()?));

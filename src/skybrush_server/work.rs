@@ -28,9 +28,9 @@ pub struct Running {
 #[derive(Debug)]
 struct Waited {
     receipt: String,
-    /// When it was begun, or something was last heard of it.
+    /// Time at which it was begun, or the server last sent anything about it.
     moved: Micros,
-    /// 0..1.
+    /// Share that is done, 0 to 1.
     share: f64,
 }
 

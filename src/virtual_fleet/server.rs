@@ -28,7 +28,7 @@ const TRANSFER_ROUND: Micros = 2 * MS;
 const LONGEST_STEP: Micros = 10 * S;
 /// Up to this speed messages are never too close together; above it time goes on in whole rounds.
 const SMOOTH_SPEED: f64 = 20.0;
-/// Largest datagram.
+/// Largest datagram that is received, bytes.
 const DATAGRAM: usize = 65_536;
 
 /// Speed of the vehicles' time.

@@ -6,7 +6,7 @@ use crate::link::clock::{MS, Micros};
 /// links: packets that are late by up to this are made up for.
 const LATE: f64 = (20 * MS) as f64;
 
-/// An autopilot's loop.
+/// Duration of an autopilot's loop, us.
 const LOOP: f64 = 2_500.0;
 
 /// Largest rates at which a vehicle sends packets, 1/s; 0: no limit.

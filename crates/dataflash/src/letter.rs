@@ -20,13 +20,13 @@ pub(super) enum Letter {
     F16,
     F32,
     F64,
-    /// Hundredths: `c`.
+    /// Signed 16-bit, hundredths: `c`.
     CentiI16,
-    /// Hundredths: `C`.
+    /// Unsigned 16-bit, hundredths: `C`.
     CentiU16,
-    /// Hundredths: `e`.
+    /// Signed 32-bit, hundredths: `e`.
     CentiI32,
-    /// Hundredths: `E`.
+    /// Unsigned 32-bit, hundredths: `E`.
     CentiU32,
     /// Degrees in units of 1e-7: `L`.
     Degrees,
@@ -181,7 +181,7 @@ impl Letter {
     }
 }
 
-/// Takes decoded numbers.
+/// Receiver of decoded numbers.
 trait Sink {
     type Output;
 

@@ -126,7 +126,7 @@ pub(super) struct Scan {
 /// What the walk needs of a type at every message.
 #[derive(Clone, Copy, Default)]
 struct Kind {
-    /// 0: unknown.
+    /// Length of the message, bytes; 0 if the type is unknown.
     length: u8,
     flags: u8,
 }

@@ -34,7 +34,7 @@ pub enum Value<'a> {
 pub struct LogWriter<W: Write> {
     out: W,
     buffer: Vec<u8>,
-    /// By type byte.
+    /// Layout of each message type, by its type byte.
     layouts: Vec<Option<Layout>>,
 }
 

@@ -45,7 +45,7 @@ impl Scalar {
         (left, right)
     }
 
-    /// The same curve written with more control points (`degree` at most 7).
+    /// This curve written with more control points (`degree` at most 7).
     pub(crate) fn elevated(mut self, degree: usize) -> Self {
         while self.degree < degree.min(7) {
             let n = self.degree + 1;

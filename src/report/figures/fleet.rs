@@ -19,7 +19,7 @@ use super::plan_view::{colour_bar, places_of_slots};
 const ROOM: f64 = 840.0;
 /// Left of the grid: the axis of heights.
 const LEFT: f64 = 58.0;
-/// Above the grid.
+/// Height above the grid, pixels.
 const TOP: f64 = 28.0;
 /// Widest cell, pixels; its height is 0.72 of its width.
 const WIDEST: f64 = 150.0;

@@ -169,7 +169,7 @@ fn still(study: &StudyResult) -> Option<Figure> {
     })
 }
 
-/// W* against W.
+/// Panel of the fitted updraft W* against the true W.
 fn inset(coloured: &Coloured<'_>) -> Panel {
     let both = || {
         coloured.flights.iter().filter_map(|(f, _)| Some([f.updraft_mps, f.paper_way_mps?.value]))

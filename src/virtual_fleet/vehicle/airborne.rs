@@ -115,7 +115,7 @@ impl<'w> VirtualVehicle<'w> {
         }
     }
 
-    /// Flies until now.
+    /// Flies on until time `now`.
     pub(super) fn fly(&mut self, now: Micros, out: &mut Vec<MavMessage>) {
         let Some(mut airborne) = self.airborne.take() else { return };
         let time_s = (self.world.gps_us(now) - airborne.start_us) as f64 * 1e-6;

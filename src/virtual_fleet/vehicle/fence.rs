@@ -9,7 +9,7 @@ use crate::link::frame::{MavMessage, dialect};
 use crate::link::station::STATION;
 use dialect::{MavCmd, MavMissionResult, MavMissionType};
 
-/// Items that fit.
+/// Largest number of items that a vehicle stores.
 const MOST_ITEMS: u16 = 300;
 /// An item that does not come is asked for again after so long, and an upload is given up.
 const ASK_AGAIN: Micros = S;
@@ -40,7 +40,7 @@ struct Upload {
 }
 
 impl Fence {
-    /// Items stored.
+    /// Number of items that are stored.
     pub(super) fn len(&self) -> usize {
         self.items.len()
     }
@@ -237,7 +237,7 @@ fn is_whole(items: &[Item]) -> bool {
     true
 }
 
-/// Even-odd rule.
+/// Whether a point is inside a polygon, by the even-odd rule.
 fn is_inside(corners: &[Vector3<f64>], point: &Vector3<f64>) -> bool {
     let mut inside = false;
     for (index, a) in corners.iter().enumerate() {

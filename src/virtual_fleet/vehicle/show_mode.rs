@@ -30,13 +30,13 @@ pub(super) enum Reload {
     Broken,
 }
 
-/// What the stage machine wants done.
+/// Action that the stages of the show ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wish {
     Nothing,
     /// Arm now if the checks allow it.
     Arm,
-    /// Say so.
+    /// Report that the start is given up.
     GiveUp,
 }
 
@@ -128,12 +128,12 @@ impl<'w> ShowMode<'w> {
         self.authorized && self.start_us.is_some() && self.stage == Stage::WaitForStart
     }
 
-    /// Takes the mode.
+    /// Enters the show mode.
     pub(super) fn enter(&mut self) {
         self.stage = Stage::Init;
     }
 
-    /// Leaves the mode.
+    /// Leaves the show mode.
     pub(super) fn leave(&mut self) {
         self.stage = Stage::Off;
     }

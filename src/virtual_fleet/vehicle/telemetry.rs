@@ -108,7 +108,7 @@ pub(super) struct Telling {
     pub(super) ready: bool,
     pub(super) place: Geodetic,
     pub(super) height_m: f64,
-    /// North, east, up.
+    /// Velocity to the north, to the east and up, m/s.
     pub(super) velocity_mps: Vector3<f64>,
     pub(super) heading_deg: f64,
     pub(super) volts: f64,
@@ -119,7 +119,7 @@ pub(super) struct Telling {
 }
 
 impl Telling {
-    /// As one message.
+    /// State as the message with this id; `None` if it has no such message.
     pub(super) fn message(&self, id: u32) -> Option<MavMessage> {
         Some(match id {
             HEARTBEAT => self.heartbeat(),

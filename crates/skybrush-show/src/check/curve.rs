@@ -136,7 +136,7 @@ impl Curve {
         difference
     }
 
-    /// The same curve moved by a constant.
+    /// This curve moved by a constant, m.
     pub(super) fn shifted(&self, by: Vector3<f64>) -> Self {
         let mut curve = *self;
         for point in &mut curve.points[..curve.count] {
@@ -145,7 +145,7 @@ impl Curve {
         curve
     }
 
-    /// The same curve in a horizontal plane: z becomes 0.
+    /// This curve projected onto the horizontal plane: z becomes 0.
     pub(super) fn flat(&self) -> Self {
         let mut curve = *self;
         for point in &mut curve.points[..curve.count] {

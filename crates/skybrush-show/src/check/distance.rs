@@ -30,7 +30,7 @@ const INSTANTS: usize = 16;
 const SHORTEST_MS: f64 = 20.0;
 /// Box comparisons per drone after which a slab is halved.
 const COMPARISONS: usize = 200;
-/// The same for the shortest slabs, after which the check gives up.
+/// Box comparisons per drone in one of the shortest slabs after which the check gives up.
 const MOST_COMPARISONS: usize = 10_000;
 /// Violations that one slab keeps, and parts into which it is halved, before the check gives up.
 const MOST_RECORDS: usize = 10_000;

@@ -55,7 +55,7 @@ pub(super) fn usable(fence: &Fence) -> bool {
         && fence.max_altitude_m.is_finite()
 }
 
-/// The same for one polygon.
+/// Whether a polygon can be checked against: three corners or more, all finite.
 pub(super) fn usable_polygon(corners_m: &[[f64; 2]]) -> bool {
     corners_m.len() >= 3 && corners_m.iter().flatten().all(|value| value.is_finite())
 }
@@ -145,7 +145,7 @@ impl<'a> Polygon<'a> {
         self.contains(x, y) == self.is_inclusion
     }
 
-    /// Even-odd rule.
+    /// Whether a point is inside, by the even-odd rule.
     fn contains(&self, x: f64, y: f64) -> bool {
         let next = self.corners.iter().cycle().skip(1);
         self.corners.iter().zip(next).fold(false, |inside, (a, b)| {

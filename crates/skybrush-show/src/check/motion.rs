@@ -90,7 +90,7 @@ pub(super) fn quantities(input: &CheckInput<'_>) -> [Quantity; 7] {
     ]
 }
 
-/// Watches one drone.
+/// Watches all quantities over the trajectory of one drone.
 pub(super) fn watch(track: &Track<'_>, quantities: &[Quantity; 7]) -> [Watch; 7] {
     let mut watches = quantities.map(Watch::new);
     let [horizontal, up, down, acceleration, step, highest, lowest] = &mut watches;

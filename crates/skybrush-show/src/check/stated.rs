@@ -87,7 +87,7 @@ impl Stated {
         }
     }
 
-    /// Watches one drone.
+    /// Watches the stated limits over the trajectory of one drone.
     pub(super) fn watch(&self, track: &Track<'_>) -> Vec<Watch> {
         let mut watches = Vec::new();
         for (quantity, vertical) in [(self.horizontal, false), (self.vertical, true)] {

@@ -30,9 +30,9 @@ pub(super) struct Track<'a> {
     pub(super) spans: Vec<Span>,
     /// Height of the ground where it takes off, show frame, m.
     pub(super) ground_m: f64,
-    /// First point, m.
+    /// First point of the trajectory, show frame, m.
     pub(super) start_m: Vector3<f64>,
-    /// Last point, m.
+    /// Last point of the trajectory, show frame, m.
     pub(super) end_m: Vector3<f64>,
     /// Lowest point of the landing that follows the trajectory, m.
     pub(super) landed_z_m: f64,

@@ -10,7 +10,7 @@ const PRECISION: f64 = 1e-6;
 /// Stretches nearer to each other than this are one, s.
 const JOINT_S: f64 = 1e-6;
 
-/// What is watched.
+/// A quantity that is watched, with its limit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quantity {
     /// Name of the check.
