@@ -1,4 +1,4 @@
-//! What became of every log, and of every drone of the plan: one account of both.
+//! Account of every log and of every drone of the plan: used, used in part, unused or missing.
 
 use std::collections::BTreeMap;
 

@@ -119,7 +119,7 @@ pub enum Quality {
 }
 
 impl Quality {
-    /// In words.
+    /// The quality as a clause for people: "the log has a gap".
     pub fn words(self) -> &'static str {
         match self {
             Self::Saturation => "a motor touched its limit",

@@ -1,4 +1,4 @@
-//! What a reader must know before using a flight's numbers, in plain words.
+//! Cautions that a reader needs before using a flight's numbers, in plain words.
 
 use super::calibrate;
 use super::options::AnalysisOptions;

@@ -1,4 +1,4 @@
-//! What a reader must know where a battery's voltage was not logged.
+//! Cautions that a reader needs where a battery's voltage was not logged.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! What an analysis gets: logs, flights, the truth where it is known.
+//! Input of an analysis: logs, flights, and the truth where it is known.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,23 +21,23 @@ pub struct LogInput {
     /// Slot of the plan by somebody's record. Only the home position in the log counts more; without
     /// a record, the file's number and the system id count.
     pub slot: Option<u16>,
-    /// The file.
+    /// Path of the log or table.
     pub path: PathBuf,
-    /// What its columns are, if it is a table and no DataFlash log.
+    /// Meaning of the columns, if the file is a table and not a DataFlash log.
     pub table: Option<Arc<Mapping>>,
-    /// Why it is not to be used, if whoever gives it knows: it is of another flight.
+    /// Reason why the log is not to be used, if the caller has one: it is of another flight.
     pub refused: Option<String>,
 }
 
 /// One flight to analyse.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlightInput<'a> {
-    /// Short name.
+    /// Short name of the flight.
     pub name: &'a str,
     /// The plan, if there is one.
     pub plan: Option<&'a Plan>,
-    /// What the flight was for; `None`: as the plan says, else a calibration if it has a ladder
-    /// (climbs at three speeds or more, and descents), else a measurement.
+    /// Purpose of the flight; `None`: that of the plan, otherwise a calibration if it has a ladder
+    /// (climbs at three speeds or more, and descents), otherwise a measurement.
     pub purpose: Option<Purpose>,
     /// The logs, in the order in which unplanned results are listed.
     pub logs: &'a [LogInput],
@@ -50,16 +50,16 @@ pub struct FlightInput<'a> {
     /// Ground height and the vehicle's response to air density; `None`: pulses of the map are not
     /// corrected for height.
     pub density: Option<Density>,
-    /// How the vehicle leans in wind, where its drag is known; `None`: the map is not corrected for
+    /// Lean of the vehicle in wind, where its drag is known; `None`: the map is not corrected for
     /// wind, and says how wrong it may be.
     pub leaning: Option<Leaning>,
     /// Power of thrust that `u - 1000` goes with, where the vehicle is known: 1 where thrust is linear
     /// in the pulse.
     pub thrust_exponent: Option<f64>,
-    /// How the battery acts on the pulse; `None`: it does not.
+    /// Effect of the battery on the pulse; `None` if it has none.
     pub sag: Option<Sag>,
-    /// What wind does to the vehicle's pulse, where its physics is known and [`FlightInput::leaning`]
-    /// does not say.
+    /// Effect of wind on the vehicle's pulse, where its physics is known and
+    /// [`FlightInput::leaning`] does not give it.
     pub lean_table: Option<&'a LeanTable>,
     /// The scales of the air that the flight was simulated in, where it has any.
     pub true_air: Option<&'a TrueAir>,
@@ -88,7 +88,7 @@ impl FlightInput<'_> {
 /// The vertical air speed that one simulated drone met.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TruthSeries {
-    /// Show time of the first value, s; the others follow each second.
+    /// Show time of the first value, s; one value follows each second.
     pub first_s: i64,
     /// Mean updraft over the 10 s around each second, m/s, up positive.
     pub updraft_mps: Vec<f64>,

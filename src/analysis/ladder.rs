@@ -1,4 +1,4 @@
-//! How much of the ladder a drone flew: a law of a few slow rungs is no equal of the others.
+//! Share of the ladder that a drone flew: a law of a few slow rungs is no equal of a law of all.
 //!
 //! A log that ends halfway gives a law as well, with small errors of its own, but it is the law of
 //! the slow rungs: it may be far from those of the fleet, for the two laws are only the first terms of

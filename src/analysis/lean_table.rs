@@ -1,4 +1,4 @@
-//! What wind does to the pulse of a vehicle whose physics is known: by lean and climb, as a table.
+//! Effect of wind on the pulse of a vehicle whose physics is known: a table by lean and climb.
 //!
 //! A drone with rotor drag leans by a degree or more for each metre per second of wind, and its
 //! rotors gain more from the fresh air (translational lift) than leaning costs. Wind is not logged,

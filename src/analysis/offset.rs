@@ -54,12 +54,12 @@ pub struct OffsetPoint {
     pub offset_us: f64,
 }
 
-/// An interpolated offset.
+/// Offset of the pulse at one time and height, interpolated between 0-windows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
-    /// The offset, us.
+    /// Offset of the pulse, us.
     pub us: f64,
-    /// Between the 0-windows; else it is the nearest one's.
+    /// Whether it lies between 0-windows; otherwise it is that of the nearest one.
     pub inside: bool,
 }
 

@@ -75,8 +75,8 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
     (slots.collect(), warnings)
 }
 
-/// Whose each log is: a slot of the plan, nobody's in particular without a plan, or why it is not
-/// used; and what contradicts itself.
+/// Owner of each log: a slot of the plan, `None` without a plan, or the reason why the log is not
+/// used. The second list has the contradictions between logs.
 pub fn whose_logs(input: &FlightInput<'_>) -> (Vec<Result<Option<u16>, String>>, Vec<String>) {
     let (slots, warnings) = match_slots(input);
     let of = |slot| match slot {

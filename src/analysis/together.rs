@@ -1,4 +1,4 @@
-//! Remarks on many drones or logs that say the same: one line, with a list of whose they are.
+//! Merging of equal remarks on many drones or logs into one line with a list of their names.
 //!
 //! Two remarks are the same when they differ at most in measured numbers (with decimals) and in names of
 //! logs: 49 logs that end in the air between 1.0 and 1.3 m above the ground are one cause.
@@ -11,11 +11,11 @@ const NAMED: usize = 6;
 /// A remark on a drone or a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Remark {
-    /// Its slot, if it has one.
+    /// Slot of the drone that the remark is about, if it has one.
     pub slot: Option<u16>,
-    /// What it is called where it stands alone.
+    /// Name of the drone or log, as the remark has it when it stands alone.
     pub name: String,
-    /// What is to be said.
+    /// Text of the remark.
     pub text: String,
 }
 

@@ -49,10 +49,10 @@ pub struct DroneSeries {
     pub(super) moved_m: Vec<Option<[f64; 3]>>,
 }
 
-/// What the lean of a drone does to its estimate.
+/// Lean of a drone, with its effect on the drone's estimate.
 #[derive(Clone, Copy, Debug)]
 pub struct Lean<'a> {
-    /// How the vehicle leans in wind, where that is known.
+    /// Lean of the vehicle in wind, where that is known.
     pub leaning: Option<Leaning>,
     /// The drone's windows in the calibration.
     pub calibration: &'a [WindowStats],

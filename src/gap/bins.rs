@@ -21,11 +21,11 @@ const SHORTEST_S: f64 = 2.5;
 /// One bin of a command group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bin {
-    /// What is flown.
+    /// Kind of segment that is flown in the bin.
     pub kind: Kind,
     /// Start, show time, s.
     pub start_s: f64,
-    /// End, excluded, s.
+    /// End, show time, s; excluded.
     pub end_s: f64,
     /// Commanded velocity, show frame, m/s, z up positive.
     pub velocity_mps: [f64; 3],
@@ -34,12 +34,12 @@ pub struct Bin {
 }
 
 impl Bin {
-    /// Its middle, show time, s.
+    /// Middle of the bin, show time, s.
     pub fn middle_s(&self) -> f64 {
         f64::midpoint(self.start_s, self.end_s)
     }
 
-    /// Its length, s.
+    /// Length of the bin, s.
     pub fn length_s(&self) -> f64 {
         self.end_s - self.start_s
     }
@@ -91,7 +91,7 @@ pub(super) fn cut(
     })
 }
 
-/// What one drone did in one bin.
+/// Measured values of one drone in one bin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BinValues {
     /// Mean pulse of all rotors, brought to level flight, us.

@@ -1,5 +1,5 @@
-//! What may be missing: effects of the library in their closed forms, and motions of the air that
-//! look like them.
+//! Candidates for what the model lacks: effects of the library in their closed forms, and motions
+//! of the air that look like them.
 
 use super::compare::Comparison;
 use super::gls::{Column, Solution};
@@ -25,24 +25,24 @@ pub(super) struct Candidate {
     pub was_there: bool,
     /// The parameter that says how large it is, its unit and bounds.
     pub size: Option<Size>,
-    /// Forms of it.
+    /// Forms of the candidate, which differ in their other parameters.
     pub variants: Vec<Variant>,
 }
 
 /// The parameter of an effect that says how large it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Size {
-    /// Its name.
+    /// Name of the parameter.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit of the parameter.
     pub unit: &'static str,
-    /// Smallest value.
+    /// Smallest value that is tried.
     pub low: f64,
-    /// Largest value.
+    /// Largest value that is tried.
     pub high: f64,
-    /// What the model has now; 0: nothing.
+    /// Value in the present model; 0 without the effect.
     pub now: f64,
-    /// What is usual.
+    /// Usual value.
     pub usual: f64,
 }
 
@@ -53,10 +53,10 @@ pub(super) struct Variant {
     pub vehicle: Option<Vehicle>,
     /// Size of the effect in it.
     pub size: f64,
-    /// What it adds to the pulse, us.
+    /// Contribution to the pulse, us.
     pub column: Column,
-    /// What it adds to the response to vertical air speed, by group and bin; empty: nothing, or scatter
-    /// does not show it.
+    /// Contribution to the response to vertical air speed, by group and bin; empty if there is
+    /// none, or scatter does not show it.
     pub felt: Vec<Vec<Response>>,
 }
 

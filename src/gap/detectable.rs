@@ -1,4 +1,4 @@
-//! What a flight could not have shown: the smallest size of each effect that would have been named.
+//! Power of a flight: the smallest size of each effect that it would have named.
 
 use super::candidates::{Candidate, library};
 use super::error::GapError;

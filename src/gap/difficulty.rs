@@ -1,4 +1,4 @@
-//! How difficult something that is known to be there was to find.
+//! Difficulty of finding an effect that is known to be there.
 
 use super::compare::{Comparison, Simulated, thrust_exponent};
 use super::data::Data;
@@ -15,14 +15,14 @@ pub type SteadyPulse<'a> = Box<dyn Fn(&Signals, f64) -> f64 + 'a>;
 pub enum There<'a> {
     /// An effect of the library.
     Effect {
-        /// Its name.
+        /// Name of the effect in the library.
         effect: &'a str,
         /// The parameter that says how large it is.
         size: &'a str,
         /// By how much that was changed.
         change: f64,
     },
-    /// What no library has: what it adds to the pulse.
+    /// An effect of no library, by its contribution to the pulse.
     Pulse(SteadyPulse<'a>),
 }
 

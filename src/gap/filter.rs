@@ -8,7 +8,7 @@
 /// How one state moves between observations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct State {
-    /// Stationary variance.
+    /// Stationary variance of the state.
     pub variance: f64,
     /// Time scale, s; infinite: constant.
     pub time_s: f64,
@@ -17,9 +17,9 @@ pub(super) struct State {
 /// One observation of the states.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Observation {
-    /// When, s; not decreasing.
+    /// Time of the observation, s; not decreasing.
     pub time_s: f64,
-    /// (state, factor) pairs.
+    /// States that the observation sees, each with its factor.
     pub looks_at: Vec<(usize, f64)>,
     /// Variance of its white noise.
     pub noise: f64,

@@ -1,5 +1,5 @@
-//! How a vehicle leans, measured by horizontal legs at known speeds over ground: most probable law and
-//! mean wind, with gusts that the whole fleet shares.
+//! Fit of how a vehicle leans, by horizontal legs at known speeds over ground: most probable law
+//! and mean wind, with gusts that the whole fleet shares.
 
 use nalgebra::SMatrix;
 
@@ -70,7 +70,7 @@ impl Point {
 /// A law and a mean wind by legs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
-    /// The law.
+    /// Most probable law of the lean.
     pub law: LeanLaw,
     /// Standard error of its linear part, rad/(m/s).
     pub linear_se: f64,

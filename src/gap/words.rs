@@ -67,7 +67,7 @@ fn values(parameters: &[Fitted]) -> String {
     format!(" ({})", parameters.iter().map(one).collect::<Vec<_>>().join("; "))
 }
 
-/// Three significant digits.
+/// A number with three significant digits.
 pub fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value:.0}");

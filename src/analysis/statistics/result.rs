@@ -1,4 +1,4 @@
-//! What the statistics of a hover say: scales of the air in space and time with their errors, the
+//! Results of the statistics of a hover: scales of the air in space and time with their errors, the
 //! horizontal wind, and how long an average must be.
 //!
 //! Lengths are m, times s, speeds m/s (up positive). The unit of a [`Scale`] is that of the field's
@@ -168,7 +168,7 @@ impl Scale {
         self
     }
 
-    /// What bounds an undetermined scale: the words before it, and the bound.
+    /// Bound of an undetermined scale, with the words that stand before it: "longer than".
     pub fn bound(&self) -> Option<(&'static str, f64)> {
         let ends = self.interval_95;
         match self.undetermined? {
@@ -368,7 +368,7 @@ pub enum Treatment {
 }
 
 impl Treatment {
-    /// In words.
+    /// Name of the treatment, for people.
     pub fn words(self) -> &'static str {
         match self {
             Self::AsMeasured => "as measured",

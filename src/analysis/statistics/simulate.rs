@@ -7,7 +7,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 /// A Gaussian field `sd² exp(-r / lambda) exp(-|dt| / tau)`, with independent noise on every drone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldScales {
-    /// Standard deviation, m/s.
+    /// Standard deviation of the field, m/s.
     pub sd_mps: f64,
     /// Correlation lengths (1/e) along x and y, m.
     pub length_m: [f64; 2],

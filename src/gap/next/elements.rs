@@ -1,4 +1,4 @@
-//! What a flight can be made of, and its template.
+//! Elements that a proposed flight can be made of, and its template.
 //!
 //! Each element breaks a confounding that the paper's ladder has (docs/physics.md, 4.3).
 
@@ -108,7 +108,7 @@ impl Elements {
         payload: false,
     };
 
-    /// The paper's ladder.
+    /// Elements of the paper's ladder.
     pub const PAPER: Self = Self {
         counter_phase: false,
         order: Order::Rising,
@@ -164,7 +164,7 @@ impl Elements {
         if self.long_legs { LEG_S.0 } else { LEG_S.1 }
     }
 
-    /// What each element is there for, one line each.
+    /// Purpose of each element, one line each.
     pub fn words(self) -> Vec<&'static str> {
         let order = match self.order {
             Order::Rising => "rungs from slow to fast",
@@ -195,7 +195,8 @@ impl Elements {
         words
     }
 
-    /// What the crew must do before flying a plan of these elements.
+    /// Preparations that the crew must make before flying a plan of these elements, one sentence
+    /// each.
     pub fn briefing(self, plan: &Plan) -> Vec<String> {
         let mut briefing = Vec::new();
         if self.charge {

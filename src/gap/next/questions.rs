@@ -1,4 +1,4 @@
-//! What a verdict left open.
+//! Questions that a verdict left open.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,19 +9,19 @@ use crate::gap::words::member;
 /// One thing that the flight did not tell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Question {
-    /// In words.
+    /// Question for people.
     pub words: String,
-    /// What is to be told from what.
+    /// Explanations that a flight must separate to answer it.
     pub sought: Sought,
 }
 
-/// What is to be told from what.
+/// Explanations that a flight must separate.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sought {
     /// Rivals of a class, the one in the model first, with the name and value of its size in the model
     /// and the value before (`None`: the model lacked it).
     Apart {
-        /// Effects.
+        /// Names of the effects.
         effects: Vec<String>,
         /// Size of the first: name, value, value before.
         size: Option<(String, f64, Option<f64>)>,
@@ -30,7 +30,7 @@ pub enum Sought {
     Shape {
         /// Signal, as in the verdict.
         depends_on: String,
-        /// The shape.
+        /// Shape as in the verdict.
         shape: Shape,
     },
     /// An effect at its usual size, from nothing.
@@ -53,7 +53,7 @@ pub enum Kind {
 }
 
 impl Question {
-    /// Its kind.
+    /// Kind of the question.
     pub fn kind(&self) -> Kind {
         match self.sought {
             Sought::Apart { .. } => Kind::Class,

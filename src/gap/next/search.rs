@@ -26,25 +26,25 @@ const BETTER: f64 = 1.5;
 /// Fast horizontal legs need a vehicle that may fly this fast, m/s.
 const FAST_MPS: f64 = 6.0;
 
-/// What is wanted.
+/// Demands on a proposed flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aim {
     /// Fisher z of every question, at least.
     pub z: f64,
-    /// Longest flight, s.
+    /// Duration of the longest flight allowed, s.
     pub longest_s: f64,
 }
 
 /// The flight that was chosen.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// What it is made of.
+    /// Elements of the proposed flight.
     pub elements: Elements,
-    /// Its plan.
+    /// Plan of the proposed flight.
     pub plan: Plan,
-    /// What it will tell.
+    /// Separations that the flight is predicted to reach, question by question.
     pub predicted: Predicted,
-    /// What the flight that was flown tells by the same prediction.
+    /// Separations of the flight that was flown, by the same prediction.
     pub was: Predicted,
     /// Fisher z that is wanted of each question: the aim's, and for what the flight should have told
     /// and did not, half as much again as it had.
