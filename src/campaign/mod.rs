@@ -181,7 +181,7 @@ pub enum CampaignError {
     Occupied {
         /// Path of the folder.
         path: PathBuf,
-        /// What the folder already holds, as an object of the sentence: "a campaign".
+        /// Name of the present content, as an object of the sentence: "a campaign".
         what: String,
     },
 }

@@ -25,7 +25,7 @@ pub(super) struct Candidate {
     pub was_there: bool,
     /// The parameter that says how large it is, its unit and bounds.
     pub size: Option<Size>,
-    /// Forms of the candidate, which differ in their other parameters.
+    /// Forms of the candidate, which differ in size and shape.
     pub variants: Vec<Variant>,
 }
 

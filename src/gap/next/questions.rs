@@ -9,7 +9,7 @@ use crate::gap::words::member;
 /// One thing that the flight did not tell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Question {
-    /// Question for people.
+    /// Question in words, for people.
     pub words: String,
     /// Explanations that a flight must separate to answer it.
     pub sought: Sought,
@@ -35,7 +35,7 @@ pub enum Sought {
     },
     /// An effect at its usual size, from nothing.
     Seen {
-        /// Effect.
+        /// Name of the effect.
         effect: String,
     },
 }
