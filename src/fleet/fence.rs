@@ -15,10 +15,10 @@ const MOST_CORNERS: usize = 60;
 /// Lowest top that ArduPilot accepts, m.
 const LEAST_TOP_M: f64 = 10.0;
 
-/// A plan without a fence that could be used.
+/// Reason why a plan has no usable fence.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FenceRefusal {
-    /// Not a polygon, or numbers that are none.
+    /// The fence is not a polygon, or one of its numbers is not finite.
     #[error(
         "the plan has no usable fence ({reason}): a show is not flown without one; plan the \
          flight again"
@@ -30,7 +30,7 @@ pub enum FenceRefusal {
     /// The show leaves the fence or comes too near to it.
     #[error("the fence is smaller than the show: {finding}")]
     Smaller {
-        /// Which drone, when, by how much and what to do, as the checks say it.
+        /// Finding of the checks: drone, time, amount and remedy.
         finding: String,
     },
 }
