@@ -9,7 +9,7 @@ use divan::counter::BytesCount;
 use updraft::fleet::ftp::Caller;
 use updraft::fleet::ftp::get::{Get, GetOptions};
 use updraft::fleet::sink::Memory;
-use updraft::link::drive::{NoWatch, drive};
+use updraft::link::conversation::{NoObserver, run_all};
 use updraft::link::id::DroneId;
 use updraft::virtual_fleet::files::FileVehicle;
 use updraft::virtual_fleet::lossy::{Faults, LossyNet};
@@ -40,7 +40,8 @@ fn get_a_megabyte(bencher: Bencher<'_, '_>, loss: f64) {
         .bench_values(|mut net| {
             let get =
                 Get::new(Caller::new(drone, 1), LOG, Memory::default(), GetOptions::default());
-            let machines = BTreeMap::from([(drone, get)]);
-            drive(&mut net, machines, 1, &mut NoWatch).expect("a simulated link stays open")
+            let conversations = BTreeMap::from([(drone, get)]);
+            run_all(&mut net, conversations, 1, &mut NoObserver)
+                .expect("a simulated link stays open")
         });
 }

@@ -23,7 +23,7 @@ use updraft::fleet::ftp::put::Put;
 use updraft::fleet::logs::one::OneOptions;
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use updraft::link::clock::{Clock, MS, Micros, S};
-use updraft::link::drive::{NoWatch, Progress, Watch, drive};
+use updraft::link::conversation::{NoObserver, Observer, Progress, run_all};
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
 use updraft::link::station::{Setup, Station};
@@ -181,7 +181,7 @@ fn put_all(station: &mut Station, clock: &Wall, ids: &[DroneId]) {
             (*id, Put::new(caller, "/collmot/show.skyb", vec![7; SHOW_BYTES], 60 * S))
         })
         .collect();
-    let done = drive(station, puts, 16, &mut NoWatch).expect("a link");
+    let done = run_all(station, puts, 16, &mut NoObserver).expect("a link");
     let good = done.values().filter(|done| done.is_ok()).count();
     tell(ids.len(), "put", good, good * SHOW_BYTES, clock.now() - begun, cpu);
 }
@@ -199,7 +199,7 @@ struct LastByte<'a> {
     done: BTreeMap<DroneId, u64>,
 }
 
-impl Watch for LastByte<'_> {
+impl Observer for LastByte<'_> {
     fn on_progress(&mut self, drone: DroneId, progress: Progress, _over: bool) {
         let most = self.done.entry(drone).or_default();
         if progress.done > *most {

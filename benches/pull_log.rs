@@ -20,7 +20,7 @@ use updraft::fleet::log_protocol::{data_message, end_message};
 use updraft::fleet::logs::one::OneOptions;
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use updraft::link::clock::{Clock, MS, Micros, S};
-use updraft::link::drive::{NoWatch, Progress, Watch, drive};
+use updraft::link::conversation::{NoObserver, Observer, Progress, run_all};
 use updraft::link::frame::MavMessage;
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
@@ -77,7 +77,7 @@ fn with_station(address: &str) -> Option<(DroneId, String)> {
     let (mut station, heard) = station(&[address.to_owned()]);
     let drone = *heard.first()?;
     let list = BTreeMap::from([(drone, LogList::new(drone, 20 * S))]);
-    let listed = drive(&mut station, list, 1, &mut NoWatch).expect("a link").remove(&drone)?;
+    let listed = run_all(&mut station, list, 1, &mut NoObserver).expect("a link").remove(&drone)?;
     let log = listed.ok()?.into_iter().rfind(|log| log.size > 0)?;
     let (bytes, took) = by_a_plain_client(&mut station, drone, log);
     tell(drone, "plain", bytes, took);
@@ -121,7 +121,7 @@ struct LastByte {
     done: BTreeMap<DroneId, u64>,
 }
 
-impl Watch for LastByte {
+impl Observer for LastByte {
     fn on_progress(&mut self, drone: DroneId, progress: Progress, _over: bool) {
         let most = self.done.entry(drone).or_default();
         if progress.done > *most {

@@ -14,10 +14,10 @@ use updraft::fleet::required::{CheckParams, requirements};
 use updraft::fleet::slots;
 use updraft::fleet::start::{Start, StartOptions};
 use updraft::fleet::telemetry::Telemetry;
-use updraft::fleet::upload::{Load, Upload};
+use updraft::fleet::upload::{ShowLoad, Upload};
 use updraft::fleet::watch::{self, Event, Monitor};
 use updraft::link::clock::{MS, Micros, S};
-use updraft::link::drive::{Watch, drive};
+use updraft::link::conversation::{Observer, run_all};
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
 use updraft::mission::Plan;
@@ -77,7 +77,7 @@ fn net<'w>(world: &'w World<'w>, plan: &Plan, faults: Faults) -> Net<'w> {
     LossyNet::new(plan.slots.iter().map(vehicle).collect(), faults, 5)
 }
 
-fn pass(net: &mut Net<'_>, for_us: Micros, watch: &mut dyn Watch) {
+fn pass(net: &mut Net<'_>, for_us: Micros, watch: &mut dyn Observer) {
     let until = net.now() + for_us;
     while net.now() < until {
         if let Some(received) = net.recv(until).unwrap() {
@@ -100,21 +100,21 @@ fn started(net: &mut Net<'_>, plan: &Plan) -> (Monitor, Start) {
     let mut telemetry = Telemetry::default();
     pass(net, 10 * S, &mut telemetry);
     let greets = all.iter().map(|id| (*id, Greet::new(*id))).collect();
-    let greeted = drive(net, greets, 9, &mut telemetry).unwrap();
+    let greeted = run_all(net, greets, 9, &mut telemetry).unwrap();
     assert!(greeted.values().all(|greeted| greeted.clock && greeted.version), "{greeted:?}");
     let table = slots::propose(plan, &telemetry, net.now()).unwrap();
     let checks =
         all.iter().map(|id| (*id, CheckParams::new(*id, requirements(plan, true), true))).collect();
-    let params = drive(net, checks, 9, &mut telemetry).unwrap();
+    let params = run_all(net, checks, 9, &mut telemetry).unwrap();
     assert!(params.values().all(updraft::fleet::required::Standing::is_right), "{params:?}");
     let upload = |line: &slots::Assignment| {
         let of = &show.drones[usize::from(line.slot) - 1];
         let skyb = skyb::write(of, &skyb::SkybOptions::default()).unwrap().bytes;
-        let load = Load { skyb, site: plan.site, fence: fence.clone() };
+        let load = ShowLoad { skyb, site: plan.site, fence: fence.clone() };
         (line.drone, Upload::new(line.drone, load, u32::from(line.slot)))
     };
     let uploads: BTreeMap<_, _> = table.drones.iter().map(upload).collect();
-    let loaded = drive(net, uploads, 9, &mut telemetry).unwrap();
+    let loaded = run_all(net, uploads, 9, &mut telemetry).unwrap();
     assert!(loaded.values().all(Result::is_ok), "{loaded:?}");
     pass(net, 15 * S, &mut telemetry);
     let known = Known { loaded: all.clone(), fenced: all.clone(), params };
@@ -202,7 +202,7 @@ fn a_show_is_aborted_in_the_air() {
         .map(|id| (id, Abort::new(id, Action::Return, monitor.telemetry.get(id))))
         .collect();
     let began = net.now();
-    let done = drive(&mut net, aborts, ALL_AT_ONCE, &mut monitor).unwrap();
+    let done = run_all(&mut net, aborts, ALL_AT_ONCE, &mut monitor).unwrap();
     let confirmed = Aborted::Confirmed(Action::Return);
     assert!(done.values().all(|aborted| *aborted == confirmed), "{done:?}");
     assert!(net.now() - began < 8 * S, "{} us", net.now() - began);

@@ -16,7 +16,6 @@ use updraft::base::time::GpsTime;
 use updraft::fleet::abort::{Abort, Action};
 use updraft::fleet::changes::{Change, Changes};
 use updraft::fleet::command::Command;
-use updraft::fleet::desk::{Desk, Notice};
 use updraft::fleet::dry_run::Obliging;
 use updraft::fleet::fence::{PutFence, fence_of};
 use updraft::fleet::ftp::Caller;
@@ -24,16 +23,17 @@ use updraft::fleet::ftp::list::List;
 use updraft::fleet::ftp::sum::Sum;
 use updraft::fleet::gate::{Class, Gate, Protection, State, class};
 use updraft::fleet::greet::Greet;
-use updraft::fleet::guided::{Flight, Guided};
+use updraft::fleet::guided::{Guided, GuidedFlight};
 use updraft::fleet::log_protocol::list::LogList;
 use updraft::fleet::messages::{GUIDED, LAND, RTL, ftp, param_set, set_mode, start_packet, text};
+use updraft::fleet::order_handler::{Notice, OrderHandler};
 use updraft::fleet::orders::{Inbox, give};
 use updraft::fleet::params::ReadParams;
 use updraft::fleet::required::{CheckParams, requirements};
 use updraft::fleet::upload::Upload;
 use updraft::fleet::vehicle_clock::VehicleClock;
 use updraft::link::clock::{Micros, S};
-use updraft::link::drive::{Machine, Step, Watch, drive};
+use updraft::link::conversation::{Conversation, Observer, Step, run_all};
 use updraft::link::error::{NetError, Refusal};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavModeFlag};
@@ -134,15 +134,15 @@ fn situations() -> Vec<(&'static str, Vec<MavMessage>, Micros)> {
     ]
 }
 
-/// What a machine sends to a drone with which all goes well.
-fn sends<M: Machine>(mut machine: M, vehicle: &mut Obliging) -> Vec<MavMessage> {
+/// What a conversation sends to a drone with which all goes well.
+fn sends<C: Conversation>(mut conversation: C, vehicle: &mut Obliging) -> Vec<MavMessage> {
     let (mut sent, mut now, mut heard) = (Vec::new(), 0, Vec::new());
     while now < 600 * S && sent.len() < 5_000 {
         let wake = vehicle.poll(now, &mut heard);
         for message in heard.drain(..) {
-            machine.on_message(now, &message);
+            conversation.on_message(now, &message);
         }
-        match machine.poll(now) {
+        match conversation.poll(now) {
             Step::Send(message) => {
                 vehicle.on_message(now, &message, &mut heard);
                 sent.push(*message);
@@ -162,7 +162,7 @@ fn vehicle(plan: &Plan, show: bool) -> Obliging {
 
 fn flight(plan: &Plan, system: u8, vehicle: &Obliging) -> Guided {
     let start = GpsTime::from_unix_ms((vehicle.unix_us / 1000) as i64 + 15_000).unwrap();
-    let flight = Flight {
+    let flight = GuidedFlight {
         trajectory: plan.trajectory(plan.slot(system.into()).unwrap()),
         frame: plan.site.frame(),
         start_gps_ms: start.total_ms(),
@@ -210,8 +210,8 @@ fn subcommands(plan: &Plan) -> BTreeMap<&'static str, Vec<MavMessage>> {
     ];
     changes.add(drone(1), &old.map(change));
     let restore = |off: bool| {
-        let machines = changes.restore(|_, change| off || !change.unfences());
-        machines.into_values().flat_map(|set| sends(set, &mut shown())).collect::<Vec<_>>()
+        let conversations = changes.restore(|_, change| off || !change.unfences());
+        conversations.into_values().flat_map(|set| sends(set, &mut shown())).collect::<Vec<_>>()
     };
     let end = |action| {
         let mut flying = shown();
@@ -572,7 +572,7 @@ struct Orders<'a> {
     refused: Vec<(DroneId, String)>,
 }
 
-impl Watch for Orders<'_> {
+impl Observer for Orders<'_> {
     fn on_refused(&mut self, drone: DroneId, refusal: &Refusal) {
         self.refused.push((drone, refusal.why.clone()));
     }
@@ -610,12 +610,12 @@ fn ordered_down(at: Micros, obeys: bool, faults: Faults) -> (Messages, Vec<(Dron
                 *before.borrow_mut() = Some(sent.borrow().len());
             }
         };
-        let mut desk = Desk::new(&mut net, Some(inbox), told);
-        let mut gate = Gate::new(&mut desk, &plan);
+        let mut handler = OrderHandler::new(&mut net, Some(inbox), told);
+        let mut gate = Gate::new(&mut handler, &plan);
         gate.set_fleet(BTreeSet::from([drone(1), drone(2)]));
         let given = false;
         let mut orders = Orders { at, given, folder: folder.path(), refused: Vec::new() };
-        drive(&mut gate, flights.into(), 9, &mut orders).unwrap();
+        run_all(&mut gate, flights.into(), 9, &mut orders).unwrap();
         orders.refused
     };
     let before = before.borrow().expect("the order was taken");

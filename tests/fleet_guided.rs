@@ -8,11 +8,11 @@ use nalgebra::Vector3;
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::base::time::GpsTime;
 use updraft::fleet::dry_run::Obliging;
-use updraft::fleet::guided::{AfterLoss, Flight, Guided, GuidedError};
+use updraft::fleet::guided::{AfterLoss, Guided, GuidedError, GuidedFlight};
 use updraft::fleet::messages::{RTL, text};
 use updraft::fleet::vehicle_clock::VehicleClock;
 use updraft::link::clock::{Micros, S};
-use updraft::link::drive::{Machine as _, Step};
+use updraft::link::conversation::{Conversation as _, Step};
 use updraft::link::id::DroneId;
 use updraft::show::{Path, Segment, Trajectory};
 
@@ -30,16 +30,16 @@ fn fly(silent: Range<Micros>, hears: bool) -> (usize, GuidedError) {
     let start = GpsTime::from_unix_ms((vehicle.unix_us / 1000) as i64 + 15_000).unwrap();
     let clock = VehicleClock::default();
     let start_gps_ms = start.total_ms();
-    let mut machine =
-        Guided::new(DRONE, Flight { trajectory, frame, start_gps_ms, yaw_rad: None, clock });
+    let mut conversation =
+        Guided::new(DRONE, GuidedFlight { trajectory, frame, start_gps_ms, yaw_rad: None, clock });
     let (mut now, mut returns, mut heard) = (0, 0, Vec::new());
     loop {
         let is_silent = silent.contains(&now);
         let wake = if is_silent { Micros::MAX } else { vehicle.poll(now, &mut heard) };
         for message in heard.drain(..).filter(|_| !is_silent) {
-            machine.on_message(now, &message);
+            conversation.on_message(now, &message);
         }
-        match machine.poll(now) {
+        match conversation.poll(now) {
             Step::Send(message) => {
                 let line = text(&message);
                 returns += usize::from(line.contains(&format!("DO_SET_MODE (176) 1 {RTL}")));

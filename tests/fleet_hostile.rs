@@ -20,7 +20,7 @@ use updraft::fleet::logs::one::{OneDone, OneOptions};
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use updraft::fleet::sink::Memory;
 use updraft::link::clock::{Micros, S};
-use updraft::link::drive::{Machine, NoWatch, Step};
+use updraft::link::conversation::{Conversation, NoObserver, Step};
 use updraft::link::frame::{FrameLoss, MavMessage, dialect};
 use updraft::link::traffic::{Traffic, troubles};
 use updraft::protocol::ftp::{Op, PAYLOAD, Packet};
@@ -86,7 +86,7 @@ fn pulled_over(repeat: f64, lie: Lie) -> (OneDone, Option<Vec<u8>>) {
         bytes_per_s: None,
         made_by: "test".to_owned(),
     };
-    let outcomes = pull(&mut net, &logs, &wanted, &options, &mut NoWatch).unwrap();
+    let outcomes = pull(&mut net, &logs, &wanted, &options, &mut NoObserver).unwrap();
     let entries = fs::read_dir(folder.path()).unwrap();
     let names: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     assert!(names.iter().all(|name| *name == logs), "written elsewhere: {names:?}");
@@ -221,12 +221,12 @@ fn message(kind: u8, mut payload: [u8; PAYLOAD], numbers: (u32, u32, u16, u8)) -
 }
 
 /// Feeds a conversation messages, those about FTP with its own numbers; it must end.
-fn survives<M: Machine>(mut machine: M, messages: &[MavMessage]) {
+fn survives<C: Conversation>(mut conversation: C, messages: &[MavMessage]) {
     let mut now = 0;
     let mut last = [0_u8; 4];
     let mut messages = messages.iter();
     for _ in 0..200_000 {
-        match machine.poll(now) {
+        match conversation.poll(now) {
             Step::Done(_) => return,
             Step::Wait(until) => {
                 if let Some(message) = messages.next() {
@@ -241,7 +241,7 @@ fn survives<M: Machine>(mut machine: M, messages: &[MavMessage]) {
                         }
                     }
                     now += 1000;
-                    machine.on_message(now, &message);
+                    conversation.on_message(now, &message);
                 } else {
                     assert!(until > now, "it waits for the past");
                     now = until;

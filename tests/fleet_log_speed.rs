@@ -14,7 +14,7 @@ use updraft::fleet::logs::one::{OneDone, OneOptions};
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use updraft::fleet::sink::Memory;
 use updraft::link::clock::{MS, Micros, S};
-use updraft::link::drive::{NoWatch, Progress, Watch, drive};
+use updraft::link::conversation::{NoObserver, Observer, Progress, run_all};
 use updraft::link::frame::MavMessage;
 use updraft::link::id::DroneId;
 use updraft::link::net::{Net as _, Received};
@@ -88,7 +88,8 @@ const DATA: f64 = 90.0 / 109.0;
 fn by_log_messages(bytes_per_s: f64, loss: f64, length: usize) -> (f64, f64) {
     let mut net = fleet(1, length, Transfers::FIRMWARE, limited(bytes_per_s, loss), 5);
     let get = LogGet::new(drone(1), 1, length as u64, Memory::default(), 60 * S);
-    let mut done = drive(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoWatch).unwrap();
+    let mut done =
+        run_all(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoObserver).unwrap();
     let got = done.remove(&drone(1)).unwrap();
     assert_eq!(got.result, Ok(length as u64));
     assert!(got.sink.bytes == content(1, length));
@@ -118,7 +119,8 @@ fn a_serial_radio_is_never_asked_for_more_than_it_carries_in_a_second() {
     for loss in [0.0, 0.1] {
         let mut net = fleet(1, 150_000, transfers, Faults { loss, ..faults }, 2);
         let get = LogGet::new(drone(1), 1, 150_000, Memory::default(), 60 * S);
-        let done = drive(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoWatch).unwrap();
+        let done =
+            run_all(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoObserver).unwrap();
         assert!(done[&drone(1)].result.is_ok());
         let most = net.vehicles[&drone(1)].windows.iter().map(|(_, count)| *count).max().unwrap();
         let share = 150_000.0 / (net.now() as f64 / 1e6) / (5_760.0 * DATA * (1.0 - loss));
@@ -142,7 +144,7 @@ fn pull_all(
     net: &mut LossyNet<Asked>,
     logs: &Path,
     count: u8,
-    watch: &mut dyn Watch,
+    watch: &mut dyn Observer,
 ) -> BTreeMap<u8, Outcome> {
     let options = PullOptions {
         each: OneOptions { start_number: 9, ..OneOptions::default() },
@@ -155,7 +157,7 @@ fn pull_all(
 }
 
 fn one(net: &mut LossyNet<Asked>, logs: &Path) -> OneDone {
-    match pull_all(net, logs, 1, &mut NoWatch).remove(&1) {
+    match pull_all(net, logs, 1, &mut NoObserver).remove(&1) {
         Some(Outcome::Done(done)) => done,
         other => panic!("{other:?}"),
     }
@@ -179,7 +181,7 @@ impl LastByte {
     }
 }
 
-impl Watch for LastByte {
+impl Observer for LastByte {
     fn on_message(&mut self, now: Micros, _received: &Received) {
         self.now = now;
     }
@@ -279,7 +281,7 @@ fn windows_suit_a_short_queue() {
     let faults = Faults { queue: 200 * MS, ..limited(1e6, 0.0) };
     let mut net = fleet(1, 8_000_000, Transfers::FIRMWARE, faults, 3);
     let get = LogGet::new(drone(1), 1, 8_000_000, Memory::default(), 60 * S);
-    let done = drive(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoWatch).unwrap();
+    let done = run_all(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoObserver).unwrap();
     assert!(done[&drone(1)].result.is_ok());
     let share = 8_000_000.0 / (net.now() as f64 / 1e6) / (1e6 * DATA);
     println!("queue of 200 ms: {share:.3}");

@@ -15,7 +15,7 @@ use updraft::fleet::logs::one::{OneDone, OneOptions, Which};
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use updraft::fleet::logs::verify::verify;
 use updraft::link::clock::{MS, Micros, S};
-use updraft::link::drive::{NoWatch, Watch};
+use updraft::link::conversation::{NoObserver, Observer};
 use updraft::link::frame::MavMessage;
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
@@ -92,7 +92,7 @@ fn options(start_number: u32) -> PullOptions {
 
 struct StopAt(Micros);
 
-impl Watch for StopAt {
+impl Observer for StopAt {
     fn stop(&mut self, now: Micros) -> bool {
         now >= self.0
     }
@@ -145,7 +145,7 @@ fn all_but_the_drone_that_is_gone_come_home_whole_through_everything() {
         assert!(tear_journals(&logs) > 0);
         println!("run {run}: {} home", Shelf::open(&logs, "").unwrap().manifest.logs.len());
     }
-    let outcomes = pull(&mut net, &logs, &wanted, &options(3), &mut NoWatch).unwrap();
+    let outcomes = pull(&mut net, &logs, &wanted, &options(3), &mut NoObserver).unwrap();
     println!("{} s", net.now() / S);
     // Simulated time: the link carries the logs and what is lost of them in 150 s.
     assert!(net.now() / S <= 220, "{} s", net.now() / S);
@@ -176,7 +176,7 @@ fn all_but_the_drone_that_is_gone_come_home_whole_through_everything() {
         && one.faults[0].to_string().starts_with("is what the drone had, but no log")));
     // Of what is there only the list is asked for; and of drones that are gone it stays.
     let before = net.carried.down;
-    let outcomes = pull(&mut net, &logs, &wanted[..3], &options(4), &mut NoWatch).unwrap();
+    let outcomes = pull(&mut net, &logs, &wanted[..3], &options(4), &mut NoObserver).unwrap();
     assert_eq!(
         (&*done(&outcomes, 2).there, &done(&outcomes, 2).unchecked),
         (&["02.BIN".to_owned()][..], &None)
@@ -184,7 +184,7 @@ fn all_but_the_drone_that_is_gone_come_home_whole_through_everything() {
     let heartbeats_and_lists = net.carried.down - before;
     assert!(heartbeats_and_lists < 20_000, "{heartbeats_and_lists}");
     net.vehicles.clear();
-    let outcomes = pull(&mut net, &logs, &wanted[..3], &options(5), &mut NoWatch).unwrap();
+    let outcomes = pull(&mut net, &logs, &wanted[..3], &options(5), &mut NoObserver).unwrap();
     assert_eq!(done(&outcomes, 2).there, ["02.BIN"]);
     // A heartbeat may have been on its way.
     let unchecked = done(&outcomes, 2).unchecked.as_ref().unwrap();
@@ -192,7 +192,7 @@ fn all_but_the_drone_that_is_gone_come_home_whole_through_everything() {
 }
 
 fn one(net: &mut LossyNet<Eventful>, logs: &Path, options: &PullOptions) -> OneDone {
-    done(&pull(net, logs, &wanted(1), options, &mut NoWatch).unwrap(), 1).clone()
+    done(&pull(net, logs, &wanted(1), options, &mut NoObserver).unwrap(), 1).clone()
 }
 
 #[test]
@@ -298,7 +298,7 @@ fn a_budget_is_kept() {
     let faults = Faults { delay: 20 * MS, ..Faults::default() };
     let mut net = fleet(4, faults, |_| 200_000);
     let options = PullOptions { bytes_per_s: Some(30_000.0), ..options(1) };
-    pull(&mut net, folder.path(), &wanted(4), &options, &mut NoWatch).unwrap();
+    pull(&mut net, folder.path(), &wanted(4), &options, &mut NoObserver).unwrap();
     let rate = net.carried.down as f64 / (net.now() as f64 / 1e6);
     // The last request may be served in a moment; heartbeats and lists are not counted.
     assert!((25_000.0..34_000.0).contains(&rate), "{rate}");

@@ -15,7 +15,7 @@ use updraft::fleet::logs::one::{OneDone, OneOptions, Which};
 use updraft::fleet::logs::part::sums;
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use updraft::link::clock::MS;
-use updraft::link::drive::NoWatch;
+use updraft::link::conversation::NoObserver;
 use updraft::log::catalog::{ARM, GPS, RCOU, SHOW};
 use updraft::log::{LogWriter, MessageDef, Value};
 use updraft::virtual_fleet::files::FileVehicle;
@@ -103,7 +103,7 @@ fn pulled(net: &mut Net, logs: &Path, which: Which, flight: Option<LogFlight>) -
         bytes_per_s: None,
         made_by: "test".to_owned(),
     };
-    let outcomes = pull(net, logs, &wanted, &options, &mut NoWatch).unwrap();
+    let outcomes = pull(net, logs, &wanted, &options, &mut NoObserver).unwrap();
     let Outcome::Done(done) = outcomes[&drone(1)].clone() else { panic!("stopped") };
     done
 }

@@ -15,7 +15,7 @@ use updraft::fleet::logs::part::sums;
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
 use updraft::fleet::logs::verify::verify;
 use updraft::link::clock::{MS, Micros, S};
-use updraft::link::drive::NoWatch;
+use updraft::link::conversation::NoObserver;
 use updraft::link::frame::MavMessage;
 use updraft::link::net::Net as _;
 use updraft::virtual_fleet::endpoint::Endpoint;
@@ -83,7 +83,7 @@ fn pull_again(net: &mut Net, logs: &Path, start_number: u32) -> OneDone {
         bytes_per_s: None,
         made_by: "test".to_owned(),
     };
-    let outcomes = pull(net, logs, &wanted, &options, &mut NoWatch).unwrap();
+    let outcomes = pull(net, logs, &wanted, &options, &mut NoObserver).unwrap();
     let Outcome::Done(done) = outcomes[&drone(1)].clone() else { panic!("stopped") };
     done
 }

@@ -15,19 +15,19 @@ use updraft::fleet::changes::Changes;
 use updraft::fleet::command::{Command, CommandError};
 use updraft::fleet::dry_run::{Obliging, dry_run};
 use updraft::fleet::greet::Greet;
-use updraft::fleet::guided::{Flight, Guided};
+use updraft::fleet::guided::{Guided, GuidedFlight};
 use updraft::fleet::journal::{Entry, JOURNAL_FILE, Journal};
 use updraft::fleet::messages::{self, GUIDED, LAND, RTL};
 use updraft::fleet::params::{ListParams, ReadParams, SetParams};
 use updraft::fleet::preflight::{Known, Limits, Preflight, preflight};
 use updraft::fleet::required::{CheckParams, Difference, Requirement, Standing, requirements};
 use updraft::fleet::slots::{self, FleetTable};
-use updraft::fleet::start::{Phase, Start, StartOptions, StartRefusal};
+use updraft::fleet::start::{Start, StartOptions, StartPhase, StartRefusal};
 use updraft::fleet::telemetry::Telemetry;
 use updraft::fleet::vehicle_clock::VehicleClock;
 use updraft::fleet::watch::{self, Monitor};
 use updraft::link::clock::{MS, S};
-use updraft::link::drive::{Machine, NoWatch, Step, drive};
+use updraft::link::conversation::{Conversation, NoObserver, Step, run_all};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavResult};
 use updraft::link::id::DroneId;
@@ -199,7 +199,7 @@ fn a_start_is_set_then_authorized_and_can_be_cancelled() {
         cast(&mut net, &mut telemetry, &mut start, 15 * S);
         assert!(start.late(&telemetry, net.now()).is_empty());
         assert!(net.vehicles.values().all(|v| v.inner.status.start_tow_s == -1));
-        assert_eq!(start.phase(), Phase::Cancelled);
+        assert_eq!(start.phase(), StartPhase::Cancelled);
     }
 }
 
@@ -260,11 +260,11 @@ fn an_abort_reaches_everyone_at_once() {
         }
         pass(&mut net, 5 * S, &mut telemetry);
         let began = net.now();
-        let machines: BTreeMap<_, _> = all()
+        let conversations: BTreeMap<_, _> = all()
             .into_iter()
             .map(|id| (id, Abort::new(id, Action::Return, telemetry.get(id))))
             .collect();
-        let done = drive(&mut net, machines, ALL_AT_ONCE, &mut NoWatch).unwrap();
+        let done = run_all(&mut net, conversations, ALL_AT_ONCE, &mut NoObserver).unwrap();
         assert_eq!(done.len(), 6);
         for (id, aborted) in done {
             let inner = &net.vehicles[&id].inner;
@@ -294,9 +294,9 @@ fn a_return_that_is_refused_becomes_a_landing_and_silence_is_said() {
         vehicle.inner.status.stage = Stage::Performing;
     }
     net.vehicles.get_mut(&drone(2)).unwrap().fault = Fault::Silent;
-    pass(&mut net, 100 * MS, &mut NoWatch);
+    pass(&mut net, 100 * MS, &mut NoObserver);
     struct NoReturn(Abort);
-    impl Machine for NoReturn {
+    impl Conversation for NoReturn {
         type Done = Aborted;
         fn on_message(&mut self, now: u64, message: &MavMessage) {
             // The vehicle's acknowledgement, turned into a refusal while a return is asked for.
@@ -318,11 +318,11 @@ fn a_return_that_is_refused_becomes_a_landing_and_silence_is_said() {
             }),
         );
     }
-    let machines = BTreeMap::from([
+    let conversations = BTreeMap::from([
         (drone(1), refused),
         (drone(2), NoReturn(Abort::new(drone(2), Action::Land, None))),
     ]);
-    let done = drive(&mut net, machines, ALL_AT_ONCE, &mut NoWatch).unwrap();
+    let done = run_all(&mut net, conversations, ALL_AT_ONCE, &mut NoObserver).unwrap();
     assert_eq!(done[&drone(1)], Aborted::Confirmed(Action::Land));
     assert_snapshot!(done[&drone(2)], @"NOT CONFIRMED after 600 tries: use its remote control");
 }
@@ -341,15 +341,15 @@ fn a_drone_that_waits_in_guided_is_taken_from_its_station() {
     clock.read(0, 1_795_143_537_000_000);
     let start_gps_ms = clock.gps_ms(0).unwrap() as i64 + 60_000;
     let frame = plan.site.frame();
-    let flight = Flight { trajectory, frame, start_gps_ms, yaw_rad: None, clock };
-    let mut machine = Guided::new(drone(1), flight);
+    let flight = GuidedFlight { trajectory, frame, start_gps_ms, yaw_rad: None, clock };
+    let mut conversation = Guided::new(drone(1), flight);
     let beat = |custom_mode| {
         MavMessage::HEARTBEAT(dialect::HEARTBEAT_DATA { custom_mode, ..Default::default() })
     };
-    machine.on_message(S, &beat(GUIDED));
-    assert!(matches!(machine.poll(S), Step::Wait(_)));
-    machine.on_message(2 * S, &beat(LAND));
-    let Step::Done(Err(error)) = machine.poll(2 * S) else { panic!("it goes on") };
+    conversation.on_message(S, &beat(GUIDED));
+    assert!(matches!(conversation.poll(S), Step::Wait(_)));
+    conversation.on_message(2 * S, &beat(LAND));
+    let Step::Done(Err(error)) = conversation.poll(2 * S) else { panic!("it goes on") };
     assert_snapshot!(error, @"the drone left GUIDED (LAND) at -58 s: nothing more was sent to it");
 }
 
@@ -390,8 +390,8 @@ fn slots_are_held_against_where_drones_stand() {
     assert_eq!(FleetTable::read(folder.path()).unwrap(), right);
 }
 
-fn run<M: Machine>(net: &mut Net, machine: M) -> M::Done {
-    fleet_show_support::one(net, machine)
+fn run<C: Conversation>(net: &mut Net, conversation: C) -> C::Done {
+    fleet_show_support::one(net, conversation)
 }
 
 #[test]
@@ -427,8 +427,8 @@ fn parameters_are_checked_mended_and_put_back() {
             .iter()
             .map(|change| updraft::fleet::changes::Change { was: change.now, ..change.clone() });
         changes.add(drone(1), &again.collect::<Vec<_>>());
-        drive(&mut net, changes.restore(|_, change| !change.unfences()), 9, &mut NoWatch).unwrap()
-            [&drone(1)]
+        run_all(&mut net, changes.restore(|_, change| !change.unfences()), 9, &mut NoObserver)
+            .unwrap()[&drone(1)]
             .clone()
             .unwrap();
         assert_eq!(net.vehicles[&drone(1)].inner.params, before, "the first old value counts");
@@ -474,7 +474,7 @@ fn commands_wait_while_a_vehicle_works() {
     };
     let message = messages::command_long(drone(1), MavCmd::MAV_CMD_USER_1, [0.0; 7], 0);
     let mut command = Command::new("load the show", message);
-    use updraft::link::drive::Step;
+    use updraft::link::conversation::Step;
     assert!(matches!(command.poll(0), Step::Send(_)));
     command.on_message(1, &ack(MavResult::MAV_RESULT_IN_PROGRESS));
     assert!(matches!(command.poll(20 * S), Step::Wait(_)), "not repeated while it works");
@@ -499,7 +499,7 @@ fn a_stock_vehicle_is_guided_along_its_trajectory() {
     let mut vehicle = Obliging::new(drone(2), false, frame.to_geodetic(trajectory.start_m));
     let start_gps_ms =
         GpsTime::from_unix_ms((vehicle.unix_us / 1000) as i64 + 30_000).unwrap().total_ms();
-    let flight = Flight {
+    let flight = GuidedFlight {
         trajectory: trajectory.clone(),
         frame,
         start_gps_ms,
@@ -527,7 +527,7 @@ fn stock_vehicles_are_guided_over_a_slow_link_and_watched() {
     let now_ms = telemetry.drones[&drone(1)].clock.gps_ms(net.now()).unwrap();
     let start_gps_ms = (now_ms / 1000.0).ceil() as i64 * 1000 + 20_000;
     let guided = |id: DroneId| {
-        let flight = Flight {
+        let flight = GuidedFlight {
             trajectory: plan.trajectory(plan.slot(id.system.into()).unwrap()),
             frame: plan.site.frame(),
             start_gps_ms,
@@ -536,10 +536,10 @@ fn stock_vehicles_are_guided_over_a_slow_link_and_watched() {
         };
         (id, Guided::new(id, flight))
     };
-    let machines: BTreeMap<_, _> = all().into_iter().map(guided).collect();
+    let conversations: BTreeMap<_, _> = all().into_iter().map(guided).collect();
     let mut monitor = Monitor::new(&plan, &table, telemetry, watch::Limits::of(&plan));
     monitor.set_start(Some(start_gps_ms));
-    let done = drive(&mut net, machines, ALL_AT_ONCE, &mut monitor).unwrap();
+    let done = run_all(&mut net, conversations, ALL_AT_ONCE, &mut monitor).unwrap();
     assert!(done.values().all(Result::is_ok), "{done:?}");
     let events = monitor.take_events();
     assert!(!events.iter().any(|told| told.event.is_alarm()), "{events:?}");
@@ -557,7 +557,7 @@ fn every_refusal_of_a_guided_flight_is_said() {
         let unix_ms = (Obliging::new(drone(2), false, place).unix_us / 1000) as i64;
         GpsTime::from_unix_ms(unix_ms + ahead_s * 1000).unwrap().total_ms()
     };
-    let flight = |trajectory: &Trajectory, ahead_s| Flight {
+    let flight = |trajectory: &Trajectory, ahead_s| GuidedFlight {
         trajectory: trajectory.clone(),
         frame,
         start_gps_ms: start(ahead_s),
@@ -568,9 +568,9 @@ fn every_refusal_of_a_guided_flight_is_said() {
     let mut case = |trajectory: &Trajectory, ahead_s, fault: Fault| {
         let vehicle = Scripted::new(Obliging::new(drone(2), false, place), fault);
         let mut net = Net::new(BTreeMap::from([(drone(2), vehicle)]), Faults::default(), 1);
-        let machine = Guided::new(drone(2), flight(trajectory, ahead_s));
-        let machines = BTreeMap::from([(drone(2), machine)]);
-        let done = drive(&mut net, machines, 1, &mut NoWatch).unwrap();
+        let conversation = Guided::new(drone(2), flight(trajectory, ahead_s));
+        let conversations = BTreeMap::from([(drone(2), conversation)]);
+        let done = run_all(&mut net, conversations, 1, &mut NoObserver).unwrap();
         lines.push(done[&drone(2)].as_ref().unwrap_err().to_string());
     };
     case(&Trajectory::default(), 30, Fault::None);

@@ -15,7 +15,7 @@ use updraft::fleet::ftp::sum::Sum;
 use updraft::fleet::ftp::{Caller, FtpError};
 use updraft::fleet::sink::Memory;
 use updraft::link::clock::{MS, S};
-use updraft::link::drive::{Machine, NoWatch, drive};
+use updraft::link::conversation::{Conversation, NoObserver, run_all};
 use updraft::link::net::Net as _;
 use updraft::virtual_fleet::lossy::Faults;
 use updraft::virtual_fleet::storage::Storage as _;
@@ -26,9 +26,9 @@ fn bad() -> Faults {
     Faults { loss: 0.2, repeat: 0.05, delay: 200 * MS, jitter: 30 * MS, ..Faults::default() }
 }
 
-fn one<M: Machine>(net: &mut Net, machine: M) -> M::Done {
-    let machines = BTreeMap::from([(drone(1), machine)]);
-    drive(net, machines, 1, &mut NoWatch).unwrap().remove(&drone(1)).expect("it ends")
+fn one<C: Conversation>(net: &mut Net, conversation: C) -> C::Done {
+    let conversations = BTreeMap::from([(drone(1), conversation)]);
+    run_all(net, conversations, 1, &mut NoObserver).unwrap().remove(&drone(1)).expect("it ends")
 }
 
 fn get() -> Get<Memory> {
@@ -74,13 +74,13 @@ fn efficiency(drones: u8, loss: f64) -> (f64, f64) {
     // More than the link carries, as vehicles on a fast radio do.
     let pps = if drones == 1 { 500.0 } else { 200.0 };
     let mut net = fleet(drones, length, pps, faults, 3);
-    let machines = (1..=drones)
+    let conversations = (1..=drones)
         .map(|system| {
             let caller = Caller::new(drone(system), 7);
             (drone(system), Get::new(caller, LOG, Memory::default(), GetOptions::default()))
         })
         .collect();
-    let done = drive(&mut net, machines, 3, &mut NoWatch).unwrap();
+    let done = run_all(&mut net, conversations, 3, &mut NoObserver).unwrap();
     let useful: u64 = done.values().map(|got| got.tally.new_bytes).sum();
     let again: u64 = done.values().map(|got| got.tally.again_bytes).sum();
     assert_eq!(useful, length as u64 * u64::from(drones));

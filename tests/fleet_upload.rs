@@ -12,7 +12,7 @@ use updraft::fleet::clear::Clear;
 use updraft::fleet::dry_run::{Obliging, dry_run};
 use updraft::fleet::fence::{PutFence, fence_of};
 use updraft::fleet::upload::Upload;
-use updraft::link::drive::{Machine as _, NoWatch, Step, drive};
+use updraft::link::conversation::{Conversation as _, NoObserver, Step, run_all};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{MavCmd, MavResult};
 use updraft::protocol::ftp::{Op, Packet};
@@ -106,7 +106,7 @@ fn a_fleet_is_loaded_over_a_bad_link_and_not_twice() {
                 })
                 .collect()
         };
-        let done = drive(&mut net, uploads(1), 4, &mut NoWatch).unwrap();
+        let done = run_all(&mut net, uploads(1), 4, &mut NoObserver).unwrap();
         assert_eq!(done.len(), 6);
         for (id, result) in done {
             assert!(result.as_ref().is_ok_and(|loaded| loaded.written), "{seed} {id}: {result:?}");
@@ -117,7 +117,7 @@ fn a_fleet_is_loaded_over_a_bad_link_and_not_twice() {
             assert_eq!(vehicle.fence, wanted.fence.corners_1e7);
         }
         let before = writes(&net, 1);
-        let done = drive(&mut net, uploads(100), 4, &mut NoWatch).unwrap();
+        let done = run_all(&mut net, uploads(100), 4, &mut NoObserver).unwrap();
         assert!(done.values().all(|r| r.as_ref().is_ok_and(|loaded| !loaded.written)), "{done:?}");
         assert_eq!(writes(&net, 1), before, "a file that is there is not written again");
     }

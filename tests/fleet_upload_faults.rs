@@ -11,7 +11,7 @@ use fleet_loaded_support::{assert_cleared, assert_loaded, bad, drone, hover, loa
 use updraft::base::time::GpsTime;
 use updraft::fleet::upload::{Left, Refused, Upload};
 use updraft::link::clock::{MS, Micros, S};
-use updraft::link::drive::{Watch, drive};
+use updraft::link::conversation::{Observer, run_all};
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
 use updraft::mission::Plan;
@@ -30,7 +30,7 @@ const REBOOT: [u16; 2] = [1, 2];
 /// Kills the station at this time: what it has under way is lost.
 struct KilledAt(Micros);
 
-impl Watch for KilledAt {
+impl Observer for KilledAt {
     fn stop(&mut self, now: Micros) -> bool {
         now >= self.0
     }
@@ -60,7 +60,7 @@ fn upload(
     let uploads = (1..=DRONES)
         .map(|slot| (drone(slot), Upload::new(drone(slot), load(plan, slot), numbers)))
         .collect();
-    let done = drive(net, uploads, 4, &mut KilledAt(until)).unwrap();
+    let done = run_all(net, uploads, 4, &mut KilledAt(until)).unwrap();
     done.into_iter().map(|(drone, done)| (drone, done.map(drop))).collect()
 }
 

@@ -149,8 +149,8 @@ fn fly_target(
             let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
             readable(&folder)?;
             let mut station = args.connect.open(links)?;
-            let mut desk = end::desk(context, &mut station, &folder);
-            let mut crew = Crew::new(context, &mut desk, &folder, &plan);
+            let mut handler = end::order_handler(context, &mut station, &folder);
+            let mut crew = Crew::new(context, &mut handler, &folder, &plan);
             crew.is_guided = args.guided;
             let flown = crew.listen(args.connect.wait).and_then(|()| fly(context, &mut crew, args));
             let (flight, exit) = crew.ending(flown)?;

@@ -119,15 +119,15 @@ impl Changes {
         self.drones.sort_by_key(|entry| entry.drone);
     }
 
-    /// A machine per vehicle that puts those old values back that may be. Once it is done, they can
+    /// A conversation per vehicle that puts those old values back that may be. Once it is done, they can
     /// be taken out with [`Changes::forget`].
     pub fn restore(&self, may: impl Fn(DroneId, &Change) -> bool) -> BTreeMap<DroneId, SetParams> {
-        let machine = |entry: &DroneChanges| {
+        let conversation = |entry: &DroneChanges| {
             let changes = entry.changes.iter().filter(|change| may(entry.drone, change));
             let values: Vec<_> = changes.map(|change| (change.name.clone(), change.was)).collect();
             (!values.is_empty()).then(|| (entry.drone, SetParams::new(entry.drone, values)))
         };
-        self.drones.iter().filter_map(machine).collect()
+        self.drones.iter().filter_map(conversation).collect()
     }
 
     /// Removes the changes that [`Changes::restore`] has undone on a vehicle.

@@ -1,6 +1,6 @@
 //! Messages that a conversation would send, without a vehicle: `--dry-run`.
 //!
-//! A machine talks to an [`Obliging`] vehicle that takes everything and answers at once, so that
+//! A conversation talks to an [`Obliging`] vehicle that takes everything and answers at once, so that
 //! the messages are exactly those of a flight on which nothing goes wrong.
 
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ use super::messages::{GUIDED, LAND, chars, fence_corner, fence_request, text};
 use crate::base::crc::ap_crc32;
 use crate::base::frame::Geodetic;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine, Step};
+use crate::link::conversation::{Conversation, Step};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::protocol::ftp::{Op, Packet};
@@ -356,19 +356,19 @@ fn ack(command: MavCmd) -> MavMessage {
 /// Runs a conversation with an obliging vehicle: its messages, one line each with the time since
 /// the first, and its result. The result is `None` if it did not end within a day of its time or
 /// `most` messages.
-pub fn dry_run<M: Machine>(
-    mut machine: M,
+pub fn dry_run<C: Conversation>(
+    mut conversation: C,
     vehicle: &mut Obliging,
     most: usize,
-) -> (Vec<String>, Option<M::Done>) {
+) -> (Vec<String>, Option<C::Done>) {
     const DAY: Micros = 24 * 3600 * S;
     let (mut lines, mut now, mut heard) = (Vec::new(), 0, Vec::new());
     while now < DAY && lines.len() < most {
         let wake = vehicle.poll(now, &mut heard);
         for message in heard.drain(..) {
-            machine.on_message(now, &message);
+            conversation.on_message(now, &message);
         }
-        match machine.poll(now) {
+        match conversation.poll(now) {
             Step::Send(message) => {
                 lines.push(format!("{:9.3} s  {}", now as f64 / 1e6, text(&message)));
                 vehicle.on_message(now, &message, &mut heard);

@@ -8,11 +8,11 @@
 //! stops the vehicle where it is; if the station is lost it returns (FS_GCS_ENABLE).
 
 use super::fence::degrees_1e7;
-use super::messages::{GUIDED, LAND, RTL, Target, command_long, position_target, set_mode};
+use super::messages::{GUIDED, GuidedTarget, LAND, RTL, command_long, position_target, set_mode};
 use super::vehicle_clock::VehicleClock;
 use crate::base::frame::ShowFrame;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
@@ -36,9 +36,9 @@ const LOST: Micros = 30 * S;
 /// A lost drone is told to return for so long.
 const RECALL: Micros = 60 * S;
 
-/// Flight of one drone under the station's guidance.
+/// GuidedFlight of one drone under the station's guidance.
 #[derive(Clone, Debug)]
-pub struct Flight {
+pub struct GuidedFlight {
     /// Trajectory to fly, show frame.
     pub trajectory: Trajectory,
     /// Position and orientation of the show frame.
@@ -146,7 +146,7 @@ enum Phase {
 #[derive(Clone, Debug)]
 pub struct Guided {
     drone: DroneId,
-    flight: Flight,
+    flight: GuidedFlight,
     takeoff_alt_m: f64,
     takeoff_s: Option<f64>,
     /// Until then the drone stays at the take-off altitude, show time s.
@@ -173,7 +173,7 @@ pub struct Guided {
 
 impl Guided {
     /// Prepares the flight of a drone that stands on its slot, disarmed.
-    pub fn new(drone: DroneId, flight: Flight) -> Self {
+    pub fn new(drone: DroneId, flight: GuidedFlight) -> Self {
         let params = DeriveParams::default();
         let derived = derive(&flight.trajectory, Firmware::V44, &params);
         let refused = (!derived.valid).then(|| derived.reasons.join("; "));
@@ -217,7 +217,7 @@ impl Guided {
 
     /// The target at a show time. Until the trajectory has risen above the take-off altitude the
     /// drone stays there, as in the firmware.
-    fn target(&self, show_s: f64) -> Target {
+    fn target(&self, show_s: f64) -> GuidedTarget {
         let trajectory = &self.flight.trajectory;
         let state = trajectory.state_at(show_s);
         let place = self.flight.frame.to_geodetic(state.position_m);
@@ -228,7 +228,7 @@ impl Guided {
             neu.z = 0.0;
         }
         let heading_rad = self.heading_deg.unwrap_or(0.0).to_radians();
-        Target {
+        GuidedTarget {
             lat_1e7: degrees_1e7(place.lat_deg),
             lon_1e7: degrees_1e7(place.lon_deg),
             above_home_m,
@@ -373,7 +373,7 @@ impl Guided {
     }
 }
 
-impl Machine for Guided {
+impl Conversation for Guided {
     type Done = Result<(), GuidedError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

@@ -1,13 +1,12 @@
 //! The station's side of a flight with real (or virtual) vehicles: what is known of them, what is
 //! put on them, what they are told, what is watched, and their logs.
 //!
-//! Everything that talks is a [`crate::link::drive::Machine`], a conversation with one drone, many
+//! Everything that talks is a [`crate::link::conversation::Conversation`], a conversation with one drone, many
 //! at once: it has no socket, clock or thread, and its refusals are values that say what is wrong
 //! and what to do. Safety comes before convenience: nothing is armed without a deliberate second
 //! step, a show is loaded whole or cleared, and the fence is never switched off.
 
 pub mod changes;
-pub mod desk;
 pub mod dry_run;
 pub mod fence;
 pub mod gate;
@@ -15,6 +14,7 @@ pub mod guided;
 pub mod journal;
 pub mod logs;
 mod off_course;
+pub mod order_handler;
 pub mod orders;
 pub mod preflight;
 pub mod required;

@@ -9,7 +9,7 @@ use super::changes::Change;
 use super::command::Patience;
 use super::params::{ReadParams, SetError, SetParams, same};
 use crate::link::clock::Micros;
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::error::Refusal;
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
@@ -258,7 +258,7 @@ impl CheckParams {
     }
 }
 
-impl Machine for CheckParams {
+impl Conversation for CheckParams {
     type Done = Standing;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

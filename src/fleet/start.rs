@@ -187,9 +187,9 @@ impl std::fmt::Display for Readback {
     }
 }
 
-/// Phase of a start, which decides what is broadcast.
+/// StartPhase of a start, which decides what is broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
+pub enum StartPhase {
     /// Time of the start, without an authorization.
     Announced,
     /// Time and authorization of the start.
@@ -204,7 +204,7 @@ pub struct Start {
     drones: BTreeSet<DroneId>,
     at_gps_ms: i64,
     options: StartOptions,
-    phase: Phase,
+    phase: StartPhase,
     next: Micros,
     /// Another station has set it: it is not repeated, only taken back.
     attached: bool,
@@ -216,7 +216,7 @@ impl Start {
     /// A start that another station has authorized, at this time if it is known.
     pub fn attached(drones: BTreeSet<DroneId>, at: Option<GpsTime>) -> Self {
         let options = StartOptions { at, ..StartOptions::default() };
-        let (phase, next) = (Phase::Authorized, 0);
+        let (phase, next) = (StartPhase::Authorized, 0);
         // A start that is not known is over.
         let at_gps_ms = at.map_or(0, GpsTime::total_ms);
         let known = at.is_some();
@@ -256,7 +256,7 @@ impl Start {
                     |at| at.total_ms().div_euclid(1000),
                 );
                 let at_gps_ms = second * 1000;
-                let (phase, next) = (Phase::Announced, 0);
+                let (phase, next) = (StartPhase::Announced, 0);
                 let (attached, known) = (false, true);
                 Ok(Self { drones, at_gps_ms, options, phase, next, attached, known })
             }
@@ -279,7 +279,7 @@ impl Start {
     }
 
     /// Present phase of the start.
-    pub fn phase(&self) -> Phase {
+    pub fn phase(&self) -> StartPhase {
         self.phase
     }
 
@@ -322,9 +322,9 @@ impl Start {
     /// Drones that have not taken what is broadcast, each with what it reports instead.
     pub fn late(&self, telemetry: &Telemetry, now: Micros) -> Vec<(DroneId, Readback)> {
         let taken = |readback| match self.phase {
-            Phase::Announced => matches!(readback, Readback::Set | Readback::Authorized),
-            Phase::Authorized => readback == Readback::Authorized,
-            Phase::Cancelled => readback == Readback::NoTime,
+            StartPhase::Announced => matches!(readback, Readback::Set | Readback::Authorized),
+            StartPhase::Authorized => readback == Readback::Authorized,
+            StartPhase::Cancelled => readback == Readback::NoTime,
         };
         let all = self.readback(telemetry, now).into_iter();
         all.filter(|(_, readback)| !taken(*readback)).collect()
@@ -339,7 +339,7 @@ impl Start {
     pub fn check_time(&self, telemetry: &Telemetry, now: Micros) -> Result<(), StartRefusal> {
         let needed_s = self.options.authorize_before_s;
         let left_s = self.left_s(telemetry, now).unwrap_or(0.0);
-        if left_s < needed_s || self.phase == Phase::Cancelled {
+        if left_s < needed_s || self.phase == StartPhase::Cancelled {
             return Err(StartRefusal::TooLate { left_s, needed_s });
         }
         Ok(())
@@ -356,7 +356,7 @@ impl Start {
         if !late.is_empty() {
             return Err(StartRefusal::Late { late });
         }
-        self.phase = Phase::Authorized;
+        self.phase = StartPhase::Authorized;
         self.next = now;
         Ok(())
     }
@@ -364,7 +364,7 @@ impl Start {
     /// Withdraws time and authorization. The withdrawal must be broadcast until [`Start::late`] is
     /// empty.
     pub fn cancel(&mut self, now: Micros) {
-        self.phase = Phase::Cancelled;
+        self.phase = StartPhase::Cancelled;
         self.next = now;
     }
 
@@ -372,13 +372,13 @@ impl Start {
     pub fn packet(&self) -> MavMessage {
         let start_tow_s = self.second_of_week();
         start_packet(&match self.phase {
-            Phase::Announced => {
+            StartPhase::Announced => {
                 StartConfig { start_tow_s, authorization: 0, countdown_ms: LEAVE_TIME }
             }
-            Phase::Authorized => {
+            StartPhase::Authorized => {
                 StartConfig { start_tow_s, authorization: 1, countdown_ms: LEAVE_TIME }
             }
-            Phase::Cancelled => {
+            StartPhase::Cancelled => {
                 StartConfig { start_tow_s: CLEAR_TIME, authorization: 0, countdown_ms: CLEAR_TIME }
             }
         })
@@ -389,7 +389,7 @@ impl Start {
     pub fn due(&mut self, telemetry: &Telemetry, now: Micros) -> Option<MavMessage> {
         let over = self.left_s(telemetry, now).is_some_and(|left_s| left_s <= 0.0);
         let silent = over || self.attached;
-        if now < self.next || (silent && self.phase != Phase::Cancelled) {
+        if now < self.next || (silent && self.phase != StartPhase::Cancelled) {
             return None;
         }
         self.next = now + (S as f64 / self.rate(telemetry).max(1.0)) as Micros;

@@ -11,7 +11,7 @@ use super::ftp::{Caller, FtpError};
 use super::messages::{command_int, command_long, set_mode};
 use super::put_file::PutFile;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
@@ -32,7 +32,7 @@ const AGREEING: u32 = 2;
 
 /// Show that is loaded onto a vehicle, with its place and fence.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Load {
+pub struct ShowLoad {
     /// Content of the slot's `.skyb` file.
     pub skyb: Vec<u8>,
     /// Position and orientation of the show frame.
@@ -188,7 +188,7 @@ enum Phase {
 #[derive(Debug)]
 pub struct Upload {
     drone: DroneId,
-    load: Load,
+    load: ShowLoad,
     numbers: u32,
     phase: Phase,
     started: Option<Micros>,
@@ -208,7 +208,7 @@ const STEPS: u64 = 6;
 impl Upload {
     /// Prepares the upload of a show to a vehicle. `numbers` should differ from run to run (see
     /// [`Caller::new`]).
-    pub fn new(drone: DroneId, load: Load, numbers: u32) -> Self {
+    pub fn new(drone: DroneId, load: ShowLoad, numbers: u32) -> Self {
         Self {
             drone,
             load,
@@ -341,7 +341,7 @@ fn reload(drone: DroneId) -> Command {
     Command::new("load the show", message)
 }
 
-impl Machine for Upload {
+impl Conversation for Upload {
     type Done = Result<Loaded, Refused>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

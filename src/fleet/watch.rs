@@ -14,7 +14,7 @@ use super::slots::{FleetTable, geodetic};
 use super::telemetry::{Drone, Telemetry};
 use crate::base::frame::ShowFrame;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::Watch;
+use crate::link::conversation::Observer;
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
 use crate::link::net::Received;
@@ -335,7 +335,7 @@ impl Monitor {
     }
 }
 
-impl Watch for Monitor {
+impl Observer for Monitor {
     fn on_message(&mut self, now: Micros, received: &Received) {
         self.listen(now);
         self.telemetry.on_message(now, received);

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use updraft::base::time::GpsTime;
 use updraft::campaign::{self, FlightFolder};
 use updraft::fleet::fence::fence_of;
-use updraft::fleet::upload::Load;
+use updraft::fleet::upload::ShowLoad;
 use updraft::link::clock::{Clock, Micros};
 use updraft::link::signing::Key;
 use updraft::mission::Plan;
@@ -66,10 +66,10 @@ impl Bench {
 
 impl Drones {
     /// What a slot's drone must get.
-    pub(crate) fn load(&self, slot: u16) -> Load {
+    pub(crate) fn load(&self, slot: u16) -> ShowLoad {
         let skyb = std::fs::read(self.folder.skyb(slot, self.plan.slots.len())).unwrap();
         let fence = fence_of(&self.plan, &self.plan.to_show()).unwrap();
-        Load { skyb, site: self.plan.site, fence }
+        ShowLoad { skyb, site: self.plan.site, fence }
     }
 
     /// Runs `body` while the drones look for a station at `station`; then looks at them.

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 use updraft::base::frame::Geodetic;
 use updraft::fleet::fence::fence_of;
-use updraft::fleet::upload::Load;
+use updraft::fleet::upload::ShowLoad;
 use updraft::link::clock::MS;
 use updraft::link::id::DroneId;
 use updraft::mission::Plan;
@@ -33,11 +33,11 @@ pub(crate) fn hover(rows: u16, columns: u16) -> Plan {
 }
 
 /// What slot `slot` of a plan gets.
-pub(crate) fn load(plan: &Plan, slot: u16) -> Load {
+pub(crate) fn load(plan: &Plan, slot: u16) -> ShowLoad {
     let show = plan.to_show();
     let drone = &show.drones[usize::from(slot) - 1];
     let skyb = skyb::write(drone, &skyb::SkybOptions::default()).unwrap().bytes;
-    Load { skyb, site: plan.site, fence: fence_of(plan, &show).unwrap() }
+    ShowLoad { skyb, site: plan.site, fence: fence_of(plan, &show).unwrap() }
 }
 
 /// One frame in five is lost, each way, takes 200 ms, and frames overtake each other.
@@ -55,7 +55,7 @@ pub(crate) fn show_file(vehicle: &VirtualVehicle<'_>) -> Option<Vec<u8>> {
 }
 
 /// It has the file, flies what is in it, and stays in a fence that the show fits into.
-pub(crate) fn assert_loaded(vehicle: &VirtualVehicle<'_>, wanted: &Load) {
+pub(crate) fn assert_loaded(vehicle: &VirtualVehicle<'_>, wanted: &ShowLoad) {
     let system = vehicle.setup.system;
     assert!(show_file(vehicle).as_deref() == Some(&wanted.skyb[..]), "drone {system}: its file");
     let has = vehicle.loaded().unwrap_or_else(|| panic!("drone {system} has loaded nothing"));

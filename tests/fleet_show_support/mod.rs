@@ -9,9 +9,9 @@ use nalgebra::Vector3;
 use updraft::fleet::dry_run::Obliging;
 use updraft::fleet::fence::fence_of;
 use updraft::fleet::slots::FleetTable;
-use updraft::fleet::upload::Load;
+use updraft::fleet::upload::ShowLoad;
 use updraft::link::clock::{MS, Micros, S};
-use updraft::link::drive::{Machine, drive};
+use updraft::link::conversation::{Conversation, run_all};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavMissionResult, MavResult};
 use updraft::link::id::DroneId;
@@ -41,11 +41,11 @@ pub(crate) fn plan() -> Plan {
     resolve("hover", &overrides).unwrap().flights.remove(0).plan
 }
 
-pub(crate) fn load(plan: &Plan, slot: u16) -> Load {
+pub(crate) fn load(plan: &Plan, slot: u16) -> ShowLoad {
     let show = plan.to_show();
     let drone = &show.drones[usize::from(slot) - 1];
     let skyb = skyb::write(drone, &skyb::SkybOptions::default()).unwrap().bytes;
-    Load { skyb, site: plan.site, fence: fence_of(plan, &show).unwrap() }
+    ShowLoad { skyb, site: plan.site, fence: fence_of(plan, &show).unwrap() }
 }
 
 pub(crate) fn table(plan: &Plan) -> FleetTable {
@@ -236,15 +236,19 @@ pub(crate) fn bad() -> Faults {
     Faults { loss: 0.2, repeat: 0.05, delay: 200 * MS, jitter: 30 * MS, ..Faults::default() }
 }
 
-/// Runs one machine with drone 1.
-pub(crate) fn one<M: Machine>(net: &mut Net, machine: M) -> M::Done {
-    let machines = BTreeMap::from([(drone(1), machine)]);
-    let mut watch = updraft::link::drive::NoWatch;
-    drive(net, machines, 1, &mut watch).unwrap().remove(&drone(1)).expect("it ends")
+/// Runs one conversation with drone 1.
+pub(crate) fn one<C: Conversation>(net: &mut Net, conversation: C) -> C::Done {
+    let conversations = BTreeMap::from([(drone(1), conversation)]);
+    let mut watch = updraft::link::conversation::NoObserver;
+    run_all(net, conversations, 1, &mut watch).unwrap().remove(&drone(1)).expect("it ends")
 }
 
 /// Lets time pass; a watch hears everything.
-pub(crate) fn pass(net: &mut Net, for_us: Micros, watch: &mut dyn updraft::link::drive::Watch) {
+pub(crate) fn pass(
+    net: &mut Net,
+    for_us: Micros,
+    watch: &mut dyn updraft::link::conversation::Observer,
+) {
     use updraft::link::net::Net as _;
     let until = net.now() + for_us;
     while net.now() < until {

@@ -1,7 +1,7 @@
 //! Stock vehicles in GUIDED: orders, targets, and a station that falls silent.
 
 use nalgebra::Vector3;
-use updraft::fleet::messages::{Target, command_long, position_target, set_mode};
+use updraft::fleet::messages::{GuidedTarget, command_long, position_target, set_mode};
 use updraft::flight::{Flight, FlightOptions};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavResult, PositionTargetTypemask};
@@ -43,7 +43,7 @@ fn in_the_air(crew: &mut Crew<'_>) {
 fn target(field: &Field, place_m: Vector3<f64>, velocity_mps: Vector3<f64>) -> MavMessage {
     let place = field.frame.to_geodetic(place_m);
     let neu = field.frame.to_neu(velocity_mps);
-    let target = Target {
+    let target = GuidedTarget {
         lat_1e7: (place.lat_deg * 1e7).round() as i32,
         lon_1e7: (place.lon_deg * 1e7).round() as i32,
         above_home_m: place_m.z,

@@ -1,7 +1,7 @@
 //! Ends a flight: every drone returns or lands, now.
 //!
-//! One machine per drone, all at once (give [`ALL_AT_ONCE`] to
-//! [`drive`](crate::link::drive::drive)): each says so every 200 ms until its drone's own
+//! One conversation per drone, all at once (give [`ALL_AT_ONCE`] to
+//! [`run_all`](crate::link::conversation::run_all)): each says so every 200 ms until its drone's own
 //! heartbeat confirms it. A drone that is not flying has its start taken back instead. Nothing
 //! else is sent meanwhile.
 
@@ -10,13 +10,13 @@ use serde::{Deserialize, Serialize};
 use super::messages::{GUIDED, LAND, RTL, set_mode, start_packet};
 use super::telemetry::Drone;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine, Step};
+use crate::link::conversation::{Conversation, Step};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::protocol::show::{CLEAR_TIME, FROM_DRONE, Stage, StartConfig, Status, flag};
 use dialect::{MavCmd, MavModeFlag, MavResult};
 
-/// For `drive`: no drone waits for another.
+/// For `run_all`: no drone waits for another.
 pub const ALL_AT_ONCE: usize = usize::MAX;
 /// Time between repetitions.
 const EVERY: Micros = 200 * MS;
@@ -209,7 +209,7 @@ impl Abort {
     }
 }
 
-impl Machine for Abort {
+impl Conversation for Abort {
     type Done = Aborted;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

@@ -2,7 +2,7 @@
 
 use super::messages::command_long;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Step};
+use crate::link::conversation::{Conversation, Step};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::protocol::show::{FROM_DRONE, Status, flag};
@@ -37,7 +37,7 @@ impl Clear {
     }
 }
 
-impl Machine for Clear {
+impl Conversation for Clear {
     type Done = Result<(), NotCleared>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

@@ -1,7 +1,7 @@
 //! Commands with their answer: repeated until the vehicle accepts, refuses or stays silent.
 
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Step};
+use crate::link::conversation::{Conversation, Step};
 use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use dialect::{MavCmd, MavResult};
@@ -101,7 +101,7 @@ impl Command {
     }
 }
 
-impl Machine for Command {
+impl Conversation for Command {
     type Done = Result<(), CommandError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

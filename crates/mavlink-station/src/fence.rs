@@ -6,7 +6,7 @@ use super::command::Patience;
 use super::messages::{fence_ack, fence_corner, fence_count, fence_list, fence_request};
 use super::params::{SetError, SetParams};
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
@@ -214,7 +214,7 @@ fn words(result: MavMissionResult) -> String {
     format!("{result:?}").trim_start_matches("MAV_MISSION_").to_lowercase().replace('_', " ")
 }
 
-impl Machine for PutFence {
+impl Conversation for PutFence {
     type Done = Result<(), FenceError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

@@ -5,7 +5,7 @@
 
 use super::messages::command_long;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Step};
+use crate::link::conversation::{Conversation, Step};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use dialect::MavCmd;
@@ -52,7 +52,7 @@ pub fn ask_time(drone: DroneId) -> MavMessage {
     ask(drone, MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, SYSTEM_TIME, TIME_EVERY_US)
 }
 
-impl Machine for Greet {
+impl Conversation for Greet {
     type Done = Greeted;
 
     fn on_message(&mut self, _now: Micros, message: &MavMessage) {

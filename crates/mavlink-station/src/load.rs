@@ -31,7 +31,7 @@ const FIRST: f64 = 1_440.0;
 
 /// A link's load; clones share it.
 #[derive(Clone, Debug, Default)]
-pub struct Load(Rc<RefCell<Inner>>);
+pub struct LinkLoad(Rc<RefCell<Inner>>);
 
 #[derive(Debug)]
 struct Inner {
@@ -87,7 +87,7 @@ impl Inner {
     }
 }
 
-impl Load {
+impl LinkLoad {
     /// A place on the link for one download.
     pub fn place(&self) -> Place {
         let mut inner = self.0.borrow_mut();
@@ -101,7 +101,7 @@ impl Load {
 /// A download's place on its link, until it is dropped.
 #[derive(Debug)]
 pub struct Place {
-    load: Load,
+    load: LinkLoad,
     number: u64,
 }
 
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn each_has_a_share_of_what_the_link_carries_and_knows_what_comes_before() {
-        let load = Load::default();
+        let load = LinkLoad::default();
         let one = load.place();
         assert_eq!((one.share(), one.delay()), (None, 0));
         let two = load.place();
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn requests_that_are_lost_do_not_narrow_the_room_and_a_queue_does() {
-        let load = Load::default();
+        let load = LinkLoad::default();
         let (one, two) = (load.place(), load.place());
         two.took(450 * MS);
         let mut step = 0;

@@ -202,7 +202,7 @@ pub fn fence_ack(drone: DroneId) -> MavMessage {
 /// Where to be and how fast, for GUIDED: latitude and longitude in 1e-7 degrees, height above
 /// home, velocity north, east, **up**, m/s, and the heading to keep, rad clockwise from north.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Target {
+pub struct GuidedTarget {
     /// Latitude, 1e-7 degrees.
     pub lat_1e7: i32,
     /// Longitude, 1e-7 degrees.
@@ -217,7 +217,7 @@ pub struct Target {
 
 /// A target for GUIDED: position (frame 6, altitude above home), velocity and heading.
 #[expect(deprecated, reason = "frame 6 is what ArduPilot 4.4 documents for this message")]
-pub fn position_target(drone: DroneId, time_boot_ms: u32, target: &Target) -> MavMessage {
+pub fn position_target(drone: DroneId, time_boot_ms: u32, target: &GuidedTarget) -> MavMessage {
     let ignored = PositionTargetTypemask::POSITION_TARGET_TYPEMASK_AX_IGNORE
         | PositionTargetTypemask::POSITION_TARGET_TYPEMASK_AY_IGNORE
         | PositionTargetTypemask::POSITION_TARGET_TYPEMASK_AZ_IGNORE

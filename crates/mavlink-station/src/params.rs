@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use super::command::Patience;
 use super::messages::{chars, param_list, param_read, param_read_index, param_set};
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::error::Refusal;
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
@@ -56,7 +56,7 @@ impl ReadParams {
     }
 }
 
-impl Machine for ReadParams {
+impl Conversation for ReadParams {
     type Done = BTreeMap<String, f32>;
 
     fn on_message(&mut self, _now: Micros, message: &MavMessage) {
@@ -161,7 +161,7 @@ impl SetParams {
     }
 }
 
-impl Machine for SetParams {
+impl Conversation for SetParams {
     type Done = Result<(), SetError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {
@@ -256,7 +256,7 @@ impl ListParams {
     }
 }
 
-impl Machine for ListParams {
+impl Conversation for ListParams {
     type Done = Result<BTreeMap<String, f32>, ListError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

@@ -5,7 +5,7 @@ use super::ftp::sum::Sum;
 use super::ftp::{Caller, FtpError};
 use crate::crc::ap_crc32;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::frame::MavMessage;
 
 /// Given up after so long without an answer.
@@ -35,7 +35,7 @@ impl PutFile {
     }
 }
 
-impl Machine for PutFile {
+impl Conversation for PutFile {
     type Done = Result<bool, FtpError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

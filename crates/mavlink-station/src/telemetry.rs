@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 use super::messages::chars;
 use super::vehicle_clock::VehicleClock;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::Watch;
+use crate::link::conversation::Observer;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::link::net::Received;
@@ -315,7 +315,7 @@ impl Telemetry {
     }
 }
 
-impl Watch for Telemetry {
+impl Observer for Telemetry {
     fn on_message(&mut self, now: Micros, received: &Received) {
         self.drones.entry(received.from).or_default().on_message(now, &received.message);
     }

@@ -37,7 +37,7 @@ use crate::fleet::preflight::{Known, Limits, Preflight, preflight};
 use crate::fleet::slots::{FleetTable, SlotProblem, check_stands, picture, propose};
 use crate::fleet::telemetry::Telemetry;
 use crate::link::clock::{Clock as _, MS, Micros, S};
-use crate::link::drive::{Machine, Progress as Share, Watch, drive};
+use crate::link::conversation::{Conversation, Observer, Progress as Share, run_all};
 use crate::link::error::{NetError, Refusal};
 use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
@@ -103,7 +103,7 @@ struct Ears<'a> {
     held: BTreeMap<DroneId, String>,
 }
 
-impl Watch for Ears<'_> {
+impl Observer for Ears<'_> {
     fn on_message(&mut self, now: Micros, received: &Received) {
         self.telemetry.on_message(now, received);
     }
@@ -201,15 +201,15 @@ impl<'a> Crew<'a> {
     }
 
     /// Runs one conversation per drone.
-    fn all<M: Machine>(
+    fn all<C: Conversation>(
         &mut self,
-        machines: BTreeMap<DroneId, M>,
+        conversations: BTreeMap<DroneId, C>,
         at_once: usize,
-    ) -> Result<BTreeMap<DroneId, M::Done>, CommandError> {
+    ) -> Result<BTreeMap<DroneId, C::Done>, CommandError> {
         let telemetry = &mut self.telemetry;
         let (done, held) = (BTreeSet::new(), BTreeMap::new());
         let mut ears = Ears { telemetry, context: self.context, done, held };
-        let done = drive(&mut self.net, machines, at_once, &mut ears)?;
+        let done = run_all(&mut self.net, conversations, at_once, &mut ears)?;
         self.held = ears.held;
         self.context.check_stop()?;
         Ok(done)
@@ -222,9 +222,9 @@ impl<'a> Crew<'a> {
 
     /// Asks for clocks and versions.
     pub(in crate::cli) fn greet(&mut self) -> Result<(), CommandError> {
-        let machines =
+        let conversations =
             self.telemetry.drones.keys().map(|drone| (*drone, Greet::new(*drone))).collect();
-        self.all(machines, AT_ONCE)?;
+        self.all(conversations, AT_ONCE)?;
         Ok(())
     }
 
@@ -289,9 +289,9 @@ impl<'a> Crew<'a> {
     pub(in crate::cli) fn list_logs(
         &mut self,
     ) -> Result<BTreeMap<DroneId, Result<Vec<LogOnDrone>, String>>, CommandError> {
-        let machines =
+        let conversations =
             self.drones().into_iter().map(|drone| (drone, LogList::new(drone, 20 * S))).collect();
-        let listed = self.all(machines, AT_ONCE)?;
+        let listed = self.all(conversations, AT_ONCE)?;
         let words = |error: LogProtocolError| crate::cli::exit::with_reasons(&error);
         Ok(listed.into_iter().map(|(drone, list)| (drone, list.map_err(words))).collect())
     }

@@ -19,14 +19,14 @@ use crate::fleet::command::Command;
 use crate::fleet::dry_run::{Obliging, dry_run};
 use crate::fleet::fence::PutFence;
 use crate::fleet::greet::Greet;
-use crate::fleet::guided::{Flight, Guided};
+use crate::fleet::guided::{Guided, GuidedFlight};
 use crate::fleet::messages::{GUIDED, set_mode};
 use crate::fleet::params::ReadParams;
 use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::slots::FleetTable;
 use crate::fleet::vehicle_clock::VehicleClock;
 use crate::link::clock::Micros;
-use crate::link::drive::Machine;
+use crate::link::conversation::Conversation;
 use crate::link::error::NetError;
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
@@ -108,10 +108,15 @@ fn place(plan: &Plan, slot: Option<&Slot>) -> Geodetic {
     plan.site.frame().to_geodetic(home.into())
 }
 
-fn shown<M: Machine>(plan: &Plan, table: &FleetTable, drone: DroneId, machine: M) -> Vec<String> {
+fn shown<C: Conversation>(
+    plan: &Plan,
+    table: &FleetTable,
+    drone: DroneId,
+    conversation: C,
+) -> Vec<String> {
     let slot = table.slot_of(drone).and_then(|slot| plan.slot(slot));
     let mut vehicle = Obliging::new(drone, true, place(plan, slot));
-    dry_run(machine, &mut vehicle, MOST).0
+    dry_run(conversation, &mut vehicle, MOST).0
 }
 
 /// A campaign's flight, and the drones that it would be flown by.
@@ -133,8 +138,8 @@ impl Dry {
         self.table.drones.iter().map(|line| (line.drone, lines(line.drone))).collect()
     }
 
-    fn shown<M: Machine>(&self, drone: DroneId, machine: M) -> Vec<String> {
-        shown(&self.plan, &self.table, drone, machine)
+    fn shown<C: Conversation>(&self, drone: DroneId, conversation: C) -> Vec<String> {
+        shown(&self.plan, &self.table, drone, conversation)
     }
 
     /// A flight by streaming, from its authorization on.
@@ -144,7 +149,7 @@ impl Dry {
         };
         let mut vehicle = Obliging::new(drone, false, place(&self.plan, Some(slot)));
         let authorized_ms = (vehicle.unix_us / 1000) as i64 + (lead_s * 1000.0) as i64;
-        let flight = Flight {
+        let flight = GuidedFlight {
             trajectory: self.plan.trajectory(slot),
             frame: self.plan.site.frame(),
             start_gps_ms: GpsTime::from_unix_ms(authorized_ms).map_or(0, GpsTime::total_ms),
@@ -295,8 +300,8 @@ pub(in crate::cli) fn restore(
 ) -> Result<Exit, CommandError> {
     let dry = Dry::of(args)?;
     let may = |_, change: &Change| fence_off || !change.unfences();
-    let machines = Changes::read(&dry.folder.0)?.restore(may).into_iter();
-    print(context, machines.map(|(drone, set)| (drone, dry.shown(drone, set))).collect())
+    let conversations = Changes::read(&dry.folder.0)?.restore(may).into_iter();
+    print(context, conversations.map(|(drone, set)| (drone, dry.shown(drone, set))).collect())
 }
 
 fn start_lines(lead_s: f64) -> Vec<String> {

@@ -15,7 +15,7 @@ use crate::cli::clock::{Stopwatch, SystemClock};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::{Aborted, Action};
-use crate::fleet::desk::{Desk, Notice};
+use crate::fleet::order_handler::{Notice, OrderHandler};
 use crate::fleet::orders::{Given, Inbox, give, has_station};
 use crate::fleet::slots::FleetTable;
 use crate::link::clock::Clock as _;
@@ -54,11 +54,11 @@ fn own_name() -> String {
 
 /// A net on which `fleet abort` and `fleet land` of other terminals are carried out, whatever this
 /// command is at.
-pub(in crate::cli) fn desk<'a>(
+pub(in crate::cli) fn order_handler<'a>(
     context: &'a Context,
     net: &'a mut dyn Net,
     folder: &'a FlightFolder,
-) -> Desk<'a> {
+) -> OrderHandler<'a> {
     let inbox = Inbox::open(&folder.0, own_name());
     if let Err(error) = &inbox {
         context.warn(&format!(
@@ -68,7 +68,8 @@ pub(in crate::cli) fn desk<'a>(
     }
     // An order needs no disk: without the table it is for those who are heard.
     let fleet = || table_of(folder);
-    Desk::new(net, inbox.ok(), move |notice| tell(context, folder, notice)).with_fleet(fleet)
+    OrderHandler::new(net, inbox.ok(), move |notice| tell(context, folder, notice))
+        .with_fleet(fleet)
 }
 
 /// The drones of a flight's table, if it has one that can be read.

@@ -221,8 +221,8 @@ fn with_desk(
 ) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
     let mut station = step_station(args)?;
-    let mut desk = end::desk(context, &mut station, &folder);
-    let mut crew = Crew::new(context, &mut desk, &folder, &plan);
+    let mut handler = end::order_handler(context, &mut station, &folder);
+    let mut crew = Crew::new(context, &mut handler, &folder, &plan);
     let ended = body(&mut crew);
     crew.ending(ended)
 }

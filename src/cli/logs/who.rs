@@ -9,7 +9,7 @@ use crate::cli::fleet::crew::{Crew, nobody};
 use crate::cli::simulate::SlotSet;
 use crate::fleet::slots::{FleetTable, SlotProblem, picture, propose, propose_clear};
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::Watch as _;
+use crate::link::conversation::Observer as _;
 use crate::link::net::Net as _;
 
 /// How often it is looked who stands where.

@@ -23,12 +23,12 @@ use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::get::{Get, Tally};
 use crate::fleet::ftp::list::List;
 use crate::fleet::ftp::sum::Sum;
-use crate::fleet::load::Load;
+use crate::fleet::load::LinkLoad;
 use crate::fleet::log_protocol::end_message;
 use crate::fleet::log_protocol::get::LogGet;
 use crate::fleet::log_protocol::list::LogList;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 
@@ -109,7 +109,7 @@ pub struct PullOne {
     /// Other drones use the link as well.
     is_shared: bool,
     /// What they have on their way.
-    load: Option<Load>,
+    load: Option<LinkLoad>,
     /// The drone is freed of a log that it sends, so often yet.
     frees: u8,
 }
@@ -206,7 +206,7 @@ impl PullOne {
 
     /// Tells the retrieval the load of its link.
     #[must_use]
-    pub fn on_link(self, load: &Load) -> Self {
+    pub fn on_link(self, load: &LinkLoad) -> Self {
         Self { load: Some(load.clone()), ..self }
     }
 
@@ -327,9 +327,9 @@ impl PullOne {
     }
 
     fn advance(&mut self, now: Micros, stage: Stage) -> (Stage, Next) {
-        macro_rules! machine {
-            ($machine:ident, $done:pat => $next:expr, $stage:expr) => {
-                match $machine.poll(now) {
+        macro_rules! advance {
+            ($step:ident, $done:pat => $next:expr, $stage:expr) => {
+                match $step.poll(now) {
                     Step::Send(message) => ($stage, Next::Step(Step::Send(message))),
                     Step::Wait(until) => ($stage, Next::Step(Step::Wait(until))),
                     Step::Done($done) => (Stage::Over, Next::Go(Box::new($next))),
@@ -339,35 +339,35 @@ impl PullOne {
         match stage {
             Stage::Start => (Stage::Over, Next::Go(Box::new(self.start()))),
             Stage::List(mut list) => {
-                machine!(list, done => self.on_list(done), Stage::List(list))
+                advance!(list, done => self.on_list(done), Stage::List(list))
             }
             Stage::Probe(mut get, part) => {
-                machine!(get, got => self.on_probed(part, &got.sink, got.result), Stage::Probe(get, part))
+                advance!(get, got => self.on_probed(part, &got.sink, got.result), Stage::Probe(get, part))
             }
-            Stage::Get(mut get) => machine!(get, got => self.on_got(got), Stage::Get(get)),
+            Stage::Get(mut get) => advance!(get, got => self.on_got(got), Stage::Get(get)),
             Stage::Try(mut trial) => {
-                machine!(trial, (got, listed) => self.on_tried(got, listed), Stage::Try(trial))
+                advance!(trial, (got, listed) => self.on_tried(got, listed), Stage::Try(trial))
             }
             Stage::Number(mut list, part) => {
-                machine!(list, done => self.on_numbered(part, done), Stage::Number(list, part))
+                advance!(list, done => self.on_numbered(part, done), Stage::Number(list, part))
             }
             Stage::IsIt(mut get, part) => {
-                machine!(get, got => self.on_is_it(part, &got), Stage::IsIt(get, part))
+                advance!(get, got => self.on_is_it(part, &got), Stage::IsIt(get, part))
             }
             Stage::Settle(part) => match self.settles() {
                 Some(until) => (Stage::Settle(part), Next::Step(Step::Wait(until))),
                 None => (Stage::Over, Next::Go(Box::new(self.relist(part)))),
             },
             Stage::LogRelist(mut list, part) => {
-                machine!(list, done => self.on_log_relisted(part, done), Stage::LogRelist(list, part))
+                advance!(list, done => self.on_log_relisted(part, done), Stage::LogRelist(list, part))
             }
             Stage::Relist(mut list, part) => {
-                machine!(list, done => self.on_relisted(part, done), Stage::Relist(list, part))
+                advance!(list, done => self.on_relisted(part, done), Stage::Relist(list, part))
             }
             Stage::Sum(mut sum, part, sums) => {
-                machine!(sum, done => self.on_summed(part, sums, done), Stage::Sum(sum, part, sums))
+                advance!(sum, done => self.on_summed(part, sums, done), Stage::Sum(sum, part, sums))
             }
-            Stage::Sample(mut get, part, sums) => machine!(
+            Stage::Sample(mut get, part, sums) => advance!(
                 get,
                 got => match got.result {
                     Ok(_) => self.on_sampled(part, sums, got.sink.differs),
@@ -376,9 +376,9 @@ impl PullOne {
                 Stage::Sample(get, part, sums)
             ),
             Stage::LogList(mut list) => {
-                machine!(list, done => self.on_log_list(done), Stage::LogList(list))
+                advance!(list, done => self.on_log_list(done), Stage::LogList(list))
             }
-            Stage::LogProbe(mut get, part) => machine!(
+            Stage::LogProbe(mut get, part) => advance!(
                 get,
                 got => match got.result {
                     _ if got.sink.differs => self.on_another(part),
@@ -388,9 +388,9 @@ impl PullOne {
                 Stage::LogProbe(get, part)
             ),
             Stage::LogGet(mut get) => {
-                machine!(get, got => self.on_log_got(got), Stage::LogGet(get))
+                advance!(get, got => self.on_log_got(got), Stage::LogGet(get))
             }
-            Stage::LogSample(mut get, part, sums) => machine!(
+            Stage::LogSample(mut get, part, sums) => advance!(
                 get,
                 got => match got.result {
                     Ok(_) => self.on_sampled(part, sums, got.sink.differs),
@@ -403,7 +403,7 @@ impl PullOne {
     }
 }
 
-impl Machine for PullOne {
+impl Conversation for PullOne {
     type Done = OneDone;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {
@@ -422,22 +422,24 @@ impl Machine for PullOne {
             return;
         }
         match &mut self.stage {
-            Stage::List(machine) | Stage::Relist(machine, _) => machine.on_message(now, message),
-            Stage::Probe(machine, _) | Stage::Sample(machine, ..) => {
-                machine.on_message(now, message);
+            Stage::List(conversation) | Stage::Relist(conversation, _) => {
+                conversation.on_message(now, message)
             }
-            Stage::Get(machine) => machine.on_message(now, message),
-            Stage::Try(machine) => machine.on_message(now, message),
-            Stage::Number(machine, _) => machine.on_message(now, message),
-            Stage::IsIt(machine, _) => machine.on_message(now, message),
-            Stage::Sum(machine, ..) => machine.on_message(now, message),
-            Stage::LogList(machine) | Stage::LogRelist(machine, _) => {
-                machine.on_message(now, message);
+            Stage::Probe(conversation, _) | Stage::Sample(conversation, ..) => {
+                conversation.on_message(now, message);
             }
-            Stage::LogProbe(machine, _) | Stage::LogSample(machine, ..) => {
-                machine.on_message(now, message);
+            Stage::Get(conversation) => conversation.on_message(now, message),
+            Stage::Try(conversation) => conversation.on_message(now, message),
+            Stage::Number(conversation, _) => conversation.on_message(now, message),
+            Stage::IsIt(conversation, _) => conversation.on_message(now, message),
+            Stage::Sum(conversation, ..) => conversation.on_message(now, message),
+            Stage::LogList(conversation) | Stage::LogRelist(conversation, _) => {
+                conversation.on_message(now, message);
             }
-            Stage::LogGet(machine) => machine.on_message(now, message),
+            Stage::LogProbe(conversation, _) | Stage::LogSample(conversation, ..) => {
+                conversation.on_message(now, message);
+            }
+            Stage::LogGet(conversation) => conversation.on_message(now, message),
             Stage::Start | Stage::Settle(_) | Stage::Over => {}
         }
     }

@@ -10,9 +10,9 @@ use super::one::{OneDone, OneOptions, PullOne};
 use super::pace::Pace;
 use crate::campaign::CampaignError;
 use crate::fleet::budget::Budget;
-use crate::fleet::load::Load;
+use crate::fleet::load::LinkLoad;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine as _, Step, Watch};
+use crate::link::conversation::{Conversation as _, Observer, Step};
 use crate::link::error::NetError;
 use crate::link::id::DroneId;
 use crate::link::net::Net;
@@ -88,10 +88,10 @@ pub fn pull(
     logs: &Path,
     wanted: &[Wanted],
     options: &PullOptions,
-    watch: &mut dyn Watch,
+    observer: &mut dyn Observer,
 ) -> Result<BTreeMap<DroneId, Outcome>, PullError> {
     let shelf = Rc::new(RefCell::new(Shelf::open(logs, &options.made_by)?));
-    let outcomes = pull_onto(&shelf, net, wanted, options, watch);
+    let outcomes = pull_onto(&shelf, net, wanted, options, observer);
     if options.each.is_durable {
         shelf.borrow().settle();
     }
@@ -103,7 +103,7 @@ fn pull_onto(
     net: &mut dyn Net,
     wanted: &[Wanted],
     options: &PullOptions,
-    watch: &mut dyn Watch,
+    observer: &mut dyn Observer,
 ) -> Result<BTreeMap<DroneId, Outcome>, NetError> {
     let mut outcomes: BTreeMap<DroneId, Outcome> = BTreeMap::new();
     let mut lanes: BTreeMap<u16, Lane> = BTreeMap::new();
@@ -111,16 +111,16 @@ fn pull_onto(
         let lane = lanes.entry(one.drone.network).or_insert_with(|| Lane::new(options));
         let each = options.each.clone();
         let shelf = Rc::clone(shelf);
-        let machine =
+        let conversation =
             PullOne::new(one.drone, one.slot, &one.file, shelf, each, lane.budget.clone())
                 .of_flight(one.flight.clone())
                 .on_link(&lane.load);
-        lane.waiting.push_back((one.drone, machine));
+        lane.waiting.push_back((one.drone, conversation));
         outcomes.insert(one.drone, Outcome::Stopped);
     }
     loop {
         let now = net.now();
-        if watch.stop(now) {
+        if observer.stop(now) {
             lanes.values().try_for_each(|lane| lane.free(net))?;
             return Ok(outcomes);
         }
@@ -128,7 +128,7 @@ fn pull_onto(
             lane.start(now);
             let due: Vec<DroneId> = lane.due(now).collect();
             for drone in due {
-                lane.advance(net, drone, &mut outcomes, watch)?;
+                lane.advance(net, drone, &mut outcomes, observer)?;
             }
         }
         if lanes.values().all(Lane::is_over) {
@@ -139,13 +139,13 @@ fn pull_onto(
         let mut wait = until;
         while let Some(received) = net.recv(wait)? {
             let now = net.now();
-            watch.on_message(now, &received);
+            observer.on_message(now, &received);
             let lane = lanes.get_mut(&received.from.network);
             if let Some(lane) = lane
                 && let Some(running) = lane.running.get_mut(&received.from)
             {
-                running.machine.on_message(now, &received.message);
-                lane.advance(net, received.from, &mut outcomes, watch)?;
+                running.conversation.on_message(now, &received.message);
+                lane.advance(net, received.from, &mut outcomes, observer)?;
             }
             wait = now;
             if now >= until {
@@ -161,13 +161,13 @@ struct Lane {
     running: BTreeMap<DroneId, Running>,
     pace: Pace,
     budget: Option<Budget>,
-    load: Load,
+    load: LinkLoad,
     /// New bytes of drones that are done.
     bytes: u64,
 }
 
 struct Running {
-    machine: PullOne,
+    conversation: PullOne,
     wakes: Micros,
     started: Micros,
 }
@@ -179,7 +179,7 @@ impl Lane {
             running: BTreeMap::new(),
             pace: Pace::new(options.at_once),
             budget: options.bytes_per_s.map(Budget::new),
-            load: Load::default(),
+            load: LinkLoad::default(),
             bytes: 0,
         }
     }
@@ -187,7 +187,7 @@ impl Lane {
     /// Ends what drones send: nobody listens any more, and they do not arm meanwhile.
     fn free(&self, net: &mut dyn Net) -> Result<(), NetError> {
         for (drone, running) in &self.running {
-            if let Some(end) = running.machine.farewell() {
+            if let Some(end) = running.conversation.farewell() {
                 // It has no answer.
                 net.send(*drone, &end)?;
                 net.send(*drone, &end)?;
@@ -210,18 +210,18 @@ impl Lane {
 
     fn start(&mut self, now: Micros) {
         let is_busy = |one: &&Running| {
-            !one.machine.is_idle()
-                && now < one.machine.heard().unwrap_or(one.started).max(one.started) + SILENT
+            !one.conversation.is_idle()
+                && now < one.conversation.heard().unwrap_or(one.started).max(one.started) + SILENT
         };
         let mut busy = self.running.values().filter(is_busy).count();
-        let bytes: u64 = self.running.values().map(|one| one.machine.new_bytes()).sum();
+        let bytes: u64 = self.running.values().map(|one| one.conversation.new_bytes()).sum();
         self.pace.look(now, self.bytes + bytes, busy);
         for running in self.running.values_mut() {
-            running.machine.share(busy > 1);
+            running.conversation.share(busy > 1);
         }
         while busy < self.pace.at_once() {
-            let Some((drone, machine)) = self.waiting.pop_front() else { return };
-            self.running.insert(drone, Running { machine, wakes: now, started: now });
+            let Some((drone, conversation)) = self.waiting.pop_front() else { return };
+            self.running.insert(drone, Running { conversation, wakes: now, started: now });
             busy += 1;
         }
     }
@@ -231,20 +231,20 @@ impl Lane {
         net: &mut dyn Net,
         drone: DroneId,
         outcomes: &mut BTreeMap<DroneId, Outcome>,
-        watch: &mut dyn Watch,
+        observer: &mut dyn Observer,
     ) -> Result<(), NetError> {
         let Some(running) = self.running.get_mut(&drone) else { return Ok(()) };
         loop {
-            match running.machine.poll(net.now()) {
+            match running.conversation.poll(net.now()) {
                 Step::Send(message) => net.send(drone, &message)?,
                 Step::Wait(until) => {
                     running.wakes = until;
-                    watch.on_progress(drone, running.machine.progress(), false);
+                    observer.on_progress(drone, running.conversation.progress(), false);
                     return Ok(());
                 }
                 Step::Done(done) => {
-                    watch.on_progress(drone, running.machine.progress(), true);
-                    self.bytes += running.machine.new_bytes();
+                    observer.on_progress(drone, running.conversation.progress(), true);
+                    self.bytes += running.conversation.new_bytes();
                     outcomes.insert(drone, Outcome::Done(done));
                     self.running.remove(&drone);
                     return Ok(());

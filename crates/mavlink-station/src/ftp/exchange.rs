@@ -3,7 +3,7 @@
 use super::{Caller, FtpError, answer};
 use crate::link::clock::{MS, Micros, S};
 use crate::link::frame::MavMessage;
-use crate::protocol::ftp::{Op, Packet, Refusal};
+use crate::protocol::ftp::{NakReason, Op, Packet};
 
 /// Longest pause between repetitions.
 const MOST_PAUSE: Micros = 3 * S;
@@ -113,7 +113,7 @@ impl Exchange {
         now: Micros,
         message: &MavMessage,
         caller: &Caller,
-    ) -> Option<Result<Packet, Refusal>> {
+    ) -> Option<Result<Packet, NakReason>> {
         let packet = answer(message)?;
         if packet.request == Op::BurstReadFile && packet.session != self.packet.session {
             self.stale = Some(packet.session);
@@ -129,7 +129,7 @@ impl Exchange {
             caller.add_rtt(now.saturating_sub(self.sent));
         }
         match packet.refusal() {
-            Some(Refusal::InvalidSession | Refusal::NoSessionsAvailable) => {
+            Some(NakReason::InvalidSession | NakReason::NoSessionsAvailable) => {
                 self.wait_for_other(now, caller);
                 None
             }

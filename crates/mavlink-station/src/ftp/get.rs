@@ -20,9 +20,9 @@ use super::reads::Reads;
 use super::{Caller, Exchange, FtpError, answer};
 use crate::budget::Budget;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::frame::MavMessage;
-use crate::protocol::ftp::{MOST_DATA, Op, Packet, Refusal};
+use crate::protocol::ftp::{MOST_DATA, NakReason, Op, Packet};
 use crate::sink::Sink;
 
 const PIECE: u64 = MOST_DATA as u64;
@@ -221,11 +221,11 @@ impl<S: Sink> Get<S> {
         self.stage = Stage::Closed(at);
     }
 
-    fn on_opened(&mut self, now: Micros, outcome: Result<Packet, Refusal>) {
+    fn on_opened(&mut self, now: Micros, outcome: Result<Packet, NakReason>) {
         let what = "opening the file";
         let packet = match outcome {
             Ok(packet) => packet,
-            Err(Refusal::Fail) => {
+            Err(NakReason::Fail) => {
                 return self.reopen(now + BUSY_PAUSE);
             }
             Err(refusal) => return self.close(Err(FtpError::Refused { what, refusal })),
@@ -264,7 +264,7 @@ impl<S: Sink> Get<S> {
     }
 }
 
-impl<S: Sink> Machine for Get<S> {
+impl<S: Sink> Conversation for Get<S> {
     type Done = Got<S>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

@@ -3,9 +3,9 @@
 use super::exchange::Wish;
 use super::{Caller, Exchange, FtpError};
 use crate::link::clock::Micros;
-use crate::link::drive::{Machine, Step};
+use crate::link::conversation::{Conversation, Step};
 use crate::link::frame::MavMessage;
-use crate::protocol::ftp::{Op, Packet, Refusal};
+use crate::protocol::ftp::{NakReason, Op, Packet};
 use untrusted_io::plain::acts;
 
 /// No folder has more names.
@@ -70,14 +70,14 @@ fn request(folder: &str, offset: u32) -> Packet {
     packet
 }
 
-impl Machine for List {
+impl Conversation for List {
     type Done = Result<Vec<Listed>, FtpError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {
         let what = "the list of files";
         match self.exchange.on_message(now, message, &self.caller) {
             None => {}
-            Some(Err(Refusal::EndOfFile)) => self.over = Some(Ok(())),
+            Some(Err(NakReason::EndOfFile)) => self.over = Some(Ok(())),
             Some(Err(refusal)) => self.over = Some(Err(FtpError::Refused { what, refusal })),
             Some(Ok(packet)) => {
                 let before = self.seen;

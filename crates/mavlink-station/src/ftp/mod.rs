@@ -14,7 +14,7 @@ use crate::link::clock::Micros;
 use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::link::station::{AUTOPILOT, STATION};
-use crate::protocol::ftp::{Packet, Refusal};
+use crate::protocol::ftp::{NakReason, Packet};
 
 use super::rtt::Rtt;
 
@@ -40,7 +40,7 @@ pub enum FtpError {
         /// What was asked.
         what: &'static str,
         /// Its reason.
-        refusal: Refusal,
+        refusal: NakReason,
     },
     /// The file ends before its size.
     #[error("the vehicle says that the file has {said} bytes, but it ends at byte {ends}")]

@@ -6,9 +6,9 @@ use super::exchange::Wish;
 use super::{Caller, Exchange, FtpError, answer};
 use crate::crc::ap_crc32;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::frame::MavMessage;
-use crate::protocol::ftp::{MOST_DATA, Op, Packet, Refusal};
+use crate::protocol::ftp::{MOST_DATA, NakReason, Op, Packet};
 
 /// Pieces on their way at once; a vehicle keeps five requests.
 const WINDOW: usize = 4;
@@ -66,7 +66,7 @@ impl Put {
     }
 
     /// Begins anew, or gives up.
-    fn again(&mut self, at: Micros, what: &'static str, refusal: Refusal) {
+    fn again(&mut self, at: Micros, what: &'static str, refusal: NakReason) {
         self.stage = if self.starts >= MOST_STARTS {
             Stage::Over(Err(FtpError::Refused { what, refusal }))
         } else {
@@ -74,10 +74,10 @@ impl Put {
         };
     }
 
-    fn on_created(&mut self, now: Micros, outcome: Result<(), Refusal>) {
+    fn on_created(&mut self, now: Micros, outcome: Result<(), NakReason>) {
         match outcome {
             Ok(()) => self.stage = Stage::Write(Writing::default()),
-            Err(refusal @ Refusal::Fail) => {
+            Err(refusal @ NakReason::Fail) => {
                 self.again(now + BUSY_PAUSE, "creating the file", refusal);
             }
             Err(refusal) => {
@@ -96,7 +96,10 @@ impl Put {
         let Some((offset, sent, tries)) = writing.on_way.remove(&number) else { return };
         self.heard = Some(now);
         if let Some(refusal) = packet.refusal() {
-            if matches!(refusal, Refusal::FileNotFound | Refusal::InvalidSession | Refusal::Fail) {
+            if matches!(
+                refusal,
+                NakReason::FileNotFound | NakReason::InvalidSession | NakReason::Fail
+            ) {
                 self.again(now, "writing", refusal);
             } else {
                 self.stage = Stage::Over(Err(FtpError::Refused { what: "writing", refusal }));
@@ -112,7 +115,7 @@ impl Put {
         }
     }
 
-    fn on_compared(&mut self, outcome: Result<Packet, Refusal>) {
+    fn on_compared(&mut self, outcome: Result<Packet, NakReason>) {
         let what = "the checksum";
         let result = match outcome {
             Err(refusal) => Err(FtpError::Refused { what, refusal }),
@@ -176,7 +179,7 @@ impl Put {
     }
 }
 
-impl Machine for Put {
+impl Conversation for Put {
     type Done = Result<(), FtpError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

@@ -3,7 +3,7 @@
 use super::exchange::Wish;
 use super::{Caller, Exchange, FtpError};
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Machine, Step};
+use crate::link::conversation::{Conversation, Step};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::{Op, Packet};
 
@@ -28,7 +28,7 @@ impl Sum {
     }
 }
 
-impl Machine for Sum {
+impl Conversation for Sum {
     type Done = Result<u32, FtpError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

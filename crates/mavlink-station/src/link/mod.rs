@@ -6,7 +6,7 @@
 
 pub mod address;
 pub mod clock;
-pub mod drive;
+pub mod conversation;
 pub mod error;
 pub mod frame;
 pub mod id;

@@ -16,10 +16,10 @@ use crate::budget::Budget;
 use crate::ftp::get::Tally;
 use crate::ftp::reads::Reads;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
-use crate::load::{Load, Place};
+use crate::load::{LinkLoad, Place};
 use crate::rtt::Rtt;
 use crate::sink::Sink;
 
@@ -125,8 +125,8 @@ impl<S: Sink> LogGet<S> {
 
     /// The link, which other drones may use as well.
     #[must_use]
-    pub fn on_link(mut self, load: Option<&Load>) -> Self {
-        self.place = load.map(Load::place);
+    pub fn on_link(mut self, load: Option<&LinkLoad>) -> Self {
+        self.place = load.map(LinkLoad::place);
         self
     }
 
@@ -309,7 +309,7 @@ impl<S: Sink> LogGet<S> {
     }
 }
 
-impl<S: Sink> Machine for LogGet<S> {
+impl<S: Sink> Conversation for LogGet<S> {
     type Done = LogGot<S>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

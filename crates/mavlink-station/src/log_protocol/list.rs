@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{LogProtocolError, list_message, says_armed};
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine, Progress, Step};
+use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
 use crate::rtt::Rtt;
@@ -87,7 +87,7 @@ impl LogList {
     }
 }
 
-impl Machine for LogList {
+impl Conversation for LogList {
     type Done = Result<Vec<Entry>, LogProtocolError>;
 
     fn on_message(&mut self, now: Micros, message: &MavMessage) {

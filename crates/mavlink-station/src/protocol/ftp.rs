@@ -44,7 +44,7 @@ pub enum Op {
     BurstReadFile = 15,
     /// Answer: done.
     Ack = 128,
-    /// Answer: refused; the data's first byte is an [`Refusal`].
+    /// Answer: refused; the data's first byte is an [`NakReason`].
     Nak = 129,
 }
 
@@ -76,7 +76,7 @@ impl Op {
 
 /// Why a request was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
+pub enum NakReason {
     /// 1: no reason given.
     Fail,
     /// 2: the file system's own number follows.
@@ -101,7 +101,7 @@ pub enum Refusal {
     Other(u8),
 }
 
-impl std::fmt::Display for Refusal {
+impl std::fmt::Display for NakReason {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let text = match self {
             Self::Fail => "failed",
@@ -200,22 +200,22 @@ impl Packet {
     }
 
     /// Why it is refused; `None` when it is not a refusal.
-    pub fn refusal(&self) -> Option<Refusal> {
+    pub fn refusal(&self) -> Option<NakReason> {
         if self.op != Op::Nak {
             return None;
         }
         Some(match self.data.first().copied().unwrap_or(1) {
-            1 => Refusal::Fail,
-            2 => Refusal::FailErrno(self.data.get(1).copied().unwrap_or(0)),
-            3 => Refusal::InvalidDataSize,
-            4 => Refusal::InvalidSession,
-            5 => Refusal::NoSessionsAvailable,
-            6 => Refusal::EndOfFile,
-            7 => Refusal::UnknownCommand,
-            8 => Refusal::FileExists,
-            9 => Refusal::FileProtected,
-            10 => Refusal::FileNotFound,
-            other => Refusal::Other(other),
+            1 => NakReason::Fail,
+            2 => NakReason::FailErrno(self.data.get(1).copied().unwrap_or(0)),
+            3 => NakReason::InvalidDataSize,
+            4 => NakReason::InvalidSession,
+            5 => NakReason::NoSessionsAvailable,
+            6 => NakReason::EndOfFile,
+            7 => NakReason::UnknownCommand,
+            8 => NakReason::FileExists,
+            9 => NakReason::FileProtected,
+            10 => NakReason::FileNotFound,
+            other => NakReason::Other(other),
         })
     }
 }

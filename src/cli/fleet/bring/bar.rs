@@ -11,7 +11,7 @@ use crate::cli::clock::Stopwatch;
 use crate::cli::context::Context;
 use crate::cli::words;
 use crate::link::clock::{Micros, S};
-use crate::link::drive::{Progress as Share, Watch};
+use crate::link::conversation::{Observer, Progress as Share};
 use crate::link::id::DroneId;
 use crate::link::net::Received;
 
@@ -68,7 +68,7 @@ impl<'a> Bar<'a> {
     }
 }
 
-impl Watch for Bar<'_> {
+impl Observer for Bar<'_> {
     fn on_message(&mut self, _: Micros, received: &Received) {
         self.absent.remove(&received.from);
     }

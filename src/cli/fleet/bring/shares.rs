@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::link::drive::Progress as Share;
+use crate::link::conversation::Progress as Share;
 use crate::link::id::DroneId;
 
 /// The shares of all drones, and their sum.

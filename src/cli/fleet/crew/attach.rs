@@ -12,7 +12,7 @@ use crate::fleet::messages::start_packet;
 use crate::fleet::slots::FleetTable;
 use crate::fleet::start::Start;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::Watch as _;
+use crate::link::conversation::Observer as _;
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 use crate::protocol::show::{CLEAR_TIME, StartConfig, flag};

@@ -9,7 +9,7 @@ use crate::cli::fleet::interrupt::Choice;
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
 use crate::fleet::telemetry::Drone;
 use crate::link::clock::MS;
-use crate::link::drive::{Watch as _, drive};
+use crate::link::conversation::{Observer as _, run_all};
 use crate::link::id::DroneId;
 use crate::link::net::Net;
 
@@ -44,9 +44,9 @@ pub(super) fn bring_down(
     eyes.finishes = true;
     let ordered = net.ordered_down();
     let end = |drone: &DroneId| (*drone, Abort::new(*drone, action, eyes.telemetry().get(*drone)));
-    let machines: BTreeMap<DroneId, Abort> =
+    let conversations: BTreeMap<DroneId, Abort> =
         drones.iter().filter(|drone| !ordered.contains_key(drone)).map(end).collect();
-    let done = drive(net, machines, ALL_AT_ONCE, eyes).unwrap_or_default();
+    let done = run_all(net, conversations, ALL_AT_ONCE, eyes).unwrap_or_default();
     for (drone, end) in &done {
         context.insist(&format!("drone {drone}: {end}"));
     }

@@ -8,7 +8,7 @@ use crate::cli::exit::CommandError;
 use crate::cli::fleet::end::{PATIENCE, by_hand, waiting, word};
 use crate::fleet::abort::{ALL_AT_ONCE, Abort, Aborted, Action};
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Progress, Watch, drive};
+use crate::link::conversation::{Observer, Progress, run_all};
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 
@@ -62,11 +62,11 @@ impl Crew<'_> {
             let abort = Abort::new(*drone, action, self.telemetry.get(*drone));
             (*drone, abort.heard_within((wait_s * 1e6) as Micros))
         };
-        let machines: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
+        let conversations: BTreeMap<DroneId, Abort> = drones.iter().map(end).collect();
         let now = self.net.now();
         let (next, by_hand) = (now + TELL, Some(now + PATIENCE.as_micros() as Micros));
         let mut ears = Waiting { context: self.context, open: drones.clone(), next, by_hand };
-        let done = drive(&mut self.net, machines, ALL_AT_ONCE, &mut ears)?;
+        let done = run_all(&mut self.net, conversations, ALL_AT_ONCE, &mut ears)?;
         let outcomes = drones.iter().map(|drone| {
             (*drone, done.get(drone).map_or("not confirmed".to_owned(), Aborted::to_string))
         });
@@ -87,7 +87,7 @@ struct Waiting<'a> {
     by_hand: Option<Micros>,
 }
 
-impl Watch for Waiting<'_> {
+impl Observer for Waiting<'_> {
     fn on_progress(&mut self, drone: DroneId, _: Progress, over: bool) {
         if over {
             self.open.remove(&drone);

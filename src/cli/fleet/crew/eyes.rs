@@ -11,7 +11,7 @@ use crate::fleet::journal::{Entry, Journal};
 use crate::fleet::telemetry::Telemetry;
 use crate::fleet::watch::Monitor;
 use crate::link::clock::{Clock as _, Micros, S};
-use crate::link::drive::Watch;
+use crate::link::conversation::Observer;
 use crate::link::error::Refusal;
 use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
@@ -135,7 +135,7 @@ impl<'a> Eyes<'a> {
     }
 }
 
-impl Watch for Eyes<'_> {
+impl Observer for Eyes<'_> {
     fn on_message(&mut self, now: Micros, received: &Received) {
         self.monitor.on_message(now, received);
     }

@@ -12,12 +12,12 @@ use crate::cli::fleet::interrupt::Choice;
 use crate::fleet::abort::{ALL_AT_ONCE, Aborted};
 use crate::fleet::command::Command;
 use crate::fleet::fence::PutFence;
-use crate::fleet::guided::{Flight, Guided, GuidedError};
+use crate::fleet::guided::{Guided, GuidedError, GuidedFlight};
 use crate::fleet::messages::{GUIDED, set_mode};
 use crate::fleet::start::{Start, StartOptions, StartRefusal};
 use crate::fleet::telemetry::Drone;
 use crate::link::clock::MS;
-use crate::link::drive::{Watch as _, drive};
+use crate::link::conversation::{Observer as _, run_all};
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 
@@ -111,7 +111,11 @@ impl<'a> Crew<'a> {
     pub(in crate::cli) fn authorize_guided(&mut self, start: &Start) -> Result<(), CommandError> {
         // A person has taken their time to answer.
         while let Some(received) = self.net.recv(0)? {
-            crate::link::drive::Watch::on_message(&mut self.telemetry, self.net.now(), &received);
+            crate::link::conversation::Observer::on_message(
+                &mut self.telemetry,
+                self.net.now(),
+                &received,
+            );
         }
         self.not_ordered_down()?;
         start.check_time(&self.telemetry, self.net.now()).map_err(refused)?;
@@ -127,25 +131,25 @@ impl<'a> Crew<'a> {
     ) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
         let start_gps_ms = start.time().map_or(0, GpsTime::total_ms);
         let frame = self.plan.site.frame();
-        let mut machines = BTreeMap::new();
+        let mut conversations = BTreeMap::new();
         for line in &self.table.drones {
             let (Some(slot), Some(known)) =
                 (self.plan.slot(line.slot), self.telemetry.get(line.drone))
             else {
                 continue;
             };
-            let flight = Flight {
+            let flight = GuidedFlight {
                 trajectory: self.plan.trajectory(slot),
                 frame,
                 start_gps_ms,
                 yaw_rad: None,
                 clock: known.clock.clone(),
             };
-            machines.insert(line.drone, Guided::new(line.drone, flight));
+            conversations.insert(line.drone, Guided::new(line.drone, flight));
         }
         let eyes = self.eyes(Some(start_gps_ms));
         self.context.signals().set_flies(Some(GUIDED_LEFT));
-        let (mut eyes, failed, ended) = self.stream(machines, eyes);
+        let (mut eyes, failed, ended) = self.stream(conversations, eyes);
         self.context.signals().set_flies(None);
         if !ended.is_empty() {
             self.try_note("abort", &in_words(&ended));
@@ -163,14 +167,14 @@ impl<'a> Crew<'a> {
     /// Flies, and brings everyone down. Nothing that fails here ends it: drones are in the air.
     fn stream(
         &mut self,
-        machines: BTreeMap<DroneId, Guided>,
+        conversations: BTreeMap<DroneId, Guided>,
         mut eyes: Eyes<'a>,
     ) -> (Eyes<'a>, Option<String>, BTreeMap<DroneId, Aborted>) {
         let drones = self.drones();
         let context = self.context;
         let mut ended = BTreeMap::new();
         let mut net = Stubborn::new(&mut self.net, context);
-        let done = drive(&mut net, machines, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
+        let done = run_all(&mut net, conversations, ALL_AT_ONCE, &mut eyes).unwrap_or_default();
         for (drone, outcome) in done {
             match outcome {
                 // That was told when it happened.

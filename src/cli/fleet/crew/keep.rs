@@ -31,8 +31,8 @@ impl Crew<'_> {
         // Nothing is changed on those in the air, so that nothing of them need be kept.
         let is_touched =
             |drone: &DroneId| matches!(self.net.state(*drone), State::Ground | State::Unheard);
-        let machines = self.drones().into_iter().filter(is_touched).map(read).collect();
-        let found = self.all(machines, AT_ONCE)?;
+        let conversations = self.drones().into_iter().filter(is_touched).map(read).collect();
+        let found = self.all(conversations, AT_ONCE)?;
         let mut changes = Changes::read(&self.folder.0)?;
         let before = changes.clone();
         for (drone, values) in found {
@@ -114,9 +114,9 @@ impl Crew<'_> {
         let may = |drone: DroneId, change: &Change| {
             on_ground.contains(&drone) && wanted(change) && (held.is_none() || !weakens(change))
         };
-        let machines = changes.restore(may);
-        let asked: Vec<DroneId> = machines.keys().copied().collect();
-        let done = self.all(machines, AT_ONCE)?;
+        let conversations = changes.restore(may);
+        let asked: Vec<DroneId> = conversations.keys().copied().collect();
+        let done = self.all(conversations, AT_ONCE)?;
         for drone in &asked {
             let outcome = match done.get(drone) {
                 Some(Ok(())) => {

@@ -14,7 +14,7 @@ use crate::fleet::ftp::Caller;
 use crate::fleet::ftp::sum::Sum;
 use crate::fleet::required::{CheckParams, requirements};
 use crate::fleet::telemetry::Drone;
-use crate::fleet::upload::{Load, Upload};
+use crate::fleet::upload::{ShowLoad, Upload};
 use crate::link::clock::{MS, Micros, S};
 use crate::link::id::DroneId;
 use crate::protocol::show::SHOW_FILE;
@@ -31,7 +31,7 @@ impl Crew<'_> {
     pub(in crate::cli) fn params(&mut self, may_change: bool) -> Result<bool, CommandError> {
         // Who flies, or may be flying, keeps what it has.
         let in_the_air = self.net.in_the_air(self.drones(), true);
-        let machines = self
+        let conversations = self
             .drones()
             .into_iter()
             .map(|drone| {
@@ -42,7 +42,7 @@ impl Crew<'_> {
                 (drone, CheckParams::new(drone, required, may_change))
             })
             .collect();
-        let standings = self.all(machines, AT_ONCE)?;
+        let standings = self.all(conversations, AT_ONCE)?;
         let mut changes =
             if self.is_virtual { Changes::default() } else { Changes::read(&self.folder.0)? };
         let (mut changed, mut wrong) = (0, 0);
@@ -106,10 +106,10 @@ impl Crew<'_> {
     }
 
     /// What is put on a drone.
-    fn load(&self, slot: u16, fence: &Fence) -> Result<Load, CommandError> {
+    fn load(&self, slot: u16, fence: &Fence) -> Result<ShowLoad, CommandError> {
         let path = self.folder.skyb(slot, self.plan.slots.len());
         let skyb = read_whole(&path, MOST_SKYB)?;
-        Ok(Load { skyb, site: self.plan.site, fence: fence.clone() })
+        Ok(ShowLoad { skyb, site: self.plan.site, fence: fence.clone() })
     }
 
     /// The plan's fence as drones get it.
@@ -180,15 +180,15 @@ impl Crew<'_> {
     pub(in crate::cli) fn look_at_files(&mut self) -> Result<(), CommandError> {
         let (count, number) = (self.plan.slots.len(), run_number());
         let mut wanted = BTreeMap::new();
-        let mut machines = BTreeMap::new();
+        let mut conversations = BTreeMap::new();
         for line in &self.table.drones {
             let file = read_whole(&self.folder.skyb(line.slot, count), MOST_SKYB)?;
             wanted.insert(line.drone, ap_crc32(&file));
             let caller = Caller::new(line.drone, number);
             let sum = Sum::new(caller, SHOW_FILE, file.len() as u64, 10 * S);
-            machines.insert(line.drone, sum);
+            conversations.insert(line.drone, sum);
         }
-        let found = self.all(machines, AT_ONCE)?;
+        let found = self.all(conversations, AT_ONCE)?;
         let same = found.into_iter().filter(|(drone, sum)| sum.as_ref().ok() == wanted.get(drone));
         let same: Vec<DroneId> = same.map(|(drone, _)| drone).collect();
         self.known.loaded.extend(same.iter().copied());

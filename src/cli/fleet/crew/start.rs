@@ -11,11 +11,11 @@ use crate::cli::exit::CommandError;
 use crate::cli::fleet::interrupt::Interrupt;
 use crate::fleet::abort::Aborted;
 use crate::fleet::journal::Journal;
-use crate::fleet::start::{Phase, Start, StartOptions};
+use crate::fleet::start::{Start, StartOptions, StartPhase};
 use crate::fleet::telemetry::Drone;
 use crate::fleet::watch::{self, Monitor};
 use crate::link::clock::{MS, S};
-use crate::link::drive::Watch as _;
+use crate::link::conversation::Observer as _;
 use crate::link::error::NetError;
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
@@ -161,13 +161,13 @@ impl<'a> Crew<'a> {
             let now = self.net.now();
             let ordered = self.net.ordered_down();
             let before = start.left_s(eyes.telemetry(), now).is_some_and(|left_s| left_s > 0.0);
-            if !ordered.is_empty() && before && start.phase() != Phase::Cancelled {
+            if !ordered.is_empty() && before && start.phase() != StartPhase::Cancelled {
                 // A start packet has no address: who goes on needs a new one.
                 self.context.insist("The start is taken back for everyone");
                 start.cancel(now);
                 self.withdraw_start();
             }
-            let cancelled = start.phase() == Phase::Cancelled;
+            let cancelled = start.phase() == StartPhase::Cancelled;
             let told = cancelled && start.late(eyes.telemetry(), now).is_empty();
             if let Some(packet) = start.due(eyes.telemetry(), now).filter(|_| !told) {
                 match self.net.broadcast(&packet) {

@@ -10,13 +10,13 @@ use crate::fleet::log_protocol::LogProtocolError;
 use crate::fleet::log_protocol::list::Entry;
 use crate::fleet::logs::part::PartFile;
 use crate::link::clock::S;
-use crate::protocol::ftp::Refusal;
+use crate::protocol::ftp::NakReason;
 
 impl PullOne {
     pub(super) fn on_list(&mut self, outcome: Result<Vec<Listed>, FtpError>) -> Stage {
         let names = match outcome {
             Ok(names) => names,
-            Err(FtpError::Refused { refusal: Refusal::FileNotFound, .. }) => {
+            Err(FtpError::Refused { refusal: NakReason::FileNotFound, .. }) => {
                 self.folder += 1;
                 return match self.list(FTP_PATIENCE) {
                     Some(list) => Stage::List(list),

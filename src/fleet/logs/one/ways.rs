@@ -16,7 +16,7 @@ use crate::fleet::log_protocol::list::{Entry, LogList};
 use crate::fleet::logs::part::{PartFile, Sample};
 use crate::fleet::sink::Sink;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine, Step};
+use crate::link::conversation::{Conversation, Step};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::MOST_DATA;
 
@@ -159,7 +159,7 @@ impl Trial {
     }
 }
 
-impl Machine for Trial {
+impl Conversation for Trial {
     /// The list, if that is not over.
     type Done = (Got<Tail>, Result<Result<Vec<Entry>, LogProtocolError>, LogList>);
 

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::ftp::FtpError;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine as _, Step};
+use crate::link::conversation::{Conversation as _, Step};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::{MOST_DATA, Op, Packet};
 use crate::sink::Sink;

@@ -3,7 +3,7 @@
 use super::{BUSY_PAUSE, Burst, Get, MOST_LIES, PIECE, TELLING, USUAL_BURST};
 use crate::ftp::{FtpError, NUMBERS_PER_BURST};
 use crate::link::clock::Micros;
-use crate::protocol::ftp::{Op, Packet, Refusal};
+use crate::protocol::ftp::{NakReason, Op, Packet};
 use crate::sink::Sink;
 
 impl<S: Sink> Get<S> {
@@ -117,7 +117,7 @@ impl<S: Sink> Get<S> {
         let Some(index) = self.bursts.iter().position(is_of) else { return };
         self.heard = Some(now);
         match packet.refusal() {
-            Some(Refusal::EndOfFile) => {
+            Some(NakReason::EndOfFile) => {
                 self.bursts.drain(..index);
                 let was_mute = self.bursts.front().is_some_and(|burst| burst.heard.is_none());
                 if was_mute {
@@ -126,7 +126,7 @@ impl<S: Sink> Get<S> {
                 }
                 self.end_burst(now);
             }
-            Some(Refusal::UnknownCommand) => {
+            Some(NakReason::UnknownCommand) => {
                 self.bursts.clear();
                 self.no_bursts = true;
             }
@@ -141,7 +141,7 @@ impl<S: Sink> Get<S> {
         self.heard = Some(now);
         self.on_read_answered(now, offset);
         match (packet.refusal(), self.size) {
-            (Some(Refusal::EndOfFile), Some(said)) if offset < said => {
+            (Some(NakReason::EndOfFile), Some(said)) if offset < said => {
                 self.lies += 1;
                 if self.lies >= MOST_LIES {
                     self.close(Err(FtpError::SizeLies { said, ends: offset }));
@@ -160,7 +160,7 @@ impl<S: Sink> Get<S> {
                 self.close(Err(FtpError::Refused { what: "reading", refusal }));
             }
             // The session is not the vehicle's: it booted.
-            Some(Refusal::FileNotFound) => self.reopen(now),
+            Some(NakReason::FileNotFound) => self.reopen(now),
             _ => self.reopen(now + BUSY_PAUSE),
         }
     }

@@ -1,6 +1,6 @@
 //! Runs one conversation per drone, many at once.
 //!
-//! A conversation is a [`Machine`]: no sockets, no clock, no threads, so that it runs the same
+//! A conversation is a [`Conversation`]: no sockets, no clock, no threads, so that it runs the same
 //! on a radio and on a simulated link that drops, delays and repeats.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -11,7 +11,7 @@ use super::frame::MavMessage;
 use super::id::DroneId;
 use super::net::{Net, Received};
 
-/// What a machine wants next.
+/// What a conversation wants next.
 #[derive(Debug)]
 pub enum Step<T> {
     /// Send this, and ask again.
@@ -39,7 +39,7 @@ pub struct Progress {
 }
 
 /// A conversation with one drone.
-pub trait Machine {
+pub trait Conversation {
     /// What it ends with; a failure is a value of it.
     type Done;
 
@@ -63,8 +63,8 @@ pub trait Machine {
     }
 }
 
-/// Sees what goes on while machines run, and may end them.
-pub trait Watch {
+/// Sees what goes on while conversations run, and may end them.
+pub trait Observer {
     /// A message has come from any drone, also those without a conversation.
     fn on_message(&mut self, now: Micros, received: &Received) {
         let _ = (now, received);
@@ -89,38 +89,38 @@ pub trait Watch {
 
 /// Watches nothing.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct NoWatch;
+pub struct NoObserver;
 
-impl Watch for NoWatch {}
+impl Observer for NoObserver {}
 
 /// The stop request is looked at so often, at least.
 const LOOK: Micros = 100 * MS;
 
-/// Runs machines, at most `at_once` per network at the same time, the others in order after
+/// Runs conversations, at most `at_once` per network at the same time, the others in order after
 /// them. What a stopped run did not finish, and what was refused, is absent from the result.
-pub fn drive<M: Machine>(
+pub fn run_all<C: Conversation>(
     net: &mut dyn Net,
-    machines: BTreeMap<DroneId, M>,
+    conversations: BTreeMap<DroneId, C>,
     at_once: usize,
-    watch: &mut dyn Watch,
-) -> Result<BTreeMap<DroneId, M::Done>, NetError> {
-    let mut waiting: BTreeMap<u16, VecDeque<(DroneId, M)>> = BTreeMap::new();
-    for (drone, machine) in machines {
-        waiting.entry(drone.network).or_default().push_back((drone, machine));
+    observer: &mut dyn Observer,
+) -> Result<BTreeMap<DroneId, C::Done>, NetError> {
+    let mut waiting: BTreeMap<u16, VecDeque<(DroneId, C)>> = BTreeMap::new();
+    for (drone, conversation) in conversations {
+        waiting.entry(drone.network).or_default().push_back((drone, conversation));
     }
-    let mut running: BTreeMap<DroneId, (M, Micros)> = BTreeMap::new();
+    let mut running: BTreeMap<DroneId, (C, Micros)> = BTreeMap::new();
     let mut finished = BTreeMap::new();
     loop {
         let now = net.now();
-        if watch.stop(now) {
+        if observer.stop(now) {
             return Ok(finished);
         }
         for (network, queue) in &mut waiting {
             let busy = running.keys().filter(|drone| drone.network == *network).count();
-            for (drone, machine) in
+            for (drone, conversation) in
                 queue.drain(..queue.len().min(at_once.max(1) - busy.min(at_once.max(1))))
             {
-                running.insert(drone, (machine, now));
+                running.insert(drone, (conversation, now));
             }
         }
         if running.is_empty() {
@@ -133,7 +133,7 @@ pub fn drive<M: Machine>(
             .collect();
         let mut ended = false;
         for drone in due {
-            ended |= advance(net, drone, &mut running, &mut finished, watch)?;
+            ended |= advance(net, drone, &mut running, &mut finished, observer)?;
         }
         if ended {
             continue;
@@ -144,10 +144,10 @@ pub fn drive<M: Machine>(
         let mut wait = until;
         while let Some(received) = net.recv(wait)? {
             let now = net.now();
-            watch.on_message(now, &received);
-            if let Some((machine, _)) = running.get_mut(&received.from) {
-                machine.on_message(now, &received.message);
-                if advance(net, received.from, &mut running, &mut finished, watch)? {
+            observer.on_message(now, &received);
+            if let Some((conversation, _)) = running.get_mut(&received.from) {
+                conversation.on_message(now, &received.message);
+                if advance(net, received.from, &mut running, &mut finished, observer)? {
                     break;
                 }
             }
@@ -159,27 +159,27 @@ pub fn drive<M: Machine>(
     }
 }
 
-/// Lets one machine do what it can; whether it ended.
-fn advance<M: Machine>(
+/// Lets one conversation do what it can; whether it ended.
+fn advance<C: Conversation>(
     net: &mut dyn Net,
     drone: DroneId,
-    running: &mut BTreeMap<DroneId, (M, Micros)>,
-    finished: &mut BTreeMap<DroneId, M::Done>,
-    watch: &mut dyn Watch,
+    running: &mut BTreeMap<DroneId, (C, Micros)>,
+    finished: &mut BTreeMap<DroneId, C::Done>,
+    observer: &mut dyn Observer,
 ) -> Result<bool, NetError> {
-    let Some((machine, until)) = running.get_mut(&drone) else { return Ok(false) };
+    let Some((conversation, until)) = running.get_mut(&drone) else { return Ok(false) };
     loop {
-        match machine.poll(net.now()) {
+        match conversation.poll(net.now()) {
             Step::Send(message) => match net.send(drone, &message) {
                 Ok(()) => {}
                 Err(NetError::Refused(refusal)) => {
-                    watch.on_refused(drone, &refusal);
+                    observer.on_refused(drone, &refusal);
                     // What may be sent in a moment is as good as lost on the radio.
                     if refusal.for_now {
                         continue;
                     }
-                    let done = machine.refused(&refusal);
-                    watch.on_progress(drone, machine.progress(), true);
+                    let done = conversation.refused(&refusal);
+                    observer.on_progress(drone, conversation.progress(), true);
                     running.remove(&drone);
                     finished.extend(done.map(|done| (drone, done)));
                     return Ok(true);
@@ -188,11 +188,11 @@ fn advance<M: Machine>(
             },
             Step::Wait(time) => {
                 *until = time;
-                watch.on_progress(drone, machine.progress(), false);
+                observer.on_progress(drone, conversation.progress(), false);
                 return Ok(false);
             }
             Step::Done(done) => {
-                watch.on_progress(drone, machine.progress(), true);
+                observer.on_progress(drone, conversation.progress(), true);
                 running.remove(&drone);
                 finished.insert(drone, done);
                 return Ok(true);

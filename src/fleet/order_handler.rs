@@ -6,7 +6,7 @@ use super::abort::{Abort, Aborted, Action};
 use super::orders::{ANSWER_SCHEMA, Answer, Inbox, Taken};
 use super::telemetry::Telemetry;
 use crate::link::clock::{MS, Micros, S};
-use crate::link::drive::{Machine as _, Step, Watch as _};
+use crate::link::conversation::{Conversation as _, Observer as _, Step};
 use crate::link::error::NetError;
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
@@ -52,7 +52,7 @@ struct Open {
 /// A net that sends drones home or lands them when another process orders it, beside everything
 /// else that goes through it. The [gate](super::gate) before it asks who was ordered down, and lets
 /// nothing pass that would make such a drone fly again.
-pub struct Desk<'a> {
+pub struct OrderHandler<'a> {
     net: &'a mut dyn Net,
     inbox: Option<Inbox>,
     tell: Box<dyn FnMut(&Notice) + 'a>,
@@ -66,7 +66,7 @@ pub struct Desk<'a> {
     ordered: BTreeSet<DroneId>,
 }
 
-impl<'a> Desk<'a> {
+impl<'a> OrderHandler<'a> {
     /// Wraps a net. `inbox` is where orders come from, if any can.
     pub fn new(net: &'a mut dyn Net, inbox: Option<Inbox>, tell: impl FnMut(&Notice) + 'a) -> Self {
         Self {
@@ -177,7 +177,7 @@ impl<'a> Desk<'a> {
     }
 }
 
-impl Drop for Desk<'_> {
+impl Drop for OrderHandler<'_> {
     /// Who waits for an answer is told what was not confirmed when the station ended.
     fn drop(&mut self) {
         for open in &mut self.open {
@@ -190,7 +190,7 @@ impl Drop for Desk<'_> {
     }
 }
 
-impl Net for Desk<'_> {
+impl Net for OrderHandler<'_> {
     fn now(&self) -> Micros {
         self.net.now()
     }
