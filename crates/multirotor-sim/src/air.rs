@@ -17,8 +17,8 @@ pub fn density_ratio(amsl_m: f64) -> f64 {
     temperature_ratio.powf(PRESSURE_EXPONENT - 1.0)
 }
 
-/// [`density_ratio`] for one who moves little between questions: a power series about the last
-/// altitude at which the power itself was made, to the last digits the same.
+/// [`density_ratio`] for altitudes that change little from call to call: a power series about the
+/// last altitude at which the power itself was computed, equal to it to the last digits.
 #[derive(Clone, Copy, Debug)]
 pub struct DensityNearby {
     amsl_m: f64,
@@ -40,7 +40,8 @@ impl DensityNearby {
         Self { amsl_m, ratio: density_ratio(amsl_m), per_m }
     }
 
-    /// As [`density_ratio`].
+    /// Density as a share of that at sea level, at an altitude above mean sea level in m; see
+    /// [`density_ratio`].
     #[inline]
     pub fn ratio(&mut self, amsl_m: f64) -> f64 {
         const POWER: f64 = PRESSURE_EXPONENT - 1.0;

@@ -1,4 +1,4 @@
-//! Why a flight could not be simulated.
+//! Errors of simulated flights.
 
 use std::io;
 
@@ -17,9 +17,9 @@ pub enum SimError {
          derives no take-off time"
     )]
     NoTakeoff {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
-        /// SHOW_TAKEOFF_ALT.
+        /// Height of the take-off (SHOW_TAKEOFF_ALT), m.
         height_m: f64,
     },
     /// The drone stands too far from where its trajectory starts.
@@ -28,25 +28,25 @@ pub enum SimError {
          refuses more than {limit_m} m"
     )]
     NotAtStart {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
-        /// Horizontal distance.
+        /// Horizontal distance from the start of the trajectory, m.
         distance_m: f64,
-        /// SHOW_TAKEOFF_ERR.
+        /// Largest distance that the firmware allows (SHOW_TAKEOFF_ERR), m.
         limit_m: f64,
     },
     /// A number of the setup is not finite.
     #[error("drone {drone}: {what} is not a finite number")]
     NotFinite {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
     },
     /// The vehicle's effects cannot be used.
     #[error("drone {drone}: the vehicle's effects cannot be used")]
     Effect {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
         /// Which one, and why.
         #[source]
@@ -57,9 +57,9 @@ pub enum SimError {
         "drone {drone}: the motion became undefined at show time {time_s:.1} s; check the wind"
     )]
     Diverged {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
-        /// Show time.
+        /// Show time at which the motion became undefined, s.
         time_s: f64,
     },
     /// The drone was still in the air long after its trajectory's end.
@@ -68,11 +68,11 @@ pub enum SimError {
          hold; {strain}"
     )]
     NotLanded {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
-        /// Show time.
+        /// Show time at which the simulation was given up, s.
         time_s: f64,
-        /// What the air was, and what the vehicle did.
+        /// Strongest air of the flight, and the vehicle's reaction to it.
         strain: Strain,
     },
     /// The drone never got off the ground as far as the show needs.
@@ -81,23 +81,23 @@ pub enum SimError {
          vehicle can hold; {strain}"
     )]
     NeverBegun {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
-        /// What the air was, and what the vehicle did.
+        /// Strongest air of the flight, and the vehicle's reaction to it.
         strain: Strain,
     },
     /// The user asked to stop.
     #[error("drone {drone}: stopped at show time {time_s:.0} s")]
     Stopped {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
-        /// Show time.
+        /// Show time at which the flight was stopped, s.
         time_s: f64,
     },
     /// The log's file could not be written.
     #[error("drone {drone}: the log was not written")]
     File {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
         /// Which file, and why.
         #[source]
@@ -106,7 +106,7 @@ pub enum SimError {
     /// The log could not be written.
     #[error("drone {drone}: failed to write the log")]
     Log {
-        /// The drone's slot.
+        /// Slot of the drone.
         drone: u16,
         /// The operating system's reason.
         #[source]

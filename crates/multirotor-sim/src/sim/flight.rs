@@ -29,13 +29,14 @@ const TAKEOFF_ERR_M: f64 = 3.0;
 /// Everything that one drone's simulated flight depends on.
 #[derive(Clone, Copy)]
 pub struct FlightSetup<'a> {
-    /// The vehicle.
+    /// Vehicle to fly.
     pub vehicle: &'a Vehicle,
-    /// What it flies, show frame.
+    /// Trajectory to fly, show frame.
     pub trajectory: &'a Trajectory,
-    /// Where it stands, show frame, m; its z is the ground there.
+    /// Place where the vehicle stands, show frame, m; its z is the ground there.
     pub home_m: Vector3<f64>,
-    /// Where the show is; the origin's altitude is the ground above mean sea level.
+    /// Position and orientation of the show frame; the origin's altitude is the ground above mean
+    /// sea level.
     pub frame: ShowFrame,
     /// Motion of the air.
     pub atmosphere: &'a dyn Atmosphere,
@@ -45,15 +46,15 @@ pub struct FlightSetup<'a> {
     pub drone: u16,
     /// GPS time of show time 0.
     pub start: GpsTime,
-    /// Its light program, as in a `.skyb` file, for the colours in the log; may be empty.
+    /// Light program, as in a `.skyb` file, for the colours in the log; may be empty.
     pub lights: &'a [u8],
     /// Whether the log has the firmware's whole default set.
     pub full_logs: bool,
-    /// Progress and stop.
+    /// Progress display and stop.
     pub hooks: Hooks<'a>,
 }
 
-/// How a flight is watched and stopped. The default does neither.
+/// Hooks for watching and stopping a flight. The default does neither.
 #[derive(Clone, Copy, Default)]
 pub struct Hooks<'a> {
     /// Called about once per simulated second with the share of the flight that is done, 0..1.
@@ -62,8 +63,8 @@ pub struct Hooks<'a> {
     pub stop: Option<&'a AtomicBool>,
 }
 
-/// What a flight has beyond its setup: the door for flights whose physics the rest of the program is
-/// not to know. The default adds nothing and changes no byte.
+/// Extension of a flight beyond its setup, for physics that the rest of the program is not to know.
+/// The default adds nothing and changes no byte.
 #[derive(Clone, Copy, Default)]
 pub struct Beyond<'a> {
     /// Effects that need not be in [`crate::effects::LIBRARY`]; they act after the vehicle's own.
@@ -72,10 +73,10 @@ pub struct Beyond<'a> {
     pub plant_steps: u16,
 }
 
-/// What became of a flight. Times are show times, s.
+/// Outcome of a flight. Times are show times, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FlightSummary {
-    /// Take-off (stage 3).
+    /// Take-off (stage 3), show time, s.
     pub takeoff_s: f64,
     /// Start of the show proper (stage 4); absent when it was never reached.
     pub performing_s: Option<f64>,
@@ -91,8 +92,8 @@ pub struct FlightSummary {
     pub max_height_m: f64,
     /// Share of the steps of stage 4 in which a rotor was at an end of its range.
     pub saturated_share: f64,
-    /// When the battery had given all its charge, to the second; absent when it lasted, or there is
-    /// none.
+    /// Time at which the battery had given all its charge, to the second; absent when it lasted, or
+    /// there is none.
     pub flat_s: Option<f64>,
     /// Steps simulated, of 2.5 ms each.
     pub steps: u64,

@@ -303,7 +303,7 @@ impl<'a> Flight<'a> {
         self.pilot.director.stage
     }
 
-    /// How the show was left, if it was.
+    /// Way in which the show was left before its end, if it was.
     pub fn aborted(&self) -> Option<Abort> {
         self.pilot.director.aborted
     }
@@ -341,7 +341,7 @@ impl<'a> Flight<'a> {
         Ok(summary)
     }
 
-    /// What became of it so far.
+    /// Outcome of the flight so far.
     pub fn summary(&self) -> FlightSummary {
         let mut summary = self.tally.finish();
         summary.steps = self.step;

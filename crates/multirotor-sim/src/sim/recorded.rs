@@ -12,7 +12,7 @@ use dataflash::time::GpsTime;
 /// A flight whose log is taken away as it grows. All its pieces together are what
 /// [`super::fly`] writes, for a flight that nobody disturbed.
 pub struct RecordedFlight<'a> {
-    /// The flight.
+    /// Flight that is recorded.
     pub flight: Flight<'a>,
     recorder: Option<LogRecorder<'a, Tap>>,
     tap: Tap,
@@ -81,12 +81,12 @@ impl<'a> RecordedFlight<'a> {
         Ok(is_over)
     }
 
-    /// What the log has grown by since the last call.
+    /// Takes the bytes by which the log has grown since the last call.
     pub fn take_log(&mut self) -> Vec<u8> {
         std::mem::take(&mut *self.tap.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// What became of the flight so far.
+    /// Outcome of the flight so far.
     pub fn summary(&self) -> FlightSummary {
         self.flight.summary()
     }

@@ -1,4 +1,4 @@
-//! What the autopilot believes: the truth with small, seeded errors, as an EKF leaves them.
+//! State estimate of the autopilot: the truth with small, seeded errors, as an EKF leaves them.
 //!
 //! Errors of position, velocity and attitude wander (Ornstein-Uhlenbeck, unbiased); gyro and
 //! accelerometer noise is white. Their size is set between that of the firmware's own simulator and
@@ -27,12 +27,12 @@ const ACCELERATION_MPS2: f64 = 0.05;
 const STEPS_PER_DRAW: u32 = 16;
 const ERRORS: usize = 9;
 
-/// What the autopilot knows of its motion, show frame.
+/// State estimate of the autopilot, show frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
-    /// Position, m.
+    /// Position, show frame, m.
     pub position_m: Vector3<f64>,
-    /// Velocity, m/s.
+    /// Velocity, show frame, m/s.
     pub velocity_mps: Vector3<f64>,
     /// Acceleration without gravity's reaction (0 at rest), m/s².
     pub acceleration_mps2: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! How hard a flight was for the vehicle, for the message when it was too hard.
+//! Strain of a flight on the vehicle, for the message when it was too much.
 
 use std::fmt;
 
@@ -8,14 +8,14 @@ use super::autopilot::motors::Spool;
 use super::autopilot::params::ANGLE_MAX_DEG;
 use super::plant::Plant;
 
-/// What the air was at its strongest, and what the vehicle did against it; looked at once a second.
+/// Strongest air of a flight, and the vehicle's reaction to it; sampled once a second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Strain {
     /// Strongest horizontal wind, m/s.
     pub wind_mps: f64,
     /// Vertical air speed that was strongest, m/s, up.
     pub updraft_mps: f64,
-    /// Largest lean, degrees.
+    /// Largest lean of the vehicle, degrees.
     pub lean_deg: f64,
     looks: u32,
     at_end: u32,

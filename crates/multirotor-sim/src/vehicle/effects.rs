@@ -1,4 +1,4 @@
-//! What a vehicle's file says about one effect: `[effects.NAME]`.
+//! Table of one effect in a vehicle's file: `[effects.NAME]`.
 
 use std::collections::BTreeMap;
 

@@ -15,7 +15,7 @@ pub enum VehicleError {
     Toml {
         /// The file or built-in name.
         name: String,
-        /// What the TOML reader says, with line and column.
+        /// Error of the TOML reader, with line and column.
         #[source]
         source: Box<toml::de::Error>,
     },
@@ -24,11 +24,11 @@ pub enum VehicleError {
     Value {
         /// The file or built-in name.
         name: String,
-        /// Table and key.
+        /// Table and key of the number.
         key: &'static str,
-        /// What the file says.
+        /// Value in the file.
         value: f64,
-        /// What is allowed.
+        /// Range of values that is allowed, in words.
         allowed: &'static str,
     },
     /// The file could not be read.
@@ -37,9 +37,9 @@ pub enum VehicleError {
     /// No built-in vehicle of this name.
     #[error("there is no built-in vehicle {}; there are: {known}", plain(name))]
     Unknown {
-        /// What was asked for.
+        /// Name as asked for.
         name: String,
-        /// What exists.
+        /// Names of the built-in vehicles, for the message.
         known: String,
     },
 }

@@ -1,4 +1,4 @@
-//! How a rotor's command becomes thrust, and what follows from a rotor's coefficients.
+//! Law of a rotor from command to thrust, and what follows from a rotor's coefficients.
 
 use std::f64::consts::{PI, TAU};
 

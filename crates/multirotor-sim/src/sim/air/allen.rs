@@ -136,7 +136,7 @@ impl AllenThermals {
         nearest.fold(f64::INFINITY, f64::min).sqrt() * self.side_m
     }
 
-    /// Vertical velocity, m/s.
+    /// Vertical velocity of the air at a position (show frame, m) and show time, m/s, up positive.
     pub fn updraft_mps(&self, position_m: &Vector3<f64>, time_s: f64) -> f64 {
         let distance_m = self.distance_m(position_m.xy(), time_s);
         let z = position_m.z / self.zi_m;

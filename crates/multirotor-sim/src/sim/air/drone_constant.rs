@@ -1,4 +1,4 @@
-//! A vertical velocity of its own for each drone, the same all the time.
+//! A constant vertical velocity for each drone, which differs from drone to drone.
 //!
 //! Not physics of the atmosphere: the simplest air in which drones differ, to test maps with.
 

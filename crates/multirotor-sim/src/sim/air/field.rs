@@ -21,10 +21,10 @@ pub(super) const SHORTEST_M: f64 = 0.5;
 /// [`Knots`] nor followed by the drone.
 pub(super) const HIGHEST_RADPS: f64 = TAU * 2.5;
 
-/// What a [`RandomField`] is like. Lengths along the show's axes.
+/// Statistics of a [`RandomField`]. Lengths are along the show's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldScales {
-    /// Standard deviation, m/s.
+    /// Standard deviation of the vertical velocity, m/s.
     pub sd_mps: f64,
     /// Correlation lengths (1/e) along show x, y and z, m.
     pub length_m: Vector3<f64>,
@@ -43,7 +43,7 @@ pub struct RandomField {
 }
 
 impl RandomField {
-    /// Draws a field.
+    /// Draws the waves of a field.
     pub fn new<R: Rng>(scales: &FieldScales, rng: &mut R) -> Self {
         let amplitude = [scales.sd_mps * (2.0 / scales.waves.max(1) as f64).sqrt()];
         let mut waves = Vec::with_capacity(scales.waves);
@@ -62,7 +62,7 @@ impl RandomField {
         Self { waves: Waves::new(&waves) }
     }
 
-    /// Vertical velocity, m/s.
+    /// Vertical velocity of the air at a position (show frame, m) and show time, m/s, up positive.
     pub fn updraft_mps(&self, position_m: &Vector3<f64>, time_s: f64) -> f64 {
         self.waves.at(position_m, time_s)[0]
     }

@@ -19,7 +19,7 @@ use super::{AirSampler, Atmosphere, Knots};
 /// Dryden's model is made for moving aircraft: without wind, gusts move at this speed, m/s.
 const SLOWEST_MPS: f64 = 1.0;
 
-/// Which spectrum.
+/// Spectrum of the gusts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GustSpectrum {
     /// Dryden: rational, falls with k^-2.

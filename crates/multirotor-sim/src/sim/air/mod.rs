@@ -37,8 +37,8 @@ pub trait Atmosphere: Sync {
     /// Without what only one drone meets ([`DroneConstant`]).
     fn air_velocity(&self, position_m: &Vector3<f64>, time_s: f64) -> Vector3<f64>;
 
-    /// What one drone (its slot, from 1) meets on its flight. Made once per flight; costly kinds of
-    /// air answer faster this way than through [`Atmosphere::air_velocity`].
+    /// The air that one drone (its slot, from 1) meets on its flight. Made once per flight; costly
+    /// kinds of air answer faster this way than through [`Atmosphere::air_velocity`].
     fn sampler(&self, drone: u16) -> Box<dyn AirSampler + Send + '_> {
         let _ = drone;
         Box::new(Direct(self))
@@ -50,7 +50,8 @@ pub trait Atmosphere: Sync {
 /// The answers depend on the atmosphere, the drone and the places and times asked for so far, and on
 /// nothing else. Queries are meant to go forward in time in steps well below [`KNOT_S`].
 pub trait AirSampler {
-    /// As [`Atmosphere::air_velocity`].
+    /// Velocity of the air at a position (show frame, m) and show time, m/s; see
+    /// [`Atmosphere::air_velocity`].
     fn air_velocity(&mut self, position_m: &Vector3<f64>, time_s: f64) -> Vector3<f64>;
 }
 
@@ -63,7 +64,7 @@ impl<A: Atmosphere + ?Sized> AirSampler for Direct<'_, A> {
     }
 }
 
-/// What the air does to a drone at one instant.
+/// State of the air around a drone at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// Velocity of the air, show frame, m/s.

@@ -7,7 +7,7 @@ use super::Atmosphere;
 /// The laws end at the top of the boundary layer: above, the wind is that of this height, m.
 const TOP_M: f64 = 1_000.0;
 
-/// How wind speed grows with height.
+/// Law of the growth of wind speed with height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WindLaw {
     /// `U(z) = U_h ln(z/z0) / ln(h/z0)`, neutral surface layer (Stull 1988, ch. 9.7); calm below z0.
@@ -17,7 +17,7 @@ pub enum WindLaw {
     },
     /// `U(z) = U_h (z/h)^alpha`; 1/7 is the customary value over open land.
     Power {
-        /// Exponent.
+        /// Exponent alpha, without unit.
         alpha: f64,
     },
 }
@@ -29,7 +29,7 @@ pub struct WindProfile {
     pub reference_mps: Vector3<f64>,
     /// Reference height above ground (show z = 0), m.
     pub reference_height_m: f64,
-    /// The law.
+    /// Law by which the speed grows with height.
     pub law: WindLaw,
 }
 

@@ -38,17 +38,17 @@ pub struct TrueUpdraft {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TruthError {
-    /// It could not be read or written.
+    /// The file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
     /// A line is wrong.
     #[error("{file}, line {line}: {reason}; simulate again with --truth")]
     Line {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The line, from 1.
+        /// Number of the line, from 1.
         line: usize,
-        /// What is wrong.
+        /// Statement of the problem with the line.
         reason: String,
     },
 }

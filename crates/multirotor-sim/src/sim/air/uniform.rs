@@ -1,4 +1,4 @@
-//! The same wind everywhere and always, as AirSim's.
+//! A constant wind, equal everywhere, as in AirSim.
 
 use nalgebra::Vector3;
 

@@ -18,9 +18,9 @@ use skybrush_show::trajectory::Cursor;
 pub enum Stage {
     /// Armed, waiting for the take-off time.
     Wait = 2,
-    /// Rising to SHOW_TAKEOFF_ALT.
+    /// Climb to SHOW_TAKEOFF_ALT.
     Takeoff = 3,
-    /// Flying the trajectory.
+    /// Flight along the trajectory.
     Performing = 4,
     /// Going back to where it took off, after an abort.
     Returning = 5,
@@ -30,7 +30,7 @@ pub enum Stage {
     Landed = 8,
 }
 
-/// How a show is left before its end.
+/// Way in which a show is left before its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Abort {
     /// Land where it is.
@@ -63,9 +63,9 @@ struct Return {
 pub enum Touchdown {
     /// In the air, or not yet taken off.
     None,
-    /// Suspected (EV 17).
+    /// Touchdown is suspected (EV 17).
     Maybe,
-    /// Declared (EV 18).
+    /// Touchdown is declared (EV 18).
     Complete,
 }
 
@@ -93,10 +93,10 @@ pub fn takeoff_time_s(trajectory: &Trajectory, speed_up_mps: f64) -> Option<f64>
     Some((reached - p::SHOW_TAKEOFF_ALT / speed_up_mps).max(0.0))
 }
 
-/// What the controllers are asked to do.
+/// Goals that the director sets for the controllers.
 #[derive(Clone, Copy, Debug)]
 pub struct Goals {
-    /// Height.
+    /// Goal of the vertical axis.
     pub vertical: Goal,
     /// Place; `None`: come to a stop.
     pub horizontal: Option<Kinematics<2>>,
@@ -107,13 +107,13 @@ pub struct Goals {
 /// The show mode of one drone. Fields that are logged are public.
 #[derive(Clone, Debug)]
 pub struct Director<'a> {
-    /// Present stage.
+    /// Present stage of the show.
     pub stage: Stage,
     /// Whether the motors are armed.
     pub armed: bool,
-    /// What is believed of the landing.
+    /// State of the landing detector.
     pub touchdown: Touchdown,
-    /// What the show asked for last (with the velocity as sent), show frame.
+    /// Last target of the show (with the velocity as sent), show frame.
     pub target: Kinematics<3>,
     /// Position of the last target as it was sent, show frame, m.
     pub sent_m: Vector3<f64>,
@@ -123,7 +123,7 @@ pub struct Director<'a> {
     pub takeoff_s: f64,
     /// End of the trajectory, show time s.
     pub end_s: f64,
-    /// How the show was left, if it was.
+    /// Way in which the show was left before its end, if it was.
     pub aborted: Option<Abort>,
     /// A ground station's orders, which take the show's place; `None`: it flies the show.
     pub guided: Option<Guided>,

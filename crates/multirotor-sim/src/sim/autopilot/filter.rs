@@ -1,4 +1,4 @@
-//! First-order low-pass.
+//! First-order low-pass filter.
 
 /// A first-order low-pass filter at a fixed rate.
 #[derive(Clone, Copy, Debug)]
@@ -8,7 +8,7 @@ pub struct LowPass {
     usual: (f64, f64),
     /// The same for the next sample: 1 and 0 when that is to pass as it is.
     share: (f64, f64),
-    /// Present output.
+    /// Present output of the filter, in the unit of its input.
     pub value: f64,
 }
 

@@ -17,7 +17,7 @@ const OFF_GROUND_M: f64 = 0.3;
 /// Share of the climb at which a take-off is done.
 const CLIMBED: f64 = 0.9;
 
-/// What a ground station has ordered.
+/// Orders of a ground station to a guided vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Guided {
     /// Height of the take-off, show frame, m; `None`: not ordered yet.

@@ -10,7 +10,7 @@ use crate::sim::sensors::Estimate;
 /// The horizontal controller, show frame. Fields that are logged are public.
 #[derive(Clone, Copy, Debug)]
 pub struct Horizontal {
-    /// The shaped target.
+    /// Shaped target of position, velocity and acceleration, show frame.
     pub target: Kinematics<2>,
     /// Target of the velocity loop, m/s.
     pub velocity_target: Vector2<f64>,

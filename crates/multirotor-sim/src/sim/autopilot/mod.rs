@@ -33,15 +33,15 @@ const LAPSE_K_PER_M: f64 = 6.5e-3;
 /// The autopilot of one drone; its parts are public for the recorder.
 #[derive(Clone, Debug)]
 pub struct Autopilot<'a> {
-    /// The show mode.
+    /// Director of the show: its stages and targets.
     pub director: Director<'a>,
-    /// Height control.
+    /// Controller of height and climb.
     pub vertical: Vertical,
-    /// Place control.
+    /// Controller of horizontal position and velocity.
     pub horizontal: Horizontal,
-    /// Attitude control.
+    /// Controller of attitude and body rates.
     pub attitude: Attitude,
-    /// Motor outputs.
+    /// Mixer and outputs of the motors.
     pub motors: Motors,
     /// Throttle before the boost for tilt (CTUN.ThI).
     pub throttle_in: f64,
@@ -126,7 +126,7 @@ impl<'a> Autopilot<'a> {
         self.motors.pulses_us
     }
 
-    /// What the throttle is multiplied by for the tilt.
+    /// Factor by which the throttle is multiplied to make up for the tilt, at most 10.
     #[inline]
     pub fn boost(&self, estimate: &Estimate) -> f64 {
         1.0 / estimate.rotation[(2, 2)].max(0.1)

@@ -11,7 +11,7 @@ use crate::vehicle;
 /// Altitude change after which the firmware refreshes its air density, m.
 const DENSITY_STEP_M: f64 = 25.0;
 
-/// What the motors are doing.
+/// Spool state of the motors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Spool {
     /// Disarmed, or armed and not yet spinning.
@@ -20,7 +20,7 @@ pub enum Spool {
     Idle,
     /// Spinning up to flight: share of the lowest output in flight.
     Up(f64),
-    /// Throttle unlimited.
+    /// The throttle is not limited by the spool state.
     Flying,
 }
 
@@ -54,7 +54,7 @@ pub struct Motors {
 }
 
 impl Motors {
-    /// Stopped.
+    /// Motors that stand still, for steps of `dt_s`.
     pub fn new(settings: &vehicle::Autopilot, dt_s: f64) -> Self {
         Self {
             spool: Spool::Stopped,

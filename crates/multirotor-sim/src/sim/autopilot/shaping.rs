@@ -6,11 +6,11 @@ use nalgebra::SVector;
 /// Position, velocity and acceleration in N dimensions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinematics<const N: usize> {
-    /// m.
+    /// Position, m.
     pub position: SVector<f64, N>,
-    /// m/s.
+    /// Velocity, m/s.
     pub velocity: SVector<f64, N>,
-    /// m/s².
+    /// Acceleration, m/s².
     pub acceleration: SVector<f64, N>,
 }
 
@@ -19,17 +19,17 @@ pub struct Kinematics<const N: usize> {
 pub struct Approach {
     /// Largest speed for making up a position error, m/s.
     pub speed: f64,
-    /// How a velocity error is made up.
+    /// Limits for making up a velocity error.
     pub swing: Swing,
     to_position: RootLaw,
 }
 
-/// How a velocity error is made up.
+/// Limits for making up a velocity error.
 #[derive(Clone, Copy, Debug)]
 pub struct Swing {
     /// Largest acceleration for it, m/s².
     pub acceleration: f64,
-    /// Largest jerk, m/s³.
+    /// Largest jerk for it, m/s³.
     pub jerk: f64,
     to_velocity: RootLaw,
 }

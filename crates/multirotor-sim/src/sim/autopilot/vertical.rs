@@ -16,7 +16,7 @@ const OVERSPEED_GAIN: f64 = 2.0;
 /// ArduPilot states the gains of acceleration for cm/s² and thousandths of throttle.
 const THROTTLE_PER_MPS2: f64 = 0.1;
 
-/// What the vertical axis is asked to do.
+/// Goal of the vertical axis.
 #[derive(Clone, Copy, Debug)]
 pub enum Goal {
     /// Follow a height with its velocity and acceleration, m, up.
@@ -37,7 +37,7 @@ pub struct ThrottleLimits {
 /// The vertical controller. Fields that are logged are public; up is positive.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertical {
-    /// The shaped target.
+    /// Shaped target of height, climb and acceleration, up positive.
     pub target: Kinematics<1>,
     /// Target of the velocity loop, m/s.
     pub velocity_target: f64,

@@ -1,4 +1,4 @@
-//! What an inertial sensor on the body reads over one frame.
+//! Inertial sensor on the body: its readings over one frame.
 
 use nalgebra::{UnitQuaternion, Vector3};
 

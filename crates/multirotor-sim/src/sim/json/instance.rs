@@ -23,14 +23,16 @@ const AIR_INTERVAL_S: f64 = 0.01;
 /// At most so much is flown at once when packets were lost, s.
 const MAX_CATCH_UP_S: f64 = 0.1;
 
-/// What an instance depends on.
+/// Setup of an instance: its vehicle, place and air.
 #[derive(Clone, Copy)]
 pub struct InstanceSetup<'a> {
-    /// The vehicle.
+    /// Vehicle to simulate.
     pub vehicle: &'a Vehicle,
-    /// Where it stands, show frame, m; its z is the ground there. ArduPilot's home is the same place.
+    /// Place where the vehicle stands, show frame, m; its z is the ground there. ArduPilot's home
+    /// is at this place.
     pub home_m: Vector3<f64>,
-    /// Where the show is; the origin's altitude is the ground above mean sea level.
+    /// Position and orientation of the show frame; the origin's altitude is the ground above mean
+    /// sea level.
     pub frame: ShowFrame,
     /// Motion of the air, at the time since the firmware's start.
     pub atmosphere: &'a dyn Atmosphere,
@@ -71,12 +73,13 @@ struct Peer {
     frame_count: u32,
 }
 
-/// What an instance has done. Counts are since the program's start, the rest is the present.
+/// Statistics and state of an instance. Counts are since the program's start, the rest is the
+/// present.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Status {
-    /// Who is flying.
+    /// Address of the firmware that flies the instance.
     pub peer: Option<SocketAddr>,
-    /// Frames flown.
+    /// Number of frames flown.
     pub frames: u64,
     /// Frames that were asked for again and answered again without flying.
     pub repeated: u64,
@@ -110,9 +113,9 @@ pub enum Refusal {
     /// The instance is flown by another firmware.
     #[error("{from} is not {peer}, which flies this instance; give every firmware its own -I")]
     Stranger {
-        /// Who sent it.
+        /// Address that the packet came from.
         from: SocketAddr,
-        /// Who is flying.
+        /// Address of the firmware that flies the instance.
         peer: SocketAddr,
     },
 }
@@ -162,12 +165,12 @@ impl<'a> Instance<'a> {
         Ok(&self.reply)
     }
 
-    /// What it has done so far.
+    /// Statistics and present state of the instance.
     pub fn status(&self) -> &Status {
         &self.status
     }
 
-    /// The body.
+    /// Body of the vehicle.
     pub fn plant(&self) -> &Plant {
         &self.plant
     }

@@ -28,13 +28,13 @@ pub enum PacketError {
     /// Too short for its magic number, or too long.
     #[error("a packet of {bytes} bytes is not a servo packet (40 or 72 bytes)")]
     Size {
-        /// Length.
+        /// Length of the packet, bytes.
         bytes: usize,
     },
     /// Something else than ArduPilot, or another version of its interface.
     #[error("a packet that starts with {magic} is not a servo packet ({MAGIC_16} or {MAGIC_32})")]
     Magic {
-        /// The number found.
+        /// Number at the start of the packet.
         magic: u16,
     },
     /// No frames per second: there is no time to simulate.

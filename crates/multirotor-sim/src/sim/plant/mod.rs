@@ -22,7 +22,7 @@ pub const GRAVITY: f64 = 9.80665;
 /// Force and torque on the body, body axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loads {
-    /// Force, N.
+    /// Force, body axes, N.
     pub force_n: Vector3<f64>,
     /// Torque about the centre, N m.
     pub torque_nm: Vector3<f64>,
@@ -39,7 +39,7 @@ pub struct Motion {
     pub acceleration_mps2: Vector3<f64>,
     /// Rotation from body to show frame.
     pub attitude: UnitQuaternion<f64>,
-    /// The same as a matrix.
+    /// Rotation from body to show frame, as a matrix.
     pub rotation: Matrix3<f64>,
     /// Angular velocity, body axes, rad/s.
     pub rate_radps: Vector3<f64>,
@@ -74,7 +74,7 @@ impl Plant {
         Self::with_effects(airframe, Active::default(), home_m, dt_s)
     }
 
-    /// The same with effects.
+    /// A body at rest on the ground as by [`Plant::new`], with effects.
     pub fn with_effects(
         airframe: &Airframe,
         effects: Active,
@@ -114,13 +114,13 @@ impl Plant {
         self.rotors.set_step(airframe, dt_s);
     }
 
-    /// Present motion.
+    /// Present motion of the body.
     #[inline]
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
 
-    /// The rotors.
+    /// Rotors of the body.
     pub fn rotors(&self) -> &Rotors {
         &self.rotors
     }

@@ -1,4 +1,4 @@
-//! What a flight's log says.
+//! Recorder of a flight, which writes its log.
 //!
 //! A [`Recorder`] sees every control step. The one that writes DataFlash logs has one file for each
 //! group of messages; `view` is the border where the show frame becomes north, east, down.
@@ -32,7 +32,7 @@ pub struct Moment<'a> {
     pub time_us: i64,
     /// The autopilot after its step.
     pub pilot: &'a Autopilot<'a>,
-    /// What it believed.
+    /// State estimate that the autopilot used in the step.
     pub estimate: &'a Estimate,
     /// The body and its true motion.
     pub plant: &'a Plant,
@@ -49,7 +49,7 @@ pub trait Recorder {
     fn record(&mut self, moment: &Moment<'_>) -> io::Result<()>;
 }
 
-/// Records nothing.
+/// A recorder that records nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoLog;
 

@@ -11,18 +11,18 @@ pub struct Key {
     pub default: Preset,
     /// Smallest and largest value.
     pub range: (f64, f64),
-    /// What it is.
+    /// Meaning of the key, for people.
     pub help: &'static str,
 }
 
-/// What a key is when it is not given.
+/// Value of a key that is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Preset {
-    /// It must be given.
+    /// No value: the key must be given.
     Required,
-    /// This value.
+    /// This value, in the key's unit.
     Value(f64),
-    /// What the words say.
+    /// A value that depends on other keys, as the words say.
     Derived(&'static str),
 }
 
@@ -31,9 +31,9 @@ pub enum Preset {
 pub struct Kind {
     /// Name, as in `field:sd=0.5`.
     pub name: &'static str,
-    /// What it is.
+    /// Description of the kind of air, for people.
     pub help: &'static str,
-    /// Its keys.
+    /// Keys that the kind takes.
     pub keys: &'static [Key],
 }
 

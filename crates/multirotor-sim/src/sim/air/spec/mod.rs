@@ -32,15 +32,15 @@ pub struct AirSpec {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum AirSpecError {
-    /// There is no such kind.
+    /// The kind of air does not exist.
     #[error(
         "there is no air \"{}\"; there is {known}; or a .toml file of several ({builtin})",
         plain(name)
     )]
     UnknownKind {
-        /// What was asked for.
+        /// Name as asked for.
         name: String,
-        /// What there is.
+        /// Names of the kinds that exist, for the message.
         known: String,
         /// Files that come with the program.
         builtin: String,
@@ -48,41 +48,41 @@ pub enum AirSpecError {
     /// The kind has no such key.
     #[error("{kind} has no \"{}\"; {allowed}", plain(key))]
     UnknownKey {
-        /// The kind.
+        /// Name of the kind of air.
         kind: &'static str,
-        /// The key.
+        /// Name of the key.
         key: String,
-        /// What it has.
+        /// Keys that the kind takes, for the message.
         allowed: String,
     },
     /// Not of the form `key=number`.
     #[error("{kind}: \"{}\" is not KEY=NUMBER", plain(text))]
     NotAPair {
-        /// The kind.
+        /// Name of the kind of air.
         kind: &'static str,
-        /// What was read.
+        /// Text that was read instead of a pair.
         text: String,
     },
     /// A key is there twice.
     #[error("{kind}: {key} is given twice")]
     Twice {
-        /// The kind.
+        /// Name of the kind of air.
         kind: &'static str,
-        /// The key.
+        /// Name of the key.
         key: &'static str,
     },
     /// A value is outside of its bounds.
     #[error("{kind}: {key} is {value}, but must be from {low} to {high}{unit}")]
     OutOfRange {
-        /// The kind.
+        /// Name of the kind of air.
         kind: &'static str,
-        /// The key.
+        /// Name of the key.
         key: &'static str,
-        /// What was given.
+        /// Value that was given.
         value: f64,
-        /// Smallest value.
+        /// Smallest value allowed.
         low: f64,
-        /// Largest value.
+        /// Largest value allowed.
         high: f64,
         /// A space and the unit.
         unit: String,
@@ -90,19 +90,19 @@ pub enum AirSpecError {
     /// A key is missing.
     #[error("{kind} needs {key} ({help})")]
     Missing {
-        /// The kind.
+        /// Name of the kind of air.
         kind: &'static str,
-        /// The key.
+        /// Name of the key.
         key: &'static str,
-        /// What it is.
+        /// Meaning of the key, for people.
         help: &'static str,
     },
     /// Keys that do not go together.
     #[error("{kind}: {why}")]
     Conflict {
-        /// The kind.
+        /// Name of the kind of air.
         kind: &'static str,
-        /// What does not fit.
+        /// Reason why the values do not fit together.
         why: &'static str,
     },
     /// A file could not be read.
@@ -111,9 +111,9 @@ pub enum AirSpecError {
     /// A file is wrong.
     #[error("{}: {reason}", plain(file))]
     Toml {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Where and why.
+        /// Place and nature of the problem.
         reason: String,
     },
 }
@@ -132,7 +132,7 @@ impl AirSpec {
         Ok(Self { kind, values: vec![None; kind.keys.len()] })
     }
 
-    /// The kind.
+    /// Kind of air that is specified.
     pub fn kind(&self) -> &'static Kind {
         self.kind
     }

@@ -9,10 +9,10 @@ use crate::vehicle::{Airframe, RotorLaw};
 use linear::Linear;
 use motor::Motor;
 
-/// Number of rotors.
+/// Number of rotors of a quadcopter.
 pub const ROTORS: usize = 4;
 
-/// Where each rotor sits (forward, left: signs) and the sign of its torque about the up axis, in
+/// Place of each rotor (forward, left: signs) and the sign of its torque about the up axis, in
 /// ArduPilot's order for a quad X: front right, rear left, front left, rear right. The first two
 /// turn counter-clockwise seen from above, which turns the body clockwise.
 pub const LAYOUT: [(f64, f64, f64); ROTORS] =
@@ -21,7 +21,7 @@ pub const LAYOUT: [(f64, f64, f64); ROTORS] =
 /// The four rotors and their state.
 #[derive(Clone, Copy, Debug)]
 pub enum Rotors {
-    /// AirSim's.
+    /// AirSim's rotors, whose thrust is linear in the pulse.
     Linear(Linear),
     /// Brushless motors at a voltage.
     Motor(Motor),
