@@ -31,7 +31,7 @@ pub struct DensityNearby {
 const NEARBY_M: f64 = 2.0;
 
 impl DensityNearby {
-    /// About an altitude above mean sea level, m.
+    /// Prepares for altitudes about this one, m above mean sea level.
     pub fn about(amsl_m: f64) -> Self {
         // Held outside of the troposphere, where the series does not know it.
         let inside = (-1_000.0 + NEARBY_M..11_000.0 - NEARBY_M).contains(&amsl_m);

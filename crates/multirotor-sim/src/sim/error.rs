@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::strain::Strain;
 use untrusted_io::file::FileError;
 
-/// A flight could not be simulated to its end; its log must not be kept.
+/// Error of a simulated flight, which did not reach its end; its log must not be kept.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SimError {
@@ -48,7 +48,7 @@ pub enum SimError {
     Effect {
         /// Slot of the drone.
         drone: u16,
-        /// Which one, and why.
+        /// Effect that cannot be used, and the reason.
         #[source]
         source: crate::effects::EffectError,
     },
@@ -99,7 +99,7 @@ pub enum SimError {
     File {
         /// Slot of the drone.
         drone: u16,
-        /// Which file, and why.
+        /// File, and the reason why it could not be written.
         #[source]
         source: FileError,
     },
@@ -108,7 +108,7 @@ pub enum SimError {
     Log {
         /// Slot of the drone.
         drone: u16,
-        /// The operating system's reason.
+        /// Reason given by the operating system.
         #[source]
         source: io::Error,
     },

@@ -57,9 +57,9 @@ pub struct FlightSetup<'a> {
 /// Hooks for watching and stopping a flight. The default does neither.
 #[derive(Clone, Copy, Default)]
 pub struct Hooks<'a> {
-    /// Called about once per simulated second with the share of the flight that is done, 0..1.
+    /// Called about once per simulated second with the share of the flight that is done, 0 to 1.
     pub progress: Option<&'a (dyn Fn(f64) + Sync)>,
-    /// Set to true to end the flight early with [`SimError::Stopped`].
+    /// Flag that ends the flight early with [`SimError::Stopped`] when it is set to true.
     pub stop: Option<&'a AtomicBool>,
 }
 
@@ -69,7 +69,7 @@ pub struct Hooks<'a> {
 pub struct Beyond<'a> {
     /// Effects that need not be in [`crate::effects::LIBRARY`]; they act after the vehicle's own.
     pub effects: &'a [Extra],
-    /// Steps of the plant (with its effects) in one control step of 2.5 ms; 0 is taken as 1.
+    /// Number of plant steps (with effects) in one control step of 2.5 ms; 0 is taken as 1.
     pub plant_steps: u16,
 }
 
@@ -80,9 +80,9 @@ pub struct FlightSummary {
     pub takeoff_s: f64,
     /// Start of the show proper (stage 4); absent when it was never reached.
     pub performing_s: Option<f64>,
-    /// Start of the landing (stage 7).
+    /// Start of the landing (stage 7), show time, s.
     pub landing_s: f64,
-    /// Landed and disarmed (stage 8).
+    /// Landed and disarmed (stage 8), show time, s.
     pub landed_s: f64,
     /// Largest horizontal distance from the show's target in stage 4, m.
     pub max_error_xy_m: f64,
@@ -95,9 +95,9 @@ pub struct FlightSummary {
     /// Time at which the battery had given all its charge, to the second; absent when it lasted, or
     /// there is none.
     pub flat_s: Option<f64>,
-    /// Steps simulated, of 2.5 ms each.
+    /// Number of simulated steps, of 2.5 ms each.
     pub steps: u64,
-    /// Rows written to the log, definitions excluded.
+    /// Number of rows written to the log, without definitions.
     pub log_rows: u64,
 }
 
@@ -112,7 +112,7 @@ pub fn fly<W: Write>(setup: &FlightSetup<'_>, out: W) -> Result<FlightSummary, S
     fly_beyond(setup, Beyond::default(), out)
 }
 
-/// [`fly`], with what the flight has beyond its setup.
+/// Flies one drone and writes its DataFlash log as [`fly`] does, with an extension of the flight.
 ///
 /// # Errors
 /// See [`SimError`].
@@ -142,7 +142,8 @@ pub fn fly_to_file(setup: &FlightSetup<'_>, path: &Path) -> Result<FlightSummary
     fly_beyond_to_file(setup, Beyond::default(), path)
 }
 
-/// [`fly_to_file`], with what the flight has beyond its setup.
+/// Flies one drone and writes its log to a file as [`fly_to_file`] does, with an extension of the
+/// flight.
 ///
 /// # Errors
 /// As [`fly_to_file`].
@@ -180,7 +181,7 @@ pub fn fly_without_log(setup: &FlightSetup<'_>) -> Result<FlightSummary, SimErro
     fly_with(setup, &mut NoLog)
 }
 
-/// Flies one drone and shows every step to a recorder.
+/// Flies one drone and passes every control step to a recorder.
 ///
 /// # Errors
 /// See [`SimError`].

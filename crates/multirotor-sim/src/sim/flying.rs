@@ -1,4 +1,4 @@
-//! A flight that goes on step by step.
+//! A flight that is simulated step by step.
 
 use std::io;
 use std::sync::atomic::Ordering;
@@ -52,7 +52,7 @@ pub struct Flight<'a> {
 }
 
 impl<'a> Flight<'a> {
-    /// A drone that arms when the firmware does it by itself, before its take-off time.
+    /// Prepares a drone that arms when the firmware does so by itself, before its take-off time.
     ///
     /// # Errors
     /// See [`SimError`].
@@ -60,7 +60,8 @@ impl<'a> Flight<'a> {
         Self::armed(setup, None)
     }
 
-    /// A drone that arms at this show time (s), if that is later than the firmware's own time.
+    /// Prepares a drone that arms at this show time (s), if that is later than the firmware's own
+    /// time.
     ///
     /// # Errors
     /// See [`SimError`].
@@ -89,7 +90,7 @@ impl<'a> Flight<'a> {
         Self::begin(setup, armed_s, beyond, pilot.ok_or(none)?)
     }
 
-    /// A drone that arms now, at show time 0, in GUIDED: it flies what it is told, not the
+    /// Prepares a drone that arms now, at show time 0, in GUIDED: it follows orders, not the
     /// trajectory.
     ///
     /// # Errors
@@ -153,8 +154,8 @@ impl<'a> Flight<'a> {
         })
     }
 
-    /// Flies all steps before this show time, s. Whether the flight is over: it has landed, and
-    /// its log has ended.
+    /// Flies all steps before this show time, s. Returns whether the flight is over: the drone has
+    /// landed, and its log has ended.
     ///
     /// # Errors
     /// See [`SimError`]; the flight cannot go on then.
@@ -255,25 +256,26 @@ impl<'a> Flight<'a> {
         Ok(())
     }
 
-    /// Leaves the show for good: another mode of the autopilot takes over. On the ground it
-    /// disarms.
+    /// Leaves the show for good, as another mode of the autopilot takes over. On the ground the
+    /// drone disarms.
     pub fn abort(&mut self, how: Abort) {
         // What comes now takes its own time.
         self.give_up_s = self.give_up_s.max(self.now_s() + 10.0 * LANDING_PATIENCE_S);
         self.pilot.director.abort(how, self.plant.motion().position_m);
     }
 
-    /// Orders a guided vehicle to take off to this height above home, m; whether it does.
+    /// Orders a guided vehicle to take off to this height above home, m; returns whether it accepts
+    /// the order.
     pub fn take_off(&mut self, above_home_m: f64) -> bool {
         self.pilot.director.take_off(above_home_m)
     }
 
-    /// Gives a guided vehicle its next target: show frame, m and m/s.
+    /// Gives a guided vehicle its next target: position in m and velocity in m/s, show frame.
     pub fn give_target(&mut self, position_m: Vector3<f64>, velocity_mps: Vector3<f64>) {
         self.pilot.director.give_target(position_m, velocity_mps);
     }
 
-    /// Whether a ground station flies it, not the show.
+    /// Whether a ground station guides the vehicle, rather than the show.
     pub fn is_guided(&self) -> bool {
         self.pilot.director.guided.is_some()
     }
@@ -318,12 +320,12 @@ impl<'a> Flight<'a> {
         &self.pilot.motors.pulses_us
     }
 
-    /// The battery, if the vehicle's effects have one.
+    /// State of the battery, if the vehicle's effects have one.
     pub fn battery(&self) -> Option<Reading> {
         self.plant.battery()
     }
 
-    /// Distance from where the show wants it, m; in stage 4 only.
+    /// Distance from the show's target, m; in stage 4 only.
     pub fn miss_m(&self) -> Option<f64> {
         (self.stage() == Stage::Performing)
             .then(|| (self.plant.motion().position_m - self.pilot.director.target.position).norm())

@@ -1,4 +1,4 @@
-//! A flight with its log, step by step.
+//! A flight that is simulated step by step, with its log.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,8 +9,8 @@ use super::flying::Flight;
 use super::recorder::LogRecorder;
 use dataflash::time::GpsTime;
 
-/// A flight whose log is taken away as it grows. All its pieces together are what
-/// [`super::fly`] writes, for a flight that nobody disturbed.
+/// A flight whose log is taken away as it grows. All its pieces together are the log that
+/// [`super::fly`] writes, if nothing disturbs the flight.
 pub struct RecordedFlight<'a> {
     /// Flight that is recorded.
     pub flight: Flight<'a>,
@@ -35,8 +35,9 @@ impl Write for Tap {
 }
 
 impl<'a> RecordedFlight<'a> {
-    /// Arms at this show time (s), or when the firmware does by itself, whichever is later. Board time
-    /// in its log counts from `booted`, or from a time of the seed's.
+    /// Prepares a drone that arms at this show time (s), or when the firmware does by itself,
+    /// whichever is later. Board time in its log counts from `booted`, or from an instant that the
+    /// seed determines.
     ///
     /// # Errors
     /// See [`SimError`].
@@ -48,7 +49,8 @@ impl<'a> RecordedFlight<'a> {
         Self::of(setup, Flight::armed(setup, armed_s)?, booted)
     }
 
-    /// Arms at show time 0 in GUIDED: see [`Flight::guided`]; `booted` as in [`Self::armed`].
+    /// Prepares a drone that arms at show time 0 in GUIDED, see [`Flight::guided`]; `booted` as in
+    /// [`Self::armed`].
     ///
     /// # Errors
     /// See [`SimError`].
@@ -68,7 +70,7 @@ impl<'a> RecordedFlight<'a> {
         Ok(Self { flight, recorder: Some(recorder), tap, drone: setup.drone })
     }
 
-    /// Flies on; whether the flight and its log have ended.
+    /// Flies all steps before this show time, s. Returns whether the flight and its log have ended.
     ///
     /// # Errors
     /// See [`SimError`]; the flight cannot go on then.

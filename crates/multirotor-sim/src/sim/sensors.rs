@@ -38,11 +38,11 @@ pub struct Estimate {
     pub acceleration_mps2: Vector3<f64>,
     /// Rotation from body to show frame.
     pub rotation: Matrix3<f64>,
-    /// Turn rates about forward, left, up, rad/s.
+    /// Turn rates about the body's forward, left and up axes, rad/s.
     pub rate_radps: Vector3<f64>,
 }
 
-/// The sensors and estimator of one drone.
+/// Sensors and state estimator of one drone.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     rng: Pcg64,
@@ -81,7 +81,7 @@ impl Sensors {
         Self { rng, value, slope: [0.0; ERRORS], decay, kick, countdown: 0 }
     }
 
-    /// One step: the estimate of the present motion.
+    /// Advances by one step; returns the estimate of the present motion.
     #[inline]
     pub fn sense(&mut self, truth: &Motion) -> Estimate {
         if self.countdown == 0 {

@@ -13,7 +13,7 @@ use super::plant::Plant;
 pub struct Strain {
     /// Strongest horizontal wind, m/s.
     pub wind_mps: f64,
-    /// Vertical air speed that was strongest, m/s, up.
+    /// Strongest vertical air speed, in either direction, m/s, up positive.
     pub updraft_mps: f64,
     /// Largest lean of the vehicle, degrees.
     pub lean_deg: f64,
@@ -38,7 +38,7 @@ impl Strain {
         self.at_end += u32::from(pilot.saturated());
     }
 
-    /// Share of the flight with a rotor at an end of its range, 0..1.
+    /// Share of the flight with a rotor at an end of its range, 0 to 1.
     pub fn at_end_share(&self) -> f64 {
         f64::from(self.at_end) / f64::from(self.looks.max(1))
     }

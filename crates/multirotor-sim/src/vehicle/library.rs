@@ -21,12 +21,13 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     BUILTIN.iter().map(|(name, _)| *name)
 }
 
-/// The TOML text of a built-in vehicle, as it is in `templates/vehicles/`.
+/// TOML text of a built-in vehicle, as it is in `templates/vehicles/`; `None` if there is none of
+/// this name.
 pub fn builtin_toml(name: &str) -> Option<&'static str> {
     BUILTIN.iter().find(|(candidate, _)| *candidate == name).map(|(_, text)| *text)
 }
 
-/// A built-in vehicle.
+/// Built-in vehicle by its name.
 ///
 /// # Errors
 /// [`VehicleError::Unknown`] lists the names that exist.
@@ -38,11 +39,12 @@ pub fn builtin(name: &str) -> Result<Vehicle, VehicleError> {
     Vehicle::from_toml(text, name)
 }
 
-/// A vehicle by the path of its TOML file or by its built-in name (with or without folder and
+/// Reads a vehicle by the path of its TOML file or by its built-in name (with or without folder and
 /// `.toml`).
 ///
 /// # Errors
-/// An unreadable or wrong file, or a name that is neither a file nor built in.
+///
+/// If the file is unreadable or not valid, or the name is neither a file nor built in.
 pub fn load(name: &str) -> Result<Vehicle, VehicleError> {
     let path = Path::new(name);
     if path.is_file() {

@@ -1,4 +1,4 @@
-//! Reading a vehicle's TOML and refusing numbers that no vehicle can have.
+//! Reader of a vehicle's TOML, which refuses numbers that no vehicle can have.
 
 use thiserror::Error;
 
@@ -6,23 +6,24 @@ use super::{RotorLaw, SitlFrame, Vehicle};
 use untrusted_io::parse;
 use untrusted_io::plain::plain;
 
-/// A vehicle file could not be used.
+/// Error of reading a vehicle's file.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum VehicleError {
-    /// Not TOML, an unknown key, a missing key or a wrong type; the source shows the line.
+    /// The text is not TOML, a key is unknown or missing, or a type is wrong; the source shows the
+    /// line.
     #[error("the vehicle file {} is not valid", plain(name))]
     Toml {
-        /// The file or built-in name.
+        /// Path of the file, or built-in name.
         name: String,
         /// Error of the TOML reader, with line and column.
         #[source]
         source: Box<toml::de::Error>,
     },
-    /// A number outside of what makes sense.
+    /// A number is outside the range of sensible values.
     #[error("the vehicle file {}: {key} = {} is not allowed; it must be {allowed}", plain(name), untrusted_io::number::plain(*value))]
     Value {
-        /// The file or built-in name.
+        /// Path of the file, or built-in name.
         name: String,
         /// Table and key of the number.
         key: &'static str,
@@ -34,7 +35,7 @@ pub enum VehicleError {
     /// The file could not be read.
     #[error(transparent)]
     File(#[from] untrusted_io::file::FileError),
-    /// No built-in vehicle of this name.
+    /// There is no built-in vehicle of this name.
     #[error("there is no built-in vehicle {}; there are: {known}", plain(name))]
     Unknown {
         /// Name as asked for.

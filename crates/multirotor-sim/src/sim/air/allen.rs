@@ -27,7 +27,7 @@ const SHAPES: [(f64, [f64; 4]); 7] = [
 /// Thermals are no narrower, m.
 const SMALLEST_RADIUS_M: f64 = 10.0;
 
-/// One thermal's numbers at one height.
+/// Dimensions and strength of one thermal at one height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thermal {
     /// Outer radius r2, m.

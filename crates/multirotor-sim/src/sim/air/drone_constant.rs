@@ -15,12 +15,12 @@ pub struct DroneConstant {
     pub sd_mps: f64,
     /// Seed of the air.
     pub seed: u64,
-    /// Which of several such components this is, from 0.
+    /// Index of this component among several of its kind, from 0.
     pub component: u16,
 }
 
 impl DroneConstant {
-    /// The updraft of one drone, m/s.
+    /// Updraft of one drone, by its slot, m/s.
     pub fn updraft_mps(&self, drone: u16) -> f64 {
         let selector = u64::from(self.component) << 16 | u64::from(drone);
         let normal: f64 = StandardNormal.sample(&mut stream(self.seed, selector, Purpose::Air));

@@ -79,8 +79,8 @@ pub struct Gusts {
 }
 
 impl Gusts {
-    /// Draws gusts with a standard deviation of each axis (m/s), an integral length along the wind
-    /// (m), carried by a wind (show frame, m/s; at least 1 m/s), of so many waves.
+    /// Draws gusts with a standard deviation of each axis (m/s) and an integral length along the
+    /// wind (m), carried by a wind (show frame, m/s; at least 1 m/s), as a sum of `waves` waves.
     pub fn new<R: Rng>(
         spectrum: GustSpectrum,
         sd_mps: f64,

@@ -27,7 +27,7 @@ pub struct Knots<F> {
 }
 
 impl<F: Fn(&Vector3<f64>, f64) -> Vector3<f64>> Knots<F> {
-    /// Around a function that gives the velocity of the air.
+    /// Makes knots for a function that gives the velocity of the air.
     pub fn new(look_up: F) -> Self {
         Self {
             look_up,

@@ -34,14 +34,14 @@ pub struct TrueUpdraft {
     pub updraft_mps: Vec<f64>,
 }
 
-/// A truth file cannot be used.
+/// Error of writing or reading a truth file.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TruthError {
     /// The file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A line is wrong.
+    /// A line of the file is not valid.
     #[error("{file}, line {line}: {reason}; simulate again with --truth")]
     Line {
         /// Name of the file.

@@ -52,18 +52,18 @@ impl RatePid {
     }
 }
 
-/// The attitude controller. Fields that are logged are public.
+/// Attitude controller. Fields that are logged are public.
 #[derive(Clone, Copy, Debug)]
 pub struct Attitude {
     /// Direction of thrust that the attitude follows, show frame, length 1.
     pub thrust_direction: Vector3<f64>,
     /// Turn rate of that direction about its own forward and left axes, rad/s.
     pub target_turn: Vector2<f64>,
-    /// Angle to the wanted attitude about the body's axes, rad.
+    /// Angle to the target attitude about the body's forward, left and up axes, rad.
     pub error_rad: Vector3<f64>,
-    /// Turn rates wanted about forward, left, up, rad/s.
+    /// Target of the turn rates about forward, left and up, rad/s.
     pub rate_target: Vector3<f64>,
-    /// Torque demands about forward, left, up, -1..1.
+    /// Torque demands about forward, left and up, -1 to 1.
     pub output: Vector3<f64>,
     rate: [RatePid; 3],
     /// Of `thrust_direction`, made when that was.
@@ -74,7 +74,7 @@ pub struct Attitude {
 }
 
 impl Attitude {
-    /// Level, heading along show x.
+    /// A controller of a level attitude with heading along show x, for steps of `dt_s`.
     pub fn new(dt_s: f64) -> Self {
         let limit_radps2 = p::ATC_ACCEL_RP_MAX_DEG.to_radians();
         Self {
@@ -91,8 +91,8 @@ impl Attitude {
         }
     }
 
-    /// One step: torque demands that bring the thrust into a direction (show frame, of any length)
-    /// and the heading to show x.
+    /// Advances by one step; returns torque demands that bring the thrust into a direction (show
+    /// frame, of any length) and the heading to show x.
     #[inline]
     pub fn update(&mut self, direction: &Vector3<f64>, estimate: &Estimate) -> Vector3<f64> {
         let turn = self.shape(direction);

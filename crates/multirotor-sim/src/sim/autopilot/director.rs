@@ -1,4 +1,5 @@
-//! The show: stages, their timing, and what is asked of the controllers (the fork's show mode).
+//! Director of the show: stages, their timing, and goals for the controllers (the fork's show
+//! mode).
 
 use nalgebra::{Vector1, Vector3};
 
@@ -22,9 +23,9 @@ pub enum Stage {
     Takeoff = 3,
     /// Flight along the trajectory.
     Performing = 4,
-    /// Going back to where it took off, after an abort.
+    /// Return to the place of the take-off, after an abort.
     Returning = 5,
-    /// Descending to the ground where the trajectory ended.
+    /// Descent to the ground where the trajectory ended.
     Landing = 7,
     /// On the ground, motors off.
     Landed = 8,
@@ -33,14 +34,14 @@ pub enum Stage {
 /// Way in which a show is left before its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Abort {
-    /// Land where it is.
+    /// Landing at the present place.
     Land,
-    /// Return to where it took off, not below RTL_ALT, and land there.
+    /// Return to the place of the take-off, not below RTL_ALT, and landing there.
     Return,
 }
 
 impl Abort {
-    /// Number of the autopilot's mode.
+    /// Number of the autopilot's mode for this way.
     pub fn mode(self) -> u8 {
         match self {
             Self::Land => 9,
@@ -58,7 +59,7 @@ struct Return {
     there_s: f64,
 }
 
-/// Whether the autopilot takes itself to be on the ground after the show.
+/// State of the landing detector after the show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Touchdown {
     /// In the air, or not yet taken off.
@@ -98,7 +99,7 @@ pub fn takeoff_time_s(trajectory: &Trajectory, speed_up_mps: f64) -> Option<f64>
 pub struct Goals {
     /// Goal of the vertical axis.
     pub vertical: Goal,
-    /// Place; `None`: come to a stop.
+    /// Goal of the horizontal axes; `None`: come to a stop.
     pub horizontal: Option<Kinematics<2>>,
     /// Whether the controllers start anew from the present motion.
     pub restart: bool,
@@ -119,13 +120,14 @@ pub struct Director<'a> {
     pub sent_m: Vector3<f64>,
     /// Steps since the last target; 0 in the step that made one.
     pub target_age: u32,
-    /// Take-off time, show time s.
+    /// Take-off time, show time, s.
     pub takeoff_s: f64,
-    /// End of the trajectory, show time s.
+    /// End of the trajectory, show time, s.
     pub end_s: f64,
     /// Way in which the show was left before its end, if it was.
     pub aborted: Option<Abort>,
-    /// A ground station's orders, which take the show's place; `None`: it flies the show.
+    /// Orders of a ground station, which take the show's place; `None` if the vehicle flies the
+    /// show.
     pub guided: Option<Guided>,
     way_home: Return,
     cursor: Cursor<'a>,
@@ -142,7 +144,8 @@ pub struct Director<'a> {
 }
 
 impl<'a> Director<'a> {
-    /// Armed and waiting at home. `None`: the trajectory never rises to SHOW_TAKEOFF_ALT.
+    /// A director of an armed vehicle that waits at home. `None` if the trajectory never rises to
+    /// SHOW_TAKEOFF_ALT.
     pub fn new(
         trajectory: &'a Trajectory,
         home_m: Vector3<f64>,
@@ -153,7 +156,8 @@ impl<'a> Director<'a> {
         Some(Self::taking_off_at(takeoff_s, trajectory, home_m, settings, dt_s))
     }
 
-    /// Armed and waiting at home for a ground station's orders; the trajectory is not flown.
+    /// A director of an armed vehicle that waits at home for a ground station's orders; the
+    /// trajectory is not flown.
     pub fn guided(
         trajectory: &'a Trajectory,
         home_m: Vector3<f64>,
@@ -201,7 +205,7 @@ impl<'a> Director<'a> {
         }
     }
 
-    /// One step: moves the stages on, and gives the goals.
+    /// Advances by one step through the stages; returns the goals.
     #[inline]
     pub fn update(&mut self, time_s: f64, estimate: &Estimate, motors: &mut Motors) -> Goals {
         let mut restart = false;
@@ -271,7 +275,7 @@ impl<'a> Director<'a> {
         }
     }
 
-    /// The stage as it is told: an aborted show is off, another mode flies.
+    /// Number of the stage as it is reported: an aborted show is off, as another mode flies.
     pub fn told(&self) -> u8 {
         if self.aborted.is_some() || self.guided.is_some() { 0 } else { self.stage as u8 }
     }

@@ -13,7 +13,7 @@ pub struct LowPass {
 }
 
 impl LowPass {
-    /// A filter with this cut-off, for steps of `dt_s`, starting at 0.
+    /// A filter with this cut-off frequency, for steps of `dt_s`, starting at 0.
     pub fn new(cutoff_hz: f64, dt_s: f64) -> Self {
         let constant_s = 1.0 / (std::f64::consts::TAU * cutoff_hz);
         let alpha = dt_s / (dt_s + constant_s);
@@ -26,7 +26,7 @@ impl LowPass {
         self.share = (1.0, 0.0);
     }
 
-    /// Takes one sample and gives the filtered value.
+    /// Takes one sample and returns the filtered value.
     #[inline]
     pub fn apply(&mut self, sample: f64) -> f64 {
         let (new, old) = self.share;

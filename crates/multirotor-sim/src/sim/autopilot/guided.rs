@@ -137,8 +137,8 @@ impl Director<'_> {
         false
     }
 
-    /// Orders a take-off to this height above home, m. Whether it is done: it stands armed in
-    /// GUIDED.
+    /// Orders a take-off to this height above home, m; returns whether the order is accepted: the
+    /// vehicle must stand armed in GUIDED.
     pub fn take_off(&mut self, above_home_m: f64) -> bool {
         match &mut self.guided {
             Some(guided) if self.stage == Stage::Wait => {
@@ -149,7 +149,7 @@ impl Director<'_> {
         }
     }
 
-    /// Gives a guided vehicle its next target: show frame, m and m/s.
+    /// Gives a guided vehicle its next target: position in m and velocity in m/s, show frame.
     pub fn give_target(&mut self, position_m: Vector3<f64>, velocity_mps: Vector3<f64>) {
         if let Some(guided) = &mut self.guided {
             guided.give(position_m, velocity_mps);

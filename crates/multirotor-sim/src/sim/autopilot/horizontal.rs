@@ -7,14 +7,14 @@ use super::shaping::{Approach, Kinematics, RootLaw, limited};
 use crate::sim::plant::GRAVITY;
 use crate::sim::sensors::Estimate;
 
-/// The horizontal controller, show frame. Fields that are logged are public.
+/// Horizontal controller, show frame. Fields that are logged are public.
 #[derive(Clone, Copy, Debug)]
 pub struct Horizontal {
     /// Shaped target of position, velocity and acceleration, show frame.
     pub target: Kinematics<2>,
     /// Target of the velocity loop, m/s.
     pub velocity_target: Vector2<f64>,
-    /// Acceleration asked of the attitude, m/s².
+    /// Acceleration demanded of the attitude, m/s².
     pub acceleration_target: Vector2<f64>,
     fresh: bool,
     position_error: Vector2<f64>,
@@ -32,7 +32,7 @@ pub struct Horizontal {
 }
 
 impl Horizontal {
-    /// At rest at a place.
+    /// A controller at rest at a position, for steps of `dt_s`.
     pub fn new(position_m: Vector2<f64>, dt_s: f64) -> Self {
         let constant_s = 1.0 / (std::f64::consts::TAU * p::PSC_VEL_FLT);
         // A change of lean takes turning: the firmware limits the jerk to half of what the greatest
@@ -67,7 +67,8 @@ impl Horizontal {
         self.fresh = true;
     }
 
-    /// One step: the acceleration wanted, show frame, m/s². Without a goal it comes to a stop.
+    /// Advances by one step; returns the acceleration demanded, show frame, m/s². Without a goal
+    /// the vehicle comes to a stop.
     #[inline]
     pub fn update(&mut self, goal: Option<&Kinematics<2>>, estimate: &Estimate) -> Vector2<f64> {
         self.target.advance_within(self.dt_s, &self.stuck, &self.position_error, &self.error);

@@ -30,7 +30,7 @@ use vertical::{ThrottleLimits, Vertical};
 /// Temperature lost per height.
 const LAPSE_K_PER_M: f64 = 6.5e-3;
 
-/// The autopilot of one drone; its parts are public for the recorder.
+/// Autopilot of one drone; its parts are public for the recorder.
 #[derive(Clone, Debug)]
 pub struct Autopilot<'a> {
     /// Director of the show: its stages and targets.
@@ -51,7 +51,8 @@ pub struct Autopilot<'a> {
 }
 
 impl<'a> Autopilot<'a> {
-    /// Armed on the ground. `None`: the trajectory never rises to SHOW_TAKEOFF_ALT.
+    /// An autopilot that is armed on the ground. `None` if the trajectory never rises to
+    /// SHOW_TAKEOFF_ALT.
     pub fn new(
         trajectory: &'a Trajectory,
         settings: &vehicle::Autopilot,
@@ -63,7 +64,8 @@ impl<'a> Autopilot<'a> {
         Some(Self::with(director, settings, home_m, home_amsl_m, dt_s))
     }
 
-    /// Armed on the ground, for a ground station's orders; the trajectory is not flown.
+    /// An autopilot that is armed on the ground for a ground station's orders; the trajectory is
+    /// not flown.
     pub fn guided(
         trajectory: &'a Trajectory,
         settings: &vehicle::Autopilot,
@@ -95,7 +97,7 @@ impl<'a> Autopilot<'a> {
         }
     }
 
-    /// One control step; returns the pulse width of each rotor, whole us.
+    /// Advances by one control step; returns the pulse width of each rotor, whole us.
     #[inline]
     pub fn update(&mut self, time_s: f64, estimate: &Estimate) -> [u16; ROTORS] {
         let goals = self.director.update(time_s, estimate, &mut self.motors);
@@ -141,7 +143,7 @@ impl<'a> Autopilot<'a> {
         self.throttle_in = self.vertical.relax(estimate, 0.0);
     }
 
-    /// Whether a rotor is at an end of its range in flight, or the throttle is.
+    /// Whether a rotor or the throttle is at an end of its range in flight.
     #[inline]
     pub fn saturated(&self) -> bool {
         let (low, high) = self.motors.pulse_range_us();

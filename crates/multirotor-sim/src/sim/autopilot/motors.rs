@@ -18,22 +18,22 @@ pub enum Spool {
     Stopped,
     /// Spinning on the ground.
     Idle,
-    /// Spinning up to flight: share of the lowest output in flight.
+    /// Spinning up to flight, with the share of the lowest output in flight.
     Up(f64),
     /// The throttle is not limited by the spool state.
     Flying,
 }
 
-/// The motor outputs. Fields that are logged are public.
+/// Outputs of the motors. Fields that are logged are public.
 #[derive(Clone, Copy, Debug)]
 pub struct Motors {
-    /// State of the motors.
+    /// Spool state of the motors.
     pub spool: Spool,
     /// Pulse width of each rotor, whole us.
     pub pulses_us: [u16; ROTORS],
-    /// Throttle after the filter, 0..1 (CTUN.ThO).
+    /// Throttle after the filter, 0 to 1 (CTUN.ThO).
     pub throttle: f64,
-    /// Limits that were hit in this step.
+    /// Limits that were reached in this step.
     pub limits: ThrottleLimits,
     throttle_filter: LowPass,
     curve: Curve,
@@ -80,14 +80,14 @@ impl Motors {
         }
     }
 
-    /// Smallest and largest pulse in flight, us.
+    /// Smallest and largest pulse width in flight, us.
     #[inline]
     pub fn pulse_range_us(&self) -> (u16, u16) {
         self.pulse_range_us
     }
 
-    /// Tells the motors the height above home (m) and how to find the density of the air there, as a
-    /// share of that at sea level, for its compensation.
+    /// Sets the height above home (m) and the density of the air there, as a share of that at sea
+    /// level, for the compensation of density.
     #[inline]
     pub fn set_density(&mut self, height_m: f64, ratio: impl FnOnce(f64) -> f64) {
         if (height_m - self.density_height_m).abs() >= DENSITY_STEP_M {
@@ -97,7 +97,7 @@ impl Motors {
         }
     }
 
-    /// Tells the motors the resting voltage of the battery, V, for its compensation; without
+    /// Sets the resting voltage of the battery, V, for the compensation of voltage; without
     /// MOT_BAT_VOLT_MAX there is none.
     pub fn set_voltage(&mut self, resting_v: f64) {
         let (low, high) = self.voltage_limits;
@@ -109,7 +109,7 @@ impl Motors {
         }
     }
 
-    /// One step with the boosted throttle and the torque demands (forward, left, up).
+    /// Advances by one step with the boosted throttle and the torque demands (forward, left, up).
     #[inline]
     pub fn update(&mut self, throttle: f64, torque: &Vector3<f64>) {
         match self.spool {

@@ -3,7 +3,7 @@
 
 use nalgebra::SVector;
 
-/// Position, velocity and acceleration in N dimensions.
+/// Position, velocity and acceleration in N dimensions: m, m/s, m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinematics<const N: usize> {
     /// Position, m.
@@ -14,22 +14,22 @@ pub struct Kinematics<const N: usize> {
     pub acceleration: SVector<f64, N>,
 }
 
-/// Limits of the approach.
+/// Limits for approaching a moving point.
 #[derive(Clone, Copy, Debug)]
 pub struct Approach {
-    /// Largest speed for making up a position error, m/s.
+    /// Largest speed for correcting a position error, m/s.
     pub speed: f64,
-    /// Limits for making up a velocity error.
+    /// Limits for correcting a velocity error.
     pub swing: Swing,
     to_position: RootLaw,
 }
 
-/// Limits for making up a velocity error.
+/// Limits for correcting a velocity error.
 #[derive(Clone, Copy, Debug)]
 pub struct Swing {
-    /// Largest acceleration for it, m/s².
+    /// Largest acceleration for correcting a velocity error, m/s².
     pub acceleration: f64,
-    /// Largest jerk for it, m/s³.
+    /// Largest jerk for correcting a velocity error, m/s³.
     pub jerk: f64,
     to_velocity: RootLaw,
 }
@@ -55,21 +55,21 @@ impl Approach {
 }
 
 impl<const N: usize> Kinematics<N> {
-    /// Standing at a point.
+    /// A point at rest.
     pub fn at(position: SVector<f64, N>) -> Self {
         Self { position, velocity: SVector::zeros(), acceleration: SVector::zeros() }
     }
 
-    /// Moves on at the present acceleration.
+    /// Advances by one step at the present acceleration.
     #[inline]
     pub fn advance(&mut self, dt_s: f64) {
         self.position += (self.velocity + self.acceleration * (dt_s / 2.0)) * dt_s;
         self.velocity += self.acceleration * dt_s;
     }
 
-    /// Moves on, but not away from a vehicle that can give no more in the direction of `stuck`
-    /// (zero: free): neither in position while that is ahead by `ahead`, nor in velocity while that
-    /// is ahead by `faster`.
+    /// Advances by one step, but not away from a vehicle that is at its limit in the direction of
+    /// `stuck` (zero: free): neither in position while that is ahead by `ahead`, nor in velocity
+    /// while that is ahead by `faster`.
     #[inline]
     pub fn advance_within(
         &mut self,
@@ -92,7 +92,7 @@ impl<const N: usize> Kinematics<N> {
         }
     }
 
-    /// Turns the acceleration towards meeting `goal` in position and velocity.
+    /// Turns the acceleration towards meeting `goal` in position and velocity, within `limits`.
     #[inline]
     pub fn approach(&mut self, goal: &Self, limits: &Approach, dt_s: f64) {
         let catch_up = limits.to_position.rate(goal.position - self.position, limits.speed);
@@ -104,7 +104,7 @@ impl<const N: usize> Kinematics<N> {
         );
     }
 
-    /// Turns the acceleration towards a velocity.
+    /// Turns the acceleration towards a velocity, within the limits.
     #[inline]
     pub fn approach_velocity(
         &mut self,
@@ -120,14 +120,16 @@ impl<const N: usize> Kinematics<N> {
 }
 
 impl Kinematics<1> {
-    /// As [`Kinematics::approach`], with limits of their own for accelerating up and down.
+    /// Turns the acceleration towards `goal` as [`Kinematics::approach`] does, with separate limits
+    /// for accelerating up and down.
     pub fn approach_between(&mut self, goal: &Self, up: &Approach, down: &Approach, dt_s: f64) {
         // What brakes before a goal above is the downward acceleration.
         let brake = if goal.position.x > self.position.x { down } else { up };
         self.approach_with(goal, brake, &up.swing, &down.swing, dt_s);
     }
 
-    /// As [`Kinematics::approach_between`], but position errors are made up as `limits` say.
+    /// Turns the acceleration towards `goal` as [`Kinematics::approach_between`] does, with
+    /// `limits` for position errors.
     pub fn approach_with(
         &mut self,
         goal: &Self,

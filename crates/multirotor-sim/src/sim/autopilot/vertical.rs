@@ -19,22 +19,22 @@ const THROTTLE_PER_MPS2: f64 = 0.1;
 /// Goal of the vertical axis.
 #[derive(Clone, Copy, Debug)]
 pub enum Goal {
-    /// Follow a height with its velocity and acceleration, m, up.
+    /// Follow a height with its velocity and acceleration, m, m/s and m/s², up positive.
     Follow(Kinematics<1>),
-    /// Descend at a speed (m/s, positive) until the ground is noticed.
+    /// Descend at a speed (m/s, positive) until the ground is detected.
     Land(f64),
 }
 
-/// Whether the motors can give no more, or no less.
+/// Limits of the throttle that the motors have reached.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ThrottleLimits {
-    /// At the upper limit.
+    /// Whether the upper limit is reached: the motors can give no more.
     pub upper: bool,
-    /// At the lower limit.
+    /// Whether the lower limit is reached: the motors can give no less.
     pub lower: bool,
 }
 
-/// The vertical controller. Fields that are logged are public; up is positive.
+/// Vertical controller; up is positive. Fields that are logged are public.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertical {
     /// Shaped target of height, climb and acceleration, up positive.
@@ -43,7 +43,7 @@ pub struct Vertical {
     pub velocity_target: f64,
     /// Target of the acceleration loop, m/s².
     pub acceleration_target: f64,
-    /// Learned hover throttle (MOT_THST_HOVER), 0..1.
+    /// Learned hover throttle (MOT_THST_HOVER), 0 to 1.
     pub hover_throttle: f64,
     gains: vehicle::Autopilot,
     position_error: f64,
@@ -59,7 +59,7 @@ pub struct Vertical {
 }
 
 impl Vertical {
-    /// At rest at a height.
+    /// A controller at rest at a height, for steps of `dt_s`.
     pub fn new(gains: &vehicle::Autopilot, height_m: f64, dt_s: f64) -> Self {
         let reach = |speed_mps: f64| {
             let linear_mps = p::WPNAV_ACCEL_Z / gains.psc_posz_p;
@@ -106,7 +106,7 @@ impl Vertical {
             - self.gains.psc_accz_p * THROTTLE_PER_MPS2 * (wanted - acceleration);
     }
 
-    /// One step on the ground: lets go of the throttle; returns it.
+    /// Advances by one step on the ground: relaxes the throttle and returns it.
     pub fn relax(&mut self, estimate: &Estimate, throttle: f64) -> f64 {
         self.restart(estimate, throttle);
         let share = self.dt_s / (self.dt_s + p::RELAX_S);
@@ -114,7 +114,7 @@ impl Vertical {
         self.throttle(estimate, ThrottleLimits::default())
     }
 
-    /// One step: throttle before the boost for tilt, not limited.
+    /// Advances by one step; returns the throttle before the boost for tilt, not limited.
     #[inline]
     pub fn update(&mut self, goal: &Goal, estimate: &Estimate, limits: ThrottleLimits) -> f64 {
         self.shape(goal, limits);

@@ -1,4 +1,4 @@
-//! One vehicle for one firmware: packets in, replies out.
+//! One simulated vehicle for one firmware: packets in, replies out.
 
 use std::net::SocketAddr;
 
@@ -36,9 +36,9 @@ pub struct InstanceSetup<'a> {
     pub frame: ShowFrame,
     /// Motion of the air, at the time since the firmware's start.
     pub atmosphere: &'a dyn Atmosphere,
-    /// Seed of what differs between drones and of random effects.
+    /// Seed of the differences between drones and of random effects.
     pub seed: u64,
-    /// Which drone of the fleet it is.
+    /// Slot of the drone in the fleet.
     pub drone: u16,
 }
 
@@ -53,7 +53,7 @@ impl InstanceSetup<'_> {
     }
 }
 
-/// One body in its air, in lockstep with one firmware.
+/// A body in its air, in lockstep with one firmware.
 #[derive(Clone)]
 pub struct Instance<'a> {
     setup: InstanceSetup<'a>,
@@ -81,15 +81,15 @@ pub struct Status {
     pub peer: Option<SocketAddr>,
     /// Number of frames flown.
     pub frames: u64,
-    /// Frames that were asked for again and answered again without flying.
+    /// Number of frames that were asked for again and answered again without flying.
     pub repeated: u64,
-    /// Frames whose packet never came.
+    /// Number of frames whose packet never came.
     pub skipped: u64,
-    /// Times that a firmware started, or started again, and found the body at home.
+    /// Number of times that a firmware started, or started again, with the body at home.
     pub starts: u64,
-    /// Packets that were not answered: not of the interface, or from a second firmware.
+    /// Number of packets that were not answered: not of the interface, or from a second firmware.
     pub refused: u64,
-    /// Times that the motion became undefined and the body was put back home.
+    /// Number of times that the motion became undefined and the body was put back home.
     pub diverged: u64,
     /// Frames per second that the firmware asks for.
     pub frame_rate_hz: u16,
@@ -103,11 +103,11 @@ pub struct Status {
     pub pulse_us: f64,
 }
 
-/// A packet that is not answered.
+/// Reason why a packet is not answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// Not a servo packet.
+    /// The datagram is not a servo packet.
     #[error(transparent)]
     Packet(#[from] PacketError),
     /// The instance is flown by another firmware.
@@ -121,7 +121,7 @@ pub enum Refusal {
 }
 
 impl<'a> Instance<'a> {
-    /// A body standing at home that waits for its firmware.
+    /// An instance whose body stands at home and waits for its firmware.
     pub fn new(setup: InstanceSetup<'a>) -> Self {
         let step_s = 1.0 / f64::from(MIN_STEP_RATE_HZ);
         Self {

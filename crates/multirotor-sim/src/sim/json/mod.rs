@@ -20,7 +20,7 @@ pub use instance::{Instance, InstanceSetup, Refusal, Status};
 pub use packet::{MAX_PACKET_BYTES, PacketError, ServoPacket};
 pub use serve::serve;
 
-/// The UDP port on which ArduPilot expects the physics of its first instance (`-I0`).
+/// UDP port on which ArduPilot expects the physics of its first instance (`-I0`).
 pub const BASE_PORT: u16 = 9002;
-/// ArduPilot's instance `-I n` looks for its physics so many ports higher for each n.
+/// Difference between the ports of ArduPilot's instances `-I n` and `-I n+1`.
 pub const PORTS_PER_INSTANCE: u16 = 10;

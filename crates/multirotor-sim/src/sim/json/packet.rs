@@ -7,37 +7,37 @@ const MAGIC_16: u16 = 18_458;
 /// Starts a packet of 32 pulses (parameter SERVO_32_ENABLE).
 const MAGIC_32: u16 = 29_569;
 const HEADER_BYTES: usize = 8;
-/// Length of the longest packet.
+/// Length of the longest packet, bytes.
 pub const MAX_PACKET_BYTES: usize = HEADER_BYTES + 2 * 32;
 
-/// One frame's outputs of the firmware.
+/// Outputs of the firmware for one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoPacket {
     /// Frames per second that the firmware asks for (SIM_RATE_HZ); never 0.
     pub frame_rate_hz: u16,
-    /// Counts the frames for which the firmware got a reply.
+    /// Number of frames for which the firmware got a reply.
     pub frame_count: u32,
     /// Pulse width of each output, us; 0 where the firmware gives none.
     pub pulses_us: [u16; 32],
 }
 
-/// Bytes that are not a servo packet.
+/// Error of reading a servo packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum PacketError {
-    /// Too short for its magic number, or too long.
+    /// The packet is too short for its magic number, or too long.
     #[error("a packet of {bytes} bytes is not a servo packet (40 or 72 bytes)")]
     Size {
         /// Length of the packet, bytes.
         bytes: usize,
     },
-    /// Something else than ArduPilot, or another version of its interface.
+    /// The packet is not from ArduPilot, or from another version of its interface.
     #[error("a packet that starts with {magic} is not a servo packet ({MAGIC_16} or {MAGIC_32})")]
     Magic {
         /// Number at the start of the packet.
         magic: u16,
     },
-    /// No frames per second: there is no time to simulate.
+    /// The frame rate is 0: there is no time to simulate.
     #[error("a servo packet asks for 0 frames per second")]
     Rate,
 }
@@ -70,7 +70,7 @@ impl ServoPacket {
         Ok(Self { frame_rate_hz, frame_count: u32::from_le_bytes(count), pulses_us })
     }
 
-    /// The packet's bytes, with 16 pulses: what the firmware sends.
+    /// Bytes of a packet with 16 pulses, as the firmware sends it.
     pub fn to_bytes(&self) -> [u8; HEADER_BYTES + 32] {
         let mut bytes = [0; HEADER_BYTES + 32];
         bytes[..2].copy_from_slice(&MAGIC_16.to_le_bytes());

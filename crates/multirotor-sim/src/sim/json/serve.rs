@@ -10,7 +10,7 @@ use super::packet::MAX_PACKET_BYTES;
 /// The stop request is looked at so often while nothing comes.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Answers packets until `stop` says so, and shows every outcome to `seen`.
+/// Answers packets until `stop` is set, and passes every outcome to `seen`.
 ///
 /// A reply that cannot be sent is not an error: the firmware asks again.
 ///

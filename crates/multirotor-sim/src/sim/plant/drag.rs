@@ -14,7 +14,7 @@ use super::rotor::ROTORS;
 use crate::sim::air::SEA_LEVEL_DENSITY;
 use crate::vehicle::Airframe;
 
-/// Below this speed a face feels no air, m/s.
+/// Speed below which a face feels no air, m/s.
 pub const DEAD_BAND_MPS: f64 = 0.1;
 
 /// Drag factors of the three pairs of faces.

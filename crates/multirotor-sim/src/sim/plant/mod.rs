@@ -108,7 +108,7 @@ impl Plant {
         }
     }
 
-    /// Changes the length of the steps in flight; `airframe` is the one it was made with.
+    /// Changes the length of the steps in flight; `airframe` must be that of the body.
     pub fn set_step(&mut self, airframe: &Airframe, dt_s: f64) {
         self.dt_s = dt_s;
         self.rotors.set_step(airframe, dt_s);
@@ -137,13 +137,13 @@ impl Plant {
         self.impact_mps2
     }
 
-    /// The battery, if this vehicle has one.
+    /// State of the battery, if the vehicle has one.
     pub fn battery(&self) -> Option<Reading> {
         self.effects.battery()
     }
 
-    /// Changes what the autopilot takes for its vertical speed, m/s up, as the effects say; `dt_s`
-    /// has passed since it looked last.
+    /// Changes the vertical speed that the autopilot senses (m/s, up positive) as the effects do;
+    /// `dt_s` is the time since the last call.
     #[inline]
     pub fn sense(&mut self, dt_s: f64, climb_mps: &mut f64) {
         if self.effects.acts(Hook::Sense) {
@@ -151,7 +151,7 @@ impl Plant {
         }
     }
 
-    /// Moves on by one step with rotor commands in 0..1.
+    /// Advances by one step with rotor commands from 0 to 1.
     ///
     /// The velocity-Verlet scheme of AirSim's FastPhysicsEngine: drag at the velocity expected in
     /// the middle of the step, velocity with the mean of old and new acceleration.

@@ -22,7 +22,7 @@ const GAS_CONSTANT: f64 = 287.26;
 /// Pressure of the standard atmosphere as a power of its density.
 const PRESSURE_OF_DENSITY: f64 = 5.255_877 / 4.255_877;
 
-/// Rotors and drag, with the density that they were last asked for.
+/// Rotors and drag, with the density of the last call.
 #[derive(Clone, Copy, Debug)]
 pub struct Sitl {
     /// Thrust of one rotor at full command over density, N / (kg/m³).
@@ -45,7 +45,8 @@ pub struct Sitl {
 }
 
 impl Sitl {
-    /// The frame of this reference test and mass (kg).
+    /// Rotors and drag of a SITL frame, from the reference flight that describes it, with this
+    /// mass, kg.
     pub fn new(frame: &SitlFrame, mass_kg: f64) -> Self {
         let per_kelvin = SEA_LEVEL_PA / (GAS_CONSTANT * (273.15 + frame.air_temperature_c));
         let density = per_kelvin * pressure_ratio(density_ratio(frame.reference_amsl_m));

@@ -15,7 +15,7 @@ use dataflash::{LogWriter, MessageDef, catalog};
 
 /// Control steps between two of the rows that a log has 25 times a second.
 const STEPS_25_HZ: u64 = 16;
-/// Control steps between two of the rows that a log has ten times a second.
+/// Number of control steps between rows that a log has ten times a second.
 pub const STEPS_10_HZ: u64 = 40;
 
 /// Writes a DataFlash log as the show firmware does.

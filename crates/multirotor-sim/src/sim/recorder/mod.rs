@@ -23,29 +23,30 @@ use super::plant::Plant;
 use super::sensors::Estimate;
 pub use log::{LogRecorder, STEPS_10_HZ};
 
-/// Everything there is to know about one control step, before the body moves.
+/// State of a flight at one control step, before the body moves.
 #[derive(Clone, Copy)]
 pub struct Moment<'a> {
     /// Number of the step since arming.
     pub step: u64,
     /// Show time, us.
     pub time_us: i64,
-    /// The autopilot after its step.
+    /// Autopilot after the step.
     pub pilot: &'a Autopilot<'a>,
     /// State estimate that the autopilot used in the step.
     pub estimate: &'a Estimate,
-    /// The body and its true motion.
+    /// Body with its true motion.
     pub plant: &'a Plant,
-    /// The air around it.
+    /// Air around the body.
     pub around: &'a Surroundings,
 }
 
-/// Sees every control step of a flight.
+/// Observer of every control step of a flight.
 pub trait Recorder {
-    /// Takes note of one step.
+    /// Takes one step.
     ///
     /// # Errors
-    /// Ends the flight: the record could not be kept.
+    ///
+    /// If the record could not be kept, which ends the flight.
     fn record(&mut self, moment: &Moment<'_>) -> io::Result<()>;
 }
 

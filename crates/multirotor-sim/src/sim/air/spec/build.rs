@@ -1,4 +1,4 @@
-//! From what was asked for to air that can be flown in.
+//! Construction of the air from its specification.
 
 use nalgebra::{Vector2, Vector3};
 use sha2::{Digest as _, Sha256};
@@ -11,12 +11,12 @@ use crate::sim::air::{
 };
 use skybrush_show::frame::ShowFrame;
 
-/// Air that was asked for: its uniform part, and the rest.
+/// Specified air: its uniform part, and the rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Air {
     /// Sum of the uniform parts, towards east, north and up, m/s.
     pub uniform_mps: [f64; 3],
-    /// All other components, in the order in which they were asked for.
+    /// All other components, in the order of the specification.
     pub moving: Vec<AirSpec>,
 }
 
@@ -41,7 +41,7 @@ impl Air {
         air
     }
 
-    /// The moving components as texts, for records.
+    /// Specifications of the moving components as text, for records.
     pub fn texts(&self) -> Vec<String> {
         self.moving.iter().map(ToString::to_string).collect()
     }

@@ -9,7 +9,7 @@ use super::{AirSpec, AirSpecError};
 use untrusted_io::file::read_whole;
 use untrusted_io::parse;
 
-/// Name and version of the format.
+/// Name and version of the format of these files.
 pub const AIR_SCHEMA: &str = "updraft.air/1";
 /// Largest file that is read, bytes.
 const MAX_BYTES: u64 = 1 << 20;

@@ -1,15 +1,15 @@
-//! The kinds of air that can be asked for by name: their keys, units, bounds and defaults.
+//! Kinds of air that can be asked for by name: their keys, units, bounds and defaults.
 
-/// One key of a [`Kind`].
+/// A key of a [`Kind`], with its unit, bounds and default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
-    /// Name, as in `sd=0.5`.
+    /// Name of the key, as in `sd=0.5`.
     pub name: &'static str,
-    /// Unit; empty for plain numbers.
+    /// Unit of the value; empty for plain numbers.
     pub unit: &'static str,
     /// Value when the key is not given.
     pub default: Preset,
-    /// Smallest and largest value.
+    /// Smallest and largest value allowed, in the key's unit.
     pub range: (f64, f64),
     /// Meaning of the key, for people.
     pub help: &'static str,
@@ -26,10 +26,10 @@ pub enum Preset {
     Derived(&'static str),
 }
 
-/// One kind of air.
+/// A kind of air and its keys.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kind {
-    /// Name, as in `field:sd=0.5`.
+    /// Name of the kind, as in `field:sd=0.5`.
     pub name: &'static str,
     /// Description of the kind of air, for people.
     pub help: &'static str,
@@ -60,7 +60,7 @@ const MODES: Key = key("modes", "", Value(600.0), (50.0, 20_000.0), "number of w
 const W_STAR: Key = key("w_star", "m/s", Value(2.0), (0.0, 10.0), "convective velocity scale w*");
 const ZI: Key = key("zi", "m", Value(1_400.0), (100.0, 6_000.0), "height of the inversion");
 
-/// Every kind, in the order of the help text.
+/// Kinds of air, in the order of the help text.
 pub const KINDS: &[Kind] = &[
     Kind { name: "still", help: "no motion", keys: &[] },
     Kind {
@@ -152,24 +152,24 @@ const GUST_KEYS: &[Key] = &[
     MODES,
 ];
 
-/// The kind of a name.
+/// Kind of air by its name; `None` if there is none.
 pub fn kind(name: &str) -> Option<&'static Kind> {
     KINDS.iter().find(|kind| kind.name == name)
 }
 
 impl Kind {
-    /// The key of a name.
+    /// Key of this kind by its name; `None` if it has none.
     pub fn key(&self, name: &str) -> Option<&'static Key> {
         self.keys.iter().find(|key| key.name == name)
     }
 
-    /// The names of its keys, for messages.
+    /// Names of the kind's keys, for messages.
     pub fn key_names(&self) -> String {
         self.keys.iter().map(|key| key.name).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// The table as text, for `--help` and the documentation.
+/// Table of all kinds and keys as text, for `--help` and the documentation.
 pub fn help_text() -> String {
     use std::fmt::Write as _;
     let mut text = String::new();

@@ -28,7 +28,7 @@ pub struct AirSpec {
     values: Vec<Option<f64>>,
 }
 
-/// A text does not say what air is meant.
+/// Error of a text that does not specify any air.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum AirSpecError {
@@ -42,7 +42,7 @@ pub enum AirSpecError {
         name: String,
         /// Names of the kinds that exist, for the message.
         known: String,
-        /// Files that come with the program.
+        /// Names of the files that come with the program.
         builtin: String,
     },
     /// The kind has no such key.
@@ -55,7 +55,7 @@ pub enum AirSpecError {
         /// Keys that the kind takes, for the message.
         allowed: String,
     },
-    /// Not of the form `key=number`.
+    /// The text is not of the form `key=number`.
     #[error("{kind}: \"{}\" is not KEY=NUMBER", plain(text))]
     NotAPair {
         /// Name of the kind of air.
@@ -63,7 +63,7 @@ pub enum AirSpecError {
         /// Text that was read instead of a pair.
         text: String,
     },
-    /// A key is there twice.
+    /// A key is given twice.
     #[error("{kind}: {key} is given twice")]
     Twice {
         /// Name of the kind of air.
@@ -84,10 +84,10 @@ pub enum AirSpecError {
         low: f64,
         /// Largest value allowed.
         high: f64,
-        /// A space and the unit.
+        /// Unit of the bounds, with a space before it.
         unit: String,
     },
-    /// A key is missing.
+    /// A key that the kind requires is missing.
     #[error("{kind} needs {key} ({help})")]
     Missing {
         /// Name of the kind of air.
@@ -97,7 +97,7 @@ pub enum AirSpecError {
         /// Meaning of the key, for people.
         help: &'static str,
     },
-    /// Keys that do not go together.
+    /// The keys do not go together.
     #[error("{kind}: {why}")]
     Conflict {
         /// Name of the kind of air.
@@ -108,7 +108,7 @@ pub enum AirSpecError {
     /// A file could not be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A file is wrong.
+    /// The file is not valid.
     #[error("{}: {reason}", plain(file))]
     Toml {
         /// Name of the file.
@@ -194,13 +194,13 @@ impl AirSpec {
         }
     }
 
-    /// The value of a key, if it was given.
+    /// Value of a key, if it was given.
     pub fn given(&self, name: &str) -> Option<f64> {
         let index = self.kind.keys.iter().position(|key| key.name == name)?;
         *self.values.get(index)?
     }
 
-    /// The value of a key, or its default; zero for keys that have neither.
+    /// Value of a key, or its default; zero for keys that have neither.
     pub fn value(&self, name: &str) -> f64 {
         let default = match self.kind.key(name).map(|key| key.default) {
             Some(Preset::Value(value)) => value,

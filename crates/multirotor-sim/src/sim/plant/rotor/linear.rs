@@ -99,7 +99,7 @@ impl Linear {
             .sum()
     }
 
-    /// Moves the rotors on by one step towards `command` (0..1 of full thrust).
+    /// Advances the rotors by one step towards `command` (0 to 1 of full thrust).
     #[inline]
     pub fn advance(&mut self, command: &[f64; ROTORS]) {
         self.output = self.filtered;

@@ -23,7 +23,7 @@ pub const LAYOUT: [(f64, f64, f64); ROTORS] =
 pub enum Rotors {
     /// AirSim's rotors, whose thrust is linear in the pulse.
     Linear(Linear),
-    /// Brushless motors at a voltage.
+    /// Brushless motors at a supply voltage.
     Motor(Motor),
 }
 
@@ -36,7 +36,7 @@ impl Rotors {
         }
     }
 
-    /// Changes the length of the steps; `airframe` is the one they were made with.
+    /// Changes the length of the steps; `airframe` must be that of the rotors.
     pub fn set_step(&mut self, airframe: &Airframe, dt_s: f64) {
         match self {
             Self::Linear(rotors) => rotors.set_step(airframe, dt_s),
@@ -85,8 +85,8 @@ impl Rotors {
         }
     }
 
-    /// Moves the rotors on by one step towards `command` (0..1); `torque` is their torque over that
-    /// in still air at sea level.
+    /// Advances the rotors by one step towards `command` (0 to 1); `torque` is their torque over
+    /// that in still air at sea level.
     #[inline]
     pub fn advance(&mut self, command: &[f64; ROTORS], torque: f64) {
         match self {

@@ -57,7 +57,7 @@ impl Motor {
         self.thrust_factor * self.max_square
     }
 
-    /// Sum of the squared speeds over the largest, 0..4.
+    /// Sum of the rotors' squared speeds as shares of the largest, 0 to 4.
     pub fn total_output(&self) -> f64 {
         self.squares().iter().sum::<f64>() / self.max_square
     }
@@ -92,7 +92,7 @@ impl Motor {
         loads.torque_nm += Vector3::new(roll * lever, pitch * lever, yaw * torque);
     }
 
-    /// Moves the motors on by one step; `torque` is the rotors' torque over that in still air at
+    /// Advances the motors by one step; `torque` is the rotors' torque over that in still air at
     /// sea level.
     #[inline]
     pub fn advance(&mut self, command: &[f64; ROTORS], torque: f64) {
