@@ -1,4 +1,4 @@
-//! What the fuzzer and `tests/fuzz_corpus.rs` feed: every reader of bytes from outside.
+//! What the fuzzer and `tests/it/house/fuzz_corpus.rs` feed: every reader of bytes from outside.
 //!
 //! To add one: a function here and a line in `TARGETS`, a file in `fuzz_targets/`, a `[[bin]]` in
 //! `fuzz/Cargo.toml`, and a few small inputs in `corpus/NAME/`. A target panics if what must hold

@@ -1,6 +1,6 @@
 //! Whether intervals hold the truth: campaigns made up from the model of [`super::zero`] and
 //! [`super::corrections`] with everything drawn that they doubt. The simulator's campaigns are in
-//! `tests/errors_coverage.rs`.
+//! `tests/it/analysis/coverage.rs`.
 
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;

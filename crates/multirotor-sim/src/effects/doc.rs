@@ -13,7 +13,7 @@ use crate::vehicle::Vehicle;
 /// The vehicle's file sets an effect wrongly.
 pub fn markdown(vehicle: &Vehicle) -> Result<String, EffectError> {
     let mut text = format!(
-        "# Effects\n\nMade by `UPDATE=1 cargo test --test effects_docs` from `src/effects/`; do not \
+        "# Effects\n\nMade by `UPDATE=1 cargo test --test it effects::docs` from `crates/multirotor-sim/src/effects/`; do not \
          edit.\n\nPhysics beyond the base model, each piece stated once: the simulator flies it, \
          the analysis explains with it. `updraft effects show NAME` explains one for a vehicle, \
          `updraft simulate --effect NAME` switches it on, `--effect NAME=off` off, and \

@@ -1,0 +1,4 @@
+//! Motions of the air.
+
+mod fields;
+mod kinds;

@@ -1,0 +1,6 @@
+//! Effects as their users read of them.
+
+mod figures;
+mod flight;
+mod speed_limit;
+mod support;

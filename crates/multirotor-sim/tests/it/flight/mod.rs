@@ -1,0 +1,4 @@
+//! What a flight and its log say.
+
+mod ladder;
+mod log;

@@ -1,0 +1,5 @@
+//! The interface to the firmware's simulator.
+
+mod firmware;
+mod packets;
+mod support;

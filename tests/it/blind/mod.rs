@@ -1,0 +1,6 @@
+//! Flights with hidden physics: drawn, flown, sealed, scored.
+
+mod flight;
+mod foreign;
+mod play;
+mod score;

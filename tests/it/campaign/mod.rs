@@ -1,0 +1,3 @@
+//! Campaigns of several flights.
+
+mod air;

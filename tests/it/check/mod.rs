@@ -1,0 +1,5 @@
+//! The safety checks on planned shows.
+
+mod plan;
+#[path = "../../../crates/skybrush-show/tests/it/check/support.rs"]
+mod support;

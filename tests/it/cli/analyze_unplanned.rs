@@ -1,0 +1,119 @@
+//! `updraft analyze` on logs without a plan, logs given twice, and laws of other drones.
+
+use std::fs;
+use std::sync::OnceLock;
+
+use insta::assert_snapshot;
+
+use crate::cli::analyze_inputs::{campaign, said};
+use crate::cli::support::{Bench, Ended};
+
+/// A ladder of three rungs and a hover of 40 s by one drone, flown once.
+fn flown() -> &'static Bench {
+    static FLOWN: OnceLock<Bench> = OnceLock::new();
+    FLOWN.get_or_init(|| {
+        let bench = Bench::new();
+        fly(&bench, "campaign", &[]);
+        bench
+    })
+}
+
+fn fly(bench: &Bench, folder: &str, more: &[&str]) {
+    let run = ["run", "--direct", "--no-study", "--quiet", "--air", "still", "-o", folder];
+    let small = ["--duration", "40", "--height", "40", "--speeds", "1,2,3"];
+    let legs = ["--leg", "12", "--hover", "6"];
+    let grid: &[&str] = if more.contains(&"--grid") { &[] } else { &["--grid", "1x1"] };
+    bench.expect(0, &[&run[..], &small, &legs, grid, more].concat());
+}
+
+fn analyze(bench: &Bench, code: i32, args: &[&str]) -> Ended {
+    bench.expect(code, &[&["analyze", "--no-report"], args].concat())
+}
+
+#[test]
+fn a_hover_alone_is_no_calibration() {
+    let bench = flown();
+    let alone = analyze(bench, 5, &["campaign/hover/simulated/01.BIN"]);
+    assert_snapshot!(said(&alone));
+    assert!(
+        alone.out.contains("without a plan a flight is a calibration only if it climbs"),
+        "{alone}"
+    );
+    let laws = ["campaign/hover/simulated/01.BIN", "--hold", "campaign/analysis.json"];
+    let held = analyze(bench, 0, &laws);
+    assert!(held.out.contains("vertical air speed W*, m/s: mean +"), "{held}");
+}
+
+#[test]
+fn a_ladder_and_a_hover_work_without_a_plan_in_any_order() {
+    let bench = flown();
+    let (ladder, hover) = ("campaign/calibration/simulated", "campaign/hover/simulated");
+    let one = analyze(bench, 0, &[ladder, hover]);
+    let other = analyze(bench, 0, &[hover, ladder]);
+    assert_eq!(one.out, other.out);
+    let heads: Vec<&str> = one.out.lines().filter(|l| l.contains(": 1 drone")).collect();
+    assert_eq!(heads, ["calibration: 1 drone", "hover, measurement: 1 drone"], "{one}");
+    assert!(one.out.contains("vertical air speed W*, m/s: mean +"), "{one}");
+    assert!(!one.out.contains("No measurement flight"), "{one}");
+}
+
+#[test]
+fn nothing_counts_twice() {
+    let bench = campaign();
+    fs::create_dir(bench.path("copy")).unwrap();
+    let log = bench.path("campaign/hover/simulated/02.BIN");
+    fs::copy(log, bench.path("copy/7.BIN")).unwrap();
+    let mut told = String::new();
+    for paths in [
+        ["campaign", "campaign/../campaign"],
+        ["campaign", "campaign/hover"],
+        ["campaign", "copy"],
+        ["copy/7.BIN", "copy"],
+    ] {
+        told.push_str(&analyze(&bench, 2, &paths).err);
+    }
+    assert_snapshot!(told);
+}
+
+#[test]
+fn laws_of_other_drones_are_used_with_a_warning() {
+    let bench = flown();
+    let other = Bench::new();
+    let more = ["--grid", "1x2", "--spacing", "9", "--seed", "5", "--vehicle", "phantom4"];
+    fly(&other, "campaign", &more);
+    let laws = other.path("campaign/analysis.json");
+    let laws = laws.to_str().unwrap();
+    // So far from them that no pulse fits.
+    let held = analyze(bench, 5, &["campaign", "--hold", laws]);
+    let folder = laws.strip_suffix("campaign/analysis.json").unwrap();
+    let told: Vec<&str> = held.out.split_whitespace().collect();
+    let told = told.join(" ").replace(folder, "");
+    let start =
+        told.find("campaign/analysis.json: the laws seem").unwrap_or_else(|| panic!("{held}"));
+    let end = told[start..].find("calibration of these drones").unwrap();
+    assert_snapshot!(told[start..start + end]);
+    let own = analyze(bench, 0, &["campaign", "--hold", "campaign/analysis.json"]);
+    assert!(!own.out.contains("the laws seem"), "{own}");
+}
+
+#[test]
+fn simulated_logs_are_home_and_can_be_verified() {
+    let bench = Bench::new();
+    bench.fly();
+    let link = format!("udpin:{}", crate::cli::fleet::free_port());
+    let pulled = bench.expect(5, &["logs", "pull", "campaign", "--connect", &link, "--wait", "1"]);
+    let whole = bench.expect(0, &["logs", "verify", "campaign"]);
+    let path = bench.path("campaign/simulated/02.BIN");
+    let mut log = fs::read(&path).unwrap();
+    let last = log.len() - 9;
+    log[last] ^= 1;
+    fs::write(&path, &log).unwrap();
+    let changed = bench.expect(3, &["logs", "verify", "campaign"]);
+    fs::remove_file(&path).unwrap();
+    let gone = bench.expect(3, &["logs", "verify", "campaign"]);
+    let told = [pulled.err, whole.err, changed.err, gone.err].concat();
+    assert_snapshot!(told);
+    let planned = Bench::new();
+    planned.plan();
+    assert_snapshot!(planned.expect(5, &["logs", "verify", "campaign"]).err);
+}

@@ -1,0 +1,44 @@
+//! The program as its users meet it: arguments, exit codes, files, interruption.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot run the program fails")]
+
+pub(crate) mod support;
+
+#[cfg(unix)]
+mod air;
+mod analyze;
+mod analyze_inputs;
+mod analyze_messages;
+mod analyze_unplanned;
+mod check;
+#[cfg(unix)]
+mod drones;
+mod effects;
+mod fleet;
+#[cfg(unix)]
+mod fleet_refusals;
+#[cfg(unix)]
+mod fleet_upload;
+#[cfg(unix)]
+mod flights;
+mod foreign_text;
+mod gap;
+mod gap_next;
+mod guided;
+mod help;
+mod inspect;
+mod lock;
+mod logs;
+mod logs_import;
+#[cfg(unix)]
+mod logs_pull;
+mod manners;
+mod orders;
+mod physics;
+mod plan;
+mod scan;
+mod simulate;
+mod tables;
+#[cfg(unix)]
+mod terminal;
+mod words;

@@ -1,0 +1,4 @@
+//! Effects as their users read of them.
+
+mod docs;
+mod example;

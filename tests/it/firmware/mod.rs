@@ -1,0 +1,5 @@
+//! Logs of the real firmware, analysed.
+
+mod ladder;
+mod short;
+mod support;

@@ -1,0 +1,3 @@
+//! What a flight and its log say.
+
+mod identity;

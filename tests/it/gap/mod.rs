@@ -1,0 +1,4 @@
+//! The flight that would tell.
+
+mod next;
+pub(crate) mod verdicts;

@@ -1,0 +1,10 @@
+//! The page, its figures and tables, the terminal.
+
+mod browser;
+mod chromium;
+mod fields;
+mod gap;
+mod page;
+mod synthetic;
+mod terminal;
+mod verdicts;

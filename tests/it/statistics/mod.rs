@@ -1,0 +1,7 @@
+//! Statistics of the map, over many seeds.
+
+mod coverage;
+mod flight;
+mod inputs;
+mod support;
+mod truth;

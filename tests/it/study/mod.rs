@@ -1,0 +1,6 @@
+//! Studies: flown, resumed, evaluated.
+
+mod result;
+mod resume;
+mod support;
+mod template;
