@@ -16,7 +16,7 @@ use crate::link::id::DroneId;
 use crate::protocol::show::{CLEAR_TIME, FROM_DRONE, Stage, StartConfig, Status, flag};
 use dialect::{MavCmd, MavModeFlag, MavResult};
 
-/// For `run_all`: no drone waits for another.
+/// Concurrency for `run_all` in which no drone waits for another.
 pub const ALL_AT_ONCE: usize = usize::MAX;
 /// Time between repetitions.
 const EVERY: Micros = 200 * MS;
@@ -34,18 +34,18 @@ const CLEARED_WITHIN: Micros = 5 * S;
 /// A return that is refused so often becomes a landing.
 const REFUSALS: u32 = 3;
 
-/// What drones in the air do.
+/// Action that ends the flight of a drone in the air.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Action {
-    /// Return to where they took off, and land there.
+    /// Return to the place of the take-off, and land there.
     Return,
-    /// Land where they are.
+    /// Land at the present place.
     Land,
 }
 
 impl Action {
-    /// Its flight mode.
+    /// Number of ArduCopter's flight mode for the action.
     pub fn mode(self) -> u32 {
         match self {
             Self::Return => RTL,
@@ -54,31 +54,31 @@ impl Action {
     }
 }
 
-/// How an abort ended for one drone.
+/// Outcome of an abort for one drone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Aborted {
-    /// Its heartbeat says that it does this; for a return that was refused, that it lands.
+    /// The drone's heartbeat confirms this action; after a refused return it is the landing.
     Confirmed(Action),
-    /// It was not flying, and has no start time any more.
+    /// The drone was not flying, and has no start time any more.
     Grounded,
-    /// Nothing was confirmed: it may fly on. It was told so often.
+    /// Nothing was confirmed: the drone may fly on.
     Unconfirmed {
-        /// How often.
+        /// Number of times that the order was sent.
         told: u32,
     },
-    /// Nothing was confirmed for so long, and nobody waits any more; a running station goes on telling
-    /// it.
+    /// Nothing was confirmed in time, and the caller has stopped waiting; a running station goes on
+    /// sending the order.
     StillTold {
-        /// How long, s.
+        /// Time since the first order, s.
         seconds: u64,
     },
-    /// It was never heard, so that nothing reaches it.
+    /// The drone was never heard, so that no order reaches it.
     Unheard,
 }
 
 impl Aborted {
-    /// Whether the drone itself has confirmed it.
+    /// Whether the drone itself has confirmed the outcome.
     pub fn is_confirmed(self) -> bool {
         matches!(self, Self::Confirmed(_) | Self::Grounded)
     }
@@ -105,7 +105,7 @@ impl std::fmt::Display for Aborted {
     }
 }
 
-/// Aborts the flight of one drone.
+/// Conversation that aborts the flight of one drone.
 #[derive(Clone, Debug)]
 pub struct Abort {
     drone: DroneId,
@@ -130,8 +130,8 @@ pub struct Abort {
 }
 
 impl Abort {
-    /// Aborts the flight of a drone. `known`: what was heard of it until now; one that stands
-    /// disarmed is not pulled out of its mode. It cannot fly before its next heartbeats: arming
+    /// Aborts the flight of a drone. `known` is what was heard of it until now: a drone that stands
+    /// disarmed is not taken out of its mode. It cannot fly before its next heartbeats, as arming
     /// comes eight seconds before the take-off.
     pub fn new(drone: DroneId, action: Action, known: Option<&Drone>) -> Self {
         let heard = known.is_some();
@@ -161,13 +161,13 @@ impl Abort {
         }
     }
 
-    /// The same, giving up a drone that has never been heard and is not within this time.
+    /// Gives up on a drone that has never been heard, and is not heard within this time, us.
     #[must_use]
     pub fn heard_within(self, heard_within: Micros) -> Self {
         Self { heard_within, ..self }
     }
 
-    /// How often the drone was told.
+    /// Number of times that the order was sent.
     pub fn told(&self) -> u32 {
         self.told
     }

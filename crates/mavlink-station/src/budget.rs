@@ -1,11 +1,11 @@
-//! What a link may be asked to carry.
+//! Limit on the data that a link carries.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
 use crate::link::clock::Micros;
 
-/// A limit of bytes per second, shared by the conversations on a link.
+/// A limit in bytes per second, shared by the conversations on a link.
 #[derive(Clone, Debug)]
 pub struct Budget(Rc<RefCell<Bucket>>);
 
@@ -18,12 +18,16 @@ struct Bucket {
 }
 
 impl Budget {
-    /// So many bytes per second, on average.
+    /// A budget of this many bytes per second, on average.
     pub fn new(bytes_per_s: f64) -> Self {
         Self(Rc::new(RefCell::new(Bucket { per_s: bytes_per_s.max(1.0), tokens: 0.0, at: 0 })))
     }
 
-    /// Takes so many bytes; an error is the time to ask again.
+    /// Takes bytes from the budget.
+    ///
+    /// # Errors
+    ///
+    /// The time at which to ask again, us, if the budget is used up.
     pub fn take(&self, now: Micros, bytes: u64) -> Result<(), Micros> {
         let mut bucket = self.0.borrow_mut();
         let passed_s = now.saturating_sub(bucket.at) as f64 / 1e6;

@@ -1,4 +1,4 @@
-//! Clears the show of a vehicle.
+//! Conversation that clears the show of a vehicle.
 
 use super::messages::command_long;
 use crate::link::clock::{Micros, S};
@@ -13,14 +13,14 @@ const SETTLE: Micros = S;
 /// Clearing is repeated so often.
 const CLEAR_TRIES: u32 = 20;
 
-/// A show that could not be cleared.
+/// Error of clearing a show: it was not confirmed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "clearing the show was not confirmed: switch the drone off, or bring it nearer and try again"
 )]
 pub struct NotCleared;
 
-/// Clears the show of a vehicle, until its status says that none is loaded.
+/// Conversation that clears the show of a vehicle, until its status reports that none is loaded.
 #[derive(Clone, Debug)]
 pub struct Clear {
     drone: DroneId,
@@ -31,7 +31,7 @@ pub struct Clear {
 }
 
 impl Clear {
-    /// Clears the show of a vehicle; for those that an interrupted upload left, too.
+    /// Clears the show of a vehicle, including one that an interrupted upload left behind.
     pub fn new(drone: DroneId) -> Self {
         Self { drone, tries: 0, next: 0, accepted: None, cleared: false }
     }

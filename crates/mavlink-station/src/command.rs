@@ -6,12 +6,12 @@ use crate::link::error::Refusal;
 use crate::link::frame::{MavMessage, dialect};
 use dialect::{MavCmd, MavResult};
 
-/// How often something is repeated before it counts as unanswered.
+/// Repetition of a request until it counts as unanswered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// Time between repetitions.
+    /// Time between repetitions, us.
     pub every: Micros,
-    /// How often it is sent at most.
+    /// Largest number of times that the request is sent.
     pub tries: u32,
 }
 
@@ -26,41 +26,41 @@ impl Default for Patience {
 /// A vehicle that works on a command has so long between two signs of it.
 const PROGRESS_WITHIN: Micros = 30 * S;
 
-/// A command that did not work.
+/// Error of a command.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CommandError {
-    /// No answer.
+    /// The vehicle does not answer.
     #[error(
         "no answer to \"{what}\" after {tries} tries: bring the drone nearer to the radio, or \
          restart it, and try again"
     )]
     Silent {
-        /// What was asked.
+        /// Request, in words.
         what: String,
-        /// How often.
+        /// Number of times that it was sent.
         tries: u32,
     },
-    /// The vehicle refuses.
+    /// The vehicle refuses the command.
     #[error("the drone refuses \"{what}\": {reason}")]
     Refused {
-        /// What was asked.
+        /// Request, in words.
         what: String,
-        /// The vehicle's answer in words.
+        /// Answer of the vehicle, in words.
         reason: &'static str,
-        /// Its number (MAV_RESULT).
+        /// Number of the answer (MAV_RESULT).
         result: u8,
     },
-    /// It was not sent.
+    /// The command was not sent, because the vehicle must not be touched.
     #[error("\"{what}\" was not sent, as {why}")]
     Held {
-        /// What was to be asked.
+        /// Request that was not sent, in words.
         what: String,
-        /// Why.
+        /// Reason why it was not sent, as a clause.
         why: String,
     },
 }
 
-/// One command to one vehicle.
+/// Conversation of one command to one vehicle.
 #[derive(Clone, Debug)]
 pub struct Command {
     what: String,
@@ -74,8 +74,8 @@ pub struct Command {
 }
 
 impl Command {
-    /// A COMMAND_LONG or COMMAND_INT, as [`super::messages`] makes them; `what` says in words
-    /// what is asked. Other messages are never answered.
+    /// Makes a conversation of a COMMAND_LONG or COMMAND_INT, as from [`super::messages`]; `what`
+    /// is the request in words. Other messages are never answered.
     pub fn new(what: impl Into<String>, message: MavMessage) -> Self {
         let asked = match &message {
             MavMessage::COMMAND_LONG(c) => c.command,
@@ -94,7 +94,7 @@ impl Command {
         }
     }
 
-    /// The same with other patience.
+    /// Sets how often and for how long the command is repeated.
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
         Self { patience, ..self }

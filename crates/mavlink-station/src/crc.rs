@@ -1,4 +1,4 @@
-//! The CRC-32 that ArduPilot answers to MAVFTP's CalcFileCRC32.
+//! CRC-32 that ArduPilot answers to MAVFTP's CalcFileCRC32.
 
 /// CRC-32 with the reflected polynomial `0xEDB88320`, initial value 0 and no final XOR
 /// (ArduPilot's `crc_crc32`).

@@ -1,4 +1,5 @@
-//! The fence on the vehicle: an inclusion polygon and a top, put there, read back and compared.
+//! Conversation that puts a fence on a vehicle: an inclusion polygon and a top, sent, read back and
+//! compared.
 //!
 //! It is never switched off: whoever loads a fence leaves one behind, the old or the new.
 
@@ -12,21 +13,21 @@ use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use dialect::{MavCmd, MavMissionResult, MavMissionType};
 
-/// FENCE_TYPE: altitude (1) and polygon (4).
+/// FENCE_TYPE for a fence with altitude (1) and polygon (4).
 pub const FENCE_TYPE: f32 = 5.0;
-/// FENCE_ACTION: return, or land where that is impossible.
+/// FENCE_ACTION for returning home, or landing where that is impossible.
 pub const FENCE_ACTION: f32 = 1.0;
-/// A fence as vehicles get it.
+/// Fence in the form in which vehicles get it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fence {
-    /// Corners: latitude and longitude, 1e-7 degrees.
+    /// Corners of the polygon: latitude and longitude, 1e-7 degrees.
     pub corners_1e7: Vec<(i32, i32)>,
-    /// Top, m above home.
+    /// Top of the fence, m above home.
     pub top_m: f64,
 }
 
 impl Fence {
-    /// The parameters, in the order in which they are set: switched on last.
+    /// Parameters of the fence, in the order in which they are set: switched on last.
     pub fn params(&self) -> Vec<(String, f32)> {
         [
             ("FENCE_ALT_MAX", self.top_m as f32),
@@ -39,12 +40,12 @@ impl Fence {
     }
 }
 
-/// Degrees as MAVLink has them, rounded to nearest.
+/// Degrees as MAVLink has them, in 1e-7 degrees, rounded to nearest.
 pub fn degrees_1e7(degrees: f64) -> i32 {
     (degrees * 1e7).round() as i32
 }
 
-/// A fence that is not on the vehicle.
+/// Error of putting a fence on a vehicle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FenceError {
     /// The drone does not answer.
@@ -55,7 +56,7 @@ pub enum FenceError {
         /// Step during which it fell silent.
         doing: &'static str,
     },
-    /// The vehicle does not take it.
+    /// The vehicle refuses the fence.
     #[error("the drone refuses the fence: {reason}")]
     Refused {
         /// Reason for the refusal, in words.
@@ -73,7 +74,7 @@ pub enum FenceError {
         /// Reason why it must not be touched, as a clause.
         why: String,
     },
-    /// One of its parameters.
+    /// A parameter of the fence could not be set.
     #[error("the fence is not set up")]
     Param(#[source] SetError),
 }
@@ -96,7 +97,7 @@ enum Phase {
 /// rather than a whole upload given up.
 const PARAMS: Patience = Patience { every: S, tries: 30 };
 
-/// Puts a fence on a vehicle and reads it back.
+/// Conversation that puts a fence on a vehicle and reads it back.
 #[derive(Clone, Debug)]
 pub struct PutFence {
     drone: DroneId,
@@ -116,7 +117,7 @@ pub struct PutFence {
 }
 
 impl PutFence {
-    /// A fence for a vehicle.
+    /// Puts this fence on a vehicle.
     pub fn new(drone: DroneId, fence: Fence) -> Self {
         Self {
             drone,

@@ -1,4 +1,5 @@
-//! The first words with a vehicle: which firmware it has, and that it tells its time.
+//! First conversation with a vehicle: it asks for the firmware's version and for regular reports of
+//! the clock.
 //!
 //! Vehicles of the show firmware say nothing of their clock unasked (all stream rates are 0), and
 //! without it no start time can be set.
@@ -17,16 +18,16 @@ const TIME_EVERY_US: f32 = 1e6;
 /// Greeted so often before it is left alone.
 const TRIES: u32 = 10;
 
-/// What a vehicle answered to a greeting.
+/// Answers of a vehicle to a greeting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Greeted {
-    /// It tells its time.
+    /// Whether the vehicle reports its time.
     pub clock: bool,
-    /// It said which firmware it has.
+    /// Whether the vehicle has reported its firmware's version.
     pub version: bool,
 }
 
-/// Asks for the clock and the version, until both come or it gives up.
+/// Conversation that asks for the clock and the version, until both come or it gives up.
 #[derive(Clone, Debug)]
 pub struct Greet {
     drone: DroneId,
@@ -37,7 +38,7 @@ pub struct Greet {
 }
 
 impl Greet {
-    /// Greets a vehicle.
+    /// Asks a vehicle for its clock and its version.
     pub fn new(drone: DroneId) -> Self {
         Self { drone, heard: Greeted::default(), tries: 0, to_send: Vec::new(), next: 0 }
     }
@@ -47,7 +48,8 @@ fn ask(drone: DroneId, command: MavCmd, first: f32, second: f32) -> MavMessage {
     command_long(drone, command, [first, second, 0.0, 0.0, 0.0, 0.0, 0.0], 0)
 }
 
-/// Asks a vehicle to tell its time from now on: one that has restarted has forgotten that it should.
+/// Message that asks a vehicle to report its time regularly: one that has restarted has forgotten
+/// the request.
 pub fn ask_time(drone: DroneId) -> MavMessage {
     ask(drone, MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, SYSTEM_TIME, TIME_EVERY_US)
 }

@@ -1,8 +1,8 @@
-//! Which bytes of a file are there.
+//! Sets of byte ranges: the parts of a file that have come.
 
 use std::collections::BTreeMap;
 
-/// Sets of byte ranges, `start..end`. Ranges that touch are one.
+/// A set of byte ranges, `start..end`. Ranges that touch become one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Intervals {
     /// End by start; neither overlapping nor touching.
@@ -10,21 +10,21 @@ pub struct Intervals {
     total: u64,
 }
 
-/// No more separate ranges than this: a peer that sends crumbs is not worth more memory.
+/// Largest number of separate ranges: a peer that sends crumbs is not worth more memory.
 pub const MOST_RANGES: usize = 1 << 18;
 
 impl Intervals {
-    /// Bytes in it.
+    /// Number of bytes in the set.
     pub fn total(&self) -> u64 {
         self.total
     }
 
-    /// Number of separate ranges.
+    /// Number of separate ranges in the set.
     pub fn count(&self) -> usize {
         self.ranges.len()
     }
 
-    /// Adds a range; returns how many of its bytes are new. What would make more than
+    /// Adds a range; returns how many of its bytes are new. A range that would exceed
     /// [`MOST_RANGES`] is not added.
     pub fn insert(&mut self, start: u64, end: u64) -> u64 {
         if start >= end {
@@ -55,12 +55,12 @@ impl Intervals {
         self.total - before
     }
 
-    /// Whether a whole range is in it.
+    /// Whether a whole range is in the set.
     pub fn contains(&self, start: u64, end: u64) -> bool {
         start >= end || self.ranges.range(..=start).next_back().is_some_and(|(_, &its)| its >= end)
     }
 
-    /// The first range at or behind `from`, below `limit`, that is not in it.
+    /// First range at or behind `from`, below `limit`, that is not in the set.
     pub fn gap(&self, from: u64, limit: u64) -> Option<(u64, u64)> {
         let mut start = from;
         if let Some((_, &end)) = self.ranges.range(..=start).next_back()
@@ -75,12 +75,12 @@ impl Intervals {
         Some((start, end))
     }
 
-    /// Ends of the ranges, in order.
+    /// Starts and ends of the ranges, in order.
     pub fn iter(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
         self.ranges.iter().map(|(&start, &end)| (start, end))
     }
 
-    /// Where the last range ends; 0 when empty.
+    /// End of the last range; 0 if the set is empty.
     pub fn end(&self) -> u64 {
         self.ranges.last_key_value().map_or(0, |(_, &end)| end)
     }

@@ -1,6 +1,6 @@
-//! What of their logs is on its way to the station, of all drones that share a link, and how fast
-//! it comes: so much that the link is never empty, and no more than it holds, a fair share for
-//! each. Who waits for an answer knows what comes before it.
+//! Load of a link that many downloads share: the data on its way, and its rate. Each download keeps
+//! a fair share on its way, so that the link is never empty and never holds more than it can; and
+//! whoever waits for an answer knows how much data comes before it.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
@@ -29,7 +29,7 @@ const LOOKS: usize = 20;
 /// 57,600 baud.
 const FIRST: f64 = 1_440.0;
 
-/// A link's load; clones share it.
+/// Load of a link; clones share it.
 #[derive(Clone, Debug, Default)]
 pub struct LinkLoad(Rc<RefCell<Inner>>);
 
@@ -88,7 +88,7 @@ impl Inner {
 }
 
 impl LinkLoad {
-    /// A place on the link for one download.
+    /// Registers a download on the link.
     pub fn place(&self) -> Place {
         let mut inner = self.0.borrow_mut();
         inner.next += 1;
@@ -98,7 +98,7 @@ impl LinkLoad {
     }
 }
 
-/// A download's place on its link, until it is dropped.
+/// Registration of a download on its link, until it is dropped.
 #[derive(Debug)]
 pub struct Place {
     load: LinkLoad,
@@ -106,12 +106,12 @@ pub struct Place {
 }
 
 impl Place {
-    /// So much of this download is on its way now, bytes.
+    /// Sets the data of this download that is on its way now, bytes.
     pub fn tell(&self, bytes: u64) {
         self.load.0.borrow_mut().on_way.insert(self.number, bytes);
     }
 
-    /// So much of it has come now, bytes.
+    /// Counts data of this download that has come, bytes.
     pub fn came(&self, now: Micros, bytes: u64) {
         let mut inner = self.load.0.borrow_mut();
         inner.came += bytes;
@@ -127,7 +127,8 @@ impl Place {
         }
     }
 
-    /// What this download may keep on its way, bytes, where others use the link as well.
+    /// Data that this download may keep on its way, bytes; `None` if no other download uses the
+    /// link.
     pub fn share(&self) -> Option<f64> {
         let inner = self.load.0.borrow();
         let count = inner.on_way.len();
@@ -136,14 +137,14 @@ impl Place {
         (count > 1).then(|| (inner.rate() * room / count as f64).max(least))
     }
 
-    /// An answer took so long.
+    /// Counts the time that an answer took, us.
     pub fn took(&self, took: Micros) {
         let mut inner = self.load.0.borrow_mut();
         inner.least_rtt = Some(inner.least_rtt.map_or(took, |least| least.min(took)));
         inner.quickest = Some(inner.quickest.map_or(took, |least| least.min(took)));
     }
 
-    /// What others are waiting for delays an answer by so much.
+    /// Delay of an answer by the data of other downloads on its way, us.
     pub fn delay(&self) -> Micros {
         let inner = self.load.0.borrow();
         let others = inner.on_way.iter().filter(|(number, _)| **number != self.number);

@@ -1,4 +1,4 @@
-//! The messages a station sends, made and described in one place.
+//! Messages that a station sends, made and described in one place.
 //!
 //! [`text`] writes a message out as people check it in a dry run: name, fields, units.
 
@@ -10,14 +10,14 @@ use crate::protocol::show::{SHOW_MODE, StartConfig, TO_DRONE};
 use dialect::{MavCmd, MavFrame, MavMissionResult, MavMissionType, PositionTargetTypemask};
 use untrusted_io::plain::{plain, plain_string};
 
-/// Flight mode GUIDED of ArduCopter.
+/// Number of ArduCopter's flight mode GUIDED.
 pub const GUIDED: u32 = 4;
-/// Flight mode RTL of ArduCopter.
+/// Number of ArduCopter's flight mode RTL.
 pub const RTL: u32 = 6;
-/// Flight mode LAND of ArduCopter.
+/// Number of ArduCopter's flight mode LAND.
 pub const LAND: u32 = 9;
 
-/// A flight mode's name; `mode N` for those that do not matter here.
+/// Name of a flight mode by its number; `mode N` for those that have no name here.
 pub fn mode_name(mode: u32) -> String {
     match mode {
         0 => "STABILIZE".to_owned(),
@@ -33,7 +33,7 @@ pub fn mode_name(mode: u32) -> String {
     }
 }
 
-/// A COMMAND_LONG. `confirmation` counts repetitions.
+/// A COMMAND_LONG; `confirmation` counts repetitions.
 pub fn command_long(
     drone: DroneId,
     command: MavCmd,
@@ -56,7 +56,7 @@ pub fn command_long(
     })
 }
 
-/// A COMMAND_INT with a place: `x`, `y` as the command has them (1e-7 degrees), and `z`.
+/// A COMMAND_INT with a place: `x` and `y` in the command's unit (1e-7 degrees), and `z`.
 pub fn command_int(
     drone: DroneId,
     command: MavCmd,
@@ -81,19 +81,19 @@ pub fn command_int(
     })
 }
 
-/// Changes the flight mode.
+/// The command that changes the flight mode.
 pub fn set_mode(drone: DroneId, mode: u32, confirmation: u8) -> MavMessage {
     let params = [1.0, mode as f32, 0.0, 0.0, 0.0, 0.0, 0.0];
     command_long(drone, MavCmd::MAV_CMD_DO_SET_MODE, params, confirmation)
 }
 
-/// A start packet; it carries no address, everyone who hears it obeys.
+/// A start packet. It has no address: every drone that hears it obeys.
 pub fn start_packet(start: &StartConfig) -> MavMessage {
     let (data, len) = start.to_data();
     MavMessage::DATA16(dialect::DATA16_DATA { mavtype: TO_DRONE, len, data })
 }
 
-/// Asks for a parameter by name.
+/// The request for a parameter by its name.
 pub fn param_read(drone: DroneId, name: &str) -> MavMessage {
     MavMessage::PARAM_REQUEST_READ(dialect::PARAM_REQUEST_READ_DATA {
         param_index: -1,
@@ -103,7 +103,7 @@ pub fn param_read(drone: DroneId, name: &str) -> MavMessage {
     })
 }
 
-/// Asks for a parameter by its number.
+/// The request for a parameter by its index.
 pub fn param_read_index(drone: DroneId, index: u16) -> MavMessage {
     MavMessage::PARAM_REQUEST_READ(dialect::PARAM_REQUEST_READ_DATA {
         param_index: index as i16,
@@ -113,7 +113,7 @@ pub fn param_read_index(drone: DroneId, index: u16) -> MavMessage {
     })
 }
 
-/// Asks for all parameters.
+/// The request for all parameters.
 pub fn param_list(drone: DroneId) -> MavMessage {
     MavMessage::PARAM_REQUEST_LIST(dialect::PARAM_REQUEST_LIST_DATA {
         target_system: drone.system,
@@ -121,7 +121,7 @@ pub fn param_list(drone: DroneId) -> MavMessage {
     })
 }
 
-/// Sets a parameter. ArduPilot converts to the parameter's own type.
+/// The message that sets a parameter. ArduPilot converts the value to the parameter's own type.
 pub fn param_set(drone: DroneId, name: &str, value: f32) -> MavMessage {
     MavMessage::PARAM_SET(dialect::PARAM_SET_DATA {
         param_value: value,
@@ -132,7 +132,7 @@ pub fn param_set(drone: DroneId, name: &str, value: f32) -> MavMessage {
     })
 }
 
-/// A file transfer packet.
+/// The message that carries a file transfer packet.
 pub fn ftp(drone: DroneId, packet: &Packet) -> MavMessage {
     MavMessage::FILE_TRANSFER_PROTOCOL(dialect::FILE_TRANSFER_PROTOCOL_DATA {
         target_network: 0,
@@ -142,7 +142,7 @@ pub fn ftp(drone: DroneId, packet: &Packet) -> MavMessage {
     })
 }
 
-/// Announces so many fence items.
+/// The announcement of the number of fence items.
 pub fn fence_count(drone: DroneId, count: u16) -> MavMessage {
     MavMessage::MISSION_COUNT(dialect::MISSION_COUNT_DATA {
         count,
@@ -153,7 +153,7 @@ pub fn fence_count(drone: DroneId, count: u16) -> MavMessage {
     })
 }
 
-/// One corner of an inclusion polygon: latitude and longitude in 1e-7 degrees.
+/// A corner of an inclusion polygon: latitude and longitude in 1e-7 degrees.
 pub fn fence_corner(drone: DroneId, seq: u16, count: u16, (x, y): (i32, i32)) -> MavMessage {
     MavMessage::MISSION_ITEM_INT(dialect::MISSION_ITEM_INT_DATA {
         param1: f32::from(count),
@@ -169,7 +169,7 @@ pub fn fence_corner(drone: DroneId, seq: u16, count: u16, (x, y): (i32, i32)) ->
     })
 }
 
-/// Asks how many fence items there are.
+/// The request for the number of fence items.
 pub fn fence_list(drone: DroneId) -> MavMessage {
     MavMessage::MISSION_REQUEST_LIST(dialect::MISSION_REQUEST_LIST_DATA {
         target_system: drone.system,
@@ -178,7 +178,7 @@ pub fn fence_list(drone: DroneId) -> MavMessage {
     })
 }
 
-/// Asks for a fence item.
+/// The request for a fence item by its number.
 pub fn fence_request(drone: DroneId, seq: u16) -> MavMessage {
     MavMessage::MISSION_REQUEST_INT(dialect::MISSION_REQUEST_INT_DATA {
         seq,
@@ -188,7 +188,7 @@ pub fn fence_request(drone: DroneId, seq: u16) -> MavMessage {
     })
 }
 
-/// Ends a read of the fence.
+/// The message that ends a read of the fence.
 pub fn fence_ack(drone: DroneId) -> MavMessage {
     MavMessage::MISSION_ACK(dialect::MISSION_ACK_DATA {
         target_system: drone.system,
@@ -199,23 +199,23 @@ pub fn fence_ack(drone: DroneId) -> MavMessage {
     })
 }
 
-/// Where to be and how fast, for GUIDED: latitude and longitude in 1e-7 degrees, height above
-/// home, velocity north, east, **up**, m/s, and the heading to keep, rad clockwise from north.
+/// A target for GUIDED: position, velocity and heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidedTarget {
-    /// Latitude, 1e-7 degrees.
+    /// Latitude, 1e-7 degrees, north positive.
     pub lat_1e7: i32,
-    /// Longitude, 1e-7 degrees.
+    /// Longitude, 1e-7 degrees, east positive.
     pub lon_1e7: i32,
     /// Height above home, m.
     pub above_home_m: f64,
-    /// Velocity north, east, up, m/s.
+    /// Velocity to the north, to the east and **up**, m/s.
     pub neu_mps: [f64; 3],
-    /// Heading, rad.
+    /// Heading to keep, rad clockwise from north.
     pub yaw_rad: f64,
 }
 
-/// A target for GUIDED: position (frame 6, altitude above home), velocity and heading.
+/// The message of a target for GUIDED: position (frame 6, altitude above home), velocity and
+/// heading.
 #[expect(deprecated, reason = "frame 6 is what ArduPilot 4.4 documents for this message")]
 pub fn position_target(drone: DroneId, time_boot_ms: u32, target: &GuidedTarget) -> MavMessage {
     let ignored = PositionTargetTypemask::POSITION_TARGET_TYPEMASK_AX_IGNORE
@@ -239,13 +239,13 @@ pub fn position_target(drone: DroneId, time_boot_ms: u32, target: &GuidedTarget)
     })
 }
 
-/// A fixed-size name or text without its zeros, plain: a drone may say anything.
+/// Text of a fixed-size name without its padding zeros, made plain: a drone may send anything.
 pub fn chars(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     plain_string(String::from_utf8_lossy(&bytes[..end]).into_owned())
 }
 
-/// A message as one line.
+/// Text of a message in one line, for a dry run.
 pub fn text(message: &MavMessage) -> String {
     match message {
         MavMessage::COMMAND_LONG(c) => {

@@ -1,4 +1,4 @@
-//! How many drones of a network are asked at once.
+//! Number of drones of a network that are downloaded from at once.
 
 use crate::link::clock::{Micros, S};
 
@@ -11,9 +11,11 @@ const FORGETS: f64 = 0.97;
 /// Never fewer, if there are as many: a drone spends most of its time waiting for answers.
 const LEAST: f64 = 4.0;
 
-/// Raises the number while that does no harm, and lowers it when clearly fewer bytes come: a
-/// radio network carries more in all from several drones than from one, until their packets
-/// collide. Loss by itself is no reason: noise takes its share from few drones as from many.
+/// Controller of the number of drones that are downloaded from at once.
+///
+/// It raises the number while that does no harm, and lowers it when clearly fewer bytes come: a radio
+/// network carries more in all from several drones than from one, until their packets collide. Loss by
+/// itself is no reason: noise takes its share from few drones as from many.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     at_once: f64,
@@ -26,18 +28,18 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// At most so many.
+    /// A controller that allows at most this many drones at once.
     pub fn new(most: usize) -> Self {
         let most = most.max(1) as f64;
         Self { at_once: most.min(12.0), most, since: None, bytes: 0, rate: 0.0, best: 0.0 }
     }
 
-    /// So many now.
+    /// Number of drones that may be downloaded from at once now.
     pub fn at_once(&self) -> usize {
         self.at_once as usize
     }
 
-    /// Tells all new bytes so far, and how many drones are being asked.
+    /// Takes the number of new bytes so far, and of drones that are being downloaded from.
     pub fn look(&mut self, now: Micros, bytes: u64, busy: usize) {
         let since = *self.since.get_or_insert(now);
         let passed = now.saturating_sub(since);

@@ -1,4 +1,4 @@
-//! Parameters: read some, read all, set with read-back.
+//! Conversations about parameters: read some, read all, set with read-back.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -15,7 +15,7 @@ const AT_ONCE: usize = 6;
 /// ArduPilot has about 1,350 parameters; more than this is no answer of it.
 const MOST: u16 = 8_192;
 
-/// Whether a parameter has a value, up to what a 32-bit float keeps.
+/// Whether two values of a parameter are equal, as far as a 32-bit float can tell.
 pub fn same(value: f32, wanted: f32) -> bool {
     value == wanted || (value - wanted).abs() <= wanted.abs() * 1e-6
 }
@@ -28,8 +28,8 @@ struct Open {
     echoed: bool,
 }
 
-/// Reads parameters by name. Done with those that answered; the firmware does not answer for
-/// names it does not have, so that absent names are missing or unheard.
+/// Conversation that reads parameters by name. Its result has those that answered: the firmware
+/// does not answer for names it does not have, so that an absent name is either missing or unheard.
 #[derive(Clone, Debug)]
 pub struct ReadParams {
     drone: DroneId,
@@ -41,7 +41,7 @@ pub struct ReadParams {
 }
 
 impl ReadParams {
-    /// Reads these.
+    /// Reads the parameters of these names.
     pub fn new(drone: DroneId, names: impl IntoIterator<Item = String>) -> Self {
         let waiting: VecDeque<String> = names.into_iter().collect();
         let total = waiting.len() as u64;
@@ -49,7 +49,7 @@ impl ReadParams {
         Self { drone, patience: Patience::default(), waiting, open, total, values }
     }
 
-    /// The same with other patience.
+    /// Sets how often and for how long a request is repeated.
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
         Self { patience, ..self }
@@ -92,44 +92,44 @@ impl Conversation for ReadParams {
     }
 }
 
-/// A parameter that could not be set.
+/// Error of setting a parameter.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SetError {
-    /// No answer, or the parameter does not exist.
+    /// The vehicle does not answer, or does not have the parameter.
     #[error(
         "no answer when {name} is set to {wanted}: the firmware has no such parameter, or the \
          radio does not reach the drone"
     )]
     Silent {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
-        /// What it should be.
+        /// Value that was to be set.
         wanted: f32,
     },
     /// The vehicle keeps another value.
     #[error("{name} is {is} after it was set to {wanted}: the drone does not take the value")]
     NotTaken {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
-        /// What it should be.
+        /// Value that was to be set.
         wanted: f32,
-        /// What it is.
+        /// Value that the vehicle keeps.
         is: f32,
     },
-    /// It was not sent.
+    /// The value was not sent, because the vehicle must not be touched.
     #[error("{name} was not set to {wanted}: {why}")]
     Refused {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
-        /// What it should be.
+        /// Value that was to be set.
         wanted: f32,
-        /// Why.
+        /// Reason why it was not sent, as a clause.
         why: String,
     },
 }
 
-/// Sets parameters one after the other, each read back before the next; ends at the first that
-/// fails.
+/// Conversation that sets parameters one after another, each read back before the next; it ends at
+/// the first that fails.
 #[derive(Clone, Debug)]
 pub struct SetParams {
     drone: DroneId,
@@ -141,7 +141,7 @@ pub struct SetParams {
 }
 
 impl SetParams {
-    /// Sets these, in this order.
+    /// Sets these parameters, in this order.
     pub fn new(drone: DroneId, values: impl IntoIterator<Item = (String, f32)>) -> Self {
         let values: VecDeque<_> = values.into_iter().collect();
         let total = values.len() as u64;
@@ -149,13 +149,13 @@ impl SetParams {
         Self { drone, patience, values, open: Open::default(), last: None, total }
     }
 
-    /// The same with other patience.
+    /// Sets how often and for how long a value is sent.
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
         Self { patience, ..self }
     }
 
-    /// Whether the next value was sent, so that it may have been taken.
+    /// Whether the next value was sent, so that the vehicle may have taken it.
     pub fn was_sent(&self) -> bool {
         self.open.tries > 2
     }
@@ -216,17 +216,17 @@ impl Conversation for SetParams {
     }
 }
 
-/// A list of parameters that is not whole.
+/// Error of reading all parameters: the list is incomplete.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("only {got} of {total} parameters came: bring the drone nearer to the radio and try again")]
 pub struct ListError {
-    /// How many came.
+    /// Number of parameters that came.
     pub got: usize,
-    /// How many there are; 0: nothing came at all.
+    /// Number of parameters that the vehicle has; 0 if none came at all.
     pub total: u16,
 }
 
-/// Reads all parameters: the stream first, then what it lost, one by one.
+/// Conversation that reads all parameters: the stream first, then those it lost, one by one.
 #[derive(Clone, Debug)]
 pub struct ListParams {
     drone: DroneId,
@@ -242,7 +242,7 @@ pub struct ListParams {
 const STREAM_GAP: Micros = 2 * S;
 
 impl ListParams {
-    /// All parameters of a vehicle.
+    /// Reads all parameters of a vehicle.
     pub fn new(drone: DroneId) -> Self {
         Self {
             drone,

@@ -1,4 +1,4 @@
-//! Puts a file on a vehicle, unless it is there already.
+//! Conversation that puts a file on a vehicle, unless it is there already.
 
 use super::ftp::put::Put;
 use super::ftp::sum::Sum;
@@ -17,7 +17,7 @@ enum Phase {
     Put(Put),
 }
 
-/// Puts one file, after a look at the checksum of what is there.
+/// Conversation that puts one file on a vehicle, after comparing the checksum of the file there.
 #[derive(Debug)]
 pub struct PutFile {
     caller: Caller,
@@ -27,7 +27,8 @@ pub struct PutFile {
 }
 
 impl PutFile {
-    /// This content as the file `path`. Done with whether it had to be written.
+    /// Puts this content on the vehicle as the file `path`. The result is whether it had to be
+    /// written.
     pub fn new(caller: Caller, path: &'static str, content: Vec<u8>) -> Self {
         let size = content.len() as u64;
         let phase = Phase::Look(Sum::new(caller.another(), path, size, PATIENCE));

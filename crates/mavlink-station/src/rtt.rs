@@ -1,4 +1,4 @@
-//! How long an answer takes (Jacobson's estimate, as TCP's).
+//! Estimate of the time to an answer (Jacobson's, as in TCP).
 
 use crate::link::clock::{MS, Micros, S};
 
@@ -6,7 +6,7 @@ const FIRST: Micros = S;
 const LEAST: Micros = 60 * MS;
 const MOST: Micros = 8 * S;
 
-/// Estimate of the time to an answer.
+/// Estimate of the time to an answer and of its spread.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rtt {
     /// Smoothed, and its mean deviation, us.
@@ -14,7 +14,7 @@ pub struct Rtt {
 }
 
 impl Rtt {
-    /// An answer took so long. Only for requests that were sent once.
+    /// Counts an answer that took this time, us. Only for requests that were sent once.
     pub fn add(&mut self, took: Micros) {
         let took = took as f64;
         self.seen = Some(match self.seen {
@@ -31,7 +31,7 @@ impl Rtt {
         self.seen.is_some()
     }
 
-    /// An answer is lost when it takes longer.
+    /// Time after which an answer counts as lost, us.
     pub fn timeout(&self) -> Micros {
         let time = self
             .seen

@@ -1,23 +1,27 @@
-//! Where downloaded bytes go.
+//! Destinations of downloaded bytes.
 
 use super::intervals::Intervals;
 use crate::link::clock::Micros;
 
-/// Takes pieces of a file in any order.
+/// Destination of a download, which takes pieces of a file in any order.
 pub trait Sink {
-    /// What is there.
+    /// Byte ranges that the destination has.
     fn have(&self) -> &Intervals;
 
-    /// Takes a piece; returns how many of its bytes are new. An error's text says what to do.
+    /// Takes a piece at an offset; returns how many of its bytes are new.
+    ///
+    /// # Errors
+    ///
+    /// A text for people, with the remedy, if the bytes cannot be kept.
     fn put(&mut self, now: Micros, offset: u64, data: &[u8]) -> Result<u64, String>;
 }
 
-/// A file in memory.
+/// A downloaded file in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
-    /// The bytes; zeros where there are none yet.
+    /// Content of the file; zeros where nothing has come yet.
     pub bytes: Vec<u8>,
-    /// Which are there.
+    /// Byte ranges that have come.
     pub have: Intervals,
 }
 

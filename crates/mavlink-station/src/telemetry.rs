@@ -1,4 +1,4 @@
-//! What is known of each vehicle, from what it says unasked.
+//! Telemetry: the state of each vehicle, from the messages that it sends unasked.
 //!
 //! Memory is bounded: the last value of everything, and the last few texts.
 
@@ -14,7 +14,7 @@ use crate::link::net::Received;
 use crate::protocol::show::{CAPABILITY, FROM_DRONE, Status};
 use dataflash::time::GpsTime;
 
-/// Texts kept per vehicle.
+/// Number of texts that are kept per vehicle.
 pub const TEXTS: usize = 16;
 /// Longest text, characters: those of several pieces end here.
 const TEXT: usize = 250;
@@ -23,12 +23,12 @@ const RESTARTED_MS: u32 = 10_000;
 /// Positions that the link's quality is taken from.
 const BEATS: usize = 20;
 
-/// Which firmware a vehicle has.
+/// Version of a vehicle's firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Version {
     /// Whether it is the show firmware.
     pub show: bool,
-    /// Major, minor, patch.
+    /// Version number: major, minor, patch.
     pub number: [u8; 3],
 }
 
@@ -40,7 +40,7 @@ impl std::fmt::Display for Version {
     }
 }
 
-/// Where a vehicle is and how it moves.
+/// Position and velocity of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
     /// Latitude, degrees, north positive.
@@ -49,64 +49,64 @@ pub struct Position {
     pub lon_deg: f64,
     /// Altitude above mean sea level, m.
     pub amsl_m: f64,
-    /// Above home, m.
+    /// Height above home, m.
     pub above_home_m: f64,
-    /// Velocity north, east, up, m/s.
+    /// Velocity to the north, to the east and up, m/s.
     pub neu_mps: [f64; 3],
     /// Heading, degrees clockwise from north, if known.
     pub heading_deg: Option<f64>,
-    /// When it was measured, ms since the vehicle was switched on.
+    /// Time of the measurement, ms since the vehicle was switched on.
     pub boot_ms: u32,
 }
 
 impl Position {
-    /// Whether it is a place: without a fix the firmware sends zeros.
+    /// Whether it is a real place: without a fix the firmware sends zeros.
     pub fn has_place(&self) -> bool {
         self.lat_deg != 0.0 || self.lon_deg != 0.0
     }
 }
 
-/// GPS receiver.
+/// State of a vehicle's GPS receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gps {
     /// Fix type: 3 is 3-D, 4 differential, 5 and 6 RTK.
     pub fix: u8,
-    /// Satellites.
+    /// Number of satellites in use.
     pub satellites: u8,
-    /// Horizontal accuracy, m, if known.
+    /// Estimated horizontal accuracy, m, if known.
     pub h_acc_m: Option<f64>,
 }
 
-/// Battery and health.
+/// State of a vehicle's battery and arming checks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Health {
-    /// Whether all arming checks pass; `None`: the firmware does not say.
+    /// Whether all arming checks pass; `None` if the firmware does not report it.
     pub prearm_ok: Option<bool>,
-    /// Battery, V, if measured.
+    /// Battery voltage, V, if measured.
     pub battery_v: Option<f64>,
     /// Charge left, %, if known.
     pub battery_percent: Option<u8>,
 }
 
-/// What a vehicle said in words.
+/// A text that a vehicle sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Text {
-    /// When its last piece came.
+    /// Time at which its last piece came, us.
     pub at: Micros,
-    /// 0 emergency ... 3 error, 4 warning, 6 info.
+    /// Severity of the text in MAVLink: 0 emergency ... 3 error, 4 warning, 6 info.
     pub severity: u8,
-    /// The words.
+    /// Text, joined from its pieces.
     pub text: String,
     id: u16,
 }
 
-/// A value and when it came.
+/// A value with the time at which it came, us; `None` if it never came.
 pub type Heard<T> = Option<(Micros, T)>;
 
-/// What is known of one vehicle.
+/// State of one vehicle, as far as it was heard.
 #[derive(Clone, Debug, Default)]
 pub struct Drone {
-    /// When anything came last.
+    /// Time of the last message, us.
     pub heard: Micros,
     /// Flight mode, from the heartbeat.
     pub mode: Heard<u32>,
@@ -114,23 +114,23 @@ pub struct Drone {
     pub armed: Heard<bool>,
     /// The show firmware's status packet.
     pub status: Heard<Status>,
-    /// Where it is.
+    /// Position and velocity of the vehicle.
     pub position: Heard<Position>,
-    /// GPS receiver.
+    /// State of the GPS receiver.
     pub gps: Heard<Gps>,
-    /// Battery and health.
+    /// State of the battery and the arming checks.
     pub health: Heard<Health>,
-    /// Its clock.
+    /// Clock of the vehicle.
     pub clock: VehicleClock,
     /// GPS time when it was switched on, by its own clock.
     pub booted: Option<GpsTime>,
-    /// Which firmware.
+    /// Version of the firmware, if it was reported.
     pub version: Option<Version>,
-    /// What it said, oldest first.
+    /// Last texts of the vehicle, oldest first.
     pub texts: VecDeque<Text>,
-    /// Texts ever said; larger than `texts` once some are forgotten.
+    /// Number of texts so far, which exceeds those in `texts` once some are forgotten.
     pub texts_said: u64,
-    /// Restarts that were seen: its board's time went back.
+    /// Number of restarts that were seen: the board's time went back.
     pub restarts: u32,
     /// The board's time that was heard last, ms.
     board_ms: Option<u32>,
@@ -138,7 +138,7 @@ pub struct Drone {
 }
 
 impl Drone {
-    /// Whether it flies the show firmware; `None`: not known yet.
+    /// Whether the vehicle has the show firmware; `None` if that is not known yet.
     pub fn has_show_firmware(&self) -> Option<bool> {
         if self.status.is_some() {
             return Some(true);
@@ -146,13 +146,13 @@ impl Drone {
         self.version.map(|version| version.show)
     }
 
-    /// Whether the motors may run; `None`: no heartbeat yet.
+    /// Whether the motors may run; `None` before the first heartbeat.
     pub fn is_armed(&self) -> Option<bool> {
         self.armed.map(|(_, armed)| armed)
     }
 
-    /// Share of its regular messages that arrive, by the vehicle's own clock in them; `None`:
-    /// too few to tell.
+    /// Share of the vehicle's regular messages that arrive, by the vehicle's own clock in them;
+    /// `None` if they are too few.
     pub fn link_quality(&self) -> Option<f64> {
         let gaps: Vec<u32> = self.beats.iter().zip(self.beats.iter().skip(1)).map(gap).collect();
         if gaps.len() < 5 {
@@ -165,14 +165,14 @@ impl Drone {
         Some((gaps.len() as f64 / sent).min(1.0))
     }
 
-    /// The newest text that says why arming is refused, without its prefix.
+    /// Newest text that says why arming is refused, without its prefix.
     pub fn prearm_reason(&self) -> Option<&str> {
         let said = |text: &'_ Text| text.text.starts_with("PreArm: ");
         let text = self.texts.iter().rev().find(|text| said(text))?;
         text.text.strip_prefix("PreArm: ")
     }
 
-    /// Takes a message of it.
+    /// Takes a message of the vehicle.
     pub fn on_message(&mut self, now: Micros, message: &MavMessage) {
         self.heard = now;
         match message {
@@ -290,18 +290,18 @@ fn health(status: &dialect::SYS_STATUS_DATA) -> Health {
     }
 }
 
-/// What is known of all vehicles.
+/// State of all vehicles that were heard.
 #[derive(Clone, Debug, Default)]
 pub struct Telemetry {
-    /// By vehicle; those heard at least once.
+    /// Vehicles that were heard at least once.
     pub drones: BTreeMap<DroneId, Drone>,
 }
 
-/// After so long without anything a drone counts as silent.
+/// Time without a message after which a drone counts as silent, us.
 pub const SILENT_AFTER: Micros = 5 * S;
 
 impl Telemetry {
-    /// Those that have restarted and have not told their time since.
+    /// Vehicles that have restarted and have not reported their time since.
     pub fn timeless(&self, now: Micros) -> Vec<DroneId> {
         let all = self.drones.iter();
         all.filter(|(_, of)| of.restarts > 0 && of.clock.gps_ms(now).is_none())
@@ -309,7 +309,7 @@ impl Telemetry {
             .collect()
     }
 
-    /// One vehicle, if it was ever heard.
+    /// State of a vehicle; `None` if it was never heard.
     pub fn get(&self, drone: DroneId) -> Option<&Drone> {
         self.drones.get(&drone)
     }

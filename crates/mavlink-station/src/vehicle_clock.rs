@@ -1,4 +1,4 @@
-//! A vehicle's GPS clock as seen from the station.
+//! GPS clock of a vehicle, as seen from the station.
 //!
 //! SYSTEM_TIME says what the vehicle's clock showed when it was sent; it arrives later. Of
 //! several, the one that travelled fastest is nearest to the truth, so that the clock read here
@@ -22,7 +22,7 @@ const JUMP_US: f64 = 60e6;
 /// little time to measure its rate, us.
 const APART: Micros = 200_000;
 
-/// Readings of a vehicle's clock.
+/// Clock of a vehicle, from readings that arrive late.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VehicleClock {
     /// Link time of arrival, and the vehicle's Unix time, us.
@@ -35,7 +35,8 @@ pub struct VehicleClock {
 const SAME_BOOT_MS: std::ops::RangeInclusive<i64> = -5_000..=120_000;
 
 impl VehicleClock {
-    /// A reading. Times before GPS existed (the vehicle has no GPS time yet) are ignored.
+    /// Takes a reading at link time `now`. Times before GPS existed (the vehicle has no GPS time
+    /// yet) are ignored.
     pub fn read(&mut self, now: Micros, unix_us: u64) {
         if unix_us / 1_000_000 < GPS_EPOCH_UNIX_S as u64 {
             return;
@@ -67,7 +68,7 @@ impl VehicleClock {
         }
     }
 
-    /// What the board's time was when the clock showed this: both are in one message.
+    /// Takes the board's time and the clock's time from one message.
     pub fn read_board(&mut self, boot_ms: u32, unix_us: u64) {
         if unix_us / 1_000_000 >= GPS_EPOCH_UNIX_S as u64 {
             self.board = Some((boot_ms, unix_us));
@@ -75,7 +76,7 @@ impl VehicleClock {
     }
 
     /// GPS time at a time of the board, ms since the GPS epoch, whenever the message that names it
-    /// arrives; `None`: the clock has said nothing since the vehicle was switched on.
+    /// arrives; `None` if the clock was not read since the vehicle was switched on.
     pub fn gps_ms_on_board(&self, boot_ms: u32) -> Option<f64> {
         let (read_ms, unix_us) = self.board?;
         let since_ms = i64::from(boot_ms) - i64::from(read_ms);
@@ -86,7 +87,7 @@ impl VehicleClock {
         Some(GpsTime::from_unix_ms(unix_ms)?.total_ms() as f64)
     }
 
-    /// Seconds of the vehicle per second of the station; 1 until measured otherwise.
+    /// Rate of the vehicle's clock, seconds per second of the station; 1 until it is measured.
     pub fn rate(&self) -> f64 {
         let (Some(first), Some(last)) = (self.readings.front(), self.readings.back()) else {
             return 1.0;
@@ -108,20 +109,20 @@ impl VehicleClock {
         self.readings.iter().map(ahead).reduce(f64::max)
     }
 
-    /// GPS time on the vehicle now, ms since the GPS epoch; `None`: it has said nothing.
+    /// GPS time on the vehicle now, ms since the GPS epoch; `None` if the clock was never read.
     pub fn gps_ms(&self, now: Micros) -> Option<f64> {
         let unix_us = self.unix_us(now)?;
         let whole = GpsTime::from_unix_ms((unix_us / 1000.0) as i64)?;
         Some(whole.total_ms() as f64 + (unix_us / 1000.0).fract())
     }
 
-    /// Link time at which the vehicle's clock shows a GPS time; may lie in the past.
+    /// Link time at which the vehicle's clock shows a GPS time, us; may lie in the past.
     pub fn link_time(&self, now: Micros, gps_ms: f64) -> Option<Micros> {
         let ahead_us = (gps_ms - self.gps_ms(now)?) * 1000.0 / self.rate();
         Some((now as f64 + ahead_us).max(0.0) as Micros)
     }
 
-    /// Age of the last reading.
+    /// Age of the last reading, us.
     pub fn age(&self, now: Micros) -> Option<Micros> {
         self.readings.back().map(|(at, _)| now.saturating_sub(*at))
     }

@@ -1,4 +1,4 @@
-//! One request and its answer.
+//! One MAVFTP request and its answer.
 
 use super::{Caller, FtpError, answer};
 use crate::link::clock::{MS, Micros, S};
@@ -21,7 +21,7 @@ const BUSY: Micros = 3_300 * MS;
 /// After one of ours was closed.
 const SHORT_BUSY: Micros = 20 * MS;
 
-/// A request that is repeated, with its number, until it is answered.
+/// A request with its number, repeated until it is answered.
 #[derive(Clone, Debug)]
 pub struct Exchange {
     packet: Packet,
@@ -38,18 +38,18 @@ pub struct Exchange {
     close_first: Option<u8>,
 }
 
-/// What an exchange wants.
+/// Next action of an exchange.
 pub enum Wish {
-    /// Send this, and ask again.
+    /// Send this message, and poll again.
     Send(Box<MavMessage>),
-    /// Nothing until then.
+    /// Wait until this time, us.
     Wait(Micros),
-    /// Give up.
+    /// Give up, with this error.
     Silent(FtpError),
 }
 
 impl Exchange {
-    /// A request; `patience` without any answer ends it.
+    /// Makes a request; `patience` without any answer, us, ends it.
     pub fn new(caller: &Caller, request: Packet, patience: Micros) -> Self {
         Self {
             packet: caller.number(request),
@@ -64,7 +64,7 @@ impl Exchange {
         }
     }
 
-    /// The vehicle may take so long for it.
+    /// Sets the time that the vehicle may need for the request itself, us.
     #[must_use]
     pub fn with_work(mut self, work: Micros) -> Self {
         self.work = work;
@@ -72,7 +72,7 @@ impl Exchange {
         self
     }
 
-    /// What to do now.
+    /// Next action at time `now`.
     pub fn poll(&mut self, now: Micros, caller: &Caller) -> Wish {
         let first = *self.first.get_or_insert(now);
         if now >= first + self.patience {
@@ -106,8 +106,8 @@ impl Exchange {
         Wish::Send(Box::new(caller.message(&self.packet)))
     }
 
-    /// The answer, if the message is it. The session may be another than the request's: newer
-    /// vehicles give their own.
+    /// Answer to the request, if the message is one. Its session may differ from the request's:
+    /// newer vehicles assign their own.
     pub fn on_message(
         &mut self,
         now: Micros,

@@ -1,4 +1,4 @@
-//! Brings a file from a drone.
+//! Conversation that downloads a file from a drone.
 //!
 //! Two ways of asking alternate. A *burst* is one request and hundreds of packets, until the
 //! vehicle stops by itself; nothing ends it early, and what else is asked meanwhile waits behind
@@ -47,21 +47,21 @@ const MOST_LIES: u32 = 3;
 /// A frame's bytes around the data.
 const OVERHEAD: u64 = 30;
 
-/// How a file is brought.
+/// Options of a download.
 #[derive(Clone, Debug)]
 pub struct GetOptions {
-    /// Gives up after so long without an answer.
+    /// Time without an answer after which it gives up, us.
     pub patience: Micros,
-    /// Refuses larger files, bytes.
+    /// Size above which a file is refused, bytes.
     pub most_size: u64,
-    /// Takes no more of a larger file, bytes.
+    /// Number of bytes that are read of a larger file.
     pub up_to: u64,
-    /// What the link may be asked to carry; none: anything.
+    /// Limit on the data rate of the link; `None`: no limit.
     pub budget: Option<Budget>,
     /// Time between two packets of a burst, us, where it is known.
     pub spacing: Option<f64>,
-    /// Something else waits for it: its last reads are asked for more than once, and that the
-    /// vehicle has closed the file is left for the next one to see to who asks for one.
+    /// Whether another conversation follows at once: the last reads are then asked for more than
+    /// once, and the next conversation sees to it that the vehicle has closed the file.
     pub is_left: bool,
 }
 
@@ -78,35 +78,35 @@ impl Default for GetOptions {
     }
 }
 
-/// What a download cost.
+/// Statistics of a download.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
-    /// Data bytes that were new.
+    /// Number of data bytes that were new.
     pub new_bytes: u64,
-    /// Data bytes that were there already.
+    /// Number of data bytes that had come before.
     pub again_bytes: u64,
-    /// Bursts asked for.
+    /// Number of bursts asked for.
     pub bursts: u64,
-    /// Single reads asked for.
+    /// Number of single reads asked for.
     pub reads: u64,
-    /// How often the file was opened.
+    /// Number of times that the file was opened.
     pub opened: u64,
-    /// Data bytes per second of the last burst, or 0.
+    /// Data rate of the last burst, bytes per second; 0 without one.
     pub burst_bytes_per_s: f64,
 }
 
-/// What is left of a [`Get`].
+/// Result of a [`Get`].
 #[derive(Debug)]
 pub struct Got<S> {
-    /// With what came, also when it failed.
+    /// Sink with the bytes that came, also after a failure.
     pub sink: S,
-    /// The file's size when it was opened first; all of it is in the sink.
+    /// Size of the file when it was first opened, bytes; all of it is in the sink.
     pub result: Result<u64, FtpError>,
-    /// What it cost.
+    /// Statistics of the download.
     pub tally: Tally,
 }
 
-/// Brings a file.
+/// Conversation that downloads a file.
 #[derive(Debug)]
 pub struct Get<S> {
     caller: Caller,
@@ -160,7 +160,7 @@ struct Burst {
 }
 
 impl<S: Sink> Get<S> {
-    /// Brings the file `path`, or what the sink lacks of it.
+    /// Downloads the file `path`, or the parts that the sink lacks.
     pub fn new(caller: Caller, path: &str, sink: S, options: GetOptions) -> Self {
         let mut reads = Reads::new(PIECE, MOST_READS, options.patience);
         reads.pace(options.spacing.unwrap_or(0.0));
@@ -185,22 +185,23 @@ impl<S: Sink> Get<S> {
         }
     }
 
-    /// What it has cost so far.
+    /// Statistics of the download so far.
     pub fn tally(&self) -> Tally {
         self.tally
     }
 
-    /// When the vehicle said something of use last.
+    /// Time at which the vehicle last sent anything of use, us.
     pub fn heard(&self) -> Option<Micros> {
         self.heard
     }
 
-    /// The sink, wherever the download is.
+    /// Sink of the download, if it is not handed over yet.
     pub fn sink(&self) -> Option<&S> {
         self.sink.as_ref()
     }
 
-    /// Ends it, once what is on its way has come, with what there is, as [`FtpError::Paused`].
+    /// Ends the download, once the data on its way has come, as [`FtpError::Paused`] with what
+    /// there is.
     pub fn pause(&mut self) {
         self.is_pausing = true;
     }

@@ -1,4 +1,4 @@
-//! Names in a folder of a drone.
+//! Conversation that lists a folder of a drone.
 
 use super::exchange::Wish;
 use super::{Caller, Exchange, FtpError};
@@ -11,16 +11,16 @@ use untrusted_io::plain::acts;
 /// No folder has more names.
 const MOST_NAMES: usize = 20_000;
 
-/// One name.
+/// An entry of a folder: a file or a folder in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listed {
-    /// Its name, without a folder. Never `.`, `..` or with a slash.
+    /// Name without the path to it; never `.`, `..` or with a slash.
     pub name: String,
-    /// Its size, bytes; `None`: a folder.
+    /// Size of the file, bytes; `None` for a folder.
     pub size: Option<u64>,
 }
 
-/// Lists a folder.
+/// Conversation that lists a folder.
 #[derive(Debug)]
 pub struct List {
     caller: Caller,
@@ -34,7 +34,7 @@ pub struct List {
 }
 
 impl List {
-    /// The names in `folder`.
+    /// Lists the entries of `folder`.
     pub fn new(caller: Caller, folder: &str, patience: Micros) -> Self {
         let exchange = Exchange::new(&caller, request(folder, 0), patience);
         let folder = folder.to_owned();

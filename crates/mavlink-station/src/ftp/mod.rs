@@ -24,73 +24,73 @@ pub use exchange::Exchange;
 /// burst.
 const NUMBERS_PER_BURST: u16 = 4096;
 
-/// Why a conversation failed.
+/// Error of a MAVFTP conversation.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FtpError {
-    /// No answer for the whole time of patience.
+    /// The vehicle has not answered for the whole time of patience.
     #[error("no answer for {seconds} s: is it on, and within reach?")]
     Silent {
-        /// So long.
+        /// Time without an answer, s.
         seconds: u64,
     },
-    /// The vehicle says no.
+    /// The vehicle refuses a request.
     #[error("{what} was refused: {refusal}")]
     Refused {
-        /// What was asked.
+        /// Request that was refused, in words.
         what: &'static str,
-        /// Its reason.
+        /// Reason that the vehicle gives.
         refusal: NakReason,
     },
-    /// The file ends before its size.
+    /// The file ends before the size that the vehicle states.
     #[error("the vehicle says that the file has {said} bytes, but it ends at byte {ends}")]
     SizeLies {
-        /// Its size by its own word, bytes.
+        /// Size that the vehicle states, bytes.
         said: u64,
-        /// Where reading ends.
+        /// Offset at which reading ends, bytes.
         ends: u64,
     },
-    /// The file is smaller than it was.
+    /// The file is smaller than it was at first.
     #[error("the file has changed: {now} bytes, {before} before")]
     Changed {
-        /// Size before, bytes.
+        /// Size at first, bytes.
         before: u64,
-        /// Size now, bytes.
+        /// Present size, bytes.
         now: u64,
     },
-    /// More than is taken.
+    /// The file is larger than the limit.
     #[error("the file has {size} bytes, more than the {most} allowed")]
     TooLarge {
-        /// Its size by the vehicle's word, bytes.
+        /// Size that the vehicle states, bytes.
         size: u64,
-        /// The limit, bytes.
+        /// Largest size accepted, bytes.
         most: u64,
     },
-    /// The written file differs.
+    /// The file that was written differs from the one that was sent.
     #[error(
         "the file on the vehicle differs from what was sent (checksum {found:08x}, not {right:08x})"
     )]
     Checksum {
-        /// Of the vehicle's file.
+        /// CRC-32 of the vehicle's file.
         found: u32,
-        /// Of ours.
+        /// CRC-32 of the file that was sent.
         right: u32,
     },
-    /// The answer makes no sense.
+    /// The answer is not valid.
     #[error("the answer to {what} makes no sense")]
     Nonsense {
-        /// What was asked.
+        /// Request that was answered, in words.
         what: &'static str,
     },
-    /// The file's bytes could not be kept.
+    /// The bytes could not be kept, for this reason.
     #[error("{0}")]
     Sink(String),
-    /// It was ended from here, to go on in another way.
+    /// The conversation was ended by the station, to continue in another way.
     #[error("it was ended from here")]
     Paused,
 }
 
-/// Numbers requests to one drone. Clones count on together.
+/// Numbering of the requests to one drone. Clones share the numbers.
 #[derive(Clone, Debug)]
 pub struct Caller {
     drone: DroneId,
@@ -107,8 +107,8 @@ struct Numbers {
 }
 
 impl Caller {
-    /// `start` should differ from run to run: a vehicle takes a request with the numbers of its
-    /// last one for a repetition, and repeats its answer.
+    /// Starts the numbering of a drone's requests. `start` should differ from run to run: a vehicle
+    /// takes a request with the numbers of its last one for a repetition, and repeats its answer.
     pub fn new(drone: DroneId, start: u32) -> Self {
         let mixed = start.wrapping_mul(0x9E37_79B1);
         let session = 1 + ((mixed >> 24) % 250) as u8;
@@ -116,7 +116,7 @@ impl Caller {
         Self { drone, numbers: Rc::new(RefCell::new(numbers)) }
     }
 
-    /// For another conversation after this one.
+    /// Numbering for a further conversation after this one.
     #[must_use]
     pub fn another(&self) -> Self {
         self.skip();
@@ -143,7 +143,7 @@ impl Caller {
         self.numbers.borrow().open
     }
 
-    /// How long its answers take.
+    /// Estimate of the time to the drone's answers.
     pub fn rtt(&self) -> Rtt {
         self.numbers.borrow().rtt
     }

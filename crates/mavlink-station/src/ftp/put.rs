@@ -1,4 +1,4 @@
-//! Sends a file to a drone.
+//! Conversation that uploads a file to a drone.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ const MOST_STARTS: u32 = 8;
 /// Another station's file is given up by the vehicle after 3 s.
 const BUSY_PAUSE: Micros = S;
 
-/// Sends a file and compares checksums.
+/// Conversation that uploads a file and compares checksums.
 #[derive(Debug)]
 pub struct Put {
     caller: Caller,
@@ -50,7 +50,7 @@ struct Writing {
 }
 
 impl Put {
-    /// Sends `content` as the file `path`. Gives up after `patience` without an answer.
+    /// Uploads `content` as the file `path`. Gives up after `patience` without an answer, us.
     pub fn new(caller: Caller, path: &str, content: Vec<u8>, patience: Micros) -> Self {
         let stage = Stage::Begin(0);
         let path = path.to_owned();

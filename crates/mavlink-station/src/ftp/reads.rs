@@ -1,4 +1,4 @@
-//! Single reads on their way, how many at once, and which bytes next.
+//! Single reads on their way: their number, and the choice of the next bytes.
 //!
 //! Shared by both protocols of download: a read is repaired by a read.
 

@@ -1,4 +1,4 @@
-//! The checksum of a drone's file.
+//! Conversation that asks for the checksum of a drone's file.
 
 use super::exchange::Wish;
 use super::{Caller, Exchange, FtpError};
@@ -10,7 +10,7 @@ use crate::protocol::ftp::{Op, Packet};
 /// A slow card of an autopilot, bytes per second.
 const SLOWEST: u64 = 200_000;
 
-/// Asks for the checksum of a whole file ([`crate::crc::ap_crc32`]).
+/// Conversation that asks for the checksum of a whole file ([`crate::crc::ap_crc32`]).
 #[derive(Debug)]
 pub struct Sum {
     caller: Caller,
@@ -19,7 +19,7 @@ pub struct Sum {
 }
 
 impl Sum {
-    /// Of the file `path`, which has about `size` bytes.
+    /// Asks for the checksum of the file `path`, which has about `size` bytes.
     pub fn new(caller: Caller, path: &str, size: u64, patience: Micros) -> Self {
         let request = Packet::request(Op::CalcFileCRC32).with_data(path.as_bytes());
         let work = size.saturating_mul(S) / SLOWEST;

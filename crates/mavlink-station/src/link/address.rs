@@ -1,4 +1,4 @@
-//! Where a link goes: the words of `--connect`.
+//! Addresses of links, as `--connect` takes them.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -10,64 +10,65 @@ use untrusted_io::plain::{Shown as _, acts};
 /// A link and the network it belongs to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
-    /// Vehicles with the same system id in different networks are different vehicles.
+    /// Network of the link: vehicles with equal system ids in different networks are different
+    /// vehicles.
     pub network: u16,
-    /// How it is reached.
+    /// Transport of the link.
     pub way: Way,
 }
 
-/// How a link is reached.
+/// Transport of a link, with its address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// Listens for datagrams; answers go to where each vehicle was heard.
+    /// A UDP socket that listens; answers go to where each vehicle was heard.
     UdpIn(String),
-    /// Sends datagrams to an address first.
+    /// A UDP socket that sends to this address first.
     UdpOut(String),
-    /// Connects to a TCP server, as the firmware's simulator is.
+    /// A connection to a TCP server, such as the firmware's simulator.
     Tcp(String),
-    /// A serial radio: device and baud rate.
+    /// A serial radio, by device and baud rate.
     Serial(String, u32),
 }
 
-/// Text that is no link.
+/// Error of an address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AddressError {
-    /// Not of any known form.
+    /// The address has no known form.
     #[error(
         "{text:?} is no link: give udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, \
          serial:DEVICE:BAUD or a file with one of these per line; N@ before it puts it into \
          network N"
     )]
     Form {
-        /// What was given.
+        /// Text that was given.
         text: String,
     },
-    /// A number in it is wrong.
+    /// A number in the address is not valid.
     #[error("{text:?}: {part:?} is no {what}")]
     Number {
-        /// What was given.
+        /// Text that was given.
         text: String,
-        /// The wrong part.
+        /// Part of the text that is not valid.
         part: String,
-        /// What it should be.
+        /// Name of the number that it should be.
         what: &'static str,
     },
-    /// A list file that cannot be read.
+    /// A list file cannot be read.
     #[error("cannot read the list of links {}: {reason}", path.shown())]
     List {
-        /// The file.
+        /// Path of the list file.
         path: PathBuf,
-        /// Why.
+        /// Reason why it cannot be read.
         reason: String,
     },
-    /// A wrong line of a list file.
+    /// A line of a list file is not valid.
     #[error("{}:{line}: {source}", path.shown())]
     Line {
-        /// The file.
+        /// Path of the list file.
         path: PathBuf,
-        /// The line, from 1.
+        /// Number of the line, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// Error of the address on the line.
         source: Box<AddressError>,
     },
 }
@@ -133,8 +134,8 @@ const MOST: usize = 1_000;
 /// Longest list file, bytes.
 const LONGEST_LIST: u64 = 1_000_000;
 
-/// The links of one `--connect`: an address, or a file that lists them (one per line, `#`
-/// begins a comment).
+/// Links of one `--connect`: an address, or a file that lists addresses (one per line, `#` begins a
+/// comment).
 pub fn links(text: &str) -> Result<Vec<Address>, AddressError> {
     let path = Path::new(text);
     match text.parse() {

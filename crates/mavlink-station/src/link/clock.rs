@@ -1,28 +1,29 @@
-//! Time on the link: microseconds since the program's start, from an injected clock.
+//! Link time: microseconds since the program's start, from an injected clock.
 
 use std::time::Duration;
 
-/// Microseconds of link time; never goes back.
+/// Microseconds of link time, which never goes back.
 pub type Micros = u64;
 
-/// One millisecond.
+/// One millisecond, us.
 pub const MS: Micros = 1_000;
-/// One second.
+/// One second, us.
 pub const S: Micros = 1_000_000;
 
-/// A clock.
+/// A source of link time and Unix time.
 pub trait Clock: Send + Sync {
-    /// Time since some fixed instant; never goes back.
+    /// Time since some fixed instant, us; never goes back.
     fn now(&self) -> Micros;
 
-    /// Unix time, us; may be set back by the user.
+    /// Unix time, us; the user may set it back.
     fn unix_us(&self) -> u64;
 
-    /// Waits.
+    /// Waits for a duration of the clock.
     fn pause(&self, time: Duration) {
         std::thread::sleep(time);
     }
 
-    /// So long was waited for somebody else: a clock that goes by itself knows.
+    /// Reports that the caller has waited for this duration elsewhere; only a clock that does not
+    /// go by itself takes note.
     fn waited(&self, _time: Duration) {}
 }

@@ -1,4 +1,4 @@
-//! Runs one conversation per drone, many at once.
+//! Conversations with drones, one per drone and many at once.
 //!
 //! A conversation is a [`Conversation`]: no sockets, no clock, no threads, so that it runs the same
 //! on a radio and on a simulated link that drops, delays and repeats.
@@ -11,83 +11,84 @@ use super::frame::MavMessage;
 use super::id::DroneId;
 use super::net::{Net, Received};
 
-/// What a conversation wants next.
+/// Next action of a conversation.
 #[derive(Debug)]
 pub enum Step<T> {
-    /// Send this, and ask again.
+    /// Send this message, and poll again.
     Send(Box<MavMessage>),
-    /// Nothing until then, or until a message comes.
+    /// Wait until this time, us, or until a message comes.
     Wait(Micros),
-    /// It is over.
+    /// The conversation has ended with this result.
     Done(T),
 }
 
 impl<T> Step<T> {
-    /// To send a message.
+    /// The action of sending a message.
     pub fn send(message: MavMessage) -> Self {
         Self::Send(Box::new(message))
     }
 }
 
-/// How far a conversation is, in its own units (bytes, items, steps).
+/// Progress of a conversation, in its own units (bytes, items, steps).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
-    /// Done.
+    /// Units that are done.
     pub done: u64,
-    /// Of so many; 0 when not known yet.
+    /// Units in total; 0 if not known yet.
     pub total: u64,
 }
 
-/// A conversation with one drone.
+/// A sans-IO conversation with one drone.
 pub trait Conversation {
-    /// What it ends with; a failure is a value of it.
+    /// Result of the conversation; a failure is one of its values.
     type Done;
 
-    /// A message of its drone has come.
+    /// Takes a message of the drone.
     fn on_message(&mut self, now: Micros, message: &MavMessage);
 
-    /// What to do now. Called until it waits or is done, and again after each message and at the
-    /// time it waits for.
+    /// Next action at time `now`. Called until the conversation waits or has ended, and again after
+    /// each message and at the time it waits for.
     fn poll(&mut self, now: Micros) -> Step<Self::Done>;
 
-    /// A message of it was refused for good, as the drone's state does not allow it: what it ends
-    /// with then; `None`: it is absent from the results.
+    /// Takes notice that one of its messages was refused for good, because the drone's state does
+    /// not allow it; returns the result with which the conversation ends, or `None` to be absent
+    /// from the results.
     fn refused(&mut self, refusal: &Refusal) -> Option<Self::Done> {
         let _ = refusal;
         None
     }
 
-    /// How far it is.
+    /// Present progress of the conversation.
     fn progress(&self) -> Progress {
         Progress::default()
     }
 }
 
-/// Sees what goes on while conversations run, and may end them.
+/// Observer of running conversations, which may end them.
 pub trait Observer {
-    /// A message has come from any drone, also those without a conversation.
+    /// Called for a message from any drone, including those without a conversation.
     fn on_message(&mut self, now: Micros, received: &Received) {
         let _ = (now, received);
     }
 
-    /// A conversation has gone on or ended. Called often.
+    /// Called, often, when a conversation has progressed or ended.
     fn on_progress(&mut self, drone: DroneId, progress: Progress, over: bool) {
         let _ = (drone, progress, over);
     }
 
-    /// A message was held back.
+    /// Called when a message was held back.
     fn on_refused(&mut self, drone: DroneId, refusal: &Refusal) {
         let _ = (drone, refusal);
     }
 
-    /// Whether to end now, with what is done.
+    /// Whether to end the run now, with the results so far.
     fn stop(&mut self, now: Micros) -> bool {
         let _ = now;
         false
     }
 }
 
-/// Watches nothing.
+/// An observer that does nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoObserver;
 
@@ -96,8 +97,9 @@ impl Observer for NoObserver {}
 /// The stop request is looked at so often, at least.
 const LOOK: Micros = 100 * MS;
 
-/// Runs conversations, at most `at_once` per network at the same time, the others in order after
-/// them. What a stopped run did not finish, and what was refused, is absent from the result.
+/// Runs conversations, at most `at_once` per network at the same time, and the rest in order after
+/// them. Those that a stopped run did not finish, and those that were refused, are absent from the
+/// result.
 pub fn run_all<C: Conversation>(
     net: &mut dyn Net,
     conversations: BTreeMap<DroneId, C>,

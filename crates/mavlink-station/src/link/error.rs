@@ -1,4 +1,4 @@
-//! What goes wrong on a link.
+//! Errors of links, and refusals of messages.
 
 use std::io;
 
@@ -6,58 +6,59 @@ use super::address::Address;
 use super::id::DroneId;
 use untrusted_io::file::FileError;
 
-/// A message that a gate has held back.
+/// A message that was held back, because a drone's state does not allow it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("not sent: {what}, as {why}")]
 pub struct Refusal {
-    /// To whom; `None`: to everyone.
+    /// Vehicle it was addressed to; `None` for all vehicles.
     pub to: Option<DroneId>,
-    /// The message, in words.
+    /// Message, in words.
     pub what: String,
-    /// Why.
+    /// Reason why it was held back, as a clause.
     pub why: String,
-    /// It may be sent in a moment, as when a drone is heard again: like a message that was lost.
+    /// Whether it may be sent in a moment, as when a drone is heard again; such a message counts as
+    /// lost.
     pub for_now: bool,
 }
 
-/// A link that cannot be used. A drone that does not answer is not one: that is told per drone.
+/// Error of a link. A drone that does not answer is none: that is reported drone by drone.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NetError {
     /// The socket or port cannot be opened.
     #[error("cannot open the link {address}: {hint}")]
     Open {
-        /// Which.
+        /// Address of the link.
         address: Address,
-        /// What to do about it.
+        /// Remedy, for the user.
         hint: &'static str,
-        /// What the system says.
+        /// Reason given by the operating system.
         source: io::Error,
     },
-    /// No thread for the link.
+    /// The thread of a link could not be started.
     #[error("cannot start a reader for the link {address}")]
     Thread {
-        /// Which.
+        /// Address of the link.
         address: Address,
-        /// What the system says.
+        /// Reason given by the operating system.
         source: io::Error,
     },
     /// The message was held back: the vehicle's state does not allow it. The link is fine.
     #[error(transparent)]
     Refused(Refusal),
-    /// What was said last with the key cannot be kept.
+    /// The newest time stamps of the signing key could not be stored.
     #[error(
         "cannot keep what was said last with the signing key beside it: put the key into a folder \
          that this program can write into"
     )]
     Stamps(#[source] FileError),
-    /// No thread for that.
+    /// The thread that stores the time stamps could not be started.
     #[error("cannot start to keep what was said last with the signing key")]
     NoKeeper(#[source] io::Error),
-    /// Every link is closed.
+    /// All links are closed.
     #[error("all links are closed: {reason}")]
     Closed {
-        /// What was heard last from them.
+        /// Last error of the links.
         reason: String,
     },
 }

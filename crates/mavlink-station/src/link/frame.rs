@@ -6,14 +6,14 @@
 pub(super) use mavlink::MAVLinkV2MessageRaw;
 use mavlink::{MavHeader, MavlinkVersion, Message as _, calculate_crc, consts};
 
-/// The messages of the ArduPilot dialect and their enums.
+/// Messages of the ArduPilot dialect and their enums.
 pub use mavlink::dialects::ardupilotmega as dialect;
-/// Any message of the ArduPilot dialect.
+/// A message of the ArduPilot dialect.
 pub use mavlink::dialects::ardupilotmega::MavMessage;
 
 use super::signing::{Signer, Verifier};
 
-/// Longest frame, bytes.
+/// Length of the longest frame, bytes.
 pub const MAX_FRAME: usize = consts::MAX_FRAME_SIZE;
 const STX_V1: u8 = 0xFE;
 const STX_V2: u8 = 0xFD;
@@ -22,42 +22,42 @@ const CHECKSUM: usize = 2;
 const SIGNATURE: usize = 13;
 const FLAG_SIGNED: u8 = 0x01;
 
-/// Who sends.
+/// Sender of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Sender {
-    /// System id.
+    /// MAVLink system id.
     pub system: u8,
-    /// Component id; 1 is an autopilot.
+    /// MAVLink component id; 1 is an autopilot.
     pub component: u8,
 }
 
 /// A message with its sender.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// Who sent it.
+    /// Sender of the frame.
     pub sender: Sender,
     /// Number of the frame in the sender's stream, modulo 256.
     pub sequence: u8,
-    /// What it says.
+    /// Message in the frame.
     pub message: MavMessage,
 }
 
 /// Bytes that gave no message, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameLoss {
-    /// Bytes outside of frames, or of frames whose checksum is wrong.
+    /// Number of bytes outside of frames, or of frames whose checksum is wrong.
     pub noise_bytes: u64,
-    /// MAVLink 1 frames (of any content).
+    /// Number of MAVLink 1 frames (of any content).
     pub version_1: u64,
-    /// Frames of messages that the dialect does not have; normal.
+    /// Number of frames with messages that the dialect does not have; normal.
     pub unknown: u64,
-    /// Frames without a signature where one is required.
+    /// Number of frames without a signature where one is required.
     pub unsigned: u64,
-    /// Frames whose signature is wrong, or that were sent before (replayed).
+    /// Number of frames whose signature is wrong, or that were sent before (replayed).
     pub forged: u64,
 }
 
-/// Writes a message as one frame.
+/// Encodes a message as one frame.
 pub fn encode(
     sender: Sender,
     sequence: u8,
@@ -76,31 +76,31 @@ pub fn encode(
     raw.raw_bytes().to_vec()
 }
 
-/// Finds frames in bytes that arrive in pieces. Holds at most one frame's worth of bytes
-/// beyond what was pushed last.
+/// Finder of frames in bytes that arrive in pieces. Holds at most one frame's worth of bytes beyond
+/// the last push.
 #[derive(Clone, Debug, Default)]
 pub struct FrameReader {
     bytes: Vec<u8>,
-    /// What was lost so far.
+    /// Losses so far, by reason.
     pub loss: FrameLoss,
-    /// Signed frames that came where no signature is looked at.
+    /// Number of signed frames that came while signatures are not checked.
     pub signed: u64,
 }
 
 impl FrameReader {
-    /// Takes bytes from the stream, or a whole datagram.
+    /// Takes bytes of the stream, or a whole datagram.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// Forgets the rest of the bytes: what follows a datagram does not continue it.
+    /// Discards the rest of the bytes: what follows a datagram does not continue it.
     pub fn end_of_datagram(&mut self) {
         self.loss.noise_bytes += self.bytes.len() as u64;
         self.bytes.clear();
     }
 
-    /// The next message; `None`: more bytes are needed. With a verifier, frames that it refuses
-    /// are counted and skipped.
+    /// Takes the next message; `None` if more bytes are needed. With a verifier, frames that it
+    /// refuses are counted and skipped.
     pub fn next(&mut self, mut verifier: Option<&mut Verifier>) -> Option<Frame> {
         let mut at = 0;
         let found = loop {

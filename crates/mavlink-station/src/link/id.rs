@@ -1,4 +1,4 @@
-//! What a vehicle is called on the air.
+//! Identity of a vehicle on the air: its network and its system id.
 
 use std::fmt;
 use std::str::FromStr;
@@ -27,7 +27,7 @@ impl fmt::Display for DroneId {
     }
 }
 
-/// A text that is no drone id.
+/// Error of a text that is not a drone id.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{text:?} is no drone id: give a system id (1 to 255) or network:system, such as 1:12")]
 pub struct NoDroneId {

@@ -1,4 +1,4 @@
-//! Message signing: who has the key may speak.
+//! Message signing: only who has the key may speak.
 //!
 //! A signature covers the frame, the sender's link and a time stamp that only ever grows
 //! (MAVLink's "Message Signing"). A datagram network reorders: a stamp somewhat older than the
@@ -33,7 +33,7 @@ const SEEN: usize = 4_096;
 /// Unix time at which signing time begins, 2015-01-01, in units of 10 us.
 const EPOCH: u64 = 142_007_040_000_000;
 
-/// Signing time of a Unix time, us.
+/// Signing time (10 us since 2015) of a Unix time in us.
 pub fn signing_time(unix_us: u64) -> u64 {
     (unix_us / 10).saturating_sub(EPOCH)
 }
@@ -54,15 +54,15 @@ impl std::fmt::Debug for Key {
     }
 }
 
-/// Why there is no key.
+/// Error of reading a signing key.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// The file cannot be read.
     #[error("cannot read the key file {}", path.shown())]
     Read {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
-        /// What the system says.
+        /// Reason given by the operating system.
         source: std::io::Error,
     },
     /// The file is empty or far too long to be a key.
@@ -71,19 +71,19 @@ pub enum KeyError {
          passphrase of 8 to 200 characters (hashed as other ground stations do)", path.shown()
     )]
     Content {
-        /// The file.
+        /// Path of the key file.
         path: PathBuf,
     },
 }
 
 impl Key {
-    /// From its bytes.
+    /// A key from its 32 bytes.
     pub fn from_bytes(bytes: [u8; 32]) -> Self {
         Self { bytes, file: None }
     }
 
-    /// From a file with 32 bytes, 64 hexadecimal digits, or a passphrase, whose SHA-256 is the
-    /// key (the custom of Mission Planner and MAVProxy).
+    /// Reads a key from a file with 32 bytes, 64 hexadecimal digits, or a passphrase, whose SHA-256
+    /// is the key (the custom of Mission Planner and MAVProxy).
     pub fn from_file(path: &Path) -> Result<Self, KeyError> {
         let content = || KeyError::Content { path: path.to_owned() };
         let bytes = read_whole(path, MOST_KEY_BYTES).map_err(|error| match error.source {
@@ -110,8 +110,8 @@ impl Key {
     }
 }
 
-/// That others than its owner may read or change a key file, and what to do; `None`: they may not, or
-/// it cannot be told.
+/// Warning that others than its owner may read or change a key file, with the remedy; `None` if
+/// they may not, or if that cannot be known.
 ///
 /// That is a warning and no refusal: sticks that crews carry keys on know no owners.
 pub fn exposure(path: &Path) -> Option<String> {
@@ -146,7 +146,7 @@ fn from_hex(text: &str) -> Option<[u8; 32]> {
     Some(key)
 }
 
-/// Signs what one station sends.
+/// Signer of the frames that one station sends.
 #[derive(Clone, Debug)]
 pub struct Signer {
     key: Key,
@@ -155,7 +155,8 @@ pub struct Signer {
 }
 
 impl Signer {
-    /// `link` tells this station's links apart; `time` is [`signing_time`] now.
+    /// Makes a signer; `link` distinguishes this station's links, `time` is the present
+    /// [`signing_time`].
     pub fn new(key: Key, link: u8, time: u64) -> Self {
         Self { key, link, stamp: time }
     }
@@ -170,7 +171,7 @@ impl Signer {
         self.stamp
     }
 
-    /// Follows the clock: stamps grow by one per frame at least.
+    /// Moves the time stamp on to the clock's time, if that is later; each frame adds at least one.
     pub fn advance(&mut self, time: u64) {
         self.stamp = self.stamp.max(time);
     }
@@ -185,7 +186,7 @@ impl Signer {
     }
 }
 
-/// Checks what arrives, in all networks.
+/// Verifier of the frames that arrive, in all networks.
 #[derive(Clone, Debug)]
 pub struct Verifier {
     key: Key,
@@ -205,7 +206,7 @@ struct Stream {
 }
 
 impl Verifier {
-    /// `time` is [`signing_time`] now.
+    /// Makes a verifier; `time` is the present [`signing_time`].
     pub fn new(key: Key, time: u64) -> Self {
         Self { key, time, streams: BTreeMap::new(), kept: BTreeMap::new() }
     }
@@ -220,7 +221,7 @@ impl Verifier {
         self.streams.iter().map(|(id, stream)| (*id, stream.newest)).collect()
     }
 
-    /// Follows the clock.
+    /// Moves the verifier's time on with the clock.
     pub fn advance(&mut self, time: u64) {
         self.time = self.time.max(time);
     }

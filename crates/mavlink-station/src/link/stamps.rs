@@ -1,4 +1,5 @@
-//! What was said last with a key, kept beside it: a frame of yesterday is refused today.
+//! Newest time stamps of a signing key, stored beside it, so that a frame of yesterday is refused
+//! today.
 //!
 //! A station that has just begun knows no stream, and would take whatever was recorded a moment ago for
 //! the beginning of one. So the newest stamp of each stream lies in `KEY.stamps` beside the key file:

@@ -1,4 +1,4 @@
-//! A ground station on the air: sockets, who was heard where, its own heartbeat.
+//! A ground station on the air: sockets, routes to the vehicles, and its own heartbeat.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -18,9 +18,9 @@ use super::stamps::{Keeper, Stamps};
 use super::traffic::Traffic;
 use super::wire::{self, Peer, Receiving, Sending};
 
-/// The identity crews know from Skybrush Server: system 254, component 190 (mission planner).
+/// Identity that crews know from Skybrush Server: system 254, component 190 (mission planner).
 pub const STATION: Sender = Sender { system: 254, component: 190 };
-/// The component that is a vehicle's autopilot.
+/// Component id of a vehicle's autopilot.
 pub const AUTOPILOT: u8 = 1;
 
 /// Pieces of input that wait to be looked at; more are dropped by the kernel, not stored here.
@@ -37,13 +37,14 @@ const PIECE: usize = 65_536;
 /// A vehicle keeps the way it was heard by until it has been silent there for so long.
 const KEEP_ROUTE: Micros = 3 * S;
 
-/// How a station is set up.
+/// Setup of a station.
 pub struct Setup {
-    /// Its links.
+    /// Links to open.
     pub links: Vec<Address>,
-    /// With a key everything sent is signed, and what is not signed with it is refused.
+    /// Signing key: with one, everything that is sent is signed, and messages that are not signed
+    /// with it are refused.
     pub key: Option<Key>,
-    /// Its clock.
+    /// Clock of the station.
     pub clock: Arc<dyn Clock>,
 }
 
@@ -94,7 +95,7 @@ enum Piece {
 }
 
 impl Station {
-    /// Opens all links.
+    /// Opens all links of a station.
     ///
     /// # Errors
     /// When one cannot be opened; the others are closed again.
@@ -368,7 +369,7 @@ fn is_vehicle(message: &MavMessage) -> bool {
         if beat.autopilot != dialect::MavAutopilot::MAV_AUTOPILOT_INVALID)
 }
 
-/// The station's own heartbeat.
+/// Heartbeat message of the station.
 pub fn heartbeat() -> MavMessage {
     MavMessage::HEARTBEAT(dialect::HEARTBEAT_DATA {
         custom_mode: 0,

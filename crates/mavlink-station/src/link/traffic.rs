@@ -1,25 +1,25 @@
-//! What went through a network, and what its people must know about it.
+//! Traffic of a network, and the problems that a crew must know about.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::frame::FrameLoss;
 use super::id::DroneId;
 
-/// What went through a network.
+/// Counts of a network's traffic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
-    /// Bytes received, with all overhead above UDP.
+    /// Number of bytes received, with all overhead above UDP.
     pub bytes_in: u64,
-    /// Bytes sent.
+    /// Number of bytes sent, with all overhead above UDP.
     pub bytes_out: u64,
-    /// Frames received that gave a message.
+    /// Number of frames received that gave a message.
     pub frames_in: u64,
-    /// Frames that are signed although the station has no key: whoever signs hears nothing that
-    /// is not.
+    /// Number of frames that are signed although the station has no key: who signs does not hear
+    /// unsigned messages.
     pub signed: u64,
-    /// Bytes that gave none.
+    /// Bytes and frames that gave no message, by reason.
     pub loss: FrameLoss,
-    /// Datagrams that were thrown away, as more came than could be looked at.
+    /// Number of datagrams that were discarded because they came faster than they could be handled.
     pub dropped: u64,
 }
 
@@ -29,16 +29,16 @@ const USUAL_NOISE: f64 = 0.1;
 /// Fewer are none either.
 const LEAST_NOISE: u64 = 1_000;
 
-/// Something about a link that people must know.
+/// A problem of a link that its users must know about.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Trouble {
-    /// The same for the same trouble, however often it has been counted.
+    /// Key that is equal for reports of one problem, however often it was counted.
     pub key: String,
-    /// What it is, and what to do.
+    /// Description of the problem, with the remedy.
     pub text: String,
 }
 
-/// What people must know about their links.
+/// Problems of the links, by their traffic and the vehicles that were heard twice.
 pub fn troubles(traffic: &BTreeMap<u16, Traffic>, doubled: &BTreeSet<DroneId>) -> Vec<Trouble> {
     let mut all: Vec<Trouble> = doubled
         .iter()

@@ -1,4 +1,4 @@
-//! Brings a log by LOG_REQUEST_DATA.
+//! Conversation that downloads a log by LOG_REQUEST_DATA.
 //!
 //! Two ways of asking alternate. A *window* is one request for many packets, as large as comes in
 //! less than half a second, so that it suits a serial radio of 57,600 baud as well as a cable, and
@@ -42,18 +42,18 @@ const IDLE: Micros = 50 * MS;
 /// The end has no answer, and is said so often.
 const ENDS: u32 = 2;
 
-/// What is left of a [`LogGet`].
+/// Result of a [`LogGet`].
 #[derive(Debug)]
 pub struct LogGot<S> {
-    /// With what came, also when it failed.
+    /// Sink with the bytes that came, also after a failure.
     pub sink: S,
-    /// Size; all of it is in the sink.
+    /// Size of the log, bytes; all of it is in the sink.
     pub result: Result<u64, LogProtocolError>,
-    /// What it cost.
+    /// Statistics of the download.
     pub tally: Tally,
 }
 
-/// Brings a log.
+/// Conversation that downloads a log.
 #[derive(Debug)]
 pub struct LogGet<S> {
     drone: DroneId,
@@ -83,7 +83,8 @@ pub struct LogGet<S> {
 }
 
 impl<S: Sink> LogGet<S> {
-    /// Brings log `id` of `size` bytes (from [`super::list::LogList`]), or what the sink lacks.
+    /// Downloads log `id` of `size` bytes (from [`super::list::LogList`]), or the parts that the
+    /// sink lacks.
     pub fn new(drone: DroneId, id: u16, size: u64, sink: S, patience: Micros) -> Self {
         Self {
             drone,
@@ -109,28 +110,29 @@ impl<S: Sink> LogGet<S> {
         }
     }
 
-    /// What the link may be asked to carry.
+    /// Limits the data rate of the link.
     #[must_use]
     pub fn with_budget(mut self, budget: Option<Budget>) -> Self {
         self.budget = budget;
         self
     }
 
-    /// How long answers take, from other conversations with the vehicle.
+    /// Sets the estimate of the time to an answer, from other conversations with the vehicle.
     #[must_use]
     pub fn with_rtt(mut self, rtt: Rtt) -> Self {
         self.rtt = rtt;
         self
     }
 
-    /// The link, which other drones may use as well.
+    /// Shares the link with the downloads of other drones.
     #[must_use]
     pub fn on_link(mut self, load: Option<&LinkLoad>) -> Self {
         self.place = load.map(LinkLoad::place);
         self
     }
 
-    /// A few bytes for which a download of the same log waits: the vehicle is not freed after it.
+    /// Marks a small download that the download of the rest of the log follows: the vehicle is not
+    /// freed after it.
     #[must_use]
     pub fn followed(mut self) -> Self {
         self.ends_said = ENDS;
@@ -154,17 +156,17 @@ impl<S: Sink> LogGet<S> {
         }
     }
 
-    /// What it has cost so far.
+    /// Statistics of the download so far.
     pub fn tally(&self) -> Tally {
         self.tally
     }
 
-    /// When the vehicle said something of use last.
+    /// Time at which the vehicle last sent anything of use, us.
     pub fn heard(&self) -> Option<Micros> {
         self.heard
     }
 
-    /// Ends it, with what has come, as [`LogProtocolError::Paused`].
+    /// Ends the download as [`LogProtocolError::Paused`], with what has come.
     pub fn pause(&mut self) {
         self.is_pausing = true;
     }

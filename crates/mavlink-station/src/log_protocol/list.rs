@@ -1,4 +1,4 @@
-//! Which logs a drone has.
+//! Conversation that lists the logs of a drone.
 
 use std::collections::BTreeMap;
 
@@ -14,18 +14,18 @@ const QUIET: Micros = 700 * MS;
 /// Where answers come fast.
 const LEAST_QUIET: Micros = 200 * MS;
 
-/// One log.
+/// A log in a drone's list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// Number, from 1; the last is the newest.
+    /// Number of the log, from 1; the last is the newest.
     pub id: u16,
     /// Size when it was listed, bytes.
     pub size: u64,
-    /// When it was begun, Unix seconds; 0: the vehicle did not know.
+    /// Time at which the log was begun, Unix, s; 0 if the vehicle did not know.
     pub time_utc_s: u32,
 }
 
-/// Lists the logs; entries that were lost are asked for again, by their numbers.
+/// Conversation that lists the logs; entries that were lost are asked for again, by their numbers.
 #[derive(Clone, Debug)]
 pub struct LogList {
     drone: DroneId,
@@ -43,7 +43,7 @@ pub struct LogList {
 }
 
 impl LogList {
-    /// All logs of `drone`. Gives up after `patience` without an answer.
+    /// Lists all logs of `drone`. Gives up after `patience` without an answer, us.
     pub fn new(drone: DroneId, patience: Micros) -> Self {
         Self {
             drone,
@@ -59,12 +59,12 @@ impl LogList {
         }
     }
 
-    /// Only log `id` of `drone`, if it has that.
+    /// Lists only log `id` of `drone`, if it has that.
     pub fn only(drone: DroneId, id: u16, patience: Micros) -> Self {
         Self { only: Some(id), ..Self::new(drone, patience) }
     }
 
-    /// How long answers take, from other conversations with the vehicle.
+    /// Sets the estimate of the time to an answer, from other conversations with the vehicle.
     #[must_use]
     pub fn with_rtt(mut self, rtt: Rtt) -> Self {
         if rtt.is_known() {

@@ -8,50 +8,50 @@ use crate::link::frame::{MavMessage, dialect};
 use crate::link::id::DroneId;
 use crate::link::station::AUTOPILOT;
 
-/// Why a conversation failed.
+/// Error of a conversation about logs.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogProtocolError {
-    /// No answer for the whole time of patience.
+    /// The vehicle has not answered for the whole time of patience.
     #[error("no answer for {seconds} s: is it on, and within reach?")]
     Silent {
-        /// So long.
+        /// Time without an answer, s.
         seconds: u64,
     },
-    /// It is armed.
+    /// The vehicle is armed, and sends no logs.
     #[error("the drone is armed and gives no logs until it has landed")]
     Armed,
-    /// There is no log of that number.
+    /// The vehicle has no log of this number.
     #[error("the drone has no log {id}")]
     NoLog {
-        /// Which.
+        /// Number of the log.
         id: u16,
     },
-    /// The log ends before its size.
+    /// The log ends before the size that the vehicle states.
     #[error("the vehicle says that the log has {said} bytes, but it ends at byte {ends}")]
     SizeLies {
-        /// Its size by its own word, bytes.
+        /// Size that the vehicle states, bytes.
         said: u64,
-        /// Where reading ends.
+        /// Offset at which reading ends, bytes.
         ends: u64,
     },
-    /// More than is taken.
+    /// The log is larger than the limit.
     #[error("the log has {size} bytes, more than the {most} allowed")]
     TooLarge {
-        /// Its size by the vehicle's word, bytes.
+        /// Size that the vehicle states, bytes.
         size: u64,
-        /// The limit, bytes.
+        /// Largest size accepted, bytes.
         most: u64,
     },
-    /// The bytes could not be kept.
+    /// The bytes could not be kept, for this reason.
     #[error("{0}")]
     Sink(String),
-    /// It was ended from here, to go on in another way.
+    /// The conversation was ended by the station, to continue in another way.
     #[error("it was ended from here")]
     Paused,
 }
 
-/// Frees the vehicle, which does not arm while it sends a log.
+/// Message that frees the vehicle, which does not arm while it sends a log.
 pub fn end_message(drone: DroneId) -> MavMessage {
     MavMessage::LOG_REQUEST_END(dialect::LOG_REQUEST_END_DATA {
         target_system: drone.system,
@@ -68,7 +68,7 @@ fn list_message(drone: DroneId, start: u16, end: u16) -> MavMessage {
     })
 }
 
-/// Asks for `count` bytes of log `id` from `ofs` on.
+/// Message that asks for `count` bytes of log `id` from `ofs` on.
 pub fn data_message(drone: DroneId, id: u16, ofs: u32, count: u32) -> MavMessage {
     MavMessage::LOG_REQUEST_DATA(dialect::LOG_REQUEST_DATA_DATA {
         ofs,

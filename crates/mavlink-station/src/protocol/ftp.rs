@@ -1,50 +1,50 @@
 //! MAVFTP: the payload of FILE_TRANSFER_PROTOCOL (MAVLink's "File Transfer Protocol").
 
-/// Data bytes in one packet.
+/// Largest number of data bytes in one packet.
 pub const MOST_DATA: usize = 239;
-/// Bytes of the payload: a header of 12 and the data.
+/// Size of the payload, bytes: a header of 12 and the data.
 pub const PAYLOAD: usize = 251;
 const HEADER: usize = 12;
 
-/// What is asked or answered.
+/// Operation of a packet: a request, or an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Op {
-    /// Nothing.
+    /// No operation.
     None = 0,
-    /// Closes a session.
+    /// Request to close a session.
     TerminateSession = 1,
-    /// Closes all sessions.
+    /// Request to close all sessions.
     ResetSessions = 2,
-    /// Names in a folder.
+    /// Request for the entries of a folder.
     ListDirectory = 3,
-    /// Opens a file for reading; the answer's data is its size, u32.
+    /// Request to open a file for reading; the answer's data is its size, u32.
     OpenFileRO = 4,
-    /// Reads from the open file.
+    /// Request to read from the open file.
     ReadFile = 5,
-    /// Creates a file, or empties one.
+    /// Request to create a file, or to empty one.
     CreateFile = 6,
-    /// Writes to the open file.
+    /// Request to write to the open file.
     WriteFile = 7,
-    /// Removes a file.
+    /// Request to remove a file.
     RemoveFile = 8,
-    /// Creates a folder.
+    /// Request to create a folder.
     CreateDirectory = 9,
-    /// Removes a folder.
+    /// Request to remove a folder.
     RemoveDirectory = 10,
-    /// Opens a file for writing.
+    /// Request to open a file for writing.
     OpenFileWO = 11,
-    /// Cuts a file.
+    /// Request to cut a file at a length.
     TruncateFile = 12,
-    /// Renames.
+    /// Request to rename a file.
     Rename = 13,
-    /// Checksum of a whole file; the answer's data is a u32.
+    /// Request for the checksum of a whole file; the answer's data is a u32.
     CalcFileCRC32 = 14,
-    /// Reads from the open file, many answers to one request.
+    /// Request to read from the open file, with many answers.
     BurstReadFile = 15,
-    /// Answer: done.
+    /// Answer that the request was carried out.
     Ack = 128,
-    /// Answer: refused; the data's first byte is an [`NakReason`].
+    /// Answer that the request was refused; the data's first byte is a [`NakReason`].
     Nak = 129,
 }
 
@@ -74,7 +74,7 @@ impl Op {
     }
 }
 
-/// Why a request was refused.
+/// Reason for a refusal, by the protocol's number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NakReason {
     /// 1: no reason given.
@@ -120,29 +120,30 @@ impl std::fmt::Display for NakReason {
     }
 }
 
-/// One packet.
+/// A packet of the protocol.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Packet {
-    /// Number; an answer's is its request's plus one.
+    /// Number of the packet; an answer's is its request's plus one.
     pub sequence: u16,
-    /// The session, as the vehicle numbered it.
+    /// Session, as numbered by the vehicle.
     pub session: u8,
-    /// What is asked, or [`Op::Ack`] or [`Op::Nak`].
+    /// Operation that is requested, or [`Op::Ack`] or [`Op::Nak`].
     pub op: Op,
-    /// In a request the wanted size, else the size of the data; bytes.
+    /// Size that a request asks for, otherwise the size of the data; bytes.
     pub size: u8,
-    /// In an answer, what it answers.
+    /// Request that an answer belongs to.
     pub request: Op,
-    /// In a burst's answer: the last one, the vehicle waits for the next request.
+    /// Whether this is the last answer of a burst, after which the vehicle waits for the next
+    /// request.
     pub burst_complete: bool,
-    /// Place in the file, bytes.
+    /// Offset in the file, bytes.
     pub offset: u32,
-    /// Data, at most [`MOST_DATA`] bytes.
+    /// Data of the packet, at most [`MOST_DATA`] bytes.
     pub data: Vec<u8>,
 }
 
 impl Packet {
-    /// A request without data, of session 0.
+    /// A request without data, in session 0.
     pub fn request(op: Op) -> Self {
         Self {
             sequence: 0,
@@ -156,7 +157,7 @@ impl Packet {
         }
     }
 
-    /// The same with data, such as a file's name; what does not fit is cut off.
+    /// Adds data, such as a file's name; what does not fit is cut off.
     #[must_use]
     pub fn with_data(mut self, data: &[u8]) -> Self {
         self.data = data[..data.len().min(MOST_DATA)].to_vec();
@@ -164,7 +165,7 @@ impl Packet {
         self
     }
 
-    /// As the payload of a message.
+    /// Encodes the packet as the payload of a message.
     pub fn to_payload(&self) -> [u8; PAYLOAD] {
         let mut bytes = [0; PAYLOAD];
         bytes[0..2].copy_from_slice(&self.sequence.to_le_bytes());
@@ -179,8 +180,7 @@ impl Packet {
         bytes
     }
 
-    /// From the payload of a message. `None`: an operation that does not exist, or a size that
-    /// cannot be.
+    /// Decodes the payload of a message; `None` for an unknown operation or an impossible size.
     pub fn from_payload(bytes: &[u8; PAYLOAD]) -> Option<Self> {
         let op = Op::from_byte(bytes[3])?;
         let size = bytes[4];
@@ -199,7 +199,7 @@ impl Packet {
         })
     }
 
-    /// Why it is refused; `None` when it is not a refusal.
+    /// Reason of a refusal; `None` if the packet is not a refusal.
     pub fn refusal(&self) -> Option<NakReason> {
         if self.op != Op::Nak {
             return None;

@@ -1,5 +1,4 @@
-//! What the bytes of the show protocol mean, for both ends: the station and
-//! the virtual vehicles.
+//! Layouts of the show protocol's bytes, for both ends: stations and virtual vehicles.
 //!
 //! Layouts only; who says what when is told by the rooms that speak.
 

@@ -2,33 +2,33 @@
 
 use std::fmt;
 
-/// MAV_CMD_USER_1: reloads (param1 0) or clears (1) the show.
+/// MAV_CMD_USER_1, which reloads (param1 0) or clears (1) the show.
 pub const RELOAD: u16 = 31010;
-/// MAV_CMD_USER_2: sets origin, altitude reference and orientation; COMMAND_INT only.
+/// MAV_CMD_USER_2, which sets origin, altitude reference and orientation; COMMAND_INT only.
 pub const SET_ORIGIN: u16 = 31011;
 /// Altitude in [`SET_ORIGIN`] that means "relative to home", mm.
 pub const NO_AMSL_MM: i32 = -32_768_000;
-/// The custom mode of a show.
+/// Custom mode number of the show mode.
 pub const SHOW_MODE: u32 = 127;
 /// Bit of AUTOPILOT_VERSION.capabilities that marks firmware with show mode.
 pub const CAPABILITY: u64 = 0x0400_0000;
-/// Where the show file lies on the vehicle.
+/// Path of the show file on the vehicle.
 pub const SHOW_FILE: &str = "/collmot/show.skyb";
-/// DATA packets to the drone have this type ...
+/// Type of DATA packets to the drone.
 pub const TO_DRONE: u8 = 0x5C;
-/// ... and those from it this.
+/// Type of DATA packets from the drone.
 pub const FROM_DRONE: u8 = 0x5B;
-/// Start times from here on mean "leave it as it is".
+/// Start time that means "leave it as it is".
 pub const LEAVE_TIME: i32 = i32::MAX;
-/// Start times below zero clear it.
+/// Start time that clears the one that is set, as all below zero do.
 pub const CLEAR_TIME: i32 = i32::MIN;
 
 const START_CONFIG: u8 = 1;
 
-/// When to start, and whether it is allowed to.
+/// Start time and authorization, as a start packet carries them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StartConfig {
-    /// GPS second of week; [`CLEAR_TIME`], or [`LEAVE_TIME`].
+    /// Start time, GPS second of week; or [`CLEAR_TIME`], or [`LEAVE_TIME`].
     pub start_tow_s: i32,
     /// Authorization: 0 none, 1 live (4.6 has rehearsal 2 and lights 3, too).
     pub authorization: u8,
@@ -38,8 +38,8 @@ pub struct StartConfig {
 }
 
 impl StartConfig {
-    /// As the data of a DATA16 packet of type [`TO_DRONE`], and its length. The last two bytes
-    /// are a millisecond offset, always 0 (as Skybrush Server sends it).
+    /// Encodes the data of a DATA16 packet of type [`TO_DRONE`], with its length. The last two
+    /// bytes are a millisecond offset, always 0 (as Skybrush Server sends it).
     pub fn to_data(&self) -> ([u8; 16], u8) {
         let mut data = [0; 16];
         data[0] = START_CONFIG;
@@ -49,8 +49,8 @@ impl StartConfig {
         (data, 12)
     }
 
-    /// From the data of a packet of type [`TO_DRONE`]; `None` for other kinds and short ones. A
-    /// countdown that is not there is left as it is.
+    /// Decodes the data of a packet of type [`TO_DRONE`]; `None` for other kinds and short ones. A
+    /// countdown that is missing becomes [`LEAVE_TIME`].
     pub fn from_data(data: &[u8], length: u8) -> Option<Self> {
         let data = data.get(..usize::from(length))?;
         if data.len() < 6 || data[0] != START_CONFIG {
@@ -68,16 +68,16 @@ impl StartConfig {
     }
 }
 
-/// Where a drone is in its show. Names are the firmware's.
+/// Stage of a drone in its show. Names are the firmware's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
     /// Not in show mode.
     Off,
-    /// Entering it.
+    /// Entering show mode.
     Init,
     /// Waiting for the start time.
     WaitForStart,
-    /// Taking off.
+    /// Taking off by itself.
     Takeoff,
     /// Flying its trajectory.
     Performing,
@@ -85,20 +85,20 @@ pub enum Stage {
     ReturnToLaunch,
     /// Staying where it is.
     Loiter,
-    /// Landing.
+    /// Landing where its trajectory ended.
     Landing,
     /// On the ground, disarmed.
     Landed,
-    /// Given up.
+    /// Error: the show was given up.
     Error,
     /// Showing its lights on the ground (4.6).
     TestingLights,
-    /// A number this program does not know.
+    /// A stage that this program does not know, by its number.
     Other(u8),
 }
 
 impl Stage {
-    /// From its number.
+    /// Stage of the firmware's number.
     pub fn from_number(number: u8) -> Self {
         match number {
             0 => Self::Off,
@@ -116,7 +116,7 @@ impl Stage {
         }
     }
 
-    /// Its number.
+    /// Number of the stage in the firmware.
     pub fn number(self) -> u8 {
         match self {
             Self::Off => 0,
@@ -163,7 +163,7 @@ impl fmt::Display for Stage {
     }
 }
 
-/// Bits of [`Status::flags`].
+/// Bits of [`Status::flags`]: state of the show.
 pub mod flag {
     /// A show is loaded and its take-off time is valid.
     pub const LOADED: u8 = 0x80;
@@ -177,42 +177,42 @@ pub mod flag {
     pub const FENCE_ON: u8 = 0x08;
     /// The start is authorized.
     pub const AUTHORIZED: u8 = 0x04;
-    /// There is no GPS time.
+    /// GPS time is not known.
     pub const NO_GPS_TIME: u8 = 0x02;
     /// The fence is breached.
     pub const FENCE_BREACHED: u8 = 0x01;
 }
 
-/// Bits of [`Status::preflight`].
+/// Bits of [`Status::preflight`]: failed checks.
 pub mod preflight {
     /// Show, origin or orientation are missing.
     pub const NOT_CONFIGURED: u8 = 0x1;
-    /// Too far from the first point of the trajectory.
+    /// The drone is too far from the first point of the trajectory.
     pub const NOT_AT_TAKEOFF: u8 = 0x8;
 }
 
 /// A drone's status packet (DATA16 of type [`FROM_DRONE`], 2 Hz).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status {
-    /// Start time, GPS second of week; -1 none.
+    /// Start time, GPS second of week; -1 if none is set.
     pub start_tow_s: i32,
     /// Colour of the light, RGB565.
     pub colour: u16,
-    /// See [`flag`].
+    /// State of the show, bits of [`flag`].
     pub flags: u8,
-    /// Failed preflight checks, four bits: see [`preflight`].
+    /// Failed preflight checks, four bits of [`preflight`].
     pub preflight: u8,
-    /// Where it is in the show.
+    /// Stage of the show.
     pub stage: Stage,
     /// GPS fix type, 0..=7; 3 is a 3-D fix.
     pub gps_fix: u8,
-    /// Satellites, 31 or more read as 31.
+    /// Number of satellites; 31 or more read as 31.
     pub satellites: u8,
-    /// Boots, modulo 4.
+    /// Number of boots, modulo 4.
     pub boot_count: u8,
-    /// Whether it is far from where it should be in the show.
+    /// Whether the drone is far from where it should be in the show.
     pub is_far: bool,
-    /// Seconds since the show's start, negative before it; `None` when not known.
+    /// Time since the show's start, s, negative before it; `None` if not known.
     pub elapsed_s: Option<i16>,
 }
 
@@ -223,12 +223,12 @@ impl Status {
     /// Bytes of the packet in firmware 4.4.
     pub const LENGTH: u8 = 12;
 
-    /// Whether the flag is set.
+    /// Whether a flag of [`flag`] is set.
     pub fn has(&self, flag: u8) -> bool {
         self.flags & flag != 0
     }
 
-    /// As the data of a DATA16 packet.
+    /// Encodes the data of a DATA16 packet.
     pub fn to_data(&self) -> [u8; 16] {
         let mut data = [0; 16];
         data[0..4].copy_from_slice(&self.start_tow_s.to_le_bytes());
@@ -241,7 +241,8 @@ impl Status {
         data
     }
 
-    /// From the data of a DATA packet of type [`FROM_DRONE`]. Bytes cut off at the end are zeros.
+    /// Decodes the data of a DATA packet of type [`FROM_DRONE`]. Bytes cut off at the end are
+    /// zeros.
     pub fn from_data(data: &[u8]) -> Self {
         let mut all = [0; 12];
         let length = data.len().min(all.len());
@@ -261,8 +262,8 @@ impl Status {
         }
     }
 
-    /// What keeps it from taking off, in the words and the order crews know from Skybrush Live;
-    /// `None`: nothing does.
+    /// Obstacle to the take-off, in the words and the order that crews know from Skybrush Live;
+    /// `None` if there is none.
     pub fn obstacle(&self) -> Option<&'static str> {
         let missing = |flag| !self.has(flag);
         if missing(flag::LOADED) {

@@ -1,4 +1,4 @@
-//! What a download asks for next: a burst, a single read, or nothing yet.
+//! Next request of a download: a burst, a single read, or none yet.
 
 use super::{
     Burst, Get, Got, MOST_OCCUPIED, MOST_RANGES, MOST_READS, OVERHEAD, PIECE, USUAL_BURST,

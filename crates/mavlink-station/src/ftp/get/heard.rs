@@ -1,4 +1,4 @@
-//! What the vehicle's packets mean for a download: data, the end of a burst, refusals.
+//! Meaning of the vehicle's packets for a download: data, the end of a burst, refusals.
 
 use super::{BUSY_PAUSE, Burst, Get, MOST_LIES, PIECE, TELLING, USUAL_BURST};
 use crate::ftp::{FtpError, NUMBERS_PER_BURST};

@@ -1,4 +1,4 @@
-//! Sockets and ports that carry frames.
+//! Transports of frames: sockets and serial ports.
 
 #[cfg(feature = "serial")]
 mod serial;
@@ -12,37 +12,37 @@ use std::time::Duration;
 use super::address::{Address, Way};
 use super::error::NetError;
 
-/// The other end of a link.
+/// Peer of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Peer {
-    /// There is but one.
+    /// The only peer of the link.
     Only,
-    /// One of many on a datagram socket.
+    /// One of many peers on a datagram socket, by its address.
     At(SocketAddr),
 }
 
-/// The sending half of a link.
+/// Sending half of a link.
 pub trait Sending: Send {
-    /// Sends one frame. Losing it is no error; a link that is down for now loses all.
+    /// Sends one frame. Losing it is not an error; a link that is down for now loses all.
     fn send(&mut self, to: Peer, frame: &[u8]) -> io::Result<()>;
 
-    /// Where to speak first when nobody was heard yet; `None`: the link can only answer.
+    /// Peer to send to before any vehicle was heard; `None` if the link can only answer.
     fn first_peer(&self) -> Option<Peer>;
 }
 
-/// The receiving half of a link.
+/// Receiving half of a link.
 pub trait Receiving: Send {
-    /// Bytes that came until the timeout; `None`: none came. A datagram is whole.
+    /// Receives bytes until the timeout; `None` if none came. A datagram is received whole.
     fn recv(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<(Peer, usize)>>;
 
-    /// Whether what is received at once belongs together.
+    /// Whether bytes that are received at once are one datagram.
     fn is_datagram(&self) -> bool;
 }
 
-/// Both halves of a link.
+/// Sending and receiving halves of a link.
 pub type Halves = (Box<dyn Sending>, Box<dyn Receiving>);
 
-/// Opens a link.
+/// Opens the transport of a link.
 ///
 /// # Errors
 /// When the address is not there, taken, or not allowed.

@@ -1,4 +1,4 @@
-//! A serial radio.
+//! Transport over a serial radio.
 
 use std::io::{self, Read, Write};
 use std::time::Duration;

@@ -1,4 +1,5 @@
-//! A TCP connection, as the firmware's simulator offers. It is made anew when it breaks.
+//! Transport over a TCP connection, as the firmware's simulator offers one. It reconnects when the
+//! connection breaks.
 
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};

@@ -1,4 +1,4 @@
-//! Datagrams.
+//! Transport over UDP datagrams.
 
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};

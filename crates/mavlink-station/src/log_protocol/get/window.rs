@@ -1,4 +1,4 @@
-//! Large requests on their way, and how large the next one is.
+//! Large requests on their way, and the size of the next one.
 
 use std::collections::VecDeque;
 
