@@ -10,7 +10,7 @@ const HEADER: usize = 12;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Op {
-    /// No operation, only a sign of life.
+    /// Request without any effect.
     None = 0,
     /// Request to close a session.
     TerminateSession = 1,
