@@ -50,3 +50,4 @@ pub mod report;
 pub mod skybrush_server;
 pub mod study;
 pub mod virtual_fleet;
+pub mod workflow;

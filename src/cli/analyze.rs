@@ -5,33 +5,21 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::fields::{read_study, write_fields};
-use super::found::{Found, OriginChoice, Work, find, find_tables, stem};
-use super::load::{has_extension, load_shows};
-use super::outcome::{nothing_found, problems};
-use super::progress::Progress;
-use super::provenance::provenance;
-use super::{held, twice, words};
-use crate::analysis::battery::Sag;
-use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
+use super::origin::OriginChoice;
+use super::words;
+use crate::analysis::result::Analysis;
 use crate::analysis::windows::Tilt;
-use crate::analysis::{AnalysisOptions, FlightInput, MapLaw, OffsetRule, analyze};
-use crate::base::file::write_with;
-use crate::base::json::write_json;
+use crate::analysis::{AnalysisOptions, MapLaw, OffsetRule};
 use crate::base::plain::Shown as _;
-use crate::base::time::GpsTime;
-use crate::campaign;
-use crate::campaign::origin::LogOrigin;
 use crate::flight::Indicator;
-use crate::flight::identity::{SAME_START_S, later_s};
-use crate::mission::Plan;
-use crate::mission::plan::Purpose;
-use crate::report::{self, Provenance, terminal_summary};
-use crate::study::result::StudyResult;
-use crate::vehicle::library;
+use crate::report::terminal_summary;
+use crate::workflow::analyze::{
+    Analysed, Analysing, Request, Settings, Uncorrected as Without, gather, simulated,
+};
+use crate::workflow::clock::Stopwatch;
+use crate::workflow::find::Work;
 
 /// Width of the terminal summary, columns.
 const WIDTH: usize = 100;
@@ -105,7 +93,7 @@ pub(super) struct AnalyzeOptions {
 }
 
 /// What the map is not corrected for.
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Clone, Copy, Debug, Default, Args)]
 #[command(next_help_heading = "Analysis")]
 struct Uncorrected {
     /// Do not correct the map for air density at different heights
@@ -177,7 +165,7 @@ enum OffsetChoice {
 }
 
 impl AnalyzeOptions {
-    fn resolve(&self) -> AnalysisOptions {
+    fn settings(&self) -> Settings {
         let mut options = AnalysisOptions::default();
         options.windows.tilt = match self.tilt {
             TiltChoice::Paper => Tilt::Paper,
@@ -200,36 +188,9 @@ impl AnalyzeOptions {
         };
         options.paper_windows = self.paper;
         options.air_aware = !self.paper;
-        options
-    }
-}
-
-impl AnalyzeOptions {
-    /// How it was analysed, for the report: (what, how).
-    fn words(&self) -> Vec<(&'static str, String)> {
-        fn name(value: &impl ValueEnum) -> String {
-            let value = value.to_possible_value();
-            value.map_or_else(String::new, |value| value.get_name().to_owned())
-        }
-        let corrected = |off: bool| if off { "not corrected" } else { "corrected" }.to_owned();
-        let windows = if self.paper {
-            "medians, weighted by the samples' standard deviation (the paper's way)"
-        } else {
-            "trimmed means, weighted by their standard errors"
-        };
-        vec![
-            ("law of the map", name(&self.law)),
-            ("tilt correction", name(&self.tilt)),
-            ("rotor effort", name(&self.indicator)),
-            ("offset over time and height", name(&self.offset)),
-            ("windows", windows.to_owned()),
-            ("air density at height, in the map", corrected(self.without.no_density)),
-            ("battery voltage, in the map", corrected(self.without.no_battery)),
-            (
-                "wind on leaning drones, in the map, where their drag is known",
-                corrected(self.without.no_wind),
-            ),
-        ]
+        let Uncorrected { no_density, no_battery, no_wind } = self.without;
+        let without = Without { density: no_density, battery: no_battery, wind: no_wind };
+        Settings { options, without }
     }
 }
 
@@ -242,48 +203,23 @@ struct AnalyzeOutput<'a> {
 }
 
 pub(super) fn run(context: &Context, args: &AnalyzeArgs) -> Result<Exit, CommandError> {
-    let plan = args.plan.as_deref().map(load_plan).transpose()?;
-    let mut work = Work::new(Path::new("."));
-    work.origin = args.logs.map(Into::into);
-    for path in &args.paths {
-        find(path, plan.as_ref(), &mut work)?;
-    }
-    twice::refuse(&args.paths, &work)?;
-    name_apart(&mut work.flights, &args.paths);
-    let mut options = args.options.clone();
-    if let Some(mapping) = &args.csv {
-        options.indicator = find_tables(mapping, &mut work)?.into();
-    }
-    let Some(first) = args.csv.as_ref().or(args.paths.first()) else {
-        return Err(CommandError::Usage("give a campaign, logs or --csv".to_owned()));
+    let request = Request {
+        paths: args.paths.clone(),
+        tables: args.csv.clone(),
+        plan: args.plan.clone(),
+        start_unix_s: args.start,
+        origin: args.logs.map(Into::into),
     };
-    if args.paths.len() < 2 {
-        work.root = if first.is_dir() {
-            first.clone()
-        } else {
-            first.parent().unwrap_or(Path::new(".")).to_owned()
-        };
+    let (work, indicator) = gather(&request)?;
+    let mut options = args.options.clone();
+    if let Some(indicator) = indicator {
+        options.indicator = indicator.into();
     }
-    if work.title.is_empty() {
-        work.title = stem(first);
-    }
-    let output = (!args.no_report).then(|| match &args.output {
-        Some(folder) => folder.clone(),
-        None if args.paths.len() == 1 && campaign::is_campaign(first) => first.clone(),
-        None => PathBuf::from(format!("{}-analysis", stem(first))),
-    });
-    if let Some(unix_s) = args.start {
-        let start = unix_s.checked_mul(1000).and_then(GpsTime::from_unix_ms).ok_or_else(|| {
-            CommandError::Usage(format!("--start {unix_s} is not a time since 1980"))
-        })?;
-        for flight in &mut work.flights {
-            // Whoever names another start than the one that was written down means its logs.
-            let is_other = |known: GpsTime| later_s(start, known).abs() > SAME_START_S;
-            if flight.start.replace(start).is_some_and(is_other) {
-                flight.logs.iter_mut().for_each(|log| log.refused = None);
-            }
-        }
-    }
+    let output = match &args.output {
+        _ if args.no_report => None,
+        Some(folder) => Some(folder.clone()),
+        None => Some(request.output()?),
+    };
     let _lock = output.as_deref().map(|folder| context.lock(folder)).transpose()?;
     finish(context, &work, &options, args.hold.as_deref(), output.as_deref())
 }
@@ -294,13 +230,11 @@ pub(super) fn analyze_campaign(
     root: &Path,
     options: &AnalyzeOptions,
 ) -> Result<Exit, CommandError> {
-    let mut work = Work::new(root);
     // What was just flown here.
-    work.origin = Some(LogOrigin::Simulated);
-    find(root, None, &mut work)?;
-    finish(context, &work, options, None, Some(root))
+    finish(context, &simulated(root)?, options, None, Some(root))
 }
 
+/// Analyses, and prints what came of it.
 fn finish(
     context: &Context,
     work: &Work,
@@ -308,86 +242,27 @@ fn finish(
     hold: Option<&Path>,
     output: Option<&Path>,
 ) -> Result<Exit, CommandError> {
-    let watch = Stopwatch::start();
-    for used in &work.used {
-        context.say(used);
-    }
-    let reference = hold.map(read_reference).transpose()?;
-    for note in work.flights.iter().flat_map(|flight| &flight.notes) {
-        context.warn(note);
-    }
-    let resolved = options.resolve();
-    let doubts = hold
-        .zip(reference.as_ref())
-        .and_then(|(path, reference)| held::doubts(path, reference, resolved.indicator, work));
+    let watch = Stopwatch::start(context);
+    let settings = options.settings();
+    let analysing = Analysing::begin(context, work, &settings, hold)?;
     // Tables and quiet runs say it with the other warnings.
-    if let Some(doubts) = doubts.as_ref().filter(|_| context.json && !context.quiet) {
+    if let Some(doubts) = analysing.doubts().filter(|_| context.json && !context.quiet) {
         context.warn(doubts);
     }
-    let inputs: Vec<_> = work
-        .flights
-        .iter()
-        .map(|flight| FlightInput {
-            name: &flight.name,
-            plan: flight.plan.as_ref(),
-            purpose: flight.purpose,
-            logs: &flight.logs,
-            start: flight.start,
-            true_updraft_mps: flight.true_updraft_mps,
-            truth: (!flight.truth.is_empty()).then_some(&flight.truth),
-            density: flight.density.filter(|_| !options.without.no_density),
-            leaning: flight.leaning.filter(|_| !options.without.no_wind),
-            thrust_exponent: flight.thrust_exponent,
-            sag: flight
-                .sag
-                .map(|sag| if options.without.no_battery { Sag::UNCORRECTED } else { sag }),
-            true_air: flight.true_air.as_ref(),
-            lean_table: flight.lean_table.as_ref().filter(|_| !options.without.no_wind),
-            folder: Some(&work.root),
-        })
-        .collect();
-    let total: usize = inputs.iter().map(|input| input.logs.len()).sum();
-    let progress = Progress::new(context, "analysing", total as u64);
-    // Hashing fills the pauses in which the analysis keeps one processor busy.
-    let (analysis, provenance) = rayon::join(
-        || {
-            analyze(&work.title, &inputs, &resolved, reference.as_ref(), &|_, _| {
-                progress.advance();
-            })
-        },
-        || output.map(|_| provenance(work, options.words())),
-    );
-    let mut analysis = analysis.map_err(|error| CommandError::Nothing(error.to_string()))?;
-    progress.finish();
-    analysis.warnings.extend(work.absent.iter().cloned());
-    analysis.warnings.extend(doubts);
-    context.check_stop()?;
+    let analysed = analysing.run(output.is_some())?;
+    let Analysed { analysis, logs, .. } = &analysed;
     if !context.json {
-        context.print(&terminal_summary(&analysis, WIDTH, context.color))?;
+        context.print(&terminal_summary(analysis, WIDTH, context.color))?;
     }
-    let nothing = analysis.what_was_found() == Yield::Nothing;
-    let mut page = None;
-    if let (Some(folder), Some(provenance)) = (output, &provenance) {
-        let study = read_study(context, &work.root);
-        let report_folder = folder.join("report");
-        let (page_made, numbers_made) = rayon::join(
-            || write_report(&analysis, study.as_ref(), provenance, &report_folder),
-            || write_numbers(&analysis, folder),
-        );
-        page_made.and(numbers_made)?;
-        // A page that says that nothing was found is written, but there is nothing to point at.
-        page = (!nothing).then(|| report_folder.join(report::PAGE_FILE));
-    }
+    let page = output.map(|folder| analysed.write(context, folder)).transpose()?.flatten();
+    let nothing = analysed.is_nothing();
     if context.json && !nothing {
-        context.print_json(&AnalyzeOutput {
-            schema: "updraft.analyze/1",
-            report: page.clone(),
-            analysis: &analysis,
-        })?;
+        let schema = "updraft.analyze/1";
+        context.print_json(&AnalyzeOutput { schema, report: page.clone(), analysis })?;
     }
     // Where no tables are printed, what is lost would go unsaid.
     if (context.quiet || context.json) && !nothing {
-        for problem in problems(&analysis, false) {
+        for problem in analysed.problems() {
             context.warn(&problem);
         }
     }
@@ -399,96 +274,8 @@ fn finish(
         Some(page) => format!(" -> {}", page.shown()),
         None => String::new(),
     };
-    let used: usize = analysis.flights.iter().map(|flight| flight.drones.len()).sum();
-    let share = if used < total { format!("{used} of ") } else { String::new() };
-    context.say(&format!("Analysed {share}{} in {watch}{place}", words::count(total, "log")));
-    let lossy = |flight: &FlightAnalysis| {
-        !(flight.missing.is_empty() && flight.unused.is_empty() && flight.partly_used.is_empty())
-    };
-    let lost = used < total
-        || !work.absent.is_empty()
-        || analysis.flights.iter().any(lossy)
-        || analysis.flights.len() < work.flights.len();
-    Ok(match analysis.what_was_found() {
-        Yield::Nothing => {
-            return Err(nothing_found(&analysis, context.quiet || context.json));
-        }
-        Yield::Whole if !lost => Exit::Done,
-        Yield::Whole | Yield::Partial => Exit::Losses,
-    })
-}
-
-/// The page with its figures.
-fn write_report(
-    analysis: &Analysis,
-    study: Option<&StudyResult>,
-    provenance: &Provenance,
-    folder: &Path,
-) -> Result<(), CommandError> {
-    let made = match study {
-        Some(study) => report::render_with_study(analysis, study, provenance)?,
-        None => report::render(analysis, provenance)?,
-    };
-    Ok(report::write(&made, folder)?)
-}
-
-/// All numbers, and the field of the map as tables.
-fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<(), CommandError> {
-    // Streamed: that of a thousand drones has a hundred megabytes.
-    write_with(&folder.join("analysis.json"), |out| write_json(out, analysis))?;
-    write_fields(analysis, folder)
-}
-
-pub(super) fn load_plan(path: &Path) -> Result<Plan, CommandError> {
-    if has_extension(path, "json") {
-        return Ok(campaign::read_plan(path)?);
-    }
-    let several = |count: usize| {
-        CommandError::Usage(format!(
-            "{} holds {count} flights; give the folder of one of them",
-            path.shown()
-        ))
-    };
-    // The plan is what counts, whatever else of the flight is there.
-    if path.is_dir() && campaign::is_campaign(path) {
-        return match campaign::flights(path)?.as_slice() {
-            [flight] => Ok(flight.read_plan()?),
-            flights => Err(several(flights.len())),
-        };
-    }
-    let vehicle = library::builtin("airsim-generic-quad")?;
-    let mut loaded = load_shows(path, &vehicle)?;
-    if loaded.len() != 1 {
-        return Err(several(loaded.len()));
-    }
-    Ok(loaded.remove(0).plan)
-}
-
-/// The calibration whose A and u0 are held.
-fn read_reference(path: &Path) -> Result<FlightAnalysis, CommandError> {
-    let analysis: Analysis = campaign::read_json(path)?;
-    analysis
-        .flights
-        .into_iter()
-        .find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some())
-        .ok_or_else(|| CommandError::Usage(format!("{} has no calibration to hold", path.shown())))
-}
-
-/// Flights of several campaigns may have the same name: the folder's name tells them apart.
-fn name_apart(flights: &mut [Found], paths: &[PathBuf]) {
-    if paths.len() < 2 || flights.len() != paths.len() {
-        return;
-    }
-    let mut names: Vec<String> = paths.iter().map(|path| stem(path)).collect();
-    let mut distinct = names.clone();
-    distinct.sort();
-    distinct.dedup();
-    // `calibration/logs` and `hover/logs`: the flight's folder has the name.
-    if distinct.len() < names.len() {
-        let above = |path: &PathBuf| path.parent().map_or_else(|| stem(path), stem);
-        names = paths.iter().map(above).collect();
-    }
-    for (flight, name) in flights.iter_mut().zip(names) {
-        flight.name = name;
-    }
+    let used = analysed.used();
+    let share = if used < *logs { format!("{used} of ") } else { String::new() };
+    context.say(&format!("Analysed {share}{} in {watch}{place}", words::count(*logs, "log")));
+    Ok(analysed.ending(context.quiet || context.json)?.into())
 }

@@ -6,8 +6,6 @@ use clap::{Args, ValueEnum};
 
 use super::context::Context;
 use super::exit::{CommandError, Exit, with_reasons};
-use super::progress::Progress;
-use super::simulate::made_by;
 use super::words;
 use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
@@ -17,6 +15,7 @@ use crate::blind::series::{self, Place, Settings};
 use crate::blind::table::table;
 use crate::blind::{AirClass, Base, BlindError, Protocol};
 use crate::campaign::to_json;
+use crate::workflow::made_by;
 
 /// Nothing hidden is this many times as frequent as each thing that is hidden, unless `--effects` says
 /// which: false alarms are what is demanded most of.
@@ -207,13 +206,13 @@ pub(super) fn run(context: &Context, args: &BlindArgs) -> Result<Exit, CommandEr
     settings.check_seed()?;
     let _lock = context.lock(&args.output)?;
     let place = Place { folder: args.output.clone(), keep: args.keep };
-    let progress = Progress::new(context, "blind flights", settings.flights as u64);
+    let progress = context.host().progress("blind flights", settings.flights as u64);
     let work = || {
         series::run(
             &settings,
             &place,
             &made_by(),
-            &super::gap::blind::Searched,
+            &crate::workflow::gap::search::Searched,
             context.stop_flag(),
             &|| {
                 progress.advance();

@@ -7,19 +7,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::campaign_files;
-use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::load::{Loaded, load_shows};
 use super::words::wrap;
 use crate::base::plain::Shown as _;
-use crate::campaign::{self, FlightFolder};
-use crate::check::{CheckInput, CheckReport, NAMES, Options, Severity, check};
-use crate::mission::Plan;
-use crate::mission::measurable;
-use crate::show::Show;
-use crate::vehicle::{Vehicle, library};
+use crate::check::CheckReport;
+use crate::vehicle::library;
+use crate::workflow::check::{Subject, allowed, is_safe, known, say_findings, subjects, verdict};
+use crate::workflow::clock::Stopwatch;
 
 /// Findings of each kind that are listed unless all are asked for.
 const FEW: usize = 5;
@@ -73,30 +68,8 @@ struct ShowOutput<'a> {
     report: Option<&'a CheckReport>,
 }
 
-/// A show and what it is checked against.
-struct Subject {
-    path: PathBuf,
-    show: Show,
-    /// None: its folder has no plan that can be read.
-    plan: Option<Plan>,
-    vehicle: Vehicle,
-    origin: Origin,
-    mismatches: Vec<String>,
-}
-
-/// Where the limits and the fence come from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Origin {
-    /// The plan that the show was made from.
-    Plan,
-    /// The plan beside the file.
-    Beside(PathBuf),
-    /// The show itself and, where it says nothing, the vehicle.
-    Show,
-}
-
 pub(super) fn run(context: &Context, args: &CheckArgs) -> Result<Exit, CommandError> {
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start(context);
     known(&args.allow)?;
     let vehicle = library::load(&args.vehicle)?;
     let subjects = subjects(&args.path, &vehicle)?;
@@ -104,12 +77,7 @@ pub(super) fn run(context: &Context, args: &CheckArgs) -> Result<Exit, CommandEr
     let mut reports = Vec::new();
     for subject in &subjects {
         context.check_stop()?;
-        reports.push(
-            subject
-                .plan
-                .as_ref()
-                .map(|plan| checked(&subject.show, plan, &subject.vehicle, &subject.origin, few)),
-        );
+        reports.push(subject.check(few));
     }
     let mut passed = true;
     for (subject, report) in subjects.iter().zip(&reports) {
@@ -139,20 +107,6 @@ pub(super) fn run(context: &Context, args: &CheckArgs) -> Result<Exit, CommandEr
     }
     context.say(&format!("{}: checked in {watch}", verdict(passed, &allowed)));
     Ok(if passed { Exit::Done } else { Exit::Unsafe })
-}
-
-/// `Safe`, `Not safe`, `Safe apart from 196 allowed findings (velocity-step: 196)`.
-pub(super) fn verdict(passed: bool, allowed: &BTreeMap<&'static str, usize>) -> String {
-    if !passed {
-        return "Not safe".to_owned();
-    }
-    let total: usize = allowed.values().sum();
-    if total == 0 {
-        return "Safe".to_owned();
-    }
-    let each: Vec<_> = allowed.iter().map(|(check, count)| format!("{check}: {count}")).collect();
-    let plural = if total == 1 { "" } else { "s" };
-    format!("Safe apart from {total} allowed finding{plural} ({})", each.join(", "))
 }
 
 /// The report on a show: the whole of it, or with `--quiet` what is wrong.
@@ -185,126 +139,7 @@ fn show_report(
     context.print(&wrap(&text, width))
 }
 
-/// The shows behind a path, each with the plan it is checked against.
-fn subjects(path: &Path, vehicle: &Vehicle) -> Result<Vec<Subject>, CommandError> {
-    if path.is_dir() && campaign::is_campaign(path) {
-        return Ok(campaign::flights(path)?.iter().map(|folder| flight(folder, vehicle)).collect());
-    }
-    let beside = plan_beside(path);
-    let foreign = |Loaded { path, show, plan, vehicle, mismatches }: Loaded| {
-        let (plan, vehicle, origin) = match &beside {
-            Some((planned, by, file)) => {
-                (planned.clone(), by.clone(), Origin::Beside(file.clone()))
-            }
-            None => (plan, vehicle, Origin::Show),
-        };
-        Subject { path, show, plan: Some(plan), vehicle, origin, mismatches }
-    };
-    Ok(load_shows(path, vehicle)?.into_iter().map(foreign).collect())
-}
-
-fn flight(folder: &FlightFolder, vehicle: &Vehicle) -> Subject {
-    let files = campaign_files::open(folder);
-    Subject {
-        path: folder.0.clone(),
-        show: files.show,
-        plan: files.plan,
-        vehicle: files.vehicle.unwrap_or_else(|| vehicle.clone()),
-        origin: Origin::Plan,
-        mismatches: files.problems,
-    }
-}
-
-/// The plan, and its vehicle, of the flight whose file (or folder of binary shows) this is.
-fn plan_beside(path: &Path) -> Option<(Plan, Vehicle, PathBuf)> {
-    let parent = path.parent()?;
-    let folders = [Some(parent), parent.parent()];
-    folders.into_iter().flatten().map(|folder| FlightFolder(folder.to_owned())).find_map(|folder| {
-        let own = [folder.skyc(), folder.csv(), folder.skyb_folder()];
-        if !own.iter().any(|file| file == path || Some(file.as_path()) == path.parent()) {
-            return None;
-        }
-        let vehicle = library::load(&folder.vehicle().to_string_lossy()).ok()?;
-        Some((folder.read_plan().ok()?, vehicle, folder.plan()))
-    })
-}
-
 /// How many findings of each kind are listed.
 pub(super) fn few(context: &Context, verbose: bool) -> usize {
     if context.json || verbose { usize::MAX } else { FEW }
-}
-
-/// Refuses names of checks that there are not.
-pub(super) fn known(allow: &[String]) -> Result<(), CommandError> {
-    let mut names: Vec<&str> = NAMES.iter().chain(&measurable::NAMES).copied().collect();
-    names.sort_unstable();
-    match allow.iter().find(|name| !names.contains(&name.as_str())) {
-        Some(unknown) => Err(CommandError::Usage(format!(
-            "there is no check \"{unknown}\"; there are {}",
-            names.join(", ")
-        ))),
-        None => Ok(()),
-    }
-}
-
-/// Checks a show against a plan's limits and fence, for the autopilot of a vehicle.
-pub(super) fn checked(
-    show: &Show,
-    plan: &Plan,
-    vehicle: &Vehicle,
-    origin: &Origin,
-    findings_per_check: usize,
-) -> CheckReport {
-    let fence = (plan.fence.polygon_m.len() >= 3).then_some(&plan.fence);
-    let options = Options { findings_per_check, ..Options::default() };
-    let input = CheckInput { options, ..CheckInput::new(show, &plan.limits) }
-        .with_speed_up(vehicle.autopilot.wpnav_speed_up_mps)
-        .with_stock(&vehicle.limits);
-    let mut report = check(&match origin {
-        Origin::Plan => input.with_fence(fence).with_rule(plan),
-        Origin::Beside(_) => input.with_fence(fence),
-        Origin::Show if show.fence_altitude_m.is_some() => input.with_fence(fence),
-        Origin::Show => input.with_polygon(fence),
-    });
-    if let Origin::Beside(file) = origin {
-        report.notes.push(format!("limits and fence are those of {}", file.shown()));
-    }
-    report
-}
-
-/// Whether only allowed checks failed.
-pub(super) fn is_safe(report: &CheckReport, allow: &[String]) -> bool {
-    report
-        .counts
-        .iter()
-        .all(|(check, count)| count.errors == 0 || allow.iter().any(|name| name == check))
-}
-
-/// Errors that were allowed, by check.
-pub(super) fn allowed<'a>(
-    reports: impl Iterator<Item = &'a CheckReport>,
-    allow: &[String],
-) -> BTreeMap<&'static str, usize> {
-    let mut found = BTreeMap::new();
-    for (check, count) in reports.flat_map(|report| &report.counts) {
-        if count.errors > 0 && allow.iter().any(|name| name == check) {
-            *found.entry(*check).or_default() += count.errors;
-        }
-    }
-    found
-}
-
-/// Says what was found, errors before warnings; a finding begins with its level.
-pub(super) fn say_findings(context: &Context, report: &CheckReport, allow: &[String]) {
-    for finding in &report.findings {
-        let allowed = allow.iter().any(|name| name == finding.check);
-        if finding.severity == Severity::Error && allowed {
-            context.insist(&format!("allowed: {finding}"));
-        } else {
-            context.insist(&finding.to_string());
-        }
-    }
-    for (check, count) in report.counts.iter().filter(|(_, count)| count.omitted > 0) {
-        context.insist(&format!("{check}: and {} more", count.omitted));
-    }
 }

@@ -8,13 +8,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::Serialize;
 
 use super::Global;
-use super::clock::SystemClock;
 use super::exit::CommandError;
+use super::progress::Bar;
 use super::signals::Signals;
-use crate::base::file::sweep_below;
 use crate::base::plain::{Shown as _, for_terminal, json_for_terminal};
 use crate::campaign::lock::FolderLock;
-use crate::link::clock::Clock;
+use crate::workflow::clock::{Clock, SystemClock};
+use crate::workflow::host::{Host, Progress};
 
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
@@ -122,27 +122,19 @@ impl Context {
         self.signals.stop_flag()
     }
 
+    /// As what runs a workflow.
+    pub(super) fn host(&self) -> &dyn Host {
+        self
+    }
+
     /// Ends the command if Ctrl-C was pressed.
     pub(super) fn check_stop(&self) -> Result<(), CommandError> {
-        if self.stop_flag().load(Ordering::SeqCst) {
-            Err(CommandError::Interrupted)
-        } else {
-            Ok(())
-        }
+        self.host().check_stop()
     }
 
     /// Locks a campaign folder for this process; dropped, it is free again.
     pub(super) fn lock(&self, folder: &Path) -> Result<FolderLock, CommandError> {
-        let lock = FolderLock::take(folder)?;
-        // Nobody else writes here now: what a killed run left is nobody's.
-        sweep_below(lock.folder());
-        if !lock.is_held() {
-            self.warn(&format!(
-                "{} cannot be locked on this file system: let no other updraft write into it",
-                folder.shown()
-            ));
-        }
-        Ok(lock)
+        self.host().lock(folder)
     }
 
     /// A table or a summary, on standard output, unless quiet.
@@ -158,19 +150,11 @@ impl Context {
 
     /// What the user asked for, on standard output, also when quiet.
     pub(super) fn emit(&self, text: &str) -> Result<(), CommandError> {
-        Self::write_out(&for_terminal(text, self.color))
+        self.try_emit(text).map_err(CommandError::Output)
     }
 
-    fn write_out(text: &str) -> Result<(), CommandError> {
-        let mut out = io::stdout().lock();
-        let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-        match written {
-            Ok(()) => Ok(()),
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
-                Err(CommandError::BrokenPipe)
-            }
-            Err(error) => Err(CommandError::Failed(format!("failed to print: {error}"))),
-        }
+    fn try_emit(&self, text: &str) -> io::Result<()> {
+        write_out(&for_terminal(text, self.color))
     }
 
     /// Data as one JSON object, on standard output.
@@ -179,7 +163,7 @@ impl Context {
         let mut text = serde_json::to_string_pretty(value)
             .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
         text.push('\n');
-        Self::write_out(&json_for_terminal(&text))
+        write_out(&json_for_terminal(&text)).map_err(CommandError::Output)
     }
 
     /// Talk, on standard error, unless quiet.
@@ -205,6 +189,61 @@ impl Context {
     pub(super) fn insist(&self, text: &str) {
         self.insisted.store(true, Ordering::Relaxed);
         complain(text);
+    }
+}
+
+fn write_out(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush())
+}
+
+impl Host for Context {
+    fn say(&self, text: &str) {
+        Self::say(self, text);
+    }
+
+    fn insist(&self, text: &str) {
+        Self::insist(self, text);
+    }
+
+    fn clock(&self) -> &Arc<dyn Clock> {
+        Self::clock(self)
+    }
+
+    fn stop_flag(&self) -> &AtomicBool {
+        Self::stop_flag(self)
+    }
+
+    fn show(&self, table: &str) -> io::Result<()> {
+        if self.json {
+            Self::say(self, table);
+            Ok(())
+        } else if self.quiet {
+            Ok(())
+        } else {
+            self.try_emit(table)
+        }
+    }
+
+    fn show_no_go(&self, table: &str) -> io::Result<()> {
+        if self.json {
+            Self::insist(self, table);
+            Ok(())
+        } else {
+            self.try_emit(table)
+        }
+    }
+
+    fn progress(&self, what: &str, total: u64) -> Box<dyn Progress + '_> {
+        Box::new(Bar::new(self, what, total))
+    }
+
+    fn command(&self) -> String {
+        let shown: Vec<_> = std::env::args()
+            .skip(1)
+            .map(|word| if word.contains(' ') { format!("'{word}'") } else { word })
+            .collect();
+        format!("updraft {}", shown.join(" "))
     }
 }
 

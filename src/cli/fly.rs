@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::fleet::bring::{Brought, Wish, bring};
@@ -16,7 +15,7 @@ use super::fleet::start::{LeadArgs, asked, fly_now, guide_now, needs_person, say
 use super::fleet::tables::PreflightOutput;
 use super::fleet::{dry, end, lock, one_flight, refuse_of_upload, server};
 use super::fly_output::{FlightEnd, FlightOutput, FlyOutput, LogOutput};
-use super::simulate::{AirArgs, Flown, Ready, Simulation, air_help, make_ready, settle, updraft};
+use super::simulate::{AirArgs, air_help, updraft};
 use crate::base::time::GpsTime;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::start::StartRecord;
@@ -30,6 +29,8 @@ use crate::mission::Plan;
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
+use crate::workflow::clock::Stopwatch;
+use crate::workflow::simulate::{Flown, Ready, Simulation, make_ready, settle};
 
 /// Virtual drones on the ground live so many times as fast as the clock on the wall.
 const GROUND_PACE: f64 = 20.0;
@@ -285,7 +286,7 @@ fn fly_and_tell(
     simulation: &Simulation,
     rehearsed: Option<&LeadArgs>,
 ) -> Result<(Flown, FlightOutput), CommandError> {
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start(context);
     let ready = make_ready(context, folder, plan, simulation)?;
     let mut output = FlightOutput {
         flight: plan.name.clone(),
@@ -306,7 +307,7 @@ fn fly_and_tell(
         }
         output.logs.sort_by_key(|log| log.slot);
     }
-    Ok((settle(context, folder, plan, ready, failed, watch)?, output))
+    Ok((settle(context, folder, plan, ready, failed, &watch)?, output))
 }
 
 /// A crew for virtual drones of this program, once they are heard.

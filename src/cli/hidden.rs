@@ -7,9 +7,8 @@ use clap::{Args, ValueEnum};
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::gap::blind::Written;
+
 use super::mission_args::MissionArgs;
-use super::simulate::made_by;
 use super::words;
 use crate::base::file::{create_folder, write_whole};
 use crate::base::plain::Shown as _;
@@ -18,6 +17,8 @@ use crate::blind::scenario::FULL_SIDE;
 use crate::blind::told::{HiddenRun, gap_words};
 use crate::blind::{AirClass, Base, Cell, Protocol, Scenario, seal};
 use crate::campaign::to_json;
+use crate::workflow::gap::search::Written;
+use crate::workflow::made_by;
 
 /// File of the comparison.
 const RESULT: &str = "hidden.json";
@@ -162,7 +163,7 @@ pub(super) fn run(
         }
     }
     };
-    let played = play(&truth, folder, &Written, Some(context.stop_flag()), &mut tell)?;
+    let played = play(&truth, folder, &Written(context), Some(context.stop_flag()), &mut tell)?;
     context.say(&format!("Seal opened: it hides {}", played.opened.truth.words()));
     let result = HiddenRun::of(&played, &made_by());
     let json = to_json(&result)

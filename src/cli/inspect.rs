@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::load::{LoadError, MAX_SKYB_BYTES, has_extension, read_show};
 use super::show_text::{describe_show, describe_skyb};
 use super::timetable;
 use super::words::{shorten, wrap};
@@ -20,6 +19,7 @@ use crate::mission::Plan;
 use crate::show::derive::DeriveParams;
 use crate::show::skyb;
 use crate::show::summary::{ShowSummary, SkybSummary, summarise, summarise_skyb};
+use crate::workflow::shows::load::{LoadError, MAX_SKYB_BYTES, has_extension, read_show};
 
 /// Arguments of `updraft inspect`.
 #[derive(Debug, Args)]

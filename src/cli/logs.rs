@@ -18,7 +18,7 @@ use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
 use super::fleet::crew::Crew;
 use super::fleet::{one_flight, server};
-use super::simulate::{SlotSet, parse_slots};
+use super::simulate::parse_slots;
 use super::words;
 use crate::base::plain::Shown as _;
 use crate::campaign;
@@ -27,6 +27,7 @@ use crate::campaign::start::earlier_folders;
 use crate::fleet::logs::one::Which;
 use crate::fleet::logs::verify::{unknown, verify};
 use crate::mission::Plan;
+use crate::workflow::slots::SlotSet;
 
 pub(super) use listing::{ListRow, ListedLog};
 

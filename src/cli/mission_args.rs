@@ -4,19 +4,8 @@ use clap::Args;
 
 use super::exit::CommandError;
 use crate::mission::plan::Site;
-use crate::mission::resolve::{EXAMPLE_ORIGIN, Mission, Override, resolve};
-
-/// Keys of a template.
-const ORIGIN: &str = "site.origin";
-const GROUND: &str = "site.ground_amsl_m";
-/// An origin that is moved by less is still on the template's own field, m.
-const SAME_FIELD_M: f64 = 1000.0;
-
-/// Whether an override sets a key, of all flights of a campaign or of one.
-fn names(item: &Override, key: &str) -> bool {
-    let flight = item.key.strip_suffix(key).and_then(|flight| flight.strip_suffix('.'));
-    item.key == key || flight.is_some_and(|flight| !flight.contains('.'))
-}
+use crate::mission::resolve::{Mission, Override};
+use crate::workflow::mission;
 
 /// What to change in a template. Every other number: `--set KEY=VALUE`.
 #[derive(Clone, Debug, Default, Args)]
@@ -129,33 +118,13 @@ impl MissionArgs {
         Ok(list)
     }
 
-    /// Resolves a template with these options. Where they move the origin and leave the ground height
-    /// to the template, the plans say that nobody knows it.
+    /// Resolves a template with these options.
     pub(super) fn resolve(&self, template: &str) -> Result<Mission, CommandError> {
-        let mut overrides = self.overrides()?;
-        let mission = resolve(template, &overrides)?;
-        let given = |key: &str| overrides.iter().any(|item| names(item, key));
-        if !given(ORIGIN) || given(GROUND) {
-            return Ok(mission);
-        }
-        let own: Vec<Override> =
-            overrides.iter().filter(|item| !names(item, ORIGIN)).cloned().collect();
-        let own = resolve(template, &own)?;
-        let elsewhere = mission.flights.iter().zip(&own.flights).any(|(moved, own)| {
-            let place = moved.plan.site.frame().origin;
-            let off_m = own.plan.site.frame().from_geodetic(place);
-            off_m.x.hypot(off_m.y) > SAME_FIELD_M
-        });
-        if !elsewhere {
-            return Ok(mission);
-        }
-        overrides.push(Override::new("site.ground_assumed", true));
-        Ok(resolve(template, &overrides)?)
+        mission::resolve(template, &self.overrides()?)
     }
 
     /// Whether the site of a plan is the built-in templates' example, and nobody has asked for it.
     pub(super) fn is_example(&self, site: &Site) -> Result<bool, CommandError> {
-        let given = self.overrides()?.iter().any(|item| names(item, ORIGIN));
-        Ok(!given && [site.origin_lat_deg, site.origin_lon_deg] == EXAMPLE_ORIGIN)
+        Ok(mission::is_example(site, &self.overrides()?))
     }
 }

@@ -2,34 +2,25 @@
 
 mod analyze;
 mod blind;
-mod campaign_files;
 mod check;
+#[cfg(debug_assertions)]
 mod clock;
 mod context;
 mod effects;
 mod effects_plot;
 pub mod exit;
-mod fields;
 mod fleet;
-mod flown;
 mod fly;
 mod fly_output;
-mod found;
 mod gap;
-mod hashes;
-mod held;
 mod hidden;
 mod inspect;
-mod leaning;
-mod load;
 mod logs;
 mod mission_args;
-mod of_start;
-mod outcome;
+mod origin;
 mod physics;
 mod plan;
 mod progress;
-mod provenance;
 mod run;
 mod show_text;
 mod signals;
@@ -37,8 +28,6 @@ mod simulate;
 mod sweep;
 mod timetable;
 pub mod tools;
-mod true_scales;
-mod twice;
 mod words;
 
 use std::process::ExitCode;
@@ -47,7 +36,7 @@ use clap::builder::FalseyValueParser;
 use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 
 use context::{Context, complain};
-use exit::{CommandError, Exit};
+use exit::{CommandError, Exit, exit_of};
 
 use crate::base::plain::{for_terminal, plain};
 
@@ -192,16 +181,16 @@ pub fn main() -> ExitCode {
             exit.into()
         }
         Err(error) => {
-            if !matches!(error, CommandError::BrokenPipe) {
+            if exit_of(&error) != Exit::Done {
                 let text = exit::with_reasons(&error);
                 let prefix = if text.starts_with("error") { "" } else { "error: " };
                 if context.json {
-                    complain(&exit::as_json(&text, error.exit()));
+                    complain(&exit::as_json(&text, exit_of(&error)));
                 } else {
                     complain(&format!("{prefix}{text}"));
                 }
             }
-            error.exit().into()
+            exit_of(&error).into()
         }
     }
 }

@@ -11,7 +11,6 @@ use clap::Args;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::simulate::{AirArgs, updraft};
@@ -23,6 +22,7 @@ use crate::sim::json::{
     BASE_PORT, Instance, InstanceSetup, PORTS_PER_INSTANCE, Refusal, Status, serve,
 };
 use crate::vehicle::{Vehicle, library};
+use crate::workflow::clock::Stopwatch;
 
 /// ArduPilot's own home when it is not told another: latitude, longitude, m above sea level, heading.
 const ARDUPILOT_HOME: [f64; 4] = [-35.363261, 149.165230, 584.0, 353.0];
@@ -303,7 +303,7 @@ fn watch(
     watched: &[&Mutex<Status>],
     stop: &dyn Fn() -> bool,
 ) {
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start(context);
     let interval = Duration::from_secs(args.status);
     let mut printed_at = Duration::ZERO;
     let mut printed: Vec<Status> = vec![Status::default(); watched.len()];

@@ -5,20 +5,17 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::check::{Origin, allowed, checked, few, is_safe, known, say_findings, verdict};
-use super::clock::Stopwatch;
+use super::check::few;
 use super::context::Context;
-use super::exit::{CommandError, Exit};
+use super::exit::{CommandError, Exit, is_end_of_pipe};
 use super::mission_args::MissionArgs;
 use super::{timetable, words};
-use crate::base::file::read_whole;
 use crate::base::plain::Shown as _;
-use crate::campaign::write::{FlightFiles, folders, write_index};
-use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::check::CheckReport;
 use crate::mission::Plan;
-use crate::mission::resolve::Mission;
-use crate::show::Show;
+use crate::workflow::check::{Origin, allowed, checked, is_safe, known, say_findings, verdict};
+use crate::workflow::clock::Stopwatch;
+use crate::workflow::plan::{what_for_whom, write};
 
 /// Arguments of `updraft plan`.
 #[derive(Debug, Args)]
@@ -71,12 +68,12 @@ struct FlightOutput<'a> {
 }
 
 pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandError> {
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start(context);
     known(&args.allow)?;
     let few = few(context, args.verbose);
     let mission = args.mission.resolve(&args.template)?;
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(&mission.name));
-    let mut reports = Vec::new();
+    let (mut shows, mut reports) = (Vec::new(), Vec::new());
     let mut safe = true;
     // Who reads only the beginning of the timetable gets the whole campaign.
     let mut read = Ok(());
@@ -87,18 +84,19 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
             let is_example = args.mission.is_example(&flight.plan.site)?;
             let told = timetable::describe(&flight.plan, context.width, is_example);
             read = context.print(&format!("{}\n", words::wrap(&told, context.width)));
-            if !matches!(read, Ok(()) | Err(CommandError::BrokenPipe)) {
+            if matches!(&read, Err(CommandError::Output(error)) if !is_end_of_pipe(error)) {
                 return read.map(|()| Exit::Done);
             }
         }
         say_findings(context, &report, &args.allow);
         safe &= is_safe(&report, &args.allow);
-        reports.push((show, report));
+        shows.push(show);
+        reports.push(report);
     }
     let written = safe && !args.dry_run;
     if written {
         let _lock = context.lock(&folder)?;
-        write(context, &mission, &reports, &folder, args.force)?;
+        write(context, &mission, &shows, &folder, args.force)?;
     }
     read?;
     if context.json {
@@ -109,7 +107,7 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
                 .flights
                 .iter()
                 .zip(&reports)
-                .map(|(flight, (_, check))| FlightOutput { plan: &flight.plan, check })
+                .map(|(flight, check)| FlightOutput { plan: &flight.plan, check })
                 .collect(),
         })?;
     }
@@ -117,7 +115,7 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         context.insist("Nothing was written: the show is not safe as it is");
         return Ok(Exit::Unsafe);
     }
-    let allowed = allowed(reports.iter().map(|(_, report)| report), &args.allow);
+    let allowed = allowed(reports.iter(), &args.allow);
     if !allowed.is_empty() {
         context.insist(&format!("{}: written as asked for", verdict(true, &allowed)));
     }
@@ -132,72 +130,4 @@ pub(super) fn run(context: &Context, args: &PlanArgs) -> Result<Exit, CommandErr
         ));
     }
     Ok(Exit::Done)
-}
-
-/// `calibration and hover for 49 drones`.
-pub(super) fn what_for_whom(mission: &Mission) -> String {
-    let names: Vec<_> = mission.flights.iter().map(|flight| flight.plan.name.as_str()).collect();
-    let drones = mission.flights.first().map_or(0, |flight| flight.plan.slots.len());
-    format!("{} for {}", words::list(&names), words::count(drones, "drone"))
-}
-
-/// Writes the campaign folder, unless something else is there.
-pub(super) fn write(
-    context: &Context,
-    mission: &Mission,
-    shows: &[(Show, CheckReport)],
-    root: &Path,
-    force: bool,
-) -> Result<(), CommandError> {
-    let folders = folders(root, mission);
-    let mut files = Vec::with_capacity(folders.len());
-    for ((flight, folder), (show, _)) in mission.flights.iter().zip(&folders).zip(shows) {
-        context.check_stop()?;
-        let made = FlightFiles::of(flight, show)?;
-        refuse_occupied(root, folder, made.plan(), force)?;
-        files.push(made);
-    }
-    for (files, folder) in files.iter().zip(&folders) {
-        context.check_stop()?;
-        files.write(folder)?;
-    }
-    Ok(write_index(root, mission)?)
-}
-
-/// The same plan may be written again; another one only with `--force`, and never over logs.
-fn refuse_occupied(
-    root: &Path,
-    folder: &FlightFolder,
-    plan: &[u8],
-    force: bool,
-) -> Result<(), CommandError> {
-    let occupied = |what: &str| {
-        Err(CampaignError::Occupied { path: folder.0.clone(), what: what.to_owned() }.into())
-    };
-    if folder.0.as_path() != root && FlightFolder(root.to_owned()).plan().exists() {
-        return occupied("a plan of one flight");
-    }
-    if folder.0.as_path() == root && campaign::index_path(root).exists() {
-        return occupied("a campaign of several flights");
-    }
-    // One more is another plan already.
-    let existing = match read_whole(&folder.plan(), plan.len() as u64) {
-        Ok(existing) => Some(existing),
-        Err(error) => match error.source.kind() {
-            std::io::ErrorKind::NotFound => return Ok(()),
-            std::io::ErrorKind::FileTooLarge => None,
-            _ => return Err(error.into()),
-        },
-    };
-    if existing.is_some_and(|existing| existing == plan) {
-        return Ok(());
-    }
-    if folder.simulated().is_dir() || folder.logs().is_dir() {
-        return Err(CommandError::Usage(format!(
-            "{} holds the logs of another plan, which are never overwritten; choose another folder, \
-             or move its folders logs and simulated away and give --force",
-            folder.0.shown()
-        )));
-    }
-    if force { Ok(()) } else { occupied("another plan") }
 }

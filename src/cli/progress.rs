@@ -5,16 +5,17 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::clock::Stopwatch;
 use super::context::Context;
 use crate::base::plain::plain;
+use crate::workflow::clock::Stopwatch;
+use crate::workflow::host::Progress;
 
 /// How often a run without a terminal says where it is.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Counts units of work; may be shared between threads.
 #[derive(Debug)]
-pub(super) struct Progress {
+pub(super) struct Bar {
     bar: ProgressBar,
     what: String,
     watch: Stopwatch,
@@ -22,7 +23,7 @@ pub(super) struct Progress {
     said: AtomicU64,
 }
 
-impl Progress {
+impl Bar {
     /// Progress over `total` units; `what` is a short verb phrase: `flying`.
     pub(super) fn new(context: &Context, what: &str, total: u64) -> Self {
         let target = if context.interactive {
@@ -40,14 +41,15 @@ impl Progress {
         Self {
             bar,
             what: what.to_owned(),
-            watch: Stopwatch::start(),
+            watch: Stopwatch::start(context),
             lines: (!context.interactive && !context.quiet).then(|| context.clone()),
             said: AtomicU64::new(0),
         }
     }
+}
 
-    /// One more unit is done.
-    pub(super) fn advance(&self) {
+impl Progress for Bar {
+    fn advance(&self) {
         self.bar.inc(1);
         if let Some(context) = &self.lines {
             let period = self.watch.elapsed().as_secs() / LINE_EVERY.as_secs();
@@ -58,8 +60,7 @@ impl Progress {
         }
     }
 
-    /// Removes the bar.
-    pub(super) fn finish(&self) {
+    fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }

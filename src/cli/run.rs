@@ -5,24 +5,25 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::analyze::{AnalyzeOptions, analyze_campaign};
-use super::check::{Origin, checked, few, is_safe, say_findings};
-use super::clock::Stopwatch;
+use super::check::few;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::fleet::sim::MOST_DRONES;
 use super::fly::fly_virtual;
 use super::hidden::{self, HideArgs};
 use super::mission_args::MissionArgs;
-use super::plan::{what_for_whom, write};
-use super::simulate::{
-    AirArgs, AirSpecs, Simulation, SlotSet, air_help, air_specs, simulate, speed, updraft,
-};
-use super::sweep::fly_study;
+use super::simulate::{AirArgs, AirSpecs, air_help, air_specs, speed, updraft};
 use crate::base::plain::Shown as _;
 use crate::base::rng::{Purpose as Chance, stream};
 use crate::campaign;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
+use crate::workflow::check::{Origin, checked, is_safe, say_findings};
+use crate::workflow::clock::Stopwatch;
+use crate::workflow::plan::{what_for_whom, write};
+use crate::workflow::simulate::{Simulation, simulate};
+use crate::workflow::slots::SlotSet;
+use crate::workflow::study::fly_built_in;
 
 /// The template that is the paper's campaign.
 const CAMPAIGN: &str = "campaign";
@@ -95,7 +96,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
     if let Some(seed) = args.hide.seed() {
         return hidden::run(context, &args.output, args.force, args.hide, &args.mission, seed);
     }
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start(context);
     let is_field_day = args.is_field_day();
     let mission = args.mission_args().resolve(&args.template)?;
     let mut shows = Vec::new();
@@ -108,7 +109,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
             context.insist("Nothing was flown: the show is not safe as it is");
             return Ok(Exit::Unsafe);
         }
-        shows.push((show, report));
+        shows.push(show);
     }
     let _lock = context.lock(&args.output)?;
     keep_off_the_field(&args.output)?;
@@ -136,7 +137,7 @@ pub(super) fn run(context: &Context, args: &RunArgs) -> Result<Exit, CommandErro
         lost |= !flown.failed.is_empty();
     }
     if !args.no_study {
-        fly_study(context, &campaign::study_folder(&args.output), args.air.seed)?;
+        fly_built_in(context, &campaign::study_folder(&args.output), args.air.seed)?;
     }
     let exit = analyze_campaign(context, &args.output, &AnalyzeOptions::default())?;
     context.say(&format!("Done in {watch}"));

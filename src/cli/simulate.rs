@@ -1,33 +1,18 @@
 //! `updraft simulate`: flies a campaign in the embedded simulator, one log per drone.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use clap::Args;
-use rayon::prelude::*;
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
-use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::flown::{changed_logs, prepare, taken_down, write_record};
-use super::progress::Progress;
-use super::words;
-use crate::base::plain::Shown as _;
-use crate::campaign::{self, FlightFolder, FlightRecord};
+use crate::campaign;
 use crate::effects;
-use crate::mission::Plan;
-use crate::mission::plan::Slot;
-use crate::show::ShowDrone;
-use crate::show::quantise::as_flown;
 use crate::sim::air::spec::{self, Air, AirSpec};
-use crate::sim::air::truth;
-use crate::sim::{FlightSetup, FlightSummary, Hooks, SimError, fly_to_file};
-use crate::vehicle::{Vehicle, library};
-
-/// Drones that are named in one warning.
-const MOST_NAMED: usize = 10;
+use crate::vehicle::library;
+use crate::workflow::simulate::{Flown, Simulation, simulate, uniform_mps};
+use crate::workflow::slots::SlotSet;
 
 /// Motion of the air and seed of a simulated flight, shared by `simulate` and `run`.
 #[derive(Clone, Debug, Args)]
@@ -116,24 +101,18 @@ impl AirArgs {
 
     /// The air of a flight with a uniform vertical speed.
     pub(super) fn air(&self, updraft_mps: f64) -> Air {
-        let (sin, cos) = self.wind_from.to_radians().sin_cos();
-        // Adding zero turns -0 into 0, which reads better in files.
-        let uniform_mps = [-self.wind * sin + 0.0, -self.wind * cos + 0.0, updraft_mps];
         let specs: Vec<_> = self.specs.iter().flat_map(|specs| specs.0.iter().cloned()).collect();
-        Air::new(uniform_mps, &specs)
+        Air::new(uniform_mps(self.wind, self.wind_from, updraft_mps), &specs)
     }
 
     /// A flight of all drones in that air, in the vehicle that was planned for.
     pub(super) fn simulation(&self, updraft_mps: f64, force: bool) -> Simulation {
         Simulation {
-            air: self.air(updraft_mps),
             truth: self.truth,
-            seed: self.seed,
             full_logs: self.full_logs,
             effects: self.effects.clone(),
-            vehicle: None,
-            only: None,
             force,
+            ..Simulation::new(self.air(updraft_mps), self.seed)
         }
     }
 }
@@ -172,68 +151,9 @@ pub(super) struct SimulateArgs {
     air: AirArgs,
 }
 
-/// A set of slots.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct SlotSet(BTreeSet<u16>);
-
 /// Parser of sets of slots: `1-10,12`.
 pub(super) fn parse_slots(text: &str) -> Result<SlotSet, String> {
-    let bad = || "write slots as 1-10,12,20-29".to_owned();
-    let mut slots = BTreeSet::new();
-    for part in text.split(',') {
-        let (first, last) = part.split_once('-').unwrap_or((part, part));
-        let first: u16 = first.trim().parse().map_err(|_| bad())?;
-        let last: u16 = last.trim().parse().map_err(|_| bad())?;
-        if first == 0 || last < first {
-            return Err(bad());
-        }
-        slots.extend(first..=last);
-    }
-    Ok(SlotSet(slots))
-}
-
-impl FromIterator<u16> for SlotSet {
-    fn from_iter<I: IntoIterator<Item = u16>>(slots: I) -> Self {
-        Self(slots.into_iter().collect())
-    }
-}
-
-impl SlotSet {
-    /// The first of them that a plan does not have.
-    pub(super) fn stray(&self, plan: &Plan) -> Option<u16> {
-        self.0.iter().copied().find(|slot| plan.slot(*slot).is_none())
-    }
-
-    /// Whether a slot is one of them.
-    pub(super) fn contains(&self, slot: u16) -> bool {
-        self.0.contains(&slot)
-    }
-}
-
-/// How one flight is to be simulated.
-#[derive(Clone, Debug)]
-pub(super) struct Simulation {
-    pub(super) air: Air,
-    pub(super) truth: bool,
-    pub(super) seed: u64,
-    pub(super) full_logs: bool,
-    /// Choices of effects, over the vehicle's own.
-    pub(super) effects: Vec<String>,
-    pub(super) vehicle: Option<Vehicle>,
-    pub(super) only: Option<SlotSet>,
-    pub(super) force: bool,
-}
-
-/// What became of one flight.
-#[derive(Clone, Debug, Serialize)]
-pub(super) struct Flown {
-    pub(super) flight: String,
-    pub(super) logs: usize,
-    pub(super) kept: usize,
-    pub(super) bytes: u64,
-    pub(super) failed: Vec<String>,
-    pub(super) saturated: Vec<u16>,
-    pub(super) flat: Vec<u16>,
+    text.parse()
 }
 
 #[derive(Serialize)]
@@ -268,211 +188,4 @@ pub(super) fn run(context: &Context, args: &SimulateArgs) -> Result<Exit, Comman
         context.print_json(&SimulateOutput { schema: "updraft.simulate/1", flights })?;
     }
     Ok(if failed { Exit::Losses } else { Exit::Done })
-}
-
-/// The vehicle of a flight (another, if given), with the effects that were chosen.
-pub(super) fn resolved_vehicle(
-    folder: &FlightFolder,
-    other: Option<&Vehicle>,
-    choices: &[String],
-) -> Result<Vehicle, CommandError> {
-    let mut vehicle = match other {
-        Some(vehicle) => vehicle.clone(),
-        None => library::load(&folder.vehicle().to_string_lossy())?,
-    };
-    for choice in choices {
-        effects::select::choose(&mut vehicle, choice)?;
-    }
-    effects::select::resolved(&vehicle)?;
-    Ok(vehicle)
-}
-
-/// A flight that is about to be flown.
-pub(super) struct Ready<'a> {
-    pub(super) vehicle: Vehicle,
-    pub(super) record: FlightRecord,
-    /// The slots asked for.
-    pub(super) wanted: Vec<&'a Slot>,
-    /// Those of them that have no log yet.
-    pub(super) open: Vec<&'a Slot>,
-    pub(super) air: crate::sim::air::Sum,
-}
-
-/// Resolves a flight's vehicle and air, and finds what is still to be flown. Logs that are there and
-/// fit are kept.
-pub(super) fn make_ready<'a>(
-    context: &Context,
-    folder: &FlightFolder,
-    plan: &'a Plan,
-    simulation: &Simulation,
-) -> Result<Ready<'a>, CommandError> {
-    let vehicle = resolved_vehicle(folder, simulation.vehicle.as_ref(), &simulation.effects)?;
-    if let Some(stray) = simulation.only.as_ref().and_then(|set| set.stray(plan)) {
-        return Err(CommandError::Usage(format!(
-            "{} has no slot {stray}; slots are 1 to {}",
-            plan.name,
-            plan.slots.len()
-        )));
-    }
-    let mut record = prepare(folder, plan, simulation, &vehicle)?;
-    let count = plan.slots.len();
-    let wanted: Vec<_> = plan
-        .slots
-        .iter()
-        .filter(|slot| simulation.only.as_ref().is_none_or(|set| set.contains(slot.slot)))
-        .collect();
-    let changed = changed_logs(folder, &record, &wanted, count)?;
-    for (slot, how) in &changed {
-        let path = folder.simulated_log(*slot, count);
-        context.warn(&format!("{} is not as it was flown ({how}): flown again", path.shown()));
-    }
-    record.logs.retain(|log| !changed.contains_key(&log.slot));
-    let is_open = |slot: &&Slot| {
-        changed.contains_key(&slot.slot) || !folder.simulated_log(slot.slot, count).exists()
-    };
-    let open: Vec<_> = wanted.iter().copied().filter(is_open).collect();
-    let frame = plan.site.frame();
-    let air = spec::build(&simulation.air, &frame, simulation.seed, &plan.name);
-    if simulation.truth {
-        wanted.par_iter().try_for_each(|slot| {
-            let path = folder.truth(slot.slot, count);
-            truth::write(&path, &air, &plan.trajectory(slot), slot.slot, &frame)
-        })?;
-    }
-    Ok(Ready { vehicle, record, wanted, open, air })
-}
-
-/// Flies one flight; logs that are there and fit are kept.
-pub(super) fn simulate(
-    context: &Context,
-    folder: &FlightFolder,
-    plan: &Plan,
-    simulation: &Simulation,
-) -> Result<Flown, CommandError> {
-    let watch = Stopwatch::start();
-    let ready = make_ready(context, folder, plan, simulation)?;
-    let Ready { vehicle, record, open, air, .. } = &ready;
-    let (start, frame, count) = (record.start, plan.site.frame(), plan.slots.len());
-    let show = plan.to_show();
-    let drones: BTreeMap<u16, &ShowDrone> =
-        plan.slots.iter().zip(&show.drones).map(|(slot, drone)| (slot.slot, drone)).collect();
-    let progress = Progress::new(context, "flying", open.len() as u64);
-    let results: Vec<Result<FlightSummary, CommandError>> = open
-        .par_iter()
-        .map(|slot| {
-            context.check_stop()?;
-            // What is uploaded to a drone, so that simulated and virtual fleets log the same.
-            let drone =
-                drones.get(&slot.slot).copied().map_or_else(|| Ok(ShowDrone::default()), as_flown);
-            let drone = drone.map_err(|error| {
-                CommandError::Failed(format!("slot {} has no .skyb file: {error}", slot.slot))
-            })?;
-            let setup = FlightSetup {
-                vehicle,
-                trajectory: &drone.trajectory,
-                home_m: slot.home_m.into(),
-                frame,
-                atmosphere: air,
-                seed: simulation.seed,
-                drone: slot.slot,
-                start,
-                lights: &drone.lights,
-                full_logs: simulation.full_logs,
-                hooks: Hooks { progress: None, stop: Some(context.stop_flag()) },
-            };
-            let result = fly_to_file(&setup, &folder.simulated_log(slot.slot, count));
-            progress.advance();
-            result.map_err(|error| match error {
-                SimError::Stopped { .. } => CommandError::Interrupted,
-                other => other.into(),
-            })
-        })
-        .collect();
-    progress.finish();
-    let mut saturated = Vec::new();
-    let mut failed = Vec::new();
-    let mut stopped = false;
-    let mut flat = Vec::new();
-    for (slot, result) in open.iter().zip(results) {
-        if matches!(&result, Ok(summary) if summary.flat_s.is_some()) {
-            flat.push(slot.slot);
-        }
-        match result {
-            Ok(summary) if summary.saturated_share > 0.0 => saturated.push(slot.slot),
-            Ok(_) => {}
-            Err(CommandError::Interrupted) => stopped = true,
-            Err(error) => failed.push(super::exit::with_reasons(&error)),
-        }
-    }
-    if !flat.is_empty() {
-        let named: Vec<_> = flat.iter().take(MOST_NAMED).map(u16::to_string).collect();
-        let more = if flat.len() > MOST_NAMED { ", ..." } else { "" };
-        context.warn(&format!(
-            "{}: the battery of {} ran flat in flight (slots {}{more}); the simulation flies on at its empty \
-             voltage, a real drone would not",
-            plan.name,
-            words::count(flat.len(), "drone"),
-            named.join(", ")
-        ));
-    }
-    let flown = settle(context, folder, plan, ready, failed, watch)?;
-    if stopped {
-        return Err(CommandError::Interrupted);
-    }
-    Ok(Flown { saturated, flat, ..flown })
-}
-
-/// Takes down what was flown, and says so.
-pub(super) fn settle(
-    context: &Context,
-    folder: &FlightFolder,
-    plan: &Plan,
-    ready: Ready<'_>,
-    failed: Vec<String>,
-    watch: Stopwatch,
-) -> Result<Flown, CommandError> {
-    let Ready { mut record, wanted, open, .. } = ready;
-    record.logs = taken_down(folder, plan, &record, &open)?;
-    write_record(folder, &record)?;
-    context.check_stop()?;
-    let kept = wanted.len() - open.len();
-    let bytes = record.logs.iter().map(|log| log.bytes).sum();
-    for error in &failed {
-        context.warn(error);
-    }
-    let word = if kept == wanted.len() { "Found" } else { "Flew" };
-    context.say(&format!(
-        "{word} {}: {}, {:.1} MB in {watch}{}",
-        plan.name,
-        words::count(wanted.len() - failed.len(), "log"),
-        bytes as f64 / 1e6,
-        if kept > 0 && kept < wanted.len() {
-            format!(" ({kept} {} there)", if kept == 1 { "was" } else { "were" })
-        } else {
-            String::new()
-        }
-    ));
-    Ok(Flown {
-        flight: plan.name.clone(),
-        logs: wanted.len() - failed.len(),
-        kept,
-        bytes,
-        failed,
-        saturated: Vec::new(),
-        flat: Vec::new(),
-    })
-}
-
-/// Program and version, for records.
-pub(super) fn made_by() -> String {
-    concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned()
-}
-
-/// SHA-256 in hexadecimal.
-pub(super) fn sha256(bytes: &[u8]) -> String {
-    use std::fmt::Write as _;
-    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }

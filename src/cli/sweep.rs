@@ -1,24 +1,19 @@
 //! `updraft sweep`: a study flown, evaluated and reported.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 
-use super::clock::Stopwatch;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::progress::Progress;
-use super::simulate::made_by;
-use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
-use crate::campaign::{self, to_json};
-use crate::report::{self, Provenance};
+use crate::report;
 use crate::study::result::StudyResult;
-use crate::study::{Flown, Settings, StudyPlan, Work, evaluate};
+use crate::study::{Settings, StudyPlan, Work};
+use crate::workflow::clock::Stopwatch;
+use crate::workflow::study::{BUILT_IN, evaluated, fly, refuse_campaign, write};
 
-/// Name of the built-in study.
-const BUILT_IN: &str = "study";
 /// Width of the terminal summary, columns: at most, and at least.
 const WIDTH: usize = 100;
 const MIN_WIDTH: usize = 60;
@@ -66,7 +61,7 @@ struct SweepOutput<'a> {
 }
 
 pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandError> {
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start(context);
     let study = StudyPlan::load(&args.study)?;
     refuse_campaign(&args.output)?;
     let _lock = context.lock(&args.output)?;
@@ -103,84 +98,6 @@ pub(super) fn run(context: &Context, args: &SweepArgs) -> Result<Exit, CommandEr
         context.warn(&format!("{} is lost: {}", lost.name, lost.reason));
     }
     Ok(if result.lost.is_empty() { Exit::Done } else { Exit::Losses })
-}
-
-/// Flies what is open of a study, `jobs` flights at the same time.
-fn fly(
-    context: &Context,
-    work: Work<'_>,
-    doing: &'static str,
-    jobs: Option<u16>,
-) -> Result<Flown, CommandError> {
-    let progress = Progress::new(context, doing, work.open_flights() as u64);
-    let fly = || work.fly(context.stop_flag(), &|| progress.advance());
-    let flown = match jobs {
-        Some(jobs) => rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(jobs))
-            .build()
-            .map_err(|error| CommandError::Failed(format!("failed to start threads: {error}")))?
-            .install(fly),
-        None => fly(),
-    };
-    progress.finish();
-    let flown = flown?;
-    context.check_stop()?;
-    Ok(flown)
-}
-
-/// The results of a study; flights that were lost are named.
-fn evaluated(
-    context: &Context,
-    study: &StudyPlan,
-    seed: u64,
-    flown: &Flown,
-) -> Result<StudyResult, CommandError> {
-    let result = evaluate(study, seed, flown)?;
-    for lost in &result.lost {
-        context.warn(&format!("{}: {}", lost.name, lost.reason));
-    }
-    Ok(result)
-}
-
-/// Flies the built-in study into a folder, for the report of a campaign. Finished flights are kept.
-pub(super) fn fly_study(context: &Context, folder: &Path, seed: u64) -> Result<(), CommandError> {
-    let watch = Stopwatch::start();
-    let study = StudyPlan::load(BUILT_IN)?;
-    let work = Work::open(&study, folder, Settings { seed, keep_logs: false, force: false })?;
-    let flown = fly(context, work, "flying the study", None)?;
-    let result = evaluated(context, &study, seed, &flown)?;
-    write(folder, format!("updraft run --seed {seed}"), seed, &result)?;
-    context.say(&format!("Flew the simulation study ({} flights) in {watch}", flown.flown));
-    Ok(())
-}
-
-/// A study in a campaign's folder would overwrite its report.
-fn refuse_campaign(folder: &Path) -> Result<(), CommandError> {
-    if campaign::is_campaign(folder) {
-        return Err(CommandError::Usage(format!(
-            "{} is a campaign; give the study another folder with --output",
-            folder.shown()
-        )));
-    }
-    Ok(())
-}
-
-/// Writes the results; the page last, so that where it is, all is.
-fn write(
-    folder: &Path,
-    command: String,
-    seed: u64,
-    result: &StudyResult,
-) -> Result<PathBuf, CommandError> {
-    let json = to_json(result)
-        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-    let provenance =
-        Provenance { program: made_by(), command, seed: Some(seed), ..Provenance::default() };
-    let made = report::render_study(result, &provenance)?;
-    let pages = folder.join("report");
-    write_whole(&folder.join("study.json"), &json)?;
-    report::write(&made, &pages)?;
-    Ok(pages.join(report::PAGE_FILE))
 }
 
 /// The command line that gives these results.

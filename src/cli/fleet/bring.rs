@@ -17,10 +17,8 @@ use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
 use crate::campaign::origin::{LogOrigin, logs_in};
 use crate::campaign::start::{StartRecord, earlier_folders, other_starts};
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
-use crate::cli::simulate::made_by;
 use crate::cli::words;
 use crate::fleet::logs::manifest::{LogFlight, Shelf};
 use crate::fleet::logs::one::{OneOptions, Which};
@@ -31,6 +29,8 @@ use crate::link::clock::{Clock as _, Micros, S};
 use crate::link::id::DroneId;
 use crate::link::net::Net;
 use crate::mission::Plan;
+use crate::workflow::clock::SystemClock;
+use crate::workflow::made_by;
 
 /// What is wanted of the drones' logs.
 #[derive(Clone, Debug)]

@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::cli::clock::SystemClock;
 use crate::cli::context::complain;
 use crate::cli::exit::CommandError;
 use crate::link::address::{Address, Way, links};
 use crate::link::clock::Clock as _;
 use crate::link::signing::{Key, exposure};
 use crate::link::station::{Setup, Station};
+use crate::workflow::clock::SystemClock;
 
 /// Where drones are listened for without a choice.
 const DEFAULT_LINK: &str = "udpin:0.0.0.0:14550";

@@ -24,7 +24,6 @@ use serde::Serialize;
 use crate::base::file::FileError;
 use crate::campaign::FlightFolder;
 use crate::campaign::start::StartRecord;
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::interrupt::Choice;
@@ -38,22 +37,17 @@ use crate::fleet::slots::{FleetTable, SlotProblem, check_stands, picture, propos
 use crate::fleet::telemetry::Telemetry;
 use crate::link::clock::{Clock as _, MS, Micros, S};
 use crate::link::conversation::{Conversation, Observer, Progress as Share, run_all};
-use crate::link::error::{NetError, Refusal};
+use crate::link::error::Refusal;
 use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
 use crate::mission::Plan;
 use crate::show::Show;
+use crate::workflow::clock::SystemClock;
 
 /// Conversations at once per network: short ones do not disturb each other.
 const AT_ONCE: usize = 64;
 /// Drones are listened to for so long after the last of them was heard, to judge their links.
 const SETTLE: Micros = 4 * S;
-
-impl From<NetError> for CommandError {
-    fn from(error: NetError) -> Self {
-        Self::Failed(crate::cli::exit::with_reasons(&error))
-    }
-}
 
 /// A fleet, its flight, and what is known of both.
 #[expect(clippy::struct_excessive_bools, reason = "each is a way in which a flight is another")]

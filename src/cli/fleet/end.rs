@@ -11,7 +11,6 @@ use crate::base::causes::with_causes;
 use crate::campaign::lock::FolderLock;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{self, CampaignError, FlightFolder};
-use crate::cli::clock::{Stopwatch, SystemClock};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::{Aborted, Action};
@@ -22,6 +21,7 @@ use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
 use crate::link::net::Net;
 use crate::mission::Plan;
+use crate::workflow::clock::{Stopwatch, SystemClock};
 
 /// A station that flies answers within this.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(3);
@@ -172,7 +172,7 @@ fn order(
                 .warn(&format!("no order to the running station: {}", with_causes(&error, ": "))),
         }
     }
-    let watch = Stopwatch::start();
+    let watch = Stopwatch::start(context);
     loop {
         if let Some(place) = given.iter().position(|(given, _)| given.answer().is_some()) {
             let (taken, flight) = given.swap_remove(place);
@@ -206,8 +206,8 @@ fn follow(
     given: Given,
     patience: Duration,
 ) -> Result<BTreeMap<DroneId, Aborted>, CommandError> {
-    let mut beat = (None, Stopwatch::start());
-    let watch = Stopwatch::start();
+    let mut beat = (None, Stopwatch::start(context));
+    let watch = Stopwatch::start(context);
     let (mut seen, mut named): (BTreeMap<_, _>, bool) = (BTreeMap::new(), false);
     loop {
         let answer = given.answer();
@@ -221,7 +221,7 @@ fn follow(
             return Ok(done);
         }
         if let Some(answer) = answer.filter(|answer| Some(answer.beat) != beat.0) {
-            beat = (Some(answer.beat), Stopwatch::start());
+            beat = (Some(answer.beat), Stopwatch::start(context));
             if answer.beat % 10 == 9 {
                 let open = answer.drones.iter().filter(|(_, done)| done.is_none());
                 context.say(&waiting(open.map(|(drone, _)| *drone)));

@@ -5,9 +5,7 @@ use std::net::SocketAddr;
 
 use super::connect::{own_link, station};
 use crate::base::time::GpsTime;
-use crate::cli::clock::SystemClock;
 use crate::cli::exit::{CommandError, with_reasons};
-use crate::cli::simulate::SlotSet;
 use crate::cli::words;
 use crate::link::clock::{Micros, S};
 use crate::link::signing::Key;
@@ -22,6 +20,8 @@ use crate::virtual_fleet::server::{Pace, Running, ServerOptions, serve_with};
 use crate::virtual_fleet::storage::MemoryStorage;
 use crate::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use crate::virtual_fleet::world::World;
+use crate::workflow::clock::SystemClock;
+use crate::workflow::slots::SlotSet;
 
 /// Virtual drones in one network: its system ids, without those of ground stations.
 pub(in crate::cli) const MOST_PER_NETWORK: usize = 253;

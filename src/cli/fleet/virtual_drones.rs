@@ -16,10 +16,9 @@ use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
 use crate::campaign::origin::default_of;
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::cli::simulate::{AirArgs, SlotSet, parse_slots, resolved_vehicle, updraft};
+use crate::cli::simulate::{AirArgs, parse_slots, updraft};
 use crate::cli::words;
 use crate::link::clock::{Clock as _, MS, Micros, S};
 use crate::mission::Plan;
@@ -28,6 +27,9 @@ use crate::virtual_fleet::broadcast::{BROADCAST_PORT, Broadcasts};
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
+use crate::workflow::clock::SystemClock;
+use crate::workflow::simulate::resolved_vehicle;
+use crate::workflow::slots::SlotSet;
 
 /// Arguments of `updraft fleet virtual`.
 #[derive(Clone, Debug, Args)]

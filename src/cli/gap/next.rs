@@ -1,39 +1,15 @@
 //! `updraft gap next`: the flight that would tell what the verdict left open.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
-use super::blind::Searched;
-use super::{MODEL, VERDICT};
-use crate::base::file::{FileError, write_whole};
 use crate::base::plain::Shown as _;
-use crate::blind::rehearse::{Rehearsal, answers, rehearse};
-use crate::campaign::{self, FlightFolder, read_json, to_json};
-use crate::cli::check::{Origin, checked, is_safe};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::cli::simulate::made_by;
 use crate::cli::words;
-use crate::gap::Verdict;
-use crate::gap::next::predict::{least, matters};
-use crate::gap::next::questions::Kind;
-use crate::gap::next::result::{Asked, Told};
-use crate::gap::next::search::{Aim, Choice, search};
-use crate::gap::next::{Flight, Known, NEXT_SCHEMA, Next, Question, Sought, ask};
-use crate::gap::verdict::VERDICT_SCHEMA;
-use crate::mission::Plan;
-use crate::mission::plan::Purpose;
-use crate::mission::resolve::{ResolvedFlight, resolve_text};
-use crate::vehicle::{Vehicle, library};
-
-/// Name of the proposal, as template and as JSON.
-const TEMPLATE: &str = "next.toml";
-const RESULT: &str = "next.json";
-/// Folder of the simulated flights that verify it; removed when they are explained.
-const REHEARSAL: &str = "next-rehearsal";
-/// Most flights that are worth telling: beyond, the question is not for this kind of flight.
-const MOST_FLIGHTS: f64 = 100.0;
+use crate::report::next_terminal;
+use crate::workflow::gap::next::{self, Proposed, Wish};
 
 /// Arguments of `updraft gap next`.
 #[derive(Debug, Args)]
@@ -76,13 +52,6 @@ pub(super) struct NextArgs {
     output: Option<PathBuf>,
 }
 
-impl NextArgs {
-    /// Folder of the comparison.
-    fn compared(&self) -> PathBuf {
-        self.gap.clone().unwrap_or_else(|| self.campaign.join("gap"))
-    }
-}
-
 fn number(text: &str, low: f64, high: f64) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),
@@ -103,345 +72,27 @@ fn wind(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(context: &Context, args: &NextArgs) -> Result<Exit, CommandError> {
-    let before = Before::read(args)?;
-    let wind_mps = [args.wind, 0.0];
-    let verdict = &before.verdict;
-    let known = Known::new(verdict, before.model.clone(), wind_mps);
-    let present = Flight::new(&known, before.plan.clone())?;
-    let (questions, passed_over) = questions(&known, &present, verdict)?;
-    if questions.is_empty() {
-        return Err(CommandError::Nothing(format!(
-            "{}: nothing is left to ask: no class, nothing unknown, and every effect that matters would \
-             have been seen",
-            before.place.shown()
-        )));
-    }
-    let limits = &before.plan.limits;
-    let longest_s = args.longest.unwrap_or(limits.endurance_s * (1.0 - limits.endurance_reserve));
-    let aim = Aim { z: args.z, longest_s };
-    let choice = search(&known, &before.plan, &before.word, &questions, aim)?.ok_or_else(|| {
-        CommandError::Usage(format!(
-            "no flight of the elements is as short as {longest_s:.0} s (--longest)"
-        ))
-    })?;
-    let mut next = result(&before, &questions, &choice, args.z);
-    next.notes = notes(&questions, &passed_over, &choice, &known);
-    let folder = args.output.clone().unwrap_or_else(|| args.compared());
-    crate::base::file::create_folder(&folder)?;
-    let _lock = context.lock(&folder)?;
-    let text = choice.elements.template(&choice.plan, &before.word, &head(&next), &next.briefing);
-    let path = folder.join(TEMPLATE);
-    let flight = planned(&path, &text)?;
-    let show = flight.plan.to_show();
-    let report = checked(&show, &flight.plan, &flight.vehicle, &Origin::Plan, 1);
-    if !is_safe(&report, &[]) {
-        next.notes.push(
-            "`updraft check` does not pass this flight as it is: plan it and see what it says"
-                .to_owned(),
-        );
-    }
-    if !args.no_verify {
-        verify(
-            context,
-            &mut next,
-            &Verify {
-                questions: &questions,
-                choice: &choice,
-                before: &before,
-                flight: &flight,
-                folder: &folder.join(REHEARSAL),
-                wind_mps,
-                seed: args.seed,
-            },
-        )?;
-    }
-    write_whole(&path, text.as_bytes())?;
-    let json = to_json(&next)
-        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-    write_whole(&folder.join(RESULT), &json)?;
+    let proposed = next::run(
+        context,
+        &Wish {
+            campaign: args.campaign.clone(),
+            gap: args.gap.clone(),
+            z: args.z,
+            longest_s: args.longest,
+            flight: args.flight.clone(),
+            wind_mps: args.wind,
+            verify: !args.no_verify,
+            seed: args.seed,
+            output: args.output.clone(),
+        },
+    )?;
+    let Proposed { next, path } = &proposed;
     if context.json {
-        context.print_json(&next)?;
+        context.print_json(next)?;
     } else {
-        context.print(&crate::report::next_terminal::text(&next))?;
+        context.print(&next_terminal::text(next))?;
     }
-    context.result(&path)?;
+    context.result(path)?;
     context.say(&format!("{} -> {}", words::count(next.questions.len(), "question"), path.shown()));
     Ok(Exit::Done)
-}
-
-/// The flight that was compared, and what came of it.
-struct Before {
-    place: PathBuf,
-    verdict: Verdict,
-    plan: Plan,
-    model: Vehicle,
-    /// The template's word for the vehicle.
-    word: String,
-}
-
-impl Before {
-    fn read(args: &NextArgs) -> Result<Self, CommandError> {
-        let campaign = &args.campaign;
-        let compared = args.compared();
-        let place = compared.join(VERDICT);
-        if !place.is_file() {
-            // A folder that is not there is another matter than one that was not compared.
-            std::fs::metadata(campaign).map_err(|error| FileError::new("read", campaign, error))?;
-            campaign::flights(campaign)?;
-            let at = match &args.gap {
-                Some(folder) => format!("{} has no {VERDICT}", folder.shown()),
-                None => format!("{} has no gap/{VERDICT}", campaign.shown()),
-            };
-            return Err(CommandError::Nothing(format!(
-                "{at}: compare it first (`updraft gap {}`), or say where that was put (--gap)",
-                campaign.shown()
-            )));
-        }
-        let verdict: Verdict = read_json(&place)?;
-        let (folder, plan) = flight_of(campaign, args.flight.as_deref())?;
-        is_of(&verdict, &plan).map_err(|why| {
-            CommandError::Usage(format!("{} cannot be used: {why}", place.shown()))
-        })?;
-        let vehicle = folder.vehicle();
-        let model = compared.join(MODEL);
-        let model = library::load(&model.to_string_lossy())?;
-        let is_builtin = library::names().any(|name| name == plan.vehicle);
-        let word =
-            if is_builtin { plan.vehicle.clone() } else { vehicle.to_string_lossy().into_owned() };
-        Ok(Self { place, verdict, plan, model, word })
-    }
-}
-
-/// Whether a verdict can be one of this flight; else why not.
-fn is_of(verdict: &Verdict, plan: &Plan) -> Result<(), String> {
-    if verdict.schema != VERDICT_SCHEMA {
-        return Err(format!("its schema is \"{}\", not {VERDICT_SCHEMA}", verdict.schema));
-    }
-    let names = |group: &(String, usize)| plan.groups.iter().any(|known| known.name == group.0);
-    let stranger = verdict.data.groups.iter().find(|group| !names(group));
-    match stranger {
-        Some((name, _)) => Err(format!(
-            "it compares a group \"{name}\", which the flight {} does not have: name the flight that \
-             was compared (--flight)",
-            plan.name
-        )),
-        None if verdict.data.drones > plan.slots.len() => Err(format!(
-            "it compares {} drones, and the flight {} has {}",
-            verdict.data.drones,
-            plan.name,
-            plan.slots.len()
-        )),
-        None => Ok(()),
-    }
-}
-
-/// The flight that is named, else the calibration, else the first.
-fn flight_of(campaign: &Path, name: Option<&str>) -> Result<(FlightFolder, Plan), CommandError> {
-    let mut flights = Vec::new();
-    for folder in campaign::flights(campaign)? {
-        let plan = folder.read_plan()?;
-        flights.push((folder, plan));
-    }
-    let place = match name {
-        Some(name) => flights.iter().position(|(_, plan)| plan.name == name),
-        None => flights
-            .iter()
-            .position(|(_, plan)| plan.purpose == Purpose::Calibration)
-            .or((!flights.is_empty()).then_some(0)),
-    };
-    let names: Vec<&str> = flights.iter().map(|(_, plan)| plan.name.as_str()).collect();
-    match place {
-        Some(place) => Ok(flights.swap_remove(place)),
-        None => Err(CommandError::Usage(format!(
-            "there is no flight \"{}\"; flights are {}",
-            name.unwrap_or_default(),
-            names.join(", ")
-        ))),
-    }
-}
-
-/// What is asked, and the effects that were too small to see and do not matter for the pulse.
-fn questions(
-    known: &Known,
-    present: &Flight,
-    verdict: &Verdict,
-) -> Result<(Vec<Question>, Vec<String>), CommandError> {
-    let (mut asked, mut passed_over) = (Vec::new(), Vec::new());
-    for question in ask(verdict) {
-        match &question.sought {
-            Sought::Seen { effect } if !matters(known, present, effect)? => {
-                passed_over.push(effect.clone());
-            }
-            _ => asked.push(question),
-        }
-    }
-    Ok((asked, passed_over))
-}
-
-fn planned(path: &Path, text: &str) -> Result<ResolvedFlight, CommandError> {
-    let mut mission = resolve_text(&path.shown().to_string(), text, &[])?;
-    if mission.flights.is_empty() {
-        return Err(CommandError::Failed("the proposed template has no flight".to_owned()));
-    }
-    Ok(mission.flights.swap_remove(0))
-}
-
-fn result(before: &Before, questions: &[Question], choice: &Choice, wanted_z: f64) -> Next {
-    let asked: Vec<Asked> = questions
-        .iter()
-        .zip(&choice.was)
-        .zip(choice.predicted.iter().zip(&choice.wanted))
-        .map(|((question, was), (will, wanted))| {
-            let (present_z, proposed_z) = (least(was), least(will));
-            let needed = (wanted / proposed_z.max(1e-9)).powi(2).ceil();
-            let from = will.iter().map(|told| {
-                let before = was.iter().find(|before| before.from == told.from);
-                Told {
-                    from: told.from.clone(),
-                    size: told.size,
-                    present_z: before.map_or(0.0, |before| before.z),
-                    proposed_z: told.z,
-                }
-            });
-            let reached = proposed_z >= *wanted;
-            Asked {
-                kind: question.kind(),
-                question: question.words.clone(),
-                wanted_z: *wanted,
-                present_z,
-                proposed_z,
-                reached,
-                flights_needed: (!reached && needed <= MOST_FLIGHTS).then_some(needed as u32),
-                from: from.collect(),
-                verified: Vec::new(),
-            }
-        })
-        .collect();
-    Next {
-        schema: NEXT_SCHEMA.to_owned(),
-        made_by: made_by(),
-        flight: before.plan.name.clone(),
-        wanted_z,
-        present_s: before.plan.duration_ms as f64 / 1000.0,
-        proposed_s: choice.plan.duration_ms as f64 / 1000.0,
-        reaches: asked.iter().all(|asked| asked.reached),
-        elements: choice.elements,
-        why: choice.elements.words().into_iter().map(str::to_owned).collect(),
-        briefing: choice.elements.briefing(&choice.plan),
-        questions: asked,
-        predicted_flights: choice.looked_at,
-        notes: Vec::new(),
-    }
-}
-
-fn notes(
-    questions: &[Question],
-    passed_over: &[String],
-    choice: &Choice,
-    known: &Known,
-) -> Vec<String> {
-    let mut notes = Vec::new();
-    if !passed_over.is_empty() {
-        let names: Vec<&str> = passed_over.iter().map(String::as_str).collect();
-        notes.push(format!(
-            "not asked: {}, which at the usual size moves the pulse of such a flight by less than 2.5 us",
-            words::list(&names)
-        ));
-    }
-    let is_asked = |effect: &str| {
-        questions.iter().any(|question| match &question.sought {
-            Sought::Seen { effect: one } => one == effect,
-            Sought::Apart { effects, .. } => effects.iter().any(|one| one == effect),
-            Sought::Shape { .. } => false,
-        })
-    };
-    if is_asked("neighbour-downwash") {
-        notes.push(
-            "neighbour-downwash hides in the drones' own offsets: fly twice, with the drones' slots \
-             permuted in between (that is not predicted here)"
-                .to_owned(),
-        );
-    }
-    if choice.elements.payload {
-        notes.push(
-            "`updraft gap` does not know of the payload: it shows in the offsets of the drones that \
-             carry it"
-                .to_owned(),
-        );
-    }
-    if !known.has_voltage {
-        notes.push(
-            "the logs have no voltage at rest: staggered charge tells nothing until they do"
-                .to_owned(),
-        );
-    }
-    notes
-}
-
-/// Comment lines of the template.
-fn head(next: &Next) -> Vec<String> {
-    let mut head = vec![
-        format!(
-            "The flight that would tell: made by `updraft gap next` from the verdict on {}.",
-            next.flight
-        ),
-        String::new(),
-        format!(
-            "Predicted Fisher z ({} is wanted), of the flight that was flown and of this:",
-            next.wanted_z
-        ),
-    ];
-    for asked in &next.questions {
-        head.push(format!(
-            "  {:5.1} -> {:5.1}  {}",
-            asked.present_z, asked.proposed_z, asked.question
-        ));
-        for told in asked.from.iter().filter(|told| !told.from.is_empty()) {
-            head.push(format!(
-                "  {:5.1} -> {:5.1}    from {}",
-                told.present_z, told.proposed_z, told.from
-            ));
-        }
-    }
-    head.push(String::new());
-    head.extend(next.why.iter().map(|why| format!("* {why}")));
-    head.push(String::new());
-    head
-}
-
-struct Verify<'a> {
-    questions: &'a [Question],
-    choice: &'a Choice,
-    before: &'a Before,
-    flight: &'a ResolvedFlight,
-    folder: &'a Path,
-    wind_mps: [f64; 2],
-    seed: u64,
-}
-
-/// Simulates the proposed flight with each answer in turn.
-fn verify(context: &Context, next: &mut Next, with: &Verify<'_>) -> Result<(), CommandError> {
-    let rehearsal = Rehearsal {
-        flight: with.flight,
-        elements: with.choice.elements,
-        noise: &with.before.verdict.noise,
-        wind_mps: with.wind_mps,
-        seed: with.seed,
-    };
-    let all = with.questions.iter().zip(&with.choice.predicted).zip(&mut next.questions);
-    for ((question, predicted), asked) in all {
-        if question.kind() == Kind::TooSmall && !asked.reached {
-            // It would not be found, and that is said already.
-            continue;
-        }
-        let sizes: Vec<(String, Option<f64>)> =
-            predicted.iter().map(|told| (told.from.clone(), told.size)).collect();
-        for answer in answers(question, &with.before.model, &sizes) {
-            context.check_stop()?;
-            context.say(&format!("Simulating it with {} ...", answer.effect));
-            let stop = Some(context.stop_flag());
-            asked.verified.push(rehearse(&rehearsal, &answer, with.folder, &Searched, stop)?);
-        }
-    }
-    Ok(())
 }

@@ -14,11 +14,8 @@ use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::start::StartRecord;
 use crate::campaign::{self, FlightFolder};
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::cli::progress::Progress;
-use crate::cli::simulate::made_by;
 use crate::cli::words;
 use crate::fleet::logs::import::{
     Answers, Carried, CarriedOut, Carry, Decision, Doubt, ImportFlight, StartFrom, Survey, Take,
@@ -28,6 +25,9 @@ use crate::fleet::slots::FleetTable;
 use crate::flight::identity::{SAME_START_S, later_s};
 use crate::link::clock::Clock as _;
 use crate::mission::Plan;
+use crate::workflow::clock::SystemClock;
+use crate::workflow::host::{Host as _, Progress};
+use crate::workflow::made_by;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "Examples:
@@ -94,9 +94,9 @@ struct LogRow {
 pub(super) fn run(context: &Context, args: &ImportArgs) -> Result<Exit, CommandError> {
     let flights = flights(args)?;
     let _lock = context.lock(&args.campaign)?;
-    let progress: OnceLock<Progress> = OnceLock::new();
+    let progress: OnceLock<Box<dyn Progress + '_>> = OnceLock::new();
     let found = survey(&args.cards, &flights, &|total| {
-        progress.get_or_init(|| Progress::new(context, "reading", total as u64)).advance();
+        progress.get_or_init(|| context.progress("reading", total as u64)).advance();
     })?;
     if let Some(progress) = progress.get() {
         progress.finish();

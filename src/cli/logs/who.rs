@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::crew::{Crew, nobody};
-use crate::cli::simulate::SlotSet;
 use crate::fleet::slots::{FleetTable, SlotProblem, picture, propose, propose_clear};
 use crate::link::clock::{MS, Micros, S};
 use crate::link::conversation::Observer as _;
 use crate::link::net::Net as _;
+use crate::workflow::slots::SlotSet;
 
 /// How often it is looked who stands where.
 const LOOK: Micros = 200 * MS;

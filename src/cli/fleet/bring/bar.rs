@@ -7,13 +7,13 @@ use std::sync::atomic::Ordering;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::shares::Shares;
-use crate::cli::clock::Stopwatch;
 use crate::cli::context::Context;
 use crate::cli::words;
 use crate::link::clock::{Micros, S};
 use crate::link::conversation::{Observer, Progress as Share};
 use crate::link::id::DroneId;
 use crate::link::net::Received;
+use crate::workflow::clock::Stopwatch;
 
 /// Who was not heard for so long is waited for, aloud.
 const SAID_AFTER: Micros = 3 * S;
@@ -45,7 +45,7 @@ impl<'a> Bar<'a> {
         Self {
             context,
             line,
-            watch: Stopwatch::start(),
+            watch: Stopwatch::start(context),
             shares: Shares::default(),
             said: 0,
             absent,

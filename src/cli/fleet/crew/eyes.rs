@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::file::FileError;
-use crate::cli::clock::SystemClock;
 use crate::cli::context::Context;
 use crate::cli::fleet::interrupt::{Choice, Interrupt};
 use crate::fleet::greet::ask_time;
@@ -15,6 +14,7 @@ use crate::link::conversation::Observer;
 use crate::link::error::Refusal;
 use crate::link::id::DroneId;
 use crate::link::net::{Net, Received};
+use crate::workflow::clock::SystemClock;
 
 /// A [`Monitor`] whose events are told to people and to the journal.
 pub(super) struct Eyes<'a> {

@@ -8,12 +8,12 @@ use crate::base::file::read_whole;
 use crate::campaign::start::{Flying, StartRecord, StartedDrone};
 use crate::cli::exit::CommandError;
 use crate::cli::fleet::crew::load::MOST_SKYB;
-use crate::cli::simulate::made_by;
 use crate::fleet::abort::Aborted;
 use crate::fleet::start::Start;
 use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
+use crate::workflow::made_by;
 
 impl Crew<'_> {
     /// Writes down who starts when, and with which show, before anybody is told to: logs are held

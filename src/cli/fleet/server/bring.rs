@@ -19,17 +19,17 @@ use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
 use crate::campaign::start::{StartRecord, other_starts};
-use crate::cli::clock::Spent;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, with_reasons};
 use crate::cli::fleet::bring::Wish;
 use crate::cli::fly_output::LogOutput;
-use crate::cli::simulate::made_by;
 use crate::cli::words;
 use crate::fleet::logs::manifest::{LogFlight, Shelf};
 use crate::link::clock::{Micros, S};
 use crate::mission::Plan;
 use crate::skybrush_server::{Client, Foreman, Job, Outcome, list_logs};
+use crate::workflow::clock::Spent;
+use crate::workflow::made_by;
 
 /// A word to who waits.
 const SAY_EVERY: Micros = 10 * S;

@@ -7,7 +7,7 @@ use crate::campaign::FlightFolder;
 use crate::campaign::start::{Flying, StartRecord, StartedDrone};
 use crate::cli::context::Context;
 use crate::cli::exit::CommandError;
-use crate::cli::simulate::made_by;
+use crate::workflow::made_by;
 
 /// The record of a start, if one could be written.
 #[derive(Default)]

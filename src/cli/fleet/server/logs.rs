@@ -10,9 +10,9 @@ use crate::cli::exit::CommandError;
 use crate::cli::fleet::bring::Wish;
 use crate::cli::fly_output::LogOutput;
 use crate::cli::logs::{ListRow, ListedLog};
-use crate::cli::simulate::SlotSet;
 use crate::mission::Plan;
 use crate::skybrush_server::{Client, LogEntry};
+use crate::workflow::slots::SlotSet;
 
 /// Who is there, and the slots that are meant.
 fn meet(

@@ -32,13 +32,13 @@ use super::start::{LeadArgs, needs_person};
 use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
-use crate::cli::exit::{CommandError, Exit, with_reasons};
+use crate::cli::exit::{CommandError, Exit};
 use crate::cli::fly_output::{FlightEnd, FlightOutput, LogOutput};
 use crate::fleet::abort::Action;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
 use crate::skybrush_server::gate::Step;
-use crate::skybrush_server::{Client, ServerError, StartConfig};
+use crate::skybrush_server::{Client, StartConfig};
 
 pub(in crate::cli) use attach::take_over;
 pub(in crate::cli) use dry::{dry_end, dry_fly, dry_look, dry_upload};
@@ -64,12 +64,6 @@ impl Flight<'_> {
     fn abort(&self) -> String {
         let Self { address, folder, .. } = self;
         format!("updraft fleet abort {} --connect skybrush://{address}", folder.0.shown())
-    }
-}
-
-impl From<ServerError> for CommandError {
-    fn from(error: ServerError) -> Self {
-        Self::Failed(with_reasons(&error))
     }
 }
 

@@ -13,9 +13,9 @@ use crate::show::{Show, csv, skyb, skyc};
 use crate::vehicle::{Vehicle, VehicleError, library};
 
 /// Largest show file that is read, bytes.
-const MAX_SHOW_BYTES: u64 = 256 << 20;
+pub(super) const MAX_SHOW_BYTES: u64 = 256 << 20;
 /// Largest binary show that is read, bytes.
-pub(super) const MAX_SKYB_BYTES: u64 = 4 << 20;
+pub(crate) const MAX_SKYB_BYTES: u64 = 4 << 20;
 
 /// A show could not be read.
 #[derive(Debug, Error)]
@@ -67,21 +67,21 @@ pub enum LoadError {
 
 /// A show with the plan it is checked against.
 #[derive(Clone, Debug)]
-pub(super) struct Loaded {
+pub(crate) struct Loaded {
     /// Where it came from.
-    pub(super) path: PathBuf,
+    pub(crate) path: PathBuf,
     /// The show.
-    pub(super) show: Show,
+    pub(crate) show: Show,
     /// Its plan; recovered from the show itself when it has none.
-    pub(super) plan: Plan,
+    pub(crate) plan: Plan,
     /// The vehicle that is to fly it.
-    pub(super) vehicle: Vehicle,
+    pub(crate) vehicle: Vehicle,
     /// How the campaign's files differ from its plan, one sentence each.
-    pub(super) mismatches: Vec<String>,
+    pub(crate) mismatches: Vec<String>,
 }
 
 /// Loads the shows behind a path; `vehicle` gives limits to shows that bring none.
-pub(super) fn load_shows(path: &Path, vehicle: &Vehicle) -> Result<Vec<Loaded>, LoadError> {
+pub(crate) fn load_shows(path: &Path, vehicle: &Vehicle) -> Result<Vec<Loaded>, LoadError> {
     if path.is_dir() {
         if campaign::is_campaign(path) {
             return campaign::flights(path)?.iter().map(load_flight).collect();
@@ -109,7 +109,7 @@ pub(super) fn load_shows(path: &Path, vehicle: &Vehicle) -> Result<Vec<Loaded>, 
 }
 
 /// Reads one show file by its ending.
-pub(super) fn read_show(path: &Path) -> Result<Show, LoadError> {
+pub(crate) fn read_show(path: &Path) -> Result<Show, LoadError> {
     if has_extension(path, "skyc") {
         read_skyc(path)
     } else if has_extension(path, "skyb") {
@@ -123,7 +123,7 @@ pub(super) fn read_show(path: &Path) -> Result<Show, LoadError> {
     }
 }
 
-pub(super) fn has_extension(path: &Path, wanted: &str) -> bool {
+pub(crate) fn has_extension(path: &Path, wanted: &str) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted))
 }
 

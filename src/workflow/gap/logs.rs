@@ -9,18 +9,18 @@ use crate::analysis::slots::whose_logs;
 use crate::analysis::together::{Remark, together};
 use crate::base::causes::with_causes;
 use crate::base::plain::Shown as _;
-use crate::cli::found::Found;
 use crate::flight::{Flight, FlightOptions, Indicator, table};
+use crate::workflow::find::Found;
 
 /// Logs that were read, and why the others were not.
 #[derive(Debug, Default)]
-pub(in crate::cli) struct Read {
+pub(crate) struct Read {
     /// Slot (a running number without a plan) and flight.
-    pub(in crate::cli) flights: Vec<(u16, Flight)>,
+    pub(crate) flights: Vec<(u16, Flight)>,
     /// Each other log with its reason.
-    pub(in crate::cli) left_out: Vec<String>,
+    pub(crate) left_out: Vec<String>,
     /// What is lost of logs that were read all the same.
-    pub(in crate::cli) in_part: Vec<String>,
+    pub(crate) in_part: Vec<String>,
 }
 
 /// A log that could be read.
@@ -32,7 +32,7 @@ struct Opened {
 }
 
 /// Reads all logs of a flight; a log that cannot be used stops none of the others.
-pub(in crate::cli) fn read(found: &Found, root: &Path) -> Read {
+pub(crate) fn read(found: &Found, root: &Path) -> Read {
     if found.logs.iter().any(|log| log.table.is_some()) {
         return tables(found);
     }

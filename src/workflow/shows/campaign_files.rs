@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::exit::with_reasons;
-use super::load::{MAX_SKYB_BYTES, has_extension, read_show};
+use super::load::{MAX_SHOW_BYTES, MAX_SKYB_BYTES, has_extension, read_show};
 use crate::base::causes::with_causes;
 use crate::base::file::read_whole;
 use crate::base::plain::Shown as _;
@@ -16,9 +15,8 @@ use crate::mission::Plan;
 use crate::show::csv::CsvOptions;
 use crate::show::{FenceZone, Show, ShowDrone, skyb, verify_archive};
 use crate::vehicle::{Vehicle, library};
+use crate::workflow::error::with_reasons;
 
-/// Largest show file that is read, bytes.
-const MAX_SHOW_BYTES: u64 = 256 << 20;
 /// What `.skyc` files round to, m.
 const SKYC_M: f64 = 0.001;
 /// Problems of one kind that are named one by one; the rest is counted.
@@ -26,19 +24,19 @@ const MAX_NAMED: usize = 5;
 
 /// A flight's folder as it is.
 #[derive(Clone, Debug)]
-pub(super) struct FlightFiles {
+pub(crate) struct FlightFiles {
     /// The plan; none if it is missing or cannot be read.
-    pub(super) plan: Option<Plan>,
+    pub(crate) plan: Option<Plan>,
     /// What the show file holds; what the plan says where that cannot be read.
-    pub(super) show: Show,
+    pub(crate) show: Show,
     /// The vehicle beside the plan, if it can be read.
-    pub(super) vehicle: Option<Vehicle>,
+    pub(crate) vehicle: Option<Vehicle>,
     /// What is wrong with the files, one sentence each.
-    pub(super) problems: Vec<String>,
+    pub(crate) problems: Vec<String>,
 }
 
 /// Reads and compares everything in a flight's folder.
-pub(super) fn open(folder: &FlightFolder) -> FlightFiles {
+pub(crate) fn open(folder: &FlightFolder) -> FlightFiles {
     let mut problems = Vec::new();
     let vehicle = match library::load(&folder.vehicle().to_string_lossy()) {
         _ if !present(&folder.vehicle(), &mut problems) => None,

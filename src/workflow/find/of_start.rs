@@ -5,18 +5,18 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::exit::CommandError;
-use super::load::has_extension;
-use super::words;
 use crate::analysis::LogInput;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::start::{START_FILE, StartRecord, earlier_folders};
 use crate::fleet::logs::manifest::Shelf;
 use crate::flight::{Belongs, Identity};
+use crate::workflow::error::WorkflowError;
+use crate::workflow::shows::load::has_extension;
+use crate::workflow::words;
 
 /// When the flight began whose logs lie in a folder, and where that is written.
-pub(super) fn written_start(logs: &Path) -> Result<Option<(GpsTime, &'static str)>, CommandError> {
+fn written_start(logs: &Path) -> Result<Option<(GpsTime, &'static str)>, WorkflowError> {
     if let Some(record) = StartRecord::read_in(logs)? {
         return Ok(Some((record.start, START_FILE)));
     }
@@ -40,7 +40,7 @@ pub(super) struct Flight<'a> {
 pub(super) fn refuse(
     flight: &Flight<'_>,
     logs: &mut [LogInput],
-) -> Result<(Option<GpsTime>, Vec<String>), CommandError> {
+) -> Result<(Option<GpsTime>, Vec<String>), WorkflowError> {
     let written = match flight.campaign {
         Some(_) => written_start(flight.logs)?,
         // In a folder that is no campaign's, files of these names may be anything.

@@ -6,7 +6,6 @@
 
 use std::path::Path;
 
-use super::found::{Found, Work};
 use crate::analysis::result::FlightAnalysis;
 use crate::base::plain::Shown as _;
 use crate::campaign::origin::LogOrigin;
@@ -14,6 +13,7 @@ use crate::campaign::{self, FlightFolder};
 use crate::flight::Indicator;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
+use crate::workflow::find::{Found, Work};
 
 /// Homes of one slot further apart are of two grids, m.
 const SAME_HOME_M: f64 = 0.5;

@@ -3,17 +3,17 @@
 
 use std::path::Path;
 
-use super::context::Context;
-use super::exit::CommandError;
 use crate::analysis::result::Analysis;
 use crate::base::file::write_with;
 use crate::base::plain::Shown as _;
 use crate::campaign;
 use crate::report::fields;
 use crate::study::result::{STUDY_RESULT_SCHEMA, StudyResult};
+use crate::workflow::error::WorkflowError;
+use crate::workflow::host::Host;
 
 /// Writes the fields, if there are any. Those of an earlier analysis that has become empty go.
-pub(super) fn write_fields(analysis: &Analysis, folder: &Path) -> Result<(), CommandError> {
+pub(super) fn write_fields(analysis: &Analysis, folder: &Path) -> Result<(), WorkflowError> {
     let (csv, parquet) = (campaign::fields_csv(folder), campaign::fields_parquet(folder));
     if !fields::any(analysis) {
         for old in [csv, parquet] {
@@ -26,7 +26,7 @@ pub(super) fn write_fields(analysis: &Analysis, folder: &Path) -> Result<(), Com
     #[cfg(feature = "parquet")]
     {
         let bytes = crate::report::fields_parquet::parquet(analysis)
-            .map_err(|error| CommandError::Failed(format!("failed to make Parquet: {error}")))?;
+            .map_err(|error| WorkflowError::Failed(format!("failed to make Parquet: {error}")))?;
         crate::base::file::write_whole(&parquet, &bytes)?;
     }
     #[cfg(not(feature = "parquet"))]
@@ -35,7 +35,7 @@ pub(super) fn write_fields(analysis: &Analysis, folder: &Path) -> Result<(), Com
 }
 
 /// The study that a campaign holds; says so, and goes on without, where it cannot be read.
-pub(super) fn read_study(context: &Context, root: &Path) -> Option<StudyResult> {
+pub(super) fn read_study(host: &dyn Host, root: &Path) -> Option<StudyResult> {
     let path = campaign::study_result(root);
     if !path.is_file() {
         return None;
@@ -43,7 +43,7 @@ pub(super) fn read_study(context: &Context, root: &Path) -> Option<StudyResult> 
     match campaign::read_json::<StudyResult>(&path) {
         Ok(study) if study.schema == STUDY_RESULT_SCHEMA => Some(study),
         Ok(study) => {
-            context.warn(&format!(
+            host.warn(&format!(
                 "{} has the format \"{}\", this program reads \"{STUDY_RESULT_SCHEMA}\": the report \
                  goes without Fig. 2 and Table I; fly the study again",
                 path.shown(),
@@ -52,7 +52,7 @@ pub(super) fn read_study(context: &Context, root: &Path) -> Option<StudyResult> 
             None
         }
         Err(error) => {
-            context.warn(&format!("the report goes without Fig. 2 and Table I: {error}"));
+            host.warn(&format!("the report goes without Fig. 2 and Table I: {error}"));
             None
         }
     }

@@ -3,20 +3,20 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::exit::CommandError;
-use super::found::{Found, Work};
+use super::{Found, Work};
 use crate::base::plain::Shown as _;
+use crate::workflow::error::WorkflowError;
 
 /// `Err` if two of the paths are the same, or two flights of one plan (or of none) have a log in
 /// common: the same file, or a copy.
 ///
 /// Copies inside of one flight are named by the analysis, which uses one of them.
-pub(super) fn refuse(paths: &[PathBuf], work: &Work) -> Result<(), CommandError> {
+pub(crate) fn refuse(paths: &[PathBuf], work: &Work) -> Result<(), WorkflowError> {
     let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let mut seen: BTreeMap<PathBuf, &PathBuf> = BTreeMap::new();
     for path in paths {
         if let Some(before) = seen.insert(real(path), path) {
-            return Err(CommandError::Usage(format!(
+            return Err(WorkflowError::Usage(format!(
                 "{} and {} are the same: give it once",
                 before.shown(),
                 path.shown()
@@ -69,14 +69,14 @@ fn repeated<'a>(logs: &[(&Found, &'a Path)]) -> Option<(&'a Path, &'a Path)> {
     Some((path, other))
 }
 
-fn same_log(one: &Path, other: &Path, how: &str) -> CommandError {
+fn same_log(one: &Path, other: &Path, how: &str) -> WorkflowError {
     if one == other {
-        return CommandError::Usage(format!(
+        return WorkflowError::Usage(format!(
             "{} is in two of the folders and logs that were given: give it once",
             one.shown()
         ));
     }
-    CommandError::Usage(format!(
+    WorkflowError::Usage(format!(
         "{} and {} {how}: a log counts once; give each flight once, or take the copy away",
         one.shown(),
         other.shown()

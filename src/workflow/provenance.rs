@@ -4,15 +4,20 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::found::Work;
-use super::simulate::made_by;
+use super::find::Work;
+use super::host::Host;
+use super::made_by;
 use crate::base::plain::Shown as _;
 use crate::campaign::origin::LogOrigin;
 use crate::campaign::{self, FlightFolder};
 use crate::report::{InputFile, Provenance};
 
 /// The provenance of an analysis.
-pub(super) fn provenance(work: &Work, settings: Vec<(&'static str, String)>) -> Provenance {
+pub(crate) fn provenance(
+    host: &dyn Host,
+    work: &Work,
+    settings: Vec<(&'static str, String)>,
+) -> Provenance {
     let mut paths = plans(&work.root, work.origin.unwrap_or(LogOrigin::Real));
     paths.extend(work.flights.iter().flat_map(|flight| &flight.logs).map(|log| log.path.clone()));
     let inputs = paths
@@ -25,13 +30,9 @@ pub(super) fn provenance(work: &Work, settings: Vec<(&'static str, String)>) -> 
             InputFile { path: shown.shown().to_string(), sha256 }
         })
         .collect();
-    let shown: Vec<_> = std::env::args()
-        .skip(1)
-        .map(|word| if word.contains(' ') { format!("'{word}'") } else { word })
-        .collect();
     Provenance {
         program: made_by(),
-        command: format!("updraft {}", shown.join(" ")),
+        command: host.command(),
         seed: work.flights.iter().find_map(|flight| flight.seed),
         made_at: String::new(),
         settings: settings.into_iter().map(|(what, how)| (what.to_owned(), how)).collect(),

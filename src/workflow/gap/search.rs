@@ -2,25 +2,27 @@
 
 use std::path::Path;
 
-use super::{Both, compare, logs, one_flight, write};
+use super::compare::{Both, compare, flown};
+use super::{logs, one_flight, write};
 use crate::base::file::create_folder;
 use crate::blind::explain::{Cause, Explain, there};
 use crate::blind::scenario::Scenario;
 use crate::blind::vehicles::true_vehicle;
 use crate::campaign::FlightFolder;
-use crate::cli::found::{Found, Work};
-use crate::cli::provenance::provenance;
-use crate::gap::{Explained, Flown, Input, Options, Verdict, fisher_z};
+use crate::gap::{Explained, Input, Options, Verdict, fisher_z};
 use crate::vehicle::library;
+use crate::workflow::find::{Found, Work};
+use crate::workflow::host::Host;
+use crate::workflow::provenance::provenance;
 
 /// `updraft gap` on a flight folder, with its files written to `gap/` there.
-pub(in crate::cli) struct Written;
+pub(crate) struct Written<'a>(pub(crate) &'a dyn Host);
 
-impl Explain for Written {
+impl Explain for Written<'_> {
     fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
         let (explained, found) = explained(flight)?;
         let work = Work { flights: vec![found], ..Work::new(flight) };
-        let provenance = provenance(&work, Vec::new());
+        let provenance = provenance(self.0, &work, Vec::new());
         let folder = flight.join("gap");
         create_folder(&folder)?;
         write(&folder, &explained, &provenance)?;
@@ -41,7 +43,7 @@ fn explained(flight: &Path) -> Result<(Explained, Found), Cause> {
 }
 
 /// `updraft gap` on a flight folder.
-pub(in crate::cli) struct Searched;
+pub(crate) struct Searched;
 
 impl Explain for Searched {
     fn explain(&self, flight: &Path) -> Result<Verdict, Cause> {
@@ -54,8 +56,7 @@ impl Explain for Searched {
         let Some(slot) = truth.cold_slot() else { return unknown() };
         let Ok(vehicle) = true_vehicle(truth, slot) else { return unknown() };
         let read = logs::read(&found, Path::new(""));
-        let flown: Vec<Flown<'_>> =
-            read.flights.iter().map(|(slot, flight)| Flown { slot: *slot, flight }).collect();
+        let flown = flown(&read);
         let input = Input {
             vehicle: &vehicle,
             plan: found.plan.as_ref(),

@@ -1,18 +1,18 @@
-//! What was lost in an analysis, as lines for standard error: where nobody sees the tables.
+//! What was lost in an analysis, as lines for those who do not see the tables.
 
 use std::fmt::Write as _;
 
-use super::exit::{BECAUSE, CommandError};
 use crate::analysis::result::{Analysis, FlightAnalysis, Unmeasured};
 use crate::analysis::together::{Remark, together};
 use crate::mission::plan::Purpose;
+use crate::workflow::error::{BECAUSE, WorkflowError};
 
 /// Reasons that an error lists.
 const LISTED: usize = 12;
 
 /// Everything that is lost: one line each, with the flight's name. `cautions`: also what must be known
 /// before numbers are used.
-pub(super) fn problems(analysis: &Analysis, cautions: bool) -> Vec<String> {
+pub(crate) fn problems(analysis: &Analysis, cautions: bool) -> Vec<String> {
     let of_flight = |flight: &FlightAnalysis| {
         let name = flight.name.clone();
         let lost = lost(flight);
@@ -70,7 +70,7 @@ fn lost(flight: &FlightAnalysis) -> Vec<String> {
 
 /// The error of an analysis without one law and one value, with what to do. `reasons`: also why, for
 /// those who do not see the tables.
-pub(super) fn nothing_found(analysis: &Analysis, reasons: bool) -> CommandError {
+pub(crate) fn nothing_found(analysis: &Analysis, reasons: bool) -> WorkflowError {
     let has = |purpose| analysis.flights.iter().any(|flight| flight.purpose == purpose);
     let remedy = match (has(Purpose::Calibration), has(Purpose::Measurement)) {
         // A flight that failed is a warning of the whole.
@@ -103,5 +103,5 @@ pub(super) fn nothing_found(analysis: &Analysis, reasons: bool) -> CommandError 
             let _ = write!(text, "{BECAUSE}and {} more", problems.len() - LISTED);
         }
     }
-    CommandError::Nothing(text)
+    WorkflowError::Nothing(text)
 }

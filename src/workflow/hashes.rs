@@ -11,13 +11,13 @@ use crate::base::file::{FileError, read_pieces};
 
 /// Hashes of files, by path.
 #[derive(Debug, Default)]
-pub(super) struct Hashes {
+pub struct Hashes {
     known: Mutex<BTreeMap<PathBuf, String>>,
 }
 
 impl Hashes {
     /// CRC-32 (that of ZIP files) of a file; its SHA-256 is known afterwards.
-    pub(super) fn crc32(&self, path: &Path) -> Result<u32, FileError> {
+    pub(crate) fn crc32(&self, path: &Path) -> Result<u32, FileError> {
         let (mut crc32, mut sha256) = (crc32fast::Hasher::new(), Sha256::new());
         read_pieces(path, |piece| {
             crc32.update(piece);
@@ -29,7 +29,7 @@ impl Hashes {
     }
 
     /// SHA-256 of a file in hexadecimal.
-    pub(super) fn sha256(&self, path: &Path) -> Result<String, FileError> {
+    pub(crate) fn sha256(&self, path: &Path) -> Result<String, FileError> {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).get(path).cloned();
         if let Some(known) = known {
             return Ok(known);
@@ -38,6 +38,11 @@ impl Hashes {
         read_pieces(path, |piece| sha256.update(piece))?;
         Ok(hexadecimal(sha256))
     }
+}
+
+/// SHA-256 of bytes in hexadecimal.
+pub(crate) fn sha256_of(bytes: &[u8]) -> String {
+    hexadecimal(Sha256::new_with_prefix(bytes))
 }
 
 fn hexadecimal(sha256: Sha256) -> String {

@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::exit::CommandError;
-use super::simulate::{Simulation, made_by, sha256};
+use super::Simulation;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
@@ -15,6 +14,9 @@ use crate::log::{Log, Select};
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
 use crate::vehicle::Vehicle;
+use crate::workflow::error::WorkflowError;
+use crate::workflow::hashes::sha256_of;
+use crate::workflow::made_by;
 
 /// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
 /// same seed gives the same bytes.
@@ -28,31 +30,31 @@ pub(super) fn prepare(
     plan: &Plan,
     simulation: &Simulation,
     vehicle: &Vehicle,
-) -> Result<FlightRecord, CommandError> {
+) -> Result<FlightRecord, WorkflowError> {
     let plan_bytes = read_whole(&folder.plan(), MAX_PLAN_BYTES)?;
     let vehicle_text = toml::to_string(vehicle)
-        .map_err(|error| CommandError::Failed(format!("failed to write the vehicle: {error}")))?;
+        .map_err(|error| WorkflowError::Failed(format!("failed to write the vehicle: {error}")))?;
     let start = GpsTime::from_unix_ms(START_UNIX_MS)
-        .ok_or_else(|| CommandError::Failed("the start time is not a GPS time".to_owned()))?;
+        .ok_or_else(|| WorkflowError::Failed("the start time is not a GPS time".to_owned()))?;
     let mut record = FlightRecord {
         schema: FLIGHT_SCHEMA.to_owned(),
         made_by: made_by(),
         source: "simulator".to_owned(),
         seed: simulation.seed,
         vehicle: vehicle.name.clone(),
-        vehicle_sha256: sha256(vehicle_text.as_bytes()),
+        vehicle_sha256: sha256_of(vehicle_text.as_bytes()),
         air_mps: simulation.air.uniform_mps,
         air: simulation.air.texts(),
         start,
         full_logs: simulation.full_logs,
-        plan_sha256: sha256(&plan_bytes),
+        plan_sha256: sha256_of(&plan_bytes),
         logs: Vec::new(),
     };
     create_folder(&folder.simulated())?;
     sweep_partial(&folder.simulated())?;
     match folder.read_record()? {
         Some(existing) if existing.source != record.source => {
-            return Err(CommandError::Usage(format!(
+            return Err(WorkflowError::Usage(format!(
                 "{} holds logs of real drones, which belong into logs/; move them there",
                 folder.simulated().shown()
             )));
@@ -61,7 +63,7 @@ pub(super) fn prepare(
             let logs = existing.logs.clone();
             let same = FlightRecord { logs: Vec::new(), ..existing } == record;
             if !same && !simulation.force {
-                return Err(CommandError::Usage(format!(
+                return Err(WorkflowError::Usage(format!(
                     "{} holds logs flown with other settings; give --force to replace them, or use \
                      another folder",
                     folder.simulated().shown()
@@ -74,7 +76,7 @@ pub(super) fn prepare(
             }
         }
         None if !present_logs(folder, plan).is_empty() => {
-            return Err(CommandError::Usage(format!(
+            return Err(WorkflowError::Usage(format!(
                 "{} holds logs that this program did not simulate; use another folder",
                 folder.simulated().shown()
             )));
@@ -86,7 +88,7 @@ pub(super) fn prepare(
 }
 
 /// Removes a flight's logs and the truth that they were flown in.
-fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), CommandError> {
+fn remove_logs(folder: &FlightFolder, plan: &Plan) -> Result<(), WorkflowError> {
     let paths = present_logs(folder, plan).into_iter().map(|(_, path)| path);
     let truths = plan.slots.iter().map(|slot| folder.truth(slot.slot, plan.slots.len()));
     for path in paths.chain(truths.filter(|path| path.exists())) {
@@ -109,7 +111,7 @@ pub(super) fn taken_down(
     plan: &Plan,
     record: &FlightRecord,
     flown: &[&Slot],
-) -> Result<Vec<LogRecord>, CommandError> {
+) -> Result<Vec<LogRecord>, WorkflowError> {
     let flown: BTreeSet<u16> = flown.iter().map(|slot| slot.slot).collect();
     let known: BTreeMap<u16, &LogRecord> = (record.logs.iter())
         .filter(|log| log.crc32.is_some() && !flown.contains(&log.slot))
@@ -131,16 +133,16 @@ pub(super) fn changed_logs(
     record: &FlightRecord,
     wanted: &[&Slot],
     count: usize,
-) -> Result<BTreeMap<u16, String>, CommandError> {
+) -> Result<BTreeMap<u16, String>, WorkflowError> {
     let known: BTreeMap<u16, &LogRecord> = record.logs.iter().map(|log| (log.slot, log)).collect();
-    let changed: Result<Vec<_>, CommandError> = wanted
+    let changed: Result<Vec<_>, WorkflowError> = wanted
         .par_iter()
         .filter_map(|slot| {
             let path = folder.simulated_log(slot.slot, count);
             let log = known.get(&slot.slot).filter(|_| path.exists())?;
             match log.difference(&path) {
                 Ok(None) => None,
-                Ok(Some(_)) if is_of_others(&path) => Some(Err(CommandError::Usage(format!(
+                Ok(Some(_)) if is_of_others(&path) => Some(Err(WorkflowError::Usage(format!(
                     "{} was not simulated by this program; move it away, or use another folder",
                     path.shown()
                 )))),
@@ -164,8 +166,8 @@ fn is_of_others(path: &Path) -> bool {
 pub(super) fn write_record(
     folder: &FlightFolder,
     record: &FlightRecord,
-) -> Result<(), CommandError> {
+) -> Result<(), WorkflowError> {
     let json = to_json(record)
-        .map_err(|error| CommandError::Failed(format!("failed to make the record: {error}")))?;
+        .map_err(|error| WorkflowError::Failed(format!("failed to make the record: {error}")))?;
     Ok(write_whole(&folder.record(), &json)?)
 }

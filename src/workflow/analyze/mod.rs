@@ -1,0 +1,248 @@
+//! Logs become laws, a map of the air, and a report.
+//!
+//! [`gather()`] finds what is to be analysed, [`Analysing`] does it step by step, [`Analysed`] is what
+//! came of it; [`analyze_campaign`] is all of it for one campaign.
+
+mod fields;
+mod gather;
+mod held;
+mod outcome;
+mod settings;
+
+use std::path::{Path, PathBuf};
+
+use self::fields::{read_study, write_fields};
+pub use self::gather::{Request, gather, load_plan};
+pub use self::settings::{Settings, Uncorrected};
+use super::ending::Ending;
+use super::error::WorkflowError;
+use super::find::{Found, Work, find};
+use super::host::Host;
+use super::provenance::provenance;
+use crate::analysis::battery::Sag;
+use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
+use crate::analysis::{FlightInput, analyze};
+use crate::base::file::write_with;
+use crate::base::json::write_json;
+use crate::base::plain::Shown as _;
+use crate::campaign;
+use crate::campaign::origin::LogOrigin;
+use crate::mission::plan::Purpose;
+use crate::report::{self, Provenance};
+use crate::study::result::StudyResult;
+
+/// Analyses the simulated logs of a campaign, and writes numbers and report into its folder.
+///
+/// # Errors
+/// When the campaign cannot be read or written, nothing can be analysed, or the work is stopped.
+pub fn analyze_campaign(
+    host: &dyn Host,
+    root: &Path,
+    settings: &Settings,
+) -> Result<Analysed, WorkflowError> {
+    let work = simulated(root)?;
+    let analysed = Analysing::begin(host, &work, settings, None)?.run(true)?;
+    analysed.write(host, root)?;
+    Ok(analysed)
+}
+
+/// The simulated flights of a campaign.
+pub(crate) fn simulated(root: &Path) -> Result<Work, WorkflowError> {
+    let mut work = Work::new(root);
+    work.origin = Some(LogOrigin::Simulated);
+    find(root, None, &mut work)?;
+    Ok(work)
+}
+
+/// An analysis that is about to be made.
+pub struct Analysing<'a> {
+    host: &'a dyn Host,
+    work: &'a Work,
+    settings: &'a Settings,
+    /// The calibration whose A and u0 are held.
+    reference: Option<FlightAnalysis>,
+    doubts: Option<String>,
+}
+
+impl<'a> Analysing<'a> {
+    /// Says which logs are taken and what is doubtful of them. `hold`: the analysis.json whose A and u0
+    /// are held.
+    ///
+    /// # Errors
+    /// When there is no calibration in `hold`.
+    pub fn begin(
+        host: &'a dyn Host,
+        work: &'a Work,
+        settings: &'a Settings,
+        hold: Option<&Path>,
+    ) -> Result<Self, WorkflowError> {
+        for used in &work.used {
+            host.say(used);
+        }
+        let reference = hold.map(read_reference).transpose()?;
+        for note in work.flights.iter().flat_map(|flight| &flight.notes) {
+            host.warn(note);
+        }
+        let indicator = settings.options.indicator;
+        let doubts = hold
+            .zip(reference.as_ref())
+            .and_then(|(path, reference)| held::doubts(path, reference, indicator, work));
+        Ok(Self { host, work, settings, reference, doubts })
+    }
+
+    /// What speaks against the laws that are held.
+    pub fn doubts(&self) -> Option<&str> {
+        self.doubts.as_deref()
+    }
+
+    /// Analyses. `provenance`: also hashes what is read, for [`Analysed::write`].
+    ///
+    /// # Errors
+    /// When nothing can be analysed, or the work is stopped.
+    pub fn run(self, provenance: bool) -> Result<Analysed, WorkflowError> {
+        let Self { host, work, settings, reference, doubts } = self;
+        let inputs = inputs(work, settings.without);
+        let logs: usize = inputs.iter().map(|input| input.logs.len()).sum();
+        let progress = host.progress("analysing", logs as u64);
+        // Hashing fills the pauses in which the analysis keeps one processor busy.
+        let (analysis, provenance) = rayon::join(
+            || {
+                analyze(&work.title, &inputs, &settings.options, reference.as_ref(), &|_, _| {
+                    progress.advance();
+                })
+            },
+            || provenance.then(|| self::provenance(host, work, settings.words())),
+        );
+        let mut analysis = analysis.map_err(|error| WorkflowError::Nothing(error.to_string()))?;
+        progress.finish();
+        analysis.warnings.extend(work.absent.iter().cloned());
+        analysis.warnings.extend(doubts);
+        host.check_stop()?;
+        let some_absent = !work.absent.is_empty() || analysis.flights.len() < work.flights.len();
+        Ok(Analysed { analysis, logs, provenance, root: work.root.clone(), some_absent })
+    }
+}
+
+/// What the analysis gets of each flight.
+fn inputs(work: &Work, without: Uncorrected) -> Vec<FlightInput<'_>> {
+    let input = |flight| input(work, flight, without);
+    work.flights.iter().map(input).collect()
+}
+
+fn input<'a>(work: &'a Work, flight: &'a Found, without: Uncorrected) -> FlightInput<'a> {
+    FlightInput {
+        name: &flight.name,
+        plan: flight.plan.as_ref(),
+        purpose: flight.purpose,
+        logs: &flight.logs,
+        start: flight.start,
+        true_updraft_mps: flight.true_updraft_mps,
+        truth: (!flight.truth.is_empty()).then_some(&flight.truth),
+        density: flight.density.filter(|_| !without.density),
+        leaning: flight.leaning.filter(|_| !without.wind),
+        thrust_exponent: flight.thrust_exponent,
+        sag: flight.sag.map(|sag| if without.battery { Sag::UNCORRECTED } else { sag }),
+        true_air: flight.true_air.as_ref(),
+        lean_table: flight.lean_table.as_ref().filter(|_| !without.wind),
+        folder: Some(&work.root),
+    }
+}
+
+/// What came of an analysis.
+pub struct Analysed {
+    /// All numbers.
+    pub analysis: Analysis,
+    /// Logs that were looked at.
+    pub logs: usize,
+    provenance: Option<Provenance>,
+    root: PathBuf,
+    /// Flights that were found gave nothing at all.
+    some_absent: bool,
+}
+
+impl Analysed {
+    /// Writes numbers and report into a folder. Where the page is; `None`: there is one, but nothing was
+    /// found.
+    ///
+    /// # Errors
+    /// When they cannot be made or written.
+    pub fn write(&self, host: &dyn Host, folder: &Path) -> Result<Option<PathBuf>, WorkflowError> {
+        let unknown = Provenance::default();
+        let provenance = self.provenance.as_ref().unwrap_or(&unknown);
+        let study = read_study(host, &self.root);
+        let report_folder = folder.join("report");
+        let (page_made, numbers_made) = rayon::join(
+            || write_report(&self.analysis, study.as_ref(), provenance, &report_folder),
+            || write_numbers(&self.analysis, folder),
+        );
+        page_made.and(numbers_made)?;
+        // A page that says that nothing was found is written, but there is nothing to point at.
+        Ok((!self.is_nothing()).then(|| report_folder.join(report::PAGE_FILE)))
+    }
+
+    /// Whether there is neither a law nor a value of the map.
+    pub fn is_nothing(&self) -> bool {
+        self.analysis.what_was_found() == Yield::Nothing
+    }
+
+    /// Logs that gave a drone's results.
+    pub fn used(&self) -> usize {
+        self.analysis.flights.iter().map(|flight| flight.drones.len()).sum()
+    }
+
+    /// What is lost, a line each.
+    pub fn problems(&self) -> Vec<String> {
+        outcome::problems(&self.analysis, false)
+    }
+
+    /// How it ended.
+    ///
+    /// # Errors
+    /// When nothing was found; with `reasons`, the error says why.
+    pub fn ending(&self, reasons: bool) -> Result<Ending, WorkflowError> {
+        let lossy = |flight: &FlightAnalysis| {
+            let is_whole = flight.missing.is_empty()
+                && flight.unused.is_empty()
+                && flight.partly_used.is_empty();
+            !is_whole
+        };
+        let lost =
+            self.used() < self.logs || self.some_absent || self.analysis.flights.iter().any(lossy);
+        match self.analysis.what_was_found() {
+            Yield::Nothing => Err(outcome::nothing_found(&self.analysis, reasons)),
+            Yield::Whole if !lost => Ok(Ending::Done),
+            Yield::Whole | Yield::Partial => Ok(Ending::Losses),
+        }
+    }
+}
+
+/// The page with its figures.
+fn write_report(
+    analysis: &Analysis,
+    study: Option<&StudyResult>,
+    provenance: &Provenance,
+    folder: &Path,
+) -> Result<(), WorkflowError> {
+    let made = match study {
+        Some(study) => report::render_with_study(analysis, study, provenance)?,
+        None => report::render(analysis, provenance)?,
+    };
+    Ok(report::write(&made, folder)?)
+}
+
+/// All numbers, and the field of the map as tables.
+fn write_numbers(analysis: &Analysis, folder: &Path) -> Result<(), WorkflowError> {
+    // Streamed: that of a thousand drones has a hundred megabytes.
+    write_with(&folder.join("analysis.json"), |out| write_json(out, analysis))?;
+    write_fields(analysis, folder)
+}
+
+/// The calibration whose A and u0 are held.
+fn read_reference(path: &Path) -> Result<FlightAnalysis, WorkflowError> {
+    let analysis: Analysis = campaign::read_json(path)?;
+    analysis
+        .flights
+        .into_iter()
+        .find(|flight| flight.purpose == Purpose::Calibration && flight.flock.is_some())
+        .ok_or_else(|| WorkflowError::Usage(format!("{} has no calibration to hold", path.shown())))
+}

@@ -1,0 +1,72 @@
+//! How logs are analysed, and the same in words for the report.
+
+use crate::analysis::windows::Tilt;
+use crate::analysis::{AnalysisOptions, MapLaw, OffsetRule};
+use crate::flight::Indicator;
+
+/// How logs are analysed.
+#[derive(Clone, Debug, Default)]
+pub struct Settings {
+    /// Windows, laws and the map.
+    pub options: AnalysisOptions,
+    /// What the map is not corrected for.
+    pub without: Uncorrected,
+}
+
+/// What the map is not corrected for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Uncorrected {
+    /// The density of the air at different heights.
+    pub density: bool,
+    /// The battery's voltage.
+    pub battery: bool,
+    /// Wind on leaning drones.
+    pub wind: bool,
+}
+
+impl Settings {
+    /// How it was analysed, for the report: (what, how).
+    pub(super) fn words(&self) -> Vec<(&'static str, String)> {
+        let Self { options, without } = self;
+        let law = match options.map_law {
+            None => "auto",
+            Some(MapLaw::Linear) => "linear",
+            Some(MapLaw::SignedQuadratic) => "signed-quadratic",
+        };
+        let tilt = match options.windows.tilt {
+            Tilt::Thrust => "thrust",
+            Tilt::Paper => "paper",
+        };
+        let effort = match options.indicator {
+            Indicator::Pulse => "pulse",
+            Indicator::RotorSpeed => "rpm",
+            Indicator::Power => "power",
+        };
+        let offset = match options.offset {
+            OffsetRule::Field => "field",
+            OffsetRule::Always => "always",
+            OffsetRule::Never => "never",
+        };
+        let windows = if options.paper_windows {
+            "medians, weighted by the samples' standard deviation (the paper's way)"
+        } else {
+            "trimmed means, weighted by their standard errors"
+        };
+        let corrected = |off: bool| if off { "not corrected" } else { "corrected" };
+        [
+            ("law of the map", law),
+            ("tilt correction", tilt),
+            ("rotor effort", effort),
+            ("offset over time and height", offset),
+            ("windows", windows),
+            ("air density at height, in the map", corrected(without.density)),
+            ("battery voltage, in the map", corrected(without.battery)),
+            (
+                "wind on leaning drones, in the map, where their drag is known",
+                corrected(without.wind),
+            ),
+        ]
+        .map(|(what, how)| (what, how.to_owned()))
+        .into()
+    }
+}

@@ -1,0 +1,159 @@
+//! Why work could not be done. Whoever runs it decides what that means: exit codes are the command
+//! line's.
+
+use std::io;
+
+use thiserror::Error;
+
+use super::shows::load::LoadError;
+use crate::base::causes::with_causes;
+use crate::base::file::FileError;
+use crate::blind::BlindError;
+use crate::campaign::CampaignError;
+use crate::campaign::write::WriteError;
+use crate::gap::GapError;
+use crate::link::error::NetError;
+use crate::log::LogError;
+use crate::mission::resolve::MissionError;
+use crate::report::ReportError;
+use crate::sim::SimError;
+use crate::skybrush_server::ServerError;
+use crate::study::StudyError;
+use crate::vehicle::VehicleError;
+
+/// What stands between an error and its reason.
+pub(crate) const BECAUSE: &str = "\n  because: ";
+
+/// An error and its reasons, one below the other.
+pub(crate) fn with_reasons(error: &dyn std::error::Error) -> String {
+    with_causes(error, BECAUSE)
+}
+
+/// Why work ended early.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WorkflowError {
+    /// A template, override or vehicle is wrong.
+    #[error(transparent)]
+    Mission(Box<MissionError>),
+    /// A vehicle is unknown or wrong.
+    #[error(transparent)]
+    Vehicle(#[from] VehicleError),
+    /// An effect cannot be used.
+    #[error(transparent)]
+    Effect(#[from] crate::effects::EffectError),
+    /// A campaign folder cannot be used.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    /// A file could not be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A show could not be written.
+    #[error(transparent)]
+    Write(Box<WriteError>),
+    /// A show could not be read.
+    #[error(transparent)]
+    Load(Box<LoadError>),
+    /// A log could not be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A report could not be made.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// A flight could not be simulated.
+    #[error(transparent)]
+    Sim(Box<SimError>),
+    /// A study could not be read, flown or evaluated.
+    #[error(transparent)]
+    Study(Box<StudyError>),
+    /// A blind flight could not be drawn, flown or scored.
+    #[error(transparent)]
+    Blind(Box<BlindError>),
+    /// Measurement and simulation cannot be compared.
+    #[error(transparent)]
+    Gap(#[from] GapError),
+    /// What was asked for does not fit together, or a file is of the wrong kind.
+    #[error("{0}")]
+    Usage(String),
+    /// A check failed, or a person has said no: nothing was started.
+    #[error("{0}")]
+    Unsafe(String),
+    /// Something unexpected, with its reason.
+    #[error("{0}")]
+    Failed(String),
+    /// Nothing to work on.
+    #[error("{0}")]
+    Nothing(String),
+    /// The work was stopped from outside.
+    #[error("interrupted; the same command goes on where it stopped")]
+    Interrupted,
+    /// The same, with what becomes of what was going on.
+    #[error("{0}")]
+    Stopped(&'static str),
+    /// Who was to be shown something could not be.
+    #[error("failed to print: {0}")]
+    Output(io::Error),
+}
+
+impl From<MissionError> for WorkflowError {
+    fn from(error: MissionError) -> Self {
+        Self::Mission(Box::new(error))
+    }
+}
+
+impl From<WriteError> for WorkflowError {
+    fn from(error: WriteError) -> Self {
+        Self::Write(Box::new(error))
+    }
+}
+
+impl From<LoadError> for WorkflowError {
+    fn from(error: LoadError) -> Self {
+        Self::Load(Box::new(error))
+    }
+}
+
+impl From<StudyError> for WorkflowError {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::File(error) => Self::File(error),
+            StudyError::Mission(error) => Self::Mission(error),
+            StudyError::Vehicle(error) => Self::Vehicle(*error),
+            StudyError::Stopped => Self::Interrupted,
+            other => Self::Study(Box::new(other)),
+        }
+    }
+}
+
+impl From<SimError> for WorkflowError {
+    fn from(error: SimError) -> Self {
+        Self::Sim(Box::new(error))
+    }
+}
+
+impl From<BlindError> for WorkflowError {
+    fn from(error: BlindError) -> Self {
+        match error {
+            BlindError::File(error) => Self::File(error),
+            BlindError::Campaign(error) => Self::Campaign(error),
+            BlindError::Mission(error) => error.into(),
+            BlindError::Vehicle(error) => Self::Vehicle(error),
+            BlindError::Effect(error) => Self::Effect(error),
+            BlindError::Sim(error) => error.into(),
+            BlindError::Stopped => Self::Interrupted,
+            other => Self::Blind(Box::new(other)),
+        }
+    }
+}
+
+impl From<NetError> for WorkflowError {
+    fn from(error: NetError) -> Self {
+        Self::Failed(with_reasons(&error))
+    }
+}
+
+impl From<ServerError> for WorkflowError {
+    fn from(error: ServerError) -> Self {
+        Self::Failed(with_reasons(&error))
+    }
+}

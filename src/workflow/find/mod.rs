@@ -1,0 +1,221 @@
+//! The flights behind paths: plans, logs and what is known of them.
+
+mod files;
+mod flight;
+mod leaning;
+mod of_start;
+mod physics;
+mod true_scales;
+pub(crate) mod twice;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use self::files::logs_in;
+pub(crate) use self::files::stem;
+use self::flight::found_flight;
+use self::physics::density;
+use super::error::WorkflowError;
+use super::hashes::Hashes;
+use crate::analysis::battery::Sag;
+use crate::analysis::density::Density;
+use crate::analysis::lean_table::LeanTable;
+use crate::analysis::statistics::result::TrueAir;
+use crate::analysis::wind::Leaning;
+use crate::analysis::{LogInput, TruthSeries};
+use crate::base::causes::with_causes;
+use crate::base::file::FileError;
+use crate::base::plain::Shown as _;
+use crate::base::time::GpsTime;
+use crate::campaign::origin::{self, LogOrigin};
+use crate::campaign::{self, CampaignIndex, FlightFolder};
+use crate::flight::Indicator;
+use crate::flight::table::{Mapping, TableError};
+use crate::log::Log;
+use crate::mission::Plan;
+use crate::mission::plan::Purpose;
+
+/// One flight found behind a path: its logs, and what is known of it. Without a plan and a record most
+/// of it is `None`.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// Name of the flight.
+    pub name: String,
+    /// The plan that was flown.
+    pub plan: Option<Plan>,
+    /// What it was flown for.
+    pub purpose: Option<Purpose>,
+    /// The logs, in the order of their paths.
+    pub logs: Vec<LogInput>,
+    /// True vertical speed of uniform air, m/s, up positive (simulated flights).
+    pub true_updraft_mps: Option<f64>,
+    /// True vertical speed of the air at each slot's planned place (simulated flights).
+    pub truth: BTreeMap<u16, TruthSeries>,
+    /// Seed of the simulation.
+    pub seed: Option<u64>,
+    /// GPS time of show time 0.
+    pub start: Option<GpsTime>,
+    /// How the pulse follows the density of the air.
+    pub density: Option<Density>,
+    /// How the vehicle leans in wind.
+    pub leaning: Option<Leaning>,
+    /// Power of thrust that `u - 1000` goes with.
+    pub thrust_exponent: Option<f64>,
+    /// How the battery acts on the pulse.
+    pub sag: Option<Sag>,
+    /// What wind does to the pulse of a leaning drone.
+    pub lean_table: Option<LeanTable>,
+    /// Scales of the air that was simulated.
+    pub true_air: Option<TrueAir>,
+    /// What is doubtful about the files, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// What was asked to be analysed.
+#[derive(Debug, Default)]
+pub struct Work {
+    /// Title for people.
+    pub title: String,
+    /// Paths in the report are shown relative to this.
+    pub root: PathBuf,
+    /// The flights, in their order.
+    pub flights: Vec<Found>,
+    /// What has been hashed on the way.
+    pub hashes: Hashes,
+    /// Flights of a campaign that cannot be looked at, one sentence each.
+    pub absent: Vec<String>,
+    /// Which logs of campaigns are meant; `None` until a campaign is looked at: real ones if there are
+    /// any.
+    pub origin: Option<LogOrigin>,
+    /// Which of them were taken, one sentence for each campaign.
+    pub used: Vec<String>,
+}
+
+impl Work {
+    /// Nothing yet, with paths relative to `root`.
+    pub fn new(root: &Path) -> Self {
+        Self { root: root.to_owned(), ..Self::default() }
+    }
+}
+
+/// Adds what a path holds to the work: a campaign folder, a folder of logs, or one log. `plan` is
+/// that of logs outside of a campaign.
+///
+/// # Errors
+/// When there is nothing, or a file that was named cannot be read.
+pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), WorkflowError> {
+    if path.is_dir() && campaign::is_campaign(path) {
+        let index = campaign::index_path(path);
+        if index.is_file() && work.title.is_empty() {
+            work.title = campaign::read_json::<CampaignIndex>(&index)?.title;
+        }
+        let folders = campaign::flights(path)?;
+        let origin = work.origin.unwrap_or_else(|| origin::default_of(&folders));
+        work.origin = Some(origin);
+        work.used.extend(used(&folders, origin));
+        let several = folders.len() > 1;
+        let mut first_error = None;
+        let before = work.flights.len();
+        for folder in folders {
+            let flight = match found_flight(path, &folder, origin, &work.hashes) {
+                Ok(flight) => flight,
+                // The campaign's other flights can be analysed without this one.
+                Err(error) if several => {
+                    work.absent.push(format!(
+                        "{} is left out: {}",
+                        stem(&folder.0),
+                        with_causes(&error, ": ")
+                    ));
+                    first_error = first_error.or(Some(error));
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            if work.title.is_empty() {
+                work.title =
+                    flight.plan.as_ref().map_or_else(String::new, |plan| plan.title.clone());
+            }
+            work.flights.push(flight);
+        }
+        let nothing = work.flights.len() == before;
+        return first_error.filter(|_| nothing).map_or(Ok(()), Err);
+    }
+    let logs = if path.is_dir() {
+        logs_in(path)?
+    } else {
+        // A file that is named itself must be there and be a log; one found in a folder may be lost.
+        Log::open(path)?;
+        vec![path.to_owned()]
+    };
+    if logs.is_empty() {
+        return Err(WorkflowError::Nothing(format!(
+            "{} holds no .BIN logs: give a campaign, or the folder in which they are",
+            path.shown()
+        )));
+    }
+    let mut logs: Vec<LogInput> =
+        logs.into_iter().map(|path| LogInput { path, ..LogInput::default() }).collect();
+    let (start, notes) = if path.is_dir() {
+        of_start::refuse(&of_start::Flight { logs: path, campaign: None }, &mut logs)?
+    } else {
+        (None, Vec::new())
+    };
+    work.flights.push(Found {
+        name: stem(path),
+        plan: plan.cloned(),
+        logs,
+        start,
+        density: plan.map(|plan| density(plan, None)),
+        sag: Some(if plan.is_some() { Sag::default() } else { Sag::UNKNOWN }),
+        notes,
+        ..Found::default()
+    });
+    Ok(())
+}
+
+/// Adds the flights of a mapping file to the work; what stands for rotor effort in them.
+///
+/// # Errors
+/// When the mapping is wrong, or a file that it names is not there.
+pub fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, WorkflowError> {
+    let mapping = Mapping::load(path).map_err(|error| match error {
+        TableError::File(error) => WorkflowError::File(error),
+        error => WorkflowError::Usage(error.to_string()),
+    })?;
+    // A file that is named itself must be there.
+    for file in mapping.flights.iter().flat_map(|flight| &flight.files) {
+        std::fs::metadata(file).map_err(|error| FileError::new("read", file, error))?;
+    }
+    work.title.clone_from(&mapping.title);
+    let shared = Arc::new(mapping);
+    work.flights.extend(shared.flights.iter().map(|flight| {
+        let log = |path: &PathBuf| LogInput {
+            path: path.clone(),
+            table: Some(Arc::clone(&shared)),
+            ..LogInput::default()
+        };
+        Found {
+            name: flight.name.clone(),
+            purpose: Some(flight.purpose),
+            logs: flight.files.iter().map(log).collect(),
+            ..Found::default()
+        }
+    }));
+    Ok(shared.indicator)
+}
+
+/// Which logs are taken, where there are any.
+fn used(folders: &[FlightFolder], origin: LogOrigin) -> Option<String> {
+    let others = match origin {
+        LogOrigin::Real => folders.iter().any(FlightFolder::has_simulated_logs),
+        LogOrigin::Simulated => folders.iter().any(FlightFolder::has_real_logs),
+    };
+    let any = others || folders.iter().any(|folder| folder.logs_of(origin).folder.is_dir());
+    let left = match (others, origin) {
+        (false, _) => "",
+        (true, LogOrigin::Real) => "; the simulated ones are left (--logs simulated takes them)",
+        (true, LogOrigin::Simulated) => "; those of real drones are left (--logs real takes them)",
+    };
+    any.then(|| format!("Using the {}{left}", origin.words()))
+}

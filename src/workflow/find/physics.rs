@@ -1,0 +1,36 @@
+//! What the analysis must know of the vehicle that flew: how its pulse follows density, thrust and
+//! voltage.
+
+use crate::analysis::battery::Sag;
+use crate::analysis::density::Density;
+use crate::mission::Plan;
+use crate::vehicle::Vehicle;
+
+/// Exponent of density for electric rotors with a real thrust curve.
+const REAL_ROTOR_EXPONENT: f64 = 0.4;
+
+/// 1 for vehicles whose thrust is linear in the pulse; for others nothing is known better than what
+/// the analysis takes itself.
+pub(super) fn linear_thrust(vehicle: &Vehicle) -> Option<f64> {
+    (vehicle.autopilot.mot_thst_expo == 0.0).then_some(1.0)
+}
+
+/// How the map is corrected for air density: by the thrust curve that the vehicle's autopilot is set
+/// for (none: linear thrust).
+pub(super) fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
+    let linear = vehicle.is_some_and(|vehicle| vehicle.autopilot.mot_thst_expo == 0.0);
+    Density {
+        ground_amsl_m: plan.site.ground_amsl_m,
+        exponent: if linear { 1.0 } else { REAL_ROTOR_EXPONENT },
+    }
+}
+
+/// How the battery acts on the pulse. Simulated drones without a battery in their physics log one
+/// that does nothing; real ones have one that does.
+pub(super) fn sag(is_simulated: bool, vehicle: Option<&Vehicle>) -> Option<Sag> {
+    let battery = vehicle.and_then(|vehicle| vehicle.effects.get("battery"));
+    match battery.filter(|battery| battery.on) {
+        Some(_) => Some(Sag::default()),
+        None => (!is_simulated).then(Sag::default),
+    }
+}

@@ -1,0 +1,175 @@
+//! Which flight is compared, and with which model.
+
+use std::path::Path;
+
+use super::Request;
+use crate::analysis::TruthSeries;
+use crate::base::plain::Shown as _;
+use crate::campaign::{self, CampaignError, FlightFolder};
+use crate::mission::plan::Purpose;
+use crate::vehicle::{Vehicle, library};
+use crate::workflow::analyze::load_plan;
+use crate::workflow::error::WorkflowError;
+use crate::workflow::find::{Found, Work, find, find_tables};
+use crate::workflow::host::Host;
+
+/// Vehicle of logs that nobody planned here: the firmware's own simulator.
+const UNPLANNED_VEHICLE: &str = "arducopter-sitl";
+
+/// The measured flight, and the others that are there.
+pub(super) fn measured(
+    host: &dyn Host,
+    request: &Request,
+) -> Result<(Found, Vec<Found>), WorkflowError> {
+    let plan = request.plan.as_deref().map(load_plan).transpose()?;
+    if let Some(mapping) = &request.tables {
+        let mut work = Work::new(mapping);
+        find_tables(mapping, &mut work)?;
+        return chosen(work.flights, mapping, request.flight.as_deref());
+    }
+    match (&request.campaign, &request.measured) {
+        (Some(campaign), _) => {
+            if plan.is_some() {
+                return Err(WorkflowError::Usage(
+                    "a campaign has its own plan; --plan goes with --measured".to_owned(),
+                ));
+            }
+            is_campaign(campaign)?;
+            measured_in(host, campaign, request)
+        }
+        (None, Some(path)) => {
+            let (mut found, others) = measured_in(host, path, request)?;
+            if plan.is_some() {
+                found.plan = plan;
+            }
+            Ok((found, others))
+        }
+        (None, None) => Err(WorkflowError::Usage(
+            "give a campaign folder, --measured LOGS or --csv MAPPING.toml".to_owned(),
+        )),
+    }
+}
+
+/// That there is a campaign to compare; if not, what to do with what is there instead.
+fn is_campaign(campaign: &Path) -> Result<(), WorkflowError> {
+    match campaign::flights(campaign) {
+        Ok(_) => Ok(()),
+        Err(CampaignError::NoPlan { path }) => Err(WorkflowError::Nothing(format!(
+            "{} is no campaign folder: it has no plan.json and no campaign.json (for logs alone: \
+             --measured LOGS with --plan or --simulated)",
+            path.shown()
+        ))),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The flight of a path that is compared, and the others in their order. It is the one that is named,
+/// else the calibration, else the first with logs.
+pub(super) fn one_flight(
+    path: &Path,
+    name: Option<&str>,
+) -> Result<(Found, Vec<Found>), WorkflowError> {
+    let mut work = Work::new(path);
+    find(path, None, &mut work)?;
+    chosen(work.flights, path, name)
+}
+
+/// The same of what was measured; says which logs are taken.
+fn measured_in(
+    host: &dyn Host,
+    path: &Path,
+    request: &Request,
+) -> Result<(Found, Vec<Found>), WorkflowError> {
+    let mut work = Work::new(path);
+    work.origin = request.origin;
+    find(path, None, &mut work)?;
+    for used in &work.used {
+        host.say(used);
+    }
+    chosen(work.flights, path, request.flight.as_deref())
+}
+
+/// As [`one_flight`], of flights that were found.
+fn chosen(
+    mut flights: Vec<Found>,
+    path: &Path,
+    name: Option<&str>,
+) -> Result<(Found, Vec<Found>), WorkflowError> {
+    let is_meant = |flight: &Found| name.is_none_or(|name| flight.name == name);
+    if let Some(name) = name
+        && !flights.iter().any(is_meant)
+    {
+        let names: Vec<&str> = flights.iter().map(|flight| flight.name.as_str()).collect();
+        return Err(WorkflowError::Usage(format!(
+            "there is no flight \"{name}\"; flights are {}",
+            names.join(", ")
+        )));
+    }
+    let is_usable = |flight: &Found| is_meant(flight) && !flight.logs.is_empty();
+    let calibrates = |flight: &Found| flight.purpose == Some(Purpose::Calibration);
+    let place = flights
+        .iter()
+        .position(|flight| calibrates(flight) && is_usable(flight))
+        .or_else(|| flights.iter().position(is_usable));
+    let flight = place.map(|place| flights.remove(place)).ok_or_else(|| {
+        WorkflowError::Nothing(format!(
+            "{} holds no logs: fly it (`updraft fly`), or put the drones' .BIN files into the \
+             flight's logs folder",
+            path.shown()
+        ))
+    })?;
+    Ok((flight, flights))
+}
+
+/// Whether it is a measurement flight whose true air is known (simulated ones).
+pub(super) fn knows_air(flight: &Found) -> bool {
+    let has_slots = || flight.plan.as_ref().is_some_and(|plan| !plan.slots.is_empty());
+    let is_uniform = flight.true_updraft_mps.is_some() && has_slots();
+    flight.purpose == Some(Purpose::Measurement)
+        && !flight.logs.is_empty()
+        && (is_uniform || !flight.truth.is_empty())
+}
+
+/// The first of these flights whose true air is known, with that air for each slot.
+pub(super) fn known_air(flights: Vec<Found>) -> Option<Found> {
+    let mut flight = flights.into_iter().find(knows_air)?;
+    if flight.truth.is_empty()
+        && let (Some(updraft_mps), Some(plan)) = (flight.true_updraft_mps, &flight.plan)
+    {
+        let ends = plan.groups.iter().flat_map(|group| &group.segments).map(|s| s.end_ms);
+        let seconds = ends.max().unwrap_or(0) as usize / 1000 + 60;
+        let same = TruthSeries { first_s: 0, updraft_mps: vec![updraft_mps; seconds] };
+        flight.truth = plan.slots.iter().map(|slot| (slot.slot, same.clone())).collect();
+    }
+    Some(flight)
+}
+
+/// The model that is held against the logs.
+pub(super) fn model_of(request: &Request, found: &Found) -> Result<Vehicle, WorkflowError> {
+    if let Some(name) = &request.vehicle {
+        return Ok(library::load(name)?);
+    }
+    if let Some(campaign) = &request.campaign {
+        let flights = campaign::flights(campaign)?;
+        let of =
+            |folder: &&FlightFolder| folder.read_plan().is_ok_and(|plan| plan.name == found.name);
+        if let Some(folder) = flights.iter().find(of) {
+            return Ok(library::load(&folder.vehicle().to_string_lossy())?);
+        }
+    }
+    match &found.plan {
+        Some(plan) => Ok(library::load(&plan.vehicle)?),
+        None => Ok(library::load(UNPLANNED_VEHICLE)?),
+    }
+}
+
+/// What a reader must know of logs without a plan.
+pub(super) fn unplanned(request: &Request, found: &Found, vehicle: &Vehicle) -> Option<String> {
+    (request.vehicle.is_none() && request.tables.is_none() && found.plan.is_none()).then(|| {
+        format!(
+            "no plan says which vehicle flew: {} is taken, and its closed forms stand for what effects do \
+             (--vehicle, --plan)",
+            vehicle.name
+        )
+    })
+}

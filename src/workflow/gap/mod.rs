@@ -1,0 +1,184 @@
+//! Where simulation and measurement disagree, and which physics is missing.
+
+mod choose;
+mod compare;
+pub(crate) mod logs;
+pub(crate) mod next;
+pub(crate) mod search;
+
+use std::path::{Path, PathBuf};
+
+use self::choose::{known_air, knows_air, measured, model_of, one_flight, unplanned};
+use self::compare::{Both, compare};
+use super::ending::Ending;
+use super::error::WorkflowError;
+use super::find::{Found, Work};
+use super::host::Host;
+use super::provenance::provenance;
+use crate::base::file::{create_folder, write_whole};
+use crate::base::plain::Shown as _;
+use crate::campaign::origin::LogOrigin;
+use crate::campaign::to_json;
+use crate::effects::select::resolved;
+use crate::gap::{Explained, Options, Verdict};
+use crate::report::{self, Provenance};
+use crate::vehicle::Vehicle;
+
+/// What is to be compared with what.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// A campaign folder.
+    pub campaign: Option<PathBuf>,
+    /// Logs of drones, instead: a folder, or one log.
+    pub measured: Option<PathBuf>,
+    /// A mapping file of tables, instead.
+    pub tables: Option<PathBuf>,
+    /// Logs of somebody else's simulation of the same flight; `None`: the plan is flown again.
+    pub simulated: Option<PathBuf>,
+    /// The plan that `measured` flew.
+    pub plan: Option<PathBuf>,
+    /// The flight of the campaign; `None`: its calibration.
+    pub flight: Option<String>,
+    /// Which logs of the campaign; `None`: real ones where there are any.
+    pub origin: Option<LogOrigin>,
+    /// The model, a vehicle's name or file; `None`: the planned one.
+    pub vehicle: Option<String>,
+    /// Where results go; `None`: into the campaign's `gap`.
+    pub output: Option<PathBuf>,
+    /// How it is searched.
+    pub options: Options,
+}
+
+/// What came of a comparison.
+pub struct Compared {
+    /// What the model lacks.
+    pub verdict: Verdict,
+    /// Where the model with what was found is.
+    pub model: PathBuf,
+    /// Where the page is.
+    pub page: PathBuf,
+}
+
+impl Compared {
+    /// How it ended: with losses if logs could not be used.
+    pub fn ending(&self) -> Ending {
+        Ending::of_losses(!self.verdict.data.left_out.is_empty())
+    }
+}
+
+/// Compares, and writes verdict, model and page.
+///
+/// # Errors
+/// When there is nothing to compare, the model cannot be used, or the folder is somebody else's.
+pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError> {
+    let (found, others) = measured(host, request)?;
+    let vehicle = model_of(request, &found)?;
+    // Before anything is flown: what is wrong with the model is the file's fault, not the flight's.
+    resolved(&vehicle).map_err(|error| {
+        let file = request.vehicle.as_ref().unwrap_or(&vehicle.name);
+        WorkflowError::Usage(format!("the model {file} cannot be used: {error}"))
+    })?;
+    let folder = output(request)?;
+    let simulated = request.simulated.as_deref().map(|path| one_flight(path, None)).transpose()?;
+    let simulated = simulated.map(|(flight, _)| flight);
+    let hover = request.campaign.as_ref().and_then(|_| known_air(others));
+    if request.campaign.is_some() && hover.is_none() && knows_air(&found) {
+        host.say(&format!(
+            "the error of the map is not told: {} is the flight that is compared, and the campaign \
+             has no other measurement flight whose true air is known",
+            found.name
+        ));
+    }
+    let both = Both { measured: &found, simulated: simulated.as_ref(), hover: hover.as_ref() };
+    let mut explained = compare(&both, &vehicle, &request.options)?;
+    explained.verdict.cautions.extend(unplanned(request, &found, &vehicle));
+    host.check_stop()?;
+    create_folder(&folder)?;
+    let _lock = host.lock(&folder)?;
+    let root = request.campaign.as_ref().or(request.measured.as_ref()).or(request.tables.as_ref());
+    let root = root.cloned().unwrap_or_default();
+    let settings = settings(request, &found, &vehicle);
+    let work = Work { flights: vec![found], ..Work::new(&root) };
+    let provenance =
+        Provenance { seed: Some(request.options.seed), ..provenance(host, &work, settings) };
+    let page = write(&folder, &explained, &provenance)?;
+    for reason in &explained.verdict.data.left_out {
+        host.warn(reason);
+    }
+    Ok(Compared { verdict: explained.verdict, model: folder.join(MODEL), page })
+}
+
+/// The folder of the results, if it may be written into.
+fn output(request: &Request) -> Result<PathBuf, WorkflowError> {
+    let folder = match (&request.output, &request.campaign) {
+        (Some(folder), _) => folder.clone(),
+        (None, Some(campaign)) => campaign.join("gap"),
+        (None, None) => PathBuf::from("gap"),
+    };
+    if folder.exists() && !folder.is_dir() {
+        return Err(WorkflowError::Failed(format!(
+            "{} is a file: --output must name a folder",
+            folder.shown()
+        )));
+    }
+    if request.output.is_some() {
+        has_room(&folder)?;
+    }
+    Ok(folder)
+}
+
+/// File names in the folder of a comparison.
+const VERDICT: &str = "verdict.json";
+const MODEL: &str = "model.toml";
+
+/// Refuses a named folder with files of somebody else's where this command's would go.
+fn has_room(folder: &Path) -> Result<(), WorkflowError> {
+    let page = Path::new("report").join(report::PAGE_FILE);
+    let theirs = [Path::new(MODEL), &page].into_iter().find(|file| folder.join(file).exists());
+    match theirs {
+        Some(file) if !folder.join(VERDICT).exists() => Err(WorkflowError::Usage(format!(
+            "{} is there and was not made by `updraft gap`; choose another folder with -o",
+            folder.join(file).shown()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// What was chosen, for the page.
+fn settings(request: &Request, found: &Found, vehicle: &Vehicle) -> Vec<(&'static str, String)> {
+    let mut settings = vec![
+        ("Flight", found.name.clone()),
+        ("Model", format!("{}: {}", vehicle.name, vehicle.source)),
+        ("Chance of naming nothing", format!("{} in each step (--alpha)", request.options.alpha)),
+        (
+            "Simulated flights for a threshold",
+            format!("{} (--replicates)", request.options.replicates),
+        ),
+    ];
+    if let Some(path) = &request.simulated {
+        settings.push(("Simulated logs", path.shown().to_string()));
+    }
+    if let Some(seed) = found.seed {
+        settings.push(("Seed of the flight", format!("{seed}: its logs are simulated")));
+    }
+    settings
+}
+
+/// Writes verdict, model and page; where the page is.
+fn write(
+    folder: &Path,
+    explained: &Explained,
+    provenance: &Provenance,
+) -> Result<PathBuf, WorkflowError> {
+    let json = to_json(&explained.verdict)
+        .map_err(|error| WorkflowError::Failed(format!("failed to make JSON: {error}")))?;
+    let model = toml::to_string(&explained.model)
+        .map_err(|error| WorkflowError::Failed(format!("failed to make the model: {error}")))?;
+    write_whole(&folder.join(MODEL), model.as_bytes())?;
+    let made = report::render_gap(&explained.verdict, provenance)?;
+    let pages = folder.join("report");
+    report::write(&made, &pages)?;
+    // Last: who finds a verdict finds the others as well.
+    write_whole(&folder.join(VERDICT), &json)?;
+    Ok(pages.join(report::PAGE_FILE))
+}

@@ -1,0 +1,177 @@
+//! What a workflow needs of the program that runs it: where to tell what happens, a clock, and
+//! somebody who may stop it or be asked.
+
+use std::io;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::clock::{Clock, SystemClock};
+use super::error::WorkflowError;
+use crate::base::file::sweep_below;
+use crate::base::plain::Shown as _;
+use crate::campaign::lock::FolderLock;
+
+/// The program that runs a workflow. All but four methods have a default: no progress is shown, and
+/// nobody can be asked.
+pub trait Host: Send + Sync {
+    /// Hears what is being done and what came of it: a line of text, or several.
+    fn say(&self, text: &str);
+
+    /// Hears what must reach a person in any case: warnings, no-go reasons, orders to drones.
+    fn insist(&self, text: &str);
+
+    /// The clock that everything goes by.
+    fn clock(&self) -> &Arc<dyn Clock>;
+
+    /// The flag that stops the work: it ends with [`WorkflowError::Interrupted`] at the next step,
+    /// and what is finished is kept.
+    fn stop_flag(&self) -> &AtomicBool;
+
+    /// Hears of something doubtful that does not stop the work.
+    fn warn(&self, text: &str) {
+        self.insist(&format!("warning: {text}"));
+    }
+
+    /// Is shown a table that a person looks at before the work goes on.
+    ///
+    /// # Errors
+    /// When it cannot be shown; the work ends then with [`WorkflowError::Output`].
+    fn show(&self, table: &str) -> io::Result<()> {
+        self.say(table);
+        Ok(())
+    }
+
+    /// Is shown a table that says why the work does not go on.
+    ///
+    /// # Errors
+    /// As [`Host::show`].
+    fn show_no_go(&self, table: &str) -> io::Result<()> {
+        self.insist(table);
+        Ok(())
+    }
+
+    /// Counts units of long work. `what` is a short verb phrase: `flying`.
+    fn progress(&self, what: &str, total: u64) -> Box<dyn Progress + '_> {
+        let _ = (what, total);
+        Box::new(Unseen)
+    }
+
+    /// The command or call that this work comes from, for the provenance of reports.
+    fn command(&self) -> String {
+        String::new()
+    }
+}
+
+/// Work that can be stopped, and folders that it writes into.
+impl dyn Host + '_ {
+    /// Whether the work is to stop.
+    pub fn is_stopped(&self) -> bool {
+        self.stop_flag().load(Ordering::SeqCst)
+    }
+
+    /// Ends the work if it is to stop.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Interrupted`].
+    pub fn check_stop(&self) -> Result<(), WorkflowError> {
+        if self.is_stopped() { Err(WorkflowError::Interrupted) } else { Ok(()) }
+    }
+
+    /// Locks a campaign folder for this process; dropped, it is free again.
+    ///
+    /// # Errors
+    /// When another process holds it, or the folder cannot be made.
+    pub fn lock(&self, folder: &Path) -> Result<FolderLock, WorkflowError> {
+        let lock = FolderLock::take(folder)?;
+        // Nobody else writes here now: what a killed run left is nobody's.
+        sweep_below(lock.folder());
+        if !lock.is_held() {
+            self.warn(&format!(
+                "{} cannot be locked on this file system: let no other updraft write into it",
+                folder.shown()
+            ));
+        }
+        Ok(lock)
+    }
+}
+
+/// Progress of long work; shared between threads.
+pub trait Progress: Send + Sync {
+    /// One more unit is done.
+    fn advance(&self);
+
+    /// All is done, or given up.
+    fn finish(&self);
+}
+
+/// Progress that nobody looks at.
+struct Unseen;
+
+impl Progress for Unseen {
+    fn advance(&self) {}
+
+    fn finish(&self) {}
+}
+
+/// A host for programs without a terminal: it hears nothing but warnings, which it keeps.
+///
+/// ```
+/// use updraft::workflow::host::{Host, Quiet};
+///
+/// let host = Quiet::default();
+/// host.say("flying");
+/// host.warn("a log is missing");
+/// assert_eq!(host.heard(), ["warning: a log is missing"]);
+/// ```
+pub struct Quiet {
+    clock: Arc<dyn Clock>,
+    stop: AtomicBool,
+    heard: Mutex<Vec<String>>,
+}
+
+impl Default for Quiet {
+    /// By the computer's clock.
+    fn default() -> Self {
+        Self::new(Arc::new(SystemClock::start()))
+    }
+}
+
+impl Quiet {
+    /// By this clock.
+    pub fn new(clock: Arc<dyn Clock>) -> Self {
+        Self { clock, stop: AtomicBool::new(false), heard: Mutex::default() }
+    }
+
+    /// Warnings and the like, in their order.
+    pub fn heard(&self) -> Vec<String> {
+        self.heard.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Stops the work at its next step; may be called from another thread.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::SeqCst);
+    }
+}
+
+impl std::fmt::Debug for Quiet {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Quiet").field("heard", &self.heard()).finish_non_exhaustive()
+    }
+}
+
+impl Host for Quiet {
+    fn say(&self, _text: &str) {}
+
+    fn insist(&self, text: &str) {
+        self.heard.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+    }
+
+    fn clock(&self) -> &Arc<dyn Clock> {
+        &self.clock
+    }
+
+    fn stop_flag(&self) -> &AtomicBool {
+        &self.stop
+    }
+}

@@ -1,0 +1,95 @@
+//! A study flown, evaluated and written: the ladder in every wind and updraft.
+
+use std::path::{Path, PathBuf};
+
+use super::clock::Stopwatch;
+use super::error::WorkflowError;
+use super::host::Host;
+use super::made_by;
+use crate::base::file::write_whole;
+use crate::base::plain::Shown as _;
+use crate::campaign::{self, to_json};
+use crate::report::{self, Provenance};
+use crate::study::result::StudyResult;
+use crate::study::{Flown, Settings, StudyPlan, Work, evaluate};
+
+/// Name of the built-in study.
+pub const BUILT_IN: &str = "study";
+
+/// Flies what is open of a study, `jobs` flights at the same time.
+pub fn fly(
+    host: &dyn Host,
+    work: Work<'_>,
+    doing: &'static str,
+    jobs: Option<u16>,
+) -> Result<Flown, WorkflowError> {
+    let progress = host.progress(doing, work.open_flights() as u64);
+    let fly = || work.fly(host.stop_flag(), &|| progress.advance());
+    let flown = match jobs {
+        Some(jobs) => rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(jobs))
+            .build()
+            .map_err(|error| WorkflowError::Failed(format!("failed to start threads: {error}")))?
+            .install(fly),
+        None => fly(),
+    };
+    progress.finish();
+    let flown = flown?;
+    host.check_stop()?;
+    Ok(flown)
+}
+
+/// The results of a study; flights that were lost are named.
+pub fn evaluated(
+    host: &dyn Host,
+    study: &StudyPlan,
+    seed: u64,
+    flown: &Flown,
+) -> Result<StudyResult, WorkflowError> {
+    let result = evaluate(study, seed, flown)?;
+    for lost in &result.lost {
+        host.warn(&format!("{}: {}", lost.name, lost.reason));
+    }
+    Ok(result)
+}
+
+/// Flies the built-in study into a folder, for the report of a campaign. Finished flights are kept.
+pub fn fly_built_in(host: &dyn Host, folder: &Path, seed: u64) -> Result<(), WorkflowError> {
+    let watch = Stopwatch::start(host);
+    let study = StudyPlan::load(BUILT_IN)?;
+    let work = Work::open(&study, folder, Settings { seed, keep_logs: false, force: false })?;
+    let flown = fly(host, work, "flying the study", None)?;
+    let result = evaluated(host, &study, seed, &flown)?;
+    write(folder, format!("updraft run --seed {seed}"), seed, &result)?;
+    host.say(&format!("Flew the simulation study ({} flights) in {watch}", flown.flown));
+    Ok(())
+}
+
+/// A study in a campaign's folder would overwrite its report.
+pub fn refuse_campaign(folder: &Path) -> Result<(), WorkflowError> {
+    if campaign::is_campaign(folder) {
+        return Err(WorkflowError::Usage(format!(
+            "{} is a campaign; give the study another folder with --output",
+            folder.shown()
+        )));
+    }
+    Ok(())
+}
+
+/// Writes the results; the page last, so that where it is, all is.
+pub fn write(
+    folder: &Path,
+    command: String,
+    seed: u64,
+    result: &StudyResult,
+) -> Result<PathBuf, WorkflowError> {
+    let json = to_json(result)
+        .map_err(|error| WorkflowError::Failed(format!("failed to make JSON: {error}")))?;
+    let provenance =
+        Provenance { program: made_by(), command, seed: Some(seed), ..Provenance::default() };
+    let made = report::render_study(result, &provenance)?;
+    let pages = folder.join("report");
+    write_whole(&folder.join("study.json"), &json)?;
+    report::write(&made, &pages)?;
+    Ok(pages.join(report::PAGE_FILE))
+}

@@ -1,0 +1,33 @@
+//! Small pieces of sentences.
+
+/// `1 log`, `2 logs`.
+pub(crate) fn count(number: usize, noun: &str) -> String {
+    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
+}
+
+/// A word of a shell's command line.
+pub(crate) fn shell(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:@,+=".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}
+
+/// `calibration`, `calibration and hover`, `a, b and c`.
+pub(crate) fn list(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// Names that say the same thing: `Drone 1`, `Drone 1 and Drone 2`, `Drone 1 to Drone 49 (49)`.
+pub(crate) fn range(names: &[&str]) -> String {
+    match names {
+        [first, _, .., last] => format!("{first} to {last} ({})", names.len()),
+        few => list(few),
+    }
+}
