@@ -1,4 +1,5 @@
-//! Parameters that were changed on vehicles, with the values they had, and how they are put back.
+//! Record of parameters that were changed on vehicles, with their old values, and the way to
+//! restore them.
 //!
 //! What belongs to an upload (the fence) and what is required otherwise are written down alike.
 //! An old value that leaves a vehicle without a fence is put back only when that is said.
@@ -119,8 +120,8 @@ impl Changes {
         self.drones.sort_by_key(|entry| entry.drone);
     }
 
-    /// A conversation per vehicle that puts those old values back that may be. Once it is done, they can
-    /// be taken out with [`Changes::forget`].
+    /// Conversations that restore old values, one per vehicle, for the changes that `may` allows.
+    /// Afterwards [`Changes::forget`] removes them from the record.
     pub fn restore(&self, may: impl Fn(DroneId, &Change) -> bool) -> BTreeMap<DroneId, SetParams> {
         let conversation = |entry: &DroneChanges| {
             let changes = entry.changes.iter().filter(|change| may(entry.drone, change));

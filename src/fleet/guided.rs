@@ -1,4 +1,5 @@
-//! Flies a plan's trajectory with stock ArduCopter: the station streams targets in GUIDED.
+//! Conversation that flies a plan's trajectory with stock ArduCopter: the station streams targets
+//! in GUIDED.
 //!
 //! A drone that is not heard any more is told to return, again and again: it may hear what is not
 //! answered.
@@ -36,7 +37,7 @@ const LOST: Micros = 30 * S;
 /// A lost drone is told to return for so long.
 const RECALL: Micros = 60 * S;
 
-/// GuidedFlight of one drone under the station's guidance.
+/// Guided flight of one drone: trajectory, start, and the drone's clock.
 #[derive(Clone, Debug)]
 pub struct GuidedFlight {
     /// Trajectory to fly, show frame.

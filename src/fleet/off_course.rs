@@ -34,13 +34,13 @@ const APART_S: f64 = 0.05;
 /// A show time and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
-    /// Show time, s.
+    /// Show time of the moment, s.
     pub(super) show_s: f64,
     /// Known to so much, s.
     pub(super) doubt_s: f64,
 }
 
-/// What has changed.
+/// A change of the drone's distance from its trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Change {
     /// It is far from its trajectory, and has been for a while.

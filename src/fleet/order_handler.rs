@@ -1,4 +1,4 @@
-//! A link on which orders of other processes are carried out, whatever the station is at.
+//! A net on which orders of other processes are carried out, whatever the station is doing.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -49,9 +49,9 @@ struct Open {
     answer: Answer,
 }
 
-/// A net that sends drones home or lands them when another process orders it, beside everything
-/// else that goes through it. The [gate](super::gate) before it asks who was ordered down, and lets
-/// nothing pass that would make such a drone fly again.
+/// A net that sends drones home or lands them when another process orders it, beside all other
+/// traffic through it. The [gate](super::gate) before it asks which drones were ordered down, and
+/// holds back whatever would make such a drone fly again.
 pub struct OrderHandler<'a> {
     net: &'a mut dyn Net,
     inbox: Option<Inbox>,

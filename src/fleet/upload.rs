@@ -202,7 +202,7 @@ pub struct Upload {
     settle: Micros,
 }
 
-/// Steps in [`Upload::progress`].
+/// Number of steps in [`Upload::progress`].
 const STEPS: u64 = 6;
 
 impl Upload {
@@ -243,7 +243,7 @@ impl Upload {
         Command::new("set the show's origin", message)
     }
 
-    /// What keeps the vehicle from being touched at all.
+    /// Reason why the vehicle must not be touched at all, if there is one.
     fn untouchable(&self) -> Option<UploadError> {
         let authorized = self.status.is_some_and(|status| status.has(flag::AUTHORIZED));
         let stage = self.status.map(|status| status.stage);

@@ -18,7 +18,7 @@ use dialect::{MavCmd, MavModeFlag, MavResult};
 
 /// Concurrency for `run_all` in which no drone waits for another.
 pub const ALL_AT_ONCE: usize = usize::MAX;
-/// Time between repetitions.
+/// Time between repetitions of the order, us.
 const EVERY: Micros = 200 * MS;
 /// Repeated for so long.
 const GIVE_UP: Micros = 120 * S;

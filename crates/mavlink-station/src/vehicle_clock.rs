@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use crate::link::clock::Micros;
 use dataflash::time::{GPS_EPOCH_UNIX_S, GpsTime};
 
-/// Readings kept.
+/// Number of readings that are kept.
 const KEEP: usize = 16;
 /// A measured rate nearer to 1 than this is 1: link delays move it that much.
 const REAL_TIME_WITHIN: f64 = 0.15;

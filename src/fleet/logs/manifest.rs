@@ -14,7 +14,7 @@ use crate::campaign::start::{earlier_folder, free_name};
 use crate::campaign::{CampaignError, read_json, to_json};
 use crate::link::id::DroneId;
 
-/// Name and version of the format.
+/// Name and version of the format of a manifest.
 pub const MANIFEST_SCHEMA: &str = "updraft.logs/1";
 
 /// `logs/manifest.json`.
@@ -92,15 +92,15 @@ pub struct LogFlight {
 /// State of a shelf's file at home, against the manifest.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AtHome {
-    /// Neither a file nor an entry.
+    /// The folder has neither the file nor an entry.
     Nothing,
-    /// A file that the manifest does not know.
+    /// The folder has the file, but the manifest has no entry.
     Foreign,
-    /// An entry whose file is gone.
+    /// The manifest has an entry, but the file is gone.
     Gone(ManifestEntry),
-    /// The file is no longer what its entry says.
+    /// The file is not as its entry says.
     Damaged(ManifestEntry),
-    /// Size and SHA-256 are those of the entry.
+    /// The file is as its entry says, in size and SHA-256.
     Intact(ManifestEntry),
 }
 
@@ -154,7 +154,8 @@ pub struct Shelf {
 }
 
 impl Shelf {
-    /// Opens the folder; an empty manifest if there is none. `made_by` is for what is added.
+    /// Opens a folder with its manifest, which is empty if there is none. `made_by` goes into new
+    /// entries.
     ///
     /// # Errors
     /// When the manifest cannot be read, or names files outside of its folder.
@@ -187,12 +188,12 @@ impl Shelf {
         Ok(Self { folder: folder.to_owned(), manifest })
     }
 
-    /// Path of a file in it.
+    /// Path of a file in the folder.
     pub fn path(&self, file: &str) -> PathBuf {
         self.folder.join(file)
     }
 
-    /// The entry of a file.
+    /// Entry of a file in the manifest, if it has one.
     pub fn entry(&self, file: &str) -> Option<&ManifestEntry> {
         self.manifest.logs.iter().find(|entry| entry.file == file)
     }
@@ -214,6 +215,10 @@ impl Shelf {
     }
 
     /// Moves a file to the older logs under a free name with `mark`: `older/07-damaged-1.BIN`.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be moved.
     pub fn set_aside(&self, file: &str, mark: &str) -> Result<(), FileError> {
         let from = self.path(file);
         let stem = file.strip_prefix("older/").unwrap_or(file).trim_end_matches(".BIN");
@@ -228,9 +233,9 @@ impl Shelf {
         }
     }
 
-    /// Moves a log, with what the manifest says of it, into the folder of an earlier start,
-    /// `flight-K`; 0 for one that is of no start that was written down. Nothing there is
-    /// overwritten. Where it lies now; `None`: there was none.
+    /// Moves a log with its entry into the folder of an earlier start, `flight-K`; 0 for a log of
+    /// no recorded start. Nothing there is overwritten. Returns the log's new path; `None` if there
+    /// was no log.
     ///
     /// # Errors
     /// When a folder or manifest cannot be read or written.
@@ -279,15 +284,20 @@ impl Shelf {
         self.write()
     }
 
-    /// Gives a finished part its name, with its entry. The entry is first: a part without its
-    /// name is continued by the next run, a file without an entry would be anybody's.
+    /// Gives a finished part its final name, with its entry. The entry is written first: a part
+    /// without its name is continued by the next run, a file without an entry would be of unknown
+    /// origin.
+    ///
+    /// # Errors
+    ///
+    /// If the folder cannot be written.
     pub fn finish(&mut self, part: PartFile, entry: ManifestEntry) -> Result<(), FileError> {
         self.add(entry)?;
         part.finish()
     }
 
-    /// Gives a finished part another name than it was begun for, that of its entry; a log that has
-    /// this name is moved aside.
+    /// Gives a finished part the name in its entry, which may differ from the one it was begun for;
+    /// a log that has this name is moved aside.
     ///
     /// # Errors
     /// When the folder cannot be written.
@@ -302,9 +312,9 @@ impl Shelf {
         part.finish_as(&path)
     }
 
-    /// Waits until the disk has the names of all finished logs. Those of earlier logs are there
-    /// with the entry of a later one; without this a power loss leaves the last log under the name
-    /// of its part, whole.
+    /// Waits until the disk has the names of all finished logs. Names of earlier logs are on the
+    /// disk with the entry of a later one; without this call a power loss could leave the last log
+    /// under the name of its part, whole.
     pub fn settle(&self) {
         for folder in [self.folder.clone(), self.folder.join("older")] {
             // Not every file system allows it.

@@ -76,24 +76,24 @@ pub struct PullOne {
     sized: Micros,
     /// When it was found growing first.
     grows: Option<Micros>,
-    /// Why only its beginning comes.
+    /// Reason why only the beginning of the log comes.
     incomplete: Option<String>,
     /// The flight whose log is wanted, if a start was written down.
     flight: Option<LogFlight>,
-    /// What was at home of the slot's file.
+    /// State of the slot's file at home, before the download.
     home: AtHome,
-    /// What was at home and is of an earlier flight.
+    /// Log at home that is of an earlier flight.
     retired: Option<Retired>,
-    /// Why a log that came is not the one that is wanted.
+    /// Reason why a log that came is not the wanted one.
     not_it: Option<String>,
     /// The drone has more of it.
     is_outgrown: bool,
-    /// What the download of the target began with.
+    /// Beginning of the target's download.
     begun: Begun,
     rounds: u32,
     restarts: u32,
     attempts: u32,
-    /// Why not MAVFTP.
+    /// Reason why MAVFTP is not used.
     reason: Option<String>,
     heartbeat: Option<Micros>,
     started: Option<Micros>,
@@ -108,7 +108,7 @@ pub struct PullOne {
     ways: Ways,
     /// Other drones use the link as well.
     is_shared: bool,
-    /// What they have on their way.
+    /// Load of the link that all downloads share.
     load: Option<LinkLoad>,
     /// The drone is freed of a log that it sends, so often yet.
     frees: u8,
@@ -140,7 +140,7 @@ enum Stage {
     Over,
 }
 
-/// What a stage wants: a step of the link's, or it is over and another follows.
+/// Result of a stage: a step of the link, or the end of the stage and the next one.
 enum Next {
     Step(Step<OneDone>),
     Go(Box<Stage>),

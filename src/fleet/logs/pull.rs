@@ -155,7 +155,7 @@ fn pull_onto(
     }
 }
 
-/// One network.
+/// Downloads in one network, and their pace.
 struct Lane {
     waiting: VecDeque<(DroneId, PullOne)>,
     running: BTreeMap<DroneId, Running>,

@@ -30,7 +30,7 @@ pub struct Entry {
 pub struct LogList {
     drone: DroneId,
     patience: Micros,
-    /// Only this one.
+    /// Number of the only log to list, if not all.
     only: Option<u16>,
     /// How many logs there are, once an entry has said so.
     count: Option<u16>,

@@ -7,17 +7,17 @@ use super::{PullOne, Stage, Target, Which};
 use crate::fleet::logs::manifest::{AtHome, ManifestEntry, Method};
 use crate::fleet::logs::part::PartFile;
 
-/// What is to be done about a log.
+/// Part of a log that is to be downloaded.
 pub(super) enum Needed {
     /// Nothing: it is there. Why that is not certain, if it is not.
     Nothing(Option<String>),
-    /// All of it.
+    /// The whole log.
     Whole,
-    /// What is beyond the log at home.
+    /// The part beyond the log at home.
     Rest,
 }
 
-/// What a download began with, and what becomes of what is at home.
+/// Beginning of a download, and the fate of the log at home.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Begun {
     /// Nothing; what is at home moves to the folder of its flight.

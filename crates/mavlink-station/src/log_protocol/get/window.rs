@@ -45,7 +45,7 @@ pub(super) struct Windows {
     least_rtt: Option<Micros>,
     /// Bytes per microsecond, of the last window.
     rate: f64,
-    /// The same with what was lost of it: how fast it passes.
+    /// Rate at which packets pass, those that were lost included.
     passes: f64,
     /// Larger ones lose their end, and by how much that grows again.
     uncut: f64,
