@@ -45,7 +45,7 @@ pub(super) struct Windows {
     least_rtt: Option<Micros>,
     /// Bytes per microsecond, of the last window.
     rate: f64,
-    /// Rate at which packets pass, those that were lost included.
+    /// Bytes per microsecond of the last window, lost ones included: how fast it passes.
     passes: f64,
     /// Larger ones lose their end, and by how much that grows again.
     uncut: f64,
