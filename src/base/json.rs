@@ -7,6 +7,10 @@ use serde_json::ser::{Formatter, Serializer};
 
 /// Writes a value as JSON with a newline at its end. A list of numbers or texts takes one line,
 /// which halves files that are mostly such lists.
+///
+/// # Errors
+///
+/// The error of the output, or of a value that has no form as JSON.
 pub fn write_json<T: Serialize>(out: &mut impl Write, value: &T) -> io::Result<()> {
     value.serialize(&mut Serializer::with_formatter(&mut *out, Lines::default()))?;
     out.write_all(b"\n")

@@ -123,6 +123,10 @@ impl LogRecord {
 
     /// Difference of a file from this record as by [`LogRecord::difference`], with the CRC-32 from
     /// `crc32`, which is called only if the size leaves the question open.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read, or the error of `crc32`.
     pub fn difference_by(
         &self,
         path: &Path,
@@ -287,6 +291,10 @@ pub fn index_path(folder: &Path) -> PathBuf {
 }
 
 /// The flights of a campaign folder, or of a folder with one flight.
+///
+/// # Errors
+///
+/// If the folder holds neither a plan nor a campaign, or the index cannot be read.
 pub fn flights(folder: &Path) -> Result<Vec<FlightFolder>, CampaignError> {
     let found = std::fs::metadata(folder).map_err(|error| FileError::new("read", folder, error))?;
     if !found.is_dir() {
@@ -348,6 +356,10 @@ pub fn is_campaign(folder: &Path) -> bool {
 }
 
 /// Reads a JSON file; errors name the file, line and column.
+///
+/// # Errors
+///
+/// If the file cannot be read, or is not valid.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CampaignError> {
     let bytes = read_whole(path, MAX_JSON_BYTES)?;
     parse::json(&bytes)
@@ -355,12 +367,20 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CampaignError> {
 }
 
 /// Reads a plan's file; errors name the file and the problem.
+///
+/// # Errors
+///
+/// If the file cannot be read, or is not a plan.
 pub fn read_plan(path: &Path) -> Result<Plan, CampaignError> {
     let bytes = read_whole(path, MAX_JSON_BYTES)?;
     parse_plan(&bytes).map_err(|reason| CampaignError::Json { path: path.to_owned(), reason })
 }
 
 /// Reads a plan from its JSON and checks that its parts fit together; the error says what is wrong.
+///
+/// # Errors
+///
+/// A description of the problem.
 pub fn parse_plan(bytes: &[u8]) -> Result<Plan, String> {
     let plan: Plan = parse::json(bytes).map_err(|error| error.to_string())?;
     validate_plan(&plan)?;
@@ -368,6 +388,10 @@ pub fn parse_plan(bytes: &[u8]) -> Result<Plan, String> {
 }
 
 /// Serialises a value as indented JSON with a final newline.
+///
+/// # Errors
+///
+/// If the value has no form as JSON.
 pub fn to_json<T: Serialize>(value: &T) -> io::Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(value)?;
     bytes.push(b'\n');

@@ -58,6 +58,10 @@ pub struct FlightFiles {
 
 impl FlightFiles {
     /// Makes the contents, drones in parallel; the bytes do not depend on the number of threads.
+    ///
+    /// # Errors
+    ///
+    /// If the show does not fit into one of the formats.
     pub fn of(flight: &ResolvedFlight, show: &Show) -> Result<Self, WriteError> {
         let text = |what, reason: String| WriteError::Text { what, reason };
         let skyb = show
@@ -96,6 +100,10 @@ impl FlightFiles {
     }
 
     /// Writes all files; the plan last, so that a folder with a plan is complete.
+    ///
+    /// # Errors
+    ///
+    /// If the folder or a file cannot be written.
     pub fn write(&self, folder: &FlightFolder) -> Result<(), WriteError> {
         create_folder(&folder.skyb_folder())?;
         sweep_partial(&folder.0)?;
@@ -139,6 +147,10 @@ pub fn folders(root: &std::path::Path, mission: &Mission) -> Vec<FlightFolder> {
 }
 
 /// Writes the index of a campaign of several flights, after its flights.
+///
+/// # Errors
+///
+/// If the file cannot be written.
 pub fn write_index(root: &std::path::Path, mission: &Mission) -> Result<(), WriteError> {
     let Some(text) = &mission.campaign_text else { return Ok(()) };
     let index = CampaignIndex {

@@ -196,6 +196,10 @@ pub fn has_station(flight: &Path) -> bool {
 
 /// Gives an order to the station of a flight; `None` if there is no station. `name` belongs to this
 /// order alone and rises with time.
+///
+/// # Errors
+///
+/// If the order cannot be written.
 pub fn give(
     flight: &Path,
     name: &str,

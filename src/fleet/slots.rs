@@ -72,6 +72,10 @@ impl FleetTable {
     }
 
     /// Reads a table from its JSON; the error says what is wrong.
+    ///
+    /// # Errors
+    ///
+    /// A description of the problem.
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
         let table: Self = parse::json(bytes).map_err(|error| error.to_string())?;
         if table.schema == FLEET_SCHEMA {

@@ -217,6 +217,10 @@ impl Flight {
     }
 
     /// Opens and reads a log file; see [`Flight::from_log`].
+    ///
+    /// # Errors
+    ///
+    /// If the file is no log, or as [`Flight::from_log`].
     pub fn open(path: &Path, options: FlightOptions<'_>) -> Result<Self, FlightError> {
         Self::from_log(&Log::open(path)?, path, options)
     }

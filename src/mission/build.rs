@@ -10,6 +10,10 @@ use crate::base::number::plain;
 use crate::vehicle::{Limits, Vehicle};
 
 /// Makes the plan of one flight. `path` and `text` are the template's, for messages.
+///
+/// # Errors
+///
+/// [`TemplateError`], which points at the place in the template that gives no plan.
 pub fn build_plan(
     path: &str,
     text: &str,

@@ -107,6 +107,10 @@ pub struct ResolvedFlight {
 
 impl Override {
     /// Reads `KEY=VALUE`; the value is TOML, or plain text where it is not.
+    ///
+    /// # Errors
+    ///
+    /// If there is no `=`, or nothing before or behind it.
     pub fn parse(text: &str) -> Result<Self, MissionError> {
         let bad = |reason: &str| MissionError::Override { key: text.into(), reason: reason.into() };
         let (key, value) = text.split_once('=').ok_or_else(|| bad("write it as KEY=VALUE"))?;
@@ -160,12 +164,20 @@ fn load(name: &str, relative_to: Option<&Path>) -> Result<(String, String), Miss
 }
 
 /// Resolves a template (a file or a built-in name) with overrides into plans.
+///
+/// # Errors
+///
+/// If the template, a file it names, its vehicle or an override is not valid.
 pub fn resolve(name: &str, overrides: &[Override]) -> Result<Mission, MissionError> {
     let (path, text) = load(name, None)?;
     resolve_text(&path, &text, overrides)
 }
 
 /// Resolves a template's text; `path` locates files it refers to and is named in messages.
+///
+/// # Errors
+///
+/// If the template, a file it names, its vehicle or an override is not valid.
 pub fn resolve_text(
     path: &str,
     text: &str,

@@ -412,6 +412,11 @@ impl<'de> Deserialize<'de> for Selection {
 
 impl Template {
     /// Reads a template. `path` is only for messages.
+    ///
+    /// # Errors
+    ///
+    /// [`TemplateError`], which points at the line: bad TOML, an unknown or missing key, a wrong
+    /// type, or another format.
     pub fn parse(path: &str, text: &str) -> Result<Self, TemplateError> {
         let failed = |error: &toml::de::Error| {
             TemplateError::new(path, text, error.span(), first_line(error.message()))

@@ -118,6 +118,10 @@ fn flags(quality: &[QualityFlag], time_s: f64) -> String {
 }
 
 /// Writes the rows as CSV: comma, point, a header, empty where there is no value; RFC 4180.
+///
+/// # Errors
+///
+/// The error of the output.
 pub fn write_csv(analysis: &Analysis, out: &mut dyn io::Write) -> io::Result<()> {
     writeln!(out, "{}", COLUMNS.join(","))?;
     let mut line = String::new();

@@ -147,6 +147,10 @@ pub fn render_with_study(
 
 /// Writes `index.html` and `figures/*.svg` to `folder`; the page comes last, so that a folder with
 /// a page is complete.
+///
+/// # Errors
+///
+/// If the folder or a file cannot be written.
 pub fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
     let figures = folder.join(FIGURES_FOLDER);
     for (name, svg) in &report.figures {

@@ -188,6 +188,10 @@ impl Client {
     }
 
     /// Identifiers of the drones that the server knows.
+    ///
+    /// # Errors
+    ///
+    /// As [`Client::ask`].
     pub fn drones(&mut self) -> Result<Vec<String>, ServerError> {
         let answer = self.ask(&json!({ "type": "UAV-LIST" }))?;
         let ids = answer.get("ids").and_then(Value::as_array).ok_or_else(|| {
@@ -197,6 +201,10 @@ impl Client {
     }
 
     /// Name and version of the server.
+    ///
+    /// # Errors
+    ///
+    /// As [`Client::ask`].
     pub fn version(&mut self) -> Result<String, ServerError> {
         let answer = self.ask(&json!({ "type": "SYS-VER" }))?;
         let part = |key| text(&answer, key).unwrap_or("?").to_owned();
@@ -204,6 +212,10 @@ impl Client {
     }
 
     /// Status of drones by identifier, as the server reports it (UAV-INF).
+    ///
+    /// # Errors
+    ///
+    /// As [`Client::ask`].
     pub fn status(&mut self, drones: &[String]) -> Result<BTreeMap<String, Value>, ServerError> {
         let answer = self.ask(&json!({ "type": "UAV-INF", "ids": drones }))?;
         Ok(entries(&answer, "status").collect())

@@ -49,6 +49,10 @@ impl StartConfig {
 
 impl Client {
     /// Gives the server the start; it passes it on to the drones once a second.
+    ///
+    /// # Errors
+    ///
+    /// If the server refuses, does not answer, or the connection breaks.
     pub fn set_start(&mut self, start: &StartConfig) -> Result<(), ServerError> {
         self.ask(&start.body()).map(|_| ())
     }

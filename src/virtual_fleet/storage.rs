@@ -72,6 +72,10 @@ const MOST_IN_MEMORY: u64 = 1 << 30;
 
 impl MemoryStorage {
     /// Stores a file, and creates the folders above it.
+    ///
+    /// # Errors
+    ///
+    /// [`StorageError::BadName`] if the name leaves the storage.
     pub fn put(&mut self, name: &str, content: Vec<u8>) -> Result<(), StorageError> {
         let name = plain_name(name)?;
         let mut folder = parent(&name);
@@ -89,6 +93,11 @@ impl MemoryStorage {
     }
 
     /// Appends to a file, as to a log that still grows.
+    ///
+    /// # Errors
+    ///
+    /// [`StorageError::NotFound`] if there is no such file, [`StorageError::BadName`] if the name
+    /// leaves the storage.
     pub fn append(&mut self, name: &str, more: &[u8]) -> Result<(), StorageError> {
         let file = self.files.get_mut(&plain_name(name)?).ok_or(StorageError::NotFound)?;
         file.extend_from_slice(more);

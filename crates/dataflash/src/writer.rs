@@ -58,6 +58,10 @@ impl<W: Write> LogWriter<W> {
     }
 
     /// Starts a log as [`LogWriter::new`] does; `time_us` is the `TimeUS` of the defining rows, us.
+    ///
+    /// # Errors
+    ///
+    /// As [`LogWriter::new`].
     pub fn with_time(out: W, messages: &[&'static MessageDef], time_us: u64) -> io::Result<Self> {
         let defining = [&catalog::FMT, &catalog::UNIT, &catalog::FMTU, &catalog::MULT];
         let mut layouts: Vec<Option<Layout>> = vec![None; 256];
@@ -160,6 +164,10 @@ impl<W: Write> LogWriter<W> {
     }
 
     /// Flushes and gives the output back.
+    ///
+    /// # Errors
+    ///
+    /// The error of the output.
     pub fn finish(mut self) -> io::Result<W> {
         self.out.write_all(&self.buffer)?;
         self.out.flush()?;

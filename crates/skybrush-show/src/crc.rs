@@ -40,6 +40,10 @@ impl ApCrc32 {
 }
 
 /// Size (bytes) and CRC-32 (that of ZIP files) of a file, read in pieces.
+///
+/// # Errors
+///
+/// If the file cannot be read.
 pub fn file_crc32(path: &Path) -> Result<(u64, u32), FileError> {
     let mut hasher = crc32fast::Hasher::new();
     let size_bytes = read_pieces(path, |piece| hasher.update(piece))?;

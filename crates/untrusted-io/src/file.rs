@@ -35,6 +35,10 @@ impl FileError {
 /// Writes a whole file: temporary file beside it, flush to disk, rename.
 ///
 /// A reader sees the old content or the new one, never a part. Missing parent folders are created.
+///
+/// # Errors
+///
+/// If the folder or the file cannot be written; the old content stays then.
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), FileError> {
     write_with(path, |out| out.write_all(content))
 }
@@ -42,6 +46,10 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), FileError> {
 /// Like [`write_whole`], with the content streamed by `fill`.
 ///
 /// When `fill` fails, the temporary file is removed and `path` is untouched.
+///
+/// # Errors
+///
+/// The error of `fill`, or that of writing; the old content stays then.
 pub fn write_with(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
@@ -50,6 +58,10 @@ pub fn write_with(
 }
 
 /// Writes a whole file as [`write_whole`] does, readable by its owner alone (mode 0600 on Unix).
+///
+/// # Errors
+///
+/// As [`write_whole`].
 pub fn write_private(path: &Path, content: &[u8]) -> Result<(), FileError> {
     write_as(path, 0o600, |out| out.write_all(content))
 }
@@ -91,6 +103,10 @@ fn write_as(
 }
 
 /// Creates a folder and its parents, if they do not exist.
+///
+/// # Errors
+///
+/// If a folder cannot be created, or a file is in its place.
 pub fn create_folder(path: &Path) -> Result<(), FileError> {
     fs::create_dir_all(path).map_err(|source| FileError::new("create the folder", path, source))
 }
@@ -121,6 +137,10 @@ pub fn open_regular(path: &Path) -> io::Result<(File, Metadata)> {
 
 /// Opens a file that a user names: a regular file, or anything below `/dev` that is no folder, such
 /// as the pipe of a shell's `<(...)`.
+///
+/// # Errors
+///
+/// As [`open_regular`]; below `/dev` the operating system's error.
 pub fn open_named(path: &Path) -> io::Result<File> {
     let is_dir = || fs::metadata(path).is_ok_and(|metadata| metadata.is_dir());
     if path.starts_with("/dev") && !is_dir() {
@@ -160,6 +180,10 @@ pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FileError> {
 const PIECE_BYTES: usize = 1 << 17;
 
 /// Reads a regular file from start to end, piece by piece; returns its size in bytes.
+///
+/// # Errors
+///
+/// If the file is not a regular file, or cannot be read.
 pub fn read_pieces(path: &Path, mut piece: impl FnMut(&[u8])) -> Result<u64, FileError> {
     let fail = |source| FileError::new("read", path, source);
     let (mut file, _) = open_regular(path).map_err(fail)?;
@@ -180,6 +204,10 @@ pub fn read_pieces(path: &Path, mut piece: impl FnMut(&[u8])) -> Result<u64, Fil
 
 /// Removes the temporary files that a killed run left in `folder` (not in its subfolders) and
 /// returns their number; files that are still being written stay.
+///
+/// # Errors
+///
+/// If the folder cannot be read, or a file cannot be removed.
 pub fn sweep_partial(folder: &Path) -> Result<usize, FileError> {
     let fail = |source| FileError::new("clean", folder, source);
     let mut swept = 0;

@@ -154,6 +154,10 @@ impl PartFile {
 
     /// Begins with the bytes of `from`, an earlier log that this one is thought to begin with.
     /// Ranges that have already come are kept.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be read or written.
     pub fn seed(&mut self, from: &Path) -> Result<(), FileError> {
         let read = |source| FileError::new("read", from, source);
         let part = part_path(&self.path);
@@ -183,6 +187,10 @@ impl PartFile {
     }
 
     /// Writes everything so far into the journal, and waits for the disk.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be written.
     pub fn sync(&mut self) -> Result<(), FileError> {
         if self.fresh.count() == 0 {
             return Ok(());
@@ -214,6 +222,10 @@ impl PartFile {
     }
 
     /// Writes the bytes in memory to the file.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be written.
     pub fn flush(&mut self) -> Result<(), FileError> {
         if self.pending.is_empty() {
             return Ok(());
@@ -229,6 +241,10 @@ impl PartFile {
     }
 
     /// Cuts or keeps the file at `size` bytes and computes its checksums.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be read or written.
     pub fn sums(&mut self, size: u64) -> Result<Sums, FileError> {
         self.note()?;
         let path = part_path(&self.path);
@@ -238,12 +254,20 @@ impl PartFile {
 
     /// Gives the finished file its name; its journal goes. The content is on the disk then, the
     /// name once its folder is: see [`super::manifest::Shelf::settle`].
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be written or renamed.
     pub fn finish(self) -> Result<(), FileError> {
         let path = self.path.clone();
         self.finish_as(&path)
     }
 
     /// Gives the finished file another name than it was begun for.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be written or renamed.
     pub fn finish_as(self, path: &Path) -> Result<(), FileError> {
         let part = part_path(&self.path);
         let fail = |source| FileError::new("rename", &part, source);
@@ -338,6 +362,10 @@ pub fn sums_of(bytes: &[u8]) -> Sums {
 }
 
 /// Size and checksums of a file, which is read through.
+///
+/// # Errors
+///
+/// If the file cannot be read.
 pub fn sums(path: &Path) -> Result<Sums, FileError> {
     let fail = |source| FileError::new("read", path, source);
     let mut file = File::open(path).map_err(fail)?;
@@ -369,6 +397,10 @@ pub struct Sample {
 impl Sample {
     /// Prepares to compare these ranges (start and end in bytes) of the part of `path`, whose file
     /// has `size` bytes.
+    ///
+    /// # Errors
+    ///
+    /// If the part cannot be opened.
     pub fn new(path: &Path, size: u64, ranges: &[(u64, u64)]) -> Result<Self, FileError> {
         let part = part_path(path);
         let file = File::open(&part).map_err(|source| FileError::new("open", &part, source))?;

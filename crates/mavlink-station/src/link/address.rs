@@ -136,6 +136,10 @@ const LONGEST_LIST: u64 = 1_000_000;
 
 /// Links of one `--connect`: an address, or a file that lists addresses (one per line, `#` begins a
 /// comment).
+///
+/// # Errors
+///
+/// If the address has no known form, a number in it is not valid, or the list file cannot be read.
 pub fn links(text: &str) -> Result<Vec<Address>, AddressError> {
     let path = Path::new(text);
     match text.parse() {

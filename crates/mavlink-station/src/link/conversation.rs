@@ -100,6 +100,10 @@ const LOOK: Micros = 100 * MS;
 /// Runs conversations, at most `at_once` per network at the same time, and the rest in order after
 /// them. Those that a stopped run did not finish, and those that were refused, are absent from the
 /// result.
+///
+/// # Errors
+///
+/// If the net fails; results so far are lost then.
 pub fn run_all<C: Conversation>(
     net: &mut dyn Net,
     conversations: BTreeMap<DroneId, C>,

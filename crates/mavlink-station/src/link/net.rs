@@ -25,12 +25,26 @@ pub trait Net {
 
     /// Waits for the next message from any vehicle; `None` if none has come until `until`. Other
     /// traffic of the station itself (its heartbeat) is handled meanwhile.
+    ///
+    /// # Errors
+    ///
+    /// If no link is left, or one cannot be used any more.
     fn recv(&mut self, until: Micros) -> Result<Option<Received>, NetError>;
 
     /// Sends a message to a vehicle; if it cannot be sent it is lost, like anything on a radio.
+    ///
+    /// # Errors
+    ///
+    /// [`NetError::Refused`] if the vehicle's state does not allow the message, otherwise as
+    /// [`Net::recv`].
     fn send(&mut self, to: DroneId, message: &MavMessage) -> Result<(), NetError>;
 
     /// Sends a message to all vehicles in all networks.
+    ///
+    /// # Errors
+    ///
+    /// [`NetError::Refused`] if the state of a vehicle does not allow the message, otherwise as
+    /// [`Net::recv`].
     fn broadcast(&mut self, message: &MavMessage) -> Result<(), NetError>;
 
     /// Vehicles that were heard so far.

@@ -84,6 +84,10 @@ impl Key {
 
     /// Reads a key from a file with 32 bytes, 64 hexadecimal digits, or a passphrase, whose SHA-256
     /// is the key (the custom of Mission Planner and MAVProxy).
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read, is empty, or is far too long to be a key.
     pub fn from_file(path: &Path) -> Result<Self, KeyError> {
         let content = || KeyError::Content { path: path.to_owned() };
         let bytes = read_whole(path, MOST_KEY_BYTES).map_err(|error| match error.source {

@@ -24,6 +24,10 @@ pub enum Peer {
 /// Sending half of a link.
 pub trait Sending: Send {
     /// Sends one frame. Losing it is not an error; a link that is down for now loses all.
+    ///
+    /// # Errors
+    ///
+    /// If the link cannot be used any more.
     fn send(&mut self, to: Peer, frame: &[u8]) -> io::Result<()>;
 
     /// Peer to send to before any vehicle was heard; `None` if the link can only answer.
@@ -33,6 +37,10 @@ pub trait Sending: Send {
 /// Receiving half of a link.
 pub trait Receiving: Send {
     /// Receives bytes until the timeout; `None` if none came. A datagram is received whole.
+    ///
+    /// # Errors
+    ///
+    /// If the link cannot be used any more.
     fn recv(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<(Peer, usize)>>;
 
     /// Whether bytes that are received at once are one datagram.
