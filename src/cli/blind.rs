@@ -5,35 +5,15 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::context::Context;
-use super::exit::{CommandError, Exit, with_reasons};
+use super::exit::{CommandError, Exit};
 use super::words;
-use crate::base::file::write_whole;
 use crate::base::plain::Shown as _;
 use crate::blind::hide::KINDS;
 use crate::blind::render::{Style, render};
-use crate::blind::series::{self, Place, Settings};
-use crate::blind::table::table;
-use crate::blind::{AirClass, Base, BlindError, Protocol};
-use crate::campaign::to_json;
-use crate::workflow::made_by;
+use crate::blind::series::{Place, Settings};
+use crate::blind::{AirClass, Base, Protocol};
+use crate::workflow::blind;
 
-/// Nothing hidden is this many times as frequent as each thing that is hidden, unless `--effects` says
-/// which: false alarms are what is demanded most of.
-const NONE_WEIGHT: usize = 6;
-/// What is hidden together with `--pairs`, beside the inflow with everything else.
-const PAIRS: &[&[&str]] = &[
-    &["battery", "parasitic-drag"],
-    &["battery", "translational-lift"],
-    &["battery", "thrust-curve"],
-    &["battery", "velocity-bias"],
-    &["motor-thermal", "vortex-ring"],
-    &["blade-flapping", "velocity-lag"],
-];
-const TRIPLES: &[&[&str]] = &[
-    &["rotor-inflow", "battery", "translational-lift"],
-    &["rotor-inflow", "battery", "parasitic-drag"],
-    &["rotor-inflow", "vortex-ring", "velocity-bias"],
-];
 /// The word for nothing.
 const NONE: &str = "none";
 
@@ -174,19 +154,9 @@ impl BlindArgs {
             BaseWord::Inflow => Base::Inflow,
             BaseWord::Pixel => Base::Pixel,
         });
-        let mut hidden = if let Some(sets) = &self.effects {
-            sets.0.clone()
-        } else {
-            let nothing = std::iter::repeat_n(Vec::new(), NONE_WEIGHT);
-            nothing.chain(KINDS.iter().map(|kind| vec![kind.name.to_owned()])).collect()
-        };
+        let mut hidden = self.effects.as_ref().map_or_else(blind::one_each, |sets| sets.0.clone());
         if self.pairs {
-            let others = KINDS.iter().filter(|kind| !kind.foreign && kind.effect != "rotor-inflow");
-            // With the inflow hidden too, the base is AirSim's, and that feels no neighbours.
-            let others = others.filter(|kind| kind.bases.contains(&Base::Airsim));
-            hidden.extend(others.map(|kind| vec!["rotor-inflow".to_owned(), kind.name.to_owned()]));
-            let listed = PAIRS.iter().chain(TRIPLES);
-            hidden.extend(listed.map(|set| set.iter().map(|name| (*name).to_owned()).collect()));
+            hidden.extend(blind::several());
         }
         Settings {
             protocols,
@@ -202,67 +172,19 @@ impl BlindArgs {
 }
 
 pub(super) fn run(context: &Context, args: &BlindArgs) -> Result<Exit, CommandError> {
-    let settings = args.settings();
-    settings.check_seed()?;
-    let _lock = context.lock(&args.output)?;
     let place = Place { folder: args.output.clone(), keep: args.keep };
-    let progress = context.host().progress("blind flights", settings.flights as u64);
-    let work = || {
-        series::run(
-            &settings,
-            &place,
-            &made_by(),
-            &crate::workflow::gap::search::Searched,
-            context.stop_flag(),
-            &|| {
-                progress.advance();
-            },
-        )
-    };
-    let results = match args.jobs {
-        Some(jobs) => rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(jobs))
-            .build()
-            .map_err(|error| CommandError::Failed(format!("failed to start threads: {error}")))?
-            .install(work),
-        None => work(),
-    };
-    progress.finish();
-    let mut outcomes = Vec::new();
-    let mut lost = Vec::new();
-    for (index, result) in results?.into_iter().enumerate() {
-        match result {
-            Ok(result) => outcomes.push(result.outcome),
-            Err(BlindError::Stopped) => return Err(CommandError::Interrupted),
-            Err(error) => {
-                let reason = with_reasons(&CommandError::from(error));
-                lost.push(format!("flight {index}: {reason}"));
-            }
-        }
-    }
-    for reason in &lost {
-        context.warn(reason);
-    }
-    if outcomes.is_empty() {
-        return Err(CommandError::Nothing("no flight has a verdict".to_owned()));
-    }
-    let table = table(&settings, &outcomes, lost.len(), &made_by());
-    let json = to_json(&table)
-        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-    let markdown = args.output.join("table.md");
-    write_whole(&args.output.join("table.json"), &json)?;
     let note = args.note.as_deref();
-    write_whole(&markdown, render(&table, Style::Markdown, note).as_bytes())?;
+    let scored = blind::run(context, &args.settings(), &place, args.jobs, note)?;
     if context.json {
-        context.print_json(&table)?;
+        context.print_json(&scored.table)?;
     } else {
-        context.print(&render(&table, Style::Text, note))?;
+        context.print(&render(&scored.table, Style::Text, note))?;
     }
-    context.result(&markdown)?;
+    context.result(&scored.markdown)?;
     context.say(&format!(
         "{} scored -> {}",
-        words::count(outcomes.len(), "blind flight"),
-        markdown.shown()
+        words::count(scored.flights, "blind flight"),
+        scored.markdown.shown()
     ));
-    Ok(if lost.is_empty() { Exit::Done } else { Exit::Losses })
+    Ok(scored.ending().into())
 }

@@ -1,20 +1,22 @@
 //! What every command gets: where to print, how much to say, and whether to stop.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, BufRead as _, IsTerminal, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, sync_channel};
 
 use serde::Serialize;
 
 use super::Global;
 use super::exit::CommandError;
+use super::fleet::bar::LogsBar;
 use super::progress::Bar;
 use super::signals::Signals;
 use crate::base::plain::{Shown as _, for_terminal, json_for_terminal};
 use crate::campaign::lock::FolderLock;
 use crate::workflow::clock::{Clock, SystemClock};
-use crate::workflow::host::{Host, Progress};
+use crate::workflow::host::{Answer, Host, Progress, Transfer};
 
 /// Output and interruption for one run of the program.
 #[derive(Clone, Debug)]
@@ -92,29 +94,9 @@ impl Context {
         context
     }
 
-    /// For tests: says nothing but warnings, and is never stopped.
-    #[cfg(test)]
-    pub(super) fn silent() -> Self {
-        Self {
-            quiet: true,
-            json: false,
-            color: false,
-            interactive: false,
-            width: None,
-            signals: Signals::default(),
-            insisted: Arc::default(),
-            clock: RunClock::default(),
-        }
-    }
-
     /// The time of this run.
     pub(super) fn clock(&self) -> &Arc<dyn Clock> {
         &self.clock.0
-    }
-
-    /// Ctrl-C and its like.
-    pub(super) fn signals(&self) -> &Signals {
-        &self.signals
     }
 
     /// The flag that Ctrl-C raises.
@@ -238,6 +220,43 @@ impl Host for Context {
         Box::new(Bar::new(self, what, total))
     }
 
+    fn transfer(&self) -> Box<dyn Transfer + '_> {
+        Box::new(LogsBar::new(self))
+    }
+
+    fn is_attended(&self) -> bool {
+        io::stdin().is_terminal()
+    }
+
+    fn sees_questions(&self) -> bool {
+        io::stdin().is_terminal() && io::stderr().is_terminal()
+    }
+
+    fn ask(&self, question: &str) -> io::Result<Receiver<Answer>> {
+        prompt(question)?;
+        let (send, answers) = sync_channel(1);
+        // Ends with the program if nobody answers.
+        let read = move || {
+            let mut answer = String::new();
+            let read = io::stdin().lock().read_line(&mut answer);
+            let _ = send.send(read.map(|bytes| (bytes > 0).then_some(answer)));
+        };
+        std::thread::Builder::new().name("answer".to_owned()).spawn(read)?;
+        Ok(answers)
+    }
+
+    fn interruptions(&self) -> u32 {
+        self.signals.count()
+    }
+
+    fn set_in_flight(&self, words: Option<&'static str>) {
+        self.signals.set_flies(words);
+    }
+
+    fn next_ends(&self) {
+        self.signals.next_ends();
+    }
+
     fn command(&self) -> String {
         let shown: Vec<_> = std::env::args()
             .skip(1)
@@ -248,7 +267,7 @@ impl Host for Context {
 }
 
 /// A question on standard error; the answer follows on its line.
-pub(super) fn prompt(question: &str) -> io::Result<()> {
+fn prompt(question: &str) -> io::Result<()> {
     let mut err = io::stderr().lock();
     err.write_all(for_terminal(question, false).as_bytes()).and_then(|()| err.flush())
 }

@@ -7,21 +7,12 @@ use clap::{Args, ValueEnum};
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-
 use super::mission_args::MissionArgs;
 use super::words;
-use crate::base::file::{create_folder, write_whole};
-use crate::base::plain::Shown as _;
-use crate::blind::play::{self, Act, play};
 use crate::blind::scenario::FULL_SIDE;
-use crate::blind::told::{HiddenRun, gap_words};
-use crate::blind::{AirClass, Base, Cell, Protocol, Scenario, seal};
-use crate::campaign::to_json;
-use crate::workflow::gap::search::Written;
-use crate::workflow::made_by;
+use crate::blind::{AirClass, Base, Cell, Protocol};
+use crate::workflow::hidden::hide;
 
-/// File of the comparison.
-const RESULT: &str = "hidden.json";
 /// Sides of the grid that are flown.
 const SIDES: std::ops::RangeInclusive<i64> = 3..=15;
 
@@ -122,7 +113,7 @@ impl HideArgs {
     }
 }
 
-/// Seals, flies, explains, opens and compares.
+/// Runs it, and prints what came of it.
 pub(super) fn run(
     context: &Context,
     folder: &Path,
@@ -132,85 +123,18 @@ pub(super) fn run(
     seed: u64,
 ) -> Result<Exit, CommandError> {
     let cell = args.cell(seed, mission)?;
-    let truth = Scenario::draw(seed, &cell)?;
-    create_folder(folder)?;
-    let _lock = context.lock(folder)?;
-    make_room(folder, force)?;
-    let mut tell = |act: Act<'_>| {
-        match act {
-        Act::Sealed(hash) => context.say(&format!(
-            "Sealed: an effect that {} does not have, of a size that is usual\n  SHA-256 {hash} -> {}",
-            cell.base.vehicle_name(),
-            seal::truth_path(folder).shown()
-        )),
-        Act::Flown(flown) => {
-            let lost = truth.nuisance.missing.len() + flown.lost;
-            let lost = if lost > 0 { format!(" ({lost} lost)") } else { String::new() };
-            context.say(&format!(
-                "Flown: {} in {} air, {}{lost} -> {}",
-                cell.protocol.template(),
-                cell.air.name(),
-                words::count(flown.logs, "log"),
-                play::flight(folder).shown()
-            ));
-        }
-        Act::Explained(verdict) => {
-            context.say(&format!("Verdict: {}", verdict.summary));
-            if let Some(shrink) = verdict.gap.drones.or(verdict.gap.rungs) {
-                context.say(&format!("Gap on held-out data: {}", gap_words(&shrink)));
-            }
-            context.say(&format!("  -> {}", play::verdict(folder).shown()));
-        }
-    }
-    };
-    let played = play(&truth, folder, &Written(context), Some(context.stop_flag()), &mut tell)?;
-    context.say(&format!("Seal opened: it hides {}", played.opened.truth.words()));
-    let result = HiddenRun::of(&played, &made_by());
-    let json = to_json(&result)
-        .map_err(|error| CommandError::Failed(format!("failed to make JSON: {error}")))?;
-    let path = folder.join(RESULT);
-    write_whole(&path, &json)?;
+    let hidden = hide(context, folder, force, &cell, seed)?;
     if context.json {
-        context.print_json(&result)?;
+        context.print_json(&hidden.result)?;
     } else {
-        context.print(&format!("{}\n", result.words.join("\n")))?;
+        context.print(&format!("{}\n", hidden.result.words.join("\n")))?;
     }
-    context.result(&path)?;
-    if played.flown.lost > 0 {
+    context.result(&hidden.path)?;
+    if hidden.lost > 0 {
         context.warn(&format!(
             "{} could not be flown and gave no log",
-            words::count(played.flown.lost, "drone")
+            words::count(hidden.lost, "drone")
         ));
-        return Ok(Exit::Losses);
     }
-    Ok(Exit::Done)
-}
-
-/// A flight of another seed is not mixed with this one's.
-fn make_room(folder: &Path, force: bool) -> Result<(), CommandError> {
-    let flight = play::flight(folder);
-    if play::is_played(folder) {
-        // What was interrupted before its verdict is flown again: the same seed gives the same flight.
-        if !force && play::verdict(folder).exists() {
-            return Err(CommandError::Usage(format!(
-                "{} has a flight with hidden physics; choose another folder with -o, or replace it with \
-                 --force",
-                folder.shown()
-            )));
-        }
-        return Ok(play::remove(folder)?);
-    }
-    if crate::campaign::flights(folder).is_ok_and(|flights| !flights.is_empty()) {
-        return Err(CommandError::Usage(format!(
-            "{} is a campaign; choose another folder with -o",
-            folder.shown()
-        )));
-    }
-    if flight.exists() {
-        return Err(CommandError::Usage(format!(
-            "{} is there and was not made by `run --hide`; choose another folder with -o",
-            flight.shown()
-        )));
-    }
-    Ok(())
+    Ok(hidden.ending().into())
 }

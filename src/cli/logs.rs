@@ -5,7 +5,6 @@ mod cards;
 mod dry;
 mod listing;
 mod simulated;
-mod who;
 
 use std::path::{Path, PathBuf};
 
@@ -14,10 +13,8 @@ use serde::Serialize;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::fleet::bring::{Brought, Wish, bring};
 use super::fleet::connect::{ConnectArgs, Target};
-use super::fleet::crew::Crew;
-use super::fleet::{one_flight, server};
+use super::fleet::server;
 use super::simulate::parse_slots;
 use super::words;
 use crate::base::plain::Shown as _;
@@ -27,9 +24,12 @@ use crate::campaign::start::earlier_folders;
 use crate::fleet::logs::one::Which;
 use crate::fleet::logs::verify::{unknown, verify};
 use crate::mission::Plan;
+use crate::workflow::fleet::bring::{Brought, Wish, bring};
+use crate::workflow::fleet::crew::Crew;
+use crate::workflow::fleet::output::{ListRow, ListedLog};
+use crate::workflow::fleet::server::{list as list_through, pull as pull_through};
+use crate::workflow::fleet::{one_flight, who};
 use crate::workflow::slots::SlotSet;
-
-pub(super) use listing::{ListRow, ListedLog};
 
 /// How long a drone may be silent, s.
 const PATIENCE_S: f64 = 60.0;
@@ -151,11 +151,11 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
         Target::Server(address) => {
             server::refuse(&args.connect, &[])?;
             let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
-            return listing::show(context, server::list(context, &address, &plan, slots, wait_s)?);
+            return listing::show(context, list_through(context, &address, &plan, slots, wait_s)?);
         }
         Target::Sim => return Err(gone()),
     };
-    let mut station = args.connect.open(links)?;
+    let mut station = args.connect.open(context, links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
     let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait)?;
     let listed = crew.list_logs()?;
@@ -277,14 +277,14 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
                 ],
             )?;
             let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
-            let rows = server::pull(context, &address, &folder, &plan, slots, &wish, wait_s)?;
+            let rows = pull_through(context, &address, &folder, &plan, slots, &wish, wait_s)?;
             let lost = rows.iter().filter(|row| row.state == "missing").map(|row| row.slot);
             let lost: Vec<u16> = lost.collect();
             return end_pull(context, args, &plan, rows, &lost);
         }
         Target::Sim => return Err(gone()),
     };
-    let mut station = args.connect.open(links)?;
+    let mut station = args.connect.open(context, links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
     let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait);
     let nobody = nobody.map_err(|error| match error {

@@ -11,7 +11,6 @@ mod effects_plot;
 pub mod exit;
 mod fleet;
 mod fly;
-mod fly_output;
 mod gap;
 mod hidden;
 mod inspect;

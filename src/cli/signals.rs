@@ -63,13 +63,6 @@ impl Signals {
         }
     }
 
-    /// As if one had come.
-    #[cfg(test)]
-    pub(super) fn pretend(&self) {
-        self.set_flies(Some("ended"));
-        self.on_signal(true);
-    }
-
     fn air(&self) -> std::sync::MutexGuard<'_, Option<Air>> {
         self.0.air.lock().unwrap_or_else(PoisonError::into_inner)
     }

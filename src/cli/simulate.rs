@@ -56,6 +56,14 @@ const STILL: &str = "still";
 #[derive(Clone, Debug, Default)]
 pub(super) struct AirSpecs(Vec<AirSpec>);
 
+impl AirSpecs {
+    /// All of these together; `None`: nothing is said.
+    pub(super) fn all(specs: &[Self]) -> Option<Vec<AirSpec>> {
+        let all = || specs.iter().flat_map(|specs| specs.0.iter().cloned()).collect();
+        (!specs.is_empty()).then(all)
+    }
+}
+
 /// Parser of `--air`.
 pub(super) fn air_specs(text: &str) -> Result<AirSpecs, String> {
     if text == STILL {
@@ -94,11 +102,6 @@ pub(super) fn updraft(text: &str) -> Result<f64, String> {
 }
 
 impl AirArgs {
-    /// Whether anything but a uniform wind is asked for.
-    pub(super) fn moves(&self) -> bool {
-        self.specs.iter().any(|specs| !specs.0.is_empty())
-    }
-
     /// The air of a flight with a uniform vertical speed.
     pub(super) fn air(&self, updraft_mps: f64) -> Air {
         let specs: Vec<_> = self.specs.iter().flat_map(|specs| specs.0.iter().cloned()).collect();

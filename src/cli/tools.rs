@@ -6,8 +6,6 @@ use schemars::schema_for;
 
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::fleet::tables::PreflightOutput;
-use super::fly_output::FlyOutput;
 use crate::analysis::result::Analysis;
 use crate::blind::seal::Sealed;
 use crate::blind::series::FlightResult;
@@ -24,6 +22,8 @@ use crate::mission::Plan;
 use crate::study::CellRecord;
 use crate::study::result::StudyResult;
 use crate::vehicle::Vehicle;
+use crate::workflow::fleet::output::FlyOutput;
+use crate::workflow::fleet::preflight::PreflightOutput;
 
 /// Arguments of `updraft completions`.
 #[derive(Debug, Args)]

@@ -3,7 +3,8 @@
 
 use std::io;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::clock::{Clock, SystemClock};
@@ -57,6 +58,43 @@ pub trait Host: Send + Sync {
         Box::new(Unseen)
     }
 
+    /// Shows how many bytes of logs have come.
+    fn transfer(&self) -> Box<dyn Transfer + '_> {
+        Box::new(Unseen)
+    }
+
+    /// Whether a person is there who can give leave to start.
+    fn is_attended(&self) -> bool {
+        false
+    }
+
+    /// Whether a person is there who sees a question that comes by itself.
+    fn sees_questions(&self) -> bool {
+        false
+    }
+
+    /// Asks a person. The answer comes while the work goes on.
+    ///
+    /// # Errors
+    /// When nobody can be asked.
+    fn ask(&self, question: &str) -> io::Result<Receiver<Answer>> {
+        Err(io::Error::new(io::ErrorKind::Unsupported, format!("nobody to answer: {question}")))
+    }
+
+    /// How often the work was told to stop: who insists while drones are in the air is not kept waiting.
+    fn interruptions(&self) -> u32 {
+        u32::from(self.stop_flag().load(Ordering::SeqCst))
+    }
+
+    /// Drones are in the air now, and these words say what becomes of them if the program ends all the
+    /// same; `None`: there are none any more.
+    fn set_in_flight(&self, words: Option<&'static str>) {
+        let _ = words;
+    }
+
+    /// The next interruption may end the program, whatever it is at.
+    fn next_ends(&self) {}
+
     /// The command or call that this work comes from, for the provenance of reports.
     fn command(&self) -> String {
         String::new()
@@ -105,8 +143,31 @@ pub trait Progress: Send + Sync {
     fn finish(&self);
 }
 
+/// A line that a person has written; `None`: nobody is there.
+pub type Answer = io::Result<Option<String>>;
+
+/// Logs on their way home.
+pub trait Transfer {
+    /// So many bytes came of those whose number is known, and so many drones are done.
+    fn advance(&self, done: u64, total: u64, drones_done: usize);
+
+    /// Hears what is said meanwhile.
+    fn say(&self, text: &str);
+
+    /// All came, or was given up.
+    fn finish(&self);
+}
+
 /// Progress that nobody looks at.
 struct Unseen;
+
+impl Transfer for Unseen {
+    fn advance(&self, _done: u64, _total: u64, _drones_done: usize) {}
+
+    fn say(&self, _text: &str) {}
+
+    fn finish(&self) {}
+}
 
 impl Progress for Unseen {
     fn advance(&self) {}
@@ -127,6 +188,7 @@ impl Progress for Unseen {
 pub struct Quiet {
     clock: Arc<dyn Clock>,
     stop: AtomicBool,
+    stopped: AtomicU32,
     heard: Mutex<Vec<String>>,
 }
 
@@ -140,7 +202,12 @@ impl Default for Quiet {
 impl Quiet {
     /// By this clock.
     pub fn new(clock: Arc<dyn Clock>) -> Self {
-        Self { clock, stop: AtomicBool::new(false), heard: Mutex::default() }
+        Self {
+            clock,
+            stop: AtomicBool::new(false),
+            stopped: AtomicU32::new(0),
+            heard: Mutex::default(),
+        }
     }
 
     /// Warnings and the like, in their order.
@@ -151,6 +218,7 @@ impl Quiet {
     /// Stops the work at its next step; may be called from another thread.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::SeqCst);
+        self.stopped.fetch_add(1, Ordering::SeqCst);
     }
 }
 
@@ -173,5 +241,9 @@ impl Host for Quiet {
 
     fn stop_flag(&self) -> &AtomicBool {
         &self.stop
+    }
+
+    fn interruptions(&self) -> u32 {
+        self.stopped.load(Ordering::SeqCst)
     }
 }

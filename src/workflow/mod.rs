@@ -31,17 +31,21 @@
 //! ```
 
 pub mod analyze;
+pub mod blind;
 pub mod check;
 pub mod clock;
 pub mod ending;
 pub mod error;
 pub mod find;
+pub mod fleet;
 pub mod gap;
 pub mod hashes;
+pub mod hidden;
 pub mod host;
 pub mod mission;
 pub mod plan;
 mod provenance;
+pub mod run;
 pub mod shows;
 pub mod simulate;
 pub mod slots;

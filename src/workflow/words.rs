@@ -1,5 +1,7 @@
 //! Small pieces of sentences.
 
+use crate::base::time::GpsTime;
+
 /// `1 log`, `2 logs`.
 pub(crate) fn count(number: usize, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
@@ -30,4 +32,10 @@ pub(crate) fn range(names: &[&str]) -> String {
         [first, _, .., last] => format!("{first} to {last} ({})", names.len()),
         few => list(few),
     }
+}
+
+/// UTC of a GPS time: `12:34:56 UTC`.
+pub(crate) fn time_of_day(time: GpsTime) -> String {
+    let seconds = time.to_unix_ms().div_euclid(1000).rem_euclid(86_400);
+    format!("{:02}:{:02}:{:02} UTC", seconds / 3600, seconds / 60 % 60, seconds % 60)
 }

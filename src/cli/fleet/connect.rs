@@ -1,18 +1,17 @@
 //! `--connect`: from words to links.
 
-use std::net::{SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
 
-use crate::cli::context::complain;
+use crate::cli::context::{Context, complain};
 use crate::cli::exit::CommandError;
-use crate::link::address::{Address, Way, links};
-use crate::link::clock::Clock as _;
+use crate::link::address::{Address, links};
 use crate::link::signing::{Key, exposure};
-use crate::link::station::{Setup, Station};
-use crate::workflow::clock::SystemClock;
+use crate::link::station::Station;
+use crate::workflow::clock::{Clock, SinceNow};
+use crate::workflow::fleet::links::open;
 
 /// Where drones are listened for without a choice.
 const DEFAULT_LINK: &str = "udpin:0.0.0.0:14550";
@@ -83,9 +82,14 @@ impl ConnectArgs {
     }
 
     /// Opens the links.
-    pub(in crate::cli) fn open(&self, links: Vec<Address>) -> Result<Station, CommandError> {
+    pub(in crate::cli) fn open(
+        &self,
+        context: &Context,
+        links: Vec<Address>,
+    ) -> Result<Station, CommandError> {
         let key = read_key(self.key.as_deref())?;
-        station(links, key, SystemClock::start())
+        let clock: Arc<dyn Clock> = Arc::new(SinceNow::of(context.clock()));
+        open(links, key, &clock)
     }
 }
 
@@ -96,29 +100,4 @@ pub(in crate::cli) fn read_key(path: Option<&Path>) -> Result<Option<Key>, Comma
         complain(&format!("warning: {warning}"));
     }
     key.map_err(|error| CommandError::Usage(crate::cli::exit::with_reasons(&error)))
-}
-
-/// Opens links with a clock.
-pub(in crate::cli) fn station(
-    links: Vec<Address>,
-    key: Option<Key>,
-    clock: SystemClock,
-) -> Result<Station, CommandError> {
-    Station::open(Setup { links, key, clock: Arc::new(clock) })
-        .map_err(|error| CommandError::Failed(crate::cli::exit::with_reasons(&error)))
-}
-
-/// A link to a network of virtual drones on this computer, on a free port, and the port's address.
-pub(in crate::cli) fn own_link(network: u16) -> Result<(Address, SocketAddr), CommandError> {
-    let free =
-        || -> std::io::Result<SocketAddr> { UdpSocket::bind(("127.0.0.1", 0))?.local_addr() };
-    let address = free().map_err(|error| {
-        CommandError::Failed(format!("no free UDP port on this computer: {error}"))
-    })?;
-    Ok((Address { network, way: Way::UdpIn(address.to_string()) }, address))
-}
-
-/// Differs from run to run, for sequence numbers that answers of an earlier run must not match.
-pub(in crate::cli) fn run_number() -> u32 {
-    (SystemClock::start().unix_us() / 1000) as u32
 }

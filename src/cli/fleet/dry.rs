@@ -5,65 +5,12 @@ use std::fmt::Display;
 
 use serde::Serialize;
 
+use super::StepArgs;
 use super::connect::Target;
-use super::crew::Crew;
-use super::{StepArgs, end, one_flight, server};
-use crate::base::frame::Geodetic;
-use crate::base::time::GpsTime;
-use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::fleet::abort::{Abort, Action};
-use crate::fleet::changes::{Change, Changes};
-use crate::fleet::command::Command;
-use crate::fleet::dry_run::{Obliging, dry_run};
-use crate::fleet::fence::PutFence;
-use crate::fleet::greet::Greet;
-use crate::fleet::guided::{Guided, GuidedFlight};
-use crate::fleet::messages::{GUIDED, set_mode};
-use crate::fleet::params::ReadParams;
-use crate::fleet::required::{CheckParams, requirements};
-use crate::fleet::slots::FleetTable;
-use crate::fleet::vehicle_clock::VehicleClock;
-use crate::link::clock::Micros;
-use crate::link::conversation::Conversation;
-use crate::link::error::NetError;
-use crate::link::frame::MavMessage;
-use crate::link::id::DroneId;
-use crate::link::net::{Net, Received};
-use crate::mission::Plan;
-use crate::mission::plan::Slot;
-
-/// Most messages shown of a conversation.
-const MOST: usize = 20_000;
-
-/// The same of a flight by streaming: three hours.
-const MOST_STREAMED: usize = 100_000;
-
-/// No links at all.
-struct Nobody;
-
-impl Net for Nobody {
-    fn now(&self) -> Micros {
-        0
-    }
-
-    fn recv(&mut self, _: Micros) -> Result<Option<Received>, NetError> {
-        Ok(None)
-    }
-
-    fn send(&mut self, _: DroneId, _: &MavMessage) -> Result<(), NetError> {
-        Ok(())
-    }
-
-    fn broadcast(&mut self, _: &MavMessage) -> Result<(), NetError> {
-        Ok(())
-    }
-
-    fn heard(&self) -> Vec<DroneId> {
-        Vec::new()
-    }
-}
+use crate::fleet::abort::Action;
+use crate::workflow::fleet::{dry, server};
 
 #[derive(Serialize)]
 struct DryOutput {
@@ -91,128 +38,38 @@ pub(in crate::cli) fn print<D: Display + Ord>(
     Ok(Exit::Done)
 }
 
-/// The table of the campaign, or drones by the number of their slots.
-fn table(folder: &std::path::Path, plan: &Plan) -> Result<FleetTable, CommandError> {
-    if FleetTable::path(folder).exists() {
-        return Ok(FleetTable::read(folder)?);
-    }
-    Ok(FleetTable::new(plan.slots.iter().map(|slot| {
-        let number = usize::from(slot.slot) - 1;
-        let id = DroneId { network: (number / 253) as u16, system: (number % 253 + 1) as u8 };
-        (id, slot.slot)
-    })))
-}
-
-fn place(plan: &Plan, slot: Option<&Slot>) -> Geodetic {
-    let home = slot.map_or([0.0; 3], |slot| slot.home_m);
-    plan.site.frame().to_geodetic(home.into())
-}
-
-fn shown<C: Conversation>(
-    plan: &Plan,
-    table: &FleetTable,
-    drone: DroneId,
-    conversation: C,
-) -> Vec<String> {
-    let slot = table.slot_of(drone).and_then(|slot| plan.slot(slot));
-    let mut vehicle = Obliging::new(drone, true, place(plan, slot));
-    dry_run(conversation, &mut vehicle, MOST).0
-}
-
-/// A campaign's flight, and the drones that it would be flown by.
-struct Dry {
-    folder: FlightFolder,
-    plan: Plan,
-    table: FleetTable,
-}
-
-impl Dry {
-    fn of(args: &StepArgs) -> Result<Self, CommandError> {
-        let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-        let table = table(&folder.0, &plan)?;
-        Ok(Self { folder, plan, table })
+impl StepArgs {
+    fn of(&self) -> dry::Of<'_> {
+        dry::Of { campaign: &self.campaign, flight: self.flight.as_deref() }
     }
 
-    /// What each drone would be sent.
-    fn each(&self, lines: impl Fn(DroneId) -> Vec<String>) -> BTreeMap<DroneId, Vec<String>> {
-        self.table.drones.iter().map(|line| (line.drone, lines(line.drone))).collect()
-    }
-
-    fn shown<C: Conversation>(&self, drone: DroneId, conversation: C) -> Vec<String> {
-        shown(&self.plan, &self.table, drone, conversation)
-    }
-
-    /// A flight by streaming, from its authorization on.
-    fn flown(&self, drone: DroneId, lead_s: f64) -> Vec<String> {
-        let Some(slot) = self.table.slot_of(drone).and_then(|slot| self.plan.slot(slot)) else {
-            return Vec::new();
-        };
-        let mut vehicle = Obliging::new(drone, false, place(&self.plan, Some(slot)));
-        let authorized_ms = (vehicle.unix_us / 1000) as i64 + (lead_s * 1000.0) as i64;
-        let flight = GuidedFlight {
-            trajectory: self.plan.trajectory(slot),
-            frame: self.plan.site.frame(),
-            start_gps_ms: GpsTime::from_unix_ms(authorized_ms).map_or(0, GpsTime::total_ms),
-            yaw_rad: None,
-            clock: VehicleClock::default(),
-        };
-        let (lines, _) = dry_run(Guided::new(drone, flight), &mut vehicle, MOST_STREAMED);
-        told_once(lines)
-    }
-
-    fn params(&self, drone: DroneId) -> Vec<String> {
-        self.shown(drone, CheckParams::new(drone, requirements(&self.plan, true), false))
-    }
-
-    fn upload(&self, context: &Context) -> Result<BTreeMap<DroneId, Vec<String>>, CommandError> {
-        let mut nobody = Nobody;
-        let mut crew = Crew::new(context, &mut nobody, &self.folder, &self.plan);
-        crew.table = self.table.clone();
-        let fence = crew.fence()?;
-        let mut lines = BTreeMap::new();
-        for (drone, upload) in crew.uploads()? {
-            let names = fence.params().into_iter().map(|(name, _)| name);
-            let mut all = self.shown(drone, ReadParams::new(drone, names));
-            all.extend(self.shown(drone, upload));
-            all.extend(self.params(drone));
-            lines.insert(drone, all);
-        }
-        Ok(lines)
+    fn is_through_server(&self) -> Result<bool, CommandError> {
+        Ok(matches!(self.connect.target()?, Target::Server(_)))
     }
 }
 
 /// What a look at the fleet would send.
 pub(in crate::cli) fn status(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
-    if let Target::Server(_) = args.connect.target()? {
-        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-        return server::dry_look(context, &plan);
+    if args.is_through_server()? {
+        return print(context, server::dry_look(&args.of().plan()?)?);
     }
-    let dry = Dry::of(args)?;
-    print(context, dry.each(|drone| dry.shown(drone, Greet::new(drone))))
+    print(context, dry::status(args.of())?)
 }
 
 /// What the preflight table would send.
 pub(in crate::cli) fn preflight(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
-    if let Target::Server(_) = args.connect.target()? {
-        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-        return server::dry_look(context, &plan);
+    if args.is_through_server()? {
+        return print(context, server::dry_look(&args.of().plan()?)?);
     }
-    let dry = Dry::of(args)?;
-    let lines = |drone| {
-        let mut lines = dry.shown(drone, Greet::new(drone));
-        lines.extend(dry.params(drone));
-        lines
-    };
-    print(context, dry.each(lines))
+    print(context, dry::preflight(args.of())?)
 }
 
 /// What an upload would send.
 pub(in crate::cli) fn upload(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
-    if let Target::Server(_) = args.connect.target()? {
-        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-        return server::dry_upload(context, &plan);
+    if args.is_through_server()? {
+        return print(context, server::dry_upload(&args.of().plan()?)?);
     }
-    print(context, Dry::of(args)?.upload(context)?)
+    print(context, dry::upload(context, args.of())?)
 }
 
 /// What a start would send.
@@ -221,7 +78,7 @@ pub(in crate::cli) fn start(
     args: &StepArgs,
     lead_s: f64,
 ) -> Result<Exit, CommandError> {
-    print(context, Dry::of(args)?.each(|_| start_lines(lead_s)))
+    print(context, dry::start(args.of(), lead_s)?)
 }
 
 /// What a whole flight would send.
@@ -230,15 +87,10 @@ pub(in crate::cli) fn fly(
     args: &StepArgs,
     lead_s: f64,
 ) -> Result<Exit, CommandError> {
-    if let Target::Server(_) = args.connect.target()? {
-        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-        return server::dry_fly(context, &plan, lead_s);
+    if args.is_through_server()? {
+        return print(context, server::dry_fly(&args.of().plan()?, lead_s)?);
     }
-    let mut lines = Dry::of(args)?.upload(context)?;
-    for all in lines.values_mut() {
-        all.extend(start_lines(lead_s));
-    }
-    print(context, lines)
+    print(context, dry::fly(context, args.of(), lead_s)?)
 }
 
 /// What a whole flight by streaming would send.
@@ -247,49 +99,7 @@ pub(in crate::cli) fn guided(
     args: &StepArgs,
     lead_s: f64,
 ) -> Result<Exit, CommandError> {
-    let dry = Dry::of(args)?;
-    let mut nobody = Nobody;
-    let fence = Crew::new(context, &mut nobody, &dry.folder, &dry.plan).fence()?;
-    let mode = |drone| Command::new("go into guided mode", set_mode(drone, GUIDED, 0));
-    let required = requirements(&dry.plan, false);
-    print(
-        context,
-        dry.each(|drone| {
-            let mut lines = dry.shown(drone, PutFence::new(drone, fence.clone()));
-            lines.extend(dry.shown(drone, mode(drone)));
-            lines.extend(dry.shown(drone, CheckParams::new(drone, required.clone(), false)));
-            lines.extend(dry.flown(drone, lead_s));
-            lines
-        }),
-    )
-}
-
-/// Targets one after another with the same velocity are told by the first of them.
-fn told_once(lines: Vec<String>) -> Vec<String> {
-    let velocity = |line: &str| {
-        let (_, rest) = line.split_once("SET_POSITION_TARGET")?;
-        let (_, rest) = rest.split_once("velocity ")?;
-        Some(rest.to_owned())
-    };
-    let (mut told, mut last, mut more) = (Vec::new(), None, 0);
-    let rest = |told: &mut Vec<String>, more: &mut usize| {
-        if *more > 0 {
-            told.push(format!("             and {more} more with this velocity, 10 a second"));
-            *more = 0;
-        }
-    };
-    for line in lines {
-        let this = velocity(&line);
-        if this.is_some() && this == last {
-            more += 1;
-            continue;
-        }
-        rest(&mut told, &mut more);
-        last = this;
-        told.push(line);
-    }
-    rest(&mut told, &mut more);
-    told
+    print(context, dry::guided(context, args.of(), lead_s)?)
 }
 
 /// What putting parameters back would send.
@@ -298,20 +108,7 @@ pub(in crate::cli) fn restore(
     args: &StepArgs,
     fence_off: bool,
 ) -> Result<Exit, CommandError> {
-    let dry = Dry::of(args)?;
-    let may = |_, change: &Change| fence_off || !change.unfences();
-    let conversations = Changes::read(&dry.folder.0)?.restore(may).into_iter();
-    print(context, conversations.map(|(drone, set)| (drone, dry.shown(drone, set))).collect())
-}
-
-fn start_lines(lead_s: f64) -> Vec<String> {
-    let packet = |authorized| {
-        format!("DATA16 start packet: the drones' GPS time + {lead_s:.0} s (by then), {authorized}")
-    };
-    vec![
-        format!("once a second: {}", packet("not authorized")),
-        format!("once authorized, until the start: {}", packet("authorized")),
-    ]
+    print(context, dry::restore(args.of(), fence_off)?)
 }
 
 /// What an abort would send.
@@ -320,20 +117,8 @@ pub(in crate::cli) fn end(
     args: &StepArgs,
     action: Action,
 ) -> Result<Exit, CommandError> {
-    if let Target::Server(_) = args.connect.target()? {
-        let (_, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-        return server::dry_end(context, &plan, action);
+    if args.is_through_server()? {
+        return print(context, server::dry_end(&args.of().plan()?, action)?);
     }
-    // As without --dry-run: any flight will do.
-    let (folder, plan) = end::find(args)?;
-    let table = table(&folder.0, &plan)?;
-    let dry = Dry { folder, plan, table };
-    let lines = |drone| {
-        let slot = dry.table.slot_of(drone).and_then(|slot| dry.plan.slot(slot));
-        let mut vehicle = Obliging::new(drone, true, place(&dry.plan, slot));
-        vehicle.armed = true;
-        vehicle.above_home_m = 20.0;
-        dry_run(Abort::new(drone, action, None), &mut vehicle, MOST).0
-    };
-    print(context, dry.each(lines))
+    print(context, dry::end(args.of(), action)?)
 }

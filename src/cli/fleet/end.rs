@@ -1,287 +1,33 @@
-//! `fleet abort` and `fleet land`: over the links, or by the station that holds them.
+//! `fleet abort` and `fleet land`.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
-use std::time::Duration;
+use std::collections::BTreeMap;
 
 use super::connect::Target;
-use super::crew::Crew;
-use super::{EndArgs, StepArgs, dry, one_flight, server, tables};
-use crate::base::causes::with_causes;
-use crate::campaign::lock::FolderLock;
-use crate::campaign::start::StartRecord;
-use crate::campaign::{self, CampaignError, FlightFolder};
+use super::{EndArgs, dry, server, tables};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::{Aborted, Action};
-use crate::fleet::order_handler::{Notice, OrderHandler};
-use crate::fleet::orders::{Given, Inbox, give, has_station};
-use crate::fleet::slots::FleetTable;
-use crate::link::clock::Clock as _;
 use crate::link::id::DroneId;
-use crate::link::net::Net;
-use crate::mission::Plan;
-use crate::workflow::clock::{Stopwatch, SystemClock};
-
-/// A station that flies answers within this.
-const ANSWERS_WITHIN: Duration = Duration::from_secs(3);
-/// One that has answered and says nothing more for so long has died.
-const DEAD_AFTER: Duration = Duration::from_secs(6);
-/// Who has not confirmed for so long is named with what to do, once.
-pub(super) const PATIENCE: Duration = Duration::from_secs(10);
-/// A running station is given so long at least to hear everyone; it goes on when nobody waits any more.
-const FOLLOWED: Duration = Duration::from_secs(15);
-const PAUSE: Duration = Duration::from_millis(100);
-
-/// What is to be done where the drones cannot be reached from here.
-const INSTEAD: &str = "press Ctrl-C in the terminal of the command that holds the link, and give the order \
-     again; or use the remote controls";
-
-/// In words.
-pub(super) fn word(action: Action) -> &'static str {
-    match action {
-        Action::Return => "abort",
-        Action::Land => "land",
-    }
-}
-
-/// Nobody is heard whom an order could reach.
-const NOBODY: &str = "no drone was heard: use their remote controls";
-
-fn own_name() -> String {
-    format!("{:020}-{}", SystemClock::start().unix_us(), std::process::id())
-}
-
-/// A net on which `fleet abort` and `fleet land` of other terminals are carried out, whatever this
-/// command is at.
-pub(in crate::cli) fn order_handler<'a>(
-    context: &'a Context,
-    net: &'a mut dyn Net,
-    folder: &'a FlightFolder,
-) -> OrderHandler<'a> {
-    let inbox = Inbox::open(&folder.0, own_name());
-    if let Err(error) = &inbox {
-        context.warn(&format!(
-            "{}; `fleet abort` from another terminal will not reach the drones: use Ctrl-C here",
-            with_causes(error, ": ")
-        ));
-    }
-    // An order needs no disk: without the table it is for those who are heard.
-    let fleet = || table_of(folder);
-    OrderHandler::new(net, inbox.ok(), move |notice| tell(context, folder, notice))
-        .with_fleet(fleet)
-}
-
-/// The drones of a flight's table, if it has one that can be read.
-fn table_of(folder: &FlightFolder) -> BTreeSet<DroneId> {
-    FleetTable::read(&folder.0)
-        .map(|table| table.by_drone().into_keys().collect())
-        .unwrap_or_default()
-}
-
-fn tell(context: &Context, folder: &FlightFolder, notice: &Notice) {
-    let (text, step, outcomes) = match notice {
-        Notice::Ordered { action, drones } => {
-            let text = format!("Ordered from another terminal: {}", word(*action));
-            let said = |drone: &DroneId| (*drone, "ordered from another terminal".to_owned());
-            (text, word(*action), drones.iter().map(said).collect())
-        }
-        Notice::Done { action, drone, done } => {
-            let outcome = BTreeMap::from([(*drone, done.to_string())]);
-            (format!("drone {drone}: {done}"), word(*action), outcome)
-        }
-        Notice::NoAnswer { reason } => {
-            (format!("warning: the order is carried out, but {reason}"), "", BTreeMap::new())
-        }
-    };
-    context.insist(&text);
-    if !step.is_empty()
-        && let Err(error) =
-            super::crew::write_outcomes(folder, SystemClock::start(), step, &outcomes)
-    {
-        context.warn(&error.to_string());
-    }
-}
-
-/// Whether another process works in the campaign.
-fn is_busy(campaign: &Path) -> bool {
-    campaign.is_dir() && matches!(FolderLock::take(campaign), Err(CampaignError::Busy { .. }))
-}
-
-/// The flights of the campaign that a station is flying, with their names, wherever in it the folder
-/// is. In truth that is one; others are of stations that have died.
-pub(super) fn flying(folder: &Path) -> Vec<(FlightFolder, String)> {
-    if !is_busy(folder) {
-        return Vec::new();
-    }
-    let full = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    let whole = full.parent().filter(|above| campaign::index_path(above).is_file());
-    let mut folders = campaign::flights(whole.unwrap_or(folder)).unwrap_or_default();
-    folders.retain(|folder| has_station(&folder.0));
-    let name =
-        |folder: &FlightFolder| folder.read_plan().map_or_else(|_| String::new(), |plan| plan.name);
-    folders
-        .into_iter()
-        .map(|folder| {
-            let name = name(&folder);
-            (folder, name)
-        })
-        .collect()
-}
-
-/// The drones that somebody ordering everyone down means, heard or not: those of the flight, or where
-/// none is named of the one that was started last.
-fn meant(campaign: &Path, flight: Option<&str>) -> BTreeSet<DroneId> {
-    let mut folders = campaign::flights(campaign).unwrap_or_default();
-    if let Some(name) = flight {
-        folders.retain(|folder| folder.read_plan().is_ok_and(|plan| plan.name == name));
-    }
-    let started = |folder: &FlightFolder| {
-        StartRecord::read(folder).ok().flatten().map(|record| record.authorized_unix_s)
-    };
-    let last = folders.iter().filter_map(|folder| Some((started(folder)?, folder)));
-    match last.max_by_key(|(at, _)| *at) {
-        Some((_, folder)) => table_of(folder),
-        None => folders.iter().flat_map(table_of).collect(),
-    }
-}
-
-fn any_flight(campaign: &Path) -> Option<(FlightFolder, Plan)> {
-    let folder = campaign::flights(campaign).ok()?.into_iter().next()?;
-    let plan = folder.read_plan().ok()?;
-    Some((folder, plan))
-}
-
-/// Gives the order to the stations of these flights, and waits for one to carry it out. `None`:
-/// nobody has taken it.
-fn order(
-    context: &Context,
-    flights: &[(FlightFolder, String)],
-    wanted: Option<&str>,
-    only: Option<&BTreeSet<DroneId>>,
-    action: Action,
-    patience: Duration,
-) -> Result<Option<BTreeMap<DroneId, Aborted>>, CommandError> {
-    let name = own_name();
-    let drones = only.map(|only| only.iter().copied().collect::<Vec<_>>());
-    let mut given: Vec<(Given, &str)> = Vec::new();
-    for (folder, flight) in flights {
-        match give(&folder.0, &name, action, drones.clone()) {
-            Ok(order) => given.extend(order.map(|order| (order, flight.as_str()))),
-            Err(error) => context
-                .warn(&format!("no order to the running station: {}", with_causes(&error, ": "))),
-        }
-    }
-    let watch = Stopwatch::start(context);
-    loop {
-        if let Some(place) = given.iter().position(|(given, _)| given.answer().is_some()) {
-            let (taken, flight) = given.swap_remove(place);
-            for (other, _) in &given {
-                other.withdraw();
-            }
-            if wanted.is_some_and(|wanted| wanted != flight) {
-                // Whoever orders drones down in a hurry means those that fly.
-                context.insist(&format!("{flight} is flying: its station carries the order out"));
-            } else {
-                context.say("The link is held by a running station: it carries the order out");
-            }
-            return follow(context, taken, patience).map(Some);
-        }
-        if given.is_empty() || watch.elapsed() >= ANSWERS_WITHIN {
-            break;
-        }
-        std::thread::sleep(PAUSE);
-    }
-    // One that was taken at the last moment is waited for.
-    let mut taken = given.into_iter().filter(|(given, _)| !given.withdraw());
-    match taken.next() {
-        Some((taken, _)) => follow(context, taken, patience).map(Some),
-        None => Ok(None),
-    }
-}
-
-/// Tells what a station answers until everyone has confirmed, or for so long.
-fn follow(
-    context: &Context,
-    given: Given,
-    patience: Duration,
-) -> Result<BTreeMap<DroneId, Aborted>, CommandError> {
-    let mut beat = (None, Stopwatch::start(context));
-    let watch = Stopwatch::start(context);
-    let (mut seen, mut named): (BTreeMap<_, _>, bool) = (BTreeMap::new(), false);
-    loop {
-        let answer = given.answer();
-        if let Some(answer) = &answer {
-            seen = answer.drones.iter().copied().collect();
-        }
-        if let Some(answer) = answer.as_ref().filter(|answer| answer.is_over()) {
-            let done = answer.drones.iter().filter_map(|(drone, done)| Some((*drone, (*done)?)));
-            let done = done.collect();
-            given.forget();
-            return Ok(done);
-        }
-        if let Some(answer) = answer.filter(|answer| Some(answer.beat) != beat.0) {
-            beat = (Some(answer.beat), Stopwatch::start(context));
-            if answer.beat % 10 == 9 {
-                let open = answer.drones.iter().filter(|(_, done)| done.is_none());
-                context.say(&waiting(open.map(|(drone, _)| *drone)));
-            }
-        }
-        if !named && watch.elapsed() >= PATIENCE {
-            named = true;
-            let open = seen.iter().filter(|(_, done)| done.is_none()).map(|(drone, _)| *drone);
-            context.insist(&by_hand(open));
-        }
-        if watch.elapsed() >= patience {
-            let seconds = watch.elapsed().as_secs();
-            let end = |done: Option<Aborted>| done.unwrap_or(Aborted::StillTold { seconds });
-            return Ok(seen.into_iter().map(|(drone, done)| (drone, end(done))).collect());
-        }
-        if beat.1.elapsed() >= DEAD_AFTER {
-            return Err(CommandError::Failed(format!(
-                "the station took the order and does not answer any more: {INSTEAD}"
-            )));
-        }
-        if context.check_stop().is_err() {
-            return Err(CommandError::Stopped(
-                "stopped: nobody waits any more, and the running station goes on with the order",
-            ));
-        }
-        std::thread::sleep(PAUSE);
-    }
-}
-
-/// Who has not confirmed yet.
-pub(super) fn waiting(drones: impl Iterator<Item = DroneId>) -> String {
-    let names: Vec<String> = drones.map(|drone| drone.to_string()).collect();
-    format!("not confirmed yet, told again and again: {}", names.join(", "))
-}
-
-/// What people do about drones that have not confirmed for a while.
-pub(super) fn by_hand(drones: impl Iterator<Item = DroneId>) -> String {
-    let names: Vec<String> = drones.map(|drone| drone.to_string()).collect();
-    format!(
-        "warning: not confirmed after {} s: {}. Use the remote controls of these drones; they are told \
-         on",
-        PATIENCE.as_secs(),
-        names.join(", ")
-    )
-}
+use crate::workflow::fleet::end::{CarriedOut, Order, end};
 
 /// Ends flights.
 pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<Exit, CommandError> {
-    let campaign = &args.step.campaign;
-    let flight = args.step.flight.as_deref();
+    let connect = &args.step.connect;
     if args.step.dry_run {
         return dry::end(context, &args.step, action);
     }
-    let only: Option<BTreeSet<DroneId>> =
-        args.drones.as_ref().map(|drones| drones.iter().copied().collect());
-    let links = match args.step.connect.target()? {
+    let order = Order {
+        campaign: &args.step.campaign,
+        flight: args.step.flight.as_deref(),
+        only: args.drones.as_ref().map(|drones| drones.iter().copied().collect()),
+        action,
+        wait_s: connect.wait,
+    };
+    let links = match connect.target()? {
         Target::Links(links) => links,
         Target::Server(address) => {
-            server::refuse(&args.step.connect, &[])?;
-            return server::end(context, &address, only.as_ref(), action);
+            server::refuse(connect, &[])?;
+            return server::end(context, &address, order.only.as_ref(), action);
         }
         Target::Sim => {
             return Err(CommandError::Usage(
@@ -289,47 +35,18 @@ pub(super) fn run(context: &Context, args: &EndArgs, action: Action) -> Result<E
             ));
         }
     };
-    let stations = flying(campaign);
-    let mut unanswered = "";
-    if !stations.is_empty() {
-        let patience = Duration::from_secs_f64(args.step.connect.wait).max(FOLLOWED);
-        if let Some(done) = order(context, &stations, flight, only.as_ref(), action, patience)? {
-            return print(context, &done);
+    match end(context, &order, || connect.open(context, links))? {
+        CarriedOut::ByStation(done) => print(context, &done),
+        CarriedOut::Here(done) => {
+            let exit = print(context, &done)?;
+            if context.check_stop().is_err() {
+                return Err(CommandError::Stopped(
+                    "stopped: drones that are not named above have not confirmed it and may fly on",
+                ));
+            }
+            Ok(exit)
         }
-        unanswered = "no station answered within 3 s";
-        context.warn(&format!("{unanswered}; the drones are told from here"));
-    } else if is_busy(campaign) {
-        unanswered = "another updraft works in this campaign and takes no orders";
     }
-    let (folder, plan) = find(&args.step)?;
-    let mut station = args.step.connect.open(links).map_err(|error| match error {
-        CommandError::Failed(text) if !unanswered.is_empty() => {
-            CommandError::Failed(format!("{unanswered}, and {text}\n  what to do: {INSTEAD}"))
-        }
-        CommandError::Failed(text) => {
-            CommandError::Failed(format!("{text}\n  what to do: {INSTEAD}"))
-        }
-        other => other,
-    })?;
-    let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    crew.hear_anyone(args.step.connect.wait, only.as_ref(), NOBODY)?;
-    let left_s = args.step.connect.wait - crew.net.now() as f64 * 1e-6;
-    let meant = meant(campaign, flight);
-    let done = crew.abort(only.as_ref(), &meant, action, left_s.max(0.0))?;
-    crew.withdraw_unflown(&done);
-    let exit = print(context, &done)?;
-    if context.check_stop().is_err() {
-        return Err(CommandError::Stopped(
-            "stopped: drones that are not named above have not confirmed it and may fly on",
-        ));
-    }
-    Ok(exit)
-}
-
-/// The flight that is meant: nobody looks for its name while drones fall, any plan will do.
-pub(super) fn find(args: &StepArgs) -> Result<(FlightFolder, Plan), CommandError> {
-    let campaign = &args.campaign;
-    one_flight(campaign, args.flight.as_deref()).or_else(|error| any_flight(campaign).ok_or(error))
 }
 
 fn print(context: &Context, done: &BTreeMap<DroneId, Aborted>) -> Result<Exit, CommandError> {

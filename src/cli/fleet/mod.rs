@@ -1,37 +1,33 @@
 //! `updraft fleet`: the steps of a flight one by one.
 
-pub(super) mod bring;
+pub(super) mod bar;
 pub(super) mod connect;
-pub(super) mod crew;
 pub(super) mod dry;
-pub(super) mod end;
-pub(super) mod interrupt;
+mod end;
 pub(super) mod server;
-pub(super) mod sim;
 pub(super) mod start;
 pub(super) mod tables;
-pub(super) mod virtual_drones;
-pub(super) mod watch;
+mod virtual_drones;
+mod watch;
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
 use self::connect::{ConnectArgs, Target};
-use self::crew::Crew;
-use self::start::{LeadArgs, fly_now};
+use self::start::LeadArgs;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::words;
-use crate::base::plain::Shown as _;
-use crate::campaign::lock::FolderLock;
-use crate::campaign::{self, FlightFolder};
 use crate::fleet::abort::Action;
 use crate::fleet::preflight::Preflight;
 use crate::link::address::Address;
 use crate::link::id::DroneId;
 use crate::link::station::Station;
-use crate::mission::Plan;
+use crate::workflow::fleet::crew::Crew;
+use crate::workflow::fleet::end::{flying, order_handler};
+use crate::workflow::fleet::start::fly_now;
+use crate::workflow::fleet::{lock, one_flight};
 
 /// Arguments of `updraft fleet`.
 #[derive(Debug, Args)]
@@ -137,54 +133,6 @@ pub(super) struct EndArgs {
     drones: Option<Vec<DroneId>>,
 }
 
-/// A campaign is a folder that is there.
-fn needs_folder(campaign: &std::path::Path) -> Result<(), CommandError> {
-    if campaign.is_file() {
-        return Err(CommandError::Usage(format!(
-            "{} is a file: give the campaign's folder",
-            campaign.shown()
-        )));
-    }
-    Ok(())
-}
-
-/// Locks a campaign; a folder that is not there is not made.
-pub(super) fn lock(
-    context: &Context,
-    campaign: &std::path::Path,
-) -> Result<FolderLock, CommandError> {
-    needs_folder(campaign)?;
-    if !campaign.exists() {
-        campaign::flights(campaign)?;
-    }
-    context.lock(campaign)
-}
-
-/// The one flight of a campaign that is meant.
-pub(super) fn one_flight(
-    campaign: &std::path::Path,
-    name: Option<&str>,
-) -> Result<(FlightFolder, Plan), CommandError> {
-    needs_folder(campaign)?;
-    let mut names = Vec::new();
-    let mut found = Vec::new();
-    for folder in campaign::flights(campaign)? {
-        let plan = folder.read_plan()?;
-        names.push(plan.name.clone());
-        if name.is_none_or(|name| name == plan.name) {
-            found.push((folder, plan));
-        }
-    }
-    let listed = names.join(", ");
-    match (found.len(), name) {
-        (1, _) => Ok(found.remove(0)),
-        (0, Some(name)) => {
-            Err(CommandError::Usage(format!("the campaign has no flight \"{name}\", but {listed}")))
-        }
-        _ => Err(CommandError::Usage(format!("which flight? give --flight ({listed})"))),
-    }
-}
-
 pub(super) fn run(context: &Context, args: &FleetArgs) -> Result<Exit, CommandError> {
     match &args.command {
         FleetCommand::Status(args) => status(context, args),
@@ -206,7 +154,7 @@ fn with_crew(
     body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
 ) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-    let mut station = step_station(args)?;
+    let mut station = step_station(context, args)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
     crew.listen(args.connect.wait)?;
     body(&mut crew)
@@ -220,16 +168,16 @@ fn with_desk(
     body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
 ) -> Result<Exit, CommandError> {
     let (folder, plan) = one_flight(&args.campaign, args.flight.as_deref())?;
-    let mut station = step_station(args)?;
-    let mut handler = end::order_handler(context, &mut station, &folder);
+    let mut station = step_station(context, args)?;
+    let mut handler = order_handler(context, &mut station, &folder);
     let mut crew = Crew::new(context, &mut handler, &folder, &plan);
     let ended = body(&mut crew);
     crew.ending(ended)
 }
 
-fn step_station(args: &StepArgs) -> Result<Station, CommandError> {
+fn step_station(context: &Context, args: &StepArgs) -> Result<Station, CommandError> {
     match args.connect.target()? {
-        Target::Links(links) => open(&args.campaign, &args.connect, links),
+        Target::Links(links) => open(context, &args.campaign, &args.connect, links),
         Target::Sim => Err(CommandError::Usage(
             "virtual drones live as long as their program: use `updraft fly --connect sim`, or \
              `updraft fleet virtual` in another terminal"
@@ -338,12 +286,13 @@ fn uploaded(all_loaded: bool, params_right: bool, set_params: bool) -> Exit {
 
 /// Opens the links, and says who holds them if another command of this campaign does.
 fn open(
+    context: &Context,
     campaign: &std::path::Path,
     connect: &ConnectArgs,
     links: Vec<Address>,
 ) -> Result<Station, CommandError> {
-    connect.open(links).map_err(|error| match error {
-        CommandError::Failed(text) if !end::flying(campaign).is_empty() => {
+    connect.open(context, links).map_err(|error| match error {
+        CommandError::Failed(text) if !flying(campaign).is_empty() => {
             CommandError::Failed(format!(
                 "{text}\n  the link is held by the command that flies this campaign: it tells what \
                  happens and writes it into fleet-journal.ndjson; `fleet abort` and `fleet land` \
@@ -371,7 +320,7 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
         if !table.go() {
             return tables::preflight(context, &table);
         }
-        fly_now(context, crew, &args.lead).map(|(exit, _)| exit)
+        fly_now(context, crew, &args.lead.lead()).map(|(ending, _)| ending.into())
     })
 }
 

@@ -3,26 +3,19 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::crew::Crew;
-use crate::base::time::GpsTime;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::Aborted;
 use crate::fleet::messages::mode_name;
-use crate::fleet::preflight::{COLUMNS, Preflight};
+use crate::fleet::preflight::Preflight;
 use crate::fleet::slots::{FleetTable, picture, stands};
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
 use crate::link::traffic::Traffic;
-
-/// UTC of a GPS time: `12:34:56 UTC`.
-pub(in crate::cli) fn time_of_day(time: GpsTime) -> String {
-    let seconds = time.to_unix_ms().div_euclid(1000).rem_euclid(86_400);
-    format!("{:02}:{:02}:{:02} UTC", seconds / 3600, seconds / 60 % 60, seconds % 60)
-}
+use crate::workflow::fleet::crew::Crew;
+use crate::workflow::fleet::preflight::PreflightOutput;
 
 #[derive(Serialize)]
 struct StatusRow {
@@ -157,36 +150,6 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
     Ok(Exit::Done)
 }
 
-/// What `fleet preflight --json` prints.
-#[derive(Serialize, JsonSchema)]
-pub(in crate::cli) struct PreflightOutput {
-    /// Format name and version: `updraft.preflight/1`.
-    schema: &'static str,
-    /// Whether everything is right for a start.
-    go: bool,
-    /// Headings of every drone's cells.
-    columns: [&'static str; 11],
-    /// The drones, in slot order.
-    drones: Vec<PreflightRow>,
-    /// What is wrong with the fleet as a whole.
-    fleet: Vec<String>,
-}
-
-/// One drone before a start.
-#[derive(Serialize, JsonSchema)]
-struct PreflightRow {
-    /// Number of the slot.
-    slot: u16,
-    /// The drone that flies it.
-    drone: DroneId,
-    /// Whether everything is right with it.
-    go: bool,
-    /// What was found, a text per column.
-    cells: Vec<String>,
-    /// Why it must not start.
-    no_go: Vec<String>,
-}
-
 /// The table before a start.
 pub(in crate::cli) fn preflight(
     context: &Context,
@@ -198,26 +161,6 @@ pub(in crate::cli) fn preflight(
         context.emit(&table.to_string())?;
     }
     Ok(if table.go() { Exit::Done } else { Exit::Unsafe })
-}
-
-impl PreflightOutput {
-    /// Of a table.
-    pub(in crate::cli) fn of(table: &Preflight) -> Self {
-        let drones = table.rows.iter().map(|row| PreflightRow {
-            slot: row.slot,
-            drone: row.drone,
-            go: row.go(),
-            cells: row.cells.iter().map(|cell| cell.text.clone()).collect(),
-            no_go: row.cells.iter().filter_map(|cell| cell.no_go.clone()).collect(),
-        });
-        Self {
-            schema: "updraft.preflight/1",
-            go: table.go(),
-            columns: COLUMNS,
-            drones: drones.collect(),
-            fleet: table.fleet.clone(),
-        }
-    }
 }
 
 /// What an upload prints under `--json`.

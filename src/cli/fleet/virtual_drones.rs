@@ -9,8 +9,6 @@ use std::time::Duration;
 use clap::Args;
 
 use super::connect::read_key;
-use super::one_flight;
-use super::sim::{Hangar, Mishaps};
 use crate::base::file::read_whole;
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
@@ -20,14 +18,16 @@ use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::cli::simulate::{AirArgs, parse_slots, updraft};
 use crate::cli::words;
-use crate::link::clock::{Clock as _, MS, Micros, S};
+use crate::link::clock::{MS, Micros, S};
 use crate::mission::Plan;
 use crate::sim::air::spec;
 use crate::virtual_fleet::broadcast::{BROADCAST_PORT, Broadcasts};
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
-use crate::workflow::clock::SystemClock;
+use crate::workflow::clock::SinceNow;
+use crate::workflow::fleet::hangar::{Hangar, Mishaps};
+use crate::workflow::fleet::one_flight;
 use crate::workflow::simulate::resolved_vehicle;
 use crate::workflow::slots::SlotSet;
 
@@ -168,7 +168,7 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
     let vehicle = resolved_vehicle(&folder, None, &args.air.effects)?;
     let frame = plan.site.frame();
     let air = spec::build(&args.air.air(args.updraft), &frame, args.air.seed, &plan.name);
-    let clock = SystemClock::start();
+    let clock = context.clock();
     let switched_on = GpsTime::from_unix_ms((clock.unix_us() / 1000) as i64).ok_or_else(|| {
         CommandError::Failed("this computer's clock is not set to any GPS time".to_owned())
     })?;
@@ -202,7 +202,8 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
         words::count(plan.slots.len(), "virtual drone"),
         stations.join(", ")
     ));
-    hangar.serve(args.station.clone(), broadcasts.as_ref(), clock, |running| {
+    let link_clock = SinceNow::of(clock);
+    hangar.serve(args.station.clone(), broadcasts.as_ref(), &link_clock, |running| {
         let mut told = false;
         while !context.stop_flag().load(Ordering::SeqCst) {
             std::thread::sleep(Duration::from_millis(100));

@@ -3,15 +3,13 @@
 use clap::Args;
 
 use super::connect::Target;
-use super::crew::{Found, nobody};
-use super::interrupt::InterruptArgs;
-use super::start::landed;
-use super::tables::time_of_day;
-use super::{StepArgs, bring, dry, lock, one_flight, server, with_desk};
-use crate::base::plain::Shown as _;
+use super::start::InterruptArgs;
+use super::{StepArgs, dry, server, with_desk};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::fleet::slots::FleetTable;
+use crate::workflow::fleet::server::take_over;
+use crate::workflow::fleet::watch::follow;
+use crate::workflow::fleet::{lock, one_flight};
 
 /// Arguments of `fleet watch`.
 #[derive(Clone, Debug, Args)]
@@ -49,60 +47,14 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
     let _lock = lock(context, &args.step.campaign)?;
     if let Some(address) = server {
         let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())?;
-        let (wait_s, on_interrupt) = (args.step.connect.wait, args.interrupt.on_interrupt);
+        let (wait_s, on_interrupt) = (args.step.connect.wait, args.interrupt.on_interrupt.into());
         let with_logs = !args.no_logs;
-        return server::take_over(
-            context,
-            &address,
-            &folder,
-            &plan,
-            wait_s,
-            on_interrupt,
-            with_logs,
-        );
+        let ending = take_over(context, &address, &folder, &plan, wait_s, on_interrupt, with_logs)?;
+        return Ok(ending.into());
     }
     with_desk(context, &args.step, |crew| {
-        if !FleetTable::path(&crew.folder.0).exists() {
-            return Err(CommandError::Nothing(format!(
-                "{} is not there, so nobody knows which drone flies which slot: no flight was \
-                 started from this folder. `updraft fleet status` shows who is heard, `updraft fleet \
-                 abort` needs no table",
-                FleetTable::path(&crew.folder.0).shown()
-            )));
-        }
-        crew.on_interrupt = args.interrupt.on_interrupt;
-        let wait_s = args.step.connect.wait;
-        crew.hear_anyone(wait_s, None, &nobody(wait_s))?;
-        let (exit, over) = match crew.attach(wait_s)? {
-            Found::Flight(mut start) => {
-                let alarms = crew.watch(&mut start)?;
-                crew.clear_start(&mut start)?;
-                (landed(context, crew, &alarms), None)
-            }
-            Found::Over(start) => {
-                crew.clear_leftover()?;
-                let over = format!("The flight of {} is over", time_of_day(start));
-                context.say(&format!("{over}: everyone is on the ground"));
-                (Exit::Done, Some(over))
-            }
-        };
-        if args.no_logs {
-            return Ok(exit);
-        }
-        let wish = bring::Wish::default();
-        let brought =
-            bring::bring(context, &mut crew.net, crew.folder, crew.plan, &crew.table, &wish)?;
-        let lost: Vec<String> = brought
-            .iter()
-            .filter(|one| one.state == "missing")
-            .map(|one| one.slot.to_string())
-            .collect();
-        match over {
-            Some(over) if lost.is_empty() => context.say(&format!("{over}; its logs are at home")),
-            Some(over) => context
-                .warn(&format!("{over}; not at home are the logs of slots {}", lost.join(", "))),
-            None => {}
-        }
-        Ok(if lost.is_empty() { exit } else { Exit::Losses })
+        let on_interrupt = args.interrupt.on_interrupt.into();
+        let ending = follow(context, crew, args.step.connect.wait, on_interrupt, !args.no_logs)?;
+        Ok(ending.into())
     })
 }

@@ -4,32 +4,12 @@ use serde::Serialize;
 
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
+use crate::workflow::fleet::output::ListRow;
 
 #[derive(Serialize)]
 struct ListOutput {
     schema: &'static str,
     drones: Vec<ListRow>,
-}
-
-/// A drone's logs, or why they are not known.
-#[derive(Serialize)]
-pub(in crate::cli) struct ListRow {
-    pub(in crate::cli) drone: String,
-    /// None: no slot is near.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::cli) slot: Option<u16>,
-    pub(in crate::cli) logs: Vec<ListedLog>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::cli) reason: Option<String>,
-}
-
-/// A log on a drone.
-#[derive(Serialize)]
-pub(in crate::cli) struct ListedLog {
-    pub(in crate::cli) number: u16,
-    pub(in crate::cli) bytes: u64,
-    /// 0: the autopilot had no clock.
-    pub(in crate::cli) unix_s: u32,
 }
 
 /// Prints them; exit code 3 when one is not known.

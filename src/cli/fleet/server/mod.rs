@@ -1,167 +1,127 @@
-//! Flights through a running Skybrush Server.
+//! What is printed of flights through a running Skybrush Server.
 
-mod attach;
-mod bring;
-mod down;
-mod dry;
-mod gate;
-mod identity;
-mod load;
-mod logs;
 mod options;
-mod rows;
-mod standing;
-mod start;
-mod steps;
-mod upload;
-mod watch;
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::collections::BTreeSet;
 
-use self::bring::bring;
-use self::down::{NOT_CONFIRMED, bring_down};
-use self::gate::gate;
-use self::load::{load, patience};
-use self::rows::sum_up;
-use self::standing::assign;
-use self::upload::Shows;
-use super::bring::Wish;
-use super::start::{LeadArgs, needs_person};
-use crate::base::plain::Shown as _;
+use serde::Serialize;
+
 use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::cli::fly_output::{FlightEnd, FlightOutput, LogOutput};
 use crate::fleet::abort::Action;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
-use crate::skybrush_server::gate::Step;
-use crate::skybrush_server::{Client, StartConfig};
+use crate::workflow::fleet::server::{self, Status, StatusRow, write_aligned};
 
-pub(in crate::cli) use attach::take_over;
-pub(in crate::cli) use dry::{dry_end, dry_fly, dry_look, dry_upload};
-pub(in crate::cli) use logs::{list, pull};
 pub(in crate::cli) use options::{of_air, refuse};
-pub(in crate::cli) use steps::{preflight, status, upload};
 
-/// Distance of the fence's circle beyond the farthest corner, m.
-const BEYOND_M: f64 = 10.0;
-
-/// A flight through a server.
-struct Flight<'a> {
-    /// The server.
-    address: &'a str,
-    folder: &'a FlightFolder,
-    plan: &'a Plan,
-    /// The server's names of the drones by slot.
-    drones: &'a BTreeMap<u16, String>,
+#[derive(Serialize)]
+struct StatusOutput<'a> {
+    schema: &'static str,
+    drones: &'a [StatusRow],
 }
 
-impl Flight<'_> {
-    /// What a person types to end it.
-    fn abort(&self) -> String {
-        let Self { address, folder, .. } = self;
-        format!("updraft fleet abort {} --connect skybrush://{address}", folder.0.shown())
+/// Who is known to the server, where they stand, what they say.
+pub(in crate::cli) fn status(
+    context: &Context,
+    address: &str,
+    plan: &Plan,
+    wait_s: f64,
+) -> Result<Exit, CommandError> {
+    let Status { drones, problems } = &server::status(context, address, plan, wait_s)?;
+    if context.json {
+        context.print_json(&StatusOutput { schema: "updraft.fleet-status/1", drones })?;
+    } else {
+        let head = ["drone", "slot", "away m", "mode", "show", "GPS", "battery", "states"];
+        let mut lines: Vec<Vec<String>> = vec![head.map(str::to_owned).into()];
+        for row in drones {
+            let dash = || "-".to_owned();
+            let away = |m: f64| if m < 1000.0 { format!("{m:.1}") } else { "far".to_owned() };
+            let mut line = vec![
+                row.drone.clone(),
+                row.nearest_slot.map_or_else(dash, |slot| slot.to_string()),
+                row.distance_m.map_or_else(dash, away),
+            ];
+            line.extend(row.cells.clone());
+            line.push(row.states.join(", "));
+            lines.push(line);
+        }
+        let mut text = String::new();
+        // Writing into a text does not fail.
+        let _ = write_aligned(&mut text, &lines);
+        context.print(&text)?;
     }
+    for problem in problems {
+        context.warn(problem);
+    }
+    if drones.is_empty() {
+        return Err(CommandError::Nothing("the server knows no drone".to_owned()));
+    }
+    Ok(Exit::Done)
 }
 
-fn connect(context: &Context, address: &str) -> Result<Client, CommandError> {
-    let mut client = Client::connect(address, Arc::clone(context.clock()))?;
-    context.say(&format!("{} at {address}", client.version()?));
-    Ok(client)
+#[derive(Serialize)]
+struct UploadOutput {
+    schema: &'static str,
+    drones: Vec<UploadRow>,
 }
 
-/// The whole flight.
-pub(in crate::cli) fn fly(
+#[derive(Serialize)]
+struct UploadRow {
+    slot: u16,
+    drone: String,
+    loaded: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+}
+
+/// Gives every drone its show, origin and fence, and switches it to show mode.
+pub(in crate::cli) fn upload(
     context: &Context,
     address: &str,
     folder: &FlightFolder,
     plan: &Plan,
-    lead: &LeadArgs,
-    with_logs: bool,
     wait_s: f64,
-) -> Result<(FlightOutput, Exit), CommandError> {
-    needs_person(lead)?;
-    let shows = Shows::of(plan)?;
-    let mut client = connect(context, address)?;
-    let drones = assign(context, &mut client, plan, wait_s)?;
-    let flight = Flight { address, folder, plan, drones: &drones };
-    let not_started = |mut reasons: BTreeMap<String, String>| {
-        let drones = drones.iter().map(|(slot, drone)| {
-            (*slot, drone.clone(), reasons.remove(drone).into_iter().collect())
-        });
-        FlightOutput::no_go(&plan.name, drones.collect(), None)
-    };
-    if let Err(refused) = load(context, &mut client, &flight, &shows, wait_s)? {
-        context.insist(&format!(
-            "NO-GO: {} of {} drones do not have the show; nothing was started",
-            refused.len(),
-            drones.len()
-        ));
-        return Ok((not_started(refused), Exit::Unsafe));
-    }
-    let table = gate(context, &mut client, &flight, Step::Ready, patience(wait_s))?;
-    if context.json {
-        context.say(&table.to_string());
-    } else {
-        context.print(&table.to_string())?;
-    }
-    if !table.go() {
-        context.insist("NO-GO: nothing was started; Skybrush Live tells more of these drones");
-        let reasons = table.rows.iter().map(|row| (row.drone.clone(), row.no_go.join(", ")));
-        return Ok((not_started(reasons.collect()), Exit::Unsafe));
-    }
-    let started = start::start(context, &mut client, &flight, lead)?;
+) -> Result<Exit, CommandError> {
+    let (drones, refused) = server::upload(context, address, folder, plan, wait_s)?;
     context.say(&format!(
-        "Authorized. Ctrl-C asks whether the drones land, return or fly on (without a terminal: \
-         --on-interrupt, by default they return); `{}` sends everyone home",
-        flight.abort()
+        "{} of {} drones have the show",
+        drones.len().saturating_sub(refused.len()),
+        drones.len()
     ));
-    let watched =
-        watch::watch(context, &mut client, &flight, started, lead.interrupt.on_interrupt)?;
-    let exit = watched.tell(context, &flight);
-    if watched.taken_back {
-        return Ok((not_started(BTreeMap::new()), Exit::Unsafe));
+    if context.json {
+        let row = |(slot, drone): (&u16, &String)| UploadRow {
+            slot: *slot,
+            drone: drone.clone(),
+            loaded: !refused.contains_key(drone),
+            reason: refused.get(drone).cloned(),
+        };
+        let drones = drones.iter().map(row).collect();
+        context.print_json(&UploadOutput { schema: "updraft.upload/1", drones })?;
     }
-    let flown = exit;
-    let mut output = not_started(BTreeMap::new());
-    output.outcome = FlightEnd::Flown;
-    for drone in &mut output.drones {
-        drone.outcome = watched.end_of(&drone.drone);
-    }
-    if !with_logs {
-        return Ok((output, flown));
-    }
-    let exit;
-    (output.logs, exit) = bring_home(context, &mut client, &flight, flown)?;
-    Ok((output, exit))
+    Ok(if refused.is_empty() { Exit::Done } else { Exit::Losses })
 }
 
-/// Brings the logs of a flight that ended so.
-fn bring_home(
+/// Whether every drone may be started. Nothing is sent to them.
+pub(in crate::cli) fn preflight(
     context: &Context,
-    client: &mut Client,
-    flight: &Flight<'_>,
-    flown: Exit,
-) -> Result<(Vec<LogOutput>, Exit), CommandError> {
-    let Flight { address, folder, plan, drones } = flight;
-    let wanted: Vec<(u16, String)> = drones.iter().map(|(slot, id)| (*slot, id.clone())).collect();
-    let brought = bring(context, client, address, folder, plan, &wanted, &Wish::default())?;
-    sum_up(context, &brought);
-    if brought.iter().all(|row| row.state != "missing") {
-        return Ok((brought, flown));
+    address: &str,
+    folder: &FlightFolder,
+    plan: &Plan,
+    wait_s: f64,
+) -> Result<Exit, CommandError> {
+    let table = server::preflight(context, address, folder, plan, wait_s)?;
+    if context.json {
+        context.print_json(&table.output())?;
+    } else {
+        context.emit(&table.to_string())?;
     }
-    let campaign = folder.0.shown();
-    context.insist(&format!(
-        "To try again: updraft logs pull {campaign} --connect skybrush://{address}"
-    ));
-    Ok((brought, Exit::Losses))
-}
-
-fn stopped(context: &Context) -> bool {
-    context.stop_flag().load(Ordering::SeqCst)
+    context.say(
+        "Which show they carry, their parameters and their fences the server does not tell: \
+         `updraft fly` uploads show and fence anew, and looks again before the start",
+    );
+    Ok(if table.go() { Exit::Done } else { Exit::Unsafe })
 }
 
 /// Ends flights: those in the air return or land, the start is taken back when all are meant.
@@ -171,26 +131,21 @@ pub(in crate::cli) fn end(
     only: Option<&BTreeSet<DroneId>>,
     action: Action,
 ) -> Result<Exit, CommandError> {
-    let mut client = connect(context, address)?;
-    let is_meant = |id: &String| {
-        only.is_none_or(|only| id.parse().is_ok_and(|drone: DroneId| only.contains(&drone)))
-    };
-    let ids: Vec<String> = client.drones()?.into_iter().filter(is_meant).collect();
-    let down = bring_down(&mut client, ids, action, &|| !stopped(context))?;
-    for (id, text) in &down.told {
-        if text.starts_with(NOT_CONFIRMED) {
+    let mut ended = server::end(context, address, only, action)?;
+    for (id, text, confirmed) in &ended.told {
+        if !confirmed {
             context.warn(&format!("drone {id}: {text}"));
         }
         context.emit(&format!("drone {id}: {text}\n"))?;
     }
-    for id in &down.on_ground {
+    for id in &ended.on_ground {
         context.emit(&format!("drone {id}: on the ground\n"))?;
     }
     if only.is_none() {
-        client.set_start(&StartConfig::none())?;
+        ended.take_start_back()?;
         context.emit("the start is taken back\n")?;
-    } else if !down.on_ground.is_empty() {
+    } else if !ended.on_ground.is_empty() {
         context.warn("the start stays for drones on the ground: without --drones it is taken back");
     }
-    Ok(if down.unsure == 0 { Exit::Done } else { Exit::Losses })
+    Ok(ended.ending().into())
 }

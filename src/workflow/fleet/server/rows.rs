@@ -1,0 +1,19 @@
+//! What became of the logs.
+
+use crate::workflow::fleet::output::LogOutput;
+use crate::workflow::host::Host;
+
+/// In a line what came of it.
+pub(super) fn sum_up(host: &dyn Host, rows: &[LogOutput]) {
+    let count = |state: &str| rows.iter().filter(|row| row.state == state).count();
+    let (pulled, there) = (count("pulled"), count("there"));
+    host.say(&format!(
+        "Brought {} of {} logs home{}",
+        pulled + there,
+        rows.len(),
+        match there {
+            0 => String::new(),
+            there => format!(" ({there} had come before)"),
+        }
+    ));
+}
