@@ -1,4 +1,4 @@
-//! Whether a show is safe: what it is checked against, and what was allowed.
+//! Check whether a show is safe: its limits, the findings, and those that were allowed.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,47 +15,48 @@ use crate::mission::measurable;
 use crate::show::Show;
 use crate::vehicle::{Vehicle, library};
 
-/// A show and what it is checked against.
+/// A show with the limits and the fence that it is checked against.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// Where it came from.
+    /// Path that the show was read from.
     pub path: PathBuf,
-    /// The show.
+    /// Show to check.
     pub show: Show,
-    /// The plan whose limits and fence count; `None`: its folder has none that can be read.
+    /// Plan whose limits and fence apply; `None` if its folder has no readable plan.
     pub plan: Option<Plan>,
-    /// The vehicle that is to fly it.
+    /// Vehicle that is to fly the show.
     pub vehicle: Vehicle,
-    /// Where limits and fence come from.
+    /// Source of the limits and the fence.
     pub origin: Origin,
-    /// How the files of its folder differ from the plan, one sentence each.
+    /// Differences between the files of the show's folder and the plan, one sentence each.
     pub mismatches: Vec<String>,
 }
 
 impl Subject {
-    /// Checks it, if it has a plan.
+    /// Checks the show; `None` if it has no plan.
     pub fn check(&self, findings_per_check: usize) -> Option<CheckReport> {
         let plan = self.plan.as_ref()?;
         Some(checked(&self.show, plan, &self.vehicle, &self.origin, findings_per_check))
     }
 }
 
-/// Where the limits and the fence come from.
+/// Source of the limits and the fence that a show is checked against.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// The plan that the show was made from.
     Plan,
-    /// The plan beside the file.
+    /// The plan beside the file, at this path.
     Beside(PathBuf),
-    /// The show itself and, where it says nothing, the vehicle.
+    /// The show itself and, where it states nothing, the vehicle.
     Show,
 }
 
-/// The shows behind a path, each with the plan it is checked against. `vehicle` gives limits to shows
-/// that have none.
+/// Finds the shows behind a path, each with the plan it is checked against. `vehicle` gives limits
+/// to shows that have none.
 ///
 /// # Errors
-/// When there is none, or a file cannot be read.
+///
+/// If there is no show, or a file cannot be read.
 pub fn subjects(path: &Path, vehicle: &Vehicle) -> Result<Vec<Subject>, WorkflowError> {
     if path.is_dir() && campaign::is_campaign(path) {
         return Ok(campaign::flights(path)?.iter().map(|folder| flight(folder, vehicle)).collect());
@@ -99,9 +100,10 @@ fn plan_beside(path: &Path) -> Option<(Plan, Vehicle, PathBuf)> {
     })
 }
 
-/// Refuses names of checks that there are not.
+/// Refuses names of checks that do not exist.
 ///
 /// # Errors
+///
 /// At the first such name.
 pub fn known(allow: &[String]) -> Result<(), WorkflowError> {
     let mut names: Vec<&str> = NAMES.iter().chain(&measurable::NAMES).copied().collect();
@@ -140,7 +142,7 @@ pub fn checked(
     report
 }
 
-/// Whether only allowed checks failed.
+/// Whether all checks that failed were allowed to.
 pub fn is_safe(report: &CheckReport, allow: &[String]) -> bool {
     report
         .counts
@@ -148,7 +150,7 @@ pub fn is_safe(report: &CheckReport, allow: &[String]) -> bool {
         .all(|(check, count)| count.errors == 0 || allow.iter().any(|name| name == check))
 }
 
-/// Errors that were allowed, by check.
+/// Number of errors that were allowed, by check.
 pub fn allowed<'a>(
     reports: impl Iterator<Item = &'a CheckReport>,
     allow: &[String],
@@ -162,7 +164,7 @@ pub fn allowed<'a>(
     found
 }
 
-/// Says what was found, errors before warnings; a finding begins with its level.
+/// Reports the findings to the host, errors before warnings; each begins with its level.
 pub fn say_findings(host: &dyn Host, report: &CheckReport, allow: &[String]) {
     for finding in &report.findings {
         let allowed = allow.iter().any(|name| name == finding.check);
@@ -177,7 +179,8 @@ pub fn say_findings(host: &dyn Host, report: &CheckReport, allow: &[String]) {
     }
 }
 
-/// In words: `Safe`, `Not safe`, `Safe apart from 196 allowed findings (velocity-step: 196)`.
+/// Verdict in words: `Safe`, `Not safe`, `Safe apart from 196 allowed findings (velocity-step:
+/// 196)`.
 pub fn verdict(passed: bool, allowed: &BTreeMap<&'static str, usize>) -> String {
     if !passed {
         return "Not safe".to_owned();

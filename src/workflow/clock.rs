@@ -1,5 +1,5 @@
-//! Clocks and spans of time. Whoever runs a workflow gives it its clock ([`Host::clock`]); the
-//! computer's own is here for programs that want no other.
+//! Clocks and durations. The program that runs a workflow provides the clock ([`Host::clock`]); the
+//! computer's own is here for programs that need no other.
 
 use std::fmt;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ impl Clock for SystemClock {
     }
 }
 
-/// Measures how long a step takes, by the host's clock; printed as [`Spent`].
+/// Stopwatch for a step, by the host's clock; printed as [`Spent`].
 #[derive(Clone)]
 pub struct Stopwatch {
     clock: Arc<dyn Clock>,
@@ -46,14 +46,14 @@ impl fmt::Debug for Stopwatch {
 }
 
 impl Stopwatch {
-    /// Starts now.
+    /// A stopwatch that starts now, by the host's clock.
     pub fn start(host: &dyn Host) -> Self {
         let clock = Arc::clone(host.clock());
         let begun = clock.now();
         Self { clock, begun }
     }
 
-    /// Time since the start.
+    /// Time since the stopwatch was started.
     pub fn elapsed(&self) -> Duration {
         Duration::from_micros(self.clock.now().saturating_sub(self.begun))
     }
@@ -65,7 +65,7 @@ impl fmt::Display for Stopwatch {
     }
 }
 
-/// A duration as people read it: `340 ms`, `12.3 s`, `2 min 5 s`.
+/// A duration that is printed as people read it: `340 ms`, `12.3 s`, `2 min 5 s`.
 #[derive(Clone, Copy, Debug)]
 pub struct Spent(pub Duration);
 
@@ -90,7 +90,7 @@ pub struct SinceNow {
 }
 
 impl SinceNow {
-    /// Begins now, and goes on as `clock` does.
+    /// A clock whose time is 0 now, and goes on as that of `clock`.
     pub fn of(clock: &Arc<dyn Clock>) -> Self {
         Self { clock: Arc::clone(clock), begun: clock.now() }
     }

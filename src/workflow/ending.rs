@@ -1,14 +1,15 @@
-//! How work ends that did not fail.
+//! Endings of work that did not fail.
 
-/// How work ended that did not fail.
+/// Ending of work that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum Ending {
-    /// All was done.
+    /// All of the work was done.
     Done,
-    /// It was done, but something was lost: a drone, a log, a part of the results. What, was told.
+    /// The work was done, but something was lost: a drone, a log, a part of the results. The host
+    /// was told what.
     Losses,
-    /// A check failed, or somebody said no: nothing was started.
+    /// A check failed, or a person said no: nothing was started.
     NoGo,
 }
 

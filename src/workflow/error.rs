@@ -1,5 +1,5 @@
-//! Why work could not be done. Whoever runs it decides what that means: exit codes are the command
-//! line's.
+//! Errors of workflows. The program that runs them decides what they mean: exit codes belong to the
+//! command line.
 
 use std::io;
 
@@ -29,14 +29,14 @@ pub(crate) fn with_reasons(error: &dyn std::error::Error) -> String {
     with_causes(error, BECAUSE)
 }
 
-/// Why work ended early.
+/// Error that ended a workflow early.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WorkflowError {
-    /// A template, override or vehicle is wrong.
+    /// A template, override or vehicle is not valid.
     #[error(transparent)]
     Mission(Box<MissionError>),
-    /// A vehicle is unknown or wrong.
+    /// A vehicle is unknown or not valid.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
     /// An effect cannot be used.
@@ -72,25 +72,25 @@ pub enum WorkflowError {
     /// Measurement and simulation cannot be compared.
     #[error(transparent)]
     Gap(#[from] GapError),
-    /// What was asked for does not fit together, or a file is of the wrong kind.
+    /// The request contradicts itself, or a file is of the wrong kind; a sentence for people.
     #[error("{0}")]
     Usage(String),
-    /// A check failed, or a person has said no: nothing was started.
+    /// A check failed, or a person said no, so that nothing was started; a sentence for people.
     #[error("{0}")]
     Unsafe(String),
-    /// Something unexpected, with its reason.
+    /// The work failed unexpectedly, for this reason.
     #[error("{0}")]
     Failed(String),
-    /// Nothing to work on.
+    /// There is nothing to work on; a sentence for people.
     #[error("{0}")]
     Nothing(String),
     /// The work was stopped from outside.
     #[error("interrupted; the same command goes on where it stopped")]
     Interrupted,
-    /// The same, with what becomes of what was going on.
+    /// The work was stopped from outside, with the fate of what was going on.
     #[error("{0}")]
     Stopped(&'static str),
-    /// Who was to be shown something could not be.
+    /// The host could not show a table.
     #[error("failed to print: {0}")]
     Output(io::Error),
 }

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use crate::base::file::{FileError, read_pieces};
 
-/// Hashes of files, by path.
+/// SHA-256 hashes of files, by path; each file is read once.
 #[derive(Debug, Default)]
 pub struct Hashes {
     known: Mutex<BTreeMap<PathBuf, String>>,

@@ -1,4 +1,4 @@
-//! A mission template with overrides, and what is known of the place where it is flown.
+//! Resolution of a mission template with overrides, and of its site.
 
 use super::error::WorkflowError;
 use crate::mission::plan::Site;
@@ -16,11 +16,12 @@ fn names(item: &Override, key: &str) -> bool {
     item.key == key || flight.is_some_and(|flight| !flight.contains('.'))
 }
 
-/// Resolves a template: a file or a built-in name. Where overrides move the origin and leave the ground
-/// height to the template, the plans say that nobody knows it.
+/// Resolves a template, a file or a built-in name. Where overrides move the origin and leave the
+/// ground height to the template, the plans state that the height is assumed.
 ///
 /// # Errors
-/// When there is no such template, or it is wrong with these overrides.
+///
+/// If there is no such template, or it is not valid with these overrides.
 pub fn resolve(template: &str, overrides: &[Override]) -> Result<Mission, WorkflowError> {
     let mission = resolve::resolve(template, overrides)?;
     let given = |key: &str| overrides.iter().any(|item| names(item, key));
@@ -43,7 +44,8 @@ pub fn resolve(template: &str, overrides: &[Override]) -> Result<Mission, Workfl
     Ok(resolve::resolve(template, &overrides)?)
 }
 
-/// Whether the site of a plan is the built-in templates' example, and no override has asked for it.
+/// Whether the site of a plan is the built-in templates' example without an override that asks for
+/// it.
 pub fn is_example(site: &Site, overrides: &[Override]) -> bool {
     let given = overrides.iter().any(|item| names(item, ORIGIN));
     !given && [site.origin_lat_deg, site.origin_lon_deg] == EXAMPLE_ORIGIN

@@ -1,4 +1,4 @@
-//! A mission becomes a campaign folder.
+//! Writing a mission as a campaign folder.
 
 use std::path::Path;
 
@@ -12,18 +12,19 @@ use crate::campaign::{self, CampaignError, FlightFolder};
 use crate::mission::resolve::Mission;
 use crate::show::Show;
 
-/// In words what is flown by whom: `calibration and hover for 49 drones`.
+/// The flights and the fleet in words: `calibration and hover for 49 drones`.
 pub fn what_for_whom(mission: &Mission) -> String {
     let names: Vec<_> = mission.flights.iter().map(|flight| flight.plan.name.as_str()).collect();
     let drones = mission.flights.first().map_or(0, |flight| flight.plan.slots.len());
     format!("{} for {}", words::list(&names), words::count(drones, "drone"))
 }
 
-/// Writes the campaign folder, unless something else is there. `shows`: those of the mission's flights,
-/// in their order. `force`: another plan is replaced, but never logs.
+/// Writes the campaign folder, unless it holds something else. `shows` are those of the mission's
+/// flights, in their order. With `force` another plan is replaced, but never logs.
 ///
 /// # Errors
-/// When something else is there, or files cannot be written.
+///
+/// If the folder holds something else, or files cannot be written.
 pub fn write(
     host: &dyn Host,
     mission: &Mission,
@@ -84,7 +85,7 @@ fn refuse_occupied(
     if force { Ok(()) } else { occupied("another plan") }
 }
 
-/// The shows of a mission's flights.
+/// Shows of a mission's flights, in their order.
 pub fn shows(mission: &Mission) -> Vec<Show> {
     mission.flights.iter().map(|flight| flight.plan.to_show()).collect()
 }

@@ -1,4 +1,4 @@
-//! Where a report came from: program, command, settings, and every file that was read with its hash.
+//! Provenance of a report: program, command, settings, and every file that was read with its hash.
 
 use std::path::{Path, PathBuf};
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::mission::Plan;
 
-/// A set of slots.
+/// A set of slots, as a user names them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlotSet(BTreeSet<u16>);
 
@@ -35,12 +35,12 @@ impl FromIterator<u16> for SlotSet {
 }
 
 impl SlotSet {
-    /// The first of them that a plan does not have.
+    /// First slot of the set that a plan does not have, if there is one.
     pub fn stray(&self, plan: &Plan) -> Option<u16> {
         self.0.iter().copied().find(|slot| plan.slot(*slot).is_none())
     }
 
-    /// Whether a slot is one of them.
+    /// Whether a slot is in the set.
     pub fn contains(&self, slot: u16) -> bool {
         self.0.contains(&slot)
     }

@@ -1,4 +1,4 @@
-//! A study flown, evaluated and written: the ladder in every wind and updraft.
+//! Flight, evaluation and report of a study: the ladder in every wind and updraft.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,11 @@ use crate::study::{Flown, Settings, StudyPlan, Work, evaluate};
 /// Name of the built-in study.
 pub const BUILT_IN: &str = "study";
 
-/// Flies what is open of a study, `jobs` flights at the same time.
+/// Flies the open cells of a study, `jobs` flights at the same time.
+///
+/// # Errors
+///
+/// If a flight cannot be written, or the work is stopped.
 pub fn fly(
     host: &dyn Host,
     work: Work<'_>,
@@ -39,7 +43,11 @@ pub fn fly(
     Ok(flown)
 }
 
-/// The results of a study; flights that were lost are named.
+/// Evaluates a study, and reports the flights that were lost to the host.
+///
+/// # Errors
+///
+/// If the reference flight is lost or gives no law.
 pub fn evaluated(
     host: &dyn Host,
     study: &StudyPlan,
@@ -54,6 +62,10 @@ pub fn evaluated(
 }
 
 /// Flies the built-in study into a folder, for the report of a campaign. Finished flights are kept.
+///
+/// # Errors
+///
+/// If the study cannot be flown or written, or the work is stopped.
 pub fn fly_built_in(host: &dyn Host, folder: &Path, seed: u64) -> Result<(), WorkflowError> {
     let watch = Stopwatch::start(host);
     let study = StudyPlan::load(BUILT_IN)?;
@@ -65,7 +77,11 @@ pub fn fly_built_in(host: &dyn Host, folder: &Path, seed: u64) -> Result<(), Wor
     Ok(())
 }
 
-/// A study in a campaign's folder would overwrite its report.
+/// Refuses a campaign's folder for a study, which would overwrite its report.
+///
+/// # Errors
+///
+/// If the folder holds a campaign.
 pub fn refuse_campaign(folder: &Path) -> Result<(), WorkflowError> {
     if campaign::is_campaign(folder) {
         return Err(WorkflowError::Usage(format!(
@@ -76,7 +92,11 @@ pub fn refuse_campaign(folder: &Path) -> Result<(), WorkflowError> {
     Ok(())
 }
 
-/// Writes the results; the page last, so that where it is, all is.
+/// Writes the results; the page comes last, so that a folder with a page is complete.
+///
+/// # Errors
+///
+/// If the results cannot be made or written.
 pub fn write(
     folder: &Path,
     command: String,

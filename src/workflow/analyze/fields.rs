@@ -1,5 +1,5 @@
-//! What an analysis leaves beside its report: the measured fields for other programs; and what it
-//! takes in: a finished study.
+//! Files beside the report of an analysis: the measured fields for other programs, and the finished
+//! study that goes into the report.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What is to be analysed: flights behind paths, told apart by name, of the start that was asked for.
+//! Input of an analysis: flights behind paths, told apart by name, of the requested start.
 
 use std::path::{Path, PathBuf};
 
@@ -14,18 +14,18 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::find::{Found, Work, find, find_tables, stem, twice};
 use crate::workflow::shows::load::{has_extension, load_shows};
 
-/// What is to be analysed.
+/// Request for an analysis: its input.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
     /// Campaign folders, folders of logs, or logs.
     pub paths: Vec<PathBuf>,
-    /// A mapping file of tables, instead of paths.
+    /// Path of a mapping file of tables, instead of `paths`.
     pub tables: Option<PathBuf>,
-    /// Where the plan is that the logs were flown from.
+    /// Path of the plan that the logs were flown from.
     pub plan: Option<PathBuf>,
     /// Unix time of show time 0, s.
     pub start_unix_s: Option<i64>,
-    /// Which logs of campaigns; `None`: real ones where there are any.
+    /// Origin of a campaign's logs; `None`: real drones if there are any of their logs.
     pub origin: Option<LogOrigin>,
 }
 
@@ -38,11 +38,11 @@ impl Request {
             .ok_or_else(|| WorkflowError::Usage("give a campaign, logs or --csv".to_owned()))
     }
 
-    /// Where results go if nobody says: into the campaign, else into a folder named after what is
-    /// analysed.
+    /// Default folder of the results: in the campaign, otherwise a folder named after the input.
     ///
     /// # Errors
-    /// When nothing is named.
+    ///
+    /// If the request names no input.
     pub fn output(&self) -> Result<PathBuf, WorkflowError> {
         let first = self.first()?;
         if self.paths.len() == 1 && campaign::is_campaign(first) {
@@ -52,10 +52,11 @@ impl Request {
     }
 }
 
-/// Finds the flights, and what stands for rotor effort in tables.
+/// Finds the flights, and the indicator of rotor effort that tables hold.
 ///
 /// # Errors
-/// When something is not there, is no log or plan, or is given twice.
+///
+/// If a path does not exist, is no log or plan, or is given twice.
 pub fn gather(request: &Request) -> Result<(Work, Option<Indicator>), WorkflowError> {
     let plan = request.plan.as_deref().map(load_plan).transpose()?;
     let mut work = Work::new(Path::new("."));
@@ -101,10 +102,11 @@ fn start_at(flights: &mut [Found], unix_s: i64) -> Result<(), WorkflowError> {
     Ok(())
 }
 
-/// The plan behind a path: plan.json, a flight's folder, or a show file of any kind.
+/// Reads the plan behind a path: plan.json, a flight's folder, or a show file of any kind.
 ///
 /// # Errors
-/// When there is none, or the folder holds several flights.
+///
+/// If there is none, or the folder holds several flights.
 pub fn load_plan(path: &Path) -> Result<Plan, WorkflowError> {
     if has_extension(path, "json") {
         return Ok(campaign::read_plan(path)?);

@@ -1,4 +1,4 @@
-//! Laws of another analysis (`--hold`): whether they are those of these drones.
+//! Check of laws held from another analysis (`--hold`): whether they belong to these drones.
 //!
 //! A law is a drone's own: its mass, rotors and controllers are in it. Laws of another fleet give a
 //! map as well, which is wrong by as much as the fleets differ. Nothing refuses them (a drone may

@@ -1,4 +1,4 @@
-//! Logs become laws, a map of the air, and a report.
+//! Analysis of logs: laws, a map of the air, and a report.
 //!
 //! [`gather()`] finds what is to be analysed, [`Analysing`] does it step by step, [`Analysed`] is what
 //! came of it; [`analyze_campaign`] is all of it for one campaign.
@@ -54,7 +54,7 @@ pub(crate) fn simulated(root: &Path) -> Result<Work, WorkflowError> {
     Ok(work)
 }
 
-/// An analysis that is about to be made.
+/// An analysis with its input and settings, before it is made.
 pub struct Analysing<'a> {
     host: &'a dyn Host,
     work: &'a Work,
@@ -65,11 +65,12 @@ pub struct Analysing<'a> {
 }
 
 impl<'a> Analysing<'a> {
-    /// Says which logs are taken and what is doubtful of them. `hold`: the analysis.json whose A and u0
-    /// are held.
+    /// Prepares an analysis and reports to the host which logs are taken, with their doubts. `hold`
+    /// is the analysis.json whose A and u0 are held.
     ///
     /// # Errors
-    /// When there is no calibration in `hold`.
+    ///
+    /// If `hold` has no calibration.
     pub fn begin(
         host: &'a dyn Host,
         work: &'a Work,
@@ -90,15 +91,16 @@ impl<'a> Analysing<'a> {
         Ok(Self { host, work, settings, reference, doubts })
     }
 
-    /// What speaks against the laws that are held.
+    /// Reason to doubt the laws that are held, if there is one.
     pub fn doubts(&self) -> Option<&str> {
         self.doubts.as_deref()
     }
 
-    /// Analyses. `provenance`: also hashes what is read, for [`Analysed::write`].
+    /// Runs the analysis. With `provenance` the input is hashed, for [`Analysed::write`].
     ///
     /// # Errors
-    /// When nothing can be analysed, or the work is stopped.
+    ///
+    /// If nothing can be analysed, or the work is stopped.
     pub fn run(self, provenance: bool) -> Result<Analysed, WorkflowError> {
         let Self { host, work, settings, reference, doubts } = self;
         let inputs = inputs(work, settings.without);
@@ -148,11 +150,11 @@ fn input<'a>(work: &'a Work, flight: &'a Found, without: Uncorrected) -> FlightI
     }
 }
 
-/// What came of an analysis.
+/// A finished analysis.
 pub struct Analysed {
-    /// All numbers.
+    /// Results of the analysis.
     pub analysis: Analysis,
-    /// Logs that were looked at.
+    /// Number of logs that were examined.
     pub logs: usize,
     provenance: Option<Provenance>,
     root: PathBuf,
@@ -161,11 +163,12 @@ pub struct Analysed {
 }
 
 impl Analysed {
-    /// Writes numbers and report into a folder. Where the page is; `None`: there is one, but nothing was
-    /// found.
+    /// Writes numbers and report into a folder. Returns the path of the page; `None` if the page
+    /// says that nothing was found.
     ///
     /// # Errors
-    /// When they cannot be made or written.
+    ///
+    /// If they cannot be made or written.
     pub fn write(&self, host: &dyn Host, folder: &Path) -> Result<Option<PathBuf>, WorkflowError> {
         let unknown = Provenance::default();
         let provenance = self.provenance.as_ref().unwrap_or(&unknown);
@@ -180,25 +183,26 @@ impl Analysed {
         Ok((!self.is_nothing()).then(|| report_folder.join(report::PAGE_FILE)))
     }
 
-    /// Whether there is neither a law nor a value of the map.
+    /// Whether the analysis has neither a law nor a value of the map.
     pub fn is_nothing(&self) -> bool {
         self.analysis.what_was_found() == Yield::Nothing
     }
 
-    /// Logs that gave a drone's results.
+    /// Number of logs that gave a drone's results.
     pub fn used(&self) -> usize {
         self.analysis.flights.iter().map(|flight| flight.drones.len()).sum()
     }
 
-    /// What is lost, a line each.
+    /// Losses of the analysis, one line each.
     pub fn problems(&self) -> Vec<String> {
         outcome::problems(&self.analysis, false)
     }
 
-    /// How it ended.
+    /// Ending of the analysis.
     ///
     /// # Errors
-    /// When nothing was found; with `reasons`, the error says why.
+    ///
+    /// If nothing was found; with `reasons`, the error says why.
     pub fn ending(&self, reasons: bool) -> Result<Ending, WorkflowError> {
         let lossy = |flight: &FlightAnalysis| {
             let is_whole = flight.missing.is_empty()

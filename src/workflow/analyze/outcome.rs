@@ -1,4 +1,4 @@
-//! What was lost in an analysis, as lines for those who do not see the tables.
+//! Losses of an analysis, as lines for those who do not see the tables.
 
 use std::fmt::Write as _;
 

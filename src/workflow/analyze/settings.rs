@@ -1,26 +1,26 @@
-//! How logs are analysed, and the same in words for the report.
+//! Settings of an analysis, and their words for the report.
 
 use crate::analysis::windows::Tilt;
 use crate::analysis::{AnalysisOptions, MapLaw, OffsetRule};
 use crate::flight::Indicator;
 
-/// How logs are analysed.
+/// Settings of an analysis.
 #[derive(Clone, Debug, Default)]
 pub struct Settings {
-    /// Windows, laws and the map.
+    /// Options for windows, laws and the map.
     pub options: AnalysisOptions,
-    /// What the map is not corrected for.
+    /// Corrections of the map that are left out.
     pub without: Uncorrected,
 }
 
-/// What the map is not corrected for.
+/// Corrections of the map that are left out.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Uncorrected {
-    /// The density of the air at different heights.
+    /// Whether the map is not corrected for the density of the air at different heights.
     pub density: bool,
-    /// The battery's voltage.
+    /// Whether the map is not corrected for the battery's voltage.
     pub battery: bool,
-    /// Wind on leaning drones.
+    /// Whether the map is not corrected for wind on leaning drones.
     pub wind: bool,
 }
 

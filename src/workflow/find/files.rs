@@ -1,4 +1,4 @@
-//! Logs in folders, and names made from paths.
+//! Search for logs in folders, and names made from paths.
 
 use std::path::{Path, PathBuf};
 

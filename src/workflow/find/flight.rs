@@ -1,4 +1,4 @@
-//! One flight of a campaign folder: its plan, its logs, and what its record says of them.
+//! One flight of a campaign folder: its plan, its logs, and the contents of its record.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! How simulated drones lean in wind, from the vehicle that was flown.
+//! Lean of simulated drones in wind, from the vehicle that was flown.
 
 use crate::analysis::lean_table::LeanTable;
 use crate::analysis::wind::Leaning;

@@ -1,4 +1,4 @@
-//! The flights behind paths: plans, logs and what is known of them.
+//! Search for flights behind paths: plans, logs and what is known of them.
 
 mod files;
 mod flight;
@@ -36,17 +36,17 @@ use crate::log::Log;
 use crate::mission::Plan;
 use crate::mission::plan::Purpose;
 
-/// One flight found behind a path: its logs, and what is known of it. Without a plan and a record most
-/// of it is `None`.
+/// A flight found behind a path: its logs, and what is known of it. Without a plan and a record
+/// most of it is `None`.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// Name of the flight.
     pub name: String,
-    /// The plan that was flown.
+    /// Plan that was flown.
     pub plan: Option<Plan>,
-    /// What it was flown for.
+    /// Purpose of the flight, if it is known.
     pub purpose: Option<Purpose>,
-    /// The logs, in the order of their paths.
+    /// Logs of the flight, in the order of their paths.
     pub logs: Vec<LogInput>,
     /// True vertical speed of uniform air, m/s, up positive (simulated flights).
     pub true_updraft_mps: Option<f64>,
@@ -56,54 +56,55 @@ pub struct Found {
     pub seed: Option<u64>,
     /// GPS time of show time 0.
     pub start: Option<GpsTime>,
-    /// How the pulse follows the density of the air.
+    /// Effect of the air's density on the pulse, if known.
     pub density: Option<Density>,
-    /// How the vehicle leans in wind.
+    /// Lean of the vehicle in wind, if known.
     pub leaning: Option<Leaning>,
     /// Power of thrust that `u - 1000` goes with.
     pub thrust_exponent: Option<f64>,
-    /// How the battery acts on the pulse.
+    /// Effect of the battery on the pulse, if known.
     pub sag: Option<Sag>,
-    /// What wind does to the pulse of a leaning drone.
+    /// Effect of wind on the pulse of a leaning drone, if known.
     pub lean_table: Option<LeanTable>,
-    /// Scales of the air that was simulated.
+    /// Scales of the simulated air, if there is any.
     pub true_air: Option<TrueAir>,
-    /// What is doubtful about the files, one sentence each.
+    /// Doubts about the files, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// What was asked to be analysed.
+/// Work for an analysis: flights found behind paths.
 #[derive(Debug, Default)]
 pub struct Work {
-    /// Title for people.
+    /// Title of the work, for people.
     pub title: String,
-    /// Paths in the report are shown relative to this.
+    /// Folder to which paths in the report are relative.
     pub root: PathBuf,
-    /// The flights, in their order.
+    /// Flights in their order.
     pub flights: Vec<Found>,
-    /// What has been hashed on the way.
+    /// Hashes of files that were read on the way.
     pub hashes: Hashes,
-    /// Flights of a campaign that cannot be looked at, one sentence each.
+    /// Flights of a campaign that cannot be analysed, one sentence each.
     pub absent: Vec<String>,
-    /// Which logs of campaigns are meant; `None` until a campaign is looked at: real ones if there are
-    /// any.
+    /// Origin of a campaign's logs; `None` until a campaign is found: real drones if there are any
+    /// of their logs.
     pub origin: Option<LogOrigin>,
-    /// Which of them were taken, one sentence for each campaign.
+    /// Origin of the logs that were taken, one sentence for each campaign.
     pub used: Vec<String>,
 }
 
 impl Work {
-    /// Nothing yet, with paths relative to `root`.
+    /// Work without any flights, with paths relative to `root`.
     pub fn new(root: &Path) -> Self {
         Self { root: root.to_owned(), ..Self::default() }
     }
 }
 
-/// Adds what a path holds to the work: a campaign folder, a folder of logs, or one log. `plan` is
-/// that of logs outside of a campaign.
+/// Adds the flights behind a path to the work: a campaign folder, a folder of logs, or one log.
+/// `plan` is that of logs outside a campaign.
 ///
 /// # Errors
-/// When there is nothing, or a file that was named cannot be read.
+///
+/// If there is nothing, or a file that was named cannot be read.
 pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), WorkflowError> {
     if path.is_dir() && campaign::is_campaign(path) {
         let index = campaign::index_path(path);
@@ -174,10 +175,12 @@ pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Wor
     Ok(())
 }
 
-/// Adds the flights of a mapping file to the work; what stands for rotor effort in them.
+/// Adds the flights of a mapping file to the work; returns the indicator of rotor effort that they
+/// hold.
 ///
 /// # Errors
-/// When the mapping is wrong, or a file that it names is not there.
+///
+/// If the mapping is not valid, or a file that it names does not exist.
 pub fn find_tables(path: &Path, work: &mut Work) -> Result<Indicator, WorkflowError> {
     let mapping = Mapping::load(path).map_err(|error| match error {
         TableError::File(error) => WorkflowError::File(error),

@@ -1,5 +1,5 @@
-//! Logs of another start are refused, by name: the flight whose start was written down is analysed, not
-//! what happens to lie in its folder.
+//! Refusal of logs of another start, by name: the flight whose start was recorded is analysed,
+//! whatever else lies in its folder.
 
 use std::path::{Path, PathBuf};
 

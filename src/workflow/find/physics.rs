@@ -1,5 +1,5 @@
-//! What the analysis must know of the vehicle that flew: how its pulse follows density, thrust and
-//! voltage.
+//! Physics of the vehicle that flew, as far as the analysis needs it: the pulse by density, thrust
+//! and voltage.
 
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;

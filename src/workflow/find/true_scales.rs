@@ -1,4 +1,4 @@
-//! The scales of the air that a simulated flight was flown in, from its record.
+//! Scales of the air in which a simulated flight was flown, from its record.
 
 use crate::analysis::statistics::result::{TrueAir, TrueField, TrueGusts};
 use crate::sim::air::spec::AirSpec;

@@ -1,4 +1,4 @@
-//! Refuses logs that are given twice: a fleet would count as two.
+//! Refusal of logs that are given twice, with which a fleet would count as two.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Which flight is compared, and with which model.
+//! Choice of the flight to compare, and of the model.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Logs are read and held against the model.
+//! Reading of logs and their comparison with the model.
 
 use std::path::Path;
 

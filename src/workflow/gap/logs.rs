@@ -1,4 +1,4 @@
-//! The logs of a comparison: whose they are, and the flights in them.
+//! Logs of a comparison: their drones, and the flights in them.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Where simulation and measurement disagree, and which physics is missing.
+//! Comparison of measurement and simulation: where they disagree, and which physics is missing.
 
 mod choose;
 mod compare;
@@ -24,43 +24,43 @@ use crate::gap::{Explained, Options, Verdict};
 use crate::report::{self, Provenance};
 use crate::vehicle::Vehicle;
 
-/// What is to be compared with what.
+/// Request for a comparison: measurement, simulation and model.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
-    /// A campaign folder.
+    /// Path of a campaign folder with the measurement.
     pub campaign: Option<PathBuf>,
-    /// Logs of drones, instead: a folder, or one log.
+    /// Path of drones' logs instead of a campaign: a folder, or one log.
     pub measured: Option<PathBuf>,
-    /// A mapping file of tables, instead.
+    /// Path of a mapping file of tables instead of a campaign.
     pub tables: Option<PathBuf>,
-    /// Logs of somebody else's simulation of the same flight; `None`: the plan is flown again.
+    /// Path of logs of another simulation of the flight; `None`: the plan is simulated.
     pub simulated: Option<PathBuf>,
-    /// The plan that `measured` flew.
+    /// Path of the plan that `measured` flew.
     pub plan: Option<PathBuf>,
-    /// The flight of the campaign; `None`: its calibration.
+    /// Name of the campaign's flight; `None`: its calibration.
     pub flight: Option<String>,
-    /// Which logs of the campaign; `None`: real ones where there are any.
+    /// Origin of the campaign's logs; `None`: real drones if there are any of their logs.
     pub origin: Option<LogOrigin>,
-    /// The model, a vehicle's name or file; `None`: the planned one.
+    /// Model to compare, a vehicle's name or file; `None`: the planned vehicle.
     pub vehicle: Option<String>,
-    /// Where results go; `None`: into the campaign's `gap`.
+    /// Folder of the results; `None`: `gap` in the campaign.
     pub output: Option<PathBuf>,
-    /// How it is searched.
+    /// Options of the search.
     pub options: Options,
 }
 
-/// What came of a comparison.
+/// A finished comparison.
 pub struct Compared {
-    /// What the model lacks.
+    /// Verdict on what the model lacks.
     pub verdict: Verdict,
-    /// Where the model with what was found is.
+    /// Path of the model with the effects that were found.
     pub model: PathBuf,
-    /// Where the page is.
+    /// Path of the report's page.
     pub page: PathBuf,
 }
 
 impl Compared {
-    /// How it ended: with losses if logs could not be used.
+    /// Ending of the comparison: with losses if logs could not be used.
     pub fn ending(&self) -> Ending {
         Ending::of_losses(!self.verdict.data.left_out.is_empty())
     }
@@ -69,7 +69,8 @@ impl Compared {
 /// Compares, and writes verdict, model and page.
 ///
 /// # Errors
-/// When there is nothing to compare, the model cannot be used, or the folder is somebody else's.
+///
+/// If there is nothing to compare, the model cannot be used, or the folder holds something else.
 pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError> {
     let (found, others) = measured(host, request)?;
     let vehicle = model_of(request, &found)?;

@@ -1,4 +1,4 @@
-//! The flight that would tell what the verdict left open.
+//! Proposal of the flight that would answer the questions that a verdict left open.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! The search as the blind benchmark asks for it.
+//! Search for missing physics, as the blind benchmark calls it.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! The files of a campaign's flight held against its plan: each that is missing, damaged, different
-//! or not of the plan is named.
+//! Comparison of the files of a campaign's flight with its plan: each that is missing, damaged,
+//! different or not of the plan is named.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! Finds the shows behind a path: a campaign, a show file of any kind, a folder of binary shows.
+//! Search for the shows behind a path: a campaign, a show file of any kind, a folder of binary
+//! shows.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +18,7 @@ pub(super) const MAX_SHOW_BYTES: u64 = 256 << 20;
 /// Largest binary show that is read, bytes.
 pub(crate) const MAX_SKYB_BYTES: u64 = 4 << 20;
 
-/// A show could not be read.
+/// Error of reading a show.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LoadError {
@@ -30,37 +31,37 @@ pub enum LoadError {
     /// The campaign's vehicle cannot be used.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
-    /// A `.skyc` file is broken.
+    /// A `.skyc` file is not valid.
     #[error("{} is not a usable .skyc file", path.shown())]
     Skyc {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Reason why it cannot be read.
         #[source]
         source: skyc::SkycError,
     },
-    /// A `.skyb` file is broken.
+    /// A `.skyb` file is not valid.
     #[error("{} is not a usable .skyb file", path.shown())]
     Skyb {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Reason why it cannot be read.
         #[source]
         source: skyb::SkybError,
     },
-    /// A CSV show is broken.
+    /// A show in CSV is not valid.
     #[error("{} is not a usable CSV show", path.shown())]
     Csv {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Reason why it cannot be read.
         #[source]
         source: csv::CsvError,
     },
-    /// Not a kind of file that holds a show.
+    /// The path is no file of a kind that holds a show.
     #[error("{} is not a campaign folder, .skyc, .skyb or zipped CSV show", path.shown())]
     Unknown {
-        /// The path.
+        /// Path that was given.
         path: PathBuf,
     },
 }

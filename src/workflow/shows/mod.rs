@@ -1,4 +1,4 @@
-//! Shows on the disk: files of any kind, and the files of a campaign held against its plan.
+//! Shows on disk: files of any kind, and the files of a campaign compared with its plan.
 
 pub(crate) mod campaign_files;
 pub mod load;

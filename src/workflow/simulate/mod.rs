@@ -1,5 +1,4 @@
-//! Flies a campaign's flights in the embedded simulator: one log for each drone, and a record of how
-//! they came to be.
+//! Simulation of a campaign's flights: one log for each drone, and a record of how they were made.
 
 mod record;
 
@@ -28,10 +27,10 @@ use crate::vehicle::{Vehicle, library};
 /// Drones that are named in one warning.
 const MOST_NAMED: usize = 10;
 
-/// How one flight is to be simulated.
+/// Settings of the simulation of one flight.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    /// Motion of the air.
+    /// Motion of the air in the flight.
     pub air: Air,
     /// Whether the true air at each drone's planned place is written beside the logs.
     pub truth: bool,
@@ -41,16 +40,16 @@ pub struct Simulation {
     pub full_logs: bool,
     /// Choices of effects, over the vehicle's own: `NAME`, `NAME=off`, `NAME.PARAMETER=NUMBER`.
     pub effects: Vec<String>,
-    /// Another vehicle than the planned one.
+    /// Vehicle to fly instead of the planned one.
     pub vehicle: Option<Vehicle>,
-    /// Only these slots.
+    /// Slots to fly; `None`: all of them.
     pub only: Option<SlotSet>,
     /// Whether logs that were flown with other settings are replaced.
     pub force: bool,
 }
 
 impl Simulation {
-    /// All drones of the planned vehicle in this air, with small logs.
+    /// Settings for all drones with the planned vehicle in this air, and small logs.
     pub fn new(air: Air, seed: u64) -> Self {
         Self {
             air,
@@ -65,28 +64,28 @@ impl Simulation {
     }
 }
 
-/// Uniform air: wind of a speed, m/s, from a direction, degrees clockwise from north, and a vertical
-/// speed, m/s, up positive; as motion towards east, north and up, m/s.
+/// Velocity of uniform air towards east, north and up, m/s, from a wind speed, m/s, the direction
+/// it comes from, degrees clockwise from north, and a vertical speed, m/s, up positive.
 pub fn uniform_mps(wind_mps: f64, from_deg: f64, updraft_mps: f64) -> [f64; 3] {
     let (sin, cos) = from_deg.to_radians().sin_cos();
     // Adding zero turns -0 into 0, which reads better in files.
     [-wind_mps * sin + 0.0, -wind_mps * cos + 0.0, updraft_mps]
 }
 
-/// What became of one simulated flight.
+/// Outcome of one simulated flight.
 #[derive(Clone, Debug, Serialize)]
 pub struct Flown {
     /// Name of the flight.
     pub flight: String,
-    /// Logs that are there now.
+    /// Number of logs that are there now.
     pub logs: usize,
-    /// Logs that were there before and fit.
+    /// Number of logs that were there before and fit.
     pub kept: usize,
     /// Size of all logs, bytes.
     pub bytes: u64,
-    /// Why drones gave no log, one sentence each.
+    /// Reasons why drones gave no log, one sentence each.
     pub failed: Vec<String>,
-    /// Slots whose rotors were at their limit at some time.
+    /// Slots whose rotors were at their limit at some time of the flight.
     pub saturated: Vec<u16>,
     /// Slots whose battery ran flat in flight.
     pub flat: Vec<u16>,
@@ -164,11 +163,12 @@ pub(crate) fn make_ready<'a>(
     Ok(Ready { vehicle, record, wanted, open, air })
 }
 
-/// Flies one flight in the simulator, a drone on each processor; logs that are there and fit are kept.
+/// Flies one flight in the simulator, a drone on each processor; existing logs that fit are kept.
 ///
 /// # Errors
-/// When the flight's files cannot be read or written, its folder holds other logs, or the work is
-/// stopped. A drone that cannot be flown is none: it is in [`Flown::failed`].
+///
+/// If the flight's files cannot be read or written, its folder holds other logs, or the work is
+/// stopped. Drones that cannot be flown are in [`Flown::failed`].
 pub fn simulate(
     host: &dyn Host,
     folder: &FlightFolder,

@@ -1,4 +1,4 @@
-//! The logs of a simulated flight and their record: what is there, what fits, what was changed.
+//! Logs of a simulated flight and their record: which exist, which fit, what was changed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
