@@ -1,4 +1,4 @@
-//! A series of blind flights: flown, explained, scored, and their table.
+//! Series of blind flights: flown, explained, scored, and their table.
 
 use std::path::PathBuf;
 
@@ -32,13 +32,13 @@ const TRIPLES: &[&[&str]] = &[
     &["rotor-inflow", "battery", "parasitic-drag"],
     &["rotor-inflow", "vortex-ring", "velocity-bias"],
 ];
-/// What is hidden if nobody says: each thing by itself, and nothing more often.
+/// Default sets of hidden effects: each effect by itself.
 pub fn one_each() -> Vec<Vec<String>> {
     let nothing = std::iter::repeat_n(Vec::new(), NONE_WEIGHT);
     nothing.chain(KINDS.iter().map(|kind| vec![kind.name.to_owned()])).collect()
 }
 
-/// Pairs and triples that are hidden together.
+/// Sets of two and three effects that are hidden together.
 pub fn several() -> Vec<Vec<String>> {
     let others = KINDS.iter().filter(|kind| !kind.foreign && kind.effect != "rotor-inflow");
     // With the inflow hidden too, the base is AirSim's, and that feels no neighbours.
@@ -49,27 +49,27 @@ pub fn several() -> Vec<Vec<String>> {
     with_inflow.chain(listed).collect()
 }
 
-/// A series that was scored.
+/// A series of blind flights after its scoring.
 pub struct Scored {
-    /// The table.
+    /// Table of the series.
     pub table: Table,
-    /// Where it is as Markdown.
+    /// Path of the table as Markdown.
     pub markdown: PathBuf,
-    /// Flights that have a verdict.
+    /// Number of flights that have a verdict.
     pub flights: usize,
-    /// Why others have none.
+    /// Reasons why flights have no verdict, one sentence each.
     pub lost: Vec<String>,
 }
 
 impl Scored {
-    /// How it ended: with losses if a flight has no verdict.
+    /// Ending of the series: with losses if a flight has no verdict.
     pub fn ending(&self) -> Ending {
         Ending::of_losses(!self.lost.is_empty())
     }
 }
 
 /// Flies a series, `jobs` flights at the same time (`None`: one per core), and writes its table.
-/// `note`: what is said in the table's head. Finished flights are kept.
+/// `note` goes into the table's head. Finished flights are kept.
 ///
 /// # Errors
 /// When the seed is not for this, the folder cannot be written, or no flight has a verdict.

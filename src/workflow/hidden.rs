@@ -17,24 +17,25 @@ use crate::campaign::to_json;
 /// File of the comparison.
 const RESULT: &str = "hidden.json";
 
-/// What came of a flight with hidden physics.
+/// A flight with hidden physics after the seal was opened.
 pub struct Hidden {
-    /// What was hidden, and what was said of it.
+    /// Hidden effects, and the verdict on them.
     pub result: HiddenRun,
-    /// Where the same is as JSON.
+    /// Path of the result as JSON.
     pub path: PathBuf,
-    /// Drones that could not be flown.
+    /// Number of drones that could not be flown.
     pub lost: usize,
 }
 
 impl Hidden {
-    /// How it ended: with losses if drones could not be flown.
+    /// Ending of the flight: with losses if drones could not be flown.
     pub fn ending(&self) -> Ending {
         Ending::of_losses(self.lost > 0)
     }
 }
 
-/// Seals, flies, explains, opens and compares. `force`: another flight with hidden physics is replaced.
+/// Seals, flies, explains, opens and compares. With `force` another flight with hidden physics is
+/// replaced.
 ///
 /// # Errors
 /// When the folder holds something else, or the flight cannot be drawn, flown or explained.

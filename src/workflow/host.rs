@@ -1,5 +1,5 @@
-//! What a workflow needs of the program that runs it: where to tell what happens, a clock, and
-//! somebody who may stop it or be asked.
+//! Interface to the program that runs a workflow: it hears what happens, provides a clock, and has
+//! somebody who may stop the work or be asked.
 
 use std::io;
 use std::path::Path;
@@ -16,25 +16,25 @@ use crate::campaign::lock::FolderLock;
 /// The program that runs a workflow. All but four methods have a default: no progress is shown, and
 /// nobody can be asked.
 pub trait Host: Send + Sync {
-    /// Hears what is being done and what came of it: a line of text, or several.
+    /// Reports an action or its result: one line of text, or several.
     fn say(&self, text: &str);
 
-    /// Hears what must reach a person in any case: warnings, no-go reasons, orders to drones.
+    /// Reports what must reach a person in any case: warnings, no-go reasons, orders to drones.
     fn insist(&self, text: &str);
 
-    /// The clock that everything goes by.
+    /// Clock of the workflow.
     fn clock(&self) -> &Arc<dyn Clock>;
 
-    /// The flag that stops the work: it ends with [`WorkflowError::Interrupted`] at the next step,
-    /// and what is finished is kept.
+    /// Flag that stops the work: it ends with [`WorkflowError::Interrupted`] at the next step, and
+    /// keeps what is finished.
     fn stop_flag(&self) -> &AtomicBool;
 
-    /// Hears of something doubtful that does not stop the work.
+    /// Reports a doubt that does not stop the work.
     fn warn(&self, text: &str) {
         self.insist(&format!("warning: {text}"));
     }
 
-    /// Is shown a table that a person looks at before the work goes on.
+    /// Shows a table that a person looks at before the work goes on.
     ///
     /// # Errors
     /// When it cannot be shown; the work ends then with [`WorkflowError::Output`].
@@ -43,7 +43,7 @@ pub trait Host: Send + Sync {
         Ok(())
     }
 
-    /// Is shown a table that says why the work does not go on.
+    /// Shows a table that says why the work does not go on.
     ///
     /// # Errors
     /// As [`Host::show`].
@@ -52,13 +52,14 @@ pub trait Host: Send + Sync {
         Ok(())
     }
 
-    /// Counts units of long work. `what` is a short verb phrase: `flying`.
+    /// Begins the progress display of long work, in `total` units. `what` is a short verb phrase:
+    /// `flying`.
     fn progress(&self, what: &str, total: u64) -> Box<dyn Progress + '_> {
         let _ = (what, total);
         Box::new(Unseen)
     }
 
-    /// Shows how many bytes of logs have come.
+    /// Begins the progress display of a transfer of logs.
     fn transfer(&self) -> Box<dyn Transfer + '_> {
         Box::new(Unseen)
     }
@@ -68,12 +69,12 @@ pub trait Host: Send + Sync {
         false
     }
 
-    /// Whether a person is there who sees a question that comes by itself.
+    /// Whether a person is there who sees a question that comes unasked.
     fn sees_questions(&self) -> bool {
         false
     }
 
-    /// Asks a person. The answer comes while the work goes on.
+    /// Asks a person; the answer arrives while the work goes on.
     ///
     /// # Errors
     /// When nobody can be asked.
@@ -81,21 +82,22 @@ pub trait Host: Send + Sync {
         Err(io::Error::new(io::ErrorKind::Unsupported, format!("nobody to answer: {question}")))
     }
 
-    /// How often the work was told to stop: who insists while drones are in the air is not kept waiting.
+    /// Number of times that the work was told to stop: a person who insists while drones are in the
+    /// air is not kept waiting.
     fn interruptions(&self) -> u32 {
         u32::from(self.stop_flag().load(Ordering::SeqCst))
     }
 
-    /// Drones are in the air now, and these words say what becomes of them if the program ends all the
-    /// same; `None`: there are none any more.
+    /// Reports that drones are in the air, with the words for what becomes of them if the program
+    /// ends all the same; `None`: none are in the air any more.
     fn set_in_flight(&self, words: Option<&'static str>) {
         let _ = words;
     }
 
-    /// The next interruption may end the program, whatever it is at.
+    /// Allows the next interruption to end the program, whatever it is doing.
     fn next_ends(&self) {}
 
-    /// The command or call that this work comes from, for the provenance of reports.
+    /// Command or call that this work comes from, for the provenance of reports.
     fn command(&self) -> String {
         String::new()
     }
@@ -116,7 +118,7 @@ impl dyn Host + '_ {
         if self.is_stopped() { Err(WorkflowError::Interrupted) } else { Ok(()) }
     }
 
-    /// Locks a campaign folder for this process; dropped, it is free again.
+    /// Locks a campaign folder for this process, until the lock is dropped.
     ///
     /// # Errors
     /// When another process holds it, or the folder cannot be made.
@@ -134,27 +136,28 @@ impl dyn Host + '_ {
     }
 }
 
-/// Progress of long work; shared between threads.
+/// Progress display of long work, shared between threads.
 pub trait Progress: Send + Sync {
-    /// One more unit is done.
+    /// Counts one more unit as done.
     fn advance(&self);
 
-    /// All is done, or given up.
+    /// Ends the display: all is done, or given up.
     fn finish(&self);
 }
 
-/// A line that a person has written; `None`: nobody is there.
+/// A line that a person has written; `None` if nobody is there.
 pub type Answer = io::Result<Option<String>>;
 
-/// Logs on their way home.
+/// Progress display of logs on their way home.
 pub trait Transfer {
-    /// So many bytes came of those whose number is known, and so many drones are done.
+    /// Sets the bytes that have come, those that are known of in total, and the number of drones
+    /// that are done.
     fn advance(&self, done: u64, total: u64, drones_done: usize);
 
-    /// Hears what is said meanwhile.
+    /// Reports a line of text meanwhile.
     fn say(&self, text: &str);
 
-    /// All came, or was given up.
+    /// Ends the display: all logs came, or were given up.
     fn finish(&self);
 }
 
@@ -200,7 +203,7 @@ impl Default for Quiet {
 }
 
 impl Quiet {
-    /// By this clock.
+    /// A host with this clock.
     pub fn new(clock: Arc<dyn Clock>) -> Self {
         Self {
             clock,
@@ -210,7 +213,7 @@ impl Quiet {
         }
     }
 
-    /// Warnings and the like, in their order.
+    /// Warnings and orders so far, in their order.
     pub fn heard(&self) -> Vec<String> {
         self.heard.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

@@ -1,5 +1,6 @@
-//! What people do with drones, step by step, for any program: plan a campaign, check it, fly it in the
-//! simulator or for real, bring the logs home, analyse them, and look for missing physics.
+//! Workflows of people with drones, step by step, for any program: plan a campaign, check it, fly
+//! it in the simulator or for real, bring the logs home, analyse them, and look for missing
+//! physics.
 //!
 //! The command line is one such program; this room knows nothing of arguments, terminals and exit
 //! codes. Whoever runs a workflow is its [`host::Host`]: it hears what happens, has the clock, and may

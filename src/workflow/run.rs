@@ -26,44 +26,44 @@ use crate::sim::air::spec::{self, Air, AirSpec};
 /// The air of the paper's field flights.
 const FIELD_DAY: &str = "field-day";
 
-/// A campaign that is to be flown in the simulator.
+/// Request for a campaign in the simulator.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// What is flown.
+    /// Mission to fly.
     pub mission: Mission,
-    /// The campaign's folder.
+    /// Folder of the campaign.
     pub root: PathBuf,
     /// Whether another plan, and logs that were simulated with other settings, are replaced.
     pub force: bool,
-    /// How each flight is simulated, but for its air.
+    /// Settings of each flight's simulation, except its air.
     pub simulation: Simulation,
-    /// In what air.
+    /// Air of the flights.
     pub airs: Airs,
-    /// Logs that are lost of each flight, chosen by the seed.
+    /// Number of logs of each flight that are lost, chosen by the seed.
     pub lose: u16,
     /// Whether the drones fly without MAVLink in between.
     pub direct: bool,
-    /// Whether the simulation study is flown, too.
+    /// Whether the simulation study is flown as well.
     pub study: bool,
 }
 
-/// The air of a campaign's flights. If nothing is said of it, both fly on a field day.
+/// Air of a campaign's flights. By default they fly on a field day.
 #[derive(Clone, Debug, Default)]
 pub struct Airs {
     /// Uniform wind in measurement flights, m/s.
     pub wind_mps: f64,
-    /// Where all wind comes from, degrees clockwise from north.
+    /// Direction that all wind comes from, degrees clockwise from north.
     pub wind_from_deg: f64,
-    /// Uniform vertical speed in measurement flights, m/s, up positive; `None`: 1 in air that does not
-    /// move else, 0 in other.
+    /// Uniform vertical speed in measurement flights, m/s, up positive; `None`: 1 in otherwise
+    /// still air, 0 in moving air.
     pub updraft_mps: Option<f64>,
-    /// What is added to the air of all flights; empty: still air, `None`: nothing is said of it.
+    /// Air that is added in all flights; empty: still air, `None`: that of the default.
     pub added: Option<Vec<AirSpec>>,
     /// Uniform wind in calibrations, m/s.
     pub calibration_wind_mps: f64,
     /// Uniform vertical speed in calibrations, m/s, up positive.
     pub calibration_updraft_mps: f64,
-    /// What is added to the air of calibrations instead.
+    /// Air that is added in calibrations instead, if it differs.
     pub calibration_added: Option<Vec<AirSpec>>,
 }
 
@@ -99,8 +99,8 @@ impl Airs {
     }
 }
 
-/// Checks, plans and flies a campaign. `findings_per_check`: how many of each kind are told.
-/// [`Ending::NoGo`]: the show is not safe, and nothing was written.
+/// Checks, plans and flies a campaign. `findings_per_check` limits the findings of each kind that
+/// are reported. [`Ending::NoGo`] means that the show is not safe, and that nothing was written.
 ///
 /// # Errors
 /// When the folder holds something else, files cannot be written, no drone of a flight could be flown,
@@ -142,9 +142,9 @@ pub fn fly_campaign(
 #[derive(Debug)]
 #[must_use]
 pub struct Flown {
-    /// How it ended.
+    /// Ending of the flights.
     pub ending: Ending,
-    /// That nobody else writes there.
+    /// Lock on the folder, so that no other process writes there.
     pub lock: Option<FolderLock>,
 }
 

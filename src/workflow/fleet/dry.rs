@@ -1,4 +1,4 @@
-//! The messages of each step, and nobody hears them.
+//! Dry runs over links: the messages of each step, which no drone hears.
 
 use std::collections::BTreeMap;
 use std::path::Path;

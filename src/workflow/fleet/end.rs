@@ -1,4 +1,4 @@
-//! Flights are ended: over the links, or by the station that holds them.
+//! End of flights: over the links, or by the station that holds them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The whole flight of real drones, step by step.
+//! Flight of real drones from preparation to logs, step by step.
 
 use std::collections::BTreeMap;
 

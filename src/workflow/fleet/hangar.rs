@@ -1,5 +1,4 @@
-//! Virtual drones that are switched on: those that a flight is practised with, and those of other
-//! ground stations.
+//! Virtual drones that are switched on: for practice, and for other ground stations.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;

@@ -1,4 +1,5 @@
-//! What an interruption means while drones are in the air: a person is asked, programs say it beforehand.
+//! Meaning of an interruption while drones are in the air: a person is asked, programs decide
+//! beforehand.
 
 use std::sync::mpsc::{Receiver, TryRecvError};
 

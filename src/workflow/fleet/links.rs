@@ -1,4 +1,4 @@
-//! Links to drones.
+//! Links to drones, opened for a workflow.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::Arc;

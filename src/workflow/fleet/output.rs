@@ -1,4 +1,4 @@
-//! How a flight ended, drone by drone, and what became of their logs, for other programs.
+//! Outcome of a flight, drone by drone, and the fate of the logs, for other programs.
 
 use std::collections::BTreeMap;
 

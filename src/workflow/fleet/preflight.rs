@@ -1,4 +1,4 @@
-//! The table before a start, for other programs.
+//! The preflight table, for other programs.
 
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -1,4 +1,4 @@
-//! How a start is given: its time, a person's word, and the flight that comes of it.
+//! Start of a flight: its time, a person's leave, and the flight that follows.
 
 use std::collections::BTreeMap;
 use std::io;

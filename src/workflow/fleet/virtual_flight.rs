@@ -24,8 +24,8 @@ use crate::workflow::simulate::{Flown, Ready, Simulation, make_ready, settle};
 /// Virtual drones on the ground live so many times as fast as the clock on the wall.
 const GROUND_PACE: f64 = 20.0;
 
-/// A flight by virtual drones: over MAVLink, like real ones, with logs that come home. The logs are
-/// those of [`simulate`](crate::workflow::simulate::simulate), to the byte.
+/// Flies a flight with virtual drones, over MAVLink like real ones, and brings their logs home. The
+/// logs are those of [`simulate`](crate::workflow::simulate::simulate), to the byte.
 ///
 /// # Errors
 /// When the flight's files cannot be read or written, the drones cannot be reached, or the work is

@@ -1,4 +1,4 @@
-//! A station in place of one that is gone, for a flight that is on its way.
+//! Watch over a flight in progress, in place of a station that is gone.
 
 use super::bring::{Wish, bring};
 use super::crew::{Crew, Found, nobody};

@@ -1,5 +1,5 @@
-//! Whose log is whose: by the campaign's table, else by where the drones stand. One drone that is
-//! missing, or two that stand on one slot, keep nobody else's log away.
+//! Assignment of logs to slots: by the campaign's table, otherwise by where the drones stand. A
+//! missing drone, or two on one slot, does not keep the logs of others away.
 
 use std::collections::BTreeMap;
 

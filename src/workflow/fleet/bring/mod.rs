@@ -1,4 +1,4 @@
-//! Bringing logs home over the drones' links: what is wanted, the pull, and what is told of it.
+//! Retrieval of logs over the drones' links: the selection, the pull, and its report.
 
 mod shares;
 mod tell;

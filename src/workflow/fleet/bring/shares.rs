@@ -1,4 +1,4 @@
-//! How much of all logs has come: every drone's share, finished or not.
+//! Progress of a pull of logs: every drone's share, finished or not.
 
 use std::collections::{BTreeMap, BTreeSet};
 

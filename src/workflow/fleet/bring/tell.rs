@@ -1,4 +1,4 @@
-//! What is told of a pull when it is over.
+//! Report of a pull when it is over.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What is seen of a pull while it runs: how much has come, and who is waited for.
+//! Display of a pull in progress: how much has come, and which drones are waited for.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Takes over the watch of a flight that another station has started.
+//! Takeover of the watch of a flight that another station has started.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! Ctrl-C in flight: everyone is brought down, or left.
+//! Interruption in flight: all drones are brought down, or left.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! Ends flights: the drones of the table, or whoever is heard.
+//! End of flights: for the drones of the table, or for all that are heard.
 
 use std::collections::{BTreeMap, BTreeSet};
 

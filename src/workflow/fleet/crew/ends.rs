@@ -1,5 +1,5 @@
-//! How a flight has ended for each drone: nobody has landed who never took off, and nobody who is
-//! not heard.
+//! Ending of a flight for each drone: a drone that never took off has not landed, nor has one that
+//! is not heard.
 
 use std::fmt::Write as _;
 

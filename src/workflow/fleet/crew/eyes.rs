@@ -1,4 +1,4 @@
-//! Watches a flight, tells what happens, and writes it down.
+//! Watch of a flight: events are reported and recorded.
 
 use std::collections::{BTreeMap, BTreeSet};
 

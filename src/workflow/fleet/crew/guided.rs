@@ -1,4 +1,4 @@
-//! A flight that the station itself flies: every drone's trajectory, streamed in GUIDED.
+//! Flight that the station itself guides: every drone's trajectory is streamed in GUIDED.
 
 use std::collections::BTreeMap;
 

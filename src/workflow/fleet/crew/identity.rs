@@ -1,4 +1,4 @@
-//! The identity of a flight: written when its start is authorized, taken back when nobody took off.
+//! Identity of a flight: recorded when its start is authorized, withdrawn when no drone took off.
 
 use std::collections::BTreeMap;
 

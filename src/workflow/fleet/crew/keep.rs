@@ -1,5 +1,5 @@
-//! Parameters that are changed on drones: what they were is on the disk before they are set, and
-//! is put back on request.
+//! Parameters that are changed on drones: their old values are on disk before new ones are set, and
+//! are restored on request.
 
 use std::collections::{BTreeMap, BTreeSet};
 

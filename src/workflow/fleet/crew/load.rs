@@ -1,4 +1,4 @@
-//! What is put on the drones before a flight: parameters, show, fence.
+//! Loading of drones before a flight: parameters, show, fence.
 
 use std::collections::BTreeMap;
 

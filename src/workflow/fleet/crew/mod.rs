@@ -1,4 +1,4 @@
-//! What a station does with a fleet, step by step: the steps of `fly` and of `fleet`.
+//! Steps of a station with its fleet: those of `fly` and of `fleet`.
 
 mod attach;
 mod down;

@@ -1,4 +1,4 @@
-//! A start in two steps, and the show that comes of it.
+//! Start in two steps, and the show that follows.
 
 use std::collections::BTreeMap;
 

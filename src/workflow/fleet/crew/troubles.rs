@@ -1,4 +1,4 @@
-//! What is wrong with the links: told once each, and written into the journal.
+//! Problems of the links: each is reported once, and written into the journal.
 
 use super::Crew;
 use crate::link::net::Net as _;

@@ -1,4 +1,4 @@
-//! `fleet watch` through a server: takes a flight over whose station is gone.
+//! `fleet watch` through a server: takes over a flight whose station is gone.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! Drones in the air are brought down through the server.
+//! Return or landing of drones in the air through the server.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

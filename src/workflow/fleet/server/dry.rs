@@ -1,4 +1,4 @@
-//! The requests of each step, and no server hears them.
+//! Dry runs with a server: the requests of each step, which no server hears.
 
 use std::collections::BTreeMap;
 

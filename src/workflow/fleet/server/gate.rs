@@ -1,5 +1,5 @@
-//! The gate between this program and the drones behind a server: every drone is looked at before
-//! each step of a start, and nobody starts when one is not as that step needs it.
+//! The gate between this program and the drones behind a server: every drone is checked before each
+//! step of a start, and none starts unless all are in the state that the step needs.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,5 +1,5 @@
-//! The identity of a flight through a server: written when its start is authorized, taken back when
-//! nobody took off.
+//! Identity of a flight through a server: recorded when its start is authorized, withdrawn when no
+//! drone took off.
 
 use super::Flight;
 use crate::base::time::GpsTime;

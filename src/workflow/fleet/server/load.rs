@@ -1,4 +1,5 @@
-//! Before a start: nobody else's start, everybody on the ground, the shows, the show mode.
+//! Preparation of a start: no other start is set, all drones are on the ground, shows are uploaded,
+//! show mode is on.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! What became of the logs.
+//! Table of the logs that were brought home, and of those that were not.
 
 use crate::workflow::fleet::output::LogOutput;
 use crate::workflow::host::Host;

@@ -1,4 +1,4 @@
-//! Which of the server's drones stands on which slot.
+//! Assignment of the server's drones to the slots that they stand on.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

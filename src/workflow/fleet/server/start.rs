@@ -1,4 +1,4 @@
-//! The two steps of a start, each with a look at every drone, and the way back.
+//! The two steps of a start, each with a check of every drone, and the way back.
 
 use std::sync::Arc;
 

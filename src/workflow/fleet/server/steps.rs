@@ -1,4 +1,4 @@
-//! Looks and steps through a server, before a flight.
+//! Checks and steps through a server, before a flight.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Shows to drones through the server, several drones at once.
+//! Upload of shows through the server, several drones at once.
 
 use std::collections::BTreeMap;
 

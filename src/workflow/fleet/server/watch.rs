@@ -1,4 +1,4 @@
-//! Watching a show through the server, second by second.
+//! Watch of a show through the server, second by second.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Which of a drone's logs are to come, given what is at home.
+//! Choice of a drone's logs to bring home, given those that are there.
 
 use super::Puller;
 use super::one::{One, Target, number};

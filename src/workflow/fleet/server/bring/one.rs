@@ -1,4 +1,4 @@
-//! One drone's logs: listed, downloaded, listed again.
+//! Retrieval of one drone's logs: listed, downloaded, listed again.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! Of which flight a log is that came, and where it goes; what is at home in its place makes room.
+//! Flight of a log that came, and its place at home; a log in its place makes room.
 
 use super::Puller;
 use super::choose::older;

@@ -1,6 +1,6 @@
-//! A log that is still being written is waited for: its size right after a download says nothing of
-//! what is in the autopilot's hands still. The firmware writes on for 15 s after disarming, and pauses
-//! while logs are listed and downloaded.
+//! Wait for a log that is still being written: its size right after a download does not count what
+//! the autopilot still holds. The firmware writes on for 15 s after disarming, and pauses while
+//! logs are listed and downloaded.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
