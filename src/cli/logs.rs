@@ -4,9 +4,8 @@ mod ask;
 mod cards;
 mod dry;
 mod listing;
-mod simulated;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use serde::Serialize;
@@ -18,16 +17,14 @@ use super::fleet::server;
 use super::simulate::parse_slots;
 use super::words;
 use crate::base::plain::Shown as _;
-use crate::campaign;
 use crate::campaign::origin::LogOrigin;
-use crate::campaign::start::earlier_folders;
 use crate::fleet::logs::one::Which;
-use crate::fleet::logs::verify::{unknown, verify};
 use crate::mission::Plan;
 use crate::workflow::fleet::bring::{Brought, Wish, bring};
 use crate::workflow::fleet::crew::Crew;
 use crate::workflow::fleet::output::{ListRow, ListedLog};
 use crate::workflow::fleet::server::{list as list_through, pull as pull_through};
+use crate::workflow::fleet::verify::{VerifyRow, verify_all};
 use crate::workflow::fleet::{one_flight, who};
 use crate::workflow::slots::SlotSet;
 
@@ -340,37 +337,8 @@ struct VerifyOutput {
     logs: Vec<VerifyRow>,
 }
 
-#[derive(Serialize)]
-struct VerifyRow {
-    flight: String,
-    file: String,
-    faults: Vec<String>,
-}
-
 fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
-    let mut rows = Vec::new();
-    for folder in campaign::flights(&args.campaign)? {
-        let plan = folder.read_plan()?;
-        let row = |logs: &Path, file: &str, faults: Vec<String>| {
-            let path = logs.join(file);
-            let shown = path.strip_prefix(&folder.0).unwrap_or(&path);
-            VerifyRow { flight: plan.name.clone(), file: shown.shown().to_string(), faults }
-        };
-        for (logs, file, faults) in simulated::verify(&folder)? {
-            rows.push(row(&logs, &file, faults));
-        }
-        let earlier = earlier_folders(&folder.logs())?.into_iter().map(|(_, folder)| folder);
-        for logs in std::iter::once(folder.logs()).chain(earlier) {
-            for checked in verify(&logs)? {
-                let faults = checked.faults.iter().map(ToString::to_string).collect();
-                rows.push(row(&logs, &checked.entry.file, faults));
-            }
-            for file in unknown(&logs)? {
-                let fault = "has no record of how it came (manifest.json): it cannot be verified";
-                rows.push(row(&logs, &file, vec![fault.to_owned()]));
-            }
-        }
-    }
+    let rows = verify_all(&args.campaign)?;
     if rows.is_empty() {
         return Err(CommandError::Nothing(
             "there are no logs yet: no manifest of logs that came (`updraft logs pull` or `import`), \

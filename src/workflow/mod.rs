@@ -44,6 +44,7 @@ pub mod hashes;
 pub mod hidden;
 pub mod host;
 pub mod mission;
+pub mod physics;
 pub mod plan;
 mod provenance;
 pub mod run;
@@ -51,6 +52,7 @@ pub mod shows;
 pub mod simulate;
 pub mod slots;
 pub mod study;
+pub(crate) mod times;
 pub(crate) mod words;
 
 /// Program and version, for records.

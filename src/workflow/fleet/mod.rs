@@ -2,6 +2,7 @@
 //! their logs brought home.
 
 pub(crate) mod bring;
+pub(crate) mod cards;
 pub(crate) mod crew;
 pub(crate) mod dry;
 pub(crate) mod end;
@@ -13,6 +14,7 @@ pub(crate) mod output;
 pub(crate) mod preflight;
 pub(crate) mod server;
 pub(crate) mod start;
+pub(crate) mod verify;
 mod virtual_flight;
 pub(crate) mod watch;
 pub(crate) mod who;
