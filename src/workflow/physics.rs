@@ -1,4 +1,4 @@
-//! Our bodies and our air for unmodified ArduCopter simulators.
+//! Simulated bodies and air for unmodified ArduCopter simulators.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
@@ -26,28 +26,28 @@ const MAX_INSTANCES: usize = 500;
 /// The stop request and the clock are looked at so often.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What is to be served.
+/// Request for instances that simulate the physics of ArduCopter's simulators.
 #[derive(Clone, Debug)]
 pub struct Physics {
     /// Address and port of the first instance; port 0: any free port for each.
     pub listen: SocketAddr,
-    /// Number of instances; `None`: all slots of the campaign, else one.
+    /// Number of instances; `None`: one for each slot of the campaign, or one without a campaign.
     pub instances: Option<usize>,
     /// Campaign folder: instance 0 stands at slot 1, and so on.
     pub campaign: Option<PathBuf>,
-    /// Flight of the campaign; `None`: the first.
+    /// Name of the campaign's flight; `None`: the first.
     pub flight: Option<String>,
-    /// Where every instance stands without a campaign.
+    /// Place at which every instance stands without a campaign.
     pub home: Option<Home>,
-    /// Vehicle: a built-in name or a file; `None`: the campaign's.
+    /// Vehicle, a built-in name or a file; `None`: the campaign's.
     pub vehicle: Option<String>,
     /// Motion of the air.
     pub air: Air,
     /// Seed of sensor noise and random air.
     pub seed: u64,
-    /// Time between status lines; zero: none.
+    /// Time between status lines; zero: no status lines.
     pub status_every: Duration,
-    /// It ends when every instance has flown so many simulated seconds; `None`: when it is stopped.
+    /// Simulated time after which an instance ends, s; `None`: when it is stopped.
     pub duration_s: Option<f64>,
 }
 
@@ -70,19 +70,19 @@ impl std::fmt::Display for Home {
     }
 }
 
-/// What became of one instance.
+/// Outcome of one instance.
 #[derive(Clone, Debug)]
 pub struct Served {
-    /// Where it listened.
+    /// Address that it listened on.
     pub listen: SocketAddr,
-    /// Where it stood.
+    /// Place and heading at which it stood.
     pub home: Home,
-    /// What it did.
+    /// Statistics and state at its end.
     pub status: Status,
 }
 
-/// Serves all instances until it is stopped, or all have flown long enough. The vehicle's name, and what
-/// became of each instance.
+/// Serves all instances until it is stopped, or all have flown long enough. Returns the vehicle's
+/// name and the outcome of each instance.
 ///
 /// # Errors
 /// When the campaign or vehicle cannot be used, or a socket fails.

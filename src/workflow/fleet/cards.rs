@@ -1,4 +1,4 @@
-//! Logs on cards: each goes to the flight and slot that it is of.
+//! Import of logs from cards: each goes to the flight and slot that it is of.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;

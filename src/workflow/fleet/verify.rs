@@ -1,5 +1,5 @@
-//! Logs at home held against what is written of them: manifests of those that came, records of those
-//! that the simulator wrote.
+//! Check of logs at home against their records: manifests of those that came, records of those that
+//! were simulated.
 
 use std::path::{Path, PathBuf};
 
