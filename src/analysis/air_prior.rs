@@ -11,14 +11,16 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
-/// Time scale that is most likely before the windows are seen, s: a few minutes, as over a field at
-/// show heights.
+/// Time scale that is most likely before the windows are seen, s: a few minutes, as over a field at show
+/// heights (docs/physics.md, 5.3). Found by trial: 120 s before, chosen while looking at the coverage of
+/// simulated campaigns (docs/errors.md). A shorter scale makes intervals of the zero narrower, as s sqrt(2
+/// tau/T).
 const USUAL_TAU_S: f64 = 150.0;
-/// One standard deviation of its logarithm: a factor of 2.2.
+/// One standard deviation of its logarithm: a factor of 2.2. Chosen, with the same campaigns.
 const TAU_SPREAD: f64 = 0.8;
-/// Above this, strong air is taken for less and less likely, m/s.
+/// Above this, strong air is taken to be less and less likely, m/s: twice that of a field day. Chosen.
 const STRONG_MPS: f64 = 1.0;
-/// Choices with less than this share of the weight are dropped.
+/// Choices with less than this share of the weight are dropped. Numerical.
 const NEGLIGIBLE: f64 = 1e-4;
 
 /// One choice of the scales.

@@ -20,28 +20,33 @@ use crate::flight::Flight;
 
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
-/// Seconds in a running mean.
+/// Seconds in a running mean, as in the paper.
 const RUNNING: f64 = 10.0;
-/// Slope of the pulse where nothing better is known, us/(m/s).
+/// Slope of the pulse where nothing better is known, us/(m/s): the paper's A' of 26.4.
 const TYPICAL_SLOPE: f64 = 26.0;
-/// Beyond this the inverse is not looked for, m/s.
+/// Beyond this the inverse is not searched, m/s: far outside any ladder. Convention.
 const FASTEST_MPS: f64 = 12.0;
-/// Least slope of a line's bend as a share of its slope in hover.
+/// Least slope of a line's bend as a share of its slope in hover: keeps the inverse unique where bends
+/// extrapolate. Chosen.
 const LEAST_SLOPE: f64 = 0.2;
-/// A signed quadratic must be this much more probable than a line (logarithm).
+/// A signed quadratic must be this much more probable than a line (logarithm of the evidence): odds of 7 to
+/// 1. Chosen in favour of the line, because the inverse of the quadratic is useless in hover
+/// (docs/physics.md, 1.2).
 const CLEARLY: f64 = 2.0;
 /// Why a law that was not chosen here is the map's.
 pub(super) const ASKED_FOR: &str = "as asked for";
-/// Rounds in which the vertical speed through the air is found beside what wind does at it.
+/// Rounds in which the vertical speed through the air is found together with the effect of the wind at it. 3
+/// before scans, whose wind doubles the slope; chosen.
 const CLIMB_ROUNDS: usize = 10;
 /// Part of the way that is gone in each: with all of it, the rounds swing around the answer where wind
 /// doubles the pulse's slope.
 const CLIMB_STEP: f64 = 0.6;
-/// Wind changes the pulse's slope by a factor between these: more is not believed.
+/// Wind changes the pulse's slope by a factor between this and [`MOST_STEEPER`]: more is not believed. Pixel
+/// has 1.5 at 7 m/s (docs/errors.md); chosen around that.
 const LEAST_STEEPER: f64 = 0.7;
 /// See [`LEAST_STEEPER`].
 const MOST_STEEPER: f64 = 2.0;
-/// Air further out than the ladder by this is marked, m/s.
+/// Air further out than the ladder by this is marked, m/s: one rung.
 const BEYOND_MPS: f64 = 0.5;
 
 /// A calibration ready for the map.

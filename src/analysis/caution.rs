@@ -9,13 +9,13 @@ use super::wind::{Leaning, axial_of};
 use super::windows::Tilt;
 use crate::base::estimate::Estimate;
 
-/// A systematic error above this is worth a sentence, m/s.
+/// A systematic error above this is worth a sentence, m/s. Chosen.
 const WORTH_SAYING_MPS: f64 = 0.05;
 
 /// A change of u0 below this reads as zero, us (or the indicator's unit).
 const WORTH_SAYING_US: f64 = 0.05;
 
-/// A law from fewer windows is warned about.
+/// A law from fewer windows is warned about: two more than a line has parameters.
 const FEWEST_WINDOWS: usize = 4;
 
 /// About the laws of a calibration: the flock's, or its only drone's.

@@ -24,30 +24,35 @@ pub(super) const DENSITY: usize = 3;
 
 /// Pulse at which the rotors make no thrust, us.
 const NO_THRUST_US: f64 = 1000.0;
-/// Motors and controllers warm up over this time, s.
+/// Time constant of warming motors and controllers, s: 60 to 200 s (docs/physics.md, 5.4).
 const WARM_UP_S: f64 = 100.0;
-/// What that does to the pulse: standard error, us (magnets lose a little flux, windings gain
-/// resistance; the signs oppose each other).
+/// What warming does to the pulse: standard error, us. Magnets lose a little flux (-10 to -20 us), windings
+/// gain resistance (+4 us); how much of it a flight still sees depends on how warm the motors take off.
+/// Chosen between.
 const WARM_UP_US: f64 = 3.0;
 /// Drift where a battery acts on the pulse and its voltage is not known: standard error, us per
 /// minute of flight. A small drone's pack falls by half a percent a minute, one percent is 5.5 us.
 const UNKNOWN_VOLTAGE_US: f64 = 3.0;
-/// Share of a wind correction that may be wrong.
+/// Share of a wind correction that may be wrong; see `DOUBTED_SHARE` in `wind.rs`.
 const WIND_SHARE: f64 = 0.15;
-/// Where wind could not be corrected for, the most that it may have done is two standard errors.
+/// Where wind could not be corrected for, the most that it may have done counts as two standard errors.
 const UNKNOWN_WIND_SHARE: f64 = 0.5;
-/// Error of the exponent of density where the thrust curve is known.
+/// Standard error of the exponent of density where the thrust curve is known: motors have 0.35 to 0.45
+/// (docs/physics.md, 2.3). Chosen around that.
 const DENSITY_EXPONENT: f64 = 0.1;
-/// And where it is not: anything from 0 to 1.
+/// Standard error of that exponent where it is not known: anything from 0 to 1.
 const UNKNOWN_DENSITY_EXPONENT: f64 = 0.5;
-/// Height over which density falls by 1/e, m.
+/// Height over which density falls by 1/e at the ground, m: the standard atmosphere's, 288.15 K over 0.0277
+/// K/m.
 const DENSITY_SCALE_M: f64 = 10_400.0;
-/// Sensitivity of the pulse to thrust where it is not known (du/dlnT), us.
+/// Sensitivity of the pulse to thrust where it is not known (du/dlnT), us: a show drone's (docs/physics.md,
+/// 2.3).
 const THRUST_US: f64 = 300.0;
-/// Step in which the table's slope by the vertical air speed is taken, m/s.
+/// Step of the derivative of the table's values by the vertical air speed, m/s. Numerical.
 const CLIMB_STEP_MPS: f64 = 0.5;
-/// Most that wind does to an unknown small drone at a lean of one degree, us; it grows with the
-/// square of the lean.
+/// Most that wind does to an unknown small drone at a lean of one degree, us; it grows with the square of
+/// the lean. Translational lift of a show drone: -15 to -45 us at 5 m/s, where it leans by 5 to 7 degrees
+/// (docs/physics.md, 2.4).
 const UNKNOWN_WIND_US: f64 = 1.5;
 
 /// Which corrections the map of a flight has.

@@ -9,13 +9,14 @@ use super::updraft::{RUNNING_S, Running};
 use super::windows::{Target, WindowOptions, lean_deg};
 use crate::flight::{Alignment, Flight};
 
-/// Pulse quantum, us: a motor within it of its limit is at the limit.
+/// Quantum of a logged pulse, us: a motor within it of its limit is at the limit.
 const QUANTUM_US: f64 = 1.0;
-/// Clocks that agree with their source to this are aligned, s.
+/// Clocks that agree with their source to this are aligned, s: half of a second of the map.
 const ALIGNED_S: f64 = 0.5;
-/// More drift than this is marked, us per minute: 0.4 m/s at 26 us/(m/s).
+/// More drift than this is marked, us per minute: 0.4 m/s at 26 us/(m/s). A small drone's battery causes
+/// about 3; chosen above that.
 const DRIFT_US_PER_MIN: f64 = 10.0;
-/// Shortest hover whose drift is told, s.
+/// Shortest hover whose drift is stated, s. Chosen.
 const DRIFT_S: f64 = 60.0;
 /// Longest hover, s.
 const LONGEST_S: i64 = 200_000;

@@ -15,16 +15,17 @@ use super::fit::{FitError, Solution, minimize, minimize_with, p_value};
 use super::result::{Fit, Parameter};
 use crate::base::estimate::Estimate;
 
-/// Range of the profile over W, m/s.
+/// Range of the profile over W, m/s: more than twice the ladder's fastest rung (docs/physics.md, 5.2).
+/// Chosen.
 const W_LIMIT_MPS: f64 = 8.0;
-/// Step of the profile over W, m/s.
+/// Step of the profile over W, m/s (docs/physics.md, 5.2). Chosen.
 const W_STEP_MPS: f64 = 0.05;
-/// Minima within this chi² of the best are reported.
+/// Minima within this chi² of the best are reported: two standard deviations.
 const OTHER_MINIMA_CHI2: f64 = 4.0;
-/// Rounds of the effective variance.
+/// Rounds of the effective variance (York; docs/physics.md, 5.2). Numerical.
 const VARIANCE_ROUNDS: usize = 3;
 
-/// A law from fewer windows is warned about.
+/// A law from fewer windows is warned about: two more than a line has parameters.
 const FEWEST_WINDOWS: usize = 4;
 
 /// One window as a point of a law.

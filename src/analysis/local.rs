@@ -8,13 +8,14 @@ use super::corrections::DOUBTS;
 use super::shape::{PARAMETERS, Shape};
 use super::split::{LEAST_NOISE_US, Parts, Point, Split, rough_sensitivity};
 
-/// Time scales of local air that are tried, s.
+/// Time scales of local air that are tried, s: gusts to minutes. A grid.
 const TAUS_S: [f64; 4] = [10.0, 40.0, 120.0, 360.0];
-/// White scatter that is tried, us.
+/// White scatter that is tried, us. A grid.
 const WHITES_US: [f64; 4] = [0.1, 0.4, 1.5, 6.0];
-/// Most drones that the scales of local air are estimated from.
+/// Most drones that the scales of local air are estimated from. Chosen for time.
 const SCALE_DRONES: usize = 25;
-/// Spread of both bends between the drones of a fleet, us/(m/s)².
+/// Spread of both bends between the drones of a fleet, us/(m/s)²: a fifth of the fleet's own
+/// (docs/physics.md, 2.3). Chosen.
 const OWN_BEND_SD: f64 = 0.2;
 /// One drone's own part of the parameters.
 pub(super) struct Own {

@@ -26,9 +26,10 @@ use super::result::WindowStats;
 use super::stats::mean_sd;
 use crate::base::estimate::Estimate;
 
-/// Time that counts as much as [`HEIGHT_SCALE_M`] in the triangulation, s.
+/// Time that counts as much as [`HEIGHT_SCALE_M`] in the triangulation, s. A Delaunay mesh depends on the
+/// ratio of the two (docs/physics.md, 5.3); the paper does not give it. Convention.
 pub const TIME_SCALE_S: f64 = 60.0;
-/// Height that counts as much as [`TIME_SCALE_S`] in the triangulation, m.
+/// Height that counts as much as [`TIME_SCALE_S`] in the triangulation, m. Convention.
 pub const HEIGHT_SCALE_M: f64 = 10.0;
 /// 0-windows without which there is no offset: a single one is its own mean.
 const FEWEST: usize = 2;

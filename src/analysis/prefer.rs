@@ -5,14 +5,16 @@ use super::options::MapLaw;
 use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws};
 use super::stats::mean_sd;
 
-/// Largest W of a calibration's signed quadratic that may be the air's, m/s.
+/// Largest W of a calibration's signed quadratic that may be the air's, m/s: a mean over seven minutes of
+/// field air has a standard deviation of 0.3 (docs/physics.md, 5.3). Lines give several m/s (2.7).
 const LARGEST_CALIBRATION_W_MPS: f64 = 0.5;
-/// Fastest vertical air that a calibration is flown in, as a mean over minutes, m/s.
+/// Fastest vertical air that a calibration is flown in, as a mean over minutes, m/s. A strong thermal;
+/// convention.
 const FASTEST_AIR_MPS: f64 = 3.0;
-/// Beyond this share of the ladder's highest and lowest speed, only one flank of the signed quadratic
-/// holds windows.
+/// Beyond this share of the ladder's highest and lowest speed, only one flank of the signed quadratic holds
+/// windows. Chosen: the last rung alone is beyond.
 const EDGE: f64 = 0.9;
-/// A reduced chi² this many times the other law's is clearly worse.
+/// A reduced chi² this many times the other law's is clearly worse. Chosen.
 const CLEARLY: f64 = 1.5;
 
 /// The law whose fits to the reference's drones have the lower mean reduced chi².

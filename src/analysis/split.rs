@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use super::corrections::DOUBTS;
 use super::shape::Shape;
 
-/// No mean of a window is known better, us.
+/// No mean of a window is known better, us: a floor for simulated flights without noise. Chosen.
 pub(super) const LEAST_NOISE_US: f64 = 0.1;
-/// Rounds of the separation into fleet and drones.
+/// Rounds of the separation into fleet and drones. Numerical.
 const ROUNDS: usize = 12;
-/// Windows whose times differ by more belong to groups that fly apart, s.
+/// Windows whose times differ by more belong to groups that fly apart, s: half a leg. Convention.
 const SAME_TIME_S: f64 = 5.0;
 /// Averages over drones of what was flown at the same time.
 pub(super) struct Cell {

@@ -2,7 +2,7 @@
 
 use super::result::SampleStats;
 
-/// Share cut off at each end for the trimmed mean.
+/// Share cut off at each end for the trimmed mean (docs/physics.md, 5.1).
 const TRIM: f64 = 0.1;
 
 /// Statistics of samples with their times. The standard error comes from the means of blocks of

@@ -22,9 +22,10 @@ use crate::mission::plan::{Kind, Segment};
 /// A horizontal velocity that differs by more between the halves of a running window is not constant,
 /// m/s: it would need a mean acceleration of 0.1 m/s², which leans a drone by 0.6 degrees.
 const STEADY_MPS: f64 = 0.5;
-/// Positions are not joined over longer silences than this, s.
+/// Positions are not joined over longer silences than this, s. Chosen.
 const GAP_S: f64 = 1.0;
 /// A log that moved by less than this share of a leg, or by more than its inverse, flew another plan.
+/// Chosen.
 const LEAST_SHARE: f64 = 0.5;
 /// Shorter legs say nothing about that, m.
 const SHORTEST_LEG_M: f64 = 10.0;

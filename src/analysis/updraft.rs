@@ -13,11 +13,11 @@ use super::windows::{Target, lean_deg};
 use crate::base::estimate::Estimate;
 use crate::flight::{Flight, Series};
 
-/// Length of the running window, s.
+/// Length of the running window, s: the paper's.
 pub const RUNNING_S: f64 = 10.0;
-/// A silence longer than this breaks a running window, s.
+/// A silence longer than this breaks a running window, s: a tenth of it. Chosen.
 const GAP_S: f64 = 1.0;
-/// Fewest running values in a 1 s bin.
+/// Fewest running values in a 1 s bin. Chosen; logs have 10.
 const FEWEST_PER_BIN: usize = 3;
 /// Blocks for the error of the mean: twice the running window, so that blocks are nearly independent.
 const BLOCK_S: f64 = 20.0;

@@ -25,12 +25,12 @@ const NO_THRUST_US: f64 = 1000.0;
 /// Speed of [`Leaning::drag_speed_mps`] for the cleanest airframe known (AirSim's generic quad is at
 /// 39 m/s): an upper bound where the drag is unknown.
 const CLEANEST_MPS: f64 = 40.0;
-/// Share of a correction that may be wrong: drag factors of the sides differ by 8 %, and a lean also
-/// has parts (trim, sensor errors) that are not the wind's.
+/// Share of a correction that may be wrong: drag factors of AirSim's sides differ by 8 %, and a lean also
+/// has parts (trim, sensor errors) that are not the wind's (docs/physics.md, 2.6). Chosen at twice the 8 %.
 const DOUBTED_SHARE: f64 = 0.15;
-/// Steepest lean that is taken for wind, degrees.
+/// Steepest lean that is taken for wind, degrees. Convention: beyond it nothing hovers.
 const STEEPEST_DEG: f64 = 45.0;
-/// Samples of a pulse are not joined over longer silences than this, s.
+/// Samples of a pulse are not joined over longer silences than this, s. Chosen.
 const GAP_S: f64 = 1.0;
 
 /// How a vehicle leans in wind, and how its pulse depends on thrust.

@@ -92,11 +92,12 @@ pub struct Target {
     pub commanded_mps: f64,
 }
 
-/// Last part of a leg that is used, s.
+/// Last part of a leg that is used, s: the paper's.
 const LEG_USED_S: f64 = 10.0;
-/// Cut at the end of every window, s.
+/// Cut at the end of every window, s: the paper's.
 const END_CUT_S: f64 = 1.0;
-/// Cut at the start of a hover (and the least cut at the start of a leg), s.
+/// Cut at the start of a hover (and the least cut at the start of a leg), s: the overshoot after 3.5 m/s
+/// lasts 2 to 3 s (docs/physics.md, 5.1). The paper does not say.
 const START_CUT_S: f64 = 3.0;
 /// Shortest constant command that is a leg or hover, s.
 const SHORTEST_RUN_S: f64 = 8.0;
@@ -104,9 +105,9 @@ const SHORTEST_RUN_S: f64 = 8.0;
 const SHORTEST_STEADY_S: f64 = 4.0;
 /// Longest time that a vehicle takes from one steady command to the next, s.
 const LONGEST_TRANSITION_S: f64 = 5.0;
-/// Legs shorter than this share of the longest one are transfers, not rungs.
+/// Legs shorter than this share of the longest one are transfers, not rungs. Chosen.
 const TRANSFER_SHARE: f64 = 0.6;
-/// Wobble of a constant command, m/s (firmware adds its own corrections in some messages).
+/// Wobble of a constant command, m/s (firmware adds its own corrections in some messages). Chosen.
 const STEADY_MPS: f64 = 0.03;
 /// A command below this is a hover, m/s.
 const HOVER_MPS: f64 = 0.05;
@@ -114,9 +115,10 @@ const HOVER_MPS: f64 = 0.05;
 const GAP_S: f64 = 1.0;
 /// A silence longer than this breaks a run of commands (some logs have them once a second), s.
 const RUN_GAP_S: f64 = 1.5;
-/// Fewest samples in a usable window.
+/// Fewest samples in a usable window: half a second of a log at 10 Hz. Chosen.
 const FEWEST_SAMPLES: usize = 5;
-/// A commanded velocity further than this from the plan's is another plan's, m/s.
+/// A commanded velocity further than this from the plan's belongs to another plan, m/s. Chosen: below the
+/// 0.5 m/s between rungs.
 const WRONG_MPS: f64 = 0.3;
 /// Fewest legs from which a constant time offset is told.
 const OFFSET_LEGS: usize = 3;

@@ -24,14 +24,15 @@ use super::result::CalibrationAir;
 use super::shape::{PARAMETERS, Shape};
 use super::split::{Parts, Point, Split, noise_us, rough_sensitivity, rough_slope};
 
-/// Time scales of the air that are tried, s.
+/// Time scales of the air that are tried, s: from windows to beyond the flight (docs/errors.md). A grid.
 const TAUS_S: [f64; 7] = [8.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0];
-/// White scatter that is tried, us.
+/// White scatter that is tried, us. A grid.
 const WHITES_US: [f64; 5] = [0.1, 0.3, 1.0, 3.0, 8.0];
 
-/// Prior standard deviation of the bend `V²`, us/(m/s)²: rotors have +0.5 to +1.5.
+/// Prior standard deviation of the bend `V²`, us/(m/s)²: rotors have +0.5 to +1.5 (docs/physics.md, 2.3).
 const BEND_SD: f64 = 1.5;
-/// Prior standard deviation of the bend `V|V|` (drag), us/(m/s)².
+/// Prior standard deviation of the bend `V|V|` (drag), us/(m/s)²: bodies have 1.0 to 1.5 (docs/physics.md,
+/// 2.4: 12 to 18 us at 3.5 m/s).
 const DRAG_SD: f64 = 1.5;
 
 /// The law of one drone.

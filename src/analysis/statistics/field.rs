@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use super::result::FieldRecord;
 
-/// Shorter records say nothing about correlations, s.
+/// Shorter records say nothing about correlations, s: a few of the shortest time scales. Chosen.
 pub(super) const SHORTEST_S: usize = 60;
 /// Fewer drones than this have no statistics in space.
 pub(super) const FEWEST_DRONES: usize = 3;
@@ -14,7 +14,7 @@ pub(super) const FEWEST_DRONES: usize = 3;
 const MOST_DRONES: usize = 144;
 /// Longer records are cut: two hours.
 const LONGEST_S: usize = 7200;
-/// A drone with a smaller share of the record's seconds than this is left out.
+/// A drone with a smaller share of the record's seconds than this is left out. Chosen.
 const LEAST_SHARE: f64 = 0.5;
 /// A drone whose values differ by less than this is a constant, m/s.
 const CONSTANT_MPS: f64 = 1e-6;

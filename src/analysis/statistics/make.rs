@@ -17,7 +17,7 @@ use super::time::autocorrelation;
 use super::words;
 use crate::base::rng::{Purpose, stream};
 
-/// An interval needs this share of the simulated flights to have given an estimate.
+/// An interval needs this share of the simulated flights to have given an estimate. Chosen.
 const FEWEST_SHARE: f64 = 0.8;
 
 /// Choices of the statistics.

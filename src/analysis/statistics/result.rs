@@ -148,9 +148,9 @@ pub enum Undetermined {
     Unknown,
 }
 
-/// An interval over more than this factor determines nothing.
+/// An interval over more than this factor determines nothing. Chosen.
 const WIDEST: f64 = 100.0;
-/// A lower end this close below the estimate bounds it.
+/// A lower end this close below the estimate bounds it, as a factor. Chosen.
 const BOUNDED: f64 = 10.0;
 
 impl Scale {

@@ -5,9 +5,9 @@ use super::words::digits;
 use crate::analysis::lean_table::LeanTable;
 use crate::base::estimate::Estimate;
 
-/// A lean that is no wind: trim of the accelerometers, a centre of mass off the middle, degrees.
+/// A lean that is no wind: trim of the accelerometers, a centre of mass off the middle, degrees. Chosen.
 const TRIM_DEG: f64 = 0.2;
-/// Steepest lean that is taken for wind: its tangent.
+/// Steepest lean that is taken for wind: its tangent. Convention.
 const STEEPEST: f64 = 2.0;
 
 /// How one drone leans on average.

@@ -3,11 +3,12 @@
 use super::likelihood::Fitted;
 use super::result::{DistanceCorrelation, FieldRecord, FieldStatistics, Scale};
 
-/// A half record whose t0 is below this share of the whole's says that the length makes t0.
+/// A half record whose t0 is below this share of the whole's shows that the length makes t0
+/// (docs/physics.md, 5.5): a trend gives 0.5, air 1. Chosen between.
 const HALVES: f64 = 0.65;
-/// Above this share the length does not matter.
+/// Above this share the length does not matter. Chosen.
 const STAYS: f64 = 0.85;
-/// p-values below this are called significant.
+/// p-values below this are called significant. Convention.
 const SIGNIFICANT: f64 = 0.05;
 
 /// What the simulated flights are.
