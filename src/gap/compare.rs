@@ -146,8 +146,8 @@ impl Comparison {
         Ok(Self { data, side, scene, wind: blown, closure_us, felt: Vec::new(), amsl_m, vehicle })
     }
 
-    /// The same with a response to vertical air speed by group and bin that no effect of the
-    /// vehicle has.
+    /// This comparison with an additional response to vertical air speed, by group and bin, that no effect
+    /// of the vehicle has.
     #[must_use]
     pub(super) fn feeling(self, felt: &[Vec<Response>]) -> Self {
         Self { felt: felt.to_vec(), ..self }

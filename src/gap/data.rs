@@ -182,7 +182,7 @@ impl Data {
         data
     }
 
-    /// The same bins of other logs, averaged: an external simulation. `None`: it lacks the bin.
+    /// These bins in the logs of an external simulation, averaged over its drones. `None`: it lacks the bin.
     pub fn averaged(
         &self,
         flown: &[Flown<'_>],

@@ -200,7 +200,7 @@ fn span(values: &[Vec<f64>]) -> f64 {
 }
 
 impl Generic {
-    /// The same of a signal that vertical air moves: what the shape does to the response.
+    /// The family with what each regressor adds to the response, for a signal that vertical air changes.
     fn feels(self) -> Self {
         let (low, high) = (least(&self.along), most(&self.along));
         let scale = 2.0 / (high - low);

@@ -12,7 +12,7 @@ pub(super) type Pulses = Vec<Vec<Vec<f64>>>;
 /// A regressor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Column {
-    /// The same for all drones of a group: by group and bin.
+    /// One series for all drones of a group: by group and bin.
     Shared(Vec<Vec<f64>>),
     /// Each drone has its own: by group, drone and bin.
     Own(Pulses),
@@ -220,7 +220,7 @@ impl<'a> Problem<'a> {
         Self { groups, pulses, columns: vec![Split::of_column(&Column::Shared(ones))] }
     }
 
-    /// The same with other patterns of the groups.
+    /// This problem with other patterns of the groups.
     pub(super) fn among<'b>(&self, groups: &'b [GroupPattern]) -> Problem<'b>
     where
         'a: 'b,

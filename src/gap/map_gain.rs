@@ -121,7 +121,7 @@ impl Zero {
     }
 }
 
-/// The same about another mean.
+/// Offsets of drones shifted to another mean, us.
 fn about(mean_us: f64, offsets_us: &BTreeMap<u16, f64>) -> BTreeMap<u16, f64> {
     let was_us = offsets_us.values().sum::<f64>() / offsets_us.len().max(1) as f64;
     offsets_us.iter().map(|(slot, offset_us)| (*slot, offset_us - was_us + mean_us)).collect()

@@ -82,7 +82,7 @@ impl Default for Hyper {
 }
 
 impl Hyper {
-    /// One parameter.
+    /// One parameter, in its own unit (the logarithm is undone).
     pub fn get(&self, place: usize) -> f64 {
         self.0[place].exp()
     }
@@ -106,7 +106,7 @@ impl Hyper {
 /// One command group as the noise needs it.
 #[derive(Clone, Debug, Default)]
 pub struct GroupPattern {
-    /// Drones in it.
+    /// Number of drones.
     pub drones: usize,
     /// Middle of each bin, s.
     pub time_s: Vec<f64>,
@@ -164,7 +164,7 @@ impl GroupPattern {
         self.response.iter().map(|response| response.over(gusts_mps).abs() + least).collect()
     }
 
-    /// The same to what a drone does not share with the others.
+    /// Response in each bin to what a drone does not share with the others, in this noise, us/(m/s).
     pub fn own_responses(&self, hyper: &Hyper) -> Vec<f64> {
         if self.shift_mps.is_empty() {
             return self.responses(hyper);

@@ -25,12 +25,12 @@ impl Response {
         Self(std::array::from_fn(|index| (at[index + 2] - at[index]) / (2.0 * STEP_MPS)))
     }
 
-    /// The same at any speed: of a line.
+    /// Response of a straight law: one slope at any speed, us/(m/s).
     pub(super) fn straight(slope: f64) -> Self {
         Self([slope; COUNT])
     }
 
-    /// At a shifted speed, m/s.
+    /// Response at a speed shifted by `shift_mps`, us/(m/s); held beyond the last step.
     pub(super) fn at(&self, shift_mps: f64) -> f64 {
         let place = (shift_mps / STEP_MPS + STEPS as f64).clamp(0.0, (COUNT - 1) as f64);
         let low = (place.floor() as usize).min(COUNT - 2);
@@ -38,12 +38,13 @@ impl Response {
         self.0[low] + share * (self.0[low + 1] - self.0[low])
     }
 
-    /// Over gusts of a strength, m/s: a curve that is flat in hover does answer gusts there.
+    /// Mean response over gusts of a standard deviation (m/s), us/(m/s): a curve that is flat in hover does
+    /// respond to gusts there.
     pub(super) fn over(&self, gusts_mps: f64) -> f64 {
         self.around(0.0, gusts_mps)
     }
 
-    /// The same around a shifted speed, m/s.
+    /// Mean response over gusts around a shifted speed, us/(m/s).
     pub(super) fn around(&self, shift_mps: f64, gusts_mps: f64) -> f64 {
         // Two points of this distance and half of the weight have the variance of the gusts.
         let apart_mps = std::f64::consts::SQRT_2 * gusts_mps.min(MOST_GUSTS_MPS);
@@ -51,7 +52,7 @@ impl Response {
         0.5 * self.at(shift_mps) + 0.25 * sides
     }
 
-    /// With a multiple of another.
+    /// This response plus a multiple of another.
     #[must_use]
     pub(super) fn plus(mut self, times: f64, other: &Self) -> Self {
         self.0.iter_mut().zip(other.0).for_each(|(own, other)| *own += times * other);
@@ -71,7 +72,7 @@ pub(super) fn add(sum: &mut [Vec<Response>], times: f64, other: &[Vec<Response>]
     }
 }
 
-/// The same of one group.
+/// Adds a multiple of responses to others, by bin of one group.
 pub(super) fn add_to(sum: &mut [Response], times: f64, other: &[Response]) {
     sum.iter_mut().zip(other).for_each(|(own, other)| *own = own.plus(times, other));
 }

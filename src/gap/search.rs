@@ -31,9 +31,9 @@ pub(super) struct Ranked {
     pub gain: f64,
     /// Coefficient on the form.
     pub beta: f64,
-    /// What it does to the pulse: standard deviation over bins, us.
+    /// Standard deviation over bins of what it does to the pulse, us.
     pub size_us: f64,
-    /// The same: largest less smallest, us.
+    /// Largest minus smallest of what it does to the pulse, us.
     pub range_us: f64,
     /// Noise with it in the model.
     pub hyper: Hyper,
@@ -48,13 +48,13 @@ pub(super) struct RankedGeneric {
     pub generic: usize,
     /// Gain less its penalty, nats.
     pub gain: f64,
-    /// The same as a regressor alone: without what it does to the scatter between drones.
+    /// Gain as a regressor alone, without what it does to the scatter between drones, nats.
     pub plain: f64,
     /// Coefficients.
     pub beta: Vec<f64>,
-    /// Standard deviation over bins, us.
+    /// Standard deviation over bins of what it does to the pulse, us.
     pub size_us: f64,
-    /// The same: largest less smallest, us.
+    /// Largest minus smallest of what it does to the pulse, us.
     pub range_us: f64,
     /// Noise with it in the model.
     pub hyper: Hyper,
