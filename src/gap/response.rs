@@ -60,7 +60,7 @@ impl Response {
     }
 }
 
-/// Stronger gusts are not reckoned with, m/s: what a model lacks looks like gusts, and with gusts strong
+/// Stronger gusts are not considered, m/s: what a model lacks looks like gusts, and with gusts strong
 /// enough any curve would look like what it lacks. About what the benchmark's strongest air has in all;
 /// chosen.
 const MOST_GUSTS_MPS: f64 = 0.5;

@@ -91,7 +91,7 @@ const FAST_STEP_MPS: f64 = 6.5;
 const LEAST_CHARGE: f64 = 0.62;
 /// Mass of the payload, kg: a tenth of a show drone, 28.6 us (docs/physics.md, 4.3).
 pub(crate) const PAYLOAD_KG: f64 = 0.04;
-/// Every which drone carries it: ten of 42 determine the sensitivity to 5 %.
+/// One drone in this many carries it: ten of 42 determine the sensitivity to 5 %.
 pub(crate) const PAYLOAD_EVERY: usize = 4;
 
 impl Elements {
