@@ -1,14 +1,6 @@
 //! Effects that no algorithm can split with the paper's protocol, fixed in advance.
 
-/// Classes of effects that cannot be told apart; an effect may be in several. Shared drift of the
-/// air belongs to the first, but is never named: the noise model explains it.
-pub const CLASSES: &[&[&str]] = &[
-    &["battery", "motor-thermal"],
-    &["translational-lift", "tilt-formula", "blade-flapping"],
-    &["parasitic-drag", "thrust-curve"],
-    &["vortex-ring", "parasitic-drag", "thrust-curve"],
-    &["mass-spread", "thrust-spread"],
-];
+use super::tables::CLASSES;
 
 /// Whether two effects are equal or in one class.
 pub fn equivalent(left: &str, right: &str) -> bool {
@@ -23,13 +15,6 @@ pub fn is_single(effect: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_member_is_in_the_library() {
-        for effect in CLASSES.iter().copied().flatten() {
-            assert!(crate::effects::find(effect).is_some(), "{effect}");
-        }
-    }
 
     #[test]
     fn classes_overlap_without_being_one() {

@@ -41,12 +41,12 @@ where
 /// is the true one.
 pub fn there<'a>(truth: &'a Scenario, vehicle: &Vehicle) -> Vec<There<'a>> {
     let foreign = |hidden: &Hidden| -> Option<SteadyPulse<'a>> {
-        let effect = foreign::find(&hidden.effect)?;
+        let found = foreign::find(&hidden.effect)?;
         let of = |name: &str| hidden.parameters.get(name).copied();
-        let values = foreign::values(effect.definition(), of);
+        let values = foreign::values(found.effect.definition(), of);
         let at = Reference::of(vehicle);
         Some(Box::new(move |signals, heading_rad| {
-            foreign::steady_us(effect, &values, &at, signals, heading_rad)
+            found.steady_us(&values, &at, signals, heading_rad)
         }))
     };
     let one = |hidden: &'a Hidden| match foreign(hidden).filter(|_| hidden.foreign) {

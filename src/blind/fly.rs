@@ -168,7 +168,7 @@ pub fn extra(scenario: &Scenario) -> Vec<Extra> {
     let hidden = scenario.hidden.iter().filter(|hidden| hidden.foreign);
     hidden
         .filter_map(|hidden| {
-            let effect = foreign::find(&hidden.effect)?;
+            let effect = foreign::find(&hidden.effect)?.effect;
             let of = |name: &str| hidden.parameters.get(name).copied();
             Some((effect, foreign::values(effect.definition(), of)))
         })

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::error::BlindError;
 use super::scenario::{Base, Protocol};
-use super::vehicles::set;
+pub use super::tables::KINDS;
 use crate::base::rng::{Purpose, stream};
-use crate::effects::select::{value_of, values_of};
-use crate::effects::{Reference, Signals, find};
+use crate::effects::select::{set, value_of, values_of};
+use crate::effects::{Reference, Role, Signals, find};
 use crate::vehicle::Vehicle;
 
 /// One hidden effect, as the true vehicle has it.
@@ -57,85 +57,51 @@ pub struct Kind {
     pub range: (f64, f64),
     /// Unit of [`Kind::range`], for people.
     pub unit: &'static str,
+    /// How the value of the parameter follows from the magnitude.
+    pub magnitude: Magnitude,
+    /// Further parameters that are stated, in the order in which they are drawn.
+    pub also: &'static [(&'static str, Also)],
     /// Bases from which the effect can be hidden.
     pub bases: &'static [Base],
 }
 
-const ANY: &[Base] = &[Base::Airsim, Base::Inflow, Base::Pixel];
-/// In AirSim a hovering drone does not feel a sink of some cm/s.
-const WITH_INFLOW: &[Base] = &[Base::Inflow, Base::Pixel];
-const WITHOUT_INFLOW: &[Base] = &[Base::Airsim];
-
-const fn kind(
-    name: &'static str,
-    effect: &'static str,
-    size: &'static str,
-    range: (f64, f64),
-    unit: &'static str,
-    bases: &'static [Base],
-) -> Kind {
-    Kind { name, effect, foreign: false, size, range, unit, bases }
+/// How a parameter's value follows from a magnitude.
+#[derive(Clone, Copy, Debug)]
+pub enum Magnitude {
+    /// It is the magnitude.
+    Value,
+    /// It is the magnitude, of either sign.
+    EitherSign,
+    /// It is the magnitude, negative with this probability.
+    Negative(f64),
+    /// The magnitude is the slope of the pulse by climb at hover, us/(m/s).
+    HoverSlope,
+    /// The magnitude is the thrust gained in this horizontal air, m/s, as a share of the hover thrust.
+    GainIn(f64),
+    /// The magnitude is the thrust lost at this climb, m/s, as a share of the hover thrust.
+    LossAt(f64),
+    /// The magnitude is a share of the drag that the known vehicle has; its sides grow with it.
+    KnownDrag,
+    /// The magnitude is in radii of the rotor.
+    RotorRadii,
 }
 
-const fn foreign(
-    name: &'static str,
-    size: &'static str,
-    range: (f64, f64),
-    unit: &'static str,
-) -> Kind {
-    Kind { name, effect: name, foreign: true, size, range, unit, bases: ANY }
+/// What another parameter of a hidden effect is.
+#[derive(Clone, Copy, Debug)]
+pub enum Also {
+    /// Always this.
+    Is(f64),
+    /// Uniform between two numbers.
+    Between(f64, f64),
+    /// Log-uniform between two positive numbers.
+    LogBetween(f64, f64),
+    /// Width of the array, m.
+    ArrayWidth,
+    /// Length of the flight, s.
+    FlightTime,
+    /// An instant, s: uniform between two shares of the flight.
+    FlightShare(f64, f64),
 }
-
-/// Effects that can be hidden, with ranges from the literature and from the field.
-pub const KINDS: &[Kind] = &[
-    kind(
-        "rotor-inflow",
-        "rotor-inflow",
-        "inflow_share",
-        (8.0, 30.0),
-        "us/(m/s) at hover",
-        WITHOUT_INFLOW,
-    ),
-    kind("parasitic-drag", "parasitic-drag", "vertical_m2", (0.3, 1.0), "of the known drag", ANY),
-    kind("battery", "battery", "exponent", (0.5, 1.0), "share of the sag that acts", ANY),
-    kind(
-        "translational-lift",
-        "translational-lift",
-        "inflow_share",
-        (0.01, 0.1),
-        "of the thrust at 5 m/s",
-        ANY,
-    ),
-    kind(
-        "vortex-ring",
-        "vortex-ring",
-        "inflow_share",
-        (0.03, 0.12),
-        "of the thrust at -3.5 m/s",
-        ANY,
-    ),
-    kind("thrust-curve", "thrust-curve", "expo", (0.3, 0.7), "expo", ANY),
-    kind("motor-thermal", "motor-thermal", "drift_us", (6.0, 20.0), "us, of either sign", ANY),
-    kind("ground-effect", "ground-effect", "radius_m", (1.0, 2.0), "of the rotor's radius", ANY),
-    kind(
-        "neighbour-downwash",
-        "neighbour-downwash",
-        "strength",
-        (1.0, 4.0),
-        "of the momentum disc's sink",
-        WITH_INFLOW,
-    ),
-    kind("blade-flapping", "blade-flapping", "drag_per_weight", (0.0175, 0.035), "s/m", ANY),
-    kind("mass-spread", "mass-spread", "sd", (0.03, 0.06), "relative", ANY),
-    kind("thrust-spread", "thrust-spread", "sd", (0.03, 0.06), "relative", ANY),
-    kind("velocity-bias", "velocity-error", "bias_mps", (0.06, 0.3), "m/s, of either sign", ANY),
-    // From about 0.44 s on AirSim's quad swings up and down to its motors' limits: nobody flies a show so.
-    kind("velocity-lag", "velocity-error", "lag_s", (0.12, 0.4), "s", ANY),
-    foreign("step", "jump_us", (8.0, 30.0), "us, of either sign"),
-    foreign("height-wave", "amplitude_us", (6.0, 20.0), "us"),
-    foreign("climb-time", "slope_us", (5.0, 15.0), "us/(m/s) at the end"),
-    foreign("heading", "amplitude_us", (8.0, 25.0), "us, of either sign"),
-];
 
 /// Finds an effect that can be hidden by its name for `--effects`.
 ///
@@ -167,11 +133,6 @@ pub(super) fn log_between(rng: &mut Pcg64, (low, high): (f64, f64)) -> f64 {
 const MOST_SHARE: f64 = 0.8;
 /// Smallest share of the inflow that is drawn.
 const LEAST_SHARE: f64 = 0.005;
-/// Speed at which translational lift is stated, m/s.
-const LIFT_MPS: f64 = 5.0;
-/// Climb at which the vortex ring is stated, m/s.
-const RING_MPS: f64 = -3.5;
-
 impl Kind {
     /// Draws the size of the effect and its other parameters.
     ///
@@ -196,84 +157,61 @@ impl Kind {
         let sign = if unit(rng) < 0.5 { -1.0 } else { 1.0 };
         let flight_s = protocol.length_s();
         let mut parameters = BTreeMap::new();
-        let mut also = |name: &str, value: f64| {
-            parameters.insert(name.to_owned(), value);
-        };
-        let value = match self.name {
-            "rotor-inflow" => {
-                also("spread", between(rng, super::scenario::INFLOW_SPREAD));
+        for (name, also) in self.also {
+            let value = match *also {
+                Also::Is(value) => value,
+                Also::Between(low, high) => between(rng, (low, high)),
+                Also::LogBetween(low, high) => log_between(rng, (low, high)),
+                Also::ArrayWidth => width_m,
+                Also::FlightTime => flight_s,
+                Also::FlightShare(low, high) => flight_s * between(rng, (low, high)),
+            };
+            parameters.insert((*name).to_owned(), value);
+        }
+        let per_thrust = Reference::of(&known).sensitivity_us();
+        let pulse = |size: f64, at: &Signals| self.pulse_us(&known, size, at);
+        let value = match self.magnitude {
+            Magnitude::Value => magnitude,
+            Magnitude::EitherSign => sign * magnitude,
+            Magnitude::Negative(chance) => {
+                if unit(rng) < chance {
+                    -magnitude
+                } else {
+                    magnitude
+                }
+            }
+            Magnitude::HoverSlope => {
                 let slope = |share| {
                     let at = |climb_mps| Signals { climb_mps, ..Signals::default() };
-                    let pulse = |climb| pulse_us(&known, self.effect, share, &at(climb));
-                    Ok((pulse(1.0)? - pulse(-1.0)?) / 2.0)
+                    Ok((pulse(share, &at(1.0))? - pulse(share, &at(-1.0))?) / 2.0)
                 };
                 share_for(self.range, &mut magnitude, slope)?
             }
-            "translational-lift" => {
-                let at = Signals { horizontal_mps: LIFT_MPS, ..Signals::default() };
-                let per_thrust = Reference::of(&known).sensitivity_us();
-                let saved = |share| Ok(-pulse_us(&known, self.effect, share, &at)? / per_thrust);
-                share_for(self.range, &mut magnitude, saved)?
+            Magnitude::GainIn(horizontal_mps) => {
+                let at = Signals { horizontal_mps, ..Signals::default() };
+                share_for(self.range, &mut magnitude, |share| Ok(-pulse(share, &at)? / per_thrust))?
             }
-            "vortex-ring" => {
-                let at = Signals { climb_mps: RING_MPS, ..Signals::default() };
-                let per_thrust = Reference::of(&known).sensitivity_us();
-                let lost = |share| Ok(pulse_us(&known, self.effect, share, &at)? / per_thrust);
-                share_for(self.range, &mut magnitude, lost)?
+            Magnitude::LossAt(climb_mps) => {
+                let at = Signals { climb_mps, ..Signals::default() };
+                share_for(self.range, &mut magnitude, |share| Ok(pulse(share, &at)? / per_thrust))?
             }
-            "parasitic-drag" => {
-                let had = |parameter| value_of(&known, "parasitic-drag", parameter);
-                if let Some(vertical_m2) = had("vertical_m2") {
-                    let side_m2 = had("horizontal_m2").unwrap_or_default();
-                    also("horizontal_m2", side_m2 * (1.0 + magnitude));
-                    vertical_m2 * (1.0 + magnitude)
-                } else {
+            Magnitude::KnownDrag => {
+                let [top_m2, side_m2] = match Role::BodyDragTop.value(&known) {
+                    Some(top_m2) => {
+                        let side_m2 = Role::BodyDragSide.value(&known).unwrap_or_default();
+                        [top_m2 * (1.0 + magnitude), side_m2 * (1.0 + magnitude)]
+                    }
                     // AirSim's law has its drag in the airframe.
-                    let [vertical_m2, side_m2] = airsim_drag_m2(&known);
-                    also("horizontal_m2", side_m2 * magnitude);
-                    vertical_m2 * magnitude
+                    None => airsim_drag_m2(&known).map(|drag_m2| drag_m2 * magnitude),
+                };
+                if let Some(side) = Role::BodyDragSide.place() {
+                    parameters.insert(side.parameter.name.to_owned(), side_m2);
                 }
+                top_m2
             }
-            "motor-thermal" => {
-                also("time_s", log_between(rng, (60.0, 200.0)));
-                // Warm magnets usually win over warm windings.
-                if unit(rng) < 0.7 { -magnitude } else { magnitude }
-            }
-            "ground-effect" => known.airframe.rotor_diameter_m / 2.0 * magnitude,
-            "neighbour-downwash" => {
-                also("array_m", width_m);
-                magnitude
-            }
-            "velocity-bias" => {
-                also("lag_s", 0.0);
-                also("sd_mps", 0.0);
-                sign * magnitude
-            }
-            "velocity-lag" => {
-                also("bias_mps", 0.0);
-                also("sd_mps", 0.0);
-                magnitude
-            }
-            "step" => {
-                also("at_s", flight_s * between(rng, (0.3, 0.7)));
-                sign * magnitude
-            }
-            "height-wave" => {
-                also("wavelength_m", log_between(rng, (25.0, 60.0)));
-                also("phase_rad", between(rng, (0.0, std::f64::consts::TAU)));
-                magnitude
-            }
-            "climb-time" => {
-                also("time_s", flight_s);
-                magnitude
-            }
-            "heading" => {
-                also("knee_mps", 1.0);
-                sign * magnitude
-            }
-            _ => magnitude,
+            Magnitude::RotorRadii => known.airframe.rotor_diameter_m / 2.0 * magnitude,
         };
-        also(self.size, value);
+        parameters.insert(self.size.to_owned(), value);
         let hidden = Hidden {
             kind: self.name.to_owned(),
             effect: self.effect.to_owned(),
@@ -285,19 +223,14 @@ impl Kind {
         };
         Ok(hidden)
     }
-}
 
-/// Pulse of an effect of the library with this share of inflow, us.
-fn pulse_us(
-    known: &Vehicle,
-    effect: &str,
-    share: f64,
-    signals: &Signals,
-) -> Result<f64, BlindError> {
-    let mut vehicle = known.clone();
-    set(&mut vehicle, effect, "inflow_share", share);
-    let Some(found) = find(effect) else { return Ok(0.0) };
-    Ok(found.pulse_us(&Reference::of(known), &values_of(found, &vehicle)?, signals))
+    /// Pulse of the effect on a vehicle when its size is this, us.
+    fn pulse_us(&self, known: &Vehicle, size: f64, at: &Signals) -> Result<f64, BlindError> {
+        let mut vehicle = known.clone();
+        set(&mut vehicle, self.effect, self.size, size);
+        let Some(found) = find(self.effect) else { return Ok(0.0) };
+        Ok(found.pulse_us(&Reference::of(known), &values_of(found, &vehicle)?, at))
+    }
 }
 
 /// The share of inflow that has this magnitude. A magnitude that no share of a rotor has is drawn

@@ -4,6 +4,7 @@ use super::interval::{clopper_pearson, median};
 use super::scenario::{AirClass, Base, Protocol};
 use super::score::{Called, HiddenOutcome, Outcome};
 use super::table::{Demand, Metric};
+use crate::effects::Role;
 
 /// Whether it is named, alone or in its class.
 pub(super) fn is_named(hidden: &HiddenOutcome) -> bool {
@@ -53,7 +54,7 @@ pub(super) fn metrics(outcomes: &[&Outcome]) -> Vec<Metric> {
                 && one.hidden.len() == 1
                 && one.hidden.iter().all(|hidden| {
                     let (low, high) = PAPER_INFLOW_US;
-                    hidden.kind == "rotor-inflow"
+                    Role::InflowShare.is_of(&hidden.effect)
                         && (low..high).contains(&(AIRSIM_US_PER_SHARE * hidden.value))
                 })
         })

@@ -25,6 +25,7 @@ pub mod score;
 pub mod seal;
 pub mod series;
 pub mod table;
+pub mod tables;
 pub mod told;
 pub mod vehicles;
 

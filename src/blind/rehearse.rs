@@ -8,7 +8,10 @@ use super::air::AirScales;
 use super::error::BlindError;
 use super::explain::Explain;
 use super::fly::{Flown, Setting, fly_into};
-use super::vehicles::{KNOWN_THRUST_SPREAD, hover_a, set};
+use super::scenario::BatteryTruth;
+use super::vehicles::{KNOWN_THRUST_SPREAD, hover_a, report_battery};
+use crate::effects::Role;
+use crate::effects::select::set;
 use crate::gap::Verdict;
 use crate::gap::next::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
 use crate::gap::next::known::charge_of;
@@ -144,30 +147,21 @@ fn drone(rehearsal: &Rehearsal<'_>, answer: &Answer, slot: u16) -> Vehicle {
     let plan = &rehearsal.flight.plan;
     let place = plan.slots.iter().position(|one| one.slot == slot).unwrap_or(0);
     let mut vehicle = answer.without.clone();
-    if !vehicle.effects.contains_key("thrust-spread") {
-        set(&mut vehicle, "thrust-spread", "sd", KNOWN_THRUST_SPREAD);
+    let spread = Role::ThrustSpread;
+    if !vehicle.effects.keys().any(|name| spread.is_of(name)) {
+        spread.set(&mut vehicle, KNOWN_THRUST_SPREAD);
     }
     let charge = if rehearsal.elements.charge {
         charge_of(place, plan.slots.len(), lowest_charge(plan))
     } else {
         1.0
     };
-    if vehicle.effects.get("battery").is_some_and(|table| table.on) {
-        set(&mut vehicle, "battery", "initial_charge", charge);
+    if Role::BatteryCharge.is_on(&vehicle) {
+        Role::BatteryCharge.set(&mut vehicle, charge);
     } else {
         let capacity_ah = hover_a(&vehicle, CELLS) * plan.limits.endurance_s / 3600.0;
-        let reported = [
-            ("cells", CELLS),
-            ("capacity_ah", capacity_ah),
-            ("resistance_ohm", RESISTANCE_OHM),
-            ("initial_charge", charge),
-            ("compensated", 0.0),
-            // It is reported and does not act, unless it is the answer.
-            ("exponent", 0.0),
-        ];
-        for (name, value) in reported {
-            set(&mut vehicle, "battery", name, value);
-        }
+        let battery = BatteryTruth { cells: CELLS, capacity_ah, resistance_ohm: RESISTANCE_OHM };
+        report_battery(&mut vehicle, &battery, charge);
     }
     if rehearsal.elements.payload && place.is_multiple_of(PAYLOAD_EVERY) {
         vehicle.airframe.mass_kg += PAYLOAD_KG;

@@ -11,6 +11,7 @@ use super::error::BlindError;
 use super::hide::{Hidden, KINDS, between, kind_of, log_between, unit};
 use super::vehicles::hover_a;
 use crate::base::rng::{Purpose, stream};
+use crate::effects::Role;
 
 /// Name and version of the format of a sealed truth.
 pub const SCENARIO_SCHEMA: &str = "updraft.blind-truth/1";
@@ -242,7 +243,7 @@ impl Scenario {
     /// True value of the parameter that states the size of a hidden effect, averaged over the
     /// fleet: a drone whose motors were warm at take-off drifts no more.
     pub fn fleet_value(&self, hidden: &Hidden) -> f64 {
-        if hidden.effect != "motor-thermal" {
+        if !Role::WarmUpTime.is_of(&hidden.effect) {
             return hidden.value();
         }
         let warm = self.nuisance.warm.len() as f64 / f64::from(self.slots().max(1));

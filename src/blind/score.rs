@@ -7,11 +7,9 @@ use super::classes::{equivalent, is_single};
 use super::foreign;
 use super::hide::Hidden;
 use super::scenario::{Cell, Scenario};
+use crate::effects::{Effect, Role, find};
 use crate::gap::Verdict;
 use crate::gap::verdict::{Finding, Fitted, Interval};
-
-/// The effect of the sensor channel, which is named without any look at the pulse.
-const SENSOR: &str = "velocity-error";
 
 /// A gap that grows by less is the same: a bias of the velocity shifts a straight response as a whole, and
 /// its repair leaves the gap as it was but for rounding.
@@ -121,8 +119,9 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
         excess_shrink: None,
         made_worse: false,
     };
-    if verdict.sensor.named {
-        outcome.note_name(truth, SENSOR);
+    // The sensor channel is named without any look at the pulse.
+    if let Some(sensor) = Role::SensorBias.place().filter(|_| verdict.sensor.named) {
+        outcome.note_name(truth, sensor.name());
     }
     for step in &verdict.steps {
         match &step.finding {
@@ -173,7 +172,8 @@ fn library(truth: &Scenario) -> impl Iterator<Item = &Hidden> {
 
 /// Whether a hidden effect is off-library and does depend on this.
 fn accepts(hidden: &Hidden, depends_on: &str) -> bool {
-    hidden.foreign && foreign::depends_on(&hidden.effect).contains(&depends_on)
+    let foreign = foreign::find(&hidden.effect).filter(|_| hidden.foreign);
+    foreign.is_some_and(|foreign| foreign.depends_on.contains(&depends_on))
 }
 
 fn compare(hidden: &Hidden, value: f64, verdict: &Verdict, z: Option<f64>) -> HiddenOutcome {
@@ -201,7 +201,7 @@ fn compare(hidden: &Hidden, value: f64, verdict: &Verdict, z: Option<f64>) -> Hi
 
 fn called(hidden: &Hidden, verdict: &Verdict) -> Called {
     let mut best = Called::Silent;
-    if !hidden.foreign && verdict.sensor.named && hidden.effect == SENSOR {
+    if !hidden.foreign && verdict.sensor.named && Role::SensorBias.is_of(&hidden.effect) {
         return Called::Named;
     }
     for step in &verdict.steps {
@@ -228,12 +228,13 @@ fn fitted(hidden: &Hidden, verdict: &Verdict) -> Option<Interval> {
     if hidden.foreign {
         return None;
     }
-    let sensor = match hidden.size.as_str() {
-        "bias_mps" => verdict.sensor.bias_mps,
-        "lag_s" => verdict.sensor.lag_s,
+    let parameter = |effect: &dyn Effect| effect.definition().parameter(&hidden.size);
+    let sensor = match find(&hidden.effect).and_then(parameter)?.role {
+        Some(Role::SensorBias) => verdict.sensor.bias_mps,
+        Some(Role::SensorLag) => verdict.sensor.lag_s,
         _ => None,
     };
-    if hidden.effect == SENSOR && verdict.sensor.named && sensor.is_some() {
+    if verdict.sensor.named && sensor.is_some() {
         return sensor;
     }
     let of = |parameters: &[Fitted]| {

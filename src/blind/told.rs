@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::play::Played;
 use super::score::{Called, HiddenOutcome, Outcome};
+use crate::effects::{Role, find};
 use crate::gap::Verdict;
 use crate::gap::verdict::Shrink;
 use crate::gap::words::short;
@@ -106,16 +107,15 @@ pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
     words
 }
 
-/// Effects that drones differ by: the fleet's mean does not feel them.
-const SPREADS: [&str; 2] = ["mass-spread", "thrust-spread"];
-
 /// Why a gap did not shrink though something was found.
 fn no_shrink(verdict: &Verdict) -> Option<String> {
     let gap = verdict.gap.drones.or(verdict.gap.rungs).filter(|_| !verdict.steps.is_empty())?;
     if gap.after_us.value < gap.before_us.value {
         return None;
     }
-    let is_spread = |name: &str| SPREADS.contains(&name);
+    // The fleet's mean does not feel what drones differ by.
+    let is_spread =
+        |name: &str| find(name).is_some_and(|effect| effect.definition().is_difference());
     let effects: Vec<&str> = verdict.steps.iter().flat_map(|step| step.finding.effects()).collect();
     Some(if !effects.is_empty() && effects.into_iter().all(is_spread) {
         "The gap is as it was: what drones differ by from each other is no part of it.".to_owned()
@@ -132,7 +132,7 @@ fn no_shrink(verdict: &Verdict) -> Option<String> {
 }
 
 fn of_one(one: &HiddenOutcome, outcome: &Outcome, verdict: &Verdict) -> String {
-    let of_all = if one.effect == "motor-thermal" && one.value != 0.0 {
+    let of_all = if Role::WarmUpTime.is_of(&one.effect) && one.value != 0.0 {
         " in the fleet's mean (motors that were warm at take-off drift no more)"
     } else {
         ""

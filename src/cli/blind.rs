@@ -8,9 +8,9 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::words;
 use crate::base::plain::Shown as _;
-use crate::blind::hide::KINDS;
 use crate::blind::render::{Style, render};
 use crate::blind::series::{Place, Settings};
+use crate::blind::tables::KINDS;
 use crate::blind::{AirClass, Base, Protocol};
 use crate::workflow::blind;
 

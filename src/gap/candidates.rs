@@ -6,10 +6,9 @@ use super::gls::{Column, Solution};
 use super::noise::{GroupPattern, Hyper};
 use super::response::{self, Response};
 use super::scene::Scene;
-use crate::effects::select::value_of;
-use crate::effects::{EffectError, LIBRARY, Sought};
+use crate::effects::{Definition, EffectError, LIBRARY, Role, Sought, find, select};
 use crate::sim::plant::drag::Drag;
-use crate::vehicle::{RotorLaw, Vehicle};
+use crate::vehicle::Vehicle;
 
 /// Relative change of a size that is in the model already, for its derivative. Chosen: small against the
 /// sizes that matter, large against the rounding of the closed forms. The sizes themselves come from a later
@@ -23,6 +22,8 @@ pub(super) struct Candidate {
     pub name: &'static str,
     /// Whether the model has it with another size.
     pub was_there: bool,
+    /// Whether the flight shows it only in the wind that the lean is taken for.
+    pub by_lean: bool,
     /// The parameter that says how large it is, its unit and bounds.
     pub size: Option<Size>,
     /// Forms of the candidate, which differ in size and shape.
@@ -70,8 +71,8 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
     let mut found = Vec::new();
     for effect in LIBRARY {
         let definition = effect.definition();
-        let Sought::Shape { size, sizes, shape } = &definition.sought else { continue };
-        let Some(parameter) = definition.parameters.iter().find(|known| known.name == *size) else {
+        let Sought::Shape { size, sizes, usual, shape } = &definition.sought else { continue };
+        let Some(parameter) = definition.parameter(size) else {
             continue;
         };
         let table = vehicle.effects.get(definition.name).filter(|table| table.on);
@@ -80,8 +81,7 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
             stated.unwrap_or_else(|| (parameter.default)(vehicle))
         });
         let sizes: Vec<f64> = if now == 0.0 {
-            let is_possible = |size: &&f64| is_possible(vehicle, definition.name, **size);
-            sizes.iter().filter(is_possible).copied().collect()
+            sizes(vehicle).to_vec()
         } else {
             let step = now * CHANGE;
             vec![if now + step <= parameter.high { now + step } else { now - step }]
@@ -97,7 +97,7 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
         for value in sizes {
             for shape in &shapes {
                 let mut other = vehicle.clone();
-                prepare(&mut other, definition.name, scene);
+                prepare(&mut other, definition, scene);
                 set(&mut other, definition.name, size, value);
                 if let Some((name, value)) = shape {
                     set(&mut other, definition.name, name, *value);
@@ -113,10 +113,11 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
                 variants.push(Variant { vehicle: Some(other), size: value, column, felt });
             }
         }
-        let usual = sizes_usual(definition.name, vehicle, parameter.default);
+        let usual = usual.unwrap_or_else(|| (parameter.default)(vehicle));
         found.push(Candidate {
             name: definition.name,
             was_there: now != 0.0,
+            by_lean: false,
             size: Some(Size {
                 name: parameter.name,
                 unit: parameter.unit,
@@ -147,18 +148,6 @@ fn is_hardly_felt(felt: &[Vec<Response>], response: &[Vec<Response>]) -> bool {
 /// strength of a field day's gusts (docs/physics.md, 4.1).
 const FELT_AT_MPS: f64 = 0.5;
 
-/// Whether a vehicle that lacks an effect can have it with a size. Thrust that grows slower than the pulse is
-/// no curve that a rotor has: only a model that is curved itself can be curved too much.
-fn is_possible(vehicle: &Vehicle, effect: &str, size: f64) -> bool {
-    let is_straight = matches!(vehicle.airframe.rotor, RotorLaw::Linear);
-    !(effect == "thrust-curve" && is_straight && size < 0.0)
-}
-
-fn sizes_usual(name: &str, vehicle: &Vehicle, default: fn(&Vehicle) -> f64) -> f64 {
-    // An expo of 0 is no effect: the thrust curve of small motors.
-    if name == "thrust-curve" { 0.5 } else { default(vehicle) }
-}
-
 /// Voltage of a lithium polymer cell at which a vehicle's hover is stated, V: the middle of its plateau.
 /// With another reference the sizes of `battery` came out a tenth low.
 const NOMINAL_V: f64 = 3.85;
@@ -167,40 +156,40 @@ const NOMINAL_V: f64 = 3.85;
 const OTHER_V: f64 = 0.4;
 
 /// Sets what the logs say of an effect that is to be tried.
-fn prepare(vehicle: &mut Vehicle, name: &str, scene: &Scene) {
-    let is_new = !vehicle.effects.get(name).is_some_and(|table| table.on);
-    if name == "battery" && is_new && scene.resting_v > 0.0 {
-        set(vehicle, name, "cells", scene.cells);
-        set(vehicle, name, "initial_charge", 1.0);
+fn prepare(vehicle: &mut Vehicle, definition: &Definition, scene: &Scene) {
+    let is_new = !vehicle.effects.get(definition.name).is_some_and(|table| table.on);
+    let is_battery = definition.with_role(Role::BatteryCells).is_some();
+    if is_battery && is_new && scene.resting_v > 0.0 {
+        Role::BatteryCells.set(vehicle, scene.cells);
+        Role::BatteryCharge.set(vehicle, 1.0);
         if let Some(resistance_ohm) = scene.resistance_ohm {
-            set(vehicle, name, "resistance_ohm", resistance_ohm.clamp(0.0, 1.0));
+            Role::BatteryResistance.set(vehicle, resistance_ohm.clamp(0.0, 1.0));
         }
         // The model's hover is stated for its own nominal voltage, unless its battery is another.
-        if value_of(vehicle, name, "reference_v")
+        if Role::BatteryReference
+            .value(vehicle)
             .is_none_or(|volts| (volts / scene.cells - NOMINAL_V).abs() > OTHER_V)
         {
-            set(vehicle, name, "reference_v", scene.cells * NOMINAL_V);
+            Role::BatteryReference.set(vehicle, scene.cells * NOMINAL_V);
         }
     }
 }
 
 /// Sets a parameter of an effect and switches it on.
 pub(super) fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f64) {
-    let sides =
-        (effect == "parasitic-drag" && parameter == "vertical_m2").then(|| sides_of(vehicle));
-    let table = vehicle.effects.entry(effect.to_owned()).or_default();
-    table.on = true;
-    table.parameters.insert(parameter.to_owned(), value);
+    let role = find(effect).and_then(|effect| effect.definition().parameter(parameter)?.role);
     // A body that is larger is larger from all sides: leans, by which the wind is read, must know it.
-    if let Some(sides) = sides {
-        table.parameters.insert("horizontal_m2".to_owned(), sides * value);
+    if role == Some(Role::BodyDragTop) {
+        let sides = sides_of(vehicle);
+        Role::BodyDragSide.set(vehicle, sides * value);
     }
+    select::set(vehicle, effect, parameter, value);
 }
 
 /// Drag area of a body's sides over that of its top.
 fn sides_of(vehicle: &Vehicle) -> f64 {
-    let of = |parameter| value_of(vehicle, "parasitic-drag", parameter).filter(|area| *area > 0.0);
-    if let (Some(top), Some(sides)) = (of("vertical_m2"), of("horizontal_m2")) {
+    let of = |role: Role| role.value(vehicle).filter(|area| *area > 0.0);
+    if let (Some(top), Some(sides)) = (of(Role::BodyDragTop), of(Role::BodyDragSide)) {
         return sides / top;
     }
     let factor = Drag::new(&vehicle.airframe).factor_m2();
@@ -212,8 +201,6 @@ fn sides_of(vehicle: &Vehicle) -> f64 {
 /// `parasitic-drag` of the library has the same ratio by default.
 const USUAL_SIDES: f64 = 0.5;
 
-/// Effect and parameter of the rotors' drag (docs/physics.md, 2.6).
-pub(super) const DRAG: (&str, &str) = ("blade-flapping", "drag_per_weight");
 /// Drag of the rotors that is tried where no horizontal leg reveals it, s/m: 0.6 to 2 degrees of lean per
 /// m/s, around the 1.0 to 1.5 of small rotors (docs/physics.md, 2.6).
 const DRAGS: [f64; 3] = [0.01, 0.02, 0.035];
@@ -227,22 +214,35 @@ pub(super) fn read_otherwise(
     comparison: &Comparison,
     vehicle: &Vehicle,
 ) -> Result<Option<Candidate>, EffectError> {
-    let (effect, parameter) = DRAG;
-    let is_known = vehicle.effects.get(effect).is_some_and(|table| table.on);
-    if is_known || comparison.wind.measured.is_some() {
+    let drag = Role::RotorDrag;
+    let Some(place) = drag.place() else { return Ok(None) };
+    if drag.is_on(vehicle) || comparison.wind.measured.is_some() {
         return Ok(None);
     }
     let base = comparison.pulses_by_lean(vehicle)?;
     let mut variants = Vec::new();
     for size in DRAGS {
         let mut other = vehicle.clone();
-        set(&mut other, effect, parameter, size);
+        drag.set(&mut other, size);
         let column = comparison.pulses_by_lean(&other)?.less(&base);
         variants.push(Variant { vehicle: Some(other), size, column, felt: Vec::new() });
     }
-    let size =
-        Size { name: parameter, unit: "s/m", low: 0.0, high: 0.1, now: 0.0, usual: DRAGS[1] };
-    Ok(Some(Candidate { name: effect, was_there: false, size: Some(size), variants }))
+    let parameter = place.parameter;
+    let size = Size {
+        name: parameter.name,
+        unit: parameter.unit,
+        low: parameter.low,
+        high: parameter.high,
+        now: 0.0,
+        usual: DRAGS[1],
+    };
+    Ok(Some(Candidate {
+        name: place.name(),
+        was_there: false,
+        by_lean: true,
+        size: Some(size),
+        variants,
+    }))
 }
 
 /// Step between the sizes tried for the drag that fits best, s/m: an eighth of a usual size; the top is then
@@ -266,7 +266,7 @@ pub(super) fn drag_by_lean(
     for step in 1..=MOST_DRAG_STEPS {
         let size = DRAG_STEP * f64::from(step);
         let mut other = vehicle.clone();
-        set(&mut other, DRAG.0, DRAG.1, size);
+        Role::RotorDrag.set(&mut other, size);
         let gain = base.gain(&comparison.pulses_by_lean(&other)?.less(&without));
         // Gain of the form as it is, where `gain` has that of its best multiple.
         let information = 2.0 * gain.nats / gain.beta.powi(2);
@@ -308,6 +308,7 @@ pub(super) fn of_the_air(
     let air = |name, column| Candidate {
         name,
         was_there: false,
+        by_lean: false,
         size: None,
         variants: vec![Variant { vehicle: None, size: 1.0, column, felt: Vec::new() }],
     };

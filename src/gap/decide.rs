@@ -1,6 +1,5 @@
 //! What a round's gains mean: nothing, an effect, a class, or a free shape.
 
-use super::candidates::DRAG;
 use super::explain::Options;
 use super::generic::Generic;
 use super::gls::{Column, Likelihood, Problem};
@@ -113,7 +112,7 @@ pub(super) fn decide(
         // That the shared air drifted is what it does: a rival, never a finding. That it grew with
         // height is no lack of the vehicle: it must say as much as a free shape.
         // So must another reading of the wind.
-        let is_plain = candidate.size.is_some() && candidate.name != DRAG.0;
+        let is_plain = candidate.size.is_some() && !candidate.by_lean;
         let is_effect = is_plain || ranked.gain > FREE_FLOOR_NATS;
         candidate.name != "updraft-drift" && is_effect && ranked.fitted && matters
     };

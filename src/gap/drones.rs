@@ -10,8 +10,8 @@ use super::noise::{
     GUST_TIME, GUSTS, GroupPattern, Hyper, OFFSETS, OWN, SHARED_TIME, SLOPES, WHITE,
 };
 use super::verdict::{DroneOffset, Drones, Finding, Fitted, Interval, Step};
-use crate::effects::select::value_of;
-use crate::effects::{Model, Reference, Signals};
+use crate::effects::role::Place;
+use crate::effects::{Model, Reference, Role, Signals};
 use crate::vehicle::Vehicle;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
@@ -117,8 +117,9 @@ fn spread(
     let chi2 = ChiSquared::new(freedom).ok()?;
     let (low, high) =
         ((square / chi2.inverse_cdf(0.975)).sqrt(), (square / chi2.inverse_cdf(0.025)).sqrt());
-    let known = |name: &str| value_of(original, name, "sd").unwrap_or(0.0);
-    let (mass, thrust) = (known("mass-spread"), known("thrust-spread"));
+    let (by_mass, by_thrust) = (Role::MassSpread.place()?, Role::ThrustSpread.place()?);
+    let known = |role: Role| role.value(original).unwrap_or(0.0);
+    let (mass, thrust) = (known(Role::MassSpread), known(Role::ThrustSpread));
     let expected = mass.hypot(thrust).max(USUAL);
     if low <= expected {
         return None;
@@ -137,8 +138,8 @@ fn spread(
     let from_model = |known: f64| (known > 0.0).then_some(known);
     // The part beyond what the model has of the other kind.
     let own = |other: f64| (sd * sd - other * other).max(0.0).sqrt();
-    let parameter = |other: f64, before: f64| Fitted {
-        name: "sd".to_owned(),
+    let parameter = |place: Place, other: f64, before: f64| Fitted {
+        name: place.parameter.name.to_owned(),
         unit: String::new(),
         value: Interval {
             value: own(other),
@@ -149,27 +150,27 @@ fn spread(
     };
     // A share of what the other kind would show is named only if it excludes that kind.
     let of = |change: fn(&mut Vehicle)| response_follows(&found.vehicle, change);
-    let (by_thrust, by_mass) = (
+    let (thrusts, masses) = (
         of(|vehicle| vehicle.airframe.thrust_coefficient /= LITTLE),
         of(|vehicle| vehicle.airframe.mass_kg *= LITTLE),
     );
     let off = |wanted: f64| (follows - wanted).abs() / se.hypot(FOLLOWS_DOUBT);
-    let finding = if off(by_mass) > EXCLUDED_Z && off(by_thrust) < off(by_mass) {
+    let finding = if off(masses) > EXCLUDED_Z && off(thrusts) < off(masses) {
         Finding::Name {
-            effect: "thrust-spread".to_owned(),
-            parameters: vec![parameter(mass, thrust)],
+            effect: by_thrust.name().to_owned(),
+            parameters: vec![parameter(by_thrust, mass, thrust)],
             was_there: thrust > 0.0,
         }
-    } else if off(by_thrust) > EXCLUDED_Z && off(by_mass) < off(by_thrust) {
+    } else if off(thrusts) > EXCLUDED_Z && off(masses) < off(thrusts) {
         Finding::Name {
-            effect: "mass-spread".to_owned(),
-            parameters: vec![parameter(thrust, mass)],
+            effect: by_mass.name().to_owned(),
+            parameters: vec![parameter(by_mass, thrust, mass)],
             was_there: mass > 0.0,
         }
     } else {
         Finding::Class {
-            effects: vec!["thrust-spread".to_owned(), "mass-spread".to_owned()],
-            parameters: vec![parameter(mass, thrust)],
+            effects: vec![by_thrust.name().to_owned(), by_mass.name().to_owned()],
+            parameters: vec![parameter(by_thrust, mass, thrust)],
         }
     };
     // Log-likelihood of the offsets by their own spread against the expected one.

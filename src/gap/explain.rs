@@ -1,6 +1,6 @@
 //! The workflow: find, name, add, and again, until nothing passes.
 
-use super::candidates::{DRAG, Variant, drag_by_lean, library, of_the_air, read_otherwise, set};
+use super::candidates::{Size, Variant, drag_by_lean, library, of_the_air, read_otherwise};
 use super::compare::{Comparison, Simulated};
 use super::contest::{Contest, before, entered};
 use super::data::Data;
@@ -13,7 +13,7 @@ use super::refine::{Parameter, doubts, fitted, half_interval, parameters_of, ref
 use super::response::{self, Response, gusts_mps};
 use super::search::{Round, Sought, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
-use crate::effects::Signals;
+use crate::effects::{Role, Signals};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
@@ -166,12 +166,12 @@ pub fn search(
                 let rivals = rivals(&round, sought);
                 let mut by_lean = None;
                 if let Some(mut next) = entered(candidate, best) {
-                    if candidate.name == DRAG.0
+                    if let Some(size) = candidate.size.filter(|_| candidate.by_lean)
                         && let Some((drag, se)) =
                             drag_by_lean(&comparison, &found.vehicle, &round.base)?
                     {
-                        set(&mut next, DRAG.0, DRAG.1, drag);
-                        by_lean = Some(lean_parameter(drag, se));
+                        Role::RotorDrag.set(&mut next, drag);
+                        by_lean = Some(lean_parameter(size, drag, se));
                     }
                     let known = found.parameters.iter().any(|p| p.effect == candidate.name);
                     if !known {
@@ -278,7 +278,7 @@ pub(super) fn settle(found: &mut Found) {
             Finding::Unknown { .. } => continue,
         };
         // What another channel said stays.
-        if effect != DRAG.0 {
+        if !Role::RotorDrag.is_of(&effect) {
             *stated = of(&effect);
         }
     }
@@ -293,10 +293,10 @@ fn finding(names: Vec<String>, was_there: bool, known: Option<Fitted>) -> Findin
 }
 
 /// The drag of the rotors as a fitted parameter.
-fn lean_parameter(drag: f64, se: f64) -> Fitted {
+fn lean_parameter(size: Size, drag: f64, se: f64) -> Fitted {
     Fitted {
-        name: DRAG.1.to_owned(),
-        unit: "s/m".to_owned(),
+        name: size.name.to_owned(),
+        unit: size.unit.to_owned(),
         value: Interval {
             value: drag,
             low: (drag - LEAN_DOUBT.hypot(2.0 * se)).max(0.0),

@@ -3,10 +3,9 @@
 use nalgebra::{DMatrix, DVector, Matrix2};
 
 use super::bins::BinValues;
-use super::candidates::DRAG;
 use super::data::Data;
 use super::lean_fit::{Point, fit, hovering_wind};
-use crate::effects::select::value_of;
+use crate::effects::Role;
 use crate::sim::plant::drag::Drag;
 use crate::vehicle::Vehicle;
 
@@ -36,12 +35,12 @@ pub struct LeanLaw {
 impl LeanLaw {
     /// What the vehicle's model says at an air density, kg/m³.
     pub fn of(vehicle: &Vehicle, density: f64) -> Self {
-        let of = |effect: &str, size: &str| value_of(vehicle, effect, size).unwrap_or(0.0);
+        let of = |role: Role| role.value(vehicle).unwrap_or(0.0);
         let factor = Drag::new(&vehicle.airframe).factor_m2();
         let box_m2 = (factor.x * factor.y).sqrt();
-        let body_m2 = of("parasitic-drag", "horizontal_m2") / 2.0;
+        let body_m2 = of(Role::BodyDragSide) / 2.0;
         Self {
-            linear: of(DRAG.0, DRAG.1),
+            linear: of(Role::RotorDrag),
             square: density * (box_m2 + body_m2) / (vehicle.airframe.mass_kg * GRAVITY),
             body_share: body_m2 / (box_m2 + body_m2).max(1e-9),
         }

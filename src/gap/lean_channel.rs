@@ -1,12 +1,11 @@
 //! The lean as a channel of its own: how much a drone leans at known speeds over ground is its rotors'
 //! drag, whatever the pulse says.
 
-use super::candidates::DRAG;
 use super::compare::Comparison;
 use super::lean::LeanLaw;
 use super::verdict::{Finding, Fitted, Interval, Step, WindFound};
 use crate::base::air::SEA_LEVEL_DENSITY;
-use crate::effects::select::value_of;
+use crate::effects::Role;
 
 /// Half of a 95 % interval in standard errors, rounded up from 1.96.
 const HALF: f64 = 2.0;
@@ -31,7 +30,7 @@ pub(super) fn found(before: &Comparison) -> WindFound {
     }
 }
 
-/// Blade flapping that the model lacks, or has with another size.
+/// Rotor drag that the model lacks, or has with another size.
 pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
     let measured = before.wind.measured?;
     let apart = measured.law.linear - wind.model_lean_per_mps;
@@ -39,16 +38,17 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
     if apart.abs() < MATERIAL || z < NAMED_Z || !z.is_finite() {
         return None;
     }
-    let known = value_of(&before.vehicle, DRAG.0, DRAG.1);
+    let place = Role::RotorDrag.place()?;
+    let known = Role::RotorDrag.value(&before.vehicle);
     let fitted = Fitted {
-        name: DRAG.1.to_owned(),
-        unit: "s/m".to_owned(),
+        name: place.parameter.name.to_owned(),
+        unit: place.parameter.unit.to_owned(),
         value: wind.lean_per_mps?,
         before: known,
     };
     Some(Step {
         finding: Finding::Name {
-            effect: DRAG.0.to_owned(),
+            effect: place.name().to_owned(),
             parameters: vec![fitted],
             was_there: known.is_some(),
         },

@@ -1,7 +1,6 @@
 //! From logs to a verdict and a model.
 
 use super::bins::Bin;
-use super::candidates::DRAG;
 use super::compare::{Comparison, Simulated};
 use super::data::{Data, Flown, constant_us};
 use super::detectable::detectable;
@@ -20,7 +19,8 @@ use super::verdict::{
     Verdict,
 };
 use super::words::summary;
-use crate::effects::select::value_of;
+use crate::effects::Role;
+use crate::effects::select::{self, value_of};
 use crate::flight::table::Steps;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
@@ -247,12 +247,14 @@ fn repaired(vehicle: &Vehicle, channel: &SensorChannel) -> Vehicle {
     let mut vehicle = vehicle.clone();
     if channel.named {
         let of = |interval: Option<Interval>| interval.map_or(0.0, |interval| interval.value);
-        for (name, value) in [
-            ("bias_mps", of(channel.bias_mps).clamp(-2.0, 2.0)),
-            ("lag_s", of(channel.lag_s).clamp(0.0, 1.0)),
-            ("sd_mps", 0.0),
-        ] {
-            super::candidates::set(&mut vehicle, "velocity-error", name, value);
+        Role::SensorBias.set(&mut vehicle, of(channel.bias_mps).clamp(-2.0, 2.0));
+        Role::SensorLag.set(&mut vehicle, of(channel.lag_s).clamp(0.0, 1.0));
+        if let Some(place) = Role::SensorBias.place() {
+            // What is told is the fleet's: drones do not differ in it.
+            let spreads = place.effect.definition().parameters.iter();
+            for spread in spreads.filter(|spread| spread.role.is_some_and(Role::is_spread)) {
+                select::set(&mut vehicle, place.name(), spread.name, 0.0);
+            }
         }
     }
     vehicle
@@ -268,11 +270,12 @@ fn add_others(model: &mut Vehicle, steps: &[Step]) {
         else {
             continue;
         };
-        if let (true, Some(drag)) = (*first == DRAG.0, parameters.first()) {
-            super::candidates::set(model, first, DRAG.1, drag.value.value.min(0.1));
-        }
-        if let (true, Some(sd)) = (first.ends_with("-spread"), parameters.first()) {
-            super::candidates::set(model, first, "sd", sd.value.value.min(0.1));
+        for role in [Role::RotorDrag, Role::MassSpread, Role::ThrustSpread] {
+            if let Some(place) = role.place().filter(|place| place.name() == *first)
+                && let Some(size) = parameters.first()
+            {
+                role.set(model, size.value.value.min(place.parameter.high));
+            }
         }
     }
 }

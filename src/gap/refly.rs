@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::bins::{Bin, BinValues};
 use crate::base::time::GpsTime;
+use crate::effects::{Role, find};
 use crate::mission::plan::{Plan, Slot};
 use crate::sim::recorder::{Moment, Recorder, STEPS_10_HZ};
 use crate::sim::{FlightSetup, Hooks, SimError, Uniform, fly_with};
@@ -17,15 +18,12 @@ const GRAVITY: f64 = 9.80665;
 /// The fleet's mean drone: what makes drones differ is off.
 pub(super) fn mean_drone(vehicle: &Vehicle) -> Vehicle {
     let mut mean = vehicle.clone();
-    for (name, parameter) in
-        [("mass-spread", "sd"), ("thrust-spread", "sd"), ("rotor-inflow", "spread")]
-    {
-        if let Some(table) = mean.effects.get_mut(name) {
-            table.parameters.insert(parameter.to_owned(), 0.0);
+    for (name, table) in &mut mean.effects {
+        let Some(effect) = find(name) else { continue };
+        let parameters = effect.definition().parameters.iter();
+        for spread in parameters.filter(|one| one.role.is_some_and(Role::is_spread)) {
+            table.parameters.insert(spread.name.to_owned(), 0.0);
         }
-    }
-    if let Some(table) = mean.effects.get_mut("velocity-error") {
-        table.parameters.insert("sd_mps".to_owned(), 0.0);
     }
     mean
 }

@@ -7,8 +7,9 @@ use super::gls::Column;
 use super::lean::Wind;
 use super::response::Response;
 use crate::base::air::density_ratio;
-use crate::effects::battery::charge_of_cell;
-use crate::effects::{EffectError, Model, Reference, Signals, find, select};
+use crate::effects::cell::charge_of_cell;
+use crate::effects::select::looks_at;
+use crate::effects::{EffectError, Model, Reference, Role, Signal, Signals};
 use crate::vehicle::Vehicle;
 
 /// Open-circuit voltage above which there must be another cell, V: a full lithium polymer cell has 4.20 V.
@@ -150,8 +151,7 @@ impl Scene {
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
         let model = Model::of(vehicle)?;
         let exponent = thrust_exponent(vehicle);
-        let battery = Battery::of(vehicle)?;
-        let is_on = |name: &str| vehicle.effects.get(name).is_some_and(|table| table.on);
+        let battery = Battery::of(vehicle);
         let hover_ah_per_s = battery.as_ref().map_or(0.0, |battery| battery.hover_ah_per_s);
         let at = |signals: &Signals, charge: Option<f64>, neighbours: f64| {
             let charge_used_ah = match (&battery, charge) {
@@ -162,7 +162,8 @@ impl Scene {
             // As both sides of the comparison are: brought to level by their own lean.
             IDLE_US + (pulse_us - IDLE_US) * signals.tilt_rad.cos().powf(exponent)
         };
-        let own = (battery.is_some() && self.charge.is_some()) || is_on("neighbour-downwash");
+        let own =
+            (battery.is_some() && self.charge.is_some()) || looks_at(vehicle, Signal::Neighbours);
         if !own {
             let of = |signals: &Vec<Signals>| signals.iter().map(|s| at(s, None, 0.0)).collect();
             return Ok(Column::Shared(self.signals.iter().map(of).collect()));
@@ -203,9 +204,7 @@ impl Scene {
 
 /// Whether an effect has a scatter of its own.
 fn shakes(effect: &str) -> bool {
-    find(effect).is_some_and(|effect| {
-        effect.definition().parameters.iter().any(|parameter| parameter.name == "jitter")
-    })
+    Role::Scatter.is_of(effect)
 }
 
 struct Battery {
@@ -215,22 +214,14 @@ struct Battery {
 }
 
 impl Battery {
-    fn of(vehicle: &Vehicle) -> Result<Option<Self>, EffectError> {
-        let name = "battery";
-        let Some(effect) = find(name) else { return Ok(None) };
-        if !vehicle.effects.get(name).is_some_and(|table| table.on) {
-            return Ok(None);
-        }
-        let values = select::values_of(effect, vehicle)?;
-        let of = |parameter: &str| {
-            let place = effect.definition().parameters.iter().position(|p| p.name == parameter);
-            place.and_then(|place| values.get(place)).copied().unwrap_or_default()
-        };
-        let power_w = Reference::of(vehicle).hover_w() + of("avionics_w");
-        Ok(Some(Self {
-            initial: of("initial_charge"),
-            capacity_ah: of("capacity_ah"),
-            hover_ah_per_s: power_w / of("reference_v").max(0.1) / 3600.0,
-        }))
+    fn of(vehicle: &Vehicle) -> Option<Self> {
+        let initial = Role::BatteryCharge.value(vehicle)?;
+        let of = |role: Role| role.value(vehicle).unwrap_or_default();
+        let power_w = Reference::of(vehicle).hover_w() + of(Role::BatteryAvionics);
+        Some(Self {
+            initial,
+            capacity_ah: of(Role::BatteryCapacity),
+            hover_ah_per_s: power_w / of(Role::BatteryReference).max(0.1) / 3600.0,
+        })
     }
 }

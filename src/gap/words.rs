@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::decide::PRODUCT;
 use super::verdict::{Finding, Fitted, Step, Verdict};
+use crate::effects::Role;
 
 /// One finding as a phrase: `rotor-inflow (inflow_share 0.42, 0.39 to 0.45)`.
 pub fn phrase(finding: &Finding) -> String {
@@ -94,10 +95,11 @@ pub fn summary(verdict: &Verdict) -> String {
     if verdict.sensor.named {
         let bias = verdict.sensor.bias_mps.map_or(0.0, |bias| bias.value);
         let lag = verdict.sensor.lag_s.map_or(0.0, |lag| lag.value);
+        let effect = Role::SensorBias.place().map_or("", |place| place.name());
         let _ = write!(
             text,
             " The vertical velocity itself is off by {bias:+.3} m/s and late by {lag:.2} s \
-             (velocity-error)."
+             ({effect})."
         );
     }
     if let Some(shrink) =

@@ -8,30 +8,17 @@ use super::gap::search::Searched;
 use super::host::Host;
 use super::made_by;
 use crate::base::file::write_whole;
-use crate::blind::hide::KINDS;
 use crate::blind::render::{Style, render};
 use crate::blind::series::{self, Place, Settings};
 use crate::blind::table::{Table, table};
+use crate::blind::tables::{FIRST_OF_PAIRS, KINDS, TOGETHER};
 use crate::blind::{Base, BlindError};
 use crate::campaign::to_json;
 
 /// Nothing hidden is this many times as frequent as each thing that is hidden, unless `--effects` says
 /// which: false alarms are what is demanded most of.
 const NONE_WEIGHT: usize = 6;
-/// What is hidden together with `--pairs`, beside the inflow with everything else.
-const PAIRS: &[&[&str]] = &[
-    &["battery", "parasitic-drag"],
-    &["battery", "translational-lift"],
-    &["battery", "thrust-curve"],
-    &["battery", "velocity-bias"],
-    &["motor-thermal", "vortex-ring"],
-    &["blade-flapping", "velocity-lag"],
-];
-const TRIPLES: &[&[&str]] = &[
-    &["rotor-inflow", "battery", "translational-lift"],
-    &["rotor-inflow", "battery", "parasitic-drag"],
-    &["rotor-inflow", "vortex-ring", "velocity-bias"],
-];
+
 /// Default sets of hidden effects: each effect by itself.
 pub fn one_each() -> Vec<Vec<String>> {
     let nothing = std::iter::repeat_n(Vec::new(), NONE_WEIGHT);
@@ -40,13 +27,12 @@ pub fn one_each() -> Vec<Vec<String>> {
 
 /// Sets of two and three effects that are hidden together.
 pub fn several() -> Vec<Vec<String>> {
-    let others = KINDS.iter().filter(|kind| !kind.foreign && kind.effect != "rotor-inflow");
+    let others = KINDS.iter().filter(|kind| !kind.foreign && kind.name != FIRST_OF_PAIRS);
     // With the inflow hidden too, the base is AirSim's, and that feels no neighbours.
     let others = others.filter(|kind| kind.bases.contains(&Base::Airsim));
-    let with_inflow = others.map(|kind| vec!["rotor-inflow".to_owned(), kind.name.to_owned()]);
-    let listed = PAIRS.iter().chain(TRIPLES);
-    let listed = listed.map(|set| set.iter().map(|name| (*name).to_owned()).collect());
-    with_inflow.chain(listed).collect()
+    let pairs = others.map(|kind| [FIRST_OF_PAIRS, kind.name].map(str::to_owned).to_vec());
+    let owned = |set: &&[&str]| set.iter().map(|name| (*name).to_owned()).collect();
+    pairs.chain(TOGETHER.iter().map(owned)).collect()
 }
 
 /// A series of blind flights after its scoring.

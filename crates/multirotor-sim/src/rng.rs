@@ -1,4 +1,16 @@
 //! Random streams: one for each (seed, drone, purpose), independent of thread count and order.
+//!
+//! The numbers that follow a seed are part of what the simulator promises, and they hang on more than
+//! the seed:
+//!
+//! * on the number of each [`Purpose`];
+//! * for effects, on the effect's name ([`crate::effects::active`] mixes its hash into the seed), so
+//!   that effects can be added and reordered freely, but not renamed;
+//! * for parts of the air, on the place of the part in its specification;
+//! * wherever `drone` counts something else (the parts of a benchmark, simulated flights), on the place
+//!   in that list, so that such lists only grow at their end.
+//!
+//! Tests pin the first draws of each: renaming, renumbering or reordering turns them red.
 
 use rand_pcg::Pcg64;
 
@@ -25,7 +37,9 @@ pub enum Purpose {
     Hidden = 8,
 }
 
-/// The random stream of one drone and purpose. PCG's output is stable across releases.
+/// The random stream of one drone and purpose: the generator PCG XSL RR 128/64 (O'Neill 2014), of which
+/// drone and purpose select the sequence and the seed the place in it. Its output is stable across
+/// releases.
 pub fn stream(seed: u64, drone: u64, purpose: Purpose) -> Pcg64 {
     let selector = (u128::from(drone) << 64) | u128::from(purpose as u64);
     Pcg64::new(u128::from(seed) ^ 0x9E37_79B9_7F4A_7C15_F39C_C060_5CED_C834, selector)
@@ -35,6 +49,22 @@ pub fn stream(seed: u64, drone: u64, purpose: Purpose) -> Pcg64 {
 mod tests {
     use super::*;
     use rand::Rng as _;
+
+    #[test]
+    fn first_draws_of_each_purpose_are_pinned() {
+        let purposes = [
+            (Purpose::Sensors, 1_u64),
+            (Purpose::Spread, 1),
+            (Purpose::Air, 1),
+            (Purpose::Resampling, 1),
+            (Purpose::Effects, 1),
+            (Purpose::Link, 1),
+            (Purpose::Losses, 1),
+            (Purpose::Hidden, 1),
+        ];
+        let drawn = purposes.map(|(purpose, _)| (purpose, stream(7, 3, purpose).next_u64()));
+        assert_eq!(drawn, purposes);
+    }
 
     #[test]
     fn streams_repeat_and_differ() {

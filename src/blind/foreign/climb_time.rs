@@ -1,21 +1,37 @@
 //! A foreign effect that grows with the product of vertical air speed and time.
 
-use super::{PULSE_US, TIME_S, lowered};
+use super::{Foreign, lowered};
 use crate::effects::definition::Parameter;
 use crate::effects::{
-    Class, Definition, Effect, Hook, Now, Own, Reference, Signal, Signals, Sought, Values,
+    Class, Definition, Effect, Hook, InFlight, Now, Reference, Signal, Signals, Sought, Start,
+    Values,
 };
+use crate::vehicle::Airframe;
 
 const SLOPE: usize = 0;
 const TIME: usize = 1;
 
 /// Response that changes with time.
 #[derive(Debug)]
-pub(super) struct ClimbTime;
+struct ClimbTime;
+
+/// What the benchmark knows of it.
+pub(super) const FOREIGN: Foreign =
+    Foreign { effect: &ClimbTime, depends_on: &["climb-time"], turns: false };
 
 /// The change at a vertical air speed and a time.
 fn pulse_us(values: &Values, climb_mps: f64, time_s: f64) -> f64 {
     values[SLOPE] * climb_mps * time_s / values[TIME]
+}
+
+/// One drone in flight.
+#[derive(Clone, Debug)]
+struct Acting {
+    values: Values,
+    /// Since the motors started.
+    time_s: f64,
+    /// Change of the pulse now.
+    pulse_us: f64,
 }
 
 impl Effect for ClimbTime {
@@ -37,6 +53,7 @@ impl Effect for ClimbTime {
                     low: -50.0,
                     high: 50.0,
                     default: |_| 10.0,
+                    role: None,
                 },
                 Parameter {
                     name: "time_s",
@@ -45,6 +62,7 @@ impl Effect for ClimbTime {
                     low: 1.0,
                     high: 36000.0,
                     default: |_| 430.0,
+                    role: None,
                 },
             ],
             hooks: &[Hook::Command],
@@ -57,14 +75,20 @@ impl Effect for ClimbTime {
         pulse_us(values, signals.climb_mps, signals.time_s)
     }
 
-    fn follow(&self, own: &mut Own, now: &Now) {
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Acting { values: *start.values, time_s: 0.0, pulse_us: 0.0 }))
+    }
+}
+
+impl InFlight for Acting {
+    fn follow(&mut self, now: &Now) {
         if now.turning {
-            own.state[TIME_S] += now.dt_s;
+            self.time_s += now.dt_s;
         }
-        own.state[PULSE_US] = pulse_us(&own.values, now.relative_mps.z, own.state[TIME_S]);
+        self.pulse_us = pulse_us(&self.values, now.relative_mps.z, self.time_s);
     }
 
-    fn command(&self, own: &Own, command: f64) -> f64 {
-        lowered(command, own.state[PULSE_US])
+    fn command(&self, command: f64) -> f64 {
+        lowered(command, self.pulse_us)
     }
 }

@@ -1,22 +1,36 @@
 //! A foreign effect of the direction of the horizontal air velocity against the nose.
 
-use super::{PULSE_US, TIME_S, lowered};
+use super::{Foreign, lowered};
 use crate::effects::definition::Parameter;
 use crate::effects::{
-    Class, Definition, Effect, Hook, Now, Own, Reference, Signal, Signals, Sought, Values,
+    Class, Definition, Effect, Hook, InFlight, Now, Reference, Signal, Signals, Sought, Start,
+    Values,
 };
+use crate::vehicle::Airframe;
 
 const AMPLITUDE: usize = 0;
 const KNEE: usize = 1;
 
 /// Dependence on the direction of the air.
 #[derive(Debug)]
-pub(super) struct Heading;
+struct Heading;
+
+/// What the benchmark knows of it.
+pub(super) const FOREIGN: Foreign =
+    Foreign { effect: &Heading, depends_on: &["heading"], turns: true };
 
 /// The change at a horizontal air velocity: forward, and to the left.
 fn pulse_us(values: &Values, forward_mps: f64, left_mps: f64) -> f64 {
     let speed = forward_mps.hypot(left_mps).hypot(values[KNEE]);
     values[AMPLITUDE] * forward_mps / speed
+}
+
+/// One drone in flight.
+#[derive(Clone, Debug)]
+struct Acting {
+    values: Values,
+    /// Change of the pulse now.
+    pulse_us: f64,
 }
 
 impl Effect for Heading {
@@ -38,6 +52,7 @@ impl Effect for Heading {
                     low: -100.0,
                     high: 100.0,
                     default: |_| 15.0,
+                    role: None,
                 },
                 Parameter {
                     name: "knee_mps",
@@ -46,6 +61,7 @@ impl Effect for Heading {
                     low: 0.01,
                     high: 20.0,
                     default: |_| 1.0,
+                    role: None,
                 },
             ],
             hooks: &[Hook::Command],
@@ -58,14 +74,17 @@ impl Effect for Heading {
         pulse_us(values, signals.horizontal_mps, 0.0)
     }
 
-    fn follow(&self, own: &mut Own, now: &Now) {
-        if now.turning {
-            own.state[TIME_S] += now.dt_s;
-        }
-        own.state[PULSE_US] = pulse_us(&own.values, now.relative_mps.x, now.relative_mps.y);
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Acting { values: *start.values, pulse_us: 0.0 }))
+    }
+}
+
+impl InFlight for Acting {
+    fn follow(&mut self, now: &Now) {
+        self.pulse_us = pulse_us(&self.values, now.relative_mps.x, now.relative_mps.y);
     }
 
-    fn command(&self, own: &Own, command: f64) -> f64 {
-        lowered(command, own.state[PULSE_US])
+    fn command(&self, command: f64) -> f64 {
+        lowered(command, self.pulse_us)
     }
 }

@@ -1,10 +1,12 @@
 //! A foreign effect that is a sinusoid over height.
 
-use super::{PULSE_US, TIME_S, lowered};
+use super::{Foreign, lowered};
 use crate::effects::definition::Parameter;
 use crate::effects::{
-    Class, Definition, Effect, Hook, Now, Own, Reference, Signal, Signals, Sought, Values,
+    Class, Definition, Effect, Hook, InFlight, Now, Reference, Signal, Signals, Sought, Start,
+    Values,
 };
+use crate::vehicle::Airframe;
 
 const AMPLITUDE: usize = 0;
 const WAVELENGTH: usize = 1;
@@ -12,12 +14,24 @@ const PHASE: usize = 2;
 
 /// Wave along the height.
 #[derive(Debug)]
-pub(super) struct HeightWave;
+struct HeightWave;
+
+/// What the benchmark knows of it.
+pub(super) const FOREIGN: Foreign =
+    Foreign { effect: &HeightWave, depends_on: &["height"], turns: false };
 
 /// The change at a height.
 fn pulse_us(values: &Values, height_m: f64) -> f64 {
     let turns = height_m / values[WAVELENGTH];
     values[AMPLITUDE] * (std::f64::consts::TAU * turns + values[PHASE]).sin()
+}
+
+/// One drone in flight.
+#[derive(Clone, Debug)]
+struct Acting {
+    values: Values,
+    /// Change of the pulse now.
+    pulse_us: f64,
 }
 
 impl Effect for HeightWave {
@@ -39,6 +53,7 @@ impl Effect for HeightWave {
                     low: 0.0,
                     high: 100.0,
                     default: |_| 12.0,
+                    role: None,
                 },
                 Parameter {
                     name: "wavelength_m",
@@ -47,6 +62,7 @@ impl Effect for HeightWave {
                     low: 5.0,
                     high: 1000.0,
                     default: |_| 40.0,
+                    role: None,
                 },
                 Parameter {
                     name: "phase_rad",
@@ -55,6 +71,7 @@ impl Effect for HeightWave {
                     low: -10.0,
                     high: 10.0,
                     default: |_| 0.0,
+                    role: None,
                 },
             ],
             hooks: &[Hook::Command],
@@ -67,14 +84,17 @@ impl Effect for HeightWave {
         pulse_us(values, signals.height_m)
     }
 
-    fn follow(&self, own: &mut Own, now: &Now) {
-        if now.turning {
-            own.state[TIME_S] += now.dt_s;
-        }
-        own.state[PULSE_US] = pulse_us(&own.values, now.height_m);
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Acting { values: *start.values, pulse_us: 0.0 }))
+    }
+}
+
+impl InFlight for Acting {
+    fn follow(&mut self, now: &Now) {
+        self.pulse_us = pulse_us(&self.values, now.height_m);
     }
 
-    fn command(&self, own: &Own, command: f64) -> f64 {
-        lowered(command, own.state[PULSE_US])
+    fn command(&self, command: f64) -> f64 {
+        lowered(command, self.pulse_us)
     }
 }

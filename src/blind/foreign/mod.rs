@@ -10,45 +10,41 @@ mod step;
 
 use crate::effects::{Definition, Effect, Reference, Signals, Values};
 
+/// Effect that no library lists.
+#[derive(Clone, Copy)]
+pub struct Foreign {
+    /// Physics, as of an effect of the library.
+    pub effect: &'static dyn Effect,
+    /// Words by which a verdict may name its dependence; the first is the plainest.
+    pub depends_on: &'static [&'static str],
+    /// Whether it goes with the cosine of the direction of the oncoming air against the nose; the closed
+    /// form has the air straight from ahead.
+    pub turns: bool,
+}
+
 /// Foreign effects: those that no library lists.
-pub const FOREIGN: &[&dyn Effect] =
-    &[&step::Step, &height_wave::HeightWave, &climb_time::ClimbTime, &heading::Heading];
+pub const FOREIGN: &[Foreign] =
+    &[step::FOREIGN, height_wave::FOREIGN, climb_time::FOREIGN, heading::FOREIGN];
 
 /// Foreign effect by its name; `None` if there is none.
-pub fn find(name: &str) -> Option<&'static dyn Effect> {
-    FOREIGN.iter().copied().find(|effect| effect.definition().name == name)
+pub fn find(name: &str) -> Option<&'static Foreign> {
+    FOREIGN.iter().find(|foreign| foreign.effect.definition().name == name)
 }
 
-/// Words by which a verdict may name the dependence of a foreign effect; the first is the plainest.
-/// Empty for an unknown name.
-pub fn depends_on(name: &str) -> &'static [&'static str] {
-    match name {
-        "step" => &["step", "time"],
-        "height-wave" => &["height"],
-        "climb-time" => &["climb-time"],
-        "heading" => &["heading"],
-        _ => &[],
+impl Foreign {
+    /// Change in the pulse width of steady flight, us; `heading_rad` is the direction of the oncoming air
+    /// against the nose.
+    pub fn steady_us(
+        &self,
+        values: &Values,
+        at: &Reference,
+        signals: &Signals,
+        heading_rad: f64,
+    ) -> f64 {
+        let ahead_us = self.effect.pulse_us(at, values, signals);
+        if self.turns { ahead_us * heading_rad.cos() } else { ahead_us }
     }
 }
-
-/// Change in the pulse width of steady flight that an effect causes, us; `heading_rad` is the
-/// direction of the oncoming air against the nose.
-pub fn steady_us(
-    effect: &dyn Effect,
-    values: &Values,
-    at: &Reference,
-    signals: &Signals,
-    heading_rad: f64,
-) -> f64 {
-    let ahead_us = effect.pulse_us(at, values, signals);
-    // The closed form has the air straight from ahead.
-    if effect.definition().name == "heading" { ahead_us * heading_rad.cos() } else { ahead_us }
-}
-
-/// Places in [`crate::effects::Own::state`] that all of them share: change of the pulse now (us) and
-/// time since the motors started (s).
-const PULSE_US: usize = 0;
-const TIME_S: usize = 1;
 
 /// A command (0..1) after the pulse has to rise by so much.
 fn lowered(command: f64, pulse_us: f64) -> f64 {

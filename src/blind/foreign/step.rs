@@ -1,21 +1,37 @@
 //! A foreign effect: a step of the pulse at one instant.
 
-use super::{PULSE_US, TIME_S, lowered};
+use super::{Foreign, lowered};
 use crate::effects::definition::Parameter;
 use crate::effects::{
-    Class, Definition, Effect, Hook, Now, Own, Reference, Signal, Signals, Sought, Values,
+    Class, Definition, Effect, Hook, InFlight, Now, Reference, Signal, Signals, Sought, Start,
+    Values,
 };
+use crate::vehicle::Airframe;
 
 const JUMP: usize = 0;
 const AT: usize = 1;
 
 /// Step of the pulse.
 #[derive(Debug)]
-pub(super) struct Step;
+struct Step;
+
+/// What the benchmark knows of it.
+pub(super) const FOREIGN: Foreign =
+    Foreign { effect: &Step, depends_on: &["step", "time"], turns: false };
 
 /// The change at a time.
 fn pulse_us(values: &Values, time_s: f64) -> f64 {
     if time_s >= values[AT] { values[JUMP] } else { 0.0 }
+}
+
+/// One drone in flight.
+#[derive(Clone, Debug)]
+struct Acting {
+    values: Values,
+    /// Since the motors started.
+    time_s: f64,
+    /// Change of the pulse now.
+    pulse_us: f64,
 }
 
 impl Effect for Step {
@@ -37,6 +53,7 @@ impl Effect for Step {
                     low: -100.0,
                     high: 100.0,
                     default: |_| 15.0,
+                    role: None,
                 },
                 Parameter {
                     name: "at_s",
@@ -45,6 +62,7 @@ impl Effect for Step {
                     low: 0.0,
                     high: 3600.0,
                     default: |_| 200.0,
+                    role: None,
                 },
             ],
             hooks: &[Hook::Command],
@@ -57,14 +75,20 @@ impl Effect for Step {
         pulse_us(values, signals.time_s)
     }
 
-    fn follow(&self, own: &mut Own, now: &Now) {
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Acting { values: *start.values, time_s: 0.0, pulse_us: 0.0 }))
+    }
+}
+
+impl InFlight for Acting {
+    fn follow(&mut self, now: &Now) {
         if now.turning {
-            own.state[TIME_S] += now.dt_s;
+            self.time_s += now.dt_s;
         }
-        own.state[PULSE_US] = pulse_us(&own.values, own.state[TIME_S]);
+        self.pulse_us = pulse_us(&self.values, self.time_s);
     }
 
-    fn command(&self, own: &Own, command: f64) -> f64 {
-        lowered(command, own.state[PULSE_US])
+    fn command(&self, command: f64) -> f64 {
+        lowered(command, self.pulse_us)
     }
 }

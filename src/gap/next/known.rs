@@ -1,7 +1,7 @@
 //! What a prediction starts from: the model and the noise that were found, and a plan flown by its mean
 //! drone.
 
-use crate::effects::find;
+use crate::effects::Role;
 use crate::gap::GapError;
 use crate::gap::bins::{Bin, BinValues, of_segments};
 use crate::gap::compare::thrust_exponent;
@@ -127,11 +127,5 @@ pub fn charge_of(place: usize, count: usize, lowest: f64) -> f64 {
 
 /// Cells of the battery that a vehicle has or would have.
 pub(super) fn cells(vehicle: &Vehicle) -> f64 {
-    let stated = vehicle.effects.get("battery").and_then(|table| table.parameters.get("cells"));
-    let default = || {
-        let parameters = find("battery").map(|effect| effect.definition().parameters)?;
-        let cells = parameters.iter().find(|known| known.name == "cells")?;
-        Some((cells.default)(vehicle))
-    };
-    stated.copied().or_else(default).unwrap_or(1.0).max(1.0)
+    Role::BatteryCells.stated_or_default(vehicle).unwrap_or(1.0).max(1.0)
 }

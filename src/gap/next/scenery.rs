@@ -2,7 +2,7 @@
 
 use super::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
 use super::known::{Flight, Known, cells, charge_of};
-use crate::effects::battery::cell_v;
+use crate::effects::cell::cell_v;
 use crate::gap::GapError;
 use crate::gap::bins::{Bin, BinValues};
 use crate::gap::candidates::{Candidate, library, of_the_air};

@@ -4,8 +4,8 @@ use crate::analysis::lean_table::LeanTable;
 use crate::analysis::wind::Leaning;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::campaign::FlightRecord;
-use crate::effects::select::value_of;
-use crate::effects::{Model, Signals};
+use crate::effects::select::without;
+use crate::effects::{Model, Role, Signal, Signals};
 use crate::mission::Plan;
 use crate::sim::plant::GRAVITY;
 use crate::sim::plant::drag::Drag;
@@ -49,20 +49,17 @@ const LIFT_ERROR: f64 = 0.07;
 pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
     let ratio = density_ratio(plan.site.ground_amsl_m);
     let (change_us, wind_mps) = changes(ratio, vehicle)?;
-    let other = |effect: &str, parameter: &str, error: f64| {
+    let other = |role: Role, error: f64| {
         let mut vehicle = vehicle.clone();
-        let value = value_of(&vehicle, effect, parameter)? * (1.0 + error);
-        let table = vehicle.effects.get_mut(effect)?;
-        table.parameters.insert(parameter.to_owned(), value);
+        let value = role.value(&vehicle)? * (1.0 + error);
+        role.set(&mut vehicle, value);
         changes(ratio, &vehicle).map(|(change_us, _)| change_us)
     };
-    let others: Vec<Vec<Vec<f64>>> = [
-        other("blade-flapping", "drag_per_weight", DRAG_ERROR),
-        other("translational-lift", "inflow_share", LIFT_ERROR),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
+    let others: Vec<Vec<Vec<f64>>> =
+        [other(Role::RotorDrag, DRAG_ERROR), other(Role::WindLift, LIFT_ERROR)]
+            .into_iter()
+            .flatten()
+            .collect();
     let at = |table: &[Vec<f64>], row: usize, column: usize| {
         table.get(row).and_then(|row| row.get(column)).copied().unwrap_or(0.0)
     };
@@ -85,13 +82,10 @@ pub(super) fn lean_table(plan: &Plan, vehicle: &Vehicle) -> Option<LeanTable> {
 /// Change of the pulse by wind, for each lean and vertical air speed of the table, us, and the wind of
 /// each lean, m/s.
 fn changes(ratio: f64, vehicle: &Vehicle) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
-    let rotor_drag =
-        value_of(vehicle, "blade-flapping", "drag_per_weight").filter(|drag| *drag > 0.0)?;
-    let body_m2 = value_of(vehicle, "parasitic-drag", "horizontal_m2").unwrap_or(0.0);
-    let mut still = vehicle.clone();
+    let rotor_drag = Role::RotorDrag.value(vehicle).filter(|drag| *drag > 0.0)?;
+    let body_m2 = Role::BodyDragSide.value(vehicle).unwrap_or(0.0);
     // The voltage is corrected for on its own.
-    still.effects.remove("battery");
-    let model = Model::of(&still).ok()?;
+    let model = Model::of(&without(vehicle, Signal::ChargeUsed)).ok()?;
     let body = SEA_LEVEL_DENSITY * ratio * body_m2 / 2.0 / (vehicle.airframe.mass_kg * GRAVITY);
     let lean = |wind_mps: f64| {
         let mut phi: f64 = 0.0;

@@ -3,6 +3,8 @@
 
 use crate::analysis::battery::Sag;
 use crate::analysis::density::Density;
+use crate::effects::Signal;
+use crate::effects::select::looks_at;
 use crate::mission::Plan;
 use crate::vehicle::Vehicle;
 
@@ -28,9 +30,6 @@ pub(super) fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
 /// How the battery acts on the pulse. Simulated drones without a battery in their physics log one
 /// that does nothing; real ones have one that does.
 pub(super) fn sag(is_simulated: bool, vehicle: Option<&Vehicle>) -> Option<Sag> {
-    let battery = vehicle.and_then(|vehicle| vehicle.effects.get("battery"));
-    match battery.filter(|battery| battery.on) {
-        Some(_) => Some(Sag::default()),
-        None => (!is_simulated).then(Sag::default),
-    }
+    let has_battery = vehicle.is_some_and(|vehicle| looks_at(vehicle, Signal::ChargeUsed));
+    (has_battery || !is_simulated).then(Sag::default)
 }

@@ -8,6 +8,7 @@ use crate::base::file::{FileError, create_folder, write_whole};
 use crate::base::plain::Shown as _;
 use crate::blind::rehearse::{Rehearsal, answers, rehearse};
 use crate::campaign::{self, FlightFolder, read_json, to_json};
+use crate::effects::{LIBRARY, Signal};
 use crate::gap::Verdict;
 use crate::gap::next::predict::{least, matters};
 use crate::gap::next::questions::Kind;
@@ -318,12 +319,15 @@ fn notes(
             Sought::Shape { .. } => false,
         })
     };
-    if is_asked("neighbour-downwash") {
-        notes.push(
-            "neighbour-downwash hides in the drones' own offsets: fly twice, with the drones' slots \
-             permuted in between (that is not predicted here)"
-                .to_owned(),
-        );
+    let by_place = LIBRARY.iter().map(|effect| effect.definition());
+    for effect in by_place.filter(|definition| definition.looks_at(Signal::Neighbours)) {
+        if is_asked(effect.name) {
+            notes.push(format!(
+                "{} hides in the drones' own offsets: fly twice, with the drones' slots permuted in \
+                 between (that is not predicted here)",
+                effect.name
+            ));
+        }
     }
     if choice.elements.payload {
         notes.push(

@@ -96,7 +96,7 @@ fn the_pulse_changes_by_what_they_say() {
         ("climb-time", set(&[9.0, 100.0])),
         ("heading", set(&[15.0, 1.0])),
     ] {
-        let effect = find(name).unwrap();
+        let effect = find(name).unwrap().effect;
         let with = read(log(&vehicle, &[(effect, values)], 2, false));
         let motors_s = with.armed_s[0].0 + 2.0;
         let (mut largest, mut count) = (0.0_f64, 0);
@@ -130,8 +130,8 @@ fn the_pulse_changes_by_what_they_say() {
 
 #[test]
 fn no_library_lists_them() {
-    for effect in FOREIGN {
-        let name = effect.definition().name;
+    for foreign in FOREIGN {
+        let name = foreign.effect.definition().name;
         assert!(!LIBRARY.iter().any(|known| known.definition().name == name), "{name}");
     }
 }

@@ -2,7 +2,7 @@
 
 // example
 use updraft::effects::definition::{Class, Definition, Hook, Parameter, Signal, Values};
-use updraft::effects::{Effect, Own, Reference, Signals, Sought, Start};
+use updraft::effects::{Effect, InFlight, Reference, Signals, Sought, Start};
 use updraft::vehicle::Airframe;
 
 const MASS: usize = 0;
@@ -29,6 +29,7 @@ impl Effect for Payload {
                 low: 0.0,
                 high: 10.0,
                 default: |vehicle| 0.05 * vehicle.airframe.mass_kg,
+                role: None,
             }],
             hooks: &[Hook::Drone],
             shown: (Signal::Drone, -2.0, 2.0),
@@ -40,8 +41,9 @@ impl Effect for Payload {
         at.thrust_us(1.0 + values[MASS] / at.airframe.mass_kg)
     }
 
-    fn start(&self, own: &mut Own, _start: &Start<'_>, airframe: &mut Airframe) {
-        airframe.mass_kg += own.values[MASS];
+    fn start(&self, start: &Start<'_>, airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        airframe.mass_kg += start.values[MASS];
+        None
     }
 }
 // end

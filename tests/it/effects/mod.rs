@@ -2,3 +2,4 @@
 
 mod docs;
 mod example;
+mod names;

@@ -1,5 +1,7 @@
 //! The effects of one simulated flight.
 
+use std::fmt;
+
 use nalgebra::Vector3;
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
@@ -11,34 +13,71 @@ use super::{Effect, Reference};
 use crate::rng::{Purpose, stream};
 use crate::vehicle::{Airframe, Vehicle};
 
-/// Numbers that an effect may remember during a flight.
-pub const MAX_STATE: usize = 8;
-
 /// Deviations of drones from the fleet are drawn again beyond this many standard deviations.
 const MOST_DEVIATION: f64 = 3.0;
 
-/// What an effect has in one flight: its parameters and what it remembers.
+/// What an effect is told before the flight.
 #[derive(Clone, Debug)]
-pub struct Own {
-    /// Parameters, in the order of the definition.
-    pub values: Values,
-    /// What it remembers from step to step.
-    pub state: [f64; MAX_STATE],
-    /// This drone's deviation from the fleet, in standard deviations.
+pub struct Start<'a> {
+    /// Its parameters, in the order of the definition.
+    pub values: &'a Values,
+    /// This drone's deviation from the fleet, in standard deviations of the effect.
     pub deviation: f64,
     /// Chance, of this drone and effect alone.
     pub rng: Pcg64,
-}
-
-/// What there is to know before the flight.
-#[derive(Clone, Copy, Debug)]
-pub struct Start<'a> {
     /// The fleet's mean drone at sea level.
     pub reference: &'a Reference,
     /// Where the drone stands, show frame, m.
     pub home_m: Vector3<f64>,
     /// Length of a step, s.
     pub dt_s: f64,
+}
+
+/// An effect in the flight of one drone: what it remembers, and how it acts at 400 Hz.
+///
+/// Only the methods that the definition's [`Hook`]s name are called; the others keep their empty
+/// default. They run at every step of 2.5 ms and must not allocate.
+pub trait InFlight: Copies + fmt::Debug + Send + Sync {
+    /// Changes the air around the drone ([`Hook::Air`]).
+    fn air(&mut self, _now: &Now, _air: &mut Air) {}
+
+    /// Follows the flight once per step, before the commands ([`Hook::Command`]).
+    fn follow(&mut self, _now: &Now) {}
+
+    /// What becomes of one rotor's command, 0..1 ([`Hook::Command`]).
+    fn command(&self, command: f64) -> f64 {
+        command
+    }
+
+    /// Changes thrust and torque, adds forces ([`Hook::Loads`]).
+    fn loads(&mut self, _now: &Now, _change: &mut Change) {}
+
+    /// Changes what the autopilot takes for its vertical speed, m/s up, `dt_s` after its last look
+    /// ([`Hook::Sense`]).
+    fn sense(&mut self, _dt_s: f64, _climb_mps: &mut f64) {}
+
+    /// The state of the battery, if this effect is one.
+    fn battery(&self) -> Option<Reading> {
+        None
+    }
+}
+
+/// Copying of an effect in flight; every [`InFlight`] that is `Clone` has it.
+pub trait Copies {
+    /// A copy with its memory as it is now.
+    fn copied(&self) -> Box<dyn InFlight>;
+}
+
+impl<T: InFlight + Clone + 'static> Copies for T {
+    fn copied(&self) -> Box<dyn InFlight> {
+        Box::new(self.clone())
+    }
+}
+
+impl Clone for Box<dyn InFlight> {
+    fn clone(&self) -> Self {
+        (**self).copied()
+    }
 }
 
 /// What there is to know at one step.
@@ -116,9 +155,9 @@ pub type Extra = (&'static dyn Effect, Values);
 
 #[derive(Clone)]
 struct Part {
-    effect: &'static dyn Effect,
     hooks: u8,
-    own: Own,
+    acting: Box<dyn InFlight>,
+    name: &'static str,
 }
 
 /// The effects that act in one flight; none is the default and costs one comparison.
@@ -128,9 +167,9 @@ pub struct Active {
     hooks: u8,
 }
 
-impl std::fmt::Debug for Active {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_list().entries(self.parts.iter().map(|part| part.effect.definition().name)).finish()
+impl fmt::Debug for Active {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.parts.iter().map(|part| part.name)).finish()
     }
 }
 
@@ -165,22 +204,22 @@ impl Active {
         dt_s: f64,
     ) -> Result<(Self, Airframe), EffectError> {
         let reference = Reference::of(vehicle);
-        let start = Start { reference: &reference, home_m, dt_s };
         let mut airframe = vehicle.airframe;
         let mut active = Self::default();
         for (effect, values) in resolved(vehicle)?.into_iter().chain(extra.iter().copied()) {
             let definition = effect.definition();
-            let named = seed ^ hash(definition.name);
-            let mut own = Own {
-                values,
-                state: [0.0; MAX_STATE],
+            let start = Start {
+                values: &values,
                 deviation: deviation(definition, seed, drone),
-                rng: stream(named, u64::from(drone), Purpose::Effects),
+                rng: chance(definition, seed, drone),
+                reference: &reference,
+                home_m,
+                dt_s,
             };
-            effect.start(&mut own, &start, &mut airframe);
+            let Some(acting) = effect.start(&start, &mut airframe) else { continue };
             let hooks = definition.hooks.iter().fold(0, |mask, hook| mask | *hook as u8);
             active.hooks |= hooks;
-            active.parts.push(Part { effect, hooks, own });
+            active.parts.push(Part { hooks, acting, name: definition.name });
         }
         Ok((active, airframe))
     }
@@ -200,28 +239,28 @@ impl Active {
     /// Changes the air.
     pub fn air(&mut self, now: &Now, air: &mut Air) {
         for part in with(&mut self.parts, Hook::Air) {
-            part.effect.air(&mut part.own, now, air);
+            part.acting.air(now, air);
         }
     }
 
     /// Lets effects on the command path follow the flight.
     pub fn follow(&mut self, now: &Now) {
         for part in with(&mut self.parts, Hook::Command) {
-            part.effect.follow(&mut part.own, now);
+            part.acting.follow(now);
         }
     }
 
     /// What becomes of one rotor's command.
     pub fn command(&self, command: f64) -> f64 {
         let acting = self.parts.iter().filter(|part| part.hooks & Hook::Command as u8 != 0);
-        acting.fold(command, |command, part| part.effect.command(&part.own, command))
+        acting.fold(command, |command, part| part.acting.command(command))
     }
 
     /// Changes of thrust and torque, and further forces.
     pub fn loads(&mut self, now: &Now) -> Change {
         let mut change = Change::default();
         for part in with(&mut self.parts, Hook::Loads) {
-            part.effect.loads(&mut part.own, now, &mut change);
+            part.acting.loads(now, &mut change);
         }
         change
     }
@@ -229,13 +268,13 @@ impl Active {
     /// Changes what the autopilot takes for its vertical speed, m/s up.
     pub fn sense(&mut self, dt_s: f64, climb_mps: &mut f64) {
         for part in with(&mut self.parts, Hook::Sense) {
-            part.effect.sense(&mut part.own, dt_s, climb_mps);
+            part.acting.sense(dt_s, climb_mps);
         }
     }
 
     /// The battery, if one acts.
     pub fn battery(&self) -> Option<Reading> {
-        self.parts.iter().find_map(|part| part.effect.battery(&part.own))
+        self.parts.iter().find_map(|part| part.acting.battery())
     }
 }
 
@@ -255,9 +294,73 @@ pub fn deviation(definition: &Definition, seed: u64, drone: u16) -> f64 {
     }
 }
 
+/// The random stream of one drone and effect, for what happens during the flight.
+fn chance(definition: &Definition, seed: u64, drone: u16) -> Pcg64 {
+    stream(seed ^ hash(definition.name), u64::from(drone), Purpose::Effects)
+}
+
 /// FNV-1a: a name as a number that no release of a library changes.
 fn hash(name: &str) -> u64 {
     name.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::Rng as _;
+
+    use super::super::LIBRARY;
+    use super::*;
+
+    /// Each effect's deviation of drone 3 under seed 7, and the first number of its chance.
+    const DRAWS: [(&str, f64, u64); 17] = [];
+
+    #[test]
+    fn random_streams_are_pinned_by_name() {
+        let drawn: Vec<(&str, f64, u64)> = LIBRARY
+            .iter()
+            .map(|effect| {
+                let definition = effect.definition();
+                let first = chance(definition, 7, 3).next_u64();
+                (definition.name, deviation(definition, 7, 3), first)
+            })
+            .collect();
+        assert_eq!(drawn, DRAWS);
+    }
+
+    #[test]
+    fn a_copy_goes_on_like_the_original() {
+        let mut vehicle = crate::vehicle::library::builtin("pixel").unwrap();
+        for effect in LIBRARY {
+            super::super::select::choose(&mut vehicle, effect.definition().name).unwrap();
+        }
+        let (mut one, _) = Active::start(&vehicle, 7, 3, Vector3::zeros(), 0.0025).unwrap();
+        let now = Now {
+            dt_s: 0.0025,
+            position_m: Vector3::new(0.0, 0.0, 20.0),
+            height_m: 20.0,
+            relative_mps: Vector3::new(2.0, 0.0, -4.0),
+            acceleration_mps2: Vector3::new(0.0, 0.0, 0.3),
+            density_ratio: 0.98,
+            thrust_n: 4.0,
+            power_w: 60.0,
+            turning: true,
+        };
+        let step = |active: &mut Active| {
+            let mut air = Air { velocity_mps: Vector3::zeros(), density_ratio: 0.98 };
+            let mut climb_mps = 1.0;
+            active.air(&now, &mut air);
+            active.follow(&now);
+            active.sense(0.0025, &mut climb_mps);
+            let change = active.loads(&now);
+            (air.velocity_mps, active.command(0.5), change.thrust, climb_mps)
+        };
+        let first = step(&mut one);
+        let mut two = one.clone();
+        let (next, copied) = (step(&mut one), step(&mut two));
+        assert_eq!(next, copied);
+        assert_ne!(first, next, "nothing is remembered");
+        assert_eq!(one.battery(), two.battery());
+    }
 }

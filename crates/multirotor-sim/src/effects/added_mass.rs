@@ -2,12 +2,10 @@
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::reference::DENSITY;
-use super::{Change, Effect, Now, Own, Reference, Signals, Start};
+use super::{Change, Effect, InFlight, Now, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
 const COEFFICIENT: usize = 0;
-/// State: added mass at sea level, kg.
-const MASS: usize = 0;
 
 /// Added mass.
 #[derive(Debug)]
@@ -17,6 +15,13 @@ pub(super) struct AddedMass;
 fn added_kg(airframe: &Airframe, coefficient: f64) -> f64 {
     let radius_m = airframe.rotor_diameter_m / 2.0;
     coefficient * 4.0 * 8.0 / 3.0 * DENSITY * radius_m.powi(3)
+}
+
+/// The air that goes with one drone.
+#[derive(Clone, Debug)]
+struct Carried {
+    /// At sea level.
+    mass_kg: f64,
 }
 
 impl Effect for AddedMass {
@@ -40,6 +45,7 @@ impl Effect for AddedMass {
                 low: 0.0,
                 high: 10.0,
                 default: |_| 0.64,
+                role: None,
             }],
             hooks: &[Hook::Loads],
             shown: (Signal::Acceleration, -2.0, 2.0),
@@ -55,12 +61,15 @@ impl Effect for AddedMass {
         at.thrust_us(with / at.weight_n()) - at.thrust_us(without / at.weight_n())
     }
 
-    fn start(&self, own: &mut Own, _start: &Start<'_>, airframe: &mut Airframe) {
+    fn start(&self, start: &Start<'_>, airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
         // More than the body itself cannot be solved step by step, and is not a multirotor.
-        own.state[MASS] = added_kg(airframe, own.values[COEFFICIENT]).min(0.5 * airframe.mass_kg);
+        let mass_kg = added_kg(airframe, start.values[COEFFICIENT]).min(0.5 * airframe.mass_kg);
+        Some(Box::new(Carried { mass_kg }))
     }
+}
 
-    fn loads(&self, own: &mut Own, now: &Now, change: &mut Change) {
-        change.force_n.z -= own.state[MASS] * now.density_ratio * now.acceleration_mps2.z;
+impl InFlight for Carried {
+    fn loads(&mut self, now: &Now, change: &mut Change) {
+        change.force_n.z -= self.mass_kg * now.density_ratio * now.acceleration_mps2.z;
     }
 }

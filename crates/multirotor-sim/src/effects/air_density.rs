@@ -1,7 +1,8 @@
 //! Air that is not the standard atmosphere's: warmer, colder, other pressure.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Air, Effect, Now, Own, Reference, Signals};
+use super::{Air, Effect, InFlight, Now, Reference, Signals, Start};
+use crate::vehicle::Airframe;
 
 const TEMPERATURE: usize = 0;
 const PRESSURE: usize = 1;
@@ -15,6 +16,13 @@ pub(super) struct AirDensity;
 
 fn factor(values: &Values) -> f64 {
     (1.0 + values[PRESSURE] / STANDARD_HPA) * STANDARD_K / (STANDARD_K + values[TEMPERATURE])
+}
+
+/// The day's air.
+#[derive(Clone, Debug)]
+struct Day {
+    /// Density over the standard atmosphere's.
+    factor: f64,
 }
 
 impl Effect for AirDensity {
@@ -40,6 +48,7 @@ impl Effect for AirDensity {
                     low: -60.0,
                     high: 60.0,
                     default: |_| 0.0,
+                    role: None,
                 },
                 Parameter {
                     name: "pressure_offset_hpa",
@@ -48,6 +57,7 @@ impl Effect for AirDensity {
                     low: -100.0,
                     high: 100.0,
                     default: |_| 0.0,
+                    role: None,
                 },
             ],
             hooks: &[Hook::Air],
@@ -63,7 +73,13 @@ impl Effect for AirDensity {
         at.in_air(signals.density_ratio * factor(values)).hover_us() - at.hover_us()
     }
 
-    fn air(&self, own: &mut Own, _now: &Now, air: &mut Air) {
-        air.density_ratio *= factor(&own.values);
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Day { factor: factor(start.values) }))
+    }
+}
+
+impl InFlight for Day {
+    fn air(&mut self, _now: &Now, air: &mut Air) {
+        air.density_ratio *= self.factor;
     }
 }

@@ -1,7 +1,9 @@
 //! A lithium battery: open-circuit voltage by charge, less current times resistance.
 
+use super::cell::cell_v;
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Effect, Now, Own, Reading, Reference, Signals, Start};
+use super::role::Role;
+use super::{Effect, InFlight, Now, Reading, Reference, Signals, Start};
 use crate::vehicle::{Airframe, RotorLaw, Vehicle};
 
 const CELLS: usize = 0;
@@ -12,15 +14,7 @@ const REFERENCE: usize = 4;
 const AVIONICS: usize = 5;
 const EXPONENT: usize = 6;
 const COMPENSATED: usize = 7;
-/// State: charge used (Ah), voltage (V), current (A), open-circuit voltage (V), factor on commands.
-const USED: usize = 0;
-const VOLTS: usize = 1;
-const AMPS: usize = 2;
-const RESTING: usize = 3;
-const FACTOR: usize = 4;
 
-/// Open-circuit voltage of a lithium polymer cell by charge, in tenths.
-const CELL_V: [f64; 11] = [3.27, 3.69, 3.73, 3.77, 3.80, 3.84, 3.87, 3.95, 4.02, 4.11, 4.20];
 /// Power over hover power by pulse over hover pulse: voltage times a current that grows a little
 /// faster than squared.
 const POWER_EXPONENT: f64 = 2.5;
@@ -31,19 +25,18 @@ const LEAST: f64 = 0.5;
 #[derive(Debug)]
 pub(super) struct Battery;
 
-/// Open-circuit voltage of a cell, V, at a charge of 0..1.
-pub fn cell_v(charge: f64) -> f64 {
-    let place = charge.clamp(0.0, 1.0) * 10.0;
-    let index = (place as usize).min(9);
-    let (low, high) = (CELL_V[index], CELL_V[index + 1]);
-    low + (high - low) * (place - index as f64)
-}
-
-/// Charge of a cell, 0..1, at an open-circuit voltage, V: the inverse of the discharge curve.
-pub fn charge_of_cell(volts: f64) -> f64 {
-    let above = CELL_V.partition_point(|known| *known <= volts).clamp(1, CELL_V.len() - 1);
-    let (low, high) = (CELL_V[above - 1], CELL_V[above]);
-    ((above - 1) as f64 + (volts - low) / (high - low)) / 10.0
+/// The battery of one drone.
+#[derive(Clone, Debug)]
+struct Pack {
+    values: Values,
+    used_ah: f64,
+    /// Under load.
+    volts: f64,
+    amps: f64,
+    /// Open-circuit voltage.
+    resting_v: f64,
+    /// Factor on commands.
+    factor: f64,
 }
 
 fn resting_v(values: &Values, used_ah: f64) -> f64 {
@@ -121,6 +114,7 @@ impl Effect for Battery {
                     low: 1.0,
                     high: 24.0,
                     default: |vehicle| (reference_v(vehicle) / 3.85).round().max(1.0),
+                    role: Some(Role::BatteryCells),
                 },
                 Parameter {
                     name: "capacity_ah",
@@ -129,6 +123,7 @@ impl Effect for Battery {
                     low: 0.01,
                     high: 1000.0,
                     default: capacity_ah,
+                    role: Some(Role::BatteryCapacity),
                 },
                 Parameter {
                     name: "resistance_ohm",
@@ -137,6 +132,7 @@ impl Effect for Battery {
                     low: 0.0,
                     high: 1.0,
                     default: |_| 0.05,
+                    role: Some(Role::BatteryResistance),
                 },
                 Parameter {
                     name: "initial_charge",
@@ -145,6 +141,7 @@ impl Effect for Battery {
                     low: 0.0,
                     high: 1.0,
                     default: |_| 1.0,
+                    role: Some(Role::BatteryCharge),
                 },
                 Parameter {
                     name: "reference_v",
@@ -153,6 +150,7 @@ impl Effect for Battery {
                     low: 1.0,
                     high: 100.0,
                     default: reference_v,
+                    role: Some(Role::BatteryReference),
                 },
                 Parameter {
                     name: "avionics_w",
@@ -161,6 +159,7 @@ impl Effect for Battery {
                     low: 0.0,
                     high: 1000.0,
                     default: |_| 3.0,
+                    role: Some(Role::BatteryAvionics),
                 },
                 Parameter {
                     name: "exponent",
@@ -169,6 +168,7 @@ impl Effect for Battery {
                     low: 0.0,
                     high: 2.0,
                     default: |_| 1.0,
+                    role: Some(Role::BatterySag),
                 },
                 Parameter {
                     name: "compensated",
@@ -177,11 +177,12 @@ impl Effect for Battery {
                     low: 0.0,
                     high: 1.0,
                     default: |_| 1.0,
+                    role: Some(Role::BatteryCompensated),
                 },
             ],
             hooks: &[Hook::Command],
             shown: (Signal::ChargeUsed, 0.0, 2.0),
-            sought: Sought::Shape { size: "exponent", sizes: &[1.0], shape: None },
+            sought: Sought::Shape { size: "exponent", sizes: |_| &[1.0], usual: None, shape: None },
         }
     }
 
@@ -194,53 +195,45 @@ impl Effect for Battery {
         pulse_us * ((values[REFERENCE] / volts).powf(values[EXPONENT]) - 1.0)
     }
 
-    fn start(&self, own: &mut Own, _start: &Start<'_>, _airframe: &mut Airframe) {
-        let resting = resting_v(&own.values, 0.0);
-        own.state[RESTING] = resting;
-        own.state[VOLTS] = resting;
-        own.state[FACTOR] = 1.0;
-    }
-
-    fn follow(&self, own: &mut Own, now: &Now) {
-        let Own { values, state, .. } = own;
-        state[AMPS] = (now.power_w + values[AVIONICS]) / state[VOLTS];
-        state[USED] += state[AMPS] * now.dt_s / 3600.0;
-        state[RESTING] = resting_v(values, state[USED]);
-        let least = LEAST * state[RESTING];
-        state[VOLTS] = (state[RESTING] - values[RESISTANCE] * state[AMPS]).max(least);
-        let ratio = state[VOLTS] / values[REFERENCE];
-        state[FACTOR] = if values[EXPONENT] == 1.0 { ratio } else { ratio.powf(values[EXPONENT]) };
-    }
-
-    fn command(&self, own: &Own, command: f64) -> f64 {
-        command * own.state[FACTOR]
-    }
-
-    fn battery(&self, own: &Own) -> Option<Reading> {
-        Some(Reading {
-            volts: own.state[VOLTS],
-            resting_v: own.state[RESTING],
-            amps: own.state[AMPS],
-            used_ah: own.state[USED],
-            charge: own.values[INITIAL] - own.state[USED] / own.values[CAPACITY],
-            capacity_ah: own.values[CAPACITY],
-            resistance_ohm: own.values[RESISTANCE],
-            compensated: own.values[COMPENSATED] >= 0.5,
-        })
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        let resting_v = resting_v(start.values, 0.0);
+        Some(Box::new(Pack {
+            values: *start.values,
+            used_ah: 0.0,
+            volts: resting_v,
+            amps: 0.0,
+            resting_v,
+            factor: 1.0,
+        }))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+impl InFlight for Pack {
+    fn follow(&mut self, now: &Now) {
+        let values = &self.values;
+        self.amps = (now.power_w + values[AVIONICS]) / self.volts;
+        self.used_ah += self.amps * now.dt_s / 3600.0;
+        self.resting_v = resting_v(values, self.used_ah);
+        let least = LEAST * self.resting_v;
+        self.volts = (self.resting_v - values[RESISTANCE] * self.amps).max(least);
+        let ratio = self.volts / values[REFERENCE];
+        self.factor = if values[EXPONENT] == 1.0 { ratio } else { ratio.powf(values[EXPONENT]) };
+    }
 
-    #[test]
-    fn cell_curve_is_monotonic_and_has_its_ends() {
-        assert_eq!((cell_v(1.0), cell_v(0.0), cell_v(7.0)), (4.2, 3.27, 4.2));
-        assert!(CELL_V.windows(2).all(|pair| pair[0] < pair[1]));
-        assert!((cell_v(0.95) - 4.155).abs() < 1e-12);
-        for charge in [0.0, 0.03, 0.5, 0.87, 1.0] {
-            assert!((charge_of_cell(cell_v(charge)) - charge).abs() < 1e-12);
-        }
+    fn command(&self, command: f64) -> f64 {
+        command * self.factor
+    }
+
+    fn battery(&self) -> Option<Reading> {
+        Some(Reading {
+            volts: self.volts,
+            resting_v: self.resting_v,
+            amps: self.amps,
+            used_ah: self.used_ah,
+            charge: self.values[INITIAL] - self.used_ah / self.values[CAPACITY],
+            capacity_ah: self.values[CAPACITY],
+            resistance_ohm: self.values[RESISTANCE],
+            compensated: self.values[COMPENSATED] >= 0.5,
+        })
     }
 }

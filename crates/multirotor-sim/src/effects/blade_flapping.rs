@@ -1,16 +1,22 @@
 //! Horizontal drag of the rotors: blade flapping and induced drag.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Change, Effect, Now, Own, Reference, Signals, Start};
+use super::role::Role;
+use super::{Change, Effect, InFlight, Now, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
 const DRAG: usize = 0;
-/// State: weight, N.
-const WEIGHT: usize = 0;
 
 /// Blade flapping and rotor drag (H-force).
 #[derive(Debug)]
 pub(super) struct BladeFlapping;
+
+/// The rotors of one drone.
+#[derive(Clone, Debug)]
+struct Rotors {
+    drag_per_weight: f64,
+    weight_n: f64,
+}
 
 impl Effect for BladeFlapping {
     fn definition(&self) -> &'static Definition {
@@ -36,6 +42,7 @@ impl Effect for BladeFlapping {
                 low: 0.0,
                 high: 0.1,
                 default: |_| 0.021,
+                role: Some(Role::RotorDrag),
             }],
             hooks: &[Hook::Loads],
             shown: (Signal::Horizontal, 0.0, 8.0),
@@ -49,13 +56,16 @@ impl Effect for BladeFlapping {
         at.thrust_us(lean(values[DRAG], signals.horizontal_mps).cos())
     }
 
-    fn start(&self, own: &mut Own, start: &Start<'_>, _airframe: &mut Airframe) {
-        own.state[WEIGHT] = start.reference.weight_n();
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        let weight_n = start.reference.weight_n();
+        Some(Box::new(Rotors { drag_per_weight: start.values[DRAG], weight_n }))
     }
+}
 
-    fn loads(&self, own: &mut Own, now: &Now, change: &mut Change) {
+impl InFlight for Rotors {
+    fn loads(&mut self, now: &Now, change: &mut Change) {
         let thrust_n = (now.thrust_n * change.thrust).max(0.0);
-        let factor = own.values[DRAG] * (thrust_n * own.state[WEIGHT]).sqrt();
+        let factor = self.drag_per_weight * (thrust_n * self.weight_n).sqrt();
         change.force_n.x -= factor * now.relative_mps.x;
         change.force_n.y -= factor * now.relative_mps.y;
     }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::role::Role;
 use crate::vehicle::Vehicle;
 
 /// Most parameters an effect has.
@@ -39,6 +40,28 @@ pub struct Definition {
     pub sought: Sought,
 }
 
+impl Definition {
+    /// Whether its closed form looks at a signal.
+    pub fn looks_at(&self, signal: Signal) -> bool {
+        self.signals.contains(&signal)
+    }
+
+    /// Whether it is a difference between drones and nothing else: the fleet's mean drone lacks it.
+    pub fn is_difference(&self) -> bool {
+        self.signals == [Signal::Drone] && self.hooks == [Hook::Drone]
+    }
+
+    /// Its parameter of a name.
+    pub fn parameter(&self, name: &str) -> Option<&'static Parameter> {
+        self.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// Its parameter that has a role.
+    pub fn with_role(&self, role: Role) -> Option<&'static Parameter> {
+        self.parameters.iter().find(|parameter| parameter.role == Some(role))
+    }
+}
+
 /// How an effect is looked for in the residual of measured against simulated pulses.
 #[derive(Debug)]
 pub enum Sought {
@@ -46,8 +69,10 @@ pub enum Sought {
     Shape {
         /// The parameter that says how large it is.
         size: &'static str,
-        /// Sizes to try; the effect is 0 at size 0.
-        sizes: &'static [f64],
+        /// Sizes to try on a vehicle that lacks the effect; the effect is 0 at size 0.
+        sizes: fn(&Vehicle) -> &'static [f64],
+        /// The usual size, where the parameter's default is not one.
+        usual: Option<f64>,
         /// Another parameter that changes the shape, with values to try.
         shape: Option<(&'static str, &'static [f64])>,
     },
@@ -71,6 +96,8 @@ pub struct Parameter {
     pub high: f64,
     /// Value when the vehicle's file states none.
     pub default: fn(&Vehicle) -> f64,
+    /// What it is to code that does not know the effect.
+    pub role: Option<Role>,
 }
 
 /// Signals that a closed form looks at; the fields of [`super::Signals`].

@@ -1,7 +1,8 @@
 //! Near the ground the rotors' wake cannot leave, and thrust grows.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Change, Effect, Now, Own, Reference, Signals};
+use super::{Change, Effect, InFlight, Now, Reference, Signals, Start};
+use crate::vehicle::Airframe;
 
 const RADIUS: usize = 0;
 const SPACING: usize = 1;
@@ -29,6 +30,10 @@ fn gain(values: &Values, height_m: f64) -> f64 {
     if lost < 1.0 - 1.0 / MOST_GAIN { 1.0 / (1.0 - lost) } else { MOST_GAIN }
 }
 
+/// The rotors of one drone above the ground: the effect's parameters.
+#[derive(Clone, Debug)]
+struct Rotors(Values);
+
 impl Effect for GroundEffect {
     fn definition(&self) -> &'static Definition {
         &Definition {
@@ -51,6 +56,7 @@ impl Effect for GroundEffect {
                     low: 0.01,
                     high: 2.0,
                     default: |vehicle| vehicle.airframe.rotor_diameter_m / 2.0,
+                    role: None,
                 },
                 Parameter {
                     name: "spacing_m",
@@ -59,6 +65,7 @@ impl Effect for GroundEffect {
                     low: 0.02,
                     high: 5.0,
                     default: |vehicle| vehicle.airframe.arm_m * std::f64::consts::SQRT_2,
+                    role: None,
                 },
                 Parameter {
                     name: "diagonal_m",
@@ -67,6 +74,7 @@ impl Effect for GroundEffect {
                     low: 0.02,
                     high: 5.0,
                     default: |vehicle| vehicle.airframe.arm_m * 2.0,
+                    role: None,
                 },
                 Parameter {
                     name: "body_lift",
@@ -75,6 +83,7 @@ impl Effect for GroundEffect {
                     low: 0.0,
                     high: 5.0,
                     default: |_| 2.0,
+                    role: None,
                 },
                 Parameter {
                     name: "rotor_height_m",
@@ -83,11 +92,17 @@ impl Effect for GroundEffect {
                     low: 0.01,
                     high: 2.0,
                     default: |_| 0.06,
+                    role: None,
                 },
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Height, 0.1, 3.0),
-            sought: Sought::Shape { size: "radius_m", sizes: &[0.08, 0.2], shape: None },
+            sought: Sought::Shape {
+                size: "radius_m",
+                sizes: |_| &[0.08, 0.2],
+                usual: None,
+                shape: None,
+            },
         }
     }
 
@@ -95,7 +110,13 @@ impl Effect for GroundEffect {
         at.thrust_us(1.0 / gain(values, signals.height_m))
     }
 
-    fn loads(&self, own: &mut Own, now: &Now, change: &mut Change) {
-        change.thrust *= gain(&own.values, now.height_m);
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Rotors(*start.values)))
+    }
+}
+
+impl InFlight for Rotors {
+    fn loads(&mut self, now: &Now, change: &mut Change) {
+        change.thrust *= gain(&self.0, now.height_m);
     }
 }

@@ -1,7 +1,8 @@
 //! Mass differs from drone to drone.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Effect, Own, Reference, Signals, Start};
+use super::role::Role;
+use super::{Effect, InFlight, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
 const SD: usize = 0;
@@ -31,6 +32,7 @@ impl Effect for MassSpread {
                 low: 0.0,
                 high: 0.1,
                 default: |_| 0.012,
+                role: Some(Role::MassSpread),
             }],
             hooks: &[Hook::Drone],
             shown: (Signal::Drone, -2.0, 2.0),
@@ -44,7 +46,8 @@ impl Effect for MassSpread {
         at.thrust_us(1.0 + values[SD] * signals.deviation)
     }
 
-    fn start(&self, own: &mut Own, _start: &Start<'_>, airframe: &mut Airframe) {
-        airframe.mass_kg *= 1.0 + own.values[SD] * own.deviation;
+    fn start(&self, start: &Start<'_>, airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        airframe.mass_kg *= 1.0 + start.values[SD] * start.deviation;
+        None
     }
 }

@@ -9,9 +9,11 @@
 pub mod active;
 mod added_mass;
 mod air_density;
-pub mod battery;
+mod battery;
 mod blade_flapping;
+pub mod cell;
 pub mod definition;
+mod disc;
 pub mod doc;
 mod error;
 mod ground_effect;
@@ -22,6 +24,7 @@ mod motor_thermal;
 mod neighbour_downwash;
 mod parasitic_drag;
 pub mod reference;
+pub mod role;
 mod rotor_inflow;
 pub mod select;
 pub mod signals;
@@ -33,11 +36,12 @@ mod turbulence;
 mod velocity_error;
 mod vortex_ring;
 
-pub use active::{Active, Air, Change, Extra, Now, Own, Reading, Start};
+pub use active::{Active, Air, Change, Extra, InFlight, Now, Reading, Start};
 pub use definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 pub use error::EffectError;
 pub use model::Model;
 pub use reference::Reference;
+pub use role::Role;
 pub use signals::Signals;
 
 use crate::vehicle::{Airframe, Vehicle};
@@ -70,10 +74,6 @@ pub fn find(name: &str) -> Option<&'static dyn Effect> {
 }
 
 /// One piece of physics.
-///
-/// Only the hooks that [`Definition::hooks`] names are ever called; the others keep their empty
-/// default. Hooks run at every step of 2.5 ms and must not allocate; what they remember is in
-/// [`Own`].
 pub trait Effect: Sync {
     /// What it is.
     fn definition(&self) -> &'static Definition;
@@ -90,29 +90,12 @@ pub trait Effect: Sync {
         None
     }
 
-    /// Once, before the flight: prepares what it remembers, changes the drone ([`Hook::Drone`]).
-    /// Called for every effect that is on.
-    fn start(&self, _own: &mut Own, _start: &Start<'_>, _airframe: &mut Airframe) {}
-
-    /// Changes the air around the drone ([`Hook::Air`]).
-    fn air(&self, _own: &mut Own, _now: &Now, _air: &mut Air) {}
-
-    /// Follows the flight once per step, before the commands ([`Hook::Command`]).
-    fn follow(&self, _own: &mut Own, _now: &Now) {}
-
-    /// What becomes of one rotor's command, 0..1 ([`Hook::Command`]).
-    fn command(&self, _own: &Own, command: f64) -> f64 {
-        command
-    }
-
-    /// Changes thrust and torque, adds forces ([`Hook::Loads`]).
-    fn loads(&self, _own: &mut Own, _now: &Now, _change: &mut Change) {}
-
-    /// Changes what the autopilot takes for its vertical speed, m/s up ([`Hook::Sense`]).
-    fn sense(&self, _own: &mut Own, _dt_s: f64, _climb_mps: &mut f64) {}
-
-    /// The state of the battery, if this effect is one.
-    fn battery(&self, _own: &Own) -> Option<Reading> {
+    /// Before the flight: changes the drone ([`Hook::Drone`]) and gives what acts during the flight,
+    /// with its own memory; `None`: nothing does.
+    ///
+    /// Called for every effect that is on, in the order of the library: `airframe` is what the
+    /// effects before left of it.
+    fn start(&self, _start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
         None
     }
 }

@@ -1,18 +1,26 @@
 //! Motors and controllers warm up.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Effect, Now, Own, Reference, Signals, Start};
+use super::role::Role;
+use super::{Effect, InFlight, Now, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
 const DRIFT: usize = 0;
 const TIME: usize = 1;
-/// State: how warm (0 cold, 1 at its end), and the share of command lost when warm.
-const WARMTH: usize = 0;
-const LOSS: usize = 1;
 
 /// Motor and controller thermal drift.
 #[derive(Debug)]
 pub(super) struct MotorThermal;
+
+/// The motors of one drone.
+#[derive(Clone, Debug)]
+struct Motors {
+    time_s: f64,
+    /// Share of the command that is lost when warm.
+    loss: f64,
+    /// 0 cold, 1 at its end.
+    warmth: f64,
+}
 
 impl Effect for MotorThermal {
     fn definition(&self) -> &'static Definition {
@@ -36,6 +44,7 @@ impl Effect for MotorThermal {
                     low: -50.0,
                     high: 50.0,
                     default: |_| -10.0,
+                    role: None,
                 },
                 Parameter {
                     name: "time_s",
@@ -44,13 +53,15 @@ impl Effect for MotorThermal {
                     low: 1.0,
                     high: 3600.0,
                     default: |_| 120.0,
+                    role: Some(Role::WarmUpTime),
                 },
             ],
             hooks: &[Hook::Command],
             shown: (Signal::Time, 0.0, 600.0),
             sought: Sought::Shape {
                 size: "drift_us",
-                sizes: &[-12.0, 12.0],
+                sizes: |_| &[-12.0, 12.0],
+                usual: None,
                 shape: Some(("time_s", &[60.0, 100.0, 160.0])),
             },
         }
@@ -60,18 +71,21 @@ impl Effect for MotorThermal {
         -values[DRIFT] * (-signals.time_s.max(0.0) / values[TIME]).exp_m1()
     }
 
-    fn start(&self, own: &mut Own, start: &Start<'_>, _airframe: &mut Airframe) {
-        let drift_us = own.values[DRIFT];
-        own.state[LOSS] = drift_us / (start.reference.hover_us() - 1000.0 + drift_us);
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        let drift_us = start.values[DRIFT];
+        let loss = drift_us / (start.reference.hover_us() - 1000.0 + drift_us);
+        Some(Box::new(Motors { time_s: start.values[TIME], loss, warmth: 0.0 }))
     }
+}
 
-    fn follow(&self, own: &mut Own, now: &Now) {
+impl InFlight for Motors {
+    fn follow(&mut self, now: &Now) {
         if now.turning {
-            own.state[WARMTH] += (1.0 - own.state[WARMTH]) * now.dt_s / own.values[TIME];
+            self.warmth += (1.0 - self.warmth) * now.dt_s / self.time_s;
         }
     }
 
-    fn command(&self, own: &Own, command: f64) -> f64 {
-        command * (1.0 - own.state[LOSS] * own.state[WARMTH])
+    fn command(&self, command: f64) -> f64 {
+        command * (1.0 - self.loss * self.warmth)
     }
 }

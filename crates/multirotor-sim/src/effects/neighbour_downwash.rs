@@ -2,15 +2,12 @@
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::reference::DENSITY;
-use super::{Air, Effect, Now, Own, Reference, Signals, Start, momentum};
+use super::{Air, Effect, InFlight, Now, Reference, Signals, Start, momentum};
 use crate::vehicle::Airframe;
 
 const SPACING: usize = 0;
 const ARRAY: usize = 1;
 const STRENGTH: usize = 2;
-/// State: share of neighbours, weight (N).
-const SHARE: usize = 0;
-const WEIGHT: usize = 1;
 
 /// Neighbour downwash.
 #[derive(Debug)]
@@ -29,6 +26,15 @@ fn neighbours(x_m: f64, y_m: f64, values: &Values) -> f64 {
     let edge_m = (values[ARRAY] - values[SPACING]) / 2.0;
     let lines = |place_m: f64| if place_m.abs() < edge_m { 3.0 } else { 2.0 };
     lines(x_m) * lines(y_m) - 1.0
+}
+
+/// One drone's place in the array.
+#[derive(Clone, Debug)]
+struct Seat {
+    values: Values,
+    /// Its neighbours over the eight of a drone in the middle.
+    share: f64,
+    weight_n: f64,
 }
 
 impl Effect for NeighbourDownwash {
@@ -54,6 +60,7 @@ impl Effect for NeighbourDownwash {
                     low: 0.5,
                     high: 1000.0,
                     default: |_| 7.0,
+                    role: None,
                 },
                 Parameter {
                     name: "array_m",
@@ -62,6 +69,7 @@ impl Effect for NeighbourDownwash {
                     low: 0.0,
                     high: 10_000.0,
                     default: |_| 42.0,
+                    role: None,
                 },
                 Parameter {
                     name: "strength",
@@ -70,11 +78,12 @@ impl Effect for NeighbourDownwash {
                     low: 0.0,
                     high: 4.0,
                     default: |_| 1.0,
+                    role: None,
                 },
             ],
             hooks: &[Hook::Air],
             shown: (Signal::Neighbours, 0.0, 8.0),
-            sought: Sought::Shape { size: "strength", sizes: &[1.0], shape: None },
+            sought: Sought::Shape { size: "strength", sizes: |_| &[1.0], usual: None, shape: None },
         }
     }
 
@@ -83,15 +92,20 @@ impl Effect for NeighbourDownwash {
         signals.sensitivity * sink * signals.neighbours / 8.0
     }
 
-    fn start(&self, own: &mut Own, start: &Start<'_>, _airframe: &mut Airframe) {
-        own.state[SHARE] = neighbours(start.home_m.x, start.home_m.y, &own.values) / 8.0;
-        own.state[WEIGHT] = start.reference.weight_n();
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Seat {
+            values: *start.values,
+            share: neighbours(start.home_m.x, start.home_m.y, start.values) / 8.0,
+            weight_n: start.reference.weight_n(),
+        }))
     }
+}
 
-    fn air(&self, own: &mut Own, now: &Now, air: &mut Air) {
+impl InFlight for Seat {
+    fn air(&mut self, now: &Now, air: &mut Air) {
         let wind_mps = now.relative_mps.xy().norm();
-        let sink = sink_mps(own.state[WEIGHT], now.density_ratio, &own.values, wind_mps);
-        air.velocity_mps.z -= sink * own.state[SHARE];
+        let sink = sink_mps(self.weight_n, now.density_ratio, &self.values, wind_mps);
+        air.velocity_mps.z -= sink * self.share;
     }
 }
 

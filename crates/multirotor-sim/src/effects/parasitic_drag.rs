@@ -2,8 +2,9 @@
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::reference::DENSITY;
-use super::{Change, Effect, Now, Own, Reference, Signals};
-use crate::vehicle::Vehicle;
+use super::role::Role;
+use super::{Change, Effect, InFlight, Now, Reference, Signals, Start};
+use crate::vehicle::Airframe;
 
 const VERTICAL: usize = 0;
 const HORIZONTAL: usize = 1;
@@ -12,14 +13,11 @@ const HORIZONTAL: usize = 1;
 #[derive(Debug)]
 pub(super) struct ParasiticDrag;
 
-const USUAL_VERTICAL_M2: f64 = 0.02;
-
-/// Vertical drag area of a vehicle on which this effect acts, else 0, m².
-pub(super) fn vertical_m2(vehicle: &Vehicle) -> f64 {
-    let Some(table) = vehicle.effects.get("parasitic-drag").filter(|table| table.on) else {
-        return 0.0;
-    };
-    table.parameters.get("vertical_m2").copied().unwrap_or(USUAL_VERTICAL_M2)
+/// The body of one drone.
+#[derive(Clone, Debug)]
+struct Body {
+    vertical_m2: f64,
+    horizontal_m2: f64,
 }
 
 impl Effect for ParasiticDrag {
@@ -44,7 +42,8 @@ impl Effect for ParasiticDrag {
                     what: "drag coefficient times area for vertical flow (S_v)",
                     low: 0.0,
                     high: 1.0,
-                    default: |_| USUAL_VERTICAL_M2,
+                    default: |_| 0.02,
+                    role: Some(Role::BodyDragTop),
                 },
                 Parameter {
                     name: "horizontal_m2",
@@ -53,11 +52,17 @@ impl Effect for ParasiticDrag {
                     low: 0.0,
                     high: 1.0,
                     default: |_| 0.01,
+                    role: Some(Role::BodyDragSide),
                 },
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Climb, -3.5, 3.5),
-            sought: Sought::Shape { size: "vertical_m2", sizes: &[0.02, 0.1], shape: None },
+            sought: Sought::Shape {
+                size: "vertical_m2",
+                sizes: |_| &[0.02, 0.1],
+                usual: None,
+                shape: None,
+            },
         }
     }
 
@@ -71,11 +76,17 @@ impl Effect for ParasiticDrag {
         at.thrust_us(own_lean.cos() + along)
     }
 
-    fn loads(&self, own: &mut Own, now: &Now, change: &mut Change) {
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        let [vertical_m2, horizontal_m2] = [start.values[VERTICAL], start.values[HORIZONTAL]];
+        Some(Box::new(Body { vertical_m2, horizontal_m2 }))
+    }
+}
+
+impl InFlight for Body {
+    fn loads(&mut self, now: &Now, change: &mut Change) {
         let pressure = DENSITY * now.density_ratio / 2.0 * now.relative_mps.norm();
-        let [vertical, horizontal] = [own.values[VERTICAL], own.values[HORIZONTAL]];
-        change.force_n.x -= pressure * horizontal * now.relative_mps.x;
-        change.force_n.y -= pressure * horizontal * now.relative_mps.y;
-        change.force_n.z -= pressure * vertical * now.relative_mps.z;
+        change.force_n.x -= pressure * self.horizontal_m2 * now.relative_mps.x;
+        change.force_n.y -= pressure * self.horizontal_m2 * now.relative_mps.y;
+        change.force_n.z -= pressure * self.vertical_m2 * now.relative_mps.z;
     }
 }

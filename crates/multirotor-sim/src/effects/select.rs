@@ -1,6 +1,6 @@
 //! Which effects a vehicle has, with which parameters.
 
-use super::definition::{MAX_PARAMETERS, Values};
+use super::definition::{MAX_PARAMETERS, Signal, Values};
 use super::error::EffectError;
 use super::{Effect, LIBRARY, find};
 use crate::vehicle::Vehicle;
@@ -72,6 +72,35 @@ pub fn values_of(effect: &dyn Effect, vehicle: &Vehicle) -> Result<Values, Effec
         return Err(EffectError::Nonsense { effect: definition.name, name, value, why });
     }
     Ok(values)
+}
+
+/// Switches an effect on and sets one of its parameters, whatever its bounds.
+pub fn set(vehicle: &mut Vehicle, effect: &str, parameter: &str, value: f64) {
+    let table = vehicle.effects.entry(effect.to_owned()).or_default();
+    table.on = true;
+    table.parameters.insert(parameter.to_owned(), value);
+}
+
+/// The effects that a vehicle's file switches on, in the order of the library; also such as have a
+/// value out of bounds.
+pub fn acting(vehicle: &Vehicle) -> impl Iterator<Item = &'static dyn Effect> {
+    let is_on = |effect: &&dyn Effect| {
+        vehicle.effects.get(effect.definition().name).is_some_and(|table| table.on)
+    };
+    LIBRARY.iter().copied().filter(is_on)
+}
+
+/// Whether an effect that acts on a vehicle looks at a signal.
+pub fn looks_at(vehicle: &Vehicle, signal: Signal) -> bool {
+    acting(vehicle).any(|effect| effect.definition().looks_at(signal))
+}
+
+/// Switches off the effects that look at a signal.
+pub fn without(vehicle: &Vehicle, signal: Signal) -> Vehicle {
+    let mut other = vehicle.clone();
+    let blind = |name: &str| find(name).is_none_or(|effect| !effect.definition().looks_at(signal));
+    other.effects.retain(|name, _| blind(name));
+    other
 }
 
 /// Applies a choice from a command line to a vehicle: `NAME`, `NAME=on`, `NAME=off` or

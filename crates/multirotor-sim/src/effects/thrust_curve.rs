@@ -1,13 +1,10 @@
 //! The motor controller's curve from command to thrust is not the model's.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Effect, Own, Reference, Signals, Start};
-use crate::vehicle::Airframe;
+use super::{Effect, InFlight, Reference, Signals, Start};
+use crate::vehicle::{Airframe, RotorLaw, Vehicle};
 
 const EXPO: usize = 0;
-/// State: command in hover, curve there.
-const HOVER: usize = 0;
-const AT_HOVER: usize = 1;
 
 /// Thrust curve.
 #[derive(Debug)]
@@ -24,6 +21,25 @@ fn inverse(expo: f64, value: f64) -> f64 {
         return value;
     }
     ((linear * linear + 4.0 * expo * value).max(0.0).sqrt() - linear) / (2.0 * expo)
+}
+
+/// Sizes to try. Thrust that grows slower than the pulse is no curve that a rotor has: only a model
+/// that is curved itself can be curved too much.
+fn sizes(vehicle: &Vehicle) -> &'static [f64] {
+    match vehicle.airframe.rotor {
+        RotorLaw::Linear => &[0.3, 0.6],
+        RotorLaw::Motor(_) => &[-0.3, 0.3, 0.6],
+    }
+}
+
+/// The controller of one drone.
+#[derive(Clone, Debug)]
+struct Controller {
+    expo: f64,
+    /// Command in hover, 0..1.
+    hover: f64,
+    /// The curve there.
+    at_hover: f64,
 }
 
 impl Effect for ThrustCurve {
@@ -48,10 +64,12 @@ impl Effect for ThrustCurve {
                 low: -0.5,
                 high: 1.0,
                 default: |vehicle| vehicle.autopilot.mot_thst_expo.clamp(0.0, 1.0),
+                role: None,
             }],
             hooks: &[Hook::Command],
             shown: (Signal::ModelIncrement, -100.0, 100.0),
-            sought: Sought::Shape { size: "expo", sizes: &[-0.3, 0.3, 0.6], shape: None },
+            // An expo of 0 is no effect: the thrust curve of small motors.
+            sought: Sought::Shape { size: "expo", sizes, usual: Some(0.5), shape: None },
         }
     }
 
@@ -62,13 +80,16 @@ impl Effect for ThrustCurve {
         1000.0 * (inverse(expo, curve(expo, hover) * wanted / hover) - wanted)
     }
 
-    fn start(&self, own: &mut Own, start: &Start<'_>, _airframe: &mut Airframe) {
-        own.state[HOVER] = (start.reference.hover_us() - 1000.0) / 1000.0;
-        own.state[AT_HOVER] = curve(own.values[EXPO], own.state[HOVER]);
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        let expo = start.values[EXPO];
+        let hover = (start.reference.hover_us() - 1000.0) / 1000.0;
+        Some(Box::new(Controller { expo, hover, at_hover: curve(expo, hover) }))
     }
+}
 
-    fn command(&self, own: &Own, command: f64) -> f64 {
-        own.state[HOVER] * curve(own.values[EXPO], command) / own.state[AT_HOVER]
+impl InFlight for Controller {
+    fn command(&self, command: f64) -> f64 {
+        self.hover * curve(self.expo, command) / self.at_hover
     }
 }
 

@@ -1,7 +1,8 @@
 //! The rotors' thrust coefficient differs from drone to drone.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Effect, Own, Reference, Signals, Start};
+use super::role::Role;
+use super::{Effect, InFlight, Reference, Signals, Start};
 use crate::vehicle::Airframe;
 
 const SD: usize = 0;
@@ -29,6 +30,7 @@ impl Effect for ThrustSpread {
                 low: 0.0,
                 high: 0.1,
                 default: |_| 0.018,
+                role: Some(Role::ThrustSpread),
             }],
             hooks: &[Hook::Drone],
             shown: (Signal::Drone, -2.0, 2.0),
@@ -42,7 +44,8 @@ impl Effect for ThrustSpread {
         at.thrust_us(1.0 / (1.0 + values[SD] * signals.deviation))
     }
 
-    fn start(&self, own: &mut Own, _start: &Start<'_>, airframe: &mut Airframe) {
-        airframe.thrust_coefficient *= 1.0 + own.values[SD] * own.deviation;
+    fn start(&self, start: &Start<'_>, airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        airframe.thrust_coefficient *= 1.0 + start.values[SD] * start.deviation;
+        None
     }
 }

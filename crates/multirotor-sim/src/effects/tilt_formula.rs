@@ -31,6 +31,7 @@ impl Effect for TiltFormula {
                 low: 0.0,
                 high: 2000.0,
                 default: |vehicle| Reference::of(vehicle).sensitivity_us(),
+                role: None,
             }],
             hooks: &[],
             shown: (Signal::Tilt, 0.0, 0.2),

@@ -1,8 +1,9 @@
 //! Horizontal air speed carries the rotor's own inflow away.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::rotor_inflow::{Disc, LEAST_SHARE, MOST_SHARE, flow_us, share_of};
-use super::{Change, Effect, Now, Own, Reference, Signals, Start, momentum};
+use super::disc::{Disc, LEAST_SHARE, MOST_SHARE, flow_us, share_of};
+use super::role::Role;
+use super::{Change, Effect, InFlight, Now, Reference, Signals, Start, momentum};
 use crate::vehicle::Airframe;
 
 const SHARE: usize = 0;
@@ -12,6 +13,13 @@ const LEAST_THRUST: f64 = 0.05;
 /// Translational lift.
 #[derive(Debug)]
 pub(super) struct TranslationalLift;
+
+/// The rotor of one drone.
+#[derive(Clone, Debug)]
+struct Rotor {
+    disc: Disc,
+    share: f64,
+}
 
 impl Effect for TranslationalLift {
     fn definition(&self) -> &'static Definition {
@@ -34,10 +42,16 @@ impl Effect for TranslationalLift {
                 low: LEAST_SHARE,
                 high: MOST_SHARE,
                 default: share_of,
+                role: Some(Role::WindLift),
             }],
             hooks: &[Hook::Loads],
             shown: (Signal::Horizontal, 0.0, 8.0),
-            sought: Sought::Shape { size: "inflow_share", sizes: &[0.02, 0.5], shape: None },
+            sought: Sought::Shape {
+                size: "inflow_share",
+                sizes: |_| &[0.02, 0.5],
+                usual: None,
+                shape: None,
+            },
         }
     }
 
@@ -49,20 +63,20 @@ impl Effect for TranslationalLift {
         flow_us(at, values[SHARE], flow(edgewise)) - flow_us(at, values[SHARE], flow(0.0))
     }
 
-    fn start(&self, own: &mut Own, _start: &Start<'_>, airframe: &mut Airframe) {
-        let disc = Disc::of(airframe);
-        own.state[0] = disc.flow_factor;
-        own.state[1] = disc.merit;
+    fn start(&self, start: &Start<'_>, airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Rotor { disc: Disc::of(airframe), share: start.values[SHARE] }))
     }
+}
 
-    fn loads(&self, own: &mut Own, now: &Now, change: &mut Change) {
-        let disc = Disc { flow_factor: own.state[0], merit: own.state[1] };
-        let Some((axial, edgewise)) = disc.speeds(now) else { return };
-        let without = momentum::at_speed(own.values[SHARE], axial, 0.0);
-        let with = momentum::at_speed(own.values[SHARE], axial, edgewise);
+impl InFlight for Rotor {
+    fn loads(&mut self, now: &Now, change: &mut Change) {
+        let Some((axial, edgewise)) = self.disc.speeds(now) else { return };
+        let without = momentum::at_speed(self.share, axial, 0.0);
+        let with = momentum::at_speed(self.share, axial, edgewise);
         if without.thrust > LEAST_THRUST {
             change.thrust *= with.thrust / without.thrust;
-            change.torque += disc.merit * (with.thrust * with.flow - without.thrust * without.flow);
+            change.torque +=
+                self.disc.merit * (with.thrust * with.flow - without.thrust * without.flow);
         }
     }
 }

@@ -3,21 +3,19 @@
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_PI};
 
 use rand_distr::{Distribution as _, StandardNormal};
+use rand_pcg::Pcg64;
 use statrs::function::erf::erf;
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::model::base_drag_m2;
 use super::reference::DENSITY;
-use super::{Air, Effect, Now, Own, Reference, Signals, Start, parasitic_drag};
+use super::role::Role;
+use super::{Air, Effect, InFlight, Now, Reference, Signals, Start};
 use crate::vehicle::{Airframe, Vehicle};
 
 const SIGMA: usize = 0;
 const TIME: usize = 1;
 const CURVATURE: usize = 2;
-/// State: gust, its decay and kick per step.
-const GUST: usize = 0;
-const DECAY: usize = 1;
-const KICK: usize = 2;
 
 const MOST_CURVATURE: f64 = 50.0;
 
@@ -28,7 +26,7 @@ pub(super) struct Turbulence;
 /// A of `A V|V|` from the drag of the box and, where that acts, of the body, us/(m/s)².
 fn curvature(vehicle: &Vehicle) -> f64 {
     let at = Reference::of(vehicle);
-    let drag_m2 = base_drag_m2(vehicle) + parasitic_drag::vertical_m2(vehicle) / 2.0;
+    let drag_m2 = base_drag_m2(vehicle) + Role::BodyDragTop.value(vehicle).unwrap_or(0.0) / 2.0;
     (at.sensitivity_us() * drag_m2 * DENSITY / at.weight_n()).clamp(0.0, MOST_CURVATURE)
 }
 
@@ -41,6 +39,17 @@ pub(super) fn mean_signed_square(velocity: f64, sigma: f64) -> f64 {
     sigma
         * sigma
         * ((x * x + 1.0) * erf(x * FRAC_1_SQRT_2) + FRAC_2_PI.sqrt() * x * (-x * x / 2.0).exp())
+}
+
+/// The gusts that one drone meets.
+#[derive(Clone, Debug)]
+struct Gusts {
+    gust_mps: f64,
+    /// What is left of a gust after a step.
+    decay: f64,
+    /// Standard deviation of what a step adds, m/s.
+    kick_mps: f64,
+    rng: Pcg64,
 }
 
 impl Effect for Turbulence {
@@ -66,6 +75,7 @@ impl Effect for Turbulence {
                     low: 0.0,
                     high: 5.0,
                     default: |_| 0.5,
+                    role: None,
                 },
                 Parameter {
                     name: "time_s",
@@ -74,6 +84,7 @@ impl Effect for Turbulence {
                     low: 0.005,
                     high: 100.0,
                     default: |_| 0.1,
+                    role: None,
                 },
                 Parameter {
                     name: "curvature",
@@ -82,6 +93,7 @@ impl Effect for Turbulence {
                     low: 0.0,
                     high: MOST_CURVATURE,
                     default: curvature,
+                    role: None,
                 },
             ],
             hooks: &[Hook::Air],
@@ -95,16 +107,18 @@ impl Effect for Turbulence {
         values[CURVATURE] * (mean_signed_square(climb, values[SIGMA]) - climb * climb.abs())
     }
 
-    fn start(&self, own: &mut Own, start: &Start<'_>, _airframe: &mut Airframe) {
-        let decay = (-start.dt_s / own.values[TIME]).exp();
-        own.state[DECAY] = decay;
-        own.state[KICK] = own.values[SIGMA] * (1.0 - decay * decay).sqrt();
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        let decay = (-start.dt_s / start.values[TIME]).exp();
+        let kick_mps = start.values[SIGMA] * (1.0 - decay * decay).sqrt();
+        Some(Box::new(Gusts { gust_mps: 0.0, decay, kick_mps, rng: start.rng.clone() }))
     }
+}
 
-    fn air(&self, own: &mut Own, _now: &Now, air: &mut Air) {
-        let draw: f64 = StandardNormal.sample(&mut own.rng);
-        own.state[GUST] = own.state[GUST] * own.state[DECAY] + own.state[KICK] * draw;
-        air.velocity_mps.z += own.state[GUST];
+impl InFlight for Gusts {
+    fn air(&mut self, _now: &Now, air: &mut Air) {
+        let draw: f64 = StandardNormal.sample(&mut self.rng);
+        self.gust_mps = self.gust_mps * self.decay + self.kick_mps * draw;
+        air.velocity_mps.z += self.gust_mps;
     }
 }
 

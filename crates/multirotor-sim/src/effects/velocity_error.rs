@@ -1,18 +1,28 @@
 //! The drone's idea of its vertical velocity is off or late.
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::{Effect, Own, Reference, Signals};
+use super::role::Role;
+use super::{Effect, InFlight, Reference, Signals, Start};
+use crate::vehicle::Airframe;
 
 const BIAS: usize = 0;
 const SD: usize = 1;
 const LAG: usize = 2;
-/// State: filtered velocity, and whether there is one.
-const FILTERED: usize = 0;
-const STARTED: usize = 1;
 
 /// Bias and lag of the vertical velocity.
 #[derive(Debug)]
 pub(super) struct VelocityError;
+
+/// The estimator of one drone.
+#[derive(Clone, Debug)]
+struct Estimator {
+    bias_mps: f64,
+    /// How far this drone is off the bias of all.
+    own_mps: f64,
+    lag_s: f64,
+    /// The velocity as it comes late; none before the first look.
+    filtered_mps: Option<f64>,
+}
 
 impl Effect for VelocityError {
     fn definition(&self) -> &'static Definition {
@@ -36,6 +46,7 @@ impl Effect for VelocityError {
                     low: -2.0,
                     high: 2.0,
                     default: |_| 0.0,
+                    role: Some(Role::SensorBias),
                 },
                 Parameter {
                     name: "sd_mps",
@@ -44,6 +55,7 @@ impl Effect for VelocityError {
                     low: 0.0,
                     high: 1.0,
                     default: |_| 0.02,
+                    role: Some(Role::Spread),
                 },
                 Parameter {
                     name: "lag_s",
@@ -52,6 +64,7 @@ impl Effect for VelocityError {
                     low: 0.0,
                     high: 1.0,
                     default: |_| 0.1,
+                    role: Some(Role::SensorLag),
                 },
             ],
             hooks: &[Hook::Sense],
@@ -65,13 +78,21 @@ impl Effect for VelocityError {
         signals.sensitivity * (values[LAG] * signals.acceleration_mps2 - bias)
     }
 
-    fn sense(&self, own: &mut Own, dt_s: f64, climb_mps: &mut f64) {
-        let Own { values, state, deviation, .. } = own;
-        if state[STARTED] == 0.0 {
-            state[STARTED] = 1.0;
-            state[FILTERED] = *climb_mps;
-        }
-        state[FILTERED] += (*climb_mps - state[FILTERED]) * dt_s / (dt_s + values[LAG]);
-        *climb_mps = state[FILTERED] + values[BIAS] + values[SD] * *deviation;
+    fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Estimator {
+            bias_mps: start.values[BIAS],
+            own_mps: start.values[SD] * start.deviation,
+            lag_s: start.values[LAG],
+            filtered_mps: None,
+        }))
+    }
+}
+
+impl InFlight for Estimator {
+    fn sense(&mut self, dt_s: f64, climb_mps: &mut f64) {
+        let mut filtered_mps = self.filtered_mps.unwrap_or(*climb_mps);
+        filtered_mps += (*climb_mps - filtered_mps) * dt_s / (dt_s + self.lag_s);
+        self.filtered_mps = Some(filtered_mps);
+        *climb_mps = filtered_mps + self.bias_mps + self.own_mps;
     }
 }

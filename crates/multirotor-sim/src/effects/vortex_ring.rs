@@ -1,18 +1,17 @@
 //! In fast descent a rotor flies into its own wake.
 
 use rand_distr::{Distribution as _, StandardNormal};
+use rand_pcg::Pcg64;
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
-use super::rotor_inflow::{Disc, LEAST_SHARE, MOST_SHARE, flow_us, share_of};
-use super::{Change, Effect, Now, Own, Reference, Signals, Start, momentum};
+use super::disc::{Disc, LEAST_SHARE, MOST_SHARE, flow_us, share_of};
+use super::role::Role;
+use super::{Change, Effect, InFlight, Now, Reference, Signals, Start, momentum};
 use crate::vehicle::Airframe;
 
 const SHARE: usize = 0;
 const ONSET: usize = 1;
 const JITTER: usize = 2;
-/// State: disc's factor and merit, jitter's decay, its present value.
-const DECAY: usize = 2;
-const NOISE: usize = 3;
 /// Half of the range of descent over which the state sets in, over the induced velocity.
 const HALF_WIDTH: f64 = 0.25;
 /// Time scale of the thrust's jitter, s: a wake is passed in some tenths of a second.
@@ -44,6 +43,20 @@ pub(super) fn excess(descent: f64, onset: f64) -> f64 {
     smooth * (measured - momentum::induced(descent, 0.0))
 }
 
+/// The rotor of one drone.
+#[derive(Clone, Debug)]
+struct Rotor {
+    disc: Disc,
+    share: f64,
+    onset: f64,
+    jitter: f64,
+    /// What is left of the noise after a step.
+    decay: f64,
+    /// Present noise of the thrust, in standard deviations.
+    noise: f64,
+    rng: Pcg64,
+}
+
 impl Effect for VortexRing {
     fn definition(&self) -> &'static Definition {
         &Definition {
@@ -69,6 +82,7 @@ impl Effect for VortexRing {
                     low: LEAST_SHARE,
                     high: MOST_SHARE,
                     default: share_of,
+                    role: None,
                 },
                 Parameter {
                     name: "onset",
@@ -77,6 +91,7 @@ impl Effect for VortexRing {
                     low: 0.25,
                     high: 1.5,
                     default: |_| 0.5,
+                    role: None,
                 },
                 Parameter {
                     name: "jitter",
@@ -85,13 +100,15 @@ impl Effect for VortexRing {
                     low: 0.0,
                     high: 0.3,
                     default: |_| 0.03,
+                    role: Some(Role::Scatter),
                 },
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Climb, -6.0, 1.0),
             sought: Sought::Shape {
                 size: "inflow_share",
-                sizes: &[0.5],
+                sizes: |_| &[0.5],
+                usual: None,
                 shape: Some(("onset", &[0.4, 0.5, 0.6, 0.7])),
             },
         }
@@ -104,17 +121,23 @@ impl Effect for VortexRing {
         flow_us(at, share, flow + excess(axial, values[ONSET])) - flow_us(at, share, flow)
     }
 
-    fn start(&self, own: &mut Own, start: &Start<'_>, airframe: &mut Airframe) {
-        let disc = Disc::of(airframe);
-        own.state[0] = disc.flow_factor;
-        own.state[1] = disc.merit;
-        own.state[DECAY] = (-start.dt_s / JITTER_S).exp();
+    fn start(&self, start: &Start<'_>, airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        Some(Box::new(Rotor {
+            disc: Disc::of(airframe),
+            share: start.values[SHARE],
+            onset: start.values[ONSET],
+            jitter: start.values[JITTER],
+            decay: (-start.dt_s / JITTER_S).exp(),
+            noise: 0.0,
+            rng: start.rng.clone(),
+        }))
     }
+}
 
-    fn loads(&self, own: &mut Own, now: &Now, change: &mut Change) {
-        let disc = Disc { flow_factor: own.state[0], merit: own.state[1] };
-        let Some((axial, _)) = disc.speeds(now) else { return };
-        let (share, onset) = (own.values[SHARE], own.values[ONSET]);
+impl InFlight for Rotor {
+    fn loads(&mut self, now: &Now, change: &mut Change) {
+        let Some((axial, _)) = self.disc.speeds(now) else { return };
+        let (share, onset) = (self.share, self.onset);
         if axial > HALF_WIDTH - onset {
             return;
         }
@@ -130,12 +153,12 @@ impl Effect for VortexRing {
             thrust = f64::midpoint(thrust, next.max(0.05));
         }
         let depth = ((HALF_WIDTH - onset - axial) / (2.0 * HALF_WIDTH)).min(1.0);
-        let decay = own.state[DECAY];
-        let draw: f64 = StandardNormal.sample(&mut own.rng);
-        own.state[NOISE] = own.state[NOISE] * decay + (1.0 - decay * decay).sqrt() * draw;
-        let jitter = 1.0 + own.values[JITTER] * depth * own.state[NOISE];
+        let decay = self.decay;
+        let draw: f64 = StandardNormal.sample(&mut self.rng);
+        self.noise = self.noise * decay + (1.0 - decay * decay).sqrt() * draw;
+        let jitter = 1.0 + self.jitter * depth * self.noise;
         change.thrust *= jitter * thrust / without.thrust.max(0.05);
-        change.torque += disc.merit * (thrust * flow - without.thrust * without.flow);
+        change.torque += self.disc.merit * (thrust * flow - without.thrust * without.flow);
     }
 }
 
