@@ -53,14 +53,14 @@ mod tests {
     #[test]
     fn first_draws_of_each_purpose_are_pinned() {
         let purposes = [
-            (Purpose::Sensors, 1_u64),
-            (Purpose::Spread, 1),
-            (Purpose::Air, 1),
-            (Purpose::Resampling, 1),
-            (Purpose::Effects, 1),
-            (Purpose::Link, 1),
-            (Purpose::Losses, 1),
-            (Purpose::Hidden, 1),
+            (Purpose::Sensors, 1_094_595_014_111_599_031_u64),
+            (Purpose::Spread, 8_794_811_414_775_087_508),
+            (Purpose::Air, 6_999_452_854_233_234_891),
+            (Purpose::Resampling, 16_114_580_854_388_305_728),
+            (Purpose::Effects, 9_989_586_353_499_086_556),
+            (Purpose::Link, 13_064_133_372_313_075_978),
+            (Purpose::Losses, 15_892_548_217_100_850_607),
+            (Purpose::Hidden, 2_891_771_322_711_400_073),
         ];
         let drawn = purposes.map(|(purpose, _)| (purpose, stream(7, 3, purpose).next_u64()));
         assert_eq!(drawn, purposes);
