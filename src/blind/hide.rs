@@ -263,3 +263,64 @@ fn airsim_drag_m2(vehicle: &Vehicle) -> [f64; 2] {
     let coefficient = frame.drag_coefficient;
     [coefficient * (length * width + discs_m2), coefficient * (width * height + sides_m2)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Kinds and the parameters that a seed draws for them from the first base that takes them.
+    const DRAWN: [(&str, &[(&str, f64)]); 18] = [
+        (
+            "rotor-inflow",
+            &[("inflow_share", 0.387_491_042_676_855_97), ("spread", 0.051_371_649_074_628_26)],
+        ),
+        (
+            "parasitic-drag",
+            &[
+                ("horizontal_m2", 0.003_259_460_331_582_528),
+                ("vertical_m2", 0.066_562_627_824_686_85),
+            ],
+        ),
+        ("battery", &[("exponent", 0.546_020_873_383_328_3)]),
+        ("translational-lift", &[("inflow_share", 0.090_882_136_868_522_76)]),
+        ("vortex-ring", &[("inflow_share", 0.628_924_101_296_893_1)]),
+        ("thrust-curve", &[("expo", 0.554_047_706_494_753_9)]),
+        (
+            "motor-thermal",
+            &[("drift_us", 6.621_411_054_103_023), ("time_s", 161.882_919_919_658_83)],
+        ),
+        ("ground-effect", &[("radius_m", 0.172_948_849_484_590_58)]),
+        ("neighbour-downwash", &[("array_m", 14.0), ("strength", 2.999_507_320_908_158)]),
+        ("blade-flapping", &[("drag_per_weight", 0.031_617_153_333_920_53)]),
+        ("mass-spread", &[("sd", 0.032_955_615_952_742_54)]),
+        ("thrust-spread", &[("sd", 0.034_082_641_494_649_81)]),
+        (
+            "velocity-bias",
+            &[("bias_mps", -0.078_649_712_079_209_57), ("lag_s", 0.0), ("sd_mps", 0.0)],
+        ),
+        ("velocity-lag", &[("bias_mps", 0.0), ("lag_s", 0.197_718_464_811_836_2), ("sd_mps", 0.0)]),
+        ("step", &[("at_s", 203.392_163_555_180_93), ("jump_us", 13.310_332_843_104_264)]),
+        (
+            "height-wave",
+            &[
+                ("amplitude_us", 9.926_418_056_735_182),
+                ("phase_rad", 3.911_290_728_756_779),
+                ("wavelength_m", 43.240_250_090_376_18),
+            ],
+        ),
+        ("climb-time", &[("slope_us", 6.972_465_350_566_109), ("time_s", 430.0)]),
+        ("heading", &[("amplitude_us", -20.711_632_671_224_12), ("knee_mps", 1.0)]),
+    ];
+
+    #[test]
+    fn a_seed_hides_what_it_always_hid() {
+        // Streams are keyed by the place in the list.
+        assert_eq!(KINDS.len(), DRAWN.len());
+        for (kind, (name, parameters)) in KINDS.iter().zip(DRAWN) {
+            let hidden = kind.draw(7_340_032, kind.bases[0], Protocol::Paper, 14.0).unwrap();
+            let drawn: Vec<(&str, f64)> =
+                hidden.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+            assert_eq!((kind.name, &drawn[..]), (name, parameters));
+        }
+    }
+}

@@ -6,7 +6,7 @@
 //! * on the number of each [`Purpose`];
 //! * for effects, on the effect's name ([`crate::effects::active`] mixes its hash into the seed), so
 //!   that effects can be added and reordered freely, but not renamed;
-//! * for parts of the air, on the place of the part in its specification;
+//! * for parts of the air, on the name of the flight and the place of the part in its specification;
 //! * wherever `drone` counts something else (the parts of a benchmark, simulated flights), on the place
 //!   in that list, so that such lists only grow at their end.
 //!
@@ -14,8 +14,8 @@
 
 use rand_pcg::Pcg64;
 
-/// What a stream is used for; each purpose has its own, so that adding a consumer does not shift
-/// the numbers of another.
+/// Purpose of a random stream. Each has numbers of its own, so that a new consumer does not shift those of
+/// another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
@@ -33,7 +33,7 @@ pub enum Purpose {
     Link = 6,
     /// Logs that a simulated campaign loses.
     Losses = 7,
-    /// What a blind flight hides.
+    /// Choice of the hidden physics of a blind flight.
     Hidden = 8,
 }
 

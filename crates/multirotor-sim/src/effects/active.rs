@@ -1,4 +1,4 @@
-//! The effects of one simulated flight.
+//! Effects in one simulated flight.
 
 use std::fmt;
 
@@ -16,18 +16,18 @@ use crate::vehicle::{Airframe, Vehicle};
 /// Deviations of drones from the fleet are drawn again beyond this many standard deviations.
 const MOST_DEVIATION: f64 = 3.0;
 
-/// What an effect is told before the flight.
+/// Inputs of an effect before the flight.
 #[derive(Clone, Debug)]
 pub struct Start<'a> {
-    /// Its parameters, in the order of the definition.
+    /// Parameters of the effect, in the order of the definition.
     pub values: &'a Values,
-    /// This drone's deviation from the fleet, in standard deviations of the effect.
+    /// Deviation of this drone from the fleet, in standard deviations of the effect.
     pub deviation: f64,
-    /// Chance, of this drone and effect alone.
+    /// Random stream of this drone and effect alone.
     pub rng: Pcg64,
-    /// The fleet's mean drone at sea level.
+    /// Fleet's mean drone at sea level.
     pub reference: &'a Reference,
-    /// Where the drone stands, show frame, m.
+    /// Position of the drone before take-off, show frame, m.
     pub home_m: Vector3<f64>,
     /// Length of a step, s.
     pub dt_s: f64,
@@ -44,7 +44,7 @@ pub trait InFlight: Copies + fmt::Debug + Send + Sync {
     /// Follows the flight once per step, before the commands ([`Hook::Command`]).
     fn follow(&mut self, _now: &Now) {}
 
-    /// What becomes of one rotor's command, 0..1 ([`Hook::Command`]).
+    /// Command that one rotor gets in place of `command`, both 0..1 ([`Hook::Command`]).
     fn command(&self, command: f64) -> f64 {
         command
     }
@@ -56,7 +56,7 @@ pub trait InFlight: Copies + fmt::Debug + Send + Sync {
     /// ([`Hook::Sense`]).
     fn sense(&mut self, _dt_s: f64, _climb_mps: &mut f64) {}
 
-    /// The state of the battery, if this effect is one.
+    /// State of the battery, if the effect is one.
     fn battery(&self) -> Option<Reading> {
         None
     }
@@ -80,7 +80,7 @@ impl Clone for Box<dyn InFlight> {
     }
 }
 
-/// What there is to know at one step.
+/// Inputs of an effect at one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Now {
     /// Length of the step, s.
@@ -112,7 +112,7 @@ pub struct Air {
     pub density_ratio: f64,
 }
 
-/// What effects make of the rotors' loads.
+/// Changes that effects make to the rotors' loads.
 #[derive(Clone, Copy, Debug)]
 pub struct Change {
     /// Factor on thrust; effects multiply it.
@@ -134,17 +134,17 @@ impl Default for Change {
 pub struct Reading {
     /// Voltage under load, V.
     pub volts: f64,
-    /// Open-circuit voltage, V.
+    /// Open-circuit voltage of the whole battery, V.
     pub resting_v: f64,
-    /// Current, A.
+    /// Current of motors and avionics, A.
     pub amps: f64,
-    /// Charge used, Ah.
+    /// Charge drawn since take-off, Ah.
     pub used_ah: f64,
-    /// What is left, share of full; below 0 when it gave more than it had.
+    /// Charge that is left, as a share of full; below 0 when the battery gave more than it had.
     pub charge: f64,
     /// Charge of a full battery, Ah.
     pub capacity_ah: f64,
-    /// Internal resistance, ohm.
+    /// Internal resistance with leads, ohm.
     pub resistance_ohm: f64,
     /// Whether the autopilot is told the voltage and compensates for it.
     pub compensated: bool,
@@ -190,8 +190,8 @@ impl Active {
         Self::start_with(vehicle, &[], seed, drone, home_m, dt_s)
     }
 
-    /// The same, with effects that no library lists: they act after the vehicle's own, and their
-    /// values are taken as they are.
+    /// As [`Active::start`], with effects that no library lists: they act after the vehicle's own, and
+    /// their values are not checked.
     ///
     /// # Errors
     /// As [`Active::start`].
@@ -236,7 +236,7 @@ impl Active {
         self.hooks != 0
     }
 
-    /// Changes the air.
+    /// Changes the air around the drone.
     pub fn air(&mut self, now: &Now, air: &mut Air) {
         for part in with(&mut self.parts, Hook::Air) {
             part.acting.air(now, air);
@@ -250,7 +250,7 @@ impl Active {
         }
     }
 
-    /// What becomes of one rotor's command.
+    /// Command that one rotor gets in place of `command`, both 0..1.
     pub fn command(&self, command: f64) -> f64 {
         let acting = self.parts.iter().filter(|part| part.hooks & Hook::Command as u8 != 0);
         acting.fold(command, |command, part| part.acting.command(command))

@@ -1,6 +1,6 @@
 //! A lithium polymer cell: its open-circuit voltage by charge, and the inverse.
 
-/// Open-circuit voltage of a lithium polymer cell by charge, in tenths.
+/// Open-circuit voltage of a lithium polymer cell at charges of 0, 0.1, ... 1: a typical discharge curve.
 const CELL_V: [f64; 11] = [3.27, 3.69, 3.73, 3.77, 3.80, 3.84, 3.87, 3.95, 4.02, 4.11, 4.20];
 
 /// Open-circuit voltage of a cell, V, at a charge of 0..1.

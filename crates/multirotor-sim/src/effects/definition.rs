@@ -1,4 +1,4 @@
-//! What an effect says about itself.
+//! Definitions: the description of an effect for people and programs.
 
 use serde::Serialize;
 
@@ -11,26 +11,26 @@ pub const MAX_PARAMETERS: usize = 8;
 /// Values of an effect's parameters, in the order of its definition; unused ones are 0.
 pub type Values = [f64; MAX_PARAMETERS];
 
-/// What an effect is, for people and for choosing among effects.
+/// Description of an effect, for people and for the choice among effects.
 #[derive(Debug)]
 pub struct Definition {
     /// Standard name in kebab case, the key in vehicle files.
     pub name: &'static str,
-    /// Title.
+    /// Title for tables and pages.
     pub title: &'static str,
-    /// What it does, one line.
+    /// Action of the effect in one line.
     pub what: &'static str,
-    /// Why, and when it matters.
+    /// Reason for the effect, and when it matters.
     pub explanation: &'static str,
-    /// The formula, as text.
+    /// Formula as text.
     pub formula: &'static str,
-    /// Where it comes from.
+    /// Source in the literature.
     pub source: &'static str,
     /// Effects in one class cannot be told apart by the paper's protocol.
     pub class: Class,
     /// Signals that its closed form looks at.
     pub signals: &'static [Signal],
-    /// Its parameters.
+    /// Parameters, at most [`MAX_PARAMETERS`].
     pub parameters: &'static [Parameter],
     /// Where it acts in the simulator.
     pub hooks: &'static [Hook],
@@ -51,12 +51,12 @@ impl Definition {
         self.signals == [Signal::Drone] && self.hooks == [Hook::Drone]
     }
 
-    /// Its parameter of a name.
+    /// Parameter of a name; `None` if there is none.
     pub fn parameter(&self, name: &str) -> Option<&'static Parameter> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// Its parameter that has a role.
+    /// Parameter with a role; `None` if there is none.
     pub fn with_role(&self, role: Role) -> Option<&'static Parameter> {
         self.parameters.iter().find(|parameter| parameter.role == Some(role))
     }
@@ -88,15 +88,15 @@ pub struct Parameter {
     pub name: &'static str,
     /// Unit; empty for a pure number.
     pub unit: &'static str,
-    /// What it is.
+    /// Meaning of the parameter in a few words.
     pub what: &'static str,
-    /// Smallest allowed value.
+    /// Smallest allowed value, in its unit.
     pub low: f64,
-    /// Largest allowed value.
+    /// Largest allowed value, in its unit.
     pub high: f64,
     /// Value when the vehicle's file states none.
     pub default: fn(&Vehicle) -> f64,
-    /// What it is to code that does not know the effect.
+    /// Meaning to code that does not know the effect.
     pub role: Option<Role>,
 }
 
@@ -124,7 +124,7 @@ pub enum Signal {
     Drone,
     /// Drones next to this one in the array, 0..8.
     Neighbours,
-    /// What the rest of the model adds to the hover pulse, us.
+    /// Change of the hover pulse by the rest of the model, us.
     ModelIncrement,
     /// Change of the pulse per vertical air speed, us/(m/s).
     Sensitivity,
@@ -168,7 +168,7 @@ pub enum Hook {
 }
 
 impl Hook {
-    /// What is acted on, in text.
+    /// Object that the hook acts on, in words.
     pub fn what(self) -> &'static str {
         match self {
             Self::Drone => "the drone itself",
@@ -207,7 +207,7 @@ pub enum Class {
 }
 
 impl Class {
-    /// Name in text.
+    /// Name of the class in tables and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::AxialLinear => "axial-linear",

@@ -1,4 +1,4 @@
-//! What can be wrong with a choice of effects.
+//! Errors of a choice of effects.
 
 use thiserror::Error;
 
@@ -11,7 +11,7 @@ pub enum EffectError {
     /// No effect of this name.
     #[error("there is no effect \"{}\"; `updraft effects` lists them{hint}", plain(name))]
     Unknown {
-        /// What was asked for.
+        /// Name that was given.
         name: String,
         /// A name that is near, as text.
         hint: String,
@@ -19,11 +19,11 @@ pub enum EffectError {
     /// The effect has no such parameter.
     #[error("the effect {effect} has no parameter \"{}\"; it has: {known}", plain(name))]
     Parameter {
-        /// The effect.
+        /// Effect of the parameter.
         effect: &'static str,
-        /// What was asked for.
+        /// Name that was given.
         name: String,
-        /// What exists.
+        /// Names of the parameters that exist, as text.
         known: String,
     },
     /// A parameter outside of what makes sense.
@@ -32,29 +32,29 @@ pub enum EffectError {
         spaced(unit)
     )]
     Bounds {
-        /// The effect.
+        /// Effect of the parameter.
         effect: &'static str,
-        /// The parameter.
+        /// Parameter with the value.
         name: &'static str,
-        /// What was asked for.
+        /// Value that was given.
         value: f64,
-        /// Smallest allowed.
+        /// Smallest allowed value.
         low: f64,
-        /// Largest allowed.
+        /// Largest allowed value.
         high: f64,
-        /// Unit.
+        /// Unit of the parameter.
         unit: &'static str,
     },
     /// A parameter that is within its bounds, but with which nothing can be flown.
     #[error("effects.{effect}.{name} = {value} is not allowed; {why}")]
     Nonsense {
-        /// The effect.
+        /// Effect of the parameter.
         effect: &'static str,
-        /// The parameter.
+        /// Parameter with the value.
         name: &'static str,
-        /// What was asked for.
+        /// Value that was given.
         value: f64,
-        /// What it must be, or what comes of it.
+        /// Condition on the value, or consequence of it, as text.
         why: String,
     },
     /// Not `NAME`, `NAME=on`, `NAME=off` or `NAME.PARAMETER=NUMBER`.

@@ -68,14 +68,14 @@ pub const LIBRARY: &[&dyn Effect] = &[
     &tilt_formula::TiltFormula,
 ];
 
-/// The effect of a name.
+/// Effect of a name; `None` if the library has none.
 pub fn find(name: &str) -> Option<&'static dyn Effect> {
     LIBRARY.iter().copied().find(|effect| effect.definition().name == name)
 }
 
 /// One piece of physics.
 pub trait Effect: Sync {
-    /// What it is.
+    /// Description of the effect.
     fn definition(&self) -> &'static Definition;
 
     /// Change of the rotor control pulse that steady flight needs because of this effect, us.

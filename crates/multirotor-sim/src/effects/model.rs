@@ -10,14 +10,14 @@ const STEP_MPS: f64 = 0.05;
 
 /// A vehicle's steady model: the base and the sum of its effects.
 pub struct Model {
-    /// The vehicle without effects.
+    /// Vehicle without effects.
     pub reference: Reference,
     base_drag_m2: f64,
     effects: Vec<(&'static dyn Effect, Values)>,
 }
 
 impl Model {
-    /// The model of a vehicle's file.
+    /// Model of a vehicle's file.
     ///
     /// # Errors
     /// An unknown effect or parameter, or a value out of bounds.

@@ -10,7 +10,7 @@
 /// Newton steps: quadratic convergence from a bound takes fewer.
 const STEPS: usize = 6;
 
-/// What a rotor does at fixed speed.
+/// State of a rotor at fixed speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Working {
     /// Thrust over thrust in still air.
@@ -19,7 +19,7 @@ pub struct Working {
     pub flow: f64,
 }
 
-/// beta of a share s of inflow.
+/// Ratio beta = s / (1 - s) of a share s of inflow.
 pub fn beta(share: f64) -> f64 {
     share / (1.0 - share)
 }

@@ -11,25 +11,25 @@ const ROTORS: f64 = 4.0;
 /// A vehicle without effects at one air density: how thrust and torque become a pulse.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
-    /// The drone.
+    /// Airframe of the drone.
     pub airframe: Airframe,
     /// Air density as a share of sea level's.
     pub density_ratio: f64,
 }
 
 impl Reference {
-    /// The fleet's mean drone at sea level.
+    /// Reference of the fleet's mean drone at sea level.
     pub fn of(vehicle: &Vehicle) -> Self {
         Self { airframe: vehicle.airframe, density_ratio: 1.0 }
     }
 
-    /// The same in other air.
+    /// Reference in air of another density, as a share of sea level's.
     #[must_use]
     pub fn in_air(self, density_ratio: f64) -> Self {
         Self { density_ratio, ..self }
     }
 
-    /// Weight, N.
+    /// Weight of the drone, N.
     pub fn weight_n(&self) -> f64 {
         self.airframe.mass_kg * GRAVITY
     }

@@ -1,4 +1,4 @@
-//! What a parameter is to code that does not know the effect it belongs to.
+//! Roles of parameters: their meaning to code that does not know the effect they belong to.
 //!
 //! Other rooms never name an effect. Who needs the vehicle's drag area or the cells of its battery
 //! asks for the parameter with that role, and who adds an effect states the roles of its parameters.
@@ -8,8 +8,8 @@ use super::select::{set, value_of};
 use super::{Effect, LIBRARY, find};
 use crate::vehicle::Vehicle;
 
-/// What a parameter is. One parameter of the library has each role, but for [`Role::Spread`] and
-/// [`Role::Scatter`], which any effect may have.
+/// Meaning of a parameter to other code. One parameter of the library has each role, except for
+/// [`Role::Spread`] and [`Role::Scatter`], which parameters of any effect may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// Drag coefficient times area of the body for vertical flow, m².
@@ -59,9 +59,9 @@ pub enum Role {
 /// The library's parameter that has a role.
 #[derive(Clone, Copy)]
 pub struct Place {
-    /// The effect.
+    /// Effect that has the parameter.
     pub effect: &'static dyn Effect,
-    /// Its parameter.
+    /// Parameter that has the role.
     pub parameter: &'static Parameter,
 }
 
@@ -73,12 +73,12 @@ impl Place {
 }
 
 impl Role {
-    /// Whether it is a difference between drones: the fleet's mean drone has 0.
+    /// Whether the parameter is a difference between drones: the fleet's mean drone has 0.
     pub fn is_spread(self) -> bool {
         matches!(self, Self::MassSpread | Self::ThrustSpread | Self::InflowSpread | Self::Spread)
     }
 
-    /// The parameter that has it, the first in the library's order; `None`: no effect has.
+    /// Parameter with this role, the first in the library's order; `None` if there is none.
     pub fn place(self) -> Option<Place> {
         LIBRARY.iter().find_map(|effect| {
             let parameter = effect.definition().with_role(self)?;
@@ -86,12 +86,12 @@ impl Role {
         })
     }
 
-    /// Whether a parameter of the effect of a name has it.
+    /// Whether the effect of a name has a parameter with this role.
     pub fn is_of(self, effect: &str) -> bool {
         find(effect).is_some_and(|effect| effect.definition().with_role(self).is_some())
     }
 
-    /// Value on a vehicle on which the effect acts; `None`: it does not, or its values are not valid.
+    /// Value on a vehicle; `None` if the effect does not act on it, or has values that are not valid.
     pub fn value(self, vehicle: &Vehicle) -> Option<f64> {
         let place = self.place()?;
         value_of(vehicle, place.name(), place.parameter.name)
@@ -108,14 +108,14 @@ impl Role {
         self.stated(vehicle).or_else(|| Some((self.place()?.parameter.default)(vehicle)))
     }
 
-    /// Sets it, whatever its bounds, and switches the effect on.
+    /// Sets the parameter without a check of its bounds, and switches the effect on.
     pub fn set(self, vehicle: &mut Vehicle, value: f64) {
         if let Some(place) = self.place() {
             set(vehicle, place.name(), place.parameter.name, value);
         }
     }
 
-    /// Whether the effect that has it acts on a vehicle.
+    /// Whether the effect with this role acts on a vehicle.
     pub fn is_on(self, vehicle: &Vehicle) -> bool {
         let place = self.place();
         let table = place.and_then(|place| vehicle.effects.get(place.name()));

@@ -1,4 +1,4 @@
-//! What closed forms look at.
+//! Signals: the inputs of the closed forms.
 
 /// One steady moment of flight. The default is hover in calm air at sea level, far from the ground,
 /// of the fleet's mean drone with a full battery.
@@ -24,7 +24,7 @@ pub struct Signals {
     pub deviation: f64,
     /// Drones next to this one in the array, 0..8.
     pub neighbours: f64,
-    /// What the rest of the model adds to the hover pulse, us.
+    /// Change of the hover pulse by the rest of the model, us.
     pub increment_us: f64,
     /// Change of the model's pulse per vertical air speed, us/(m/s).
     pub sensitivity: f64,

@@ -150,3 +150,33 @@ fn fingerprint(name: &str) -> u64 {
     let digest = Sha256::digest(name.as_bytes());
     digest.iter().take(8).fold(0, |number, byte| number << 8 | u64::from(*byte))
 }
+
+#[cfg(test)]
+mod tests {
+    use skybrush_show::frame::Geodetic;
+
+    use super::*;
+    use crate::sim::air::Atmosphere as _;
+
+    /// Updraft at drone 3, 20 m up, after 5 s, of seed 7.
+    fn updraft_mps(parts: &[&str], flight: &str) -> f64 {
+        let specs: Vec<AirSpec> = parts.iter().map(|part| part.parse().unwrap()).collect();
+        let origin = Geodetic { lat_deg: 47.0, lon_deg: 19.0, amsl_m: 100.0 };
+        let frame = ShowFrame { origin, orientation_deg: 0.0 };
+        let air = build(&Air::new([0.0; 3], &specs), &frame, 7, flight);
+        air.sampler(3).air_velocity(&Vector3::new(0.0, 0.0, 20.0), 5.0).z
+    }
+
+    #[test]
+    fn parts_are_drawn_by_their_place_and_the_flights_name() {
+        let (own, field) = ("drone-constant:sd=1", "field:sd=1,lambda=50,tau=30");
+        let drawn = [
+            updraft_mps(&[own], "ladder"),
+            updraft_mps(&[own, own], "ladder"),
+            updraft_mps(&[own], "hover"),
+            updraft_mps(&[field], "ladder"),
+            updraft_mps(&[own, field], "ladder"),
+        ];
+        assert_eq!(drawn, [0.0; 5]);
+    }
+}
