@@ -177,6 +177,13 @@ mod tests {
             updraft_mps(&[field], "ladder"),
             updraft_mps(&[own, field], "ladder"),
         ];
-        assert_eq!(drawn, [0.0; 5]);
+        let pinned = [
+            0.592_156_666_987_890_8,
+            0.360_368_362_108_959_06,
+            0.627_839_930_998_607_1,
+            -0.769_790_689_652_503_7,
+            0.785_418_049_369_751_3,
+        ];
+        assert_eq!(drawn, pinned);
     }
 }
