@@ -1,5 +1,6 @@
 //! What holds the house together: its layers, what is generated, the fuzzer's corpus.
 
+mod architecture;
 mod doc_comments;
 mod fuzz_corpus;
 mod generated;
