@@ -6,12 +6,16 @@
 //! mission -> show -> check -> sim | fleet -> log -> flight -> analysis -> gap | study -> report
 //! ```
 //!
+//! Another program can run a campaign through [`workflow`]. Logs, shows, links and the simulator are
+//! crates of their own, which this library shows under short names: [`log`] is `dataflash`, [`show`]
+//! and [`check`] are of `skybrush-show`, [`link`] and [`protocol`] of `mavlink-station`, [`sim`],
+//! [`effects`] and [`vehicle`] of `multirotor-sim`.
+//!
 //! * [`mission`]: TOML templates become a [`mission::plan::Plan`], the timetable that everything
 //!   downstream reads.
 //! * [`show`]: plans become trajectories and Skybrush files (`.skyc`, `.skyb`, zipped CSV), and back.
 //! * [`check`]: exact safety checks on the trajectory pieces.
 //! * [`effects`]: physics beyond the base model, each piece stated once, for simulator and analysis.
-//! * [`fleet`]: real vehicles over MAVLink: uploads, preflight, start, watch, abort.
 //! * [`sim`]: the embedded simulator flies a show and writes the same `.BIN` logs as a drone.
 //! * [`link`], [`protocol`]: MAVLink 2, and what the show protocol's bytes mean.
 //! * [`fleet`]: real vehicles: upload, preflight, start, watch, abort, logs.
@@ -25,6 +29,8 @@
 //! * [`blind`]: flights with hidden physics that test it.
 //! * [`report`]: figures, tables and the HTML page.
 //! * [`campaign`]: names of the files in a campaign folder.
+//! * [`workflow`]: the steps of people with drones, for any program.
+//! * [`cli`]: arguments, terminal and exit codes of the program `updraft`.
 //!
 //! # Conventions
 //!
