@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use super::cause::Cause;
 use super::drone::One;
 use super::input::{FlightInput, LogInput};
 use super::result::{DroneAnalysis, Missing, PartlyUsedLog, UnusedLog};
 use super::slots::SlotMatch;
-use crate::base::plain::Shown as _;
 
 /// The logs of a flight, sorted by their use.
 #[derive(Default)]
@@ -20,7 +20,7 @@ impl Account {
     /// Sorts what the logs gave.
     pub(super) fn of<'a>(
         input: &FlightInput<'_>,
-        outcomes: impl Iterator<Item = (&'a LogInput, &'a SlotMatch, Result<One, String>)>,
+        outcomes: impl Iterator<Item = (&'a LogInput, &'a SlotMatch, Result<One, Cause>)>,
     ) -> Self {
         let mut account = Self::default();
         for (log, found, outcome) in outcomes {
@@ -31,12 +31,6 @@ impl Account {
                     account.ones.push(one);
                 }
                 Err(reason) => {
-                    // Errors name the file as it was opened; results name it as their reader finds it.
-                    let reason = reason.replace(&log.path.shown().to_string(), &source);
-                    let reason = match reason.strip_prefix(&format!("{source}: ")) {
-                        Some(rest) => rest.to_owned(),
-                        None => reason,
-                    };
                     let slot = match found {
                         SlotMatch::Slot(slot) => Some(*slot),
                         SlotMatch::Unplanned => None,
@@ -51,11 +45,10 @@ impl Account {
 }
 
 fn partly_used(one: &One, source: String) -> Option<PartlyUsedLog> {
-    let reasons: Vec<&str> = one.losses.iter().map(String::as_str).collect();
-    (!reasons.is_empty()).then(|| PartlyUsedLog {
+    (!one.losses.is_empty()).then(|| PartlyUsedLog {
         source,
         slot: one.drone.slot,
-        reason: reasons.join("; "),
+        reason: Cause::InPart(one.losses.clone()),
         skipped_bytes: one.skipped_bytes,
     })
 }
@@ -78,11 +71,10 @@ pub(super) fn missing(
     let reason = |slot: u16, name: &str| {
         let of_slot = logs.get(&slot).map(Vec::as_slice).unwrap_or_default();
         match of_slot {
-            [] => format!("no log of {name}"),
-            [only] => format!("its log is not used: {}", only.sentence()),
-            several => {
-                let named: Vec<String> = several.iter().map(|log| log.sentence()).collect();
-                format!("its {} logs are not used: {}", several.len(), named.join("; "))
+            [] => Cause::NoLog { name: name.to_owned() },
+            logs => {
+                let named = logs.iter().map(|log| (log.source.clone(), log.reason.clone()));
+                Cause::LogsNotUsed(named.collect())
             }
         }
     };

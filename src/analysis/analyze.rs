@@ -6,30 +6,35 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::account::{self, Account};
-use super::aware::{ASKED_FOR, Aware, Measured};
-use super::calibrate::{self, PaperTable};
-use super::caution::{PLAIN_CAUTION, SCAN_CAUTION, fit_cautions, tilt_caution, wind_caution};
+use super::aware::{ASKED_FOR, Aware};
+use super::calibrate::{self, FitOptions};
+use super::cause::Cause;
+use super::caution::{fit_cautions, tilt_caution, wind_caution};
 use super::caution_battery::battery_caution;
 use super::corrections::Corrections;
-use super::drone::{FLOCK, One, Shared, one, same_drone};
+use super::drone::{One, Shared, one};
 use super::input::{FlightInput, LogInput, TruthSeries};
-use super::ladder::{is_ladder, mark_partial, no_ladder, rungs};
-use super::law::{LINEAR, SIGNED_QUADRATIC};
-use super::options::{AnalysisOptions, MapLaw};
+use super::ladder::{FleetLadders, is_ladder, rungs};
+use super::law::{LawKind, LawOf};
+use super::map_statistics::{HoverSeen, of_map};
+use super::measured::Measured;
+use super::options::AnalysisOptions;
 use super::prefer::{better_law, chosen, describes, vertex_mps};
 use super::refer::refer_calibration;
+use super::reference::same_drone;
 use super::result::{
     ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, FlightAnalysis, Laws,
-    TableRow, Unmeasured, UnusedLog, UpdraftMap, WindCorrection,
+    TableRow, Unmeasured, UpdraftMap, WindCorrection, WindowStats,
 };
 use super::slots::{SlotMatch, match_slots};
 use super::starts;
-use super::statistics::of_map;
 use super::statistics::result::FieldStatistics;
 use super::statistics::tilt_wind::LeanDrag;
+use super::table::{self, PaperTable, TableLaw};
 use super::track;
 use super::truth;
 use super::updraft::{self, DroneSeries};
+use super::warning::Warning;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
@@ -108,7 +113,9 @@ pub fn analyze(
             }
             Err(error) => {
                 // One warning for each line: what is told and, below it, of which log.
-                warnings.extend(error.to_string().lines().map(|line| line.trim().to_owned()));
+                let lines = error.to_string();
+                let lines = lines.lines().map(|line| Warning::Failed(line.trim().to_owned()));
+                warnings.extend(lines);
                 failures.push(error);
             }
         }
@@ -201,7 +208,7 @@ pub fn analyze_flight(
 
     let done = AtomicUsize::new(0);
     let work: Vec<(&LogInput, &SlotMatch)> = input.logs.iter().zip(&slots).collect();
-    let outcomes: Vec<Result<One, String>> = work
+    let outcomes: Vec<Result<One, Cause>> = work
         .par_iter()
         .map(|(log, slot)| {
             let outcome = match slot {
@@ -220,116 +227,46 @@ pub fn analyze_flight(
         return Err(AnalysisError::NothingUsable {
             name: input.name.to_owned(),
             count: input.logs.len(),
-            reasons: account.unused.iter().map(UnusedLog::sentence).collect(),
+            reasons: account.unused.iter().map(|log| log.sentence().to_string()).collect(),
         });
     }
     if input.plan.is_some() {
         account.ones.sort_by_key(|one| one.drone.slot);
     }
-    Ok(finish(&shared, account, warnings))
+    let contradictions = warnings.into_iter().map(Warning::WhoseLogs).collect();
+    Ok(finish(&shared, account, contradictions))
 }
 
 /// Unusable logs named in an error.
 const LISTED: usize = 20;
 
 /// Joins the drones' results: purpose, laws, flock, tables, map, missing.
-fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> FlightAnalysis {
+fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<Warning>) -> FlightAnalysis {
     let Shared { input, options, .. } = shared;
     let Account { ones, unused, partly_used } = account;
-    let with_laws = ones.iter().filter(|one| one.calibration.is_ok());
-    let climbed: Vec<(usize, usize)> =
-        with_laws.map(|one| rungs(&one.drone, &options.fit)).collect();
+    let climbed: Vec<(usize, usize)> = (ones.iter().filter(|one| one.calibration.is_ok()))
+        .map(|one| rungs(&one.drone.windows, &options.fit))
+        .collect();
     let purpose = shared.planned_purpose.unwrap_or(if climbed.iter().copied().any(is_ladder) {
         Purpose::Calibration
     } else {
         Purpose::Measurement
     });
-    let mut drones = Vec::new();
-    let (mut updrafts, mut seen) = (Vec::new(), Vec::new());
-    let mut unmeasured = Vec::new();
-    // Without a plan logs may be of any day.
-    let apart = if input.plan.is_some() { starts::apart(&ones) } else { vec![None; ones.len()] };
-    for (One { mut drone, calibration, updraft, hover, truth, .. }, later_s) in
-        ones.into_iter().zip(apart)
-    {
-        let (slot, name) = (drone.slot, drone.name.clone());
-        let updraft = match later_s {
-            Some(later_s) => updraft.map(|_| Err(starts::not_in_map(later_s))),
-            None => updraft,
-        };
-        if let (Purpose::Calibration, Some(later_s)) = (purpose, later_s) {
-            warnings.push(starts::in_calibration(&name, later_s));
-        }
-        let nothing = |reason| Unmeasured { slot, name: name.clone(), reason };
-        match (purpose, calibration, updraft) {
-            (Purpose::Calibration, Ok(laws), _) => drone.laws = Some(laws),
-            (Purpose::Calibration, Err(error), _) => unmeasured.push(nothing(error.to_string())),
-            (Purpose::Measurement, _, Some(Ok((series, mapping)))) => {
-                drone
-                    .warnings
-                    .extend(partial_law(shared, slot, &name).filter(|_| mapping == FLOCK));
-                seen.push(hover);
-                updrafts.push((slot, name.clone(), drone.home_m, series, mapping, truth));
-            }
-            (Purpose::Measurement, _, Some(Err(reason))) => unmeasured.push(nothing(reason)),
-            (Purpose::Measurement, _, None) => {}
-        }
-        drones.push(drone);
-    }
-    let mut flock = None;
-    let mut table = Vec::new();
-    let mut paper = None;
-    if purpose == Purpose::Calibration {
-        warnings.extend(mark_partial(&mut drones, &options.fit));
-        match calibrate::flock(&drones, &options.fit) {
-            Ok(laws) => flock = Some(laws),
-            Err(error) => warnings.push(format!("flock mapping: {error}")),
-        }
-        paper = paper_table(shared, &drones);
-        table = calibrate::table(&drones, paper, &options.fit);
-        if let Some(laws) = &flock {
-            let vertex = vertex_mps(laws, &drones, input.true_updraft_mps).is_some();
-            compare_what_fits(&mut table, laws, vertex);
-        }
-        warnings.extend(fit_cautions(
-            flock.as_ref(),
-            &drones,
-            input.leaning,
-            input.true_updraft_mps,
-        ));
-        warnings.extend(tilt_caution(&drones, options));
-    } else if shared.reference.is_none() {
-        warnings.push(
-            "no calibration was given: the air cannot be measured without laws. Analyse the \
-             calibration flight together with this one (updraft analyze CALIBRATION HOVER), or take \
-             the laws of an analysis of these drones (--hold analysis.json). Until then there are \
-             only the flight's windows and its traces"
-                .to_owned(),
-        );
-        let most = climbed.iter().copied().max_by_key(|(up, down)| up + down);
-        warnings.extend(most.filter(|_| shared.planned_purpose.is_none()).map(no_ladder));
-    }
-    let map = (!updrafts.is_empty()).then(|| map(updrafts, shared));
-    warnings.extend(map.as_ref().and_then(wind_caution));
-    let calibration = shared.aware.as_ref().zip(shared.reference).map(|(_, found)| found);
-    let battery = calibration.zip(map.as_ref()).filter(|_| input.sag.is_some());
-    warnings.extend(battery.and_then(|(found, map)| battery_caution(map, found)));
-    if map.is_some() && shared.aware.is_none() {
-        warnings.push(PLAIN_CAUTION.to_owned());
-    }
-    let moved = map.as_ref().is_some_and(UpdraftMap::is_scan);
-    if moved {
-        warnings.push(SCAN_CAUTION.to_owned());
-    }
-    let drag = match (input.leaning, input.lean_table) {
-        (Some(leaning), _) => LeanDrag::Faces(leaning.drag_speed_mps),
-        (None, Some(table)) => LeanDrag::Table(table),
-        (None, None) => LeanDrag::Unknown,
+    let Sorted { mut drones, measured, seen, unmeasured } =
+        sorted(shared, purpose, ones, &mut warnings);
+    let laws = match purpose {
+        Purpose::Calibration => fleet_laws(shared, &mut drones, &mut warnings),
+        Purpose::Measurement => FleetLaws::default(),
     };
-    let statistics = map.as_ref().filter(|_| !moved).map(|map| FieldStatistics {
-        true_air: input.true_air.cloned(),
-        ..of_map(map, &seen, &options.statistics, drag)
-    });
+    if purpose == Purpose::Measurement && shared.reference.is_none() {
+        warnings.push(Warning::NoCalibration);
+        let most = climbed.iter().copied().max_by_key(|(up, down)| up + down);
+        let most = most.filter(|_| shared.planned_purpose.is_none());
+        warnings.extend(most.map(|(up, down)| Warning::NoLadder { up, down }));
+    }
+    let map = (!measured.is_empty()).then(|| map(measured, shared));
+    warnings.extend(map.iter().flat_map(|map| map_warnings(shared, map)));
+    let statistics = map.as_ref().and_then(|map| statistics(shared, map, &seen));
     FlightAnalysis {
         name: input.name.to_owned(),
         purpose,
@@ -340,16 +277,157 @@ fn finish(shared: &Shared<'_>, account: Account, mut warnings: Vec<String>) -> F
         logs: input.logs.len(),
         missing: account::missing(input, &drones, &unused),
         drones,
-        flock,
-        table,
+        flock: laws.flock,
+        table: laws.table,
         map,
         statistics,
         unmeasured,
-        paper_table: paper.map(|paper| paper.number().to_owned()),
+        paper_table: laws.paper,
         warnings,
         unused,
         partly_used,
     }
+}
+
+/// The drones of a flight, by what became of them.
+#[derive(Default)]
+struct Sorted {
+    drones: Vec<DroneAnalysis>,
+    /// What the map is made of.
+    measured: Vec<NamedUpdraft>,
+    /// The hovers of these, for the statistics.
+    seen: Vec<HoverSeen>,
+    unmeasured: Vec<Unmeasured>,
+}
+
+/// Gives each drone what the flight was for, or says why it has none.
+fn sorted(
+    shared: &Shared<'_>,
+    purpose: Purpose,
+    ones: Vec<One>,
+    warnings: &mut Vec<Warning>,
+) -> Sorted {
+    // Without a plan logs may be of any day.
+    let planned = shared.input.plan.is_some();
+    let apart = if planned { starts::apart(&ones) } else { vec![None; ones.len()] };
+    let mut sorted = Sorted::default();
+    for (One { mut drone, calibration, updraft, hover, truth, .. }, later_s) in
+        ones.into_iter().zip(apart)
+    {
+        let (slot, name) = (drone.slot, drone.name.clone());
+        let updraft = match later_s {
+            Some(later_s) => updraft.map(|_| Err(Cause::OtherStart { later_s })),
+            None => updraft,
+        };
+        if let (Purpose::Calibration, Some(later_s)) = (purpose, later_s) {
+            warnings.push(Warning::OtherStart { name: name.clone(), later_s });
+        }
+        let nothing = |reason| Unmeasured { slot, name: name.clone(), reason };
+        match (purpose, calibration, updraft) {
+            (Purpose::Calibration, Ok(laws), _) => drone.laws = Some(laws),
+            (Purpose::Calibration, Err(error), _) => sorted.unmeasured.push(nothing(error.into())),
+            (Purpose::Measurement, _, Some(Ok((series, mapping)))) => {
+                let partial = partial_law(shared, slot, &name);
+                drone.warnings.extend(partial.filter(|_| mapping == LawOf::Flock));
+                sorted.seen.push(hover);
+                sorted.measured.push((slot, name.clone(), drone.home_m, series, mapping, truth));
+            }
+            (Purpose::Measurement, _, Some(Err(reason))) => sorted.unmeasured.push(nothing(reason)),
+            (Purpose::Measurement, _, None) => {}
+        }
+        sorted.drones.push(drone);
+    }
+    sorted
+}
+
+/// What a calibration says of the fleet.
+#[derive(Default)]
+struct FleetLaws {
+    flock: Option<Laws>,
+    table: Vec<TableRow>,
+    paper: Option<PaperTable>,
+}
+
+/// The laws of the drones' average and the table over the drones; marks drones with a part of the ladder.
+fn fleet_laws(
+    shared: &Shared<'_>,
+    drones: &mut [DroneAnalysis],
+    warnings: &mut Vec<Warning>,
+) -> FleetLaws {
+    let Shared { input, options, .. } = shared;
+    warnings.extend(mark_partial(drones, &options.fit));
+    let whole = || drones.iter().filter(|drone| drone.partial_ladder.is_none());
+    let windows = whole().map(|drone| drone.windows.as_slice());
+    let flock = match calibrate::flock(windows, &options.fit) {
+        Ok(laws) => Some(laws),
+        Err(error) => {
+            warnings.push(Warning::NoFlock(error));
+            None
+        }
+    };
+    let paper = paper_table(shared, drones);
+    let laws: Vec<&Laws> = whole().filter_map(|drone| drone.laws.as_ref()).collect();
+    let mut table = table::table(&laws, paper, &options.fit);
+    if let Some(laws) = &flock {
+        let vertex = vertex_mps(laws, drones, input.true_updraft_mps).is_some();
+        compare_what_fits(&mut table, laws, vertex);
+    }
+    warnings.extend(fit_cautions(flock.as_ref(), drones, input.leaning, input.true_updraft_mps));
+    warnings.extend(tilt_caution(drones, options));
+    FleetLaws { flock, table, paper }
+}
+
+/// Marks the drones of a calibration with clearly less of the ladder than the fleet, and warns of them.
+/// That most drones have less than two thirds of the plan is a warning of its own.
+fn mark_partial(drones: &mut [DroneAnalysis], options: &FitOptions) -> Vec<Warning> {
+    let with_laws: Vec<&[WindowStats]> = (drones.iter().filter(|drone| drone.laws.is_some()))
+        .map(|drone| drone.windows.as_slice())
+        .collect();
+    let Some(ladders) = FleetLadders::of(&with_laws, options) else { return Vec::new() };
+    let mut named = Vec::new();
+    for drone in drones.iter_mut() {
+        if let Some(partial) = ladders.partial(&drone.windows, options) {
+            named.push((drone.name.clone(), partial));
+            drone.partial_ladder = Some(partial);
+        }
+    }
+    let FleetLadders { flown, usable } = ladders;
+    let mut warnings = Vec::new();
+    if !named.is_empty() {
+        let of = drones.len();
+        warnings.push(Warning::PartialLadders { drones: named, of, whole: usable });
+    }
+    warnings.extend(ladders.is_partial().then_some(Warning::FleetLadder { usable, flown }));
+    warnings
+}
+
+/// What a reader of a map must know.
+fn map_warnings(shared: &Shared<'_>, map: &UpdraftMap) -> Vec<Warning> {
+    let mut warnings: Vec<Warning> = wind_caution(map).into_iter().collect();
+    let calibration = shared.reference.filter(|_| shared.aware.is_some());
+    let battery = calibration.filter(|_| shared.input.sag.is_some());
+    warnings.extend(battery.and_then(|found| battery_caution(map, found)));
+    warnings.extend(shared.aware.is_none().then_some(Warning::PlainMap));
+    warnings.extend(map.is_scan().then_some(Warning::Scan));
+    warnings
+}
+
+/// Statistics of the air over a map; `None` where drones moved.
+fn statistics(
+    shared: &Shared<'_>,
+    map: &UpdraftMap,
+    seen: &[HoverSeen],
+) -> Option<FieldStatistics> {
+    let Shared { input, options, .. } = shared;
+    let drag = match (input.leaning, input.lean_table) {
+        (Some(leaning), _) => LeanDrag::Faces(leaning.drag_speed_mps),
+        (None, Some(table)) => LeanDrag::Table(table),
+        (None, None) => LeanDrag::Unknown,
+    };
+    (!map.is_scan()).then(|| FieldStatistics {
+        true_air: input.true_air.cloned(),
+        ..of_map(map, seen, &options.statistics, drag)
+    })
 }
 
 /// The table of the paper to compare a calibration with. Table II is one of a fleet in the field: a
@@ -370,10 +448,10 @@ fn paper_table(shared: &Shared<'_>, drones: &[DroneAnalysis]) -> Option<PaperTab
 /// flight, whose parameters mean nothing there.
 fn compare_what_fits(table: &mut [TableRow], flock: &Laws, vertex: bool) {
     for row in table.iter_mut().filter(|row| row.paper.is_some()) {
-        let law = if row.law == LINEAR { MapLaw::Linear } else { MapLaw::SignedQuadratic };
+        let Some(law) = row.law.kind() else { continue };
         if !describes(flock, law) {
             row.not_compared = Some("this law does not describe this flight".to_owned());
-        } else if vertex && row.law == SIGNED_QUADRATIC {
+        } else if vertex && row.law == TableLaw::SignedQuadratic {
             row.not_compared = Some(
                 "here this law is one flank of a parabola: its A, u0 and W* are no rotor's and no air's"
                     .to_owned(),
@@ -383,13 +461,10 @@ fn compare_what_fits(table: &mut [TableRow], flock: &Laws, vertex: bool) {
 }
 
 /// That the law of a measured drone is the flock's because its own is of a part of the ladder.
-fn partial_law(shared: &Shared<'_>, slot: Option<u16>, name: &str) -> Option<String> {
+fn partial_law(shared: &Shared<'_>, slot: Option<u16>, name: &str) -> Option<Warning> {
     let drone = same_drone(shared.map_reference?, slot, name)?;
     let partial = drone.partial_ladder.filter(|_| drone.laws.is_some())?;
-    Some(format!(
-        "the map uses the flock's law: its own is of a partial ladder ({})",
-        partial.short()
-    ))
+    Some(Warning::PartialLaw(partial))
 }
 
 /// Where a drone that moved was at the map's times, in the show frame where its home is known.
@@ -418,7 +493,7 @@ fn law_reason(shared: &Shared<'_>) -> Option<String> {
 }
 
 type NamedUpdraft =
-    (Option<u16>, String, Option<[f64; 2]>, DroneSeries, &'static str, Option<TruthSeries>);
+    (Option<u16>, String, Option<[f64; 2]>, DroneSeries, LawOf, Option<TruthSeries>);
 
 fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
     let uniform_mps = shared.input.true_updraft_mps;
@@ -441,7 +516,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
             position_m: position_m.filter(|_| series.moved_m.is_empty()),
             track_m: track_of(shared, position_m, &series, &times),
             height_m: series.height_m,
-            mapping: mapping.to_owned(),
+            mapping,
             mean: series.mean,
             mean_interval_mps: series.measured.as_ref().map(|one| one.mean_interval_mps),
             errors: series.measured.as_ref().map_or_else(ErrorBudget::default, |one| one.errors),
@@ -461,11 +536,7 @@ fn map(updrafts: Vec<NamedUpdraft>, shared: &Shared<'_>) -> UpdraftMap {
         })
         .collect();
     UpdraftMap {
-        law: match shared.map_law {
-            Some(MapLaw::SignedQuadratic) => SIGNED_QUADRATIC,
-            _ => LINEAR,
-        }
-        .to_owned(),
+        law: shared.map_law.unwrap_or(LawKind::Linear),
         law_reason: law_reason(shared),
         wind: match (shared.input.leaning, shared.input.lean_table) {
             (Some(_), _) => Some(WindCorrection::Drag),

@@ -7,10 +7,12 @@
 
 use super::battery::{self, Pack, Sag, Slow};
 use super::budget::{BatteryCorrection, CommonError, ErrorBudget, Quality, QualityFlag};
+use super::cause::Cause;
 use super::corrections::{BATTERY, Corrections, DENSITY, DOUBTS, DRIFT, Raw, Referred, WIND};
-use super::drone::same_drone;
 use super::hover::{Hover, Second};
-use super::options::MapLaw;
+use super::law::LawKind;
+use super::measured::Measured;
+use super::reference::same_drone;
 use super::result::{DroneAnalysis, FlightAnalysis, WindowStats};
 use super::shape::{PARAMETERS, Shape};
 use super::split::Point;
@@ -60,24 +62,6 @@ pub(super) struct Aware<'a> {
     evidence: Option<[f64; 2]>,
 }
 
-/// What one drone's hover gave.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Measured {
-    pub(super) first_s: i64,
-    pub(super) updraft_mps: Vec<Option<f64>>,
-    pub(super) sd_mps: Vec<Option<f64>>,
-    pub(super) interval_mps: Vec<Option<[f64; 2]>>,
-    pub(super) mean_mps: f64,
-    pub(super) mean_interval_mps: [f64; 2],
-    pub(super) errors: ErrorBudget,
-    pub(super) quality: Vec<QualityFlag>,
-    pub(super) is_own: bool,
-    /// The law's derivatives over its slope, for the fleet's common error.
-    basis: [f64; PARAMETERS],
-    /// Signed standard errors from the doubts, m/s.
-    doubts_mps: [f64; DOUBTS],
-}
-
 /// Whether a drone's windows count for the fleet.
 fn counts(reference: &FlightAnalysis, drone: &DroneAnalysis) -> bool {
     drone.laws.is_some() && (drone.partial_ladder.is_none() || reference.flock.is_none())
@@ -89,10 +73,10 @@ fn pack_of(drone: &DroneAnalysis, battery: Option<BatteryCorrection>) -> Option<
 
 impl<'a> Aware<'a> {
     /// The law of the map.
-    pub(super) fn law(&self) -> MapLaw {
+    pub(super) fn law(&self) -> LawKind {
         match self.zero.shape {
-            Shape::Line => MapLaw::Linear,
-            Shape::SignedQuadratic => MapLaw::SignedQuadratic,
+            Shape::Line => LawKind::Linear,
+            Shape::SignedQuadratic => LawKind::SignedQuadratic,
         }
     }
 
@@ -121,11 +105,12 @@ impl<'a> Aware<'a> {
         reference: &'a FlightAnalysis,
         corrections: Corrections<'a>,
         sag: Option<Sag>,
-        law: Option<MapLaw>,
+        law: Option<LawKind>,
     ) -> Option<Self> {
-        let battery = sag.and_then(|sag| battery::correction(reference, sag));
+        let windows = || reference.drones.iter().map(|drone| drone.windows.as_slice());
+        let battery = sag.and_then(|sag| battery::correction(windows(), sag));
         let unknown_share =
-            battery.map_or(0.0, |battery| battery::unknown_share(reference, battery));
+            battery.map_or(0.0, |battery| battery::unknown_share(windows(), battery));
         let corrections = Corrections { has_battery: sag.is_some(), unknown_share, ..corrections };
         let slopes: Vec<f64> = reference
             .drones
@@ -139,8 +124,8 @@ impl<'a> Aware<'a> {
         let points_of = |hovers| points(reference, &corrections, battery, slope, hovers);
         let mut compared = None;
         let shape = match law {
-            Some(MapLaw::Linear) => Shape::Line,
-            Some(MapLaw::SignedQuadratic) => Shape::SignedQuadratic,
+            Some(LawKind::Linear) => Shape::Line,
+            Some(LawKind::SignedQuadratic) => Shape::SignedQuadratic,
             // Compared on the windows that both take: in hover the signed quadratic says nothing
             // about its parameters.
             None => {
@@ -166,7 +151,7 @@ impl<'a> Aware<'a> {
         hover: &Hover,
         slot: Option<u16>,
         name: &str,
-    ) -> Result<Measured, String> {
+    ) -> Result<Measured, Cause> {
         let found = same_drone(self.reference, slot, name);
         let index = found
             .and_then(|found| self.reference.drones.iter().position(|d| std::ptr::eq(d, found)));
@@ -180,35 +165,65 @@ impl<'a> Aware<'a> {
         let values = Values { shape: self.zero.shape, law, zero: &self.zero };
         let refer = |second: &Second| {
             let resting_v = slow.as_ref().and_then(|slow| slow.at(second.time_s));
-            let mut raw = Raw {
-                time_s: second.time_s,
-                pulse_us: second.pulse_us,
-                velocity_mps: second.velocity_mps,
-                climb_mps: second.velocity_mps,
-                lean_deg: second.lean_deg,
-                height_m: second.height_m,
-                resting_v,
-            };
-            let mut one = self.corrections.refer(&raw, pack.as_ref(), self.slope);
-            if self.corrections.lean_table.is_some() {
-                // What wind does depends on the air that is looked for: at 7 m/s the pulse answers
-                // climbs half as strongly again as in still air, or more.
-                for _ in 0..CLIMB_ROUNDS {
-                    let Some(air_mps) = values.air_mps(one.pulse_us) else { break };
-                    raw.climb_mps += CLIMB_STEP * (air_mps - raw.climb_mps);
-                    one = self.corrections.refer(&raw, pack.as_ref(), self.slope);
-                }
-            }
-            (one, raw)
+            self.refer(second, resting_v, pack.as_ref(), &values)
         };
-        let mut quality = hover.quality.clone();
         let referred: Vec<Option<(Referred, Raw)>> =
             hover.seconds.iter().map(|second| second.as_ref().map(refer)).collect();
         let sigmas = self.corrections.sigmas(pack.as_ref());
         let mut measured =
             Measured { first_s: hover.first_s, is_own: own.is_some(), ..Measured::default() };
+        let known = self.seconds(&mut measured, &referred, &values, hover, &sigmas);
+        if known.is_empty() {
+            return Err(hover.nothing());
+        }
+        self.mean(&mut measured, &known, &values, hover, &sigmas);
+        measured.quality.clone_from(&hover.quality);
+        measured.quality.extend(self.doubtful(hover, &known, &referred, pack.as_ref()));
+        Ok(measured)
+    }
+
+    /// A second with what is known besides the vertical air speed taken away, and as it was logged.
+    fn refer(
+        &self,
+        second: &Second,
+        resting_v: Option<f64>,
+        pack: Option<&Pack>,
+        values: &Values<'_>,
+    ) -> (Referred, Raw) {
+        let mut raw = Raw {
+            time_s: second.time_s,
+            pulse_us: second.pulse_us,
+            velocity_mps: second.velocity_mps,
+            climb_mps: second.velocity_mps,
+            lean_deg: second.lean_deg,
+            height_m: second.height_m,
+            resting_v,
+        };
+        let mut one = self.corrections.refer(&raw, pack, self.slope);
+        if self.corrections.lean_table.is_some() {
+            // What wind does depends on the air that is looked for: at 7 m/s the pulse answers
+            // climbs half as strongly again as in still air, or more.
+            for _ in 0..CLIMB_ROUNDS {
+                let Some(air_mps) = values.air_mps(one.pulse_us) else { break };
+                raw.climb_mps += CLIMB_STEP * (air_mps - raw.climb_mps);
+                one = self.corrections.refer(&raw, pack, self.slope);
+            }
+        }
+        (one, raw)
+    }
+
+    /// Values of the seconds with their errors; the referred seconds that have one, with their air
+    /// speed, m/s.
+    fn seconds(
+        &self,
+        measured: &mut Measured,
+        referred: &[Option<(Referred, Raw)>],
+        values: &Values<'_>,
+        hover: &Hover,
+        sigmas: &[f64; DOUBTS],
+    ) -> Vec<(Referred, f64)> {
         let mut known: Vec<(Referred, f64)> = Vec::new();
-        for one in &referred {
+        for one in referred {
             let found = one.and_then(|(one, _)| Some((one, values.air_mps(one.pulse_us)?)));
             let Some((one, air_mps)) = found else {
                 measured.updraft_mps.push(None);
@@ -218,7 +233,7 @@ impl<'a> Aware<'a> {
             };
             known.push((one, air_mps));
             let noise_us = hover.noise_us(values.slope(air_mps)) / RUNNING.sqrt();
-            let error = values.error(&one.doubts_us, air_mps, &sigmas);
+            let error = values.error(&one.doubts_us, air_mps, sigmas);
             let half_us = error.half_us(self.zero.width, noise_us);
             let interval = values.interval(&one, values.level_us(&one, air_mps, half_us));
             let noise = values.interval(&one, values.level_us(&one, air_mps, NORMAL * noise_us));
@@ -226,17 +241,25 @@ impl<'a> Aware<'a> {
             measured.interval_mps.push(interval);
             measured.sd_mps.push(noise.map(|[low, high]| (high - low) / (2.0 * NORMAL)));
         }
-        if known.is_empty() {
-            return Err(hover.nothing());
-        }
-        self.mean(&mut measured, &known, &values, hover, &sigmas);
+        known
+    }
+
+    /// What is doubtful about the whole hover: air beyond the ladder, the battery, a drift.
+    fn doubtful(
+        &self,
+        hover: &Hover,
+        known: &[(Referred, f64)],
+        referred: &[Option<(Referred, Raw)>],
+        pack: Option<&Pack>,
+    ) -> Vec<QualityFlag> {
+        let mut quality = Vec::new();
+        let mut flag = |flag: Quality, reason: String| {
+            quality.push(QualityFlag { flag, start_s: hover.start_s, end_s: hover.end_s, reason });
+        };
         let [low, high] = self.zero.speeds_mps;
         let beyond =
             |(_, air): &&(Referred, f64)| *air < low - BEYOND_MPS || *air > high + BEYOND_MPS;
         let count = known.iter().filter(beyond).count();
-        let mut flag = |flag: Quality, reason: String| {
-            quality.push(QualityFlag { flag, start_s: hover.start_s, end_s: hover.end_s, reason });
-        };
         if count > 0 {
             flag(
                 Quality::BeyondLadder,
@@ -259,7 +282,7 @@ impl<'a> Aware<'a> {
                 },
             );
         }
-        if let Some(pack) = &pack {
+        if let Some(pack) = pack {
             let volts = referred.iter().flatten().filter_map(|(_, raw)| raw.resting_v);
             let least = volts.fold(f64::INFINITY, f64::min);
             let share = pack.volts(least) / pack.correction.reference_v;
@@ -271,12 +294,11 @@ impl<'a> Aware<'a> {
             }
         }
         // Along a track the air changes as well: only a hover's trend is a drift.
-        let trend = Hover::trend_us_per_min(&known_times(&referred));
+        let trend = Hover::trend_us_per_min(&known_times(referred));
         if let Some(per_minute) = trend.filter(|_| !hover.moves) {
             flag(Quality::Drift, format!("the pulse drifts by {per_minute:+.0} us per minute"));
         }
-        measured.quality = quality;
-        Ok(measured)
+        quality
     }
 
     fn mean(

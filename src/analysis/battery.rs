@@ -11,8 +11,9 @@
 //! calibration). What remains, the drop by more or less power than that, belongs to the slope of the
 //! law.
 
-use super::result::{BatteryCorrection, FlightAnalysis, Supply};
+use super::budget::{BatteryCorrection, Supply};
 use super::stats::mean_sd;
+use super::window::WindowStats;
 use crate::flight::{Flight, Series};
 
 /// Pulse at which the rotors make no thrust, us.
@@ -141,24 +142,25 @@ impl Slow {
 }
 
 /// The supplies in a drone's usable hovers, else in all of its windows.
-pub(super) fn of_hovers(windows: &[super::result::WindowStats]) -> Vec<Supply> {
+pub(super) fn of_hovers(windows: &[WindowStats]) -> Vec<Supply> {
     let hovers: Vec<Supply> =
         windows.iter().filter(|w| w.kind.is_hover()).filter_map(|w| w.supply).collect();
     if hovers.is_empty() { windows.iter().filter_map(|w| w.supply).collect() } else { hovers }
 }
 
-/// The correction that a calibration's voltages give: referred to the mean of the fleet's hovers.
-pub(super) fn correction(calibration: &FlightAnalysis, sag: Sag) -> Option<BatteryCorrection> {
+/// The correction that the voltages of a calibration's drones (windows of each) give: referred to the mean of the fleet's hovers.
+pub(super) fn correction<'a>(
+    drones: impl Iterator<Item = &'a [WindowStats]>,
+    sag: Sag,
+) -> Option<BatteryCorrection> {
     let reference = BatteryCorrection {
         reference_v: 1.0,
         exponent: sag.exponent,
         exponent_se: sag.exponent_se,
     };
-    let volts: Vec<f64> = calibration
-        .drones
-        .iter()
-        .flat_map(|drone| {
-            let supplies = of_hovers(&drone.windows);
+    let volts: Vec<f64> = drones
+        .flat_map(|windows| {
+            let supplies = of_hovers(windows);
             let pack = Pack::of(&supplies, reference);
             supplies.into_iter().filter_map(move |s| Some(pack?.volts(s.resting_v)))
         })
@@ -170,13 +172,14 @@ pub(super) fn correction(calibration: &FlightAnalysis, sag: Sag) -> Option<Batte
 /// a standard error. Nothing is known of it but that it is one of the fleet's, anywhere between the
 /// fullest and the emptiest that the calibration saw; the error is the farther of these two from the
 /// reference, and never less than [`LEAST_UNKNOWN`].
-pub(super) fn unknown_share(calibration: &FlightAnalysis, correction: BatteryCorrection) -> f64 {
-    let farthest = calibration
-        .drones
-        .iter()
-        .flat_map(|drone| {
-            let pack = Pack::of(&of_hovers(&drone.windows), correction);
-            let supplies = drone.windows.iter().filter_map(|window| window.supply);
+pub(super) fn unknown_share<'a>(
+    drones: impl Iterator<Item = &'a [WindowStats]>,
+    correction: BatteryCorrection,
+) -> f64 {
+    let farthest = drones
+        .flat_map(|windows| {
+            let pack = Pack::of(&of_hovers(windows), correction);
+            let supplies = windows.iter().filter_map(|window| window.supply);
             supplies.filter_map(move |supply| Some(pack?.volts(supply.resting_v)))
         })
         .map(|volts| (volts / correction.reference_v).ln().abs())

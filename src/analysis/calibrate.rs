@@ -3,10 +3,10 @@
 use thiserror::Error;
 
 use super::fit::FitError;
+use super::fitted::{Fit, Laws};
 use super::law::{self, ErrorScale, Law, Point};
-use super::result::{DroneAnalysis, Fit, Laws, SampleStats, TableRow, WindowStats};
-use super::stats::mean_sd;
-use crate::base::estimate::Estimate;
+use super::stats::SampleStats;
+use super::window::WindowStats;
 use crate::flight::Indicator;
 
 /// Which number stands for a window.
@@ -222,11 +222,8 @@ fn fit_points(
 
 /// The fit's parameters in the indicator's unit instead of microseconds.
 fn in_units_of(indicator: Indicator, mut fit: Fit) -> Fit {
-    let pulse = Indicator::Pulse.unit();
     for parameter in &mut fit.parameters {
-        if let Some(rest) = parameter.unit.strip_prefix(pulse) {
-            parameter.unit = format!("{}{rest}", indicator.unit());
-        }
+        parameter.unit = parameter.name.unit(indicator);
     }
     fit
 }
@@ -271,14 +268,16 @@ fn added_sigma_us(points: &[Point]) -> Option<f64> {
 /// Windows are the same when kind, label, command and their order among equals agree, so that groups
 /// flying at different times are averaged too. The averages' statistical errors shrink with the
 /// number of drones; the air they share does not, which the added variance accounts for. Drones with
-/// a part of the ladder ([`DroneAnalysis::partial_ladder`]) do not count: the average would change its
-/// drones from rung to rung.
-pub fn flock(drones: &[DroneAnalysis], options: &FitOptions) -> Result<Laws, CalibrationError> {
+/// a part of the ladder are not to be among them: the average would change its drones from rung to rung.
+pub fn flock<'a>(
+    drones: impl IntoIterator<Item = &'a [WindowStats]>,
+    options: &FitOptions,
+) -> Result<Laws, CalibrationError> {
     let mut groups: std::collections::BTreeMap<(String, i64, usize), Vec<Point>> =
         std::collections::BTreeMap::new();
-    for drone in drones.iter().filter(|drone| drone.partial_ladder.is_none()) {
+    for windows in drones {
         let mut seen = std::collections::BTreeMap::<(String, i64), usize>::new();
-        for window in &drone.windows {
+        for window in windows {
             let command = (window.commanded_mps * 1000.0).round() as i64;
             let key = (format!("{:?} {}", window.kind, window.label), command);
             let count = seen.entry(key.clone()).or_default();
@@ -308,123 +307,4 @@ pub fn flock(drones: &[DroneAnalysis], options: &FitOptions) -> Result<Laws, Cal
     };
     let points: Vec<Point> = groups.values().map(average).collect();
     fit_points(&points, options, CalibrationError::NoLadder { rejected: 0, hovers: 0 })
-}
-
-/// Which of the paper's tables stands beside the fleet's numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PaperTable {
-    /// Table I: simulation in still air.
-    Simulation,
-    /// Table II: field.
-    Field,
-}
-
-impl PaperTable {
-    /// Its number in the paper.
-    pub fn number(self) -> &'static str {
-        match self {
-            Self::Simulation => "I",
-            Self::Field => "II",
-        }
-    }
-
-    fn value(self, law: &str, parameter: &str) -> Option<Estimate> {
-        let (value, se) = match (self, law, parameter) {
-            (Self::Simulation, law::SIGNED_QUADRATIC, "A") => (8.207, 0.020),
-            (Self::Simulation, law::SIGNED_QUADRATIC, "u0") => (1598.656, 0.039),
-            (Self::Simulation, law::SIGNED_QUADRATIC, "W") => (-0.0589, 0.0031),
-            (Self::Field, law::SIGNED_QUADRATIC, "A") => (10.5, 2.6),
-            (Self::Field, law::SIGNED_QUADRATIC, "u0") => (1562.0, 42.0),
-            (Self::Field, law::SIGNED_QUADRATIC, "W") => (0.4, 3.0),
-            (Self::Field, law::SIGNED_QUADRATIC, "chi2_nu") => (2.19, 0.84),
-            (Self::Field, law::LINEAR, "A'") => (26.4, 2.6),
-            (Self::Field, law::LINEAR, "u0") => (1546.5, 7.8),
-            (Self::Field, law::LINEAR, "chi2_nu") => (0.91, 0.44),
-            _ => return None,
-        };
-        Some(Estimate::new(value, se))
-    }
-}
-
-/// Why a chi² of other weights is not compared.
-const OTHER_CHI2: &str = "the paper weighs windows by the spread of their samples, which is no error of \
-    a mean; ours (without --paper) is over their standard errors";
-
-/// Name of the law with A and u0 held, in tables.
-pub const SIGNED_QUADRATIC_HELD: &str = "signed quadratic, A and u0 held";
-
-type FitOf = fn(&Laws) -> Option<&Fit>;
-
-/// Name of what belongs to all laws, in tables.
-pub const BOTH_LAWS: &str = "both laws";
-/// Name of the added scatter in tables.
-pub const ADDED_SCATTER: &str = "sigma_added";
-
-/// Statistics over drones of the fitted parameters, in the rows of Tables I and II. Drones with a
-/// part of the ladder ([`DroneAnalysis::partial_ladder`]) do not count. Without `paper`, nothing is
-/// compared.
-///
-/// The paper's chi² counts the samples' standard deviation as the error of a window: it is compared
-/// with ours only when the weights are the same ([`Weights::WindowSd`]).
-pub fn table(
-    drones: &[DroneAnalysis],
-    paper: Option<PaperTable>,
-    options: &FitOptions,
-) -> Vec<TableRow> {
-    let FitOptions { weights, indicator, .. } = *options;
-    let whole = || drones.iter().filter(|drone| drone.partial_ladder.is_none());
-    let laws: [(&str, FitOf); 3] = [
-        (law::SIGNED_QUADRATIC, |laws| laws.signed_quadratic.as_ref()),
-        (SIGNED_QUADRATIC_HELD, |laws| laws.signed_quadratic_held.as_ref()),
-        (law::LINEAR, |laws| laws.linear.as_ref()),
-    ];
-    let mut rows = Vec::new();
-    for (name, fit_of) in laws {
-        let fits: Vec<&Fit> = whole().filter_map(|drone| fit_of(drone.laws.as_ref()?)).collect();
-        let Some(first) = fits.first() else { continue };
-        for (index, parameter) in first.parameters.iter().enumerate() {
-            if parameter.held {
-                continue;
-            }
-            let estimates: Vec<Estimate> =
-                fits.iter().filter_map(|fit| Some(fit.parameters.get(index)?.estimate)).collect();
-            let values: Vec<f64> = estimates.iter().map(|estimate| estimate.value).collect();
-            let errors: Vec<f64> =
-                estimates.iter().map(|estimate| estimate.se).filter(|se| *se > 0.0).collect();
-            rows.push(row(name, &parameter.name, &parameter.unit, &values, &errors, paper));
-        }
-        let reduced: Vec<f64> = fits.iter().filter_map(|fit| fit.chi2_reduced).collect();
-        if !reduced.is_empty() {
-            let row = row(name, "chi2_nu", "", &reduced, &[], paper);
-            let other = row.paper.is_some() && weights != Weights::WindowSd;
-            rows.push(TableRow { not_compared: other.then(|| OTHER_CHI2.to_owned()), ..row });
-        }
-    }
-    let added: Vec<f64> = whole().filter_map(|drone| drone.laws.as_ref()?.sigma_added_us).collect();
-    if !added.is_empty() {
-        rows.push(row(BOTH_LAWS, ADDED_SCATTER, indicator.unit(), &added, &[], paper));
-    }
-    rows
-}
-
-fn row(
-    law: &str,
-    parameter: &str,
-    unit: &str,
-    values: &[f64],
-    errors: &[f64],
-    paper: Option<PaperTable>,
-) -> TableRow {
-    let (mean, sd) = mean_sd(values);
-    TableRow {
-        law: law.to_owned(),
-        parameter: parameter.to_owned(),
-        unit: unit.to_owned(),
-        mean,
-        sd,
-        mean_se: mean_sd(errors).0,
-        n: values.len(),
-        paper: paper.and_then(|paper| paper.value(law, parameter)),
-        not_compared: None,
-    }
 }

@@ -8,8 +8,8 @@
 use super::battery::Pack;
 use super::density::Density;
 use super::lean_table::LeanTable;
-use super::result::WindowStats;
 use super::wind::Leaning;
+use super::window::WindowStats;
 
 /// Doubts in their order: battery, drift, wind, density.
 pub(super) const DOUBTS: usize = 4;

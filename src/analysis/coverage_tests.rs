@@ -12,7 +12,7 @@ use super::calibrate::FitOptions;
 use super::corrections::Corrections;
 use super::density::Density;
 use super::hover::Hover;
-use super::options::MapLaw;
+use super::law::LawKind;
 use super::result::{DroneAnalysis, FlightAnalysis, SampleStats, Trace, WindowStats};
 use super::windows::{Target, WindowOptions};
 use crate::base::rng::{Purpose as Stream, stream};
@@ -56,19 +56,19 @@ struct World {
     warm_us: f64,
     /// Constant, slope and two bends.
     laws: Vec<[f64; 4]>,
-    shape: MapLaw,
+    shape: LawKind,
 }
 
 impl World {
-    fn new(rng: &mut Pcg64, shape: MapLaw) -> Self {
+    fn new(rng: &mut Pcg64, shape: LawKind) -> Self {
         let bends = [0.8 * normal(rng), 0.5 * normal(rng)];
         let law = |rng: &mut Pcg64| match shape {
-            MapLaw::Linear => {
+            LawKind::Linear => {
                 [1546.5 + 6.7 * normal(rng), 26.4 + 1.9 * normal(rng), bends[0], bends[1]]
             }
-            MapLaw::SignedQuadratic => [1598.6 + 2.0 * normal(rng), 0.0, 0.0, 8.1],
+            LawKind::SignedQuadratic => [1598.6 + 2.0 * normal(rng), 0.0, 0.0, 8.1],
         };
-        let real = shape == MapLaw::Linear;
+        let real = shape == LawKind::Linear;
         Self {
             exponent: if real { 1.0 + 0.05 * normal(rng) } else { 0.0 },
             density: if real { 0.4 + 0.1 * normal(rng) } else { 1.0 },
@@ -249,14 +249,14 @@ fn hover(
 }
 
 /// Shares of values and of means inside of their intervals, and the rms error, of one campaign.
-fn campaign(seed: u64, weather: Weather, shape: MapLaw) -> [f64; 3] {
+fn campaign(seed: u64, weather: Weather, shape: LawKind) -> [f64; 3] {
     let mut rng = stream(seed, 0, Stream::Sensors);
     let world = World::new(&mut rng, shape);
     assert_eq!(world.shape, shape);
     let calibration = calibration(&mut rng, &world, weather);
     let density = match shape {
-        MapLaw::Linear => World::density(),
-        MapLaw::SignedQuadratic => Density { exponent: 1.0, ..World::density() },
+        LawKind::Linear => World::density(),
+        LawKind::SignedQuadratic => Density { exponent: 1.0, ..World::density() },
     };
     let corrections = Corrections {
         density: Some(density),
@@ -264,7 +264,7 @@ fn campaign(seed: u64, weather: Weather, shape: MapLaw) -> [f64; 3] {
         leaning: Some(super::wind::Leaning { thrust_exponent: 1.0, drag_speed_mps: 38.0 }),
         ..Corrections::default()
     };
-    let sag = (shape == MapLaw::Linear).then(Sag::default);
+    let sag = (shape == LawKind::Linear).then(Sag::default);
     let aware = Aware::new(&calibration, corrections, sag, Some(shape)).unwrap();
     let shared = wander(&mut rng, weather.shared, HOVER_S);
     let (mut inside, mut values, mut squares, mut means) = (0, 0, 0.0, 0);
@@ -298,7 +298,7 @@ fn campaign(seed: u64, weather: Weather, shape: MapLaw) -> [f64; 3] {
 
 /// Mean shares over campaigns with their Monte-Carlo errors: values of one campaign share its zero,
 /// so that campaigns are counted, not values.
-fn cover(campaigns: u64, weather: Weather, shape: MapLaw) -> [(f64, f64); 2] {
+fn cover(campaigns: u64, weather: Weather, shape: LawKind) -> [(f64, f64); 2] {
     use rayon::prelude::*;
     let shares: Vec<[f64; 3]> =
         (0..campaigns).into_par_iter().map(|seed| campaign(seed, weather, shape)).collect();
@@ -324,7 +324,7 @@ const FIELD: Weather = Weather { shared: (0.48, 186.0), local: (0.14, 186.0), no
 const GUSTY: Weather = Weather { shared: (0.3, 15.0), local: (0.3, 5.0), noise_us: 6.0 };
 const BREEZE: Weather = Weather { shared: (0.2, 60.0), local: (0.1, 30.0), noise_us: 4.0 };
 
-fn holds(campaigns: u64, weather: Weather, shape: MapLaw) {
+fn holds(campaigns: u64, weather: Weather, shape: LawKind) {
     for (share, error) in cover(campaigns, weather, shape) {
         let (low, high) = (share - 2.0 * error, share + 2.0 * error);
         assert!(low <= 0.97 && high >= 0.93, "{shape:?} {weather:?}: {share} ± {error}");
@@ -333,19 +333,19 @@ fn holds(campaigns: u64, weather: Weather, shape: MapLaw) {
 
 #[test]
 fn intervals_hold_95_percent_in_still_air() {
-    holds(60, STILL, MapLaw::Linear);
+    holds(60, STILL, LawKind::Linear);
 }
 
 #[test]
 fn intervals_hold_95_percent_in_the_air_of_a_field_day() {
-    holds(120, FIELD, MapLaw::Linear);
+    holds(120, FIELD, LawKind::Linear);
 }
 
 /// `cargo test --release --lib coverage -- --ignored --nocapture`
 #[test]
 #[ignore = "minutes"]
 fn many_campaigns() {
-    for shape in [MapLaw::Linear, MapLaw::SignedQuadratic] {
+    for shape in [LawKind::Linear, LawKind::SignedQuadratic] {
         for weather in [STILL, BREEZE, GUSTY, FIELD] {
             cover(1000, weather, shape);
         }

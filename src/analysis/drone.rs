@@ -2,20 +2,25 @@
 
 use super::aware::Aware;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};
+use super::cause::Cause;
 use super::hover::Hover;
 use super::input::{FlightInput, LogInput, TruthSeries};
+use super::law::{LawKind, LawOf};
+use super::map_statistics::HoverSeen;
 use super::offset::OffsetMap;
-use super::options::{AnalysisOptions, MapLaw};
-use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, Trace, WindowStats};
-use super::statistics::HoverSeen;
+use super::options::AnalysisOptions;
+use super::reference::laws_for;
+use super::result::{DroneAnalysis, FlightAnalysis, Laws, Trace, WindowStats};
+use super::running::{RUNNING_S, Running};
 use super::stats::mean_sd;
 use super::steps::steady;
 use super::track;
-use super::updraft::{self, DroneSeries, Lean, RUNNING_S, Running};
+use super::updraft::{self, DroneSeries, Lean};
+use super::warning::Warning;
 use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
-use crate::base::plain::plain;
-use crate::flight::{Alignment, Flight, FlightOptions, table};
+use crate::base::plain::{Shown as _, plain};
+use crate::flight::{Alignment, Flight, FlightOptions, Loss, table};
 use crate::mission::plan::{Kind, Purpose, Segment, Slot};
 
 /// What all logs of a flight share.
@@ -26,7 +31,7 @@ pub(super) struct Shared<'a> {
     /// The reference with its laws referred to the density at the ground, for the map.
     pub(super) map_reference: Option<&'a FlightAnalysis>,
     pub(super) planned_purpose: Option<Purpose>,
-    pub(super) map_law: Option<MapLaw>,
+    pub(super) map_law: Option<LawKind>,
     /// The calibration with what it tells about errors, for the map.
     pub(super) aware: Option<Aware<'a>>,
 }
@@ -34,13 +39,13 @@ pub(super) struct Shared<'a> {
 /// What one log gave.
 pub(super) struct One {
     pub(super) drone: DroneAnalysis,
-    /// What the log lacks: one phrase for each, in the words of the drone's warnings.
-    pub(super) losses: Vec<String>,
+    /// What the log lacks.
+    pub(super) losses: Vec<Loss>,
     /// Bytes of the log that its reader skipped.
     pub(super) skipped_bytes: u64,
     pub(super) calibration: Result<Laws, CalibrationError>,
     /// The air, with the mapping used; or why there is none. `None` without reference laws.
-    pub(super) updraft: Option<Result<(DroneSeries, &'static str), String>>,
+    pub(super) updraft: Option<Result<(DroneSeries, LawOf), Cause>>,
     /// Its hover, for the statistics.
     pub(super) hover: HoverSeen,
     /// What something beside the drone measured of the air.
@@ -48,7 +53,7 @@ pub(super) struct One {
 }
 
 /// Everything about one log.
-pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Result<One, String> {
+pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Result<One, Cause> {
     let Shared { input, options, .. } = shared;
     let slot: Option<(&Slot, &[Segment])> = slot.and_then(|number| {
         let plan = input.plan?;
@@ -60,22 +65,22 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
         indicator: options.indicator,
         segments: slot.map(|(_, segments)| segments),
     };
-    let flight = match &log.table {
-        Some(mapping) => {
-            table::read(&log.path, mapping).map_err(|error| with_causes(&error, ": "))?
-        }
-        None => {
-            Flight::open(&log.path, flight_options).map_err(|error| with_causes(&error, ": "))?
-        }
+    let unusable = |error: &dyn std::error::Error| {
+        let said = with_causes(error, ": ");
+        Cause::of_log(&said, &log.path.shown().to_string(), &input.shown(&log.path))
     };
-    let mut warnings = flight.warnings.clone();
+    let flight = match &log.table {
+        Some(mapping) => table::read(&log.path, mapping).map_err(|error| unusable(&error))?,
+        None => Flight::open(&log.path, flight_options).map_err(|error| unusable(&error))?,
+    };
+    let mut warnings: Vec<Warning> = flight.warnings.iter().cloned().map(Warning::Log).collect();
 
     let targets = match &log.table {
         Some(mapping) if flight.desired_up_mps.is_none() => steady(&flight, &mapping.steps),
         _ => find_targets(&flight, slot.map(|(_, segments)| segments), &mut warnings)?,
     };
     let elsewhere = elsewhere(&flight, &targets);
-    warnings.extend(elsewhere.clone());
+    warnings.extend(elsewhere.clone().map(Warning::NothingOfPlan));
     let corrected = windows::correct_tilt(&flight, &options.windows);
     let mut stats = windows::measure(&flight, &corrected, &targets, &options.windows);
     let offset = options
@@ -118,18 +123,12 @@ pub(super) fn one(shared: &Shared<'_>, log: &LogInput, slot: Option<u16>) -> Res
 }
 
 /// That none of the windows lies in the time that the log speaks of.
-fn elsewhere(flight: &Flight, targets: &[Target]) -> Option<String> {
+fn elsewhere(flight: &Flight, targets: &[Target]) -> Option<Cause> {
     let (from, to) = flight.velocity_up_mps.span()?;
     let (first, last) = (targets.first()?, targets.last()?);
     let apart = targets.iter().all(|target| target.end_s < from || target.start_s > to);
-    apart.then(|| {
-        format!(
-            "its log runs from {from:.0} to {to:.0} s of show time, and the plan's windows lie between \
-             {:.0} and {:.0} s: the drone's clock jumped or was set wrong, or the log is of another \
-             start; nothing of the plan is in it",
-            first.start_s, last.end_s
-        )
-    })
+    let (log_s, plan_s) = ([from, to], [first.start_s, last.end_s]);
+    apart.then_some(Cause::OtherTime { log_s, plan_s })
 }
 
 /// The true air over the hover as the map sees it: means over the 10 s around each second.
@@ -159,31 +158,24 @@ fn measure(
     reference: &FlightAnalysis,
     slot: Option<u16>,
     name: &str,
-) -> Result<(DroneSeries, &'static str), String> {
+) -> Result<(DroneSeries, LawOf), Cause> {
     let Shared { input, .. } = shared;
-    let (laws, mapping, calibration) = laws_for(reference, slot, name)
-        .ok_or("the calibration has no law for it (neither its own nor the flock's)")?;
-    let fit = shared
-        .map_law
-        .and_then(|law| law_fit(laws, law))
-        .ok_or("the calibration has no fit of the law that the map uses")?;
+    let (laws, mapping, calibration) = laws_for(reference, slot, name).ok_or(Cause::NoLaw)?;
+    let fit = shared.map_law.and_then(|law| laws.of(law)).ok_or(Cause::NoFit)?;
     let looked = track::measuring(seen.targets);
-    let hover = *looked.first().ok_or("no hover was found in the flight")?;
+    let hover = *looked.first().ok_or(Cause::NoHover)?;
     if looked.iter().any(|target| target.kind == Kind::Horizontal) {
-        let aware = shared.aware.as_ref().ok_or(
-            "the drone moved, and a track is measured with a law that knows its errors: this \
-             calibration allows none, or the paper's way was asked for",
-        )?;
+        let aware = shared.aware.as_ref().ok_or(Cause::TrackWithoutErrors)?;
         let along = track::look(seen.flight, &looked, &shared.options.windows);
         let measured = aware.measure(seen.flight, &along, slot, name)?;
-        let mapping = if measured.is_own { mapping } else { FLOCK };
+        let mapping = if measured.is_own { mapping } else { LawOf::Flock };
         let systematic_mps = 2.0 * measured.errors.wind_mps;
         return Ok((track::series(seen.flight, &along, measured, systematic_mps), mapping));
     }
     if let Some(aware) = &shared.aware {
         let seconds = Hover::of(seen.flight, hover, &shared.options.windows);
         let measured = aware.measure(seen.flight, &seconds, slot, name)?;
-        let mapping = if measured.is_own { mapping } else { FLOCK };
+        let mapping = if measured.is_own { mapping } else { LawOf::Flock };
         let systematic_mps = 2.0 * measured.errors.wind_mps;
         let series = updraft::with_errors(seen.flight, hover, measured, systematic_mps);
         return Ok((series, mapping));
@@ -192,20 +184,15 @@ fn measure(
         window.kind.is_hover() && window.start_s == hover.start_s && window.end_s == hover.end_s
     });
     if let Some(window) = window.filter(|window| !window.rejected.is_empty()) {
-        let reasons: Vec<&str> = window.rejected.iter().map(|reason| reason.words()).collect();
-        return Err(format!(
-            "the hover from {:.0} to {:.0} s was rejected: {}",
-            hover.start_s,
-            hover.end_s,
-            reasons.join(", ")
-        ));
+        return Err(Cause::Rejected {
+            track: false,
+            from_to_s: [hover.start_s, hover.end_s],
+            reasons: window.rejected.iter().map(|reason| reason.words()).collect(),
+        });
     }
     let length_s = hover.end_s - hover.start_s;
     if length_s < RUNNING_S {
-        return Err(format!(
-            "the hover is too short: its window has {length_s:.0} s, the running mean needs \
-             {RUNNING_S:.0} s"
-        ));
+        return Err(Cause::TooShort { length_s });
     }
     let leveled = input.leaning.map(|leaning| leaning.level_series(seen.flight, seen.corrected));
     let pulse_us = leveled.as_ref().unwrap_or(&seen.corrected.pulse_phi_us);
@@ -213,8 +200,7 @@ fn measure(
         input.density.map(|density| density.refer_series(pulse_us, &seen.flight.height_m));
     let pulse_us = referred.as_ref().unwrap_or(pulse_us);
     let lean = Lean { leaning: input.leaning, calibration };
-    let series = updraft::estimate(seen.flight, pulse_us, hover, fit, lean)
-        .ok_or("the hover has no 10 s without a gap in the log")?;
+    let series = updraft::estimate(seen.flight, pulse_us, hover, fit, lean).ok_or(Cause::Gaps)?;
     Ok((series, mapping))
 }
 
@@ -222,68 +208,24 @@ fn measure(
 fn find_targets(
     flight: &Flight,
     segments: Option<&[Segment]>,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<Target>, String> {
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<Target>, Cause> {
     let Some(segments) = segments else {
         if flight.desired_up_mps.is_none() {
-            return Err("without a plan the windows come from the log's desired velocity, and it \
-                        has none (GUIP, PSCD or CTUN); give the plan"
-                .to_owned());
+            return Err(Cause::NoCommands);
         }
         return Ok(windows::inferred(flight));
     };
     let targets = windows::planned(segments);
     if targets.is_empty() {
-        return Err("the plan has no analysis windows for this slot: its legs and hovers are too \
-                    short for one"
-            .to_owned());
+        return Err(Cause::NoWindows);
     }
     if flight.clock.method == Alignment::Takeoff {
-        warnings
-            .push("times count from take-off: windows may be shifted against the plan".to_owned());
+        warnings.push(Warning::TakeoffClock);
     }
     windows::contradiction(flight, &targets)
         .or_else(|| track::contradiction(flight, segments))
         .map_or(Ok(targets), Err)
-}
-
-/// Mapping of a drone that has none of its own: `DroneUpdraft::mapping`.
-pub(super) const FLOCK: &str = "flock";
-
-/// A drone in a reference calibration: of the same slot, else of the same name.
-pub(super) fn same_drone<'a>(
-    reference: &'a FlightAnalysis,
-    slot: Option<u16>,
-    name: &str,
-) -> Option<&'a DroneAnalysis> {
-    let same = |drone: &&DroneAnalysis| match (slot, drone.slot) {
-        (Some(slot), Some(other)) => slot == other,
-        _ => drone.name == name,
-    };
-    reference.drones.iter().find(same)
-}
-
-/// The laws of a drone in a reference calibration, and its windows there: its own, else the flock's
-/// with those of the first drone. A law of a part of the ladder stands only where there is no flock's.
-fn laws_for<'a>(
-    reference: &'a FlightAnalysis,
-    slot: Option<u16>,
-    name: &str,
-) -> Option<(&'a Laws, &'static str, &'a [WindowStats])> {
-    let whole = |drone: &DroneAnalysis| drone.partial_ladder.is_none() || reference.flock.is_none();
-    let own = same_drone(reference, slot, name).filter(|drone| whole(drone));
-    if let Some((drone, laws)) = own.and_then(|drone| Some((drone, drone.laws.as_ref()?))) {
-        return Some((laws, "own", &drone.windows));
-    }
-    let first = reference.drones.iter().find(|drone| drone.laws.is_some() && whole(drone));
-    Some((reference.flock.as_ref()?, FLOCK, first.map_or(&[][..], |drone| &drone.windows)))
-}
-
-pub(super) fn law_fit(laws: &Laws, law: MapLaw) -> Option<&Fit> {
-    match law {
-        MapLaw::Linear => laws.linear.as_ref(),
-        MapLaw::SignedQuadratic => laws.signed_quadratic.as_ref(),
-    }
 }
 
 /// Traces for figures: means over equal time steps.

@@ -4,8 +4,9 @@
 //! a flag; the rest of the hover stands.
 
 use super::budget::{Quality, QualityFlag};
+use super::cause::Cause;
+use super::running::{RUNNING_S, Running};
 use super::stats::mean_sd;
-use super::updraft::{RUNNING_S, Running};
 use super::windows::{Target, WindowOptions, lean_deg};
 use crate::flight::{Alignment, Flight};
 
@@ -203,30 +204,22 @@ impl Hover {
     }
 
     /// Why there is not one value.
-    pub(super) fn nothing(&self) -> String {
+    pub(super) fn nothing(&self) -> Cause {
         let length_s = self.end_s - self.start_s;
-        let what = if self.moves { "track" } else { "hover" };
         if length_s < RUNNING_S {
-            return format!(
-                "the hover is too short: its window has {length_s:.0} s, the running mean needs \
-                 {RUNNING_S:.0} s"
-            );
+            return Cause::TooShort { length_s };
         }
-        let mut reasons: Vec<&str> = Vec::new();
+        let mut reasons: Vec<&'static str> = Vec::new();
         for flag in self.quality.iter().filter(|flag| flag.flag.excludes()) {
             if !reasons.contains(&flag.flag.words()) {
                 reasons.push(flag.flag.words());
             }
         }
+        let track = self.moves;
         if reasons.is_empty() {
-            return format!("the {what}'s pulses are outside of the law's range");
+            return Cause::OutsideLaw { track };
         }
-        format!(
-            "the {what} from {:.0} to {:.0} s was rejected: {}",
-            self.start_s,
-            self.end_s,
-            reasons.join(", ")
-        )
+        Cause::Rejected { track, from_to_s: [self.start_s, self.end_s], reasons }
     }
 }
 
@@ -287,9 +280,14 @@ mod tests {
         let hover = look(&flown(|_| 1540.0), 300.0);
         assert_eq!(flags(&hover), [(Quality::Incomplete, 196.0, 295.0)]);
         let none = Hover { seconds: Vec::new(), ..hover };
-        assert_eq!(none.nothing(), "the hover from 0 to 300 s was rejected: the log ends early");
+        assert_eq!(
+            none.nothing().to_string(),
+            "the hover from 0 to 300 s was rejected: the log ends early"
+        );
         let short = look(&flown(|_| 1540.0), 8.0);
-        assert!(short.nothing().starts_with("the hover is too short: its window has 8 s"));
+        assert!(
+            short.nothing().to_string().starts_with("the hover is too short: its window has 8 s")
+        );
     }
 
     #[test]

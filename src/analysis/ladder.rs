@@ -5,8 +5,12 @@
 //! a rotor's curve. Such a drone keeps its law, is marked, and is left out of what speaks for the
 //! fleet.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::calibrate::{FitOptions, is_used};
-use super::result::{DroneAnalysis, Ladder, PartialLadder};
+use super::window::WindowStats;
+use crate::base::sentence::Sentence;
 
 /// A drone with less than this share of the fleet's ladder has a part of it: less than a third may be
 /// lost to gusts, gaps or motors at their limit, and a log cut in the middle has half.
@@ -14,14 +18,49 @@ const WHOLE_SHARE: f64 = 2.0 / 3.0;
 /// Spans are compared to within this, m/s: commands are whole mm/s.
 const ROUNDING_MPS: f64 = 1e-3;
 
+/// That a drone's usable legs are fewer than two thirds of the fleet's, or span less than two thirds
+/// of its speeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PartialLadder {
+    /// Usable legs of the drone.
+    pub usable: Ladder,
+    /// Usable legs of the fleet's middle drone.
+    pub fleet: Ladder,
+}
+
+impl PartialLadder {
+    /// `6 of 14 legs, -1.5 to +1.5 m/s`.
+    pub fn short(&self) -> String {
+        self.sentence().to_string()
+    }
+
+    /// [`PartialLadder::short`] with its speeds as numbers.
+    pub fn sentence(&self) -> Sentence {
+        let Ladder { legs, lowest_mps, highest_mps } = self.usable;
+        Sentence::from(format!("{legs} of {} legs, ", self.fleet.legs))
+            .number(lowest_mps, &format!("{lowest_mps:+}"))
+            .words(" to ")
+            .number(highest_mps, &format!("{highest_mps:+}"))
+            .words(" m/s")
+    }
+}
+
+/// Legs of vertical motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Ladder {
+    /// How many.
+    pub legs: usize,
+    /// Lowest commanded vertical velocity, m/s, up positive.
+    pub lowest_mps: f64,
+    /// Highest commanded vertical velocity, m/s, up positive.
+    pub highest_mps: f64,
+}
+
 impl Ladder {
-    /// The legs of a drone for which `counts` says so.
-    fn of(drone: &DroneAnalysis, used: impl Fn(usize) -> bool) -> Self {
+    /// The legs among a drone's windows that are `used`.
+    fn of(windows: &[WindowStats], used: impl Fn(&WindowStats) -> bool) -> Self {
         let mut ladder = Self::default();
-        for (index, window) in drone.windows.iter().enumerate() {
-            if !window.kind.is_leg() || !used(index) {
-                continue;
-            }
+        for window in windows.iter().filter(|window| window.kind.is_leg() && used(window)) {
             let speed_mps = window.commanded_mps;
             ladder = if ladder.legs == 0 {
                 Self { legs: 1, lowest_mps: speed_mps, highest_mps: speed_mps }
@@ -36,9 +75,8 @@ impl Ladder {
         ladder
     }
 
-    fn usable(drone: &DroneAnalysis, options: &FitOptions) -> Self {
-        let used = |index: usize| drone.windows.get(index).is_some_and(|w| is_used(w, options));
-        Self::of(drone, used)
+    fn usable(windows: &[WindowStats], options: &FitOptions) -> Self {
+        Self::of(windows, |window| is_used(window, options))
     }
 
     fn span_mps(&self) -> f64 {
@@ -53,14 +91,14 @@ impl Ladder {
 }
 
 /// Climbs at fewer speeds, or descents at fewer, are no ladder: take-off and landing have one or two.
-const FEWEST_RUNGS: usize = 3;
+pub(super) const FEWEST_RUNGS: usize = 3;
 /// Speeds closer than this are one rung, m/s.
 const SAME_RUNG_MPS: f64 = 0.15;
 
 /// At how many speeds a drone has usable climbs, and at how many descents.
-pub(super) fn rungs(drone: &DroneAnalysis, options: &FitOptions) -> (usize, usize) {
+pub(super) fn rungs(windows: &[WindowStats], options: &FitOptions) -> (usize, usize) {
     let distinct = |sign: f64| {
-        let legs = drone.windows.iter().filter(|w| w.kind.is_leg() && is_used(w, options));
+        let legs = windows.iter().filter(|w| w.kind.is_leg() && is_used(w, options));
         let mut speeds: Vec<f64> =
             legs.map(|window| sign * window.commanded_mps).filter(|speed| *speed > 0.0).collect();
         speeds.sort_by(f64::total_cmp);
@@ -75,16 +113,6 @@ pub(super) fn is_ladder((up, down): (usize, usize)) -> bool {
     up >= FEWEST_RUNGS && down >= FEWEST_RUNGS
 }
 
-/// That a flight with some climbs is not taken for a calibration: the most rungs that a drone has.
-pub(super) fn no_ladder((up, down): (usize, usize)) -> String {
-    format!(
-        "without a plan a flight is a calibration only if it climbs at {FEWEST_RUNGS} speeds or more \
-         and sinks at {FEWEST_RUNGS} or more: this one has steady climbs at {up} and descents at \
-         {down} (take-off and landing?), and is taken for a measurement. If it is a calibration, give \
-         its plan (--plan)"
-    )
-}
-
 /// The ladder of most of the drones: the middle one in legs and in span (the greater of two).
 fn of_fleet(mut ladders: Vec<Ladder>) -> Option<Ladder> {
     let middle = ladders.len() / 2;
@@ -94,51 +122,39 @@ fn of_fleet(mut ladders: Vec<Ladder>) -> Option<Ladder> {
     Some(Ladder { legs: ladders.get(middle)?.legs, ..by_span })
 }
 
-/// Marks the drones of a calibration whose usable legs are fewer than two thirds of the fleet's, or
-/// span less than two thirds of its speeds. Returns cautions that name them.
-///
-/// The fleet's ladder is that of its middle drone, not the plan's: a rung that no drone could fly is
-/// nobody's loss. That most drones have less than two thirds of the plan is a caution of its own.
-pub(super) fn mark_partial(drones: &mut [DroneAnalysis], options: &FitOptions) -> Vec<String> {
-    let with_laws = || drones.iter().filter(|drone| drone.laws.is_some());
-    let planned = of_fleet(with_laws().map(|drone| Ladder::of(drone, |_| true)).collect());
-    let flown = of_fleet(with_laws().map(|drone| Ladder::usable(drone, options)).collect());
-    let (Some(planned), Some(whole)) = (planned, flown) else { return Vec::new() };
-    let mut named = Vec::new();
-    for drone in drones.iter_mut() {
-        let usable = Ladder::usable(drone, options);
-        if usable.legs > 0 && usable.is_part_of(&whole) {
-            let partial = PartialLadder { usable, fleet: whole };
-            named.push(format!("{} ({})", drone.name, partial.short()));
-            drone.partial_ladder = Some(partial);
-        }
+/// The ladders of a calibration's fleet.
+pub(super) struct FleetLadders {
+    /// What the middle drone flew.
+    pub(super) flown: Ladder,
+    /// What of it is usable.
+    pub(super) usable: Ladder,
+}
+
+impl FleetLadders {
+    /// From the windows of each drone that has laws; `None` without any.
+    ///
+    /// The fleet's ladder is that of its middle drone, not the plan's: a rung that no drone could fly is
+    /// nobody's loss.
+    pub(super) fn of(drones: &[&[WindowStats]], options: &FitOptions) -> Option<Self> {
+        let flown = drones.iter().map(|windows| Ladder::of(windows, |_| true));
+        let usable = drones.iter().map(|windows| Ladder::usable(windows, options));
+        Some(Self { flown: of_fleet(flown.collect())?, usable: of_fleet(usable.collect())? })
     }
-    let mut cautions = Vec::new();
-    if !named.is_empty() {
-        cautions.push(format!(
-            "partial ladder: {} of {} drones flew less than two thirds of the fleet's ladder ({} \
-             legs from {:+} to {:+} m/s): {}. They keep their own laws, but are left out of the \
-             fleet's means and standard deviations and of the average of the drones; a map takes \
-             the law of that average for them",
-            named.len(),
-            drones.len(),
-            whole.legs,
-            whole.lowest_mps,
-            whole.highest_mps,
-            named.join(", "),
-        ));
+
+    /// Whether most drones have less than two thirds of what they flew.
+    pub(super) fn is_partial(&self) -> bool {
+        self.usable.is_part_of(&self.flown)
     }
-    if whole.is_part_of(&planned) {
-        cautions.push(format!(
-            "most drones have usable windows of a part of the ladder only: {} legs from {:+} to {:+} \
-             m/s of {} from {:+} to {:+} m/s. The fleet's numbers are those of that part",
-            whole.legs,
-            whole.lowest_mps,
-            whole.highest_mps,
-            planned.legs,
-            planned.lowest_mps,
-            planned.highest_mps,
-        ));
+
+    /// That a drone's usable legs are fewer than two thirds of the fleet's, or span less than two thirds
+    /// of its speeds; `None` if they do not.
+    pub(super) fn partial(
+        &self,
+        windows: &[WindowStats],
+        options: &FitOptions,
+    ) -> Option<PartialLadder> {
+        let usable = Ladder::usable(windows, options);
+        let is_part = usable.legs > 0 && usable.is_part_of(&self.usable);
+        is_part.then_some(PartialLadder { usable, fleet: self.usable })
     }
-    cautions
 }

@@ -12,16 +12,15 @@
 use nalgebra::DMatrix;
 
 use super::fit::{FitError, Solution, minimize, minimize_with, p_value};
-use super::result::{Fit, Parameter};
+use super::fit_warning::{FitWarning, OTHER_MINIMA_CHI2, W_LIMIT_MPS};
+use super::fitted::{Fit, Parameter};
 use crate::base::estimate::Estimate;
+use crate::flight::Indicator;
 
-/// Range of the profile over W, m/s: more than twice the ladder's fastest rung (docs/physics.md, 5.2).
-/// Chosen.
-const W_LIMIT_MPS: f64 = 8.0;
+pub use super::kind::{LawKind, LawOf, Symbol};
+
 /// Step of the profile over W, m/s (docs/physics.md, 5.2). Chosen.
 const W_STEP_MPS: f64 = 0.05;
-/// Minima within this chi² of the best are reported: two standard deviations.
-const OTHER_MINIMA_CHI2: f64 = 4.0;
 /// Rounds of the effective variance (York; docs/physics.md, 5.2). Numerical.
 const VARIANCE_ROUNDS: usize = 3;
 
@@ -77,11 +76,11 @@ pub fn signed_square(x: f64) -> f64 {
 }
 
 impl Law {
-    /// Name as in the tables.
-    pub fn name(&self) -> &'static str {
+    /// Its form.
+    pub fn kind(&self) -> LawKind {
         match self {
-            Self::SignedQuadratic { .. } => SIGNED_QUADRATIC,
-            Self::Linear { .. } => LINEAR,
+            Self::SignedQuadratic { .. } => LawKind::SignedQuadratic,
+            Self::Linear { .. } => LawKind::Linear,
         }
     }
 
@@ -118,21 +117,14 @@ impl Law {
 
     /// The law in a fit's parameters; `None` if they are not those of a law.
     pub fn from_fit(fit: &Fit) -> Option<Self> {
-        let value =
-            |name: &str| fit.parameters.iter().find(|p| p.name == name).map(|p| p.estimate.value);
-        let u0_us = value("u0")?;
-        match (value("A"), value("A'")) {
-            (Some(a), _) => Some(Self::SignedQuadratic { a, u0_us, w_mps: value("W")? }),
+        let u0_us = fit.value(Symbol::U0)?;
+        match (fit.value(Symbol::A), fit.value(Symbol::Slope)) {
+            (Some(a), _) => Some(Self::SignedQuadratic { a, u0_us, w_mps: fit.value(Symbol::W)? }),
             (None, Some(slope)) => Some(Self::Linear { slope, u0_us }),
             (None, None) => None,
         }
     }
 }
-
-/// Name of the signed-quadratic law in results.
-pub const SIGNED_QUADRATIC: &str = "signed quadratic";
-/// Name of the linear law in results.
-pub const LINEAR: &str = "linear";
 
 /// Fits `u = A' V + u0`.
 pub fn linear(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
@@ -151,8 +143,7 @@ pub fn linear(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
         Ok((solution, law))
     })?;
     let (solution, law) = fit;
-    let names = [("A'", "us/(m/s)"), ("u0", "us")];
-    Ok(describe(points, &sigmas, law, &solution, &names, &[true, true], scale))
+    Ok(describe(points, &sigmas, law, &solution, &[true, true], scale))
 }
 
 /// Fits `u = A f(V - W) + u0` with all three free.
@@ -168,8 +159,7 @@ pub fn signed_quadratic(points: &[Point], scale: ErrorScale) -> Result<Fit, FitE
         Ok((found, law))
     })?;
     let law = law_of(&found.best);
-    let names = [("A", "us/(m/s)²"), ("u0", "us"), ("W", "m/s")];
-    let mut fit = describe(points, &sigmas, law, &found.best, &names, &[true, true, true], scale);
+    let mut fit = describe(points, &sigmas, law, &found.best, &[true, true, true], scale);
     fit.other_minima = found
         .others
         .iter()
@@ -177,11 +167,7 @@ pub fn signed_quadratic(points: &[Point], scale: ErrorScale) -> Result<Fit, FitE
         .map(|other| other.parameters.clone())
         .collect();
     if !fit.other_minima.is_empty() {
-        fit.warnings.push(format!(
-            "{} more local minimum(s) within a chi2 of {OTHER_MINIMA_CHI2} of this one: W is not \
-             determined",
-            fit.other_minima.len()
-        ));
+        fit.warnings.push(FitWarning::OtherMinima { count: fit.other_minima.len() });
     }
     fit.warnings.extend(found.warning);
     Ok(fit)
@@ -213,8 +199,7 @@ pub fn signed_quadratic_held(
         Ok((minima, law))
     })?;
     let best = found.first().ok_or(FitError::Singular)?;
-    let names = [("A", "us/(m/s)²"), ("u0", "us"), ("W", "m/s")];
-    let mut fit = describe(points, &sigmas, law, best, &names, &[false, false, true], scale);
+    let mut fit = describe(points, &sigmas, law, best, &[false, false, true], scale);
     fit.other_minima = found
         .iter()
         .skip(1)
@@ -222,8 +207,7 @@ pub fn signed_quadratic_held(
         .map(|other| vec![a, u0_us, other.parameters[0]])
         .collect();
     if best.parameters[0].abs() >= W_LIMIT_MPS {
-        fit.warnings
-            .push(format!("W is at or beyond the edge of the searched range, ±{W_LIMIT_MPS} m/s"));
+        fit.warnings.push(FitWarning::WAtEdge);
     }
     Ok(fit)
 }
@@ -317,7 +301,7 @@ fn minima_of(profile: &[f64]) -> impl Iterator<Item = f64> + '_ {
 struct Minima {
     best: Solution,
     others: Vec<Solution>,
-    warning: Option<String>,
+    warning: Option<FitWarning>,
 }
 
 fn law_of(solution: &Solution) -> Law {
@@ -366,20 +350,11 @@ fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
     if minima.is_empty() {
         let (_, start) = edge.ok_or(FitError::Singular)?;
         let best = held_at(points, sigmas, start)?;
-        let warning = format!(
-            "no minimum inside |W| < {W_LIMIT_MPS} m/s, the parameters are those at the edge: the \
-             points do not have the signed-quadratic shape (compare the linear law)"
-        );
-        return Ok(Minima { best, others: Vec::new(), warning: Some(warning) });
+        return Ok(Minima { best, others: Vec::new(), warning: Some(FitWarning::NoMinimum) });
     }
     let best = minima.remove(0);
-    // Without the numbers, which differ from drone to drone: a fleet is told once.
-    let warning = edge.filter(|(chi2, _)| *chi2 < best.chi2).map(|_| {
-        format!(
-            "the signed quadratic fits better still with a W beyond the searched ±{W_LIMIT_MPS} m/s, \
-             as one flank of a parabola: the windows do not have its shape, and W* is no air speed"
-        )
-    });
+    let better_beyond = edge.is_some_and(|(chi2, _)| chi2 < best.chi2);
+    let warning = better_beyond.then_some(FitWarning::BetterBeyond);
     Ok(Minima { best, others: minima, warning })
 }
 
@@ -401,13 +376,14 @@ fn describe(
     sigmas: &[f64],
     law: Law,
     solution: &Solution,
-    names: &[(&str, &str)],
     free: &[bool],
     scale: ErrorScale,
 ) -> Fit {
-    let values = match law {
-        Law::SignedQuadratic { a, u0_us, w_mps } => vec![a, u0_us, w_mps],
-        Law::Linear { slope, u0_us } => vec![slope, u0_us],
+    let (symbols, values): (&[Symbol], _) = match law {
+        Law::SignedQuadratic { a, u0_us, w_mps } => {
+            (&Symbol::SIGNED_QUADRATIC, vec![a, u0_us, w_mps])
+        }
+        Law::Linear { slope, u0_us } => (&Symbol::LINEAR, vec![slope, u0_us]),
     };
     let factor = match scale {
         ErrorScale::Unscaled => 1.0,
@@ -421,13 +397,13 @@ fn describe(
             covariance[row * n + column] = solution.covariance[(i, j)] * factor;
         }
     }
-    let parameters = names
+    let parameters = symbols
         .iter()
         .zip(values)
         .enumerate()
-        .map(|(index, ((name, unit), value))| Parameter {
-            name: (*name).to_owned(),
-            unit: (*unit).to_owned(),
+        .map(|(index, (symbol, value))| Parameter {
+            name: *symbol,
+            unit: symbol.unit(Indicator::Pulse),
             // With as many parameters as points the fit says nothing about its own errors.
             estimate: Estimate::new(
                 value,
@@ -438,15 +414,14 @@ fn describe(
         .collect();
     let mut warnings = Vec::new();
     if !solution.converged {
-        warnings.push("the optimiser ran out of patience before it converged".to_owned());
+        warnings.push(FitWarning::NotConverged);
     }
     if points.len() < FEWEST_WINDOWS {
-        let n = points.len();
-        let dof = solution.dof;
+        let (windows, dof) = (points.len(), solution.dof);
         warnings.push(if dof == 0 {
-            format!("only {n} windows for as many parameters: no errors can be given")
+            FitWarning::NoErrors { windows }
         } else {
-            format!("only {n} windows ({dof} more than parameters): little speaks for this law")
+            FitWarning::FewWindows { windows, dof }
         });
     }
     let squares: f64 =

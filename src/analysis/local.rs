@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
-use super::air_prior::{Record, grid, quantile, weigh};
+use super::air_prior::{Record, Weighed, grid, quantile, weigh};
 use super::corrections::DOUBTS;
 use super::shape::{PARAMETERS, Shape};
 use super::split::{LEAST_NOISE_US, Parts, Point, Split, rough_sensitivity};
@@ -30,37 +30,86 @@ pub(super) struct Local {
     pub(super) sd_mps: f64,
 }
 
+/// The windows of a fleet with their averages over drones taken out.
+pub(super) struct Deviations<'a> {
+    pub(super) shape: Shape,
+    pub(super) points: &'a [Point],
+    pub(super) split: &'a Split,
+    /// Pulses at the mean speed of their cells, us.
+    pub(super) pulses: &'a [f64],
+    pub(super) parts: &'a Parts,
+    pub(super) doubts: &'a [Parts],
+    /// Slope of an unweighted line through the points.
+    pub(super) rough: f64,
+}
+
 /// The drones' deviations from the fleet, with the air that each met alone.
-pub(super) fn local_air(
-    shape: Shape,
-    points: &[Point],
-    split: &Split,
-    pulses: &[f64],
-    parts: &Parts,
-    doubts: &[Parts],
-    rough: f64,
-) -> Local {
-    let mut of_drone: Vec<Vec<usize>> = vec![Vec::new(); split.drones];
-    points.iter().enumerate().for_each(|(index, point)| of_drone[point.drone].push(index));
+pub(super) fn local_air(of: &Deviations<'_>) -> Local {
+    let mut of_drone: Vec<Vec<usize>> = vec![Vec::new(); of.split.drones];
+    of.points.iter().enumerate().for_each(|(index, point)| of_drone[point.drone].push(index));
     let flown = of_drone.iter().filter(|own| !own.is_empty()).count();
     if flown < 2 {
-        let none = || Own {
-            value: Vector4::zeros(),
-            covariance: Matrix4::zeros(),
-            answers: [[0.0; PARAMETERS]; DOUBTS],
-        };
-        return Local {
-            drones: of_drone.iter().map(|own| (!own.is_empty()).then(none)).collect(),
-            spread: Matrix4::zeros(),
-            sd_mps: 0.0,
-        };
+        return undivided(&of_drone);
     }
     // Averages were taken from the same points: deviations are too small by this.
     let grow = (flown as f64 / (flown as f64 - 1.0)).sqrt();
-    let p = shape.parameters();
-    // A drone's bends differ little from the fleet's; its constant and slope are free.
-    let priors: &[usize] = if p > 2 { &[2, 3] } else { &[] };
-    let record = |own: &[usize]| {
+    let records: Vec<Option<Record>> =
+        of_drone.iter().map(|own| (own.len() > 2).then(|| of.record(own, grow))).collect();
+    let weighed = scales(&records);
+    let drones: Vec<Option<Own>> = of_drone
+        .iter()
+        .zip(&records)
+        .map(|(own, record)| of.own(own, record.as_ref()?, &weighed, grow))
+        .collect();
+    let spread = spread(&drones);
+    Local { drones, spread, sd_mps: quantile(&weighed, 0.5, |one| one.air.sd_mps) }
+}
+
+/// A single drone is the fleet: it has no deviation.
+fn undivided(of_drone: &[Vec<usize>]) -> Local {
+    let none = || Own {
+        value: Vector4::zeros(),
+        covariance: Matrix4::zeros(),
+        answers: [[0.0; PARAMETERS]; DOUBTS],
+    };
+    Local {
+        drones: of_drone.iter().map(|own| (!own.is_empty()).then(none)).collect(),
+        spread: Matrix4::zeros(),
+        sd_mps: 0.0,
+    }
+}
+
+/// Weighs the scales of local air. A few dozen drones tell them as well as a thousand.
+fn scales(records: &[Option<Record>]) -> Vec<Weighed<()>> {
+    let step = records.len().div_ceil(SCALE_DRONES).max(1);
+    weigh(&grid(10, &TAUS_S, &WHITES_US), |air| {
+        let mut sum = 0.0;
+        for record in records.iter().step_by(step).flatten() {
+            sum += record.fit(air)?.log_likelihood;
+        }
+        Some((sum, ()))
+    })
+}
+
+/// Covariance of the deviation of a drone that is not known, from those that are.
+fn spread(drones: &[Option<Own>]) -> Matrix4<f64> {
+    let known: Vec<Vector4<f64>> = drones.iter().flatten().map(|own| own.value).collect();
+    let n = known.len() as f64;
+    let mut spread = Matrix4::zeros();
+    for value in &known {
+        spread += value * value.transpose() / (n - 1.0).max(1.0);
+    }
+    spread *= 1.0 + 1.0 / n.max(1.0);
+    spread
+}
+
+impl Deviations<'_> {
+    /// One drone's windows (by their indices) with the priors of its bends: they differ little from the
+    /// fleet's; its constant and slope are free.
+    fn record(&self, own: &[usize], grow: f64) -> Record {
+        let Self { shape, points, split, pulses, parts, rough, .. } = *self;
+        let p = shape.parameters();
+        let priors: &[usize] = if p > 2 { &[2, 3] } else { &[] };
         let (n, rows) = (own.len(), own.len() + priors.len());
         let padded = |value: &dyn Fn(&Point) -> f64| -> Vec<f64> {
             let windows = own.iter().map(|index| value(&points[*index]));
@@ -83,55 +132,39 @@ pub(super) fn local_air(
             doubts_us: Vec::new(),
             windows: n,
         }
-    };
-    let records: Vec<Option<Record>> =
-        of_drone.iter().map(|own| (own.len() > 2).then(|| record(own))).collect();
-    // A few dozen drones tell the scales as well as a thousand.
-    let step = records.len().div_ceil(SCALE_DRONES).max(1);
-    let weighed = weigh(&grid(10, &TAUS_S, &WHITES_US), |air| {
-        let mut sum = 0.0;
-        for record in records.iter().step_by(step).flatten() {
-            sum += record.fit(air)?.log_likelihood;
-        }
-        Some((sum, ()))
-    });
-    let drones: Vec<Option<Own>> = of_drone
-        .iter()
-        .zip(&records)
-        .map(|(own, record)| {
-            let record = record.as_ref()?;
-            let mut gain = DMatrix::zeros(p, record.pulse_us.len());
-            let mut covariance = Matrix4::zeros();
-            for one in &weighed {
-                let fit = record.fit(&one.air)?;
-                gain += &fit.gain * one.weight;
-                for (row, column) in (0..p).flat_map(|row| (0..p).map(move |column| (row, column)))
-                {
-                    covariance[(row, column)] += fit.covariance[(row, column)] * one.weight;
-                }
-            }
-            let apply = |values: &DVector<f64>| {
-                let found = &gain * values;
-                Vector4::from_fn(|row, _| found.get(row).copied().unwrap_or(0.0))
-            };
-            let answers = std::array::from_fn(|doubt| {
-                let cells = &doubts[doubt].cells;
-                let rest =
-                    |index: &usize| points[*index].doubts_us[doubt] - cells[split.cell_of[*index]];
-                apply(&DVector::from_fn(record.pulse_us.len(), |row, _| {
-                    own.get(row).map_or(0.0, rest)
-                }))
-                .into()
-            });
-            Some(Own { value: apply(&record.pulse_us) / grow, covariance, answers })
-        })
-        .collect();
-    let known: Vec<Vector4<f64>> = drones.iter().flatten().map(|own| own.value).collect();
-    let n = known.len() as f64;
-    let mut spread = Matrix4::zeros();
-    for value in &known {
-        spread += value * value.transpose() / (n - 1.0).max(1.0);
     }
-    spread *= 1.0 + 1.0 / n.max(1.0);
-    Local { drones, spread, sd_mps: quantile(&weighed, 0.5, |one| one.air.sd_mps) }
+
+    /// One drone's part of the parameters, averaged over the scales of the air; `None` where its windows
+    /// do not give one.
+    fn own(
+        &self,
+        own: &[usize],
+        record: &Record,
+        weighed: &[Weighed<()>],
+        grow: f64,
+    ) -> Option<Own> {
+        let Self { shape, points, split, doubts, .. } = *self;
+        let p = shape.parameters();
+        let mut gain = DMatrix::zeros(p, record.pulse_us.len());
+        let mut covariance = Matrix4::zeros();
+        for one in weighed {
+            let fit = record.fit(&one.air)?;
+            gain += &fit.gain * one.weight;
+            for (row, column) in (0..p).flat_map(|row| (0..p).map(move |column| (row, column))) {
+                covariance[(row, column)] += fit.covariance[(row, column)] * one.weight;
+            }
+        }
+        let apply = |values: &DVector<f64>| {
+            let found = &gain * values;
+            Vector4::from_fn(|row, _| found.get(row).copied().unwrap_or(0.0))
+        };
+        let answers = std::array::from_fn(|doubt| {
+            let cells = &doubts[doubt].cells;
+            let rest =
+                |index: &usize| points[*index].doubts_us[doubt] - cells[split.cell_of[*index]];
+            let column = |row: usize, _: usize| own.get(row).map_or(0.0, rest);
+            apply(&DVector::from_fn(record.pulse_us.len(), column)).into()
+        });
+        Some(Own { value: apply(&record.pulse_us) / grow, covariance, answers })
+    }
 }

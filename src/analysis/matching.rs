@@ -10,6 +10,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::cause::Cause;
 use crate::base::crc::ap_crc32;
 use crate::base::frame::Geodetic;
 use crate::log::Log;
@@ -40,7 +41,7 @@ pub(super) struct Candidate {
     /// The first log with the same bytes.
     pub(super) same_as: Option<usize>,
     /// Why nothing can be read from it.
-    pub(super) unreadable: Option<String>,
+    pub(super) unreadable: Option<Cause>,
     /// Why it is not to be used.
     pub(super) refused: Option<String>,
 }
@@ -48,7 +49,7 @@ pub(super) struct Candidate {
 /// The slot of each log, or why it has none; and what contradicts itself, one sentence each.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Matched {
-    pub(super) slots: Vec<Result<u16, String>>,
+    pub(super) slots: Vec<Result<u16, Cause>>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -137,7 +138,7 @@ pub(super) fn slots(plan: &Plan, logs: &[Candidate]) -> Matched {
 
     for (index, log) in logs.iter().enumerate() {
         if let Some(reason) = &log.refused {
-            work.refuse(index, reason.clone());
+            work.refuse(index, Cause::Refused(reason.clone()));
         }
     }
     work.refuse_copies(&places);
@@ -149,7 +150,9 @@ pub(super) fn slots(plan: &Plan, logs: &[Candidate]) -> Matched {
         match place {
             Place::On(slot) => standing.push((index, *slot)),
             Place::Away(slot, distance_m) => {
-                work.refuse(index, away(*slot, *distance_m, field.limit_m.unwrap_or_default()));
+                let (slot, distance_m) = (*slot, *distance_m);
+                let limit_m = field.limit_m.unwrap_or_default();
+                work.refuse(index, Cause::OtherPlace { slot, distance_m, limit_m });
             }
             Place::Unknown | Place::Between(_) => {}
         }
@@ -175,7 +178,7 @@ pub(super) fn slots(plan: &Plan, logs: &[Candidate]) -> Matched {
     for (index, log) in logs.iter().enumerate() {
         match log.given.filter(|_| work.result[index].is_none()) {
             Some(slot) if plan.slot(slot).is_none() => {
-                work.refuse(index, format!("the plan has no slot {slot}"));
+                work.refuse(index, Cause::NoSuchSlot { slot });
             }
             Some(slot) => work.claim(index, slot),
             None => {}
@@ -184,40 +187,16 @@ pub(super) fn slots(plan: &Plan, logs: &[Candidate]) -> Matched {
     work.by_name(plan);
     let contradictions = contradictions(plan, &work, &places);
     Matched {
-        slots: work.result.into_iter().map(|slot| slot.unwrap_or_else(|| Err(nowhere()))).collect(),
+        slots: work.result.into_iter().map(|slot| slot.unwrap_or(Err(Cause::NoFreeSlot))).collect(),
         warnings: contradictions,
     }
-}
-
-fn away(slot: u16, distance_m: f64, limit_m: f64) -> String {
-    let distance = if distance_m < 1000.0 {
-        format!("{distance_m:.1} m")
-    } else {
-        format!("{:.1} km", distance_m / 1000.0)
-    };
-    format!(
-        "it was flown somewhere else: its home is {distance} from that of slot {slot}, the nearest \
-         (at most {limit_m:.1} m is taken for GPS error); take the log away, or plan with the origin \
-         and orientation that were flown"
-    )
-}
-
-/// Why a copy of a log is not used.
-pub(super) fn copy_of(name: &str) -> String {
-    format!("a copy of {name} (the same bytes)")
-}
-
-fn nowhere() -> String {
-    "the log fits no free slot of the plan by home position, file name or system id; name it after \
-     its slot (07.BIN)"
-        .to_owned()
 }
 
 /// Slots given out so far.
 struct Work<'a> {
     logs: &'a [Candidate],
     taken: BTreeMap<u16, usize>,
-    result: Vec<Option<Result<u16, String>>>,
+    result: Vec<Option<Result<u16, Cause>>>,
 }
 
 impl Work<'_> {
@@ -241,12 +220,12 @@ impl Work<'_> {
         for (first, copies) in alike {
             let kept = copies.iter().copied().find(|index| agrees(index)).unwrap_or(first);
             for index in copies.into_iter().filter(|index| *index != kept) {
-                self.refuse(index, copy_of(&logs[kept].name));
+                self.refuse(index, Cause::Copy { of: logs[kept].name.clone() });
             }
         }
     }
 
-    fn refuse(&mut self, index: usize, reason: String) {
+    fn refuse(&mut self, index: usize, reason: Cause) {
         // That nothing can be read says more than that nothing fits.
         let reason = self.logs[index].unreadable.clone().unwrap_or(reason);
         self.result[index] = Some(Err(reason));
@@ -254,8 +233,8 @@ impl Work<'_> {
 
     fn claim(&mut self, index: usize, slot: u16) {
         if let Some(first) = self.taken.get(&slot) {
-            let first = &self.logs[*first].name;
-            self.refuse(index, format!("slot {slot} has a log already ({first})"));
+            let first = self.logs[*first].name.clone();
+            self.refuse(index, Cause::SlotTaken { slot, first });
         } else {
             self.taken.insert(slot, index);
             self.result[index] = Some(Ok(slot));
@@ -286,7 +265,7 @@ impl Work<'_> {
             let free = found.iter().copied().find(|slot| !self.taken.contains_key(slot));
             match free.or(found.first().copied()) {
                 Some(slot) => self.claim(index, slot),
-                None => self.refuse(index, nowhere()),
+                None => self.refuse(index, Cause::NoFreeSlot),
             }
         }
     }

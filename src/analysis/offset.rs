@@ -22,8 +22,8 @@ use spade::{
 };
 
 use super::calibrate::{Location, location};
-use super::result::WindowStats;
 use super::stats::mean_sd;
+use super::window::WindowStats;
 use crate::base::estimate::Estimate;
 
 /// Time that counts as much as [`HEIGHT_SCALE_M`] in the triangulation, s. A Delaunay mesh depends on the

@@ -1,8 +1,10 @@
 //! Choices of an analysis.
 
-use super::calibrate::{FitOptions, Location, PaperTable, Weights};
+use super::calibrate::{FitOptions, Location, Weights};
 use super::input::FlightInput;
+use super::law::LawKind;
 use super::statistics::StatisticsOptions;
+use super::table::PaperTable;
 use super::windows::{Tilt, WindowOptions};
 use crate::flight::Indicator;
 
@@ -23,7 +25,7 @@ pub struct AnalysisOptions {
     /// Law for the map of the air (`linear`, `signed quadratic`); `None`: the line, which may bend,
     /// unless the calibration's windows make the signed quadratic clearly more probable (without
     /// [`AnalysisOptions::air_aware`]: the one of lower reduced chi²).
-    pub map_law: Option<MapLaw>,
+    pub map_law: Option<LawKind>,
     /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
     /// updraft (simulations), Table II for other fleets (of two drones or more).
     pub paper: Option<PaperTable>,
@@ -56,15 +58,6 @@ impl OffsetRule {
             Self::Never => false,
         }
     }
-}
-
-/// Law for the map of the air.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MapLaw {
-    /// `u = A' V + u0`.
-    Linear,
-    /// `u = A f(V - W) + u0`.
-    SignedQuadratic,
 }
 
 impl Default for AnalysisOptions {

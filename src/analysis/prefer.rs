@@ -1,9 +1,9 @@
 //! Which of the two laws describes a calibration, and when the signed quadratic does not.
 
-use super::drone::law_fit;
-use super::options::MapLaw;
+use super::law::{LawKind, Symbol};
 use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws};
 use super::stats::mean_sd;
+use super::warning::Warning;
 
 /// Largest W of a calibration's signed quadratic that may be the air's, m/s: a mean over seven minutes of
 /// field air has a standard deviation of 0.3 (docs/physics.md, 5.3). Lines give several m/s (2.7).
@@ -21,12 +21,12 @@ const CLEARLY: f64 = 1.5;
 ///
 /// A signed quadratic that needs a strong W is a parabola's flank standing in for another curve, not
 /// air that moved: its inverse is off by that W, and the line is taken.
-pub fn better_law(reference: &FlightAnalysis) -> MapLaw {
+pub fn better_law(reference: &FlightAnalysis) -> LawKind {
     chosen(reference).0
 }
 
 /// [`better_law`], and why in one phrase.
-pub(super) fn chosen(reference: &FlightAnalysis) -> (MapLaw, String) {
+pub(super) fn chosen(reference: &FlightAnalysis) -> (LawKind, String) {
     let own = match reference.drones.as_slice() {
         [drone] => drone.laws.as_ref(),
         _ => None,
@@ -35,32 +35,32 @@ pub(super) fn chosen(reference: &FlightAnalysis) -> (MapLaw, String) {
         let w = laws.signed_quadratic.as_ref().and_then(w_mps);
         w.is_none_or(|w| w.abs() <= LARGEST_CALIBRATION_W_MPS)
     });
-    let reduced = |law: MapLaw| {
+    let reduced = |law: LawKind| {
         let values: Vec<f64> = reference
             .drones
             .iter()
             .filter(|drone| drone.partial_ladder.is_none())
-            .filter_map(|drone| law_fit(drone.laws.as_ref()?, law)?.chi2_reduced)
+            .filter_map(|drone| drone.laws.as_ref()?.of(law)?.chi2_reduced)
             .collect();
         (!values.is_empty()).then(|| mean_sd(&values).0)
     };
-    match (reduced(MapLaw::Linear), reduced(MapLaw::SignedQuadratic)) {
+    match (reduced(LawKind::Linear), reduced(LawKind::SignedQuadratic)) {
         (Some(linear), Some(quadratic)) => {
             let chi2 = format!(
                 "mean chi2/nu of the drones' fits: {linear:.2} with the line, {quadratic:.2} with the \
                  signed quadratic"
             );
             match (quadratic < linear, calm) {
-                (true, true) => (MapLaw::SignedQuadratic, chi2),
+                (true, true) => (LawKind::SignedQuadratic, chi2),
                 (true, false) => (
-                    MapLaw::Linear,
+                    LawKind::Linear,
                     format!("{chi2}, but its W* is that of a parabola's flank and no air"),
                 ),
-                (false, _) => (MapLaw::Linear, chi2),
+                (false, _) => (LawKind::Linear, chi2),
             }
         }
-        (None, Some(_)) => (MapLaw::SignedQuadratic, "there is no line".to_owned()),
-        _ => (MapLaw::Linear, "there is no signed quadratic to compare with".to_owned()),
+        (None, Some(_)) => (LawKind::SignedQuadratic, "there is no line".to_owned()),
+        _ => (LawKind::Linear, "there is no signed quadratic to compare with".to_owned()),
     }
 }
 
@@ -93,75 +93,53 @@ fn speeds_mps(drones: &[DroneAnalysis]) -> Option<[f64; 2]> {
     })
 }
 
-/// In plain words, that W* is no air ([`vertex_mps`]).
+/// That W* is no air ([`vertex_mps`]).
 pub(super) fn vertex_caution(
     laws: &Laws,
     drones: &[DroneAnalysis],
     true_updraft_mps: Option<f64>,
-) -> Option<String> {
-    let w = vertex_mps(laws, drones, true_updraft_mps)?;
-    let [low, high] = speeds_mps(drones)?;
-    let place = if (low..=high).contains(&w) { "at the edge of" } else { "outside of" };
-    Some(format!(
-        "The signed quadratic's W* of {w:+.2} m/s is the vertex of a parabola and no air speed: it \
-         lies {place} the ladder's {low:+.1} to {high:+.1} m/s, so that the windows are on one flank, \
-         which stands in for a line that bends. A, u0 and W* describe that bend alone"
-    ))
+) -> Option<Warning> {
+    let w_mps = vertex_mps(laws, drones, true_updraft_mps)?;
+    Some(Warning::Vertex { w_mps, speeds_mps: speeds_mps(drones)? })
 }
 
 /// The law that describes one set of windows better.
-pub fn better_of(laws: &Laws) -> Option<MapLaw> {
+pub fn better_of(laws: &Laws) -> Option<LawKind> {
     let reduced = |fit: &Option<Fit>| fit.as_ref().and_then(|fit| fit.chi2_reduced);
     match (reduced(&laws.linear), reduced(&laws.signed_quadratic)) {
-        (Some(linear), Some(quadratic)) if quadratic < linear => Some(MapLaw::SignedQuadratic),
-        (Some(_), _) => Some(MapLaw::Linear),
-        (None, Some(_)) => Some(MapLaw::SignedQuadratic),
+        (Some(linear), Some(quadratic)) if quadratic < linear => Some(LawKind::SignedQuadratic),
+        (Some(_), _) => Some(LawKind::Linear),
+        (None, Some(_)) => Some(LawKind::SignedQuadratic),
         (None, None) => match (&laws.linear, &laws.signed_quadratic) {
-            (Some(_), _) => Some(MapLaw::Linear),
-            (None, quadratic) => quadratic.as_ref().map(|_| MapLaw::SignedQuadratic),
+            (Some(_), _) => Some(LawKind::Linear),
+            (None, quadratic) => quadratic.as_ref().map(|_| LawKind::SignedQuadratic),
         },
     }
 }
 
 /// Whether a law describes a set of windows: unless the other law is clearly better.
-pub(super) fn describes(laws: &Laws, law: MapLaw) -> bool {
-    let other = match law {
-        MapLaw::Linear => MapLaw::SignedQuadratic,
-        MapLaw::SignedQuadratic => MapLaw::Linear,
-    };
-    let reduced = |law| law_fit(laws, law).and_then(|fit| fit.chi2_reduced);
-    match (reduced(law), reduced(other)) {
+pub(super) fn describes(laws: &Laws, law: LawKind) -> bool {
+    let reduced = |law| laws.of(law).and_then(|fit| fit.chi2_reduced);
+    match (reduced(law), reduced(law.other())) {
         (Some(this), Some(other)) => this <= CLEARLY * other,
         _ => true,
     }
 }
 
-/// In plain words, that the signed quadratic is not the shape of these windows; `None` where it is,
-/// or where the windows do not tell.
-pub fn misfit(laws: &Laws) -> Option<String> {
-    let (quadratic, linear) = (laws.signed_quadratic.as_ref()?, laws.linear.as_ref()?);
-    let (worse, than) = (quadratic.chi2_reduced?, linear.chi2_reduced?);
-    if describes(laws, MapLaw::SignedQuadratic) {
+/// That the signed quadratic is not the shape of these windows; `None` where it is, or where the windows
+/// do not tell.
+pub fn misfit(laws: &Laws) -> Option<Warning> {
+    let (square, line) = (laws.signed_quadratic.as_ref()?, laws.linear.as_ref()?);
+    let (quadratic, linear) = (square.chi2_reduced?, line.chi2_reduced?);
+    if describes(laws, LawKind::SignedQuadratic) {
         return None;
     }
-    let w = w_mps(quadratic)?;
-    let strong = if w.abs() > LARGEST_CALIBRATION_W_MPS {
-        format!(
-            " Its W* of {w:+.2} m/s is the flank of a parabola that stands in for the line, not \
-             moving air."
-        )
-    } else {
-        String::new()
-    };
-    Some(format!(
-        "The signed-quadratic law does not describe this flight: its chi2/nu is {worse:.2}, that of \
-         the line {than:.2}. Use A' of the line; A, u0 and W* of the signed quadratic mean \
-         nothing here.{strong}"
-    ))
+    let strong_w_mps = Some(w_mps(square)?).filter(|w| w.abs() > LARGEST_CALIBRATION_W_MPS);
+    Some(Warning::Misfit { quadratic, linear, strong_w_mps })
 }
 
 fn w_mps(fit: &Fit) -> Option<f64> {
-    fit.parameters.iter().find(|found| found.name == "W").map(|w| w.estimate.value)
+    fit.value(Symbol::W)
 }
 
 #[cfg(test)]
@@ -194,11 +172,11 @@ mod tests {
     #[test]
     fn the_shape_decides() {
         let square = laws(|v| 1598.6 + 8.14 * v * v.abs());
-        assert_eq!(better_of(&square), Some(MapLaw::SignedQuadratic));
+        assert_eq!(better_of(&square), Some(LawKind::SignedQuadratic));
         assert_eq!(misfit(&square), None);
         let line = laws(|v| 1546.5 + 26.4 * v);
-        assert_eq!(better_of(&line), Some(MapLaw::Linear));
-        let words = misfit(&line).unwrap();
+        assert_eq!(better_of(&line), Some(LawKind::Linear));
+        let words = misfit(&line).unwrap().to_string();
         assert!(words.contains("does not describe this flight"), "{words}");
         // A bent line looks like a parabola's flank: only W tells that it is none.
         let mut bent = laws(|v| 1546.5 + 26.4 * v + 4.0 * v * v);
@@ -206,7 +184,7 @@ mod tests {
         bent.signed_quadratic.as_mut().unwrap().chi2_reduced = Some(9.0);
         let w = w_mps(bent.signed_quadratic.as_ref().unwrap()).unwrap();
         assert!(w.abs() > LARGEST_CALIBRATION_W_MPS, "{w}");
-        assert!(misfit(&bent).unwrap().contains("not moving air"), "{w}");
+        assert!(misfit(&bent).unwrap().to_string().contains("not moving air"), "{w}");
     }
 
     #[test]
@@ -233,7 +211,7 @@ mod tests {
         let bent = laws(|v| 1546.5 + 26.4 * v + 3.0 * v * v);
         let w = vertex_mps(&bent, &drones, None).unwrap();
         assert!(w < -3.15, "{w}");
-        let words = vertex_caution(&bent, &drones, None).unwrap();
+        let words = vertex_caution(&bent, &drones, None).unwrap().to_string();
         assert!(words.contains("no air speed") && words.contains("-3.5 to +3.5 m/s"), "{words}");
         assert_eq!(vertex_mps(&bent, &drones, Some(w)), None, "the air is known to be as fast");
         let windy = laws(|v| 1598.6 + 8.14 * (v - 1.5) * (v - 1.5).abs());

@@ -51,6 +51,7 @@ pub(super) fn refer_calibration(
             drone.laws = calibrate::calibrate(&drone.windows, options).ok();
         }
     });
-    referred.flock = calibrate::flock(&referred.drones, options).ok();
+    let whole = referred.drones.iter().filter(|drone| drone.partial_ladder.is_none());
+    referred.flock = calibrate::flock(whole.map(|drone| drone.windows.as_slice()), options).ok();
     referred
 }

@@ -7,13 +7,24 @@ pub use super::budget::{
     BatteryCorrection, CalibrationAir, CommonError, ErrorBudget, Quality, QualityFlag, Supply,
     TruthCheck,
 };
+use super::cause::Cause;
 use super::density::Density;
+pub use super::fit_warning::FitWarning;
+pub use super::fitted::{Fit, Laws, Parameter};
+use super::kind::{LawKind, LawOf};
+pub use super::ladder::{Ladder, PartialLadder};
 use super::offset::OffsetMap;
 use super::statistics::result::FieldStatistics;
+pub use super::stats::SampleStats;
+use super::table::PaperTable;
+pub use super::table::TableRow;
+use super::warning::Warning;
 use super::wind::Leaning;
+pub use super::window::{Rejection, WindowStats};
 use crate::base::estimate::Estimate;
+use crate::base::sentence::Sentence;
 use crate::flight::{Clock, Indicator};
-use crate::mission::plan::{Kind, Purpose};
+use crate::mission::plan::Purpose;
 
 /// Name and version of the analysis format.
 pub const ANALYSIS_SCHEMA: &str = "updraft.analysis/1";
@@ -30,7 +41,7 @@ pub struct Analysis {
     /// The flights, calibration first.
     pub flights: Vec<FlightAnalysis>,
     /// What is doubtful about the whole.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// One flight of the fleet.
@@ -76,11 +87,12 @@ pub struct FlightAnalysis {
     /// The paper's table that [`FlightAnalysis::table`] is compared with: `I` (simulation) or `II`
     /// (field, for two drones or more); absent: with none.
     #[serde(default)]
-    pub paper_table: Option<String>,
+    #[schemars(with = "Option<String>")]
+    pub paper_table: Option<PaperTable>,
     /// What is doubtful about the flight as a whole (logs that contradict each other), one sentence
     /// each.
     #[serde(default)]
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Logs that nothing was taken from, those of missing slots among them.
     #[serde(default)]
     pub unused: Vec<UnusedLog>,
@@ -99,17 +111,18 @@ pub struct UnusedLog {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slot: Option<u16>,
     /// Why it is not used.
-    pub reason: String,
+    pub reason: Cause,
 }
 
 impl UnusedLog {
     /// One sentence that names the file.
-    pub fn sentence(&self) -> String {
-        if self.reason.contains(&self.source) {
-            self.reason.clone()
-        } else {
-            format!("{}: {}", self.source, self.reason)
-        }
+    pub fn sentence(&self) -> Sentence {
+        self.reason.about(&self.source)
+    }
+
+    /// Whether the reason names the file by itself.
+    pub fn is_named(&self) -> bool {
+        self.reason.sentence().names(&self.source)
     }
 }
 
@@ -122,7 +135,7 @@ pub struct PartlyUsedLog {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slot: Option<u16>,
     /// What is lost of it.
-    pub reason: String,
+    pub reason: Cause,
     /// Bytes that the reader skipped because no message could be read there.
     #[serde(default)]
     pub skipped_bytes: u64,
@@ -137,7 +150,7 @@ pub struct Missing {
     #[serde(default)]
     pub home_m: Option<[f64; 2]>,
     /// Why.
-    pub reason: String,
+    pub reason: Cause,
 }
 
 /// A drone whose log gave no law, or no value of the map.
@@ -148,7 +161,7 @@ pub struct Unmeasured {
     /// Label.
     pub name: String,
     /// Why.
-    pub reason: String,
+    pub reason: Cause,
 }
 
 /// How much of what was asked for an analysis gave.
@@ -217,206 +230,7 @@ pub struct DroneAnalysis {
     /// Thinned traces for figures.
     pub trace: Trace,
     /// What is doubtful about this drone.
-    pub warnings: Vec<String>,
-}
-
-/// That a drone's usable legs are fewer than two thirds of the fleet's, or span less than two thirds
-/// of its speeds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PartialLadder {
-    /// Usable legs of the drone.
-    pub usable: Ladder,
-    /// Usable legs of the fleet's middle drone.
-    pub fleet: Ladder,
-}
-
-impl PartialLadder {
-    /// `6 of 14 legs, -1.5 to +1.5 m/s`.
-    pub fn short(&self) -> String {
-        let Ladder { legs, lowest_mps, highest_mps } = self.usable;
-        format!("{legs} of {} legs, {lowest_mps:+} to {highest_mps:+} m/s", self.fleet.legs)
-    }
-}
-
-/// Legs of vertical motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Ladder {
-    /// How many.
-    pub legs: usize,
-    /// Lowest commanded vertical velocity, m/s, up positive.
-    pub lowest_mps: f64,
-    /// Highest commanded vertical velocity, m/s, up positive.
-    pub highest_mps: f64,
-}
-
-/// Statistics of one window.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct WindowStats {
-    /// Kind of the segment.
-    pub kind: Kind,
-    /// Label: `up 0.5 m/s`.
-    pub label: String,
-    /// Show time of the window, s.
-    pub start_s: f64,
-    /// Show time of the end, s.
-    pub end_s: f64,
-    /// Commanded vertical velocity, m/s, up positive.
-    pub commanded_mps: f64,
-    /// Mean height above home, m.
-    pub height_m: f64,
-    /// Vertical velocity V_U, m/s.
-    pub velocity_mps: SampleStats,
-    /// Rotor control pulse width u, us.
-    pub pulse_us: SampleStats,
-    /// Tilt-corrected pulse width u_phi, us.
-    pub pulse_phi_us: SampleStats,
-    /// Tilt from the vertical, degrees.
-    pub tilt_deg: SampleStats,
-    /// Angle of the mean attitude from the vertical, degrees: what wind does, without noise.
-    #[serde(default)]
-    pub lean_deg: f64,
-    /// What the other form of the tilt correction (the paper's, if ours was used) would change, us.
-    #[serde(default)]
-    pub tilt_form_us: f64,
-    /// Slow offset (eq. 5) at the window's time and height, subtracted before laws are fitted, us.
-    pub offset_us: Option<f64>,
-    /// The window lies outside the 0-windows: its offset is the nearest one's.
-    #[serde(default)]
-    pub offset_outside: bool,
-    /// The battery in the window, where it was logged.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub supply: Option<Supply>,
-    /// Why the window is not used in fits; empty: it is used (if it is of the fitted kind).
-    pub rejected: Vec<Rejection>,
-}
-
-/// Why a window is not used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Rejection {
-    /// A motor output touched its limit.
-    Saturated,
-    /// The vehicle did not follow the command (|V_U - commanded| > 0.3 m/s).
-    NotFollowing,
-    /// The log has a gap or too few samples.
-    Gap,
-    /// The log ends before the window does.
-    Incomplete,
-    /// The vertical velocity wandered by more than 0.3 m/s (standard deviation) in a hover.
-    Manoeuvre,
-}
-
-impl Rejection {
-    /// In words.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Saturated => "a motor touched its limit",
-            Self::NotFollowing => "it did not follow the command",
-            Self::Gap => "the log has a gap",
-            Self::Incomplete => "the log ends early",
-            Self::Manoeuvre => "it moved up and down",
-        }
-    }
-}
-
-/// Location and spread of the samples in a window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct SampleStats {
-    /// Median.
-    pub median: f64,
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation of the samples.
-    pub sd: f64,
-    /// Number of samples.
-    pub n: usize,
-    /// Mean without the lowest and the highest tenth of the samples.
-    #[serde(default)]
-    pub trimmed: f64,
-    /// Standard error of the mean from the means of blocks longer than the signal's memory.
-    #[serde(default)]
-    pub se: f64,
-}
-
-/// The laws fitted to one set of windows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Laws {
-    /// `u = A f(V - W) + u0`, f(x) = x|x|, W free.
-    pub signed_quadratic: Option<Fit>,
-    /// The same with A and u0 held from a reference, only W fitted.
-    pub signed_quadratic_held: Option<Fit>,
-    /// `u = A' V + u0`.
-    pub linear: Option<Fit>,
-    /// Scatter of the windows beyond their own measured noise, us: the standard deviation that was
-    /// added to every window's error before the fits, chosen so that the better law's chi² became its
-    /// degrees of freedom. It is turbulence longer than a window and what the law does not describe.
-    /// `None` when the weights do not ask for it or there are no degrees of freedom.
-    #[serde(default)]
-    pub sigma_added_us: Option<f64>,
-}
-
-/// A fitted law.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Fit {
-    /// Parameters in the law's order: `A`, `u0`, `W` or `A'`, `u0`.
-    pub parameters: Vec<Parameter>,
-    /// Covariance of the free parameters, row-major over all parameters (0 where held).
-    pub covariance: Vec<f64>,
-    /// Points fitted.
-    pub points: usize,
-    /// Sum of squared residuals over the windows' own errors, before any scatter was added to them
-    /// ([`Laws::sigma_added_us`]).
-    pub chi2: f64,
-    /// That over the degrees of freedom; `None` without any. A statistic: nothing was tuned for it.
-    pub chi2_reduced: Option<f64>,
-    /// Probability of a chi² at least this large if the law and the sigmas are right.
-    #[serde(default)]
-    pub p_value: Option<f64>,
-    /// Degrees of freedom.
-    pub dof: usize,
-    /// Unweighted rms residual, us.
-    pub rms_us: f64,
-    /// Other local minima within a chi2 of 4 of the best: their parameters.
-    pub other_minima: Vec<Vec<f64>>,
-    /// What is doubtful about this fit.
-    pub warnings: Vec<String>,
-}
-
-/// One fitted or held parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Parameter {
-    /// Symbol: `A`, `u0`, `W`, `A'`.
-    pub name: String,
-    /// Unit: `us/(m/s)²`, `us`, `m/s`, `us/(m/s)`.
-    pub unit: String,
-    /// Value and standard error; the error is 0, and unknown, without degrees of freedom.
-    pub estimate: Estimate,
-    /// Held, not fitted.
-    pub held: bool,
-}
-
-/// One row of Table I or II: a parameter over the fleet.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct TableRow {
-    /// Law: `signed quadratic` or `linear`.
-    pub law: String,
-    /// Parameter symbol, or `chi2_nu`.
-    pub parameter: String,
-    /// Unit.
-    pub unit: String,
-    /// Mean over drones.
-    pub mean: f64,
-    /// Standard deviation between drones.
-    pub sd: f64,
-    /// Mean of the drones' own standard errors.
-    pub mean_se: f64,
-    /// Drones.
-    pub n: usize,
-    /// The paper's value and error where it has one.
-    pub paper: Option<Estimate>,
-    /// Why the two are not to be compared; absent: they are, where the paper has a value.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub not_compared: Option<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Thinned traces of one drone, for figures.
@@ -436,7 +250,8 @@ pub struct Trace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct UpdraftMap {
     /// Law used for the inversion: `linear` or `signed quadratic`.
-    pub law: String,
+    #[schemars(with = "String")]
+    pub law: LawKind,
     /// Why that law; absent: not told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub law_reason: Option<String>,
@@ -506,7 +321,8 @@ pub struct DroneUpdraft {
     /// Height above home, m; along a track the mean.
     pub height_m: f64,
     /// Mapping used: `own` or `flock`.
-    pub mapping: String,
+    #[schemars(with = "String")]
+    pub mapping: LawOf,
     /// Mean over the hover, m/s, up positive, with its standard error: that of
     /// [`DroneUpdraft::errors`], which holds all origins.
     pub mean: Estimate,

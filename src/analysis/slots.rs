@@ -2,11 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::input::FlightInput;
+use super::cause::Cause;
+use super::input::{FlightInput, LogInput};
 use super::matching::{self, Candidate, Matched};
 use crate::base::causes::with_causes;
+use crate::base::plain::Shown as _;
 use crate::flight::identify;
-use crate::log::Log;
+use crate::log::{Log, LogError};
 
 /// Whose log it is.
 pub(super) enum SlotMatch {
@@ -17,7 +19,7 @@ pub(super) enum SlotMatch {
     /// It is not used.
     Refused {
         /// Why.
-        reason: String,
+        reason: Cause,
         /// The slot of the plan that the flight record or the file name mean.
         meant_for: Option<u16>,
     },
@@ -26,8 +28,12 @@ pub(super) enum SlotMatch {
 /// Finds the slot of each log, refuses copies, other places and a slot's second log; and says what
 /// contradicts itself.
 pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<String>) {
-    let opened: Vec<Result<Log, String>> = (input.logs.par_iter())
-        .map(|log| Log::open(&log.path).map_err(|error| with_causes(&error, ": ")))
+    let unreadable = |log: &LogInput, error: &LogError| {
+        let said = with_causes(error, ": ");
+        Cause::of_log(&said, &log.path.shown().to_string(), &input.shown(&log.path))
+    };
+    let opened: Vec<Result<Log, Cause>> = (input.logs.par_iter())
+        .map(|log| Log::open(&log.path).map_err(|error| unreadable(log, &error)))
         .collect();
     let logs: Vec<Option<&Log>> =
         opened.iter().map(|log| log.as_ref().ok().filter(|log| log.size_bytes() > 0)).collect();
@@ -35,11 +41,13 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
     let Some(plan) = input.plan else {
         let refused = |first: usize| {
             let first = input.logs.get(first).map(|log| input.shown(&log.path));
-            let reason = matching::copy_of(&first.unwrap_or_default());
+            let reason = Cause::Copy { of: first.unwrap_or_default() };
             SlotMatch::Refused { reason, meant_for: None }
         };
         let slots = copies.into_iter().zip(input.logs).map(|(copy, log)| match &log.refused {
-            Some(reason) => SlotMatch::Refused { reason: reason.clone(), meant_for: None },
+            Some(reason) => {
+                SlotMatch::Refused { reason: Cause::Refused(reason.clone()), meant_for: None }
+            }
             None => copy.map_or(SlotMatch::Unplanned, refused),
         });
         return (slots.collect(), Vec::new());
@@ -77,7 +85,7 @@ pub(super) fn match_slots(input: &FlightInput<'_>) -> (Vec<SlotMatch>, Vec<Strin
 
 /// Owner of each log: a slot of the plan, `None` without a plan, or the reason why the log is not
 /// used. The second list has the contradictions between logs.
-pub fn whose_logs(input: &FlightInput<'_>) -> (Vec<Result<Option<u16>, String>>, Vec<String>) {
+pub fn whose_logs(input: &FlightInput<'_>) -> (Vec<Result<Option<u16>, Cause>>, Vec<String>) {
     let (slots, warnings) = match_slots(input);
     let of = |slot| match slot {
         SlotMatch::Slot(slot) => Ok(Some(slot)),

@@ -41,30 +41,6 @@ fn later_than_most(starts_s: &[Option<f64>]) -> Vec<Option<f64>> {
     starts_s.iter().map(later).collect()
 }
 
-/// `3600 s later`.
-fn how(later_s: f64) -> String {
-    format!("{:.0} s {}", later_s.abs(), if later_s < 0.0 { "earlier" } else { "later" })
-}
-
-/// Why a drone is not in the map.
-pub(super) fn not_in_map(later_s: f64) -> String {
-    format!(
-        "its show began {} than that of most drones (by its log's GPS time): it flew the plan at \
-         another time, in other air, and has no place in this map. Analyse its log by itself \
-         (--plan FLIGHT --hold analysis.json), or put the log of this flight in its place",
-        how(later_s)
-    )
-}
-
-/// What a calibration flown at another time means.
-pub(super) fn in_calibration(name: &str, later_s: f64) -> String {
-    format!(
-        "{name}: its show began {} than that of most drones (by its log's GPS time). Its law stands, \
-         but is of the air at that time: its zero may be off against the others'",
-        how(later_s)
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

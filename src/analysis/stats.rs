@@ -1,9 +1,29 @@
 //! Location, spread and standard error of samples in a window.
 
-use super::result::SampleStats;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Share cut off at each end for the trimmed mean (docs/physics.md, 5.1).
 const TRIM: f64 = 0.1;
+
+/// Location and spread of the samples in a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SampleStats {
+    /// Median.
+    pub median: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation of the samples.
+    pub sd: f64,
+    /// Number of samples.
+    pub n: usize,
+    /// Mean without the lowest and the highest tenth of the samples.
+    #[serde(default)]
+    pub trimmed: f64,
+    /// Standard error of the mean from the means of blocks longer than the signal's memory.
+    #[serde(default)]
+    pub se: f64,
+}
 
 /// Statistics of samples with their times. The standard error comes from the means of blocks of
 /// `block_s` (longer than the signal's memory), so that it does not shrink with the logging rate.

@@ -8,11 +8,13 @@
 
 use nalgebra::Vector3;
 
-use super::aware::Measured;
 use super::budget::{Quality, QualityFlag};
+use super::cause::Cause;
 use super::hover::Hover;
+use super::measured::Measured;
+use super::running::RUNNING_S;
 use super::stats::mean_sd;
-use super::updraft::{self, DroneSeries, RUNNING_S};
+use super::updraft::{self, DroneSeries};
 use super::windows::{Target, WindowOptions};
 use crate::base::estimate::Estimate;
 use crate::base::frame::ShowFrame;
@@ -133,7 +135,7 @@ pub(super) fn place_m(frame: &ShowFrame, home_m: [f64; 2], moved: [f64; 3]) -> [
 }
 
 /// That a log did not fly the plan's horizontal legs: how far it moved instead.
-pub(super) fn contradiction(flight: &Flight, segments: &[Segment]) -> Option<String> {
+pub(super) fn contradiction(flight: &Flight, segments: &[Segment]) -> Option<Cause> {
     let way = |segment: &Segment| {
         let (from, to) = (segment.start_ms as f64 / 1000.0, segment.end_ms as f64 / 1000.0);
         let moved = |series: &Series| Some(series.at(to, GAP_S)? - series.at(from, GAP_S)?);
@@ -154,16 +156,12 @@ pub(super) fn contradiction(flight: &Flight, segments: &[Segment]) -> Option<Str
         })
         .collect();
     let (segment, flown) = wrong.first().filter(|_| 2 * wrong.len() > legs.len())?;
-    Some(format!(
-        "this log does not belong to the plan: {} of {} horizontal legs were not flown (first: `{}` \
-         at {:.0} s, planned {:.0} m, flown {flown:.0} m); check that the logs are in the folder of \
-         their own flight",
-        wrong.len(),
-        legs.len(),
-        segment.label,
-        segment.start_ms as f64 / 1000.0,
-        planned(segment),
-    ))
+    Some(Cause::OtherTrack {
+        wrong_of: [wrong.len(), legs.len()],
+        label: segment.label.clone(),
+        start_s: segment.start_ms as f64 / 1000.0,
+        planned_flown_m: [planned(segment), *flown],
+    })
 }
 
 #[cfg(test)]
@@ -256,7 +254,7 @@ mod tests {
             window: None,
         };
         assert_eq!(contradiction(&flown(), &[leg(25_000, 4.0), leg(45_000, 4.0)]), None);
-        let said = contradiction(&flown(), &[leg(0, 4.0), leg(25_000, 1.0)]).unwrap();
+        let said = contradiction(&flown(), &[leg(0, 4.0), leg(25_000, 1.0)]).unwrap().to_string();
         assert!(said.contains("2 of 2 horizontal legs were not flown"), "{said}");
         assert!(said.contains("planned 80 m, flown 0 m"), "{said}");
         assert_eq!(contradiction(&flown(), &[]), None);

@@ -52,6 +52,7 @@ pub(super) fn check(drones: &[DroneUpdraft]) -> Option<TruthCheck> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::law::LawOf;
 
     fn drone(updraft_mps: Vec<Option<f64>>, truth_mps: Option<Vec<f64>>) -> DroneUpdraft {
         let interval = |value: &Option<f64>| value.map(|value| [value - 0.15, value + 0.15]);
@@ -61,7 +62,7 @@ mod tests {
             position_m: None,
             track_m: Vec::new(),
             height_m: 100.0,
-            mapping: "own".to_owned(),
+            mapping: LawOf::Own,
             mean: crate::base::estimate::Estimate::new(0.0, 0.1),
             mean_interval_mps: Some([0.0, 0.3]),
             errors: super::super::budget::ErrorBudget::default(),

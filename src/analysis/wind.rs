@@ -16,7 +16,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::law::Law;
-use super::result::{SampleStats, WindowStats};
+use super::stats::SampleStats;
+use super::window::WindowStats;
 use super::windows::Corrected;
 use crate::flight::{Flight, Series};
 

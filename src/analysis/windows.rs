@@ -5,8 +5,9 @@
 //! 3 s (the controller's overshoot) and the last second.
 
 use super::battery;
-use super::result::{Rejection, SampleStats, WindowStats};
-use super::stats::sample_stats;
+use super::cause::Cause;
+use super::stats::{SampleStats, sample_stats};
+use super::window::{Rejection, WindowStats};
 use crate::flight::{Flight, Indicator, Series};
 use crate::mission::plan::{Kind, Segment};
 
@@ -398,7 +399,7 @@ fn measure_one(
 /// Whether the log contradicts the plan: what was flown instead, if more than half of the plan's legs
 /// (or of its hovers, when it has no legs) were commanded otherwise. A log without commands is
 /// judged by its measured velocity.
-pub fn contradiction(flight: &Flight, targets: &[Target]) -> Option<String> {
+pub fn contradiction(flight: &Flight, targets: &[Target]) -> Option<Cause> {
     let series = flight.desired_up_mps.as_ref().unwrap_or(&flight.velocity_up_mps);
     let flown = |target: &Target| {
         let values = series.between(target.start_s, target.end_s);
@@ -424,34 +425,18 @@ pub fn contradiction(flight: &Flight, targets: &[Target]) -> Option<String> {
     let too_many = 2 * wrong.len() > compared.len()
         || (wrong.len() >= FEWEST_WRONG && 2 * wrong.len() == compared.len());
     let (target, flown) = wrong.first().filter(|_| too_many)?;
+    let label = target.label.clone();
     if busy(target) {
-        return Some(format!(
-            "this log does not belong to the plan: it was to stand still in `{}` from {:.0} to \
-             {:.0} s, and was commanded up and down most of that time; check that the logs are in \
-             the folder of their own flight",
-            target.label, target.start_s, target.end_s,
-        ));
+        return Some(Cause::Restless { label, from_to_s: [target.start_s, target.end_s] });
     }
-    Some(format!(
-        "this log does not belong to the plan: {} of {} {} were flown at another vertical speed \
-         (first: `{}` at {:.0} s, planned {} m/s, flown {flown:.2} m/s); {}",
-        wrong.len(),
-        compared.len(),
-        if has_legs { "legs" } else { "windows" },
-        target.label,
-        target.start_s,
-        target.commanded_mps,
-        match time_offset_s(flight, targets) {
-            Some(offset_s) => format!(
-                "the legs are the plan's, but the flight seems to run {:.1} s {} than the plan: \
-                 plan it with the take-off and the waits that were flown (for example \
-                 --set takeoff.speed_mps=2)",
-                offset_s.abs(),
-                if offset_s < 0.0 { "earlier" } else { "later" },
-            ),
-            None => "check that the logs are in the folder of their own flight".to_owned(),
-        },
-    ))
+    Some(Cause::OtherSpeeds {
+        wrong_of: [wrong.len(), compared.len()],
+        legs: has_legs,
+        label,
+        start_s: target.start_s,
+        planned_flown_mps: [target.commanded_mps, *flown],
+        offset_s: time_offset_s(flight, targets),
+    })
 }
 
 /// How much later than planned the legs were flown, s, if they were the plan's legs in the plan's

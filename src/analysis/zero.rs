@@ -18,9 +18,9 @@
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::air_prior::{Air, Gls, Record, Weighed, grid, quantile, weigh};
+use super::budget::CalibrationAir;
 use super::corrections::{BATTERY, DOUBTS, DRIFT};
-use super::local::{Own, local_air};
-use super::result::CalibrationAir;
+use super::local::{Deviations, Own, local_air};
 use super::shape::{PARAMETERS, Shape};
 use super::split::{Parts, Point, Split, noise_us, rough_sensitivity, rough_slope};
 
@@ -147,7 +147,15 @@ impl<'a> Fleet<'a> {
         }
         let width = zero_width(&weighed, &fleet, &parameters, &common);
 
-        let local = local_air(shape, points, &split, &pulses, &parts, &doubts, rough);
+        let local = local_air(&Deviations {
+            shape,
+            points,
+            split: &split,
+            pulses: &pulses,
+            parts: &parts,
+            doubts: &doubts,
+            rough,
+        });
         let answer = |parts: &Parts| -> Vec<f64> {
             let mut column = DVector::zeros(fleet.pulse_us.len());
             column.rows_mut(0, parts.cells.len()).copy_from_slice(&parts.cells);

@@ -19,16 +19,20 @@ impl Estimate {
     pub fn new(value: f64, se: f64) -> Self {
         Self { value, se }
     }
+
+    /// Decimals that the error supports (two significant digits of it); `None` without an error.
+    pub fn decimals(&self) -> Option<usize> {
+        (self.se > 0.0 && self.se.is_finite())
+            .then(|| (1 - self.se.log10().floor() as i32).clamp(0, 9) as usize)
+    }
 }
 
 /// Prints the value to the digit that its error supports (two significant digits of the error).
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.se > 0.0 && self.se.is_finite() {
-            let decimals = (1 - self.se.log10().floor() as i32).clamp(0, 9) as usize;
-            write!(f, "{:.decimals$} ± {:.decimals$}", self.value, self.se)
-        } else {
-            write!(f, "{:.3}", self.value)
+        match self.decimals() {
+            Some(decimals) => write!(f, "{:.decimals$} ± {:.decimals$}", self.value, self.se),
+            None => write!(f, "{:.3}", self.value),
         }
     }
 }

@@ -4,6 +4,8 @@
 pub mod causes;
 pub mod estimate;
 pub mod json;
+pub(crate) mod said;
+pub mod sentence;
 
 pub use dataflash::time;
 pub use multirotor_sim::{air, rng};

@@ -22,13 +22,37 @@ const AIRSIM_US_PER_SHARE: f64 = 72.0;
 
 /// What is measured, in the order of the table.
 pub(super) fn metrics(outcomes: &[&Outcome]) -> Vec<Metric> {
-    use Demand::{AtLeast, AtMost, UpperAtMost, Within};
-    let least = |bound| AtLeast { bound };
-    let most = |bound| AtMost { bound };
-    let upper = |bound| UpperAtMost { bound };
-    let none: Vec<_> = outcomes.iter().filter(|one| one.hidden.is_empty()).collect();
-    let some: Vec<_> = outcomes.iter().filter(|one| !one.hidden.is_empty()).collect();
+    let (none, some): (Vec<&Outcome>, Vec<&Outcome>) =
+        outcomes.iter().copied().partition(|one| one.hidden.is_empty());
     let hidden: Vec<&HiddenOutcome> = outcomes.iter().flat_map(|one| &one.hidden).collect();
+    let mut metrics = false_alarms(&none);
+    metrics.extend(names(&some, &hidden));
+    metrics.extend(sizes(&some, &hidden));
+    metrics.push(said_invisible(&hidden));
+    metrics.extend(the_papers_own(&some));
+    metrics
+}
+
+fn at_least(bound: f64) -> Demand {
+    Demand::AtLeast { bound }
+}
+
+fn at_most(bound: f64) -> Demand {
+    Demand::AtMost { bound }
+}
+
+/// How often something is found where nothing is hidden.
+fn false_alarms(none: &[&Outcome]) -> Vec<Metric> {
+    let alarms = || none.iter().map(|one| one.is_false_alarm());
+    let upper = |bound| Demand::UpperAtMost { bound };
+    vec![
+        rate("false alarms, nothing hidden (upper end)", alarms(), [upper(0.05), upper(0.025)]),
+        rate("false alarms, nothing hidden (observed)", alarms(), [at_most(0.05), at_most(0.01)]),
+    ]
+}
+
+/// How often what is hidden is called by its name.
+fn names(some: &[&Outcome], hidden: &[&HiddenOutcome]) -> Vec<Metric> {
     let library = |from: f64, to: f64| {
         hidden.iter().copied().filter(move |one| !one.foreign && has_z(one, from, to))
     };
@@ -38,15 +62,88 @@ pub(super) fn metrics(outcomes: &[&Outcome]) -> Vec<Metric> {
         of.filter(|one| one.hidden.iter().all(|hidden| has_z(hidden, 6.0, f64::INFINITY)))
     };
     let all_named = |one: &Outcome| one.hidden.iter().all(is_named);
+    vec![
+        rate(
+            "named or in class, z >= 6",
+            library(6.0, f64::INFINITY).map(is_named),
+            [at_least(0.9), at_least(0.98)],
+        ),
+        rate(
+            "named or in class, z 4 to 6",
+            library(4.0, 6.0).map(is_named),
+            [at_least(0.4), at_least(0.75)],
+        ),
+        rate(
+            "named alone, z >= 6, alone in class",
+            library(6.0, f64::INFINITY)
+                .filter(|one| one.single)
+                .map(|one| one.called == Called::Named),
+            [at_least(0.85), at_least(0.97)],
+        ),
+        rate(
+            "a wrong single name, any z",
+            some.iter().map(|one| !one.wrong_names.is_empty()),
+            [at_most(0.03), at_most(0.005)],
+        ),
+        rate(
+            "unknown recognised, right dependence, z >= 8",
+            foreign()
+                .filter(|one| has_z(one, 8.0, f64::INFINITY))
+                .map(|one| one.called == Called::Named),
+            [at_least(0.75), at_least(0.95)],
+        ),
+        rate(
+            "two effects, both named, each z >= 6",
+            together(2).map(|one| all_named(one)),
+            [at_least(0.75), at_least(0.93)],
+        ),
+        rate(
+            "three effects, all named, each z >= 6",
+            together(3).map(|one| all_named(one)),
+            [at_least(0.0), at_least(0.8)],
+        ),
+    ]
+}
+
+/// How well sizes are found, and what of the gap they take away.
+fn sizes(some: &[&Outcome], hidden: &[&HiddenOutcome]) -> Vec<Metric> {
     let errors: Vec<f64> =
         hidden.iter().filter_map(|one| one.relative_error).map(f64::abs).collect();
-    let shrinks: Vec<f64> = (some.iter().filter(|one| !one.found.is_empty()))
-        .filter_map(|one| one.excess_shrink)
-        .collect();
-    let raw: Vec<f64> = (some.iter().filter(|one| !one.found.is_empty()))
-        .filter_map(|one| one.raw_shrink)
-        .collect();
-    // The paper's own case: AirSim's law against a field flight of drones with usual rotors.
+    let found = || some.iter().filter(|one| !one.found.is_empty());
+    let shrinks: Vec<f64> = found().filter_map(|one| one.excess_shrink).collect();
+    let raw: Vec<f64> = found().filter_map(|one| one.raw_shrink).collect();
+    let within = |low, high| Demand::Within { low, high };
+    vec![
+        middle("median error of the parameter", &errors, [at_most(0.1), at_most(0.03)]),
+        rate(
+            "95 % interval covers",
+            hidden.iter().filter_map(|one| one.covered),
+            [within(0.90, 0.98), within(0.94, 0.96)],
+        ),
+        middle("held-out excess that is gone, median", &shrinks, [at_least(0.8), at_least(0.95)]),
+        middle("held-out gap that is gone, median", &raw, [at_least(0.0), at_least(0.0)]),
+        rate(
+            "flights made worse",
+            some.iter().map(|one| one.made_worse),
+            [at_most(0.03), at_most(0.0)],
+        ),
+    ]
+}
+
+/// How often what is called invisible is.
+fn said_invisible(hidden: &[&HiddenOutcome]) -> Metric {
+    let unseen = hidden
+        .iter()
+        .filter(|one| !one.foreign && one.said_visible == Some(false) && one.z.is_some());
+    rate(
+        "said invisible, and z < 4",
+        unseen.map(|one| one.z.is_some_and(|z| z.abs() < 4.0)),
+        [at_least(0.9), at_least(0.95)],
+    )
+}
+
+/// The paper's own case: AirSim's law against a field flight of drones with usual rotors.
+fn the_papers_own(some: &[&Outcome]) -> Vec<Metric> {
     let paper_like = || {
         some.iter().copied().filter(|one| {
             let cell = (one.cell.protocol, one.cell.air, one.cell.base);
@@ -60,81 +157,17 @@ pub(super) fn metrics(outcomes: &[&Outcome]) -> Vec<Metric> {
         })
     };
     let means: Vec<f64> = paper_like().filter_map(|one| one.mean_shrink).collect();
-    let unseen = || {
-        hidden
-            .iter()
-            .filter(|one| !one.foreign && one.said_visible == Some(false) && one.z.is_some())
-    };
     vec![
-        rate(
-            "false alarms, nothing hidden (upper end)",
-            none.iter().map(|one| one.is_false_alarm()),
-            [upper(0.05), upper(0.025)],
-        ),
-        rate(
-            "false alarms, nothing hidden (observed)",
-            none.iter().map(|one| one.is_false_alarm()),
-            [most(0.05), most(0.01)],
-        ),
-        rate(
-            "named or in class, z >= 6",
-            library(6.0, f64::INFINITY).map(is_named),
-            [least(0.9), least(0.98)],
-        ),
-        rate(
-            "named or in class, z 4 to 6",
-            library(4.0, 6.0).map(is_named),
-            [least(0.4), least(0.75)],
-        ),
-        rate(
-            "named alone, z >= 6, alone in class",
-            library(6.0, f64::INFINITY)
-                .filter(|one| one.single)
-                .map(|one| one.called == Called::Named),
-            [least(0.85), least(0.97)],
-        ),
-        rate(
-            "a wrong single name, any z",
-            some.iter().map(|one| !one.wrong_names.is_empty()),
-            [most(0.03), most(0.005)],
-        ),
-        rate(
-            "unknown recognised, right dependence, z >= 8",
-            foreign()
-                .filter(|one| has_z(one, 8.0, f64::INFINITY))
-                .map(|one| one.called == Called::Named),
-            [least(0.75), least(0.95)],
-        ),
-        rate(
-            "two effects, both named, each z >= 6",
-            together(2).map(|one| all_named(one)),
-            [least(0.75), least(0.93)],
-        ),
-        rate(
-            "three effects, all named, each z >= 6",
-            together(3).map(|one| all_named(one)),
-            [least(0.0), least(0.8)],
-        ),
-        middle("median error of the parameter", &errors, [most(0.1), most(0.03)]),
-        rate(
-            "95 % interval covers",
-            hidden.iter().filter_map(|one| one.covered),
-            [Within { low: 0.90, high: 0.98 }, Within { low: 0.94, high: 0.96 }],
-        ),
-        middle("held-out excess that is gone, median", &shrinks, [least(0.8), least(0.95)]),
-        middle("held-out gap that is gone, median", &raw, [least(0.0), least(0.0)]),
-        rate("flights made worse", some.iter().map(|one| one.made_worse), [most(0.03), most(0.0)]),
-        rate(
-            "said invisible, and z < 4",
-            unseen().map(|one| one.z.is_some_and(|z| z.abs() < 4.0)),
-            [least(0.9), least(0.95)],
-        ),
         rate(
             "the paper's own case: inflow named",
             paper_like().map(|one| one.hidden.iter().all(|hidden| hidden.called == Called::Named)),
-            [least(0.95), least(1.0)],
+            [at_least(0.95), at_least(1.0)],
         ),
-        middle("the same: gap of the drones' mean that is gone", &means, [least(0.55), least(0.0)]),
+        middle(
+            "the same: gap of the drones' mean that is gone",
+            &means,
+            [at_least(0.55), at_least(0.0)],
+        ),
     ]
 }
 

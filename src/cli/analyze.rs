@@ -11,7 +11,7 @@ use super::origin::OriginChoice;
 use super::words;
 use crate::analysis::result::Analysis;
 use crate::analysis::windows::Tilt;
-use crate::analysis::{AnalysisOptions, MapLaw, OffsetRule};
+use crate::analysis::{AnalysisOptions, LawKind, OffsetRule};
 use crate::base::plain::Shown as _;
 use crate::flight::Indicator;
 use crate::report::terminal_summary;
@@ -178,8 +178,8 @@ impl AnalyzeOptions {
         };
         options.map_law = match self.law {
             LawChoice::Auto => None,
-            LawChoice::Linear => Some(MapLaw::Linear),
-            LawChoice::SignedQuadratic => Some(MapLaw::SignedQuadratic),
+            LawChoice::Linear => Some(LawKind::Linear),
+            LawChoice::SignedQuadratic => Some(LawKind::SignedQuadratic),
         };
         options.offset = match self.offset {
             OffsetChoice::Field => OffsetRule::Field,

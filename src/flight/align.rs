@@ -2,7 +2,7 @@
 
 use super::channels::Messages;
 use super::pick::PERFORMING;
-use super::{Alignment, Clock, FlightOptions, Series};
+use super::{Alignment, Clock, FlightOptions, Series, Warning};
 use crate::base::time::GpsTime;
 use crate::mission::plan::Segment;
 
@@ -33,7 +33,7 @@ pub(super) struct Evidence<'a> {
 pub(super) fn align(
     evidence: &Evidence<'_>,
     options: FlightOptions<'_>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Clock {
     let gps = gps_offset_s(evidence);
     let with_start = |mut clock: Clock| {
@@ -53,13 +53,15 @@ pub(super) fn align(
                 let method = Alignment::GpsTime;
                 return Clock { method, offset_s, residual_s, start: Some(start) };
             }
-            warnings.push(format!(
+            let text = format!(
                 "the given start of the show ({start}) is {:.0} s away from this flight and is \
                  not used",
                 offset_s - armed
-            ));
+            );
+            warnings.push(text.into());
         } else {
-            warnings.push("the log has no GPS time to place the start of the show by".to_owned());
+            let text = "the log has no GPS time to place the start of the show by".to_owned();
+            warnings.push(text.into());
         }
     }
     if let Some(segments) = options.segments {
@@ -68,7 +70,8 @@ pub(super) fn align(
             None => warnings.push(
                 "the log's vertical velocity does not match the plan anywhere: times count from \
                  take-off"
-                    .to_owned(),
+                    .to_owned()
+                    .into(),
             ),
         }
     }

@@ -79,25 +79,24 @@ pub(super) fn load(
         (Some(((away_s, _), mut flight)), _)
             if options.start.is_some() && !is_of_start && is_near(&flight, away_s) =>
         {
-            flight.warnings.push(format!(
+            let text = format!(
                 "{}; the one that began at the flight's start is analysed: the {which}",
                 of(held)
-            ));
+            );
+            flight.warnings.push(text.into());
             Ok(flight)
         }
         (_, _) if options.start.is_some() && !is_of_start => {
             of_start_or_none(log, source, options, usual)
         }
         (Some(((_, off), mut flight)), Some(_)) if off < SAME_MPS => {
-            flight
-                .warnings
-                .push(format!("{}; the one that flew the plan is analysed: the {which}", of(held)));
+            let text = format!("{}; the one that flew the plan is analysed: the {which}", of(held));
+            flight.warnings.push(text.into());
             Ok(flight)
         }
         (Some((_, mut flight)), _) if usual.is_err() => {
-            flight
-                .warnings
-                .push(format!("{}; one that can be read is analysed: the {which}", of(held)));
+            let text = format!("{}; one that can be read is analysed: the {which}", of(held));
+            flight.warnings.push(text.into());
             Ok(flight)
         }
         _ => usual,

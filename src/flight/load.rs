@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::align::{Evidence, align};
 use super::channels::Messages;
-use super::{Flight, FlightError, FlightOptions, Indicator, Series, pick};
-use crate::log::{Log, ScanStats};
+use super::{Flight, FlightError, FlightOptions, Indicator, Loss, Series, Warning, pick};
+use crate::log::Log;
 
 /// Kept before arming and after disarming, s.
 const MARGIN_S: f64 = 2.0;
@@ -56,10 +56,10 @@ pub(super) fn load(
     let boots = messages.keep_one_boot(wanted.boot);
     (held.boots, held.boot) = (boots, messages.boot);
     if boots > 1 && wanted.boot.is_none() {
-        warnings.push(format!(
-            "the log holds {boots} boots of the autopilot; the {} is analysed",
-            ordinal(messages.boot, boots)
-        ));
+        let which = ordinal(messages.boot, boots);
+        warnings.push(
+            format!("the log holds {boots} boots of the autopilot; the {which} is analysed").into(),
+        );
     }
     let missing = |what, messages, remedy| FlightError::Missing {
         source_path: source.to_owned(),
@@ -139,7 +139,7 @@ pub(super) fn load(
     let (flight, choice) = chosen.ok_or_else(|| {
         no_flight("the motors were never armed for 5 s with outputs logged".into())
     })?;
-    warnings.extend(choice);
+    warnings.extend(choice.map(Warning::Said));
     let pulse_limits_us = messages.pulse_limits_us();
     let strongest =
         pulse.between(flight.0, flight.1).iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -179,7 +179,7 @@ pub(super) fn load(
     let running = pulse.value.last().is_some_and(|last| *last > pulse_limits_us.0 + IDLE_US);
     let cut_off_at_m = running.then(|| end_height_m(&pulse, &ekf.height, flight.1, ground_m));
     let cut_off_at_m = cut_off_at_m.flatten().filter(|height| *height > CUT_OFF_M);
-    warnings.extend(cut_off_at_m.map(cut_off));
+    warnings.extend(cut_off_at_m.map(|height_m| Warning::Loss(Loss::CutOff { height_m })));
     let mut height_m = cut(ekf.height);
     for height in &mut height_m.value {
         *height -= ground_m;
@@ -195,7 +195,7 @@ pub(super) fn load(
             (lost, format!("the log ends {lost:.1} s before the flight does")),
         ];
         warnings.extend(told.into_iter().filter_map(|(silent_s, words)| {
-            silence(silent_s, words).map(|words| format!("{name}: {words}"))
+            silence(silent_s, words).map(|words| format!("{name}: {words}").into())
         }));
     }
     let (voltage_v, current_a) = messages.battery();
@@ -250,36 +250,17 @@ fn end_height_m(pulse: &Series, height: &Series, disarmed_s: f64, ground_m: f64)
     height.value.last().filter(|_| armed).map(|height| height - ground_m)
 }
 
-/// That a log ends before its flight does.
-pub(super) fn cut_off(height_m: f64) -> String {
-    format!("the log ends in the air, {height_m:.1} m above the ground; what it holds is analysed")
-}
-
-/// What the reader skipped inside of a log. That it ends within a message is how logs end whose
-/// drone was switched off.
-pub(super) fn damage(scan: &ScanStats) -> Option<String> {
-    let counted = [
-        (scan.unknown, "message heads of unknown types"),
-        (scan.time_jumps, "jumps of the board time"),
-    ];
-    let seen: Vec<String> = (counted.iter().filter(|(count, _)| *count > 0))
-        .map(|(count, what)| format!("{count} {what}"))
-        .collect();
-    let seen = if seen.is_empty() { String::new() } else { format!(" ({})", seen.join(", ")) };
-    (scan.bad_bytes > 0)
-        .then(|| format!("{} bytes of the log are damaged and were skipped{seen}", scan.bad_bytes))
-}
-
-fn scan_warnings(messages: &Messages) -> Vec<String> {
+fn scan_warnings(messages: &Messages) -> Vec<Warning> {
     let scan = &messages.scan;
-    let mut warnings: Vec<String> = damage(scan).into_iter().collect();
+    let mut warnings: Vec<Warning> = Loss::of(scan).into_iter().map(Warning::Loss).collect();
     if scan.rejected_formats > 0 {
         let count = scan.rejected_formats;
-        warnings.push(format!("{count} message definitions in the log contradict themselves"));
+        let text = format!("{count} message definitions in the log contradict themselves");
+        warnings.push(text.into());
     }
     if messages.dropped > 0 {
         let count = messages.dropped;
-        warnings.push(format!("{count} rows with an impossible time were dropped"));
+        warnings.push(format!("{count} rows with an impossible time were dropped").into());
     }
     warnings
 }

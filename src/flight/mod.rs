@@ -25,6 +25,7 @@ mod load;
 mod pick;
 mod series;
 pub mod table;
+mod warning;
 
 use std::path::{Path, PathBuf};
 
@@ -40,6 +41,7 @@ use crate::mission::plan::Segment;
 pub use fit::share_flown;
 pub use identity::{Belongs, Identity, identify};
 pub use indicator::Indicator;
+pub use warning::{Loss, Warning};
 
 /// A channel: samples with their own times.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -111,7 +113,7 @@ pub struct Flight {
     /// Statistics of the log's reader: messages, damage, unknown types.
     pub scan: ScanStats,
     /// Doubts about this log, one sentence each.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Knowledge about a flight from beside its log.
@@ -194,9 +196,9 @@ pub enum FlightError {
 impl Flight {
     /// Losses of this flight, one phrase each as in [`Flight::warnings`]: a log that ends in the
     /// air, or damage that its reader skipped. Empty if nothing is lost.
-    pub fn losses(&self) -> Vec<String> {
-        let cut_off = self.cut_off_at_m.map(load::cut_off);
-        cut_off.into_iter().chain(load::damage(&self.scan)).collect()
+    pub fn losses(&self) -> Vec<Loss> {
+        let cut_off = self.cut_off_at_m.map(|height_m| Loss::CutOff { height_m });
+        cut_off.into_iter().chain(Loss::of(&self.scan)).collect()
     }
 
     /// Reads one flight of a log.

@@ -1,6 +1,7 @@
 //! The measured side: all drones of a campaign's flight in the same steady bins.
 
 use super::bins::{Bin, BinValues, cut, of_segments};
+use super::left_out::LeftOut;
 use super::measure::measured;
 use super::scene::IDLE_US;
 use crate::analysis::steps::steady;
@@ -91,7 +92,7 @@ pub struct Data {
     /// Command groups that have drones.
     pub groups: Vec<Group>,
     /// Drones left out, with their reasons.
-    pub left_out: Vec<String>,
+    pub left_out: Vec<LeftOut>,
     /// Resistance of the batteries as the autopilots found it (median), ohm.
     pub resistance_ohm: Option<f64>,
 }
@@ -212,7 +213,7 @@ impl Data {
         let has_any =
             |drone: &(u16, [f64; 2], Vec<Option<BinValues>>)| drone.2.iter().any(Option::is_some);
         for (slot, ..) in drones.iter().filter(|drone| !has_any(drone)) {
-            self.left_out.push(format!("slot {slot}: no steady flight of the plan in its log"));
+            self.left_out.push(LeftOut::NoSteadyFlight { slot: *slot });
         }
         let drones: Vec<_> = drones.into_iter().filter(has_any).collect();
         let needed = (drones.len() as f64 * BIN_SHARE).ceil() as usize;
@@ -232,12 +233,8 @@ impl Data {
             if (count(&there) as f64) < DRONE_SHARE * kept.len() as f64 || count(&there) == 0 {
                 // Where no bin is common to the fleet, each drone's own say how bad it is.
                 let of = if kept.is_empty() { &values } else { &there };
-                self.left_out.push(format!(
-                    "slot {slot}: only {} of {} steady bins are usable (gaps in the log, motors at a \
-                     limit, or another flight)",
-                    count(of),
-                    of.len()
-                ));
+                let (usable, bins) = (count(of), of.len());
+                self.left_out.push(LeftOut::FewBins { slot, usable, bins });
                 continue;
             }
             group.slots.push(slot);
@@ -284,9 +281,7 @@ impl Data {
             for (slot, constant) in group.slots.iter().zip(&constants) {
                 if let Some(us) = constant {
                     last = Some(*us);
-                    self.left_out.push(format!(
-                        "slot {slot}: its pulse is {us:.0} us in the whole flight: no rotor flies so"
-                    ));
+                    self.left_out.push(LeftOut::ConstantPulse { slot: *slot, pulse_us: *us });
                 }
             }
             *group = group.only(|index| constants[index].is_none());

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::left_out::LeftOut;
 use crate::effects::EffectError;
 use crate::mission::resolve::MissionError;
 use crate::sim::SimError;
@@ -17,7 +18,7 @@ pub enum GapError {
     )]
     NothingMeasured {
         /// Why each was left out.
-        reasons: Vec<String>,
+        reasons: Vec<LeftOut>,
     },
     /// Too few bins on both sides.
     #[error(
@@ -62,6 +63,6 @@ pub enum GapError {
 }
 
 /// Reasons one below the other; the first ten.
-fn listed(reasons: &[String]) -> String {
-    reasons.iter().take(10).fold(String::new(), |text, reason| text + "\n  " + reason)
+fn listed(reasons: &[LeftOut]) -> String {
+    reasons.iter().take(10).fold(String::new(), |text, reason| format!("{text}\n  {reason}"))
 }

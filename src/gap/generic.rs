@@ -1,6 +1,6 @@
 //! Free shapes: what depends on something, though no effect of the library says how.
 
-use super::gls::{Column, means_of};
+use super::gls::{Column, Pulses, means_of};
 use super::response::Response;
 use super::scene::Scene;
 use crate::effects::Signals;
@@ -38,12 +38,15 @@ const GROWTHS: [fn(f64) -> f64; 2] =
 const STEPS: usize = 47;
 /// Step of the derivative by vertical air speed, m/s. Numerical.
 const SLOPE_STEP: f64 = 0.01;
+/// A charge that changes by less, as a share, says nothing. Chosen.
+const LEAST_CHARGE: f64 = 0.05;
+/// A component of the air from the nose that spans less says nothing, m/s. Chosen.
+const LEAST_TURN_MPS: f64 = 1.5;
 /// A signal that moves less than this share of its scale says nothing. Chosen.
 const LEAST_SPAN: f64 = 0.05;
 
 /// All free shapes that the flight can show.
 pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
-    let mut found = Vec::new();
     let along = |of: &dyn Fn(&Signals) -> f64| -> Vec<Vec<f64>> {
         scene.signals.iter().map(|group| group.iter().map(of).collect()).collect()
     };
@@ -51,77 +54,101 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     let time = along(&|s| s.time_s);
     let height = along(&|s| s.height_m);
     let wind = along(&|s| s.horizontal_mps);
+    let mut found = Vec::new();
     found.extend(smooth("climb", "vertical velocity (m/s)", &climb, 5, 0.5).map(Generic::feels));
     found.extend(smooth("time", "time since arming (s)", &time, 3, 30.0));
     found.extend(smooth("height", "height (m)", &height, 3, 3.0));
     found.extend(smooth("wind", "horizontal air speed (m/s)", &wind, 3, 1.5));
-    for wave_m in WAVES_M {
+    found.extend(waves(&height));
+    found.push(climb_times_time(&climb, &time));
+    found.extend(steps(&time));
+    found.extend(scene.charge.as_ref().and_then(by_charge));
+    found.extend(directions(scene, headings));
+    found
+}
+
+/// Waves over the height, where the flight spans most of one.
+fn waves(height: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
+    WAVES_M.into_iter().filter(|wave_m| span(height) > 0.7 * wave_m).map(|wave_m| {
         let phase = |of: fn(f64) -> f64| {
-            Column::Shared(map(&height, &|h| of(std::f64::consts::TAU * h / wave_m)))
+            Column::Shared(map(height, &|h| of(std::f64::consts::TAU * h / wave_m)))
         };
-        if span(&height) > 0.7 * wave_m {
-            found.push(Generic {
-                depends_on: "height",
-                axis: "height (m)",
-                columns: vec![phase(f64::sin), phase(f64::cos)],
-                felt: Vec::new(),
-                along: height.clone(),
-                penalty: 2.0 + (WAVES_M.len() as f64).ln(),
-            });
+        Generic {
+            depends_on: "height",
+            axis: "height (m)",
+            columns: vec![phase(f64::sin), phase(f64::cos)],
+            felt: Vec::new(),
+            along: height.to_vec(),
+            penalty: 2.0 + (WAVES_M.len() as f64).ln(),
         }
-    }
-    let middle = f64::midpoint(least(&time), most(&time));
-    let half = (most(&time) - least(&time)).max(1.0) / 2.0;
+    })
+}
+
+/// The product of climb speed and time.
+fn climb_times_time(climb: &[Vec<f64>], time: &[Vec<f64>]) -> Generic {
+    let middle = f64::midpoint(least(time), most(time));
+    let half = (most(time) - least(time)).max(1.0) / 2.0;
     let product = |(climb, time): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
         climb.iter().zip(time).map(|(climb, time)| climb * (time - middle) / half).collect()
     };
-    let crossed: Vec<Vec<f64>> = climb.iter().zip(&time).map(product).collect();
-    found.push(Generic {
+    let crossed: Vec<Vec<f64>> = climb.iter().zip(time).map(product).collect();
+    Generic {
         depends_on: "climb-time",
         axis: "vertical velocity times time, scaled",
         // A product comes with its own mean part. What goes with the size of the climb and time is what a
         // drift of the air does.
         felt: vec![
-            straight(map(&time, &|time| (time - middle) / half)),
-            straight(map(&time, &|_| 1.0)),
+            straight(map(time, &|time| (time - middle) / half)),
+            straight(map(time, &|_| 1.0)),
         ],
-        columns: vec![Column::Shared(crossed.clone()), Column::Shared(climb.clone())],
+        columns: vec![Column::Shared(crossed.clone()), Column::Shared(climb.to_vec())],
         along: crossed,
         penalty: 2.0,
-    });
-    for step in 1..=STEPS {
-        let at_s = least(&time) + (most(&time) - least(&time)) * step as f64 / (STEPS + 1) as f64;
-        found.push(Generic {
+    }
+}
+
+/// Steps at instants spread over the flight.
+fn steps(time: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
+    (1..=STEPS).map(|step| {
+        let at_s = least(time) + (most(time) - least(time)) * step as f64 / (STEPS + 1) as f64;
+        Generic {
             depends_on: "step",
             axis: "time since arming (s)",
-            columns: vec![Column::Shared(map(&time, &|t| if t < at_s { 0.0 } else { 1.0 }))],
+            columns: vec![Column::Shared(map(time, &|t| if t < at_s { 0.0 } else { 1.0 }))],
             felt: Vec::new(),
-            along: time.clone(),
+            along: time.to_vec(),
             penalty: (STEPS as f64).ln(),
-        });
+        }
+    })
+}
+
+/// A curve over the drones' own charge (by group, drone and bin), where it changes.
+fn by_charge(charge: &Pulses) -> Option<Generic> {
+    let values = charge.iter().flatten().flatten();
+    let (low, high) = values.fold((1.0_f64, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    if high - low <= LEAST_CHARGE {
+        return None;
     }
-    if let Some(charge) = scene.charge.as_ref().filter(|charge| {
-        let values = charge.iter().flatten().flatten();
-        let (low, high) = values.fold((1.0_f64, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
-        high - low > 0.05
-    }) {
-        let powers = (1..=3).map(|power| {
-            let drone =
-                |bins: &Vec<f64>| bins.iter().map(|c| chebyshev(power, 2.0 * c - 1.0)).collect();
-            let group = |drones: &Vec<Vec<f64>>| drones.iter().map(drone).collect();
-            Column::Own(charge.iter().map(group).collect())
-        });
-        found.push(Generic {
-            depends_on: "voltage",
-            axis: "charge by the voltage at rest (share)",
-            columns: powers.collect(),
-            felt: Vec::new(),
-            along: means_of(charge),
-            penalty: 4.0,
-        });
-    }
-    // A direction that does not change is an offset.
-    for grown in GROWTHS {
+    let powers = (1..=3).map(|power| {
+        let drone =
+            |bins: &Vec<f64>| bins.iter().map(|c| chebyshev(power, 2.0 * c - 1.0)).collect();
+        let group = |drones: &Vec<Vec<f64>>| drones.iter().map(drone).collect();
+        Column::Own(charge.iter().map(group).collect())
+    });
+    Some(Generic {
+        depends_on: "voltage",
+        axis: "charge by the voltage at rest (share)",
+        columns: powers.collect(),
+        felt: Vec::new(),
+        along: means_of(charge),
+        penalty: 4.0,
+    })
+}
+
+/// The direction of the air from the nose, growing with the air speed in several ways. A direction that
+/// does not change is an offset.
+fn directions(scene: &Scene, headings: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
+    GROWTHS.into_iter().filter_map(|grown| {
         let turns = |of: fn(f64) -> f64| {
             let value =
                 |(angle, signals): (&f64, &Signals)| of(*angle) * grown(signals.horizontal_mps);
@@ -131,18 +158,15 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
             headings.iter().zip(&scene.signals).map(group).collect::<Vec<Vec<f64>>>()
         };
         let (ahead, aside) = (turns(f64::cos), turns(f64::sin));
-        if span(&ahead).max(span(&aside)) > 1.5 {
-            found.push(Generic {
-                depends_on: "heading",
-                axis: "direction of the air from the nose (rad)",
-                columns: vec![Column::Shared(ahead), Column::Shared(aside)],
-                felt: Vec::new(),
-                along: headings.to_vec(),
-                penalty: 2.0 + (GROWTHS.len() as f64).ln(),
-            });
-        }
-    }
-    found
+        (span(&ahead).max(span(&aside)) > LEAST_TURN_MPS).then(|| Generic {
+            depends_on: "heading",
+            axis: "direction of the air from the nose (rad)",
+            columns: vec![Column::Shared(ahead), Column::Shared(aside)],
+            felt: Vec::new(),
+            along: headings.to_vec(),
+            penalty: 2.0 + (GROWTHS.len() as f64).ln(),
+        })
+    })
 }
 
 /// What a smooth shape does to the response is hardly bent over a gust.

@@ -8,6 +8,7 @@ use super::drones::drones;
 use super::error::GapError;
 use super::explain::{Found, Options, search};
 use super::heldout::Case;
+use super::left_out::LeftOut;
 use super::noise::{
     GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SIDE_GUSTS,
     SLOPES, WHITE,
@@ -18,9 +19,10 @@ use super::verdict::{
     DataUsed, Drones, Finding, Interval, Noise, Regime, Rung, SensorChannel, Step, VERDICT_SCHEMA,
     Verdict,
 };
+use super::warning::warnings;
 use super::words::summary;
 use crate::effects::Role;
-use crate::effects::select::{self, value_of};
+use crate::effects::select;
 use crate::flight::table::Steps;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
@@ -42,7 +44,7 @@ pub struct Input<'a> {
     /// Measured logs that there are, used or not.
     pub logs: usize,
     /// Logs that could not be used, with their reasons.
-    pub left_out: Vec<String>,
+    pub left_out: Vec<LeftOut>,
 }
 
 /// A verdict with the model that it leads to.
@@ -55,10 +57,6 @@ pub struct Explained {
     /// The search, for what comes after.
     pub found: Found,
 }
-
-/// Sides whose leans are further apart flew in different wind, degrees. Chosen: several times the error of
-/// an attitude, and 0.4 m/s on a drone that leans by 1.2 degrees per m/s.
-const OTHER_WIND_DEG: f64 = 0.5;
 
 /// Climb speeds of one rung of the ladder differ by less, m/s. Commands are exact; rungs are 0.5 m/s apart.
 const SAME_SPEED_MPS: f64 = 0.05;
@@ -156,7 +154,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         map: None,
         regimes: regimes(&before, &whole, &found, options.seed)?,
         ladder: Vec::new(),
-        cautions: cautions(&data, &found, input),
+        cautions: warnings(&data, &found, input),
     };
     verdict.ladder = ladder(&whole.data, &verdict.regimes);
     verdict.summary = summary(&verdict);
@@ -278,69 +276,4 @@ fn add_others(model: &mut Vehicle, steps: &[Step]) {
             }
         }
     }
-}
-
-fn cautions(data: &Data, found: &Found, input: &Input<'_>) -> Vec<String> {
-    let mut cautions = Vec::new();
-    let drones = data.drones();
-    if drones == 1 {
-        cautions.push(
-            "one drone: its own offset and the air at its place cannot be told from the model's \
-             errors; nothing is held out but rungs"
-                .to_owned(),
-        );
-    } else if drones < 8 {
-        cautions.push(format!("{drones} drones: none is held out from fitting"));
-    }
-    if let Some(plan) = input.plan
-        && drones * 2 <= plan.slots.len()
-    {
-        cautions.push(format!(
-            "only {drones} of {} drones gave a usable log: intervals are wide, and groups may be \
-             uneven",
-            plan.slots.len()
-        ));
-    }
-    for parameter in &found.parameters {
-        let value = value_of(&found.vehicle, parameter.effect, parameter.name);
-        let (low, high) = parameter.bounds;
-        if value.is_some_and(|value| value <= low || value >= high) {
-            cautions.push(format!(
-                "{}.{} is at its bound: the effect as it is named does not fit, and the model with it may \
-                 be worse elsewhere",
-                parameter.effect, parameter.name
-            ));
-        }
-    }
-    if input.simulated.is_some() {
-        let lean_deg = found.comparison.apart_rad().to_degrees();
-        if lean_deg > OTHER_WIND_DEG {
-            cautions.push(format!(
-                "the drones lean by {lean_deg:.1} degrees more or less than the simulated ones in hover and \
-                 vertical flight: the two sides flew in different wind, and what wind does is mixed with \
-                 what the simulation lacks"
-            ));
-        }
-    }
-    if input.table.is_some() {
-        cautions.push(
-            "tables have no plan that could be flown again: the model's side is its closed forms at the \
-             climb that was flown"
-                .to_owned(),
-        );
-    }
-    if data.groups.len() == 1 && input.plan.is_some() && input.simulated.is_none() {
-        cautions.push(
-            "all drones climb at the same time: what depends on climb speed is mixed with the \
-             shared air (calibration-counterphase tells them apart)"
-                .to_owned(),
-        );
-    }
-    if found.comparison.scene.charge.is_none() {
-        cautions.push(
-            "the logs have no voltage at rest (BAT.VoltR): battery sag is looked for by time alone"
-                .to_owned(),
-        );
-    }
-    cautions
 }

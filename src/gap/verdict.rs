@@ -5,6 +5,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::left_out::LeftOut;
+use super::warning::Warning;
+
 /// Name and version of the format.
 pub const VERDICT_SCHEMA: &str = "updraft.verdict/1";
 
@@ -47,7 +50,14 @@ pub struct Verdict {
     #[serde(default)]
     pub ladder: Vec<Rung>,
     /// What a reader must know, one sentence each.
-    pub cautions: Vec<String>,
+    pub cautions: Vec<Warning>,
+}
+
+impl Verdict {
+    /// Whether the logs have the battery's voltage at rest.
+    pub fn has_resting_voltage(&self) -> bool {
+        !self.cautions.iter().any(|caution| matches!(caution, Warning::NoRestingVoltage))
+    }
 }
 
 /// What went into a verdict.
@@ -64,7 +74,7 @@ pub struct DataUsed {
     /// Slots held out from fitting.
     pub held_out: Vec<u16>,
     /// Logs or drones left out, with their reasons.
-    pub left_out: Vec<String>,
+    pub left_out: Vec<LeftOut>,
 }
 
 /// Vertical velocity V_U against the rate of change of the height.

@@ -1,15 +1,16 @@
 //! Fleet tables beside the paper's values, and the words that a page and a terminal share.
 
+use crate::analysis::law::Symbol;
 use crate::analysis::result::{Analysis, DroneAnalysis, Fit, FlightAnalysis, Laws, TableRow};
-use crate::analysis::{MapLaw, prefer};
+use crate::analysis::table::PaperTable;
+use crate::analysis::{LawKind, Warning, prefer};
 use crate::base::estimate::Estimate;
-use crate::flight::Alignment;
+use crate::flight::{self, Alignment};
 use crate::mission::plan::Purpose;
 
 use super::law;
 use super::text::{
-    NONE, clean, count, estimate, fixed, parameter, reduced, rejection, signed, symbol, unit,
-    usable,
+    NONE, clean, count, estimate, fixed, quantity, reduced, rejection, signed, symbol, unit, usable,
 };
 
 /// A reduced chi² up to this needs no explanation.
@@ -17,8 +18,8 @@ const GOOD_CHI2: f64 = 1.5;
 
 /// A row of Table I or II in words.
 pub(super) struct Comparison {
-    pub(super) law: String,
-    pub(super) parameter: String,
+    pub(super) law: &'static str,
+    pub(super) parameter: &'static str,
     pub(super) unit: String,
     /// Mean and standard deviation between drones.
     pub(super) fleet: String,
@@ -44,8 +45,8 @@ pub(super) fn comparison(row: &TableRow) -> Comparison {
         .and_then(|paper| gap.map(|gap| gap / paper.se));
     let unit = unit(&row.unit);
     Comparison {
-        law: clean(&row.law),
-        parameter: symbol(&row.parameter),
+        law: row.law.name(),
+        parameter: quantity(row.parameter),
         unit: if unit.is_empty() { NONE.to_owned() } else { unit },
         fleet: if row.n > 1 {
             estimate(Estimate::new(row.mean, row.sd))
@@ -82,7 +83,7 @@ pub(super) fn fit_line(fit: &Fit) -> String {
         .iter()
         .map(|p| {
             let held = if p.held { " (held)" } else { "" };
-            format!("{} = {} {}{held}", symbol(&p.name), estimate(p.estimate), unit(&p.unit))
+            format!("{} = {} {}{held}", symbol(p.name), estimate(p.estimate), unit(&p.unit))
         })
         .collect();
     match fit.chi2_reduced {
@@ -96,8 +97,7 @@ pub(super) fn fit_line(fit: &Fit) -> String {
 
 /// The unit of rotor effort in a fit: that of u0.
 fn effort_unit(fit: &Fit) -> String {
-    let offset = fit.parameters.iter().find(|parameter| parameter.name == "u0");
-    offset.map_or_else(String::new, |parameter| unit(&parameter.unit))
+    fit.parameter(Symbol::U0).map_or_else(String::new, |parameter| unit(&parameter.unit))
 }
 
 /// The flock's fits in words: (law, line).
@@ -106,9 +106,9 @@ pub(super) fn flock_lines(flight: &FlightAnalysis) -> Vec<(&'static str, String)
         return Vec::new();
     };
     [
-        ("signed quadratic", &laws.signed_quadratic),
+        (LawKind::SignedQuadratic.name(), &laws.signed_quadratic),
         ("signed quadratic, held", &laws.signed_quadratic_held),
-        ("linear", &laws.linear),
+        (LawKind::Linear.name(), &laws.linear),
     ]
     .into_iter()
     .filter_map(|(name, fit)| Some((name, fit_line(fit.as_ref()?))))
@@ -134,10 +134,10 @@ pub(super) fn scatter_line(laws: &Laws) -> Option<String> {
 
 /// The paper's table that a flight's parameters stand beside, in words.
 pub(super) fn table_heading(flight: &FlightAnalysis) -> String {
-    let table = match flight.paper_table.as_deref() {
-        Some("I") => " beside the paper's Table I (simulation)",
-        Some("II") => " beside the paper's Table II (its drones in the field)",
-        _ => "",
+    let table = match flight.paper_table {
+        Some(PaperTable::Simulation) => " beside the paper's Table I (simulation)",
+        Some(PaperTable::Field) => " beside the paper's Table II (its drones in the field)",
+        None => "",
     };
     format!("Fitted parameters{}", if compared(flight) { table } else { "" })
 }
@@ -145,17 +145,17 @@ pub(super) fn table_heading(flight: &FlightAnalysis) -> String {
 /// Which rows are not compared with the paper's values beside them, and why, one sentence for each
 /// reason.
 pub(super) fn not_compared_lines(flight: &FlightAnalysis) -> Vec<String> {
-    let mut reasons: Vec<((&str, &str), Vec<String>)> = Vec::new();
+    let mut reasons: Vec<((&str, &str), Vec<&str>)> = Vec::new();
     for row in flight.table.iter().filter(|row| row.paper.is_some()) {
         let Some(reason) = row.not_compared.as_deref() else { continue };
-        let (of, name) = ((row.law.as_str(), reason), symbol(&row.parameter));
+        let (of, name) = ((row.law.name(), reason), quantity(row.parameter));
         match reasons.iter_mut().find(|(known, _)| *known == of) {
             Some((_, rows)) => rows.push(name),
             None => reasons.push((of, vec![name])),
         }
     }
-    let line = |((law, reason), rows): ((&str, &str), Vec<String>)| {
-        format!("Not compared: {} of the {} law: {}.", rows.join(", "), clean(law), clean(reason))
+    let line = |((law, reason), rows): ((&str, &str), Vec<&str>)| {
+        format!("Not compared: {} of the {law} law: {}.", rows.join(", "), clean(reason))
     };
     reasons.into_iter().map(line).collect()
 }
@@ -220,8 +220,8 @@ pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
     let chi2 = |fit: Option<&Fit>| fit.and_then(|fit| fit.chi2_reduced).filter(|v| usable(*v));
     let better = prefer::better_of(laws)?;
     let (name, this, other) = match better {
-        MapLaw::Linear => ("linear", chi2(linear), chi2(quadratic)),
-        MapLaw::SignedQuadratic => ("signed-quadratic", chi2(quadratic), chi2(linear)),
+        LawKind::Linear => (better.name(), chi2(linear), chi2(quadratic)),
+        LawKind::SignedQuadratic => ("signed-quadratic", chi2(quadratic), chi2(linear)),
     };
     let (this, other) = this.zip(other)?;
     let against = format!("χ²/ν {} against {}", reduced(this), reduced(other));
@@ -234,7 +234,7 @@ pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
         ("", "the windows' own errors are so small that")
     };
     let note = match law::vertex_mps(flight) {
-        Some(_) if better == MapLaw::SignedQuadratic => {
+        Some(_) if better == LawKind::SignedQuadratic => {
             "; its W* is the vertex of a parabola, no air"
         }
         _ => "",
@@ -262,8 +262,8 @@ pub(super) struct DroneLaws {
 pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
     let quadratic = drone.laws.as_ref().and_then(law::signed_quadratic);
     let linear = drone.laws.as_ref().and_then(|laws| laws.linear.as_ref());
-    let of = |fit, name| {
-        parameter(fit, name).map_or_else(
+    let of = |fit: Option<&Fit>, symbol| {
+        fit.and_then(|fit| fit.parameter(symbol)).map_or_else(
             || NONE.to_owned(),
             |p| {
                 if p.held { format!("{} held", estimate(p.estimate)) } else { estimate(p.estimate) }
@@ -274,12 +274,12 @@ pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
         fit.and_then(|fit| fit.chi2_reduced).map_or_else(|| NONE.to_owned(), reduced)
     };
     DroneLaws {
-        a: of(quadratic, "A"),
-        u0: of(quadratic, "u0"),
-        w: of(quadratic, "W"),
+        a: of(quadratic, Symbol::A),
+        u0: of(quadratic, Symbol::U0),
+        w: of(quadratic, Symbol::W),
         chi2: chi2(quadratic),
-        slope: of(linear, "A'"),
-        linear_u0: of(linear, "u0"),
+        slope: of(linear, Symbol::Slope),
+        linear_u0: of(linear, Symbol::U0),
         linear_chi2: chi2(linear),
         scatter: drone
             .laws
@@ -291,6 +291,16 @@ pub(super) fn drone_laws(drone: &DroneAnalysis) -> DroneLaws {
 
 /// Everything doubtful about a drone: rejected windows by reason, its warnings, its fits' warnings.
 pub(super) fn flags(drone: &DroneAnalysis) -> Vec<String> {
+    flags_of(drone, drone.warnings.iter())
+}
+
+/// The same without what of its log is lost, where that is told with the logs.
+pub(super) fn flags_without_losses(drone: &DroneAnalysis) -> Vec<String> {
+    let is_loss = |warning: &&Warning| matches!(warning, Warning::Log(flight::Warning::Loss(_)));
+    flags_of(drone, drone.warnings.iter().filter(|warning| !is_loss(warning)))
+}
+
+fn flags_of<'a>(drone: &DroneAnalysis, warnings: impl Iterator<Item = &'a Warning>) -> Vec<String> {
     let mut flags = Vec::new();
     let mut reasons: Vec<(&str, usize)> = Vec::new();
     for reason in drone.windows.iter().flat_map(|window| &window.rejected) {
@@ -301,14 +311,14 @@ pub(super) fn flags(drone: &DroneAnalysis) -> Vec<String> {
         }
     }
     flags.extend(reasons.iter().map(|(words, n)| format!("{} {words}", count(*n, "window"))));
-    flags.extend(drone.warnings.iter().map(|warning| clean(warning)));
+    flags.extend(warnings.map(|warning| clean(&warning.to_string())));
     flags.extend(drone.partial_ladder.map(|partial| {
         format!("partial ladder ({}): not in the fleet's numbers", partial.short())
     }));
     if let Some(laws) = &drone.laws {
         let fits = [&laws.signed_quadratic, &laws.signed_quadratic_held, &laws.linear];
         for fit in fits.into_iter().flatten() {
-            flags.extend(fit.warnings.iter().map(|warning| clean(warning)));
+            flags.extend(fit.warnings.iter().map(|warning| clean(&warning.to_string())));
             if !fit.other_minima.is_empty() {
                 let n = fit.other_minima.len();
                 let noun = if n == 1 { "other minimum" } else { "other minima" };

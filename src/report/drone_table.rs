@@ -9,7 +9,7 @@ use super::compare::{clock, drone_laws, flags, windows_used};
 use super::figures::air::mean_truth;
 use super::law;
 use super::notes::shared_flags;
-use super::text::{NONE, clean, estimate, fixed, shortened, unit, usable};
+use super::text::{NONE, estimate, fixed, shortened, unit, usable};
 
 /// Headings and rows of the table of drones; columns that no drone fills are left out.
 pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
@@ -56,7 +56,7 @@ pub(super) fn drone_table(flight: &FlightAnalysis) -> (Vec<Value>, Vec<Value>) {
                 air.filter(|air| usable(air.systematic_mps) && air.systematic_mps > 0.0)
                     .map_or_else(none, |air| fixed(air.systematic_mps, 2)),
                 air.and_then(mean_truth).map_or_else(none, |truth| fixed(truth, 3)),
-                air.map_or_else(none, |air| clean(&air.mapping)),
+                air.map_or_else(none, |air| air.mapping.name().to_owned()),
                 laws.a,
                 laws.u0,
                 laws.w,

@@ -3,6 +3,7 @@
 use minijinja::context;
 use minijinja::value::Value;
 
+use crate::analysis::law::LawOf;
 use crate::analysis::result::{CommonError, DroneUpdraft, ErrorBudget, UpdraftMap};
 
 use super::fleet_air::fleet_air;
@@ -129,7 +130,7 @@ fn coverage(map: &UpdraftMap) -> String {
     let cells = map.drones.len() * map.time_s.len();
     let present: usize =
         map.drones.iter().map(|drone| drone.updraft_mps.iter().flatten().count()).sum();
-    let own = map.drones.iter().filter(|drone| drone.mapping == "own").count();
+    let own = map.drones.iter().filter(|drone| drone.mapping == LawOf::Own).count();
     let by = match (map.drones.len(), own) {
         (1, 1) => "It is measured by its own calibration law".to_owned(),
         (1, _) => {

@@ -122,7 +122,7 @@ mod tests {
                 position_m: None,
                 track_m: Vec::new(),
                 height_m: 100.0,
-                mapping: "own".to_owned(),
+                mapping: crate::analysis::law::LawOf::Own,
                 mean: Estimate::new(0.1 * index as f64, 0.5),
                 mean_interval_mps: Some([-1.0, 1.2]),
                 errors: ErrorBudget { window_mps: 0.3, law_mps: 0.4, ..ErrorBudget::default() },

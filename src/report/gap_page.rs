@@ -33,8 +33,6 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         .map(|(index, step)| step_section(step, index + 1, &mut figures))
         .collect();
     let scatter = drones::figure(verdict).map(|figure| figures.show(figure));
-    let list =
-        |texts: &[String]| texts.iter().map(|text| micro(&sentence(text))).collect::<Vec<_>>();
     let groups: Vec<String> = verdict
         .data
         .groups
@@ -54,9 +52,9 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         vehicle => clean(&verdict.vehicle),
         summary => micro(&verdict.summary),
         tiles => tiles(verdict),
-        cautions => list(&verdict.cautions),
+        cautions => sentences(&verdict.cautions),
         left_out_open => verdict.data.left_out.len() <= OPEN_LIMIT,
-        left_out => verdict.data.left_out.iter().map(|reason| clean(reason)).collect::<Vec<_>>(),
+        left_out => verdict.data.left_out.iter().map(|reason| clean(&reason.to_string())).collect::<Vec<_>>(),
         map,
         regimes => regime_rows(verdict),
         ladder,
@@ -72,7 +70,7 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
         detectables => detectables(verdict),
         scatter,
         correlation => verdict.drones.correlation.map(|value| fixed(value, 2)),
-        drone_words => list(&verdict.drones.words),
+        drone_words => sentences(&verdict.drones.words),
         noise => noise_rows(verdict),
         groups,
         logs => verdict.data.logs,
@@ -85,4 +83,9 @@ pub fn render_gap(verdict: &Verdict, provenance: &Provenance) -> Result<Report, 
     };
     let html = fill("gap.html", PAGE, values)?;
     Ok(Report { html, figures: figures.files })
+}
+
+/// What is said, as sentences of a page.
+fn sentences(said: &[impl ToString]) -> Vec<String> {
+    said.iter().map(|text| micro(&sentence(&text.to_string()))).collect()
 }

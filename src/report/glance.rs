@@ -5,8 +5,10 @@ use std::fmt::Write as _;
 use minijinja::context;
 use minijinja::value::Value;
 
+use crate::analysis::law::Symbol;
 use crate::analysis::result::{Analysis, FlightAnalysis};
-use crate::analysis::{MapLaw, prefer};
+use crate::analysis::table::{Quantity, TableLaw};
+use crate::analysis::{LawKind, prefer};
 use crate::base::estimate::Estimate;
 
 use super::compare::{better_words, drones_of, flags, nothing};
@@ -14,7 +16,7 @@ use super::figures::air;
 use super::fleet_air::fleet_air;
 use super::law;
 use super::page::capitalised;
-use super::text::{clean, count, estimate, fixed, parameter, signed, unit, usable, value_of};
+use super::text::{clean, count, error_of, fixed, signed, unit, usable, value_of};
 
 /// More flights than this are summed up at the top of the page.
 const SUMMED_FLIGHTS: usize = 3;
@@ -90,7 +92,7 @@ fn fit_error(analysis: &Analysis) -> Option<(f64, usize)> {
             let truth = flight.true_updraft_mps.unwrap_or(f64::NAN);
             flight.drones.iter().filter_map(move |drone| {
                 let fit = law::signed_quadratic(drone.laws.as_ref()?);
-                let error = parameter(fit, "W")?.estimate.value - truth;
+                let error = fit?.value(Symbol::W)? - truth;
                 usable(error).then_some(error * error)
             })
         })
@@ -98,44 +100,34 @@ fn fit_error(analysis: &Analysis) -> Option<(f64, usize)> {
     air::mean(errors()).map(|mean| (mean.sqrt(), errors().count()))
 }
 
-fn error_of(of: Estimate) -> String {
-    estimate(of).split("± ").nth(1).unwrap_or("unknown").to_owned()
-}
-
 /// The fleet's parameters for the tiles: from its table, else from the laws of the flight.
 fn fleet_values(flight: &FlightAnalysis) -> Vec<(String, Estimate, String)> {
-    let wanted = [
-        ("signed quadratic", "A", "A, quadratic law"),
-        ("signed quadratic", "W", "W* in the fits"),
-        ("linear", "A'", "A′, linear law"),
-    ];
     let laws = law::flight_laws(flight);
     let vertex = law::vertex_mps(flight).is_some();
     // The numbers of the law that describes the flight; the other one's would only mislead.
-    let better = match laws.and_then(prefer::better_of) {
-        Some(MapLaw::Linear) => "linear",
-        _ => "signed quadratic",
+    let better = laws.and_then(prefer::better_of).unwrap_or(LawKind::SignedQuadratic);
+    let (table_law, wanted): (_, &[(Symbol, &str)]) = match better {
+        LawKind::Linear => (TableLaw::Linear, &[(Symbol::Slope, "A′, linear law")]),
+        LawKind::SignedQuadratic => (
+            TableLaw::SignedQuadratic,
+            &[(Symbol::A, "A, quadratic law"), (Symbol::W, "W* in the fits")],
+        ),
     };
     wanted
-        .into_iter()
-        .filter(|(law_name, _, _)| *law_name == better)
-        .filter_map(|(law_name, name, label)| {
+        .iter()
+        .filter_map(|&(symbol, label)| {
+            let of_row = Quantity::Parameter(symbol);
             let row = flight
                 .table
                 .iter()
-                .find(|row| row.law == law_name && row.parameter == name && row.n > 1)
+                .find(|row| row.law == table_law && row.parameter == of_row && row.n > 1)
                 .map(|row| (Estimate::new(row.mean, row.sd), unit(&row.unit)));
             let own = || {
-                let laws = laws?;
-                let fit = if law_name == "linear" {
-                    laws.linear.as_ref()
-                } else {
-                    law::signed_quadratic(laws)
-                };
-                parameter(fit, name).map(|found| (found.estimate, unit(&found.unit)))
+                let found = law::fit_of(laws?, better)?.parameter(symbol)?;
+                Some((found.estimate, unit(&found.unit)))
             };
             let (of, unit) = row.or_else(own)?;
-            let label = if vertex && name == "W" { VERTEX } else { label };
+            let label = if vertex && symbol == Symbol::W { VERTEX } else { label };
             usable(of.value).then(|| (label.to_owned(), of, unit))
         })
         .collect()

@@ -1,11 +1,12 @@
 //! Fitted laws as curves, and windows as points.
 
+use crate::analysis::law::{LawKind, Symbol};
 use crate::analysis::prefer;
 use crate::analysis::result::{DroneAnalysis, Fit, FlightAnalysis, Laws, WindowStats};
 
 use super::axis::Axis;
 use super::chart::Mark;
-use super::text::{parameter, usable};
+use super::text::usable;
 
 /// Samples of a drawn curve.
 const CURVE_POINTS: u32 = 81;
@@ -31,6 +32,14 @@ pub(super) fn signed_quadratic(laws: &Laws) -> Option<&Fit> {
     laws.signed_quadratic_held.as_ref().or(laws.signed_quadratic.as_ref())
 }
 
+/// The fit of a law to show; of the signed quadratic, [`signed_quadratic`].
+pub(super) fn fit_of(laws: &Laws, law: LawKind) -> Option<&Fit> {
+    match law {
+        LawKind::Linear => laws.linear.as_ref(),
+        LawKind::SignedQuadratic => signed_quadratic(laws),
+    }
+}
+
 /// The laws of a flight as one: the flock's, or its only drone's.
 pub(super) fn flight_laws(flight: &FlightAnalysis) -> Option<&Laws> {
     flight.flock.as_ref().or(match flight.drones.as_slice() {
@@ -46,8 +55,8 @@ pub(super) fn vertex_mps(flight: &FlightAnalysis) -> Option<f64> {
 
 /// Points (V_U, u) of `u = A f(V - W) + u0` over a velocity axis; empty if a parameter is missing.
 pub(super) fn signed_quadratic_curve(fit: &Fit, axis: &Axis) -> Vec<(f64, f64)> {
-    let get = |name| value(fit, name);
-    let (Some(a), Some(u0), Some(w)) = (get("A"), get("u0"), get("W")) else {
+    let get = |symbol| value(fit, symbol);
+    let (Some(a), Some(u0), Some(w)) = (get(Symbol::A), get(Symbol::U0), get(Symbol::W)) else {
         return Vec::new();
     };
     sampled(axis, |v| a * (v - w) * (v - w).abs() + u0)
@@ -55,14 +64,14 @@ pub(super) fn signed_quadratic_curve(fit: &Fit, axis: &Axis) -> Vec<(f64, f64)> 
 
 /// Points (V_U, u) of `u = A' V + u0` over a velocity axis; empty if a parameter is missing.
 pub(super) fn linear_curve(fit: &Fit, axis: &Axis) -> Vec<(f64, f64)> {
-    let (Some(slope), Some(u0)) = (value(fit, "A'"), value(fit, "u0")) else {
+    let (Some(slope), Some(u0)) = (value(fit, Symbol::Slope), value(fit, Symbol::U0)) else {
         return Vec::new();
     };
     sampled(axis, |v| slope * v + u0)
 }
 
-fn value(fit: &Fit, name: &str) -> Option<f64> {
-    parameter(Some(fit), name).map(|found| found.estimate.value).filter(|&value| usable(value))
+fn value(fit: &Fit, symbol: Symbol) -> Option<f64> {
+    fit.value(symbol).filter(|&value| usable(value))
 }
 
 fn sampled(axis: &Axis, law: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {

@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::analysis::Cause;
 use crate::analysis::result::{FlightAnalysis, PartlyUsedLog};
 use crate::analysis::together::{Remark, together};
 
-use super::compare::flags;
+use super::compare::{flags, flags_without_losses};
 use super::text::{clean, count};
 
 /// Drones without a law or a value of the map, and why: without a usable log, or with one that gave
@@ -13,20 +14,22 @@ use super::text::{clean, count};
 pub(super) fn without_result_lines(flight: &FlightAnalysis) -> Vec<String> {
     let missing = flight.missing.iter().map(|one| (Some(one.slot), "", &one.reason));
     let unmeasured = flight.unmeasured.iter().map(|one| (one.slot, &*one.name, &one.reason));
-    let mut all: Vec<(Option<u16>, &str, &String)> = missing.chain(unmeasured).collect();
+    let mut all: Vec<(Option<u16>, &str, &Cause)> = missing.chain(unmeasured).collect();
     all.sort_by_key(|(slot, ..)| slot.unwrap_or(u16::MAX));
-    grouped(all.into_iter().map(|(slot, name, reason)| (who(slot, name), clean(reason))))
+    grouped(
+        all.into_iter().map(|(slot, name, reason)| (who(slot, name), clean(&reason.to_string()))),
+    )
 }
 
 /// Logs that are not used, and why.
 pub(super) fn unused_lines(flight: &FlightAnalysis) -> Vec<String> {
-    let remarks = flight.unused.iter().map(|log| match log.sentence() {
-        // An error that names the file by itself.
-        own if own == log.reason => Remark { slot: None, name: String::new(), text: own },
-        _ => Remark { slot: None, name: log.source.clone(), text: log.reason.clone() },
+    let remarks = flight.unused.iter().map(|log| Remark {
+        slot: None,
+        // A reason that names the log by itself.
+        name: if log.is_named() { String::new() } else { log.source.clone() },
+        said: log.reason.sentence(),
     });
-    let bare = |line: String| line.strip_prefix(": ").map(str::to_owned).unwrap_or(line);
-    together(remarks).into_iter().map(|line| clean(&bare(line))).collect()
+    together(remarks).iter().map(|line| clean(line)).collect()
 }
 
 /// Logs that are used in part, and what is lost of them.
@@ -34,7 +37,7 @@ pub(super) fn partly_used_lines(flight: &FlightAnalysis) -> Vec<String> {
     let remark = |log: &PartlyUsedLog| Remark {
         slot: log.slot,
         name: log.source.clone(),
-        text: log.reason.clone(),
+        said: log.reason.sentence(),
     };
     together(flight.partly_used.iter().map(remark)).iter().map(|line| clean(line)).collect()
 }
@@ -49,10 +52,9 @@ pub(super) fn logs_used(flight: &FlightAnalysis) -> String {
 pub(super) fn note_lines(flight: &FlightAnalysis) -> Vec<String> {
     grouped(flight.drones.iter().flat_map(|drone| {
         let of = who(drone.slot, &drone.name);
-        let log = flight.partly_used.iter().find(|log| log.source == drone.source);
-        let told = log.map(|log| clean(&log.reason)).unwrap_or_default();
-        let new = flags(drone).into_iter().filter(move |flag| !told.contains(flag.as_str()));
-        new.map(move |flag| (of.clone(), flag))
+        let told = flight.partly_used.iter().any(|log| log.source == drone.source);
+        let new = if told { flags_without_losses(drone) } else { flags(drone) };
+        new.into_iter().map(move |flag| (of.clone(), flag))
     }))
 }
 

@@ -42,7 +42,7 @@ pub(super) fn render(
         .enumerate()
         .map(|(index, flight)| flight_section(analysis, flight, index, &mut figures))
         .collect();
-    let warnings: Vec<String> = analysis.warnings.iter().map(|w| clean(w)).collect();
+    let warnings: Vec<String> = analysis.warnings.iter().map(|w| clean(&w.to_string())).collect();
     let title = clean(&analysis.title);
     let values = context! {
         title => if title.trim().is_empty() { "Updraft report".to_owned() } else { title },

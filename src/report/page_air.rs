@@ -66,7 +66,7 @@ pub(super) fn air_section(
         context! { correlations, averaging, ..scales::section(found) }
     });
     Some(
-        context! { heading => capitalised(&clean(&flight.name)), law => clean(&map.law), law_reason => map.law_reason.as_deref().map(clean), no_map, mean, film => shown, more, statistics, errors => errors::section(map) },
+        context! { heading => capitalised(&clean(&flight.name)), law => map.law.name(), law_reason => map.law_reason.as_deref().map(clean), no_map, mean, film => shown, more, statistics, errors => errors::section(map) },
     )
 }
 

@@ -54,7 +54,7 @@ pub(super) fn flight_section(
         let Gallery3 { shown, choices, left_out, undrawn } = gallery;
         context! { shown => figures.show(shown), choices, left_out, undrawn }
     });
-    let map_law = flight.map.as_ref().map(|map| clean(&map.law));
+    let map_law = flight.map.as_ref().map(|map| map.law.name());
     let table: Vec<Value> = flight
         .table
         .iter()
@@ -103,7 +103,7 @@ pub(super) fn flight_section(
         nothing => nothing(flight),
         table_heading => table_heading(flight),
         scatter => law::flight_laws(flight).and_then(scatter_line),
-        cautions => flight.warnings.iter().map(|w| clean(w)).collect::<Vec<_>>(),
+        cautions => flight.warnings.iter().map(|w| clean(&w.to_string())).collect::<Vec<_>>(),
         wind => flight.map.as_ref().and_then(|map| map.wind).map_or("", |wind| match wind {
             WindCorrection::Drag => "drag",
             WindCorrection::Physics => "physics",

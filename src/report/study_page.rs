@@ -87,7 +87,7 @@ fn tiles(study: &StudyResult) -> Vec<Value> {
         .iter()
         .map(|row| {
             context! {
-                label => format!("{} in still air ({})", symbol(&row.parameter), unit(&row.unit)),
+                label => format!("{} in still air ({})", symbol(row.parameter), unit(&row.unit)),
                 value => super::text::value_of(row.windless),
                 note => format!("paper {}", estimate(row.paper)),
             }
@@ -118,7 +118,7 @@ pub(super) fn law_table(study: &StudyResult) -> Vec<Value> {
             let own = study.own_way.table.iter().find(|own| own.parameter == row.parameter);
             let or_none = |value: Option<_>| value.map_or_else(|| NONE.to_owned(), estimate);
             context! {
-                parameter => symbol(&row.parameter),
+                parameter => symbol(row.parameter),
                 unit => unit(&row.unit),
                 paper => estimate(row.paper),
                 windless => estimate(row.windless),

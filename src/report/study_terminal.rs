@@ -78,7 +78,7 @@ fn law_table(study: &StudyResult) -> (Vec<Column>, Vec<Vec<String>>) {
         .map(|row| {
             let own = study.own_way.table.iter().find(|own| own.parameter == row.parameter);
             vec![
-                symbol(&row.parameter),
+                symbol(row.parameter).to_owned(),
                 unit(&row.unit),
                 estimate(row.paper),
                 estimate(row.windless),

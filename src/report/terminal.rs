@@ -50,7 +50,10 @@ pub fn terminal_summary(analysis: &Analysis, width: usize, color: bool) -> Strin
         out.line("", "");
         out.wrapped("", "", words);
     }
-    out.list("Warnings", &analysis.warnings.iter().map(|w| clean(w)).collect::<Vec<_>>());
+    out.list(
+        "Warnings",
+        &analysis.warnings.iter().map(|w| clean(&w.to_string())).collect::<Vec<_>>(),
+    );
     out.text
 }
 
@@ -148,7 +151,7 @@ impl Output {
         self.list_of("  Logs not used", flight.unused.len(), &unused_lines(flight));
         let partly = partly_used_lines(flight);
         self.list_of("  Logs partly used", flight.partly_used.len(), &partly);
-        let warnings: Vec<String> = flight.warnings.iter().map(|w| clean(w)).collect();
+        let warnings: Vec<String> = flight.warnings.iter().map(|w| clean(&w.to_string())).collect();
         self.list("  Cautions", &warnings);
     }
 
@@ -175,8 +178,8 @@ impl Output {
             .map(comparison)
             .map(|row| {
                 vec![
-                    row.law,
-                    row.parameter,
+                    row.law.to_owned(),
+                    row.parameter.to_owned(),
                     row.fleet,
                     row.unit,
                     row.mean_se,
@@ -294,7 +297,7 @@ impl Output {
                         signed(air.highest, 2)
                     ),
                 },
-                clean(&map.law),
+                map.law.name(),
             ),
         );
         if let Some(reason) = &map.law_reason {

@@ -1,6 +1,8 @@
 //! Numbers, symbols and foreign text as people read them.
 
-use crate::analysis::result::{Fit, Parameter, Rejection};
+use crate::analysis::law::Symbol;
+use crate::analysis::result::Rejection;
+use crate::analysis::table::Quantity;
 use crate::base::estimate::Estimate;
 use crate::base::plain::plain;
 use crate::flight::Indicator;
@@ -70,24 +72,44 @@ pub(super) fn signed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A value with its error; says so when either is not a number.
-pub(super) fn estimate(estimate: Estimate) -> String {
-    if !usable(estimate.value) {
-        return fixed(estimate.value, 2);
+/// Stands for an error that is not known.
+const UNKNOWN: &str = "unknown";
+
+/// A value to the digit that its error supports, and the error, if there is one; either says so when it
+/// is not a number.
+fn value_and_error(of: Estimate) -> (String, Option<String>) {
+    if !usable(of.value) {
+        return (fixed(of.value, 2), None);
     }
-    if !usable(estimate.se) {
-        return format!("{} ± unknown", fixed(estimate.value, 3));
+    if !usable(of.se) {
+        return (fixed(of.value, 3), Some(UNKNOWN.to_owned()));
     }
     // An error in the last bits of a double is none.
-    let negligible = estimate.se < 1e-9 * estimate.value.abs();
-    let shown = if negligible { Estimate::new(estimate.value, 0.0) } else { estimate };
-    minus(&shown.to_string())
+    let negligible = of.se < 1e-9 * of.value.abs();
+    match of.decimals().filter(|_| !negligible) {
+        Some(decimals) => {
+            (minus(&format!("{:.decimals$}", of.value)), Some(format!("{:.decimals$}", of.se)))
+        }
+        None => (minus(&format!("{:.3}", of.value)), None),
+    }
+}
+
+/// A value with its error; says so when either is not a number.
+pub(super) fn estimate(estimate: Estimate) -> String {
+    match value_and_error(estimate) {
+        (value, Some(error)) => format!("{value} ± {error}"),
+        (value, None) => value,
+    }
 }
 
 /// A value without its error, to the digit that the error supports.
 pub(super) fn value_of(of: Estimate) -> String {
-    let text = estimate(of);
-    text.split(" ±").next().unwrap_or(&text).to_owned()
+    value_and_error(of).0
+}
+
+/// The error of a value alone; `unknown` without one.
+pub(super) fn error_of(of: Estimate) -> String {
+    value_and_error(of).1.unwrap_or_else(|| UNKNOWN.to_owned())
 }
 
 fn minus(text: &str) -> String {
@@ -128,14 +150,21 @@ pub(super) fn effort_label(indicator: Indicator) -> String {
 }
 
 /// The report's symbol of a parameter.
-pub(super) fn symbol(name: &str) -> String {
-    match name {
-        "u0" => "u₀".to_owned(),
-        "W" | "W_Z" => "W*".to_owned(),
-        "A'" => "A′".to_owned(),
-        "chi2_nu" => "χ²/ν".to_owned(),
-        "sigma_added" => "scatter".to_owned(),
-        other => clean(other),
+pub(super) fn symbol(symbol: Symbol) -> &'static str {
+    match symbol {
+        Symbol::A => "A",
+        Symbol::Slope => "A′",
+        Symbol::U0 => "u₀",
+        Symbol::W => "W*",
+    }
+}
+
+/// The report's symbol of what a row of a table is about.
+pub(super) fn quantity(of: Quantity) -> &'static str {
+    match of {
+        Quantity::Parameter(parameter) => symbol(parameter),
+        Quantity::ReducedChi2 => "χ²/ν",
+        Quantity::AddedScatter => "scatter",
     }
 }
 
@@ -172,11 +201,6 @@ pub(super) fn rejection(rejection: Rejection) -> &'static str {
         Rejection::Incomplete => "log ends early",
         Rejection::Manoeuvre => "moving up and down",
     }
-}
-
-/// A parameter of a fit by its symbol.
-pub(super) fn parameter<'fit>(fit: Option<&'fit Fit>, name: &str) -> Option<&'fit Parameter> {
-    fit?.parameters.iter().find(|parameter| parameter.name == name)
 }
 
 /// Foreign words as a sentence: a capital first letter and a full stop.
@@ -227,5 +251,9 @@ mod tests {
         assert_eq!(estimate(Estimate::new(f64::NAN, 0.1)), "not a number");
         assert_eq!(estimate(Estimate::new(-0.0589, 0.0031)), "−0.0589 ± 0.0031");
         assert_eq!(value_of(Estimate::new(-0.0589, 0.0031)), "−0.0589");
+        assert_eq!(error_of(Estimate::new(-0.0589, 0.0031)), "0.0031");
+        assert_eq!(error_of(Estimate::new(8.1, f64::INFINITY)), "unknown");
+        assert_eq!(error_of(Estimate::new(8.1, 0.0)), "unknown");
+        assert_eq!(estimate(Estimate::new(-8.1, 1e-12)), "−8.100", "the last bits of a double");
     }
 }

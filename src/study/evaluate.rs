@@ -15,8 +15,10 @@ use super::result::{
 use super::template::StudyPlan;
 use super::work::Flown;
 use crate::analysis::calibrate::{FitOptions, Hold, Location, Weights, calibrate};
+use crate::analysis::law::Symbol;
 use crate::analysis::result::{Fit, Rejection, WindowStats};
 use crate::base::estimate::Estimate;
+use crate::flight::Indicator;
 
 /// A cell with its record, if it was flown.
 type Entry<'a> = (Cell, Option<&'a CellRecord>);
@@ -116,7 +118,7 @@ fn evaluation(
         .iter()
         .map(|(_, record)| {
             let laws = calibrate(&(*record)?.windows, &held).ok()?;
-            value(laws.signed_quadratic_held.as_ref()?, "W")
+            value(laws.signed_quadratic_held.as_ref()?, Symbol::W)
         })
         .collect();
     let conditions: Vec<ConditionResult> = study
@@ -125,14 +127,13 @@ fn evaluation(
         .map(|&condition| of_condition(condition, entries, &updrafts))
         .collect();
     let pooled = pooled(entries, &options);
-    let rows =
-        [("A", "us/(m/s)²", paper::A), ("u0", "us", paper::U0_US), ("W", "m/s", paper::W_MPS)];
+    let rows = [(Symbol::A, paper::A), (Symbol::U0, paper::U0_US), (Symbol::W, paper::W_MPS)];
     let table = rows
         .into_iter()
-        .filter_map(|(parameter, unit, paper)| {
+        .filter_map(|(parameter, paper)| {
             Some(StudyRow {
-                parameter: parameter.to_owned(),
-                unit: unit.to_owned(),
+                parameter,
+                unit: parameter.unit(Indicator::Pulse),
                 windless: value(&free, parameter)?,
                 pooled: pooled.as_ref().and_then(|fit| value(fit, parameter)),
                 paper,
@@ -171,8 +172,8 @@ fn reference(
         .ok_or_else(|| fail("the signed-quadratic law does not fit".to_owned()))
 }
 
-fn value(fit: &Fit, name: &str) -> Option<Estimate> {
-    fit.parameters.iter().find(|parameter| parameter.name == name).map(|found| found.estimate)
+fn value(fit: &Fit, symbol: Symbol) -> Option<Estimate> {
+    fit.parameter(symbol).map(|found| found.estimate)
 }
 
 fn of_condition(

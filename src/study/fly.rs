@@ -110,7 +110,7 @@ pub(super) fn fly_cell(
         saturated_share: summary.saturated_share,
         log: None,
         windows: measure(&flight, &corrected, &planned(&study.segments), &windows),
-        warnings: flight.warnings,
+        warnings: flight.warnings.iter().map(ToString::to_string).collect(),
     };
     Ok((record, log))
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cell::Condition;
 use super::regression::Regression;
+use crate::analysis::law::Symbol;
 use crate::analysis::result::{Rejection, SampleStats};
 use crate::base::estimate::Estimate;
 
@@ -72,7 +73,8 @@ pub struct Evaluation {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StudyRow {
     /// Symbol: `A`, `u0`, `W`.
-    pub parameter: String,
+    #[schemars(with = "String")]
+    pub parameter: Symbol,
     /// Unit.
     pub unit: String,
     /// From the flight without wind and updraft; A and u0 of all other fits.

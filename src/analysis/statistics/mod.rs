@@ -12,7 +12,6 @@ mod estimators;
 mod field;
 mod likelihood;
 mod make;
-mod of_map;
 mod paper;
 pub mod result;
 mod search;
@@ -24,5 +23,4 @@ mod words;
 
 pub use field::FieldInput;
 pub use make::{PaperScales, StatisticsOptions, field_statistics, paper_scales};
-pub(in crate::analysis) use of_map::{HoverSeen, of_map};
 pub use simulate::{FieldScales, Simulator};

@@ -172,7 +172,7 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
     if rows < FEWEST_ROWS {
         return Err(TableError::Short { path: path.to_owned(), rows, backward });
     }
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> = Vec::new();
     if cut_off.is_some() {
         warnings.push("the table's last line is cut off and was left out".to_owned());
     }
@@ -188,7 +188,7 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
         indicator: mapping.indicator,
         pulse_limits_us: (f64::NEG_INFINITY, f64::INFINITY),
         clock: Clock::default(),
-        warnings,
+        warnings: warnings.into_iter().map(Into::into).collect(),
         ..Flight::default()
     };
     for (name, Wanted { series, .. }) in wanted {

@@ -68,8 +68,7 @@ impl Known {
             let Some(effect) = effect else { continue };
             parameters.extend(fitted.iter().filter_map(|fitted| size_of(effect, &fitted.name)));
         }
-        // The search says so where it is so.
-        let has_voltage = !verdict.cautions.iter().any(|text| text.contains("BAT.VoltR"));
+        let has_voltage = verdict.has_resting_voltage();
         let hyper = hyper_of(&verdict.noise);
         Self { model, parameters, hyper, wind_mps, has_voltage }
     }

@@ -6,6 +6,7 @@ use kuva::plot::scatter::MarkerShape;
 
 use super::laws::VELOCITY_LABEL;
 use super::plan_view::narrow_bar;
+use crate::analysis::law::LawKind;
 use crate::analysis::offset::OffsetMap;
 use crate::analysis::result::{DroneAnalysis, FlightAnalysis, WindowStats};
 use crate::report::Figure;
@@ -285,12 +286,12 @@ fn law_panel(drone: &DroneAnalysis, axes: &Axes) -> Panel {
     if let Some(laws) = &drone.laws {
         if let Some(fit) = &laws.linear {
             panel.line(&law::linear_curve(fit, &axes.law_velocity), INK, 1.6, "");
-            panel.entry("linear", INK, LegendShape::Line, "");
+            panel.entry(LawKind::Linear.name(), INK, LegendShape::Line, "");
         }
         if let Some(fit) = law::signed_quadratic(laws) {
             let curve = law::signed_quadratic_curve(fit, &axes.law_velocity);
             panel.line(&curve, MUTED, 1.6, "7 4");
-            panel.entry("signed quadratic", MUTED, LegendShape::Line, "7 4");
+            panel.entry(LawKind::SignedQuadratic.name(), MUTED, LegendShape::Line, "7 4");
         }
     }
     for window in &drone.windows {

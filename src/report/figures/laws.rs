@@ -3,6 +3,7 @@
 use kuva::plot::legend::{LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 
+use crate::analysis::law::{LawKind, Symbol};
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::base::estimate::Estimate;
 
@@ -13,9 +14,7 @@ use crate::report::colour::{BLUE, INK, MUTED, VERMILLION, sequential};
 use crate::report::law;
 use crate::report::page::capitalised;
 use crate::report::sheet::Sheet;
-use crate::report::text::{
-    clean, count, effort_label, effort_name, parameter, shortened, signed, usable,
-};
+use crate::report::text::{clean, count, effort_label, effort_name, shortened, signed, usable};
 
 /// Label of the pulse-width axis.
 pub(in crate::report) const PULSE_LABEL: &str = "tilt-corrected pulse width uφ (µs)";
@@ -121,11 +120,11 @@ fn one_flight(panel: &mut Panel, flight: &FlightAnalysis, v: &Axis) {
     if let Some(laws) = law::flight_laws(flight) {
         if let Some(fit) = law::signed_quadratic(laws) {
             panel.line(&law::signed_quadratic_curve(fit, v), INK, 1.8, "");
-            panel.entry("signed quadratic", INK, LegendShape::Line, "");
+            panel.entry(LawKind::SignedQuadratic.name(), INK, LegendShape::Line, "");
         }
         if let Some(fit) = &laws.linear {
             panel.line(&law::linear_curve(fit, v), MUTED, 1.6, "7 4");
-            panel.entry("linear", MUTED, LegendShape::Line, "7 4");
+            panel.entry(LawKind::Linear.name(), MUTED, LegendShape::Line, "7 4");
         }
     }
 }
@@ -239,6 +238,6 @@ fn by_drone(flights: &[&FlightAnalysis]) -> (Option<Panel>, String) {
 fn updrafts(flight: &FlightAnalysis) -> impl Iterator<Item = (usize, Option<u16>, Estimate)> {
     flight.drones.iter().enumerate().filter_map(|(index, drone)| {
         let fit = law::signed_quadratic(drone.laws.as_ref()?);
-        Some((index, drone.slot, parameter(fit, "W")?.estimate))
+        Some((index, drone.slot, fit?.parameter(Symbol::W)?.estimate))
     })
 }

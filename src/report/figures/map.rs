@@ -155,7 +155,7 @@ fn mean_cell(
         "{}: {} m/s, {} mapping",
         clean(&drone.name),
         estimate(drone.mean),
-        clean(&drone.mapping),
+        drone.mapping.name(),
     ));
     drawing.rect([x + 0.75, y + 0.75, w - 1.5, h - 1.5], &fill, "rx=\"2\"");
     if let Some(decimals) = decimals {

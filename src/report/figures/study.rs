@@ -4,6 +4,7 @@
 use kuva::plot::legend::{LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 
+use crate::analysis::law::Symbol;
 use crate::base::estimate::Estimate;
 use crate::study::Condition;
 use crate::study::result::{ConditionResult, StudyFlight, StudyResult};
@@ -40,11 +41,11 @@ pub(in crate::report) fn figures(study: &StudyResult) -> Vec<Figure> {
 
 /// A and u0 that all fits hold.
 fn law(study: &StudyResult) -> Option<(f64, f64)> {
-    let get = |name: &str| {
-        let row = study.paper_way.table.iter().find(|row| row.parameter == name)?;
+    let get = |symbol: Symbol| {
+        let row = study.paper_way.table.iter().find(|row| row.parameter == symbol)?;
         Some(row.windless.value).filter(|value| usable(*value))
     };
-    Some((get("A")?, get("u0")?))
+    Some((get(Symbol::A)?, get(Symbol::U0)?))
 }
 
 fn of_condition(study: &StudyResult, condition: Condition) -> Coloured<'_> {

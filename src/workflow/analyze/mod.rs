@@ -21,7 +21,7 @@ use super::host::Host;
 use super::provenance::provenance;
 use crate::analysis::battery::Sag;
 use crate::analysis::result::{Analysis, FlightAnalysis, Yield};
-use crate::analysis::{FlightInput, analyze};
+use crate::analysis::{FlightInput, Warning, analyze};
 use crate::base::file::write_with;
 use crate::base::json::write_json;
 use crate::base::plain::Shown as _;
@@ -117,8 +117,8 @@ impl<'a> Analysing<'a> {
         );
         let mut analysis = analysis.map_err(|error| WorkflowError::Nothing(error.to_string()))?;
         progress.finish();
-        analysis.warnings.extend(work.absent.iter().cloned());
-        analysis.warnings.extend(doubts);
+        analysis.warnings.extend(work.absent.iter().cloned().map(Warning::Failed));
+        analysis.warnings.extend(doubts.into_iter().map(Warning::WhoseLogs));
         host.check_stop()?;
         let some_absent = !work.absent.is_empty() || analysis.flights.len() < work.flights.len();
         Ok(Analysed { analysis, logs, provenance, root: work.root.clone(), some_absent })

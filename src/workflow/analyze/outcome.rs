@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use crate::analysis::result::{Analysis, FlightAnalysis, Unmeasured};
 use crate::analysis::together::{Remark, together};
+use crate::base::sentence::Sentence;
 use crate::mission::plan::Purpose;
 use crate::workflow::error::{BECAUSE, WorkflowError};
 
@@ -17,12 +18,12 @@ pub(crate) fn problems(analysis: &Analysis, cautions: bool) -> Vec<String> {
         let name = flight.name.clone();
         let lost = lost(flight);
         lost.into_iter()
-            .chain(flight.warnings.iter().filter(|_| cautions).cloned())
+            .chain(flight.warnings.iter().filter(|_| cautions).map(ToString::to_string))
             .map(move |problem| format!("{name}: {problem}"))
             .collect::<Vec<_>>()
     };
     let flights = analysis.flights.iter().flat_map(of_flight);
-    analysis.warnings.iter().cloned().chain(flights).collect()
+    analysis.warnings.iter().map(ToString::to_string).chain(flights).collect()
 }
 
 /// Drones and logs of a flight that gave nothing, or not everything.
@@ -34,7 +35,7 @@ fn lost(flight: &FlightAnalysis) -> Vec<String> {
     let missing = flight.missing.iter().map(|one| Remark {
         slot: Some(one.slot),
         name: format!("slot {}", one.slot),
-        text: one.reason.clone(),
+        said: one.reason.sentence(),
     });
     // A missing drone's reason is that of its log.
     let told = |slot: Option<u16>| flight.missing.iter().any(|one| Some(one.slot) == slot);
@@ -42,12 +43,12 @@ fn lost(flight: &FlightAnalysis) -> Vec<String> {
     let unused = unused.map(|log| Remark {
         slot: log.slot,
         name: "not used".to_owned(),
-        text: log.sentence(),
+        said: log.sentence(),
     });
     let partly = flight.partly_used.iter().map(|log| Remark {
         slot: log.slot,
         name: log.source.clone(),
-        text: log.reason.clone(),
+        said: log.reason.sentence(),
     });
     let what = match flight.purpose {
         Purpose::Calibration => "no law",
@@ -56,13 +57,15 @@ fn lost(flight: &FlightAnalysis) -> Vec<String> {
     let unmeasured = flight.unmeasured.iter().map(|one| Remark {
         slot: one.slot,
         name: who(one),
-        text: format!("{what}: {}", one.reason),
+        said: Sentence::from(format!("{what}: ")).then(one.reason.sentence()),
     });
     let partial = flight.drones.iter().filter_map(|drone| {
         drone.partial_ladder.map(|partial| Remark {
             slot: drone.slot,
             name: drone.slot.map_or_else(|| drone.name.clone(), |slot| format!("slot {slot}")),
-            text: format!("partial ladder ({}): not in the fleet's numbers", partial.short()),
+            said: Sentence::from("partial ladder (")
+                .then(partial.sentence())
+                .words("): not in the fleet's numbers"),
         })
     });
     together(missing.chain(unused).chain(partly).chain(unmeasured).chain(partial))

@@ -1,7 +1,7 @@
 //! Settings of an analysis, and their words for the report.
 
 use crate::analysis::windows::Tilt;
-use crate::analysis::{AnalysisOptions, MapLaw, OffsetRule};
+use crate::analysis::{AnalysisOptions, LawKind, OffsetRule};
 use crate::flight::Indicator;
 
 /// Settings of an analysis.
@@ -30,8 +30,8 @@ impl Settings {
         let Self { options, without } = self;
         let law = match options.map_law {
             None => "auto",
-            Some(MapLaw::Linear) => "linear",
-            Some(MapLaw::SignedQuadratic) => "signed-quadratic",
+            Some(LawKind::Linear) => "linear",
+            Some(LawKind::SignedQuadratic) => "signed-quadratic",
         };
         let tilt = match options.windows.tilt {
             Tilt::Thrust => "thrust",

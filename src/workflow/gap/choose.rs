@@ -6,6 +6,7 @@ use super::Request;
 use crate::analysis::TruthSeries;
 use crate::base::plain::Shown as _;
 use crate::campaign::{self, CampaignError, FlightFolder};
+use crate::gap::Warning;
 use crate::mission::plan::Purpose;
 use crate::vehicle::{Vehicle, library};
 use crate::workflow::analyze::load_plan;
@@ -163,13 +164,8 @@ pub(super) fn model_of(request: &Request, found: &Found) -> Result<Vehicle, Work
     }
 }
 
-/// What a reader must know of logs without a plan.
-pub(super) fn unplanned(request: &Request, found: &Found, vehicle: &Vehicle) -> Option<String> {
-    (request.vehicle.is_none() && request.tables.is_none() && found.plan.is_none()).then(|| {
-        format!(
-            "no plan says which vehicle flew: {} is taken, and its closed forms stand for what effects do \
-             (--vehicle, --plan)",
-            vehicle.name
-        )
-    })
+/// Warning about logs without a plan.
+pub(super) fn unplanned(request: &Request, found: &Found, vehicle: &Vehicle) -> Option<Warning> {
+    (request.vehicle.is_none() && request.tables.is_none() && found.plan.is_none())
+        .then(|| Warning::VehicleGuessed { vehicle: vehicle.name.clone() })
 }

@@ -5,7 +5,8 @@ use std::path::Path;
 use super::logs::{self, Read};
 use crate::flight::{Flight, Indicator};
 use crate::gap::{
-    Explained, Flown, Input, Measured, Options, aloft, as_pulses, explain, lossless, map_gain,
+    Explained, Flown, Input, LeftOut, Measured, Options, aloft, as_pulses, explain, lossless,
+    map_gain,
 };
 use crate::vehicle::Vehicle;
 use crate::workflow::error::WorkflowError;
@@ -83,13 +84,14 @@ pub(super) fn flown(read: &Read) -> Vec<Flown<'_>> {
 }
 
 /// Why logs are not used, or not all of them.
-fn left_out(read: &Read, others: Option<&Read>) -> Vec<String> {
+fn left_out(read: &Read, others: Option<&Read>) -> Vec<LeftOut> {
     let mut left_out = read.left_out.clone();
-    left_out.extend(read.in_part.iter().map(|lost| format!("{lost} (the rest is used)")));
+    left_out.extend(read.in_part.iter().map(|lost| format!("{lost} (the rest is used)").into()));
     left_out.extend(others.iter().flat_map(|others| others.left_out.clone()));
     left_out
 }
 
-fn unusable(logs: &str, reasons: &[String]) -> WorkflowError {
-    WorkflowError::Nothing(format!("none of the {logs} can be used:\n  {}", reasons.join("\n  ")))
+fn unusable(logs: &str, reasons: &[LeftOut]) -> WorkflowError {
+    let reasons: String = reasons.iter().map(|reason| format!("\n  {reason}")).collect();
+    WorkflowError::Nothing(format!("none of the {logs} can be used:{reasons}"))
 }

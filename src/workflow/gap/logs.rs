@@ -4,12 +4,13 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::analysis::FlightInput;
 use crate::analysis::slots::whose_logs;
 use crate::analysis::together::{Remark, together};
+use crate::analysis::{Cause, FlightInput};
 use crate::base::causes::with_causes;
 use crate::base::plain::Shown as _;
 use crate::flight::{Flight, FlightOptions, Indicator, table};
+use crate::gap::LeftOut;
 use crate::workflow::find::Found;
 
 /// Logs that were read, and why the others were not.
@@ -18,7 +19,7 @@ pub(crate) struct Read {
     /// Slot (a running number without a plan) and flight.
     pub(crate) flights: Vec<(u16, Flight)>,
     /// Each other log with its reason.
-    pub(crate) left_out: Vec<String>,
+    pub(crate) left_out: Vec<LeftOut>,
     /// What is lost of logs that were read all the same.
     pub(crate) in_part: Vec<String>,
 }
@@ -67,12 +68,13 @@ pub(crate) fn read(found: &Found, root: &Path) -> Read {
             let lost = (!lost.is_empty()).then(|| Remark {
                 slot,
                 name: shown.clone(),
-                text: lost.join("; "),
+                said: Cause::InPart(lost).sentence(),
             });
             Ok(Opened { slot: slot.unwrap_or(number), flight, lost })
         })
         .collect();
-    let mut read = Read { left_out: warnings, ..Read::default() };
+    let left_out = warnings.into_iter().map(LeftOut::Said).collect();
+    let mut read = Read { left_out, ..Read::default() };
     let mut in_part = Vec::new();
     for one in opened {
         match one {
@@ -80,7 +82,7 @@ pub(crate) fn read(found: &Found, root: &Path) -> Read {
                 read.flights.push((opened.slot, opened.flight));
                 in_part.extend(opened.lost);
             }
-            Err(reason) => read.left_out.push(reason),
+            Err(reason) => read.left_out.push(reason.into()),
         }
     }
     read.in_part = together(in_part);
@@ -96,11 +98,14 @@ fn tables(found: &Found) -> Read {
         let number = u16::try_from(index + 1).unwrap_or(u16::MAX);
         let shown = log.path.shown();
         match table::read(&log.path, mapping) {
-            Ok(flight) if flight.indicator == Indicator::Power => read.left_out.push(format!(
-                "{shown}: electrical power is no pulse; give pulses or rotor speeds"
-            )),
+            Ok(flight) if flight.indicator == Indicator::Power => read.left_out.push(
+                format!("{shown}: electrical power is no pulse; give pulses or rotor speeds")
+                    .into(),
+            ),
             Ok(flight) => read.flights.push((number, flight)),
-            Err(error) => read.left_out.push(format!("{shown}: {}", with_causes(&error, ": "))),
+            Err(error) => {
+                read.left_out.push(format!("{shown}: {}", with_causes(&error, ": ")).into());
+            }
         }
     }
     read

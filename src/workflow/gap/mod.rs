@@ -104,7 +104,7 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
         Provenance { seed: Some(request.options.seed), ..provenance(host, &work, settings) };
     let page = write(&folder, &explained, &provenance)?;
     for reason in &explained.verdict.data.left_out {
-        host.warn(reason);
+        host.warn(&reason.to_string());
     }
     Ok(Compared { verdict: explained.verdict, model: folder.join(MODEL), page })
 }

@@ -9,8 +9,10 @@ use std::path::{Path, PathBuf};
 use crate::analysis::support::{
     Synthetic, Timetable, fixture, ladder, ladder_up, ladder_up_segments, plan,
 };
+use updraft::analysis::law::LawOf;
 use updraft::analysis::result::{Analysis, FlightAnalysis, TableRow, Yield};
-use updraft::analysis::{AnalysisOptions, FlightInput, LogInput, analyze, analyze_flight};
+use updraft::analysis::table::PaperTable;
+use updraft::analysis::{AnalysisOptions, FlightInput, LogInput, Warning, analyze, analyze_flight};
 use updraft::mission::plan::{Kind, Plan, Purpose};
 use updraft::report::terminal_summary;
 
@@ -56,7 +58,11 @@ fn flown(plan: Option<&Plan>, logs: &[LogInput]) -> FlightAnalysis {
 }
 
 fn row<'a>(flight: &'a FlightAnalysis, law: &str, parameter: &str) -> &'a TableRow {
-    flight.table.iter().find(|row| row.law == law && row.parameter == parameter).unwrap()
+    flight
+        .table
+        .iter()
+        .find(|row| row.law.name() == law && row.parameter.name() == parameter)
+        .unwrap()
 }
 
 fn in_terminal(flight: &FlightAnalysis) -> String {
@@ -89,10 +95,19 @@ fn a_part_of_the_ladder_does_not_speak_for_the_fleet() {
         assert_eq!(fleet.n, 4);
 
         let name = &flight.drones[4].name;
-        let caution = flight.warnings.iter().find(|w| w.starts_with("partial ladder")).unwrap();
+        let caution = flight
+            .warnings
+            .iter()
+            .map(ToString::to_string)
+            .find(|w| w.starts_with("partial ladder"))
+            .unwrap();
         let words = format!("{name} (4 of 8 legs, -2 to +2 m/s)");
         assert!(caution.contains("1 of 5 drones") && caution.contains(&words), "{caution}");
-        assert!(!without.warnings.iter().any(|w| w.contains("ladder")), "{:?}", without.warnings);
+        assert!(
+            !without.warnings.iter().any(|w| w.to_string().contains("ladder")),
+            "{:?}",
+            without.warnings
+        );
         assert!(in_terminal(&flight).contains(", partial "), "marked in the table of drones");
     }
 }
@@ -115,10 +130,10 @@ fn a_map_takes_the_flocks_law_for_a_partial_ladder() {
         [input("calibration", Some(&ladder), &calibration), input("hover", Some(&scan), &hover)];
     let analysis = analyze("x", &inputs, &AnalysisOptions::default(), None, &|_, _| {}).unwrap();
     let measured = &analysis.flights[1];
-    let mapping: Vec<&str> =
-        measured.map.as_ref().unwrap().drones.iter().map(|drone| &*drone.mapping).collect();
-    assert_eq!(mapping, ["own", "own", "flock"]);
-    let said = measured.drones[2].warnings.join("; ");
+    let mapping: Vec<LawOf> =
+        measured.map.as_ref().unwrap().drones.iter().map(|drone| drone.mapping).collect();
+    assert_eq!(mapping, [LawOf::Own, LawOf::Own, LawOf::Flock]);
+    let said = joined(&measured.drones[2].warnings);
     assert!(
         said.contains("the map uses the flock's law: its own is of a partial ladder"),
         "{said}"
@@ -135,7 +150,7 @@ fn most_logs_cut_is_said_of_the_fleet() {
     let flight = flown(Some(&plan), &logs);
     let words = "most drones have usable windows of a part of the ladder only: 4 legs from -2 to \
                  +2 m/s of 8 from -3 to +3 m/s";
-    assert!(flight.warnings.iter().any(|w| w.contains(words)), "{:?}", flight.warnings);
+    assert!(flight.warnings.iter().any(|w| w.to_string().contains(words)), "{:?}", flight.warnings);
     assert_eq!(row(&flight, "linear", "A'").n, 4);
 }
 
@@ -154,7 +169,7 @@ fn twins(folder: &Path, name: &str) -> Vec<LogInput> {
 fn only_what_can_be_compared_stands_beside_the_paper() {
     let folder = tempfile::tempdir().unwrap();
     let fleet = flown(None, &twins(folder.path(), "square-law-ladder.trimmed.BIN"));
-    assert_eq!(fleet.paper_table.as_deref(), Some("II"));
+    assert_eq!(fleet.paper_table, Some(PaperTable::Field));
     // The paper's value is there in each row; whether the two compare is another thing.
     let told = |flight: &FlightAnalysis, law: &str, parameter: &str| {
         let row = row(flight, law, parameter);
@@ -200,8 +215,13 @@ fn a_contradiction_is_told_once() {
     let logs = [LogInput { slot: Some(2), path, ..LogInput::default() }];
     let flight = flown(Some(&plan(Purpose::Calibration, ladder(1.0), 2)), &logs);
     assert_eq!(flight.drones[0].slot, Some(1));
-    let told: Vec<&String> = flight.warnings.iter().filter(|w| w.contains("02.BIN")).collect();
+    let told: Vec<String> =
+        flight.warnings.iter().map(ToString::to_string).filter(|w| w.contains("02.BIN")).collect();
     assert_eq!(told.len(), 1, "{told:?}");
     let words = "home position contradicts flight record and file name; home position counts";
     assert!(told[0].contains(words) && told[0].ends_with("is slot 1, not 2"), "{told:?}");
+}
+
+fn joined(warnings: &[Warning]) -> String {
+    warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }

@@ -42,7 +42,7 @@ fn a_show_log_is_read_with_its_own_clock() {
     assert!((flight.height_m.at(395.0, 1.0).unwrap() - 72.5).abs() < 1.0);
     assert!((flight.height_m.at(-5.0, 1.0).unwrap()).abs() < 0.1);
     assert!((flight.voltage_v.unwrap().at(100.0, 2.0).unwrap() - 12.588).abs() < 0.01);
-    assert_eq!(flight.warnings, Vec::<String>::new());
+    assert_eq!(flight.warnings, []);
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn a_log_that_ends_in_the_air_says_so() {
     };
     let flight = load(log.write(), FlightOptions::default()).unwrap();
     assert!((flight.cut_off_at_m.unwrap() - 28.5).abs() < 0.2, "{:?}", flight.cut_off_at_m);
-    assert!(flight.warnings.iter().any(|warning| warning.contains("ends in the air")));
+    assert!(flight.warnings.iter().any(|warning| warning.to_string().contains("ends in the air")));
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn a_start_time_of_another_day_is_refused() {
     let options = FlightOptions { start: Some(start), ..FlightOptions::default() };
     let flight = load(renamed(&bytes(), *b"SHOW", *b"SHOX"), options).unwrap();
     assert_eq!(flight.clock.method, Alignment::Takeoff);
-    assert!(flight.warnings.iter().any(|w| w.contains("away from this flight")));
+    assert!(flight.warnings.iter().any(|w| w.to_string().contains("away from this flight")));
 }
 
 #[test]
@@ -130,7 +130,10 @@ fn a_plan_that_was_not_flown_is_not_matched() {
     let hidden = renamed(&renamed(&bytes(), *b"SHOW", *b"SHOX"), *b"GPS\0", *b"GPX\0");
     let flight = load(hidden, options).unwrap();
     assert_eq!(flight.clock.method, Alignment::Takeoff);
-    assert!(flight.warnings.iter().any(|w| w.contains("does not match the plan")), "{flight:?}");
+    assert!(
+        flight.warnings.iter().any(|w| w.to_string().contains("does not match the plan")),
+        "{flight:?}"
+    );
     // Seconds since the drone left the ground, which it did 1.3 s after the show's start.
     assert!((flight.clock.offset_s - OFFSET_S - 1.2).abs() < 0.5, "{:?}", flight.clock);
 }
@@ -187,7 +190,11 @@ fn two_boots_in_one_file_are_told_apart() {
     let mut twice = bytes();
     twice.extend(bytes());
     let flight = load(twice, FlightOptions::default()).unwrap();
-    assert!(flight.warnings.iter().any(|w| w.contains("2 boots")), "{:?}", flight.warnings);
+    assert!(
+        flight.warnings.iter().any(|w| w.to_string().contains("2 boots")),
+        "{:?}",
+        flight.warnings
+    );
     assert_eq!(flight.pulse_us, once.pulse_us);
     assert_eq!(flight.velocity_up_mps, once.velocity_up_mps);
     assert_eq!(flight.clock, once.clock);

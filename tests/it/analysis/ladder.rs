@@ -11,12 +11,14 @@ use crate::analysis::support::{
     Synthetic, Timetable, fixture, ladder, ladder_up, ladder_up_segments, plan,
 };
 use updraft::analysis::calibrate::{FitOptions, Location, Weights};
+use updraft::analysis::law::Symbol;
 use updraft::analysis::result::{
-    Analysis, Fit, FlightAnalysis, Quality, Rejection, UnusedLog, WindowStats, Yield,
+    Analysis, Fit, FlightAnalysis, Quality, Rejection, WindowStats, Yield,
 };
+use updraft::analysis::table::{Quantity, TableLaw};
 use updraft::analysis::windows::{Tilt, WindowOptions};
 use updraft::analysis::{
-    AnalysisError, AnalysisOptions, FlightInput, LogInput, MapLaw, OffsetRule, analyze,
+    AnalysisError, AnalysisOptions, FlightInput, LawKind, LogInput, OffsetRule, Warning, analyze,
     analyze_flight,
 };
 use updraft::mission::plan::{Kind, Plan, Purpose};
@@ -94,7 +96,12 @@ fn the_still_air_ladder_has_the_law_of_its_plant() {
         let (line, square) =
             (laws.linear.as_ref().unwrap(), laws.signed_quadratic.as_ref().unwrap());
         assert!(line.chi2_reduced.unwrap() < square.chi2_reduced.unwrap(), "mostly linear");
-        assert!(square.warnings.iter().any(|warning| warning.contains("beyond the searched")));
+        assert!(
+            square
+                .warnings
+                .iter()
+                .any(|warning| warning.to_string().contains("beyond the searched"))
+        );
     }
 }
 
@@ -147,7 +154,8 @@ fn a_reference_calibration_holds_a_and_u0() {
     assert_eq!(values(held)[..2], values(free)[..2]);
     assert!((values(held)[2] - values(free)[2]).abs() < 1e-5, "the same data give the same W");
     assert!(held.parameters[2].estimate.se < free.parameters[2].estimate.se);
-    assert!(again.table.iter().any(|row| row.law.contains("held") && row.parameter == "W"));
+    assert!(again.table.iter().any(|row| row.law == TableLaw::SignedQuadraticHeld
+        && row.parameter == Quantity::Parameter(Symbol::W)));
 }
 
 #[test]
@@ -192,14 +200,15 @@ fn a_fleet_is_matched_and_what_is_lost_is_said() {
     let missing: Vec<(u16, bool)> = flight
         .missing
         .iter()
-        .map(|missing| (missing.slot, missing.reason.contains("empty")))
+        .map(|missing| (missing.slot, missing.reason.to_string().contains("empty")))
         .collect();
     assert_eq!(missing, [(3, true), (5, false)], "{:?}", flight.missing);
-    assert_eq!(flight.missing[1].reason, "no log of Drone 5");
+    assert_eq!(flight.missing[1].reason.to_string(), "no log of Drone 5");
 
     let flock = flight.flock.as_ref().unwrap().signed_quadratic.as_ref().unwrap();
     assert!((values(flock)[0] - 4.963).abs() < 0.002, "the average of equals is one of them");
-    let row = flight.table.iter().find(|row| row.parameter == "A").unwrap();
+    let row =
+        flight.table.iter().find(|row| row.parameter == Quantity::Parameter(Symbol::A)).unwrap();
     assert_eq!((row.n, row.sd), (3, 0.0));
     assert_eq!(row.paper.map(|paper| paper.value), Some(10.5), "a field flight beside Table II");
 
@@ -328,14 +337,14 @@ fn a_campaign_measures_the_air_it_flew_in() {
         assert_eq!(hover.drones[0].source, "hover-1.BIN");
 
         let map = hover.map.as_ref().unwrap();
-        assert_eq!(map.law, "linear");
-        let mapping: Vec<&str> = map.drones.iter().map(|drone| drone.mapping.as_str()).collect();
+        assert_eq!(map.law, LawKind::Linear);
+        let mapping: Vec<&str> = map.drones.iter().map(|drone| drone.mapping.name()).collect();
         // Without a plan a hover log is not known to be the same drone as a ladder log.
         let expected = if planned { ["own", "own", "flock"] } else { ["flock", "flock", "flock"] };
         assert_eq!(mapping, expected);
         for drone in &map.drones {
             // Own hover pulses are 1 us apart; the flock's is in the middle of drones 1 and 2.
-            let bias = match (drone.mapping.as_str(), drone.name.chars().last()) {
+            let bias = match (drone.mapping.name(), drone.name.chars().last()) {
                 ("flock", Some('1')) => 0.5 / 26.4,
                 ("flock", Some('2')) => -0.5 / 26.4,
                 ("flock", Some('3')) => -1.5 / 26.4,
@@ -347,7 +356,7 @@ fn a_campaign_measures_the_air_it_flew_in() {
                 let truth = 0.3 + 0.9886 * (wave(*time) - 0.3);
                 worst = worst.max((value.unwrap() - truth - bias).abs());
             }
-            assert!(worst < 0.03, "{} {}: {worst}", drone.name, drone.mapping);
+            assert!(worst < 0.03, "{} {}: {worst}", drone.name, drone.mapping.name());
             assert!(drone.mean.se > 0.0 && drone.mean.se < 0.3, "{}", drone.mean);
         }
         assert_eq!(map.time_s.windows(2).filter(|pair| pair[1] - pair[0] != 1.0).count(), 0);
@@ -359,11 +368,11 @@ fn a_measurement_without_laws_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let [_, hover] = synthetic_campaign(folder.path());
     let [_, scan] = synthetic_plans();
-    let options = AnalysisOptions { map_law: Some(MapLaw::Linear), ..still() };
+    let options = AnalysisOptions { map_law: Some(LawKind::Linear), ..still() };
     let flight =
         analyze_flight(&input("hover", Some(&scan), &hover), &options, None, &|_, _| {}).unwrap();
     assert!(flight.map.is_none());
-    assert!(flight.warnings.iter().any(|w| w.contains("no calibration was given")));
+    assert!(flight.warnings.iter().any(|w| w.to_string().contains("no calibration was given")));
     assert!(flight.drones.iter().all(|drone| drone.laws.is_none()));
 }
 
@@ -381,7 +390,7 @@ fn flights_that_cannot_calibrate_are_told_apart() {
         let flight = analyze_flight(&input, &still(), None, &|_, _| {}).unwrap();
         assert!(flight.drones[0].laws.is_none());
         assert_eq!(flight.unmeasured.len(), 1, "listed once");
-        flight.unmeasured[0].reason.clone()
+        flight.unmeasured[0].reason.to_string()
     };
     let none = warning("hover.BIN", |_| 0.0, Box::new(|_| 1550.0));
     assert!(none.contains("no ladder"), "{none}");
@@ -527,7 +536,7 @@ fn a_second_log_of_a_slot_is_left_out_and_named() {
     let flight =
         analyze_flight(&input("twice", Some(&plan), &twice), &paper(), None, &|_, _| {}).unwrap();
     assert_eq!((flight.drones.len(), flight.missing.len()), (1, 0));
-    let unused: Vec<String> = flight.unused.iter().map(UnusedLog::sentence).collect();
+    let unused: Vec<String> = flight.unused.iter().map(|log| log.sentence().to_string()).collect();
     assert_eq!(unused.len(), 1, "{unused:?}");
     assert!(unused[0].contains("slot 1 has a log already"), "{unused:?}");
 }
@@ -544,10 +553,10 @@ fn chi_squared_is_told_from_before_scatter_was_added() {
     // With the scatter in, the better law's would be 1 by construction.
     assert!(line.chi2_reduced.unwrap() > 2.0 && line.p_value.unwrap() < 1e-3);
     assert!((line.chi2 / line.dof as f64 - line.chi2_reduced.unwrap()).abs() < 1e-9);
-    let row = |flight: &FlightAnalysis, name: &str| {
-        flight.table.iter().find(|row| row.parameter == name).cloned()
+    let row = |flight: &FlightAnalysis, of: Quantity| {
+        flight.table.iter().find(|row| row.parameter == of).cloned()
     };
-    assert_eq!(row(&flight, "sigma_added").unwrap().mean, added);
+    assert_eq!(row(&flight, Quantity::AddedScatter).unwrap().mean, added);
     // Two logs are a fleet, which the paper's Table II is of.
     let folder = tempfile::tempdir().unwrap();
     let bytes = fs::read(fixture("square-law-ladder.trimmed.BIN")).unwrap();
@@ -556,19 +565,19 @@ fn chi_squared_is_told_from_before_scatter_was_added() {
         fs::write(path, &bytes[..bytes.len() - cut]).unwrap();
     }
     let ours = run(None, &fleet, &AnalysisOptions::default());
-    let chi2 = row(&ours, "chi2_nu").unwrap();
+    let chi2 = row(&ours, Quantity::ReducedChi2).unwrap();
     assert_eq!(chi2.paper.unwrap().value, 2.19, "told all the same");
     assert!(chi2.not_compared.unwrap().contains("spread of their samples"), "not its statistic");
     let as_published = run(None, &fleet, &paper());
-    assert_eq!(row(&as_published, "chi2_nu").unwrap().not_compared, None);
-    assert_eq!(row(&as_published, "chi2_nu").unwrap().paper.unwrap().value, 2.19);
-    assert_eq!(row(&as_published, "sigma_added"), None);
+    assert_eq!(row(&as_published, Quantity::ReducedChi2).unwrap().not_compared, None);
+    assert_eq!(row(&as_published, Quantity::ReducedChi2).unwrap().paper.unwrap().value, 2.19);
+    assert_eq!(row(&as_published, Quantity::AddedScatter), None);
 }
 
 #[test]
 fn a_signed_quadratic_that_does_not_fit_is_called_so() {
     let flight = run(None, &[fixture("ladder-still.trimmed.BIN")], &still());
-    let words = flight.warnings.join("; ");
+    let words = joined(&flight.warnings);
     assert!(words.contains("signed-quadratic law does not describe this flight"), "{words}");
     assert!(words.contains("Use A' of the line"), "{words}");
     let square = run(None, &[fixture("square-law-ladder.trimmed.BIN")], &paper());
@@ -624,7 +633,7 @@ fn a_rejected_hover_gives_no_value_and_says_why() {
         let analysis = measured(pulse, up, planned_s);
         let flight = &analysis.flights[1];
         let of_two = flight.unmeasured.iter().find(|drone| drone.slot == Some(2)).unwrap();
-        assert!(of_two.reason.contains(reason), "{reason}: {}", of_two.reason);
+        assert!(of_two.reason.to_string().contains(reason), "{reason}: {}", of_two.reason);
         assert_eq!(of_two.name, flight.drones[1].name);
         let values = flight.map.as_ref().map_or(0, |map| map.drones.len());
         assert_eq!(values + flight.unmeasured.len(), 2, "{reason}");
@@ -634,7 +643,7 @@ fn a_rejected_hover_gives_no_value_and_says_why() {
     let other = measured(calm, swings, 264.0);
     let unused = &other.flights[1].unused[0];
     assert_eq!(unused.slot, Some(2));
-    assert!(unused.reason.contains("it was to stand still"), "{}", unused.reason);
+    assert!(unused.reason.to_string().contains("it was to stand still"), "{}", unused.reason);
     assert_eq!(other.what_was_found(), Yield::Partial);
     // A bad part costs its seconds, and a flag says so; the drone keeps the rest.
     let partly = measured(touches, still, 264.0);
@@ -665,4 +674,8 @@ fn what_was_found_tells_nothing_from_something() {
     let laws = found("calibration", &calibration);
     assert!(matches!(laws.what_was_found(), Yield::Whole | Yield::Partial));
     assert!(!updraft::report::terminal_summary(&laws, 100, false).contains("No calibration"));
+}
+
+fn joined(warnings: &[Warning]) -> String {
+    warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }

@@ -142,7 +142,7 @@ fn a_plan_is_contradicted_by_most_of_its_legs_only() {
     let climbing = flight(|_| 1.0);
     let (right, wrong) = (leg(10.0, 19.0, 1.0), leg(30.0, 39.0, -1.0));
     assert_eq!(contradiction(&climbing, &[right.clone(), wrong.clone()]), None);
-    let text = contradiction(&climbing, &[right, wrong.clone(), wrong]).unwrap();
+    let text = contradiction(&climbing, &[right, wrong.clone(), wrong]).unwrap().to_string();
     assert!(text.contains("2 of 3 legs") && text.contains("flown 1.00 m/s"), "{text}");
     assert_eq!(contradiction(&climbing, &[]), None);
 }

@@ -1,8 +1,8 @@
 //! What the page and the terminal say of a verdict.
 
 use crate::report::verdicts::{class, named, nothing, provenance, sensor, unknown};
-use updraft::gap::Verdict;
 use updraft::gap::verdict::{Drones, Finding, Gap, SensorChannel};
+use updraft::gap::{LeftOut, Verdict, Warning};
 use updraft::report::{gap_summary, render_gap};
 
 fn all() -> [Verdict; 5] {
@@ -180,8 +180,8 @@ fn hostile_words_and_numbers_do_no_harm() {
     let mut verdict = unknown();
     verdict.vehicle = bad.to_owned();
     verdict.summary = bad.to_owned();
-    verdict.cautions = vec![bad.to_owned()];
-    verdict.data.left_out = vec![bad.to_owned()];
+    verdict.cautions = vec![Warning::Said(bad.to_owned())];
+    verdict.data.left_out = vec![LeftOut::Said(bad.to_owned())];
     verdict.data.groups = vec![(bad.to_owned(), 3)];
     verdict.rest.candidate = bad.to_owned();
     verdict.steps[0].finding =

@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use crate::report::synthetic::{calibration, campaign, provenance, updraft_series, whole_campaign};
+use updraft::analysis::law::Symbol;
 use updraft::analysis::result::{Analysis, TableRow};
+use updraft::analysis::table::{Quantity, TableLaw};
+use updraft::analysis::{Cause, Warning};
 use updraft::base::estimate::Estimate;
 use updraft::report::{Report, render, terminal_summary, write};
 
@@ -206,23 +209,20 @@ fn hostile_text_stays_text() {
     let mut analysis = campaign();
     analysis.title = EVIL.to_owned();
     analysis.made_by = EVIL.to_owned();
-    analysis.warnings.push(EVIL.to_owned());
+    analysis.warnings.push(Warning::Said(EVIL.to_owned()));
     for flight in &mut analysis.flights {
         flight.name = EVIL.to_owned();
-        flight.missing[0].reason = EVIL.to_owned();
+        flight.missing[0].reason = Cause::Said(EVIL.to_owned());
         for drone in &mut flight.drones {
             drone.name = EVIL.to_owned();
-            drone.warnings.push(EVIL.to_owned());
+            drone.warnings.push(Warning::Said(EVIL.to_owned()));
         }
         for row in &mut flight.table {
             row.unit = EVIL.to_owned();
-            row.law = EVIL.to_owned();
         }
         if let Some(map) = &mut flight.map {
-            map.law = EVIL.to_owned();
             for drone in &mut map.drones {
                 drone.name = EVIL.to_owned();
-                drone.mapping = EVIL.to_owned();
             }
         }
     }
@@ -277,8 +277,8 @@ fn numbers_that_are_none_do_no_harm() {
         for flight in &mut analysis.flights {
             flight.true_updraft_mps = Some(bad);
             flight.table.push(TableRow {
-                law: "linear".to_owned(),
-                parameter: "A'".to_owned(),
+                law: TableLaw::Linear,
+                parameter: Quantity::Parameter(Symbol::Slope),
                 unit: String::new(),
                 mean: bad,
                 sd: bad,

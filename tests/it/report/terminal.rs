@@ -1,6 +1,7 @@
 //! What the terminal says, as people see it.
 
 use crate::report::synthetic::{campaign, provenance, updraft_series};
+use updraft::analysis::Warning;
 use updraft::analysis::result::{Analysis, FlightAnalysis};
 use updraft::report::{render, terminal_summary};
 
@@ -55,13 +56,14 @@ fn warnings_are_printed_in_full() {
     let long = |what: &str| {
         format!("{what} {} {}", "word ".repeat(60), "/a/path/without/a/blank".repeat(12))
     };
-    analysis.warnings = (0..30).map(|i| long(&format!("warning{i}"))).collect();
-    analysis.flights[0].warnings = vec![long("caution")];
-    analysis.flights[1].drones[0].warnings = vec![long("note")];
+    analysis.warnings = (0..30).map(|i| Warning::Said(long(&format!("warning{i}")))).collect();
+    analysis.flights[0].warnings = vec![Warning::Said(long("caution"))];
+    analysis.flights[1].drones[0].warnings = vec![Warning::Said(long("note"))];
     for width in [60, 100] {
         let text = terminal_summary(&analysis, width, false);
         let joined: String = text.split_whitespace().collect();
-        for wanted in analysis.warnings.iter().chain([&long("caution"), &long("note")]) {
+        let warnings = analysis.warnings.iter().map(ToString::to_string);
+        for wanted in warnings.chain([long("caution"), long("note")]) {
             let wanted: String = wanted.split_whitespace().collect();
             assert!(joined.contains(&wanted), "{width}: {wanted:.20} is cut");
         }

@@ -2,12 +2,12 @@
 
 #![allow(dead_code, reason = "each test uses its share")]
 
-use updraft::gap::Verdict;
 use updraft::gap::verdict::{
     DataUsed, Detectable, DroneOffset, Drones, Finding, Fitted, Gap, Interval, MapError, MapGain,
     Noise, Regime, Rest, Rival, Rung, SensorChannel, Shape, Shrink, Step, VERDICT_SCHEMA,
 };
 use updraft::gap::words::summary;
+use updraft::gap::{LeftOut, Verdict, Warning};
 use updraft::report::Provenance;
 
 fn around(value: f64, half: f64) -> Interval {
@@ -166,7 +166,7 @@ pub(crate) fn nothing() -> Verdict {
             groups: vec![("even".to_owned(), 4), ("odd".to_owned(), 4)],
             bins: vec![146, 145],
             held_out: vec![8, 4],
-            left_out: vec!["slot-9.BIN: the log ends before the ladder".to_owned()],
+            left_out: vec![LeftOut::Said("slot-9.BIN: the log ends before the ladder".to_owned())],
         },
         sensor: SensorChannel {
             bias_mps: Some(around(0.0004, 0.0003)),
@@ -262,10 +262,10 @@ pub(crate) fn unknown() -> Verdict {
     let rivals = vec![rival("height", true, 55.0), rival("ground-effect", false, 9.0)];
     let mut verdict = with(vec![step(finding, 55.0, rivals)]);
     verdict.drones = Drones::default();
-    verdict.cautions = vec![
+    verdict.cautions = vec![Warning::Said(
         "all drones climb at the same time: what depends on climb speed is mixed with the shared air"
             .to_owned(),
-    ];
+    )];
     verdict
 }
 

@@ -9,14 +9,17 @@ mod whole;
 use std::f64::consts::TAU;
 
 use rand::Rng as _;
+use updraft::analysis::law::{LawOf, Symbol};
 use updraft::analysis::result::{
-    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, Fit, FlightAnalysis, Laws,
-    Missing, Parameter, Rejection, SampleStats, TableRow, Trace, Unmeasured, UpdraftMap,
-    WindowStats,
+    ANALYSIS_SCHEMA, Analysis, DroneAnalysis, DroneUpdraft, ErrorBudget, Fit, FitWarning,
+    FlightAnalysis, Laws, Missing, Parameter, Rejection, SampleStats, TableRow, Trace, Unmeasured,
+    UpdraftMap, WindowStats,
 };
+use updraft::analysis::table::{PaperTable, Quantity, TableLaw};
+use updraft::analysis::{Cause, LawKind, Warning};
 use updraft::base::estimate::Estimate;
 use updraft::base::rng::{self, Purpose as Stream};
-use updraft::flight::{Alignment, Clock};
+use updraft::flight::{Alignment, Clock, Indicator};
 use updraft::mission::plan::{Kind, Purpose};
 use updraft::report::{InputFile, Provenance};
 
@@ -61,10 +64,10 @@ pub(crate) fn campaign() -> Analysis {
         made_by: "updraft 0.1.0".to_owned(),
         title: "Pixel fleet, 49 drones over a synthetic thermal".to_owned(),
         flights: vec![calibration, hover()],
-        warnings: vec![
+        warnings: vec![Warning::Said(
             "Slot 12: the clock was aligned with the plan only; its windows may be off by 0.2 s."
                 .to_owned(),
-        ],
+        )],
     }
 }
 
@@ -119,9 +122,9 @@ pub(crate) fn calibration(
         .collect();
     let flock = Laws {
         signed_quadratic: Some(fit(&[
-            ("A", "us/(m/s)²", A, 0.012),
-            ("u0", "us", U0, 0.031),
-            ("W", "m/s", truth + W_BIAS, 0.0021),
+            (Symbol::A, A, 0.012),
+            (Symbol::U0, U0, 0.031),
+            (Symbol::W, truth + W_BIAS, 0.0021),
         ])),
         signed_quadratic_held: None,
         sigma_added_us: Some(0.42),
@@ -130,7 +133,7 @@ pub(crate) fn calibration(
     let table = table(&analysed);
     FlightAnalysis {
         name: name.to_owned(),
-        indicator: updraft::flight::Indicator::Pulse,
+        indicator: Indicator::Pulse,
         purpose: Purpose::Calibration,
         planned: true,
         orientation_deg: Some(30.0),
@@ -145,7 +148,7 @@ pub(crate) fn calibration(
             .map(|(slot, reason)| Missing {
                 slot: *slot,
                 home_m: None,
-                reason: (*reason).to_owned(),
+                reason: Cause::Said((*reason).to_owned()),
             })
             .collect(),
         flock: (drones > 1).then_some(flock),
@@ -153,7 +156,7 @@ pub(crate) fn calibration(
         map: None,
         unmeasured: Vec::new(),
         statistics: None,
-        paper_table: Some("I".to_owned()),
+        paper_table: Some(PaperTable::Simulation),
     }
 }
 
@@ -233,17 +236,19 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
     let (slope, u0) = straight_line(&windows);
     let chi2 = 0.98 + 0.3 * noise.normal().clamp(-2.0, 2.0);
     let mut quadratic = fit(&[
-        ("A", "us/(m/s)²", A + 0.02 * noise.normal(), 0.021),
-        ("u0", "us", U0 + bias, 0.051),
-        ("W", "m/s", w + 0.004 * noise.normal(), 0.0043),
+        (Symbol::A, A + 0.02 * noise.normal(), 0.021),
+        (Symbol::U0, U0 + bias, 0.051),
+        (Symbol::W, w + 0.004 * noise.normal(), 0.0043),
     ]);
     quadratic.chi2_reduced = Some(chi2);
     let mut warnings = Vec::new();
     if slot == 12 {
-        warnings.push("no SHOW rows in the log; clock aligned with the plan".to_owned());
+        let text = "no SHOW rows in the log; clock aligned with the plan".to_owned();
+        warnings.push(Warning::Said(text));
     }
     if slot == 30 {
-        quadratic.warnings.push("W is correlated with A (0.93)".to_owned());
+        let text = "W is correlated with A (0.93)".to_owned();
+        quadratic.warnings.push(FitWarning::Said(text));
     }
     DroneAnalysis {
         slot: Some(slot),
@@ -270,7 +275,7 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
 
 /// A line through windows on a parabola: many times their errors away from it.
 fn straight(slope: f64, u0: f64) -> Fit {
-    let line = fit(&[("A'", "us/(m/s)", slope, 1.4), ("u0", "us", u0, 3.1)]);
+    let line = fit(&[(Symbol::Slope, slope, 1.4), (Symbol::U0, u0, 3.1)]);
     Fit { chi2: 720.0, chi2_reduced: Some(60.0), ..line }
 }
 
@@ -288,13 +293,13 @@ fn straight_line(windows: &[WindowStats]) -> (f64, f64) {
     (slope, my - slope * mx)
 }
 
-pub(crate) fn fit(parameters: &[(&str, &str, f64, f64)]) -> Fit {
+pub(crate) fn fit(parameters: &[(Symbol, f64, f64)]) -> Fit {
     Fit {
         parameters: parameters
             .iter()
-            .map(|(name, unit, value, se)| Parameter {
-                name: (*name).to_owned(),
-                unit: (*unit).to_owned(),
+            .map(|(name, value, se)| Parameter {
+                name: *name,
+                unit: name.unit(Indicator::Pulse),
                 estimate: Estimate::new(*value, *se),
                 held: false,
             })
@@ -312,25 +317,26 @@ pub(crate) fn fit(parameters: &[(&str, &str, f64, f64)]) -> Fit {
 }
 
 fn table(drones: &[DroneAnalysis]) -> Vec<TableRow> {
-    let row = |law: &str, name: &str, unit: &str, paper: Option<Estimate>| {
+    let row = |law: TableLaw, parameter: Quantity, unit: &str, paper: Option<Estimate>| {
         let estimates: Vec<Estimate> = drones
             .iter()
             .filter_map(|drone| {
                 let laws = drone.laws.as_ref()?;
-                let fit = if law == "linear" { &laws.linear } else { &laws.signed_quadratic };
+                let fit =
+                    if law == TableLaw::Linear { &laws.linear } else { &laws.signed_quadratic };
                 let fit = fit.as_ref()?;
-                if name == "chi2_nu" {
-                    return Some(Estimate::new(fit.chi2_reduced?, 0.0));
+                match parameter {
+                    Quantity::Parameter(symbol) => Some(fit.parameter(symbol)?.estimate),
+                    _ => Some(Estimate::new(fit.chi2_reduced?, 0.0)),
                 }
-                fit.parameters.iter().find(|p| p.name == name).map(|p| p.estimate)
             })
             .collect();
         let n = estimates.len() as f64;
         let mean = estimates.iter().map(|e| e.value).sum::<f64>() / n;
         let squares = estimates.iter().map(|e| (e.value - mean).powi(2)).sum::<f64>();
         TableRow {
-            law: law.to_owned(),
-            parameter: name.to_owned(),
+            law,
+            parameter,
             unit: unit.to_owned(),
             mean,
             sd: (squares / (n - 1.0)).sqrt(),
@@ -342,13 +348,28 @@ fn table(drones: &[DroneAnalysis]) -> Vec<TableRow> {
     };
     let paper = |value, se| Some(Estimate::new(value, se));
     vec![
-        row("signed quadratic", "A", "us/(m/s)²", paper(8.207, 0.020)),
-        row("signed quadratic", "u0", "us", paper(1598.656, 0.039)),
-        row("signed quadratic", "W", "m/s", paper(-0.0589, 0.0031)),
-        row("signed quadratic", "chi2_nu", "", None),
-        row("linear", "A'", "us/(m/s)", paper(26.4, 2.6)),
-        row("linear", "u0", "us", paper(1546.5, 7.8)),
-        row("linear", "chi2_nu", "", None),
+        row(
+            TableLaw::SignedQuadratic,
+            Quantity::Parameter(Symbol::A),
+            "us/(m/s)²",
+            paper(8.207, 0.020),
+        ),
+        row(
+            TableLaw::SignedQuadratic,
+            Quantity::Parameter(Symbol::U0),
+            "us",
+            paper(1598.656, 0.039),
+        ),
+        row(
+            TableLaw::SignedQuadratic,
+            Quantity::Parameter(Symbol::W),
+            "m/s",
+            paper(-0.0589, 0.0031),
+        ),
+        row(TableLaw::SignedQuadratic, Quantity::ReducedChi2, "", None),
+        row(TableLaw::Linear, Quantity::Parameter(Symbol::Slope), "us/(m/s)", paper(26.4, 2.6)),
+        row(TableLaw::Linear, Quantity::Parameter(Symbol::U0), "us", paper(1546.5, 7.8)),
+        row(TableLaw::Linear, Quantity::ReducedChi2, "", None),
     ]
 }
 
@@ -397,7 +418,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             position_m: Some(position),
             track_m: Vec::new(),
             height_m: 100.0,
-            mapping: if [41].contains(&slot) { "flock" } else { "own" }.to_owned(),
+            mapping: if [41].contains(&slot) { LawOf::Flock } else { LawOf::Own },
             mean: Estimate::new(mean, 0.028),
             mean_interval_mps: None,
             errors: ErrorBudget::default(),
@@ -421,7 +442,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             partial_ladder: None,
             trace: Trace::default(),
             warnings: if slot == 20 {
-                vec!["gap of 290 s in the log".to_owned()]
+                vec![Warning::Said("gap of 290 s in the log".to_owned())]
             } else {
                 Vec::new()
             },
@@ -429,7 +450,7 @@ pub(crate) fn hover() -> FlightAnalysis {
     }
     FlightAnalysis {
         name: "hover".to_owned(),
-        indicator: updraft::flight::Indicator::Pulse,
+        indicator: Indicator::Pulse,
         purpose: Purpose::Measurement,
         planned: true,
         orientation_deg: Some(30.0),
@@ -444,7 +465,7 @@ pub(crate) fn hover() -> FlightAnalysis {
             .map(|(slot, reason)| Missing {
                 slot: *slot,
                 home_m: None,
-                reason: (*reason).to_owned(),
+                reason: Cause::Said((*reason).to_owned()),
             })
             .collect(),
         flock: None,
@@ -452,12 +473,14 @@ pub(crate) fn hover() -> FlightAnalysis {
         unmeasured: vec![Unmeasured {
             slot: Some(44),
             name: "Drone 44".to_owned(),
-            reason: "the hover from 95 to 685 s was rejected: a motor touched its limit".to_owned(),
+            reason: Cause::Said(
+                "the hover from 95 to 685 s was rejected: a motor touched its limit".to_owned(),
+            ),
         }],
         statistics: None,
         paper_table: None,
         map: Some(UpdraftMap {
-            law: "signed quadratic".to_owned(),
+            law: LawKind::SignedQuadratic,
             law_reason: None,
             wind: None,
             leaning: None,

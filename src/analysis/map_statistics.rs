@@ -1,13 +1,13 @@
 //! The statistics of a flight's map: what its logs showed, as the input of the pure functions.
 
-use super::averaging::{Seconds, averaging};
-use super::field::FieldInput;
-use super::make::{StatisticsOptions, field_statistics};
-use super::result::FieldStatistics;
-use super::tilt_wind::{LeanDrag, MeanLean, tilt_wind};
-use crate::analysis::result::{Laws, UpdraftMap};
-use crate::analysis::updraft::{self, RUNNING_S};
-use crate::analysis::windows::{Corrected, Target};
+use super::result::{Fit, Laws, UpdraftMap};
+use super::running::RUNNING_S;
+use super::statistics::averaging::{Seconds, averaging};
+use super::statistics::result::FieldStatistics;
+use super::statistics::tilt_wind::{LeanDrag, MeanLean, tilt_wind};
+use super::statistics::{FieldInput, StatisticsOptions, field_statistics};
+use super::updraft;
+use super::windows::{Corrected, Target};
 use crate::flight::{Flight, Series};
 
 /// Fewest samples in a second.
@@ -17,7 +17,7 @@ const LONGEST_S: usize = 200_000;
 
 /// What a log showed of its hover, besides the running means of the map.
 #[derive(Clone, Debug, Default)]
-pub(in crate::analysis) struct HoverSeen {
+pub(super) struct HoverSeen {
     /// Means over each second of the tilt-corrected pulse, us, and of the vertical velocity, m/s.
     seconds: Vec<Option<(f64, f64)>>,
     /// Tangents of the mean lean forward and to the right.
@@ -28,11 +28,7 @@ pub(in crate::analysis) struct HoverSeen {
 
 impl HoverSeen {
     /// Of the longest hover.
-    pub(in crate::analysis) fn of(
-        flight: &Flight,
-        corrected: &Corrected,
-        targets: &[Target],
-    ) -> Self {
+    pub(super) fn of(flight: &Flight, corrected: &Corrected, targets: &[Target]) -> Self {
         let Some(hover) = updraft::hover(targets) else { return Self::default() };
         let length = (hover.end_s - hover.start_s).floor().max(0.0) as usize;
         let seconds = (0..length.min(LONGEST_S))
@@ -78,7 +74,7 @@ fn heading_deg(flight: &Flight, hover: &Target) -> Option<f64> {
 }
 
 /// Statistics of a map and of what its logs showed, in the order of the map's drones.
-pub(in crate::analysis) fn of_map(
+pub(super) fn of_map(
     map: &UpdraftMap,
     seen: &[HoverSeen],
     options: &StatisticsOptions,
@@ -130,7 +126,7 @@ pub(in crate::analysis) fn of_map(
 /// Pulse per speed of the flock: of its line, else of its signed square up to 1 m/s, as the slope of
 /// the square itself is 0 in still air.
 fn slope_us_per_mps(laws: &Laws) -> Option<f64> {
-    let first = |fit: &crate::analysis::result::Fit| Some(fit.parameters.first()?.estimate.value);
+    let first = |fit: &Fit| Some(fit.parameters.first()?.estimate.value);
     let slope = laws
         .linear
         .as_ref()

@@ -1,0 +1,63 @@
+//! Reasons for leaving a log or a drone out of a comparison, and their sentences.
+
+use std::fmt;
+
+use crate::base::said::said_in_files;
+
+/// Reason why a log or a drone is not in a comparison, or only in part. In `verdict.json` it stands as its
+/// sentence.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum LeftOut {
+    /// Nothing in the drone's log is steady flight of the plan.
+    NoSteadyFlight {
+        /// Slot of the drone.
+        slot: u16,
+    },
+    /// Too few of the steady bins can be used.
+    FewBins {
+        /// Slot of the drone.
+        slot: u16,
+        /// Bins that can be used.
+        usable: usize,
+        /// Bins in all.
+        bins: usize,
+    },
+    /// The pulse never changes.
+    ConstantPulse {
+        /// Slot of the drone.
+        slot: u16,
+        /// The pulse, us.
+        pulse_us: f64,
+    },
+    /// A reason in the words of those who read the log, or as it was read from a file.
+    Said(String),
+}
+
+said_in_files!(LeftOut);
+
+impl From<String> for LeftOut {
+    fn from(text: String) -> Self {
+        Self::Said(text)
+    }
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoSteadyFlight { slot } => {
+                write!(f, "slot {slot}: no steady flight of the plan in its log")
+            }
+            Self::FewBins { slot, usable, bins } => write!(
+                f,
+                "slot {slot}: only {usable} of {bins} steady bins are usable (gaps in the log, motors at \
+                 a limit, or another flight)"
+            ),
+            Self::ConstantPulse { slot, pulse_us } => write!(
+                f,
+                "slot {slot}: its pulse is {pulse_us:.0} us in the whole flight: no rotor flies so"
+            ),
+            Self::Said(text) => f.write_str(text),
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! Warnings to the reader of a verdict, and their sentences.
+
+use std::fmt;
+
+use super::data::Data;
+use super::explain::Found;
+use super::make::Input;
+use crate::base::said::said_in_files;
+use crate::effects::select::value_of;
+
+/// Fewer drones than this are all fitted, and none is held out.
+const FEWEST_TO_HOLD: usize = 8;
+
+/// Sides whose leans are further apart flew in different wind, degrees. Chosen: several times the error of
+/// an attitude, and 0.4 m/s on a drone that leans by 1.2 degrees per m/s.
+const OTHER_WIND_DEG: f64 = 0.5;
+
+/// Warning to the reader of a verdict. In `verdict.json` it stands as its sentence.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A single drone was compared.
+    OneDrone,
+    /// There were too few drones to hold any out from fitting.
+    NoneHeldOut {
+        /// Drones compared.
+        drones: usize,
+    },
+    /// No more than half of the plan's drones gave a usable log.
+    FewDrones {
+        /// Drones compared.
+        drones: usize,
+        /// Drones of the plan.
+        planned: usize,
+    },
+    /// A parameter was fitted to a bound of its range.
+    AtBound {
+        /// The effect.
+        effect: String,
+        /// The parameter.
+        parameter: String,
+    },
+    /// The measured drones leaned otherwise than those of somebody else's simulation.
+    OtherWind {
+        /// Difference of the leans, degrees.
+        lean_deg: f64,
+    },
+    /// Tables were compared, which have no plan.
+    Tables,
+    /// All drones climb at the same time.
+    OneGroup,
+    /// The logs have no battery voltage at rest.
+    NoRestingVoltage,
+    /// No plan says which vehicle flew.
+    VehicleGuessed {
+        /// The vehicle that was taken.
+        vehicle: String,
+    },
+    /// A warning as it was read from a file.
+    Said(String),
+}
+
+impl Warning {
+    /// Warnings that are recognised by their sentence when a verdict is read: what is proposed next
+    /// depends on them ([`Verdict::has_resting_voltage`](super::verdict::Verdict::has_resting_voltage)).
+    const RECOGNISED: [Self; 1] = [Self::NoRestingVoltage];
+
+    fn from_text(text: String) -> Self {
+        let known = Self::RECOGNISED.into_iter().find(|known| known.to_string() == text);
+        known.unwrap_or(Self::Said(text))
+    }
+}
+
+said_in_files!(Warning, Warning::from_text);
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OneDrone => f.write_str(
+                "one drone: its own offset and the air at its place cannot be told from the model's \
+                 errors; nothing is held out but rungs",
+            ),
+            Self::NoneHeldOut { drones } => {
+                write!(f, "{drones} drones: none is held out from fitting")
+            }
+            Self::FewDrones { drones, planned } => write!(
+                f,
+                "only {drones} of {planned} drones gave a usable log: intervals are wide, and groups \
+                 may be uneven"
+            ),
+            Self::AtBound { effect, parameter } => write!(
+                f,
+                "{effect}.{parameter} is at its bound: the effect as it is named does not fit, and the \
+                 model with it may be worse elsewhere"
+            ),
+            Self::OtherWind { lean_deg } => write!(
+                f,
+                "the drones lean by {lean_deg:.1} degrees more or less than the simulated ones in hover \
+                 and vertical flight: the two sides flew in different wind, and what wind does is mixed \
+                 with what the simulation lacks"
+            ),
+            Self::Tables => f.write_str(
+                "tables have no plan that could be flown again: the model's side is its closed forms at \
+                 the climb that was flown",
+            ),
+            Self::OneGroup => f.write_str(
+                "all drones climb at the same time: what depends on climb speed is mixed with the \
+                 shared air (calibration-counterphase tells them apart)",
+            ),
+            Self::NoRestingVoltage => f.write_str(
+                "the logs have no voltage at rest (BAT.VoltR): battery sag is looked for by time alone",
+            ),
+            Self::VehicleGuessed { vehicle } => write!(
+                f,
+                "no plan says which vehicle flew: {vehicle} is taken, and its closed forms stand for \
+                 what effects do (--vehicle, --plan)"
+            ),
+            Self::Said(text) => f.write_str(text),
+        }
+    }
+}
+
+/// Warnings about a comparison.
+pub(super) fn warnings(data: &Data, found: &Found, input: &Input<'_>) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let drones = data.drones();
+    if drones == 1 {
+        warnings.push(Warning::OneDrone);
+    } else if drones < FEWEST_TO_HOLD {
+        warnings.push(Warning::NoneHeldOut { drones });
+    }
+    if let Some(plan) = input.plan
+        && drones * 2 <= plan.slots.len()
+    {
+        warnings.push(Warning::FewDrones { drones, planned: plan.slots.len() });
+    }
+    for parameter in &found.parameters {
+        let value = value_of(&found.vehicle, parameter.effect, parameter.name);
+        let (low, high) = parameter.bounds;
+        if value.is_some_and(|value| value <= low || value >= high) {
+            warnings.push(Warning::AtBound {
+                effect: parameter.effect.to_owned(),
+                parameter: parameter.name.to_owned(),
+            });
+        }
+    }
+    if input.simulated.is_some() {
+        let lean_deg = found.comparison.apart_rad().to_degrees();
+        if lean_deg > OTHER_WIND_DEG {
+            warnings.push(Warning::OtherWind { lean_deg });
+        }
+    }
+    if input.table.is_some() {
+        warnings.push(Warning::Tables);
+    }
+    if data.groups.len() == 1 && input.plan.is_some() && input.simulated.is_none() {
+        warnings.push(Warning::OneGroup);
+    }
+    if found.comparison.scene.charge.is_none() {
+        warnings.push(Warning::NoRestingVoltage);
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gap::verdict::Verdict;
+
+    #[test]
+    fn a_verdict_keeps_its_sentences_and_what_is_decided_by_them() {
+        let cautions = vec![Warning::NoneHeldOut { drones: 4 }, Warning::NoRestingVoltage];
+        let verdict = Verdict { cautions, ..Verdict::default() };
+        assert!(!verdict.has_resting_voltage());
+        let text = serde_json::to_string(&verdict).unwrap();
+        assert!(text.contains(r#""4 drones: none is held out from fitting""#), "{text}");
+        let read: Verdict = serde_json::from_str(&text).unwrap();
+        assert_eq!(read, verdict);
+        assert!(!read.has_resting_voltage(), "also of a verdict that was read");
+        assert!(matches!(&read.cautions[0], Warning::Said(_)), "{:?}", read.cautions);
+        let other = Warning::Said("the logs have BAT.VoltR".to_owned());
+        assert!(Verdict { cautions: vec![other], ..Verdict::default() }.has_resting_voltage());
+    }
+}
