@@ -86,10 +86,10 @@ pub enum Magnitude {
     RotorRadii,
 }
 
-/// What another parameter of a hidden effect is.
+/// Value of a further parameter of a hidden effect, or how it is drawn.
 #[derive(Clone, Copy, Debug)]
 pub enum Also {
-    /// Always this.
+    /// A fixed value, in the unit of the parameter.
     Is(f64),
     /// Uniform between two numbers.
     Between(f64, f64),

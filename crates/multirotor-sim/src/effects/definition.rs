@@ -32,11 +32,11 @@ pub struct Definition {
     pub signals: &'static [Signal],
     /// Parameters, at most [`MAX_PARAMETERS`].
     pub parameters: &'static [Parameter],
-    /// Where it acts in the simulator.
+    /// Places in the simulator at which the effect acts.
     pub hooks: &'static [Hook],
     /// The signal along which it is shown, with the range.
     pub shown: (Signal, f64, f64),
-    /// How it is looked for where simulation and measurement disagree.
+    /// Way in which the effect is looked for where simulation and measurement disagree.
     pub sought: Sought,
 }
 
@@ -62,7 +62,7 @@ impl Definition {
     }
 }
 
-/// How an effect is looked for in the residual of measured against simulated pulses.
+/// Way in which an effect is looked for in the residual of measured against simulated pulses.
 #[derive(Debug)]
 pub enum Sought {
     /// By its closed form.
@@ -150,7 +150,7 @@ impl Signal {
     }
 }
 
-/// Where an effect acts in the simulator.
+/// Place in the simulator at which an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]

@@ -50,7 +50,7 @@ pub enum Role {
     BatteryReference,
     /// Power of everything but the motors, W.
     BatteryAvionics,
-    /// How much of a fall of the voltage reaches the motors, as an exponent.
+    /// Share of a fall of the voltage that reaches the motors, as an exponent.
     BatterySag,
     /// 1: the autopilot compensates for the voltage; 0: it does not.
     BatteryCompensated,
