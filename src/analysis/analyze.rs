@@ -1,4 +1,4 @@
-//! One flight of a fleet, and a campaign, from logs to results.
+//! Analysis of one flight of a fleet, and of a campaign, from logs to results.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -38,35 +38,35 @@ use super::warning::Warning;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
-/// Told after each log: (logs done, logs in all).
+/// Progress callback, called after each log with (logs done, logs in all).
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
-/// A flight cannot be analysed at all.
+/// Error of analysing a flight or a campaign.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
-    /// There are no logs.
+    /// The flight has no logs.
     #[error(
         "{name}: no logs to analyse (put the drones' .BIN files into the flight's logs folder)"
     )]
     NoLogs {
-        /// The flight.
+        /// Name of the flight.
         name: String,
     },
-    /// None of the logs could be used.
+    /// None of the flight's logs could be used.
     #[error("{name}: none of the {count} log(s) can be used:{}", listed(reasons))]
     NothingUsable {
-        /// The flight.
+        /// Name of the flight.
         name: String,
-        /// Logs given.
+        /// Number of logs that were given.
         count: usize,
-        /// Why not, one sentence for each.
+        /// Reasons why the logs could not be used, one sentence each.
         reasons: Vec<String>,
     },
     /// None of several flights can be analysed.
     #[error("{}", failures.iter().map(Self::to_string).collect::<Vec<_>>().join("\n"))]
     Every {
-        /// Why not, one for each.
+        /// Errors of the flights, one each.
         failures: Vec<AnalysisError>,
     },
     /// The campaign has no flights.

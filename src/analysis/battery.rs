@@ -31,19 +31,20 @@ pub(super) const LOW_SHARE: f64 = 0.88;
 /// per cent, 5.5 us on a show drone (docs/physics.md, 5.4). Chosen.
 const LEAST_UNKNOWN: f64 = 0.01;
 
-/// How much of a fall of voltage reaches the pulse.
+/// Effect of a fall of voltage on the pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sag {
-    /// `u - 1000` goes with the voltage to minus this power.
+    /// Power of the voltage, negated, with which `u - 1000` goes.
     pub exponent: f64,
-    /// Its standard error, common to the fleet.
+    /// Standard error of the exponent, common to the fleet.
     pub exponent_se: f64,
 }
 
 impl Sag {
-    /// Not corrected for: all of what the voltage may have done is error.
+    /// No correction: all that the voltage may have done is error.
     pub const UNCORRECTED: Self = Self { exponent: 0.0, exponent_se: 1.0 };
-    /// Logs of an unknown vehicle, which may be simulated with a battery that acts on nothing.
+    /// Correction for logs of an unknown vehicle, which may be simulated with a battery that acts
+    /// on nothing.
     pub const UNKNOWN: Self = Self { exponent: 0.5, exponent_se: 0.5 };
 }
 

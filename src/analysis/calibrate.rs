@@ -1,4 +1,4 @@
-//! Calibration: from windows to laws, for a drone, for the fleet's average, and as tables.
+//! Calibration: laws from windows, for a drone, for the fleet's average, and as tables.
 
 use thiserror::Error;
 
@@ -9,31 +9,31 @@ use super::stats::SampleStats;
 use super::window::WindowStats;
 use crate::flight::Indicator;
 
-/// Which number stands for a window.
+/// Statistic that represents the samples of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Location {
-    /// Median (the paper, in simulation).
+    /// Median of the samples (the paper, in simulation).
     Median,
-    /// Mean (the paper, in the field).
+    /// Mean of the samples (the paper, in the field).
     Mean,
-    /// Mean without the lowest and highest tenth: as robust as needed, and unlike the median it sees
-    /// fractions of the whole microseconds that logs hold.
+    /// Mean without the lowest and highest tenth: as robust as needed, and unlike the median it
+    /// resolves fractions of the whole microseconds that logs hold.
     #[default]
     Trimmed,
 }
 
-/// What a window's error is.
+/// Error of a window in the fit of a law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Weights {
-    /// The in-window standard deviation (the paper). Not the error of a mean, so that chi² is no
-    /// test; parameter errors are scaled with chi².
+    /// Standard deviation of the samples (the paper). It is not the error of a mean, so that chi²
+    /// is no test; parameter errors are scaled with chi².
     WindowSd,
     /// Standard error of the window's mean from block means, plus one variance common to all
     /// windows (turbulence longer than a window), chosen so that the better of the two laws has a
     /// reduced chi² of 1. Velocity errors count. Parameter errors are not scaled.
     #[default]
     BlockError,
-    /// All windows alike; parameter errors are scaled with chi².
+    /// One error for all windows; parameter errors are scaled with chi².
     Equal,
 }
 
@@ -46,17 +46,17 @@ impl Weights {
     }
 }
 
-/// A and u0 of the signed-quadratic law, to fit W alone.
+/// A and u0 of the signed-quadratic law, which are held while W alone is fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hold {
-    /// A, us/(m/s)².
+    /// A of the signed-quadratic law, us/(m/s)².
     pub a: f64,
-    /// u0, us.
+    /// u0 of the signed-quadratic law, us.
     pub u0_us: f64,
 }
 
 impl Hold {
-    /// From a reference calibration's signed-quadratic fit.
+    /// A and u0 of a reference calibration's signed-quadratic fit; `None` if it has none.
     pub fn from_laws(laws: &Laws) -> Option<Self> {
         match Law::from_fit(laws.signed_quadratic.as_ref()?)? {
             Law::SignedQuadratic { a, u0_us, .. } => Some(Self { a, u0_us }),
@@ -65,48 +65,48 @@ impl Hold {
     }
 }
 
-/// Choices of a calibration.
+/// Options of a calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitOptions {
-    /// What stands for rotor effort.
+    /// Indicator of rotor effort in the windows.
     pub indicator: Indicator,
-    /// Which number stands for a window.
+    /// Statistic that represents a window.
     pub location: Location,
-    /// What a window's error is.
+    /// Error of a window.
     pub weights: Weights,
-    /// Fit the hovers too (the paper does not).
+    /// Whether the hovers are fitted too (the paper does not).
     pub with_hovers: bool,
-    /// Also fit W with A and u0 held.
+    /// A and u0 to hold in an additional fit of W; `None`: no such fit.
     pub hold: Option<Hold>,
 }
 
-/// A calibration is not possible.
+/// Error of a calibration.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
-    /// No window of vertical motion.
+    /// No window of vertical motion can be used.
     #[error(
         "no ladder: the flight has no usable window of constant vertical speed ({rejected} rejected, \
          {hovers} hovers); a calibration needs legs at two speeds or more"
     )]
     NoLadder {
-        /// Moving windows that were rejected.
+        /// Number of moving windows that were rejected.
         rejected: usize,
-        /// Hover windows.
+        /// Number of hover windows.
         hovers: usize,
     },
-    /// All moving windows have the same speed.
+    /// There is only one speed in all moving windows.
     #[error(
         "only one vertical speed ({speed_mps} m/s) in {windows} usable window(s); a calibration \
          needs legs at two speeds or more"
     )]
     OneSpeed {
-        /// The speed.
+        /// Vertical speed of the windows, m/s, up positive.
         speed_mps: f64,
-        /// Windows of it.
+        /// Number of windows with the speed.
         windows: usize,
     },
-    /// The pulse is the same in all windows.
+    /// The indicator has one value in all windows.
     #[error(
         "the {} is {value:.0} {} in all windows: it does not depend on the speed (are these the \
          motor channels? check SERVOn_FUNCTION)",
@@ -114,17 +114,17 @@ pub enum CalibrationError {
         indicator.unit()
     )]
     ConstantPulse {
-        /// The indicator.
+        /// Indicator of rotor effort.
         indicator: Indicator,
-        /// Its value.
+        /// Value of the indicator in all windows, in its unit.
         value: f64,
     },
-    /// The fit failed.
+    /// The fit of a law failed.
     #[error("the fit failed: {0}")]
     Fit(#[from] FitError),
 }
 
-/// The number that stands for samples.
+/// Value of the statistic that represents samples.
 pub fn location(stats: &SampleStats, location: Location) -> f64 {
     match location {
         Location::Median => stats.median,

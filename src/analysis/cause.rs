@@ -14,35 +14,35 @@ use crate::flight::Loss;
 pub enum Cause {
     /// The log cannot be read, or holds no flight, in the words of its reader.
     Log(Sentence),
-    /// Who gives the log says that it is not to be used.
+    /// The caller says that the log is not to be used, for the reason given.
     Refused(String),
-    /// The log has the same bytes as another.
+    /// The log has the same bytes as another one.
     Copy {
-        /// The other log.
+        /// Name of the other log.
         of: String,
     },
     /// The drone's slot has a log already.
     SlotTaken {
-        /// The slot.
+        /// Number of the slot.
         slot: u16,
-        /// The log that the slot has.
+        /// Name of the log that the slot has.
         first: String,
     },
     /// The log is meant for a slot that the plan does not have.
     NoSuchSlot {
-        /// The slot.
+        /// Number of the slot.
         slot: u16,
     },
     /// The drone stood somewhere else.
     OtherPlace {
-        /// The slot with the nearest home.
+        /// Number of the slot with the nearest home.
         slot: u16,
-        /// How far that home is, m.
+        /// Distance from that home, m.
         distance_m: f64,
-        /// Distance that is taken for GPS error, m.
+        /// Largest distance that counts as GPS error, m.
         limit_m: f64,
     },
-    /// Nothing says whose the log is.
+    /// Nothing tells which drone the log is of.
     NoFreeSlot,
     /// Without a plan, the log has no commands to find windows by.
     NoCommands,
@@ -50,35 +50,35 @@ pub enum Cause {
     NoWindows,
     /// The drone was to stand still and was commanded up and down.
     Restless {
-        /// The window.
+        /// Name of the window.
         label: String,
         /// Start and end of the window, show time, s.
         from_to_s: [f64; 2],
     },
     /// Vertical speeds were flown that are not the plan's.
     OtherSpeeds {
-        /// Windows with another speed, and windows compared.
+        /// Number of windows with another speed, and of windows compared.
         wrong_of: [usize; 2],
         /// Whether legs were compared, or all windows.
         legs: bool,
-        /// The first wrong window.
+        /// Name of the first window with another speed.
         label: String,
-        /// Start of that window, show time, s.
+        /// Start of the first window with another speed, show time, s.
         start_s: f64,
-        /// Planned and flown, m/s.
+        /// Vertical speed planned and flown, m/s, up positive.
         planned_flown_mps: [f64; 2],
-        /// How much later than planned the legs were flown, if they are the plan's, s.
+        /// Delay of the flown legs behind the planned ones, if they are the plan's, s.
         offset_s: Option<f64>,
     },
     /// Horizontal legs of the plan were not flown.
     OtherTrack {
-        /// Legs that were not flown, and legs compared.
+        /// Number of legs that were not flown, and of legs compared.
         wrong_of: [usize; 2],
-        /// The first of them.
+        /// Name of the first leg that was not flown.
         label: String,
-        /// Start of that window, show time, s.
+        /// Start of the first leg that was not flown, show time, s.
         start_s: f64,
-        /// Planned and flown, m.
+        /// Length of the leg planned and flown, m.
         planned_flown_m: [f64; 2],
     },
     /// No window of the plan lies in the time that the log speaks of.
@@ -90,14 +90,14 @@ pub enum Cause {
     },
     /// The drone's show began at another time than those of most drones.
     OtherStart {
-        /// How much later, s.
+        /// Delay behind the start of most drones, s.
         later_s: f64,
     },
     /// The log is used, but not all of it is there.
     InPart(Vec<Loss>),
     /// There is no log of the drone.
     NoLog {
-        /// The drone.
+        /// Name of the drone.
         name: String,
     },
     /// None of the drone's logs is used: their names and the reasons.
@@ -116,9 +116,9 @@ pub enum Cause {
     Rejected {
         /// Whether the drone moved along a track.
         track: bool,
-        /// Start and end, show time, s.
+        /// Start and end of the hover or track, show time, s.
         from_to_s: [f64; 2],
-        /// Reasons, in words.
+        /// Reasons for the rejection, as clauses.
         reasons: Vec<&'static str>,
     },
     /// The hover is shorter than a running mean.
@@ -131,7 +131,7 @@ pub enum Cause {
         /// Whether the drone moved along a track.
         track: bool,
     },
-    /// The log has gaps in all of the hover.
+    /// The log has gaps that cover the whole hover.
     Gaps,
     /// A reason as it was read from a file.
     Said(String),

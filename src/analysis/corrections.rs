@@ -1,5 +1,5 @@
-//! What is known about pulses besides the vertical air speed, taken away before laws are fitted for
-//! the map, with the doubt that each correction leaves.
+//! Corrections of pulses for known effects other than the vertical air speed, made before laws are
+//! fitted for the map, with the doubt that each correction leaves.
 //!
 //! A doubt is one number for the whole fleet (how much more or less than assumed a correction should
 //! have been). It moves calibration and hover together: what is left of it in the map is the

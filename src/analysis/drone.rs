@@ -1,4 +1,4 @@
-//! One log of a flight: windows, laws and (with reference laws) the air.
+//! Analysis of one log of a flight: windows, laws and (with reference laws) the air.
 
 use super::aware::Aware;
 use super::calibrate::{self, CalibrationError, FitOptions, Hold};

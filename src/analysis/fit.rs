@@ -15,16 +15,16 @@ use nalgebra::{DMatrix, DVector, Dyn};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 
-/// A fit was not possible.
+/// Error of a fit.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FitError {
-    /// Fewer points than free parameters.
+    /// There are fewer points than free parameters.
     #[error("{points} points cannot determine {parameters} parameters")]
     TooFewPoints {
-        /// Points given.
+        /// Number of points.
         points: usize,
-        /// Free parameters.
+        /// Number of free parameters.
         parameters: usize,
     },
     /// A start value or a residual at the start is not a number.
@@ -35,16 +35,16 @@ pub enum FitError {
     Singular,
 }
 
-/// A local minimum of chi².
+/// A fit: a local minimum of chi².
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
     /// Parameters at the minimum.
     pub parameters: Vec<f64>,
-    /// Unscaled covariance `(JᵀJ)⁻¹`.
+    /// Unscaled covariance of the parameters, `(JᵀJ)⁻¹`.
     pub covariance: DMatrix<f64>,
     /// Sum of squared residuals.
     pub chi2: f64,
-    /// Residuals minus parameters.
+    /// Degrees of freedom: number of residuals minus number of parameters.
     pub dof: usize,
     /// Whether the iteration ended at a minimum rather than by running out of patience.
     pub converged: bool,
@@ -96,7 +96,7 @@ where
     minimize_with(residuals, None, start)
 }
 
-/// Derivatives of the residuals (rows) by the parameters (columns).
+/// Function that gives the derivatives of the residuals (rows) by the parameters (columns).
 pub type Jacobian<'a> = &'a dyn Fn(&[f64]) -> DMatrix<f64>;
 
 /// [`minimize`] with exact derivatives, of as many rows as there are residuals.

@@ -16,16 +16,16 @@ pub(super) const OTHER_MINIMA_CHI2: f64 = 4.0;
 pub enum FitWarning {
     /// The optimiser stopped before a minimum.
     NotConverged,
-    /// There are as many parameters as windows.
+    /// The fit has as many parameters as windows.
     NoErrors {
-        /// Windows fitted.
+        /// Number of windows in the fit.
         windows: usize,
     },
-    /// There are hardly more windows than parameters.
+    /// The fit has hardly more windows than parameters.
     FewWindows {
-        /// Windows fitted.
+        /// Number of windows in the fit.
         windows: usize,
-        /// Degrees of freedom.
+        /// Degrees of freedom of the fit.
         dof: usize,
     },
     /// Other minima are nearly as good.
@@ -35,9 +35,9 @@ pub enum FitWarning {
     },
     /// W, fitted alone, lies at or beyond the edge of the searched range.
     WAtEdge,
-    /// There is no minimum inside of the searched range of W.
+    /// Chi² has no minimum inside the searched range of W.
     NoMinimum,
-    /// The fit is better still beyond the searched range of W.
+    /// Chi² is lower still beyond the searched range of W.
     BetterBeyond,
     /// A doubt as it was read from a file.
     Said(String),

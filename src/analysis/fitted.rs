@@ -1,4 +1,4 @@
-//! Laws as they were fitted.
+//! Laws as they were fitted to windows.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,12 +52,12 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// One of its parameters; `None` if its law has no such one.
+    /// Parameter of the fit; `None` if its law does not have it.
     pub fn parameter(&self, symbol: Symbol) -> Option<&Parameter> {
         self.parameters.iter().find(|parameter| parameter.name == symbol)
     }
 
-    /// The value of a parameter; `None` if its law has no such one.
+    /// Value of a parameter; `None` if the fit's law does not have it.
     pub fn value(&self, symbol: Symbol) -> Option<f64> {
         self.parameter(symbol).map(|parameter| parameter.estimate.value)
     }
@@ -78,7 +78,7 @@ pub struct Parameter {
 }
 
 impl Laws {
-    /// The free fit of a law.
+    /// Free fit of a law, if there is one.
     pub fn of(&self, law: LawKind) -> Option<&Fit> {
         match law {
             LawKind::Linear => self.linear.as_ref(),

@@ -1,4 +1,4 @@
-//! The words of the laws: their forms, their parameters, and whose they are.
+//! Names of the laws: their forms, their parameters, and their owners.
 
 use std::fmt;
 
@@ -6,19 +6,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::flight::Indicator;
 
-/// The form of a law. In files and tables it stands by its name.
+/// Form of a law. In files and tables it stands by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LawKind {
-    /// `u = A' V + u0`.
+    /// The straight line `u = A' V + u0`.
     #[serde(rename = "linear")]
     Linear,
-    /// `u = A f(V - W) + u0`.
+    /// The signed quadratic `u = A f(V - W) + u0`.
     #[serde(rename = "signed quadratic")]
     SignedQuadratic,
 }
 
 impl LawKind {
-    /// Name in files and tables.
+    /// Name of the form in files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -26,7 +26,7 @@ impl LawKind {
         }
     }
 
-    /// The other of the two forms.
+    /// The signed quadratic for the line, and the line for the signed quadratic.
     #[must_use]
     pub fn other(self) -> Self {
         match self {
@@ -45,15 +45,15 @@ impl fmt::Display for LawKind {
 /// A parameter of a law. In files it stands by its symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Symbol {
-    /// Coefficient of the signed quadratic.
+    /// Coefficient A of the signed quadratic.
     A,
-    /// Slope of the line.
+    /// Slope A' of the line.
     #[serde(rename = "A'")]
     Slope,
-    /// Effort in hover.
+    /// Effort in hover, u0.
     #[serde(rename = "u0")]
     U0,
-    /// Vertical air speed during the calibration.
+    /// Vertical air speed W during the calibration.
     W,
 }
 
@@ -63,7 +63,7 @@ impl Symbol {
     /// Parameters of the signed quadratic, in their order.
     pub const SIGNED_QUADRATIC: [Self; 3] = [Self::A, Self::U0, Self::W];
 
-    /// Symbol in files.
+    /// Symbol of the parameter in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::A => "A",
@@ -96,7 +96,7 @@ pub enum LawOf {
 }
 
 impl LawOf {
-    /// Name in files and tables.
+    /// Name of the owner in files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Own => "own",

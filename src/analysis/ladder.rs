@@ -29,12 +29,12 @@ pub struct PartialLadder {
 }
 
 impl PartialLadder {
-    /// `6 of 14 legs, -1.5 to +1.5 m/s`.
+    /// The part of the ladder in words: `6 of 14 legs, -1.5 to +1.5 m/s`.
     pub fn short(&self) -> String {
         self.sentence().to_string()
     }
 
-    /// [`PartialLadder::short`] with its speeds as numbers.
+    /// The part of the ladder in words as by [`PartialLadder::short`], with its speeds as numbers.
     pub fn sentence(&self) -> Sentence {
         let Ladder { legs, lowest_mps, highest_mps } = self.usable;
         Sentence::from(format!("{legs} of {} legs, ", self.fleet.legs))

@@ -40,7 +40,7 @@ pub struct Point {
     pub velocity_sigma_mps: f64,
 }
 
-/// Which errors a fit reports.
+/// Scale of the errors that a fit reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorScale {
     /// `(JᵀJ)⁻¹`: the sigmas are the errors of the points.
@@ -52,31 +52,31 @@ pub enum ErrorScale {
 /// A law with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
-    /// `u = a f(V - w) + u0`.
+    /// The signed quadratic `u = a f(V - w) + u0`.
     SignedQuadratic {
-        /// A, us/(m/s)².
+        /// Coefficient A, us/(m/s)².
         a: f64,
-        /// Hover pulse, us.
+        /// Pulse in hover in still air, u0, us.
         u0_us: f64,
         /// Vertical air speed during the calibration, m/s, up positive.
         w_mps: f64,
     },
-    /// `u = slope V + u0`.
+    /// The straight line `u = slope V + u0`.
     Linear {
-        /// A', us/(m/s).
+        /// Slope A', us/(m/s).
         slope: f64,
-        /// Hover pulse, us.
+        /// Pulse in hover, u0, us.
         u0_us: f64,
     },
 }
 
-/// `f(x) = x|x|`, eq. 3.
+/// The signed square `f(x) = x|x|`, eq. 3.
 pub fn signed_square(x: f64) -> f64 {
     x * x.abs()
 }
 
 impl Law {
-    /// Its form.
+    /// Form of the law.
     pub fn kind(&self) -> LawKind {
         match self {
             Self::SignedQuadratic { .. } => LawKind::SignedQuadratic,
@@ -115,7 +115,7 @@ impl Law {
         }
     }
 
-    /// The law in a fit's parameters; `None` if they are not those of a law.
+    /// The law with a fit's parameters; `None` if they are not those of a law.
     pub fn from_fit(fit: &Fit) -> Option<Self> {
         let u0_us = fit.value(Symbol::U0)?;
         match (fit.value(Symbol::A), fit.value(Symbol::Slope)) {
@@ -126,7 +126,7 @@ impl Law {
     }
 }
 
-/// Fits `u = A' V + u0`.
+/// Fits the straight line `u = A' V + u0`.
 pub fn linear(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
     check(points, 2)?;
     let (fit, sigmas) = with_effective_variance(points, |sigmas| {
@@ -146,7 +146,7 @@ pub fn linear(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
     Ok(describe(points, &sigmas, law, &solution, &[true, true], scale))
 }
 
-/// Fits `u = A f(V - W) + u0` with all three free.
+/// Fits the signed quadratic `u = A f(V - W) + u0` with all three parameters free.
 ///
 /// The answer is the deepest minimum inside |W| < 8 m/s; other minima within a chi² of 4 of it are
 /// listed. A chi² that falls below the answer's at the edge of the range (or no minimum inside) is

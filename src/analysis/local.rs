@@ -1,4 +1,4 @@
-//! The drones' deviations from the fleet: their own constants, slopes and bends, and the air that
+//! Deviations of the drones from the fleet: their own constants, slopes and bends, and the air that
 //! each met alone.
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};

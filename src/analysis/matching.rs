@@ -1,4 +1,4 @@
-//! Which log belongs to which slot of a plan.
+//! Assignment of logs to the slots of a plan.
 //!
 //! What a log says about its drone counts in this order: the place where it stood when it was armed,
 //! a record's word ([`LogInput::slot`](super::LogInput::slot)), the number in its file name, its

@@ -1,4 +1,4 @@
-//! One drone's values of the map, with their errors.
+//! Values of the map for one drone, with their errors.
 
 use super::budget::{ErrorBudget, QualityFlag};
 use super::corrections::DOUBTS;

@@ -65,7 +65,8 @@ pub struct Offset {
 }
 
 impl OffsetMap {
-    /// From the hovers of a calibration that were flown properly; `None` with fewer than two.
+    /// The offset map of a calibration, from the hovers that were flown properly; `None` with fewer
+    /// than two.
     pub fn of(windows: &[WindowStats], by: Location) -> Option<Self> {
         let hovers = || windows.iter().filter(|one| one.kind.is_hover() && one.rejected.is_empty());
         let pulses: Vec<f64> = hovers().map(|one| location(&one.pulse_phi_us, by)).collect();
@@ -85,7 +86,7 @@ impl OffsetMap {
         Some(Self { baseline_us: Estimate::new(mean, se), points })
     }
 
-    /// The interpolation; make it once for many places.
+    /// Prepares the interpolation; to be done once for many times and heights.
     pub fn surface(&self) -> OffsetSurface {
         let mut mesh = DelaunayTriangulation::new();
         let mut along: Vec<(f64, f64)> = Vec::new();

@@ -1,4 +1,4 @@
-//! Choices of an analysis.
+//! Options of an analysis.
 
 use super::calibrate::{FitOptions, Location, Weights};
 use super::input::FlightInput;
@@ -8,16 +8,16 @@ use super::table::PaperTable;
 use super::windows::{Tilt, WindowOptions};
 use crate::flight::Indicator;
 
-/// Choices of an analysis.
+/// Options of an analysis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnalysisOptions {
-    /// What stands for rotor effort.
+    /// Indicator of rotor effort to analyse.
     pub indicator: Indicator,
-    /// How windows are measured.
+    /// Options for measuring windows.
     pub windows: WindowOptions,
     /// Whether the slow offset of the pulse is subtracted before laws are fitted.
     pub offset: OffsetRule,
-    /// How laws are fitted.
+    /// Options for fitting laws.
     pub fit: FitOptions,
     /// Windows as in the paper, whatever `fit` says of them: medians in simulations and means in the
     /// field, weighted by the samples' standard deviation.
@@ -29,24 +29,24 @@ pub struct AnalysisOptions {
     /// The paper's table beside the fleet's numbers; `None`: Table I for flights with a known true
     /// updraft (simulations), Table II for other fleets (of two drones or more).
     pub paper: Option<PaperTable>,
-    /// How statistics of a map are made.
+    /// Options for the statistics of a map.
     pub statistics: StatisticsOptions,
     /// Whether the map's calibration law knows about slow air and the map has errors with their
     /// origins; else the laws of the tables are inverted, as in the paper.
     pub air_aware: bool,
-    /// Most points of a trace for figures.
+    /// Largest number of points of a trace for figures.
     pub trace_points: usize,
 }
 
-/// When the slow offset (eq. 5) is subtracted.
+/// Rule for subtracting the slow offset (eq. 5).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OffsetRule {
-    /// As in the paper: in the field, and not in simulations of uniform air.
+    /// In the field, but not in simulations of uniform air, as in the paper.
     #[default]
     Field,
-    /// Always.
+    /// In every flight.
     Always,
-    /// Never.
+    /// In no flight, so that pulses stay as they were measured.
     Never,
 }
 

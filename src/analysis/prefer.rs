@@ -1,4 +1,5 @@
-//! Which of the two laws describes a calibration, and when the signed quadratic does not.
+//! Choice between the two laws for a calibration, and the cases in which the signed quadratic does
+//! not describe it.
 
 use super::law::{LawKind, Symbol};
 use super::result::{DroneAnalysis, Fit, FlightAnalysis, Laws};
@@ -126,8 +127,8 @@ pub(super) fn describes(laws: &Laws, law: LawKind) -> bool {
     }
 }
 
-/// That the signed quadratic is not the shape of these windows; `None` where it is, or where the windows
-/// do not tell.
+/// Warning that the signed quadratic is not the shape of these windows; `None` where it is, or
+/// where the windows do not tell.
 pub fn misfit(laws: &Laws) -> Option<Warning> {
     let (square, line) = (laws.signed_quadratic.as_ref()?, laws.linear.as_ref()?);
     let (quadratic, linear) = (square.chi2_reduced?, line.chi2_reduced?);

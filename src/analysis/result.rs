@@ -1,4 +1,4 @@
-//! What an analysis says, as written to `analysis.json` and drawn by the report.
+//! Results of an analysis, as written to `analysis.json` and drawn by the report.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -115,12 +115,12 @@ pub struct UnusedLog {
 }
 
 impl UnusedLog {
-    /// One sentence that names the file.
+    /// Sentence about the unused log that names its file.
     pub fn sentence(&self) -> Sentence {
         self.reason.about(&self.source)
     }
 
-    /// Whether the reason names the file by itself.
+    /// Whether the reason itself names the file.
     pub fn is_named(&self) -> bool {
         self.reason.sentence().names(&self.source)
     }
@@ -164,19 +164,20 @@ pub struct Unmeasured {
     pub reason: Cause,
 }
 
-/// How much of what was asked for an analysis gave.
+/// Completeness of an analysis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Yield {
     /// Every drone has its laws, from the fleet's whole ladder, or its value of the map.
     Whole,
     /// Some drones, or some flights, have none, or a law of a part of the ladder.
     Partial,
-    /// There is no law and no value of the map at all.
+    /// No flight has a law or a value of the map.
     Nothing,
 }
 
 impl FlightAnalysis {
-    /// Drones that have what the flight was for: laws, or a value of the map.
+    /// Number of drones with a result of the kind that the flight was for: laws, or a value of the
+    /// map.
     pub fn results(&self) -> usize {
         match self.purpose {
             Purpose::Calibration => self.drones.iter().filter(|one| one.laws.is_some()).count(),
@@ -186,7 +187,7 @@ impl FlightAnalysis {
 }
 
 impl Analysis {
-    /// How much of what was asked for there is.
+    /// Completeness of the analysis.
     pub fn what_was_found(&self) -> Yield {
         let whole = |flight: &FlightAnalysis| {
             flight.missing.is_empty()

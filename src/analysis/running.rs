@@ -1,4 +1,4 @@
-//! Running means.
+//! Running means of a series.
 
 use crate::flight::Series;
 

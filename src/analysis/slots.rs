@@ -1,4 +1,4 @@
-//! Opens the logs of a flight and finds out whose they are.
+//! Opening of a flight's logs, and their assignment to slots.
 
 use rayon::prelude::*;
 

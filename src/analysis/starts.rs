@@ -1,5 +1,5 @@
-//! Drones whose show began at another time than the others': their logs are of another flight of the
-//! same plan, however well they fit it.
+//! Detection of drones whose show began at another time than that of most: their logs are of
+//! another flight of the same plan, however well they fit it.
 
 use super::drone::One;
 use crate::flight::Alignment;

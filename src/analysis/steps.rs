@@ -16,8 +16,8 @@ const END_CUT_S: f64 = 0.5;
 /// Longest table, s.
 const LONGEST_S: f64 = 1e6;
 
-/// Stretches over which the velocity, averaged over 1 s, stays near its mean: each is a window, less
-/// the controller's transient.
+/// Finds the stretches over which the velocity, averaged over 1 s, stays near its mean: each is a
+/// window, less the controller's transient.
 pub fn steady(flight: &Flight, steps: &Steps) -> Vec<Target> {
     let mut targets = Vec::new();
     let mut run: Vec<(f64, f64)> = Vec::new();

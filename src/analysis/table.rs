@@ -20,7 +20,7 @@ pub enum PaperTable {
     /// Table I: simulation in still air.
     #[serde(rename = "I")]
     Simulation,
-    /// Table II: field.
+    /// Table II: flights in the field.
     #[serde(rename = "II")]
     Field,
 }
@@ -53,19 +53,19 @@ pub enum TableLaw {
     /// The signed quadratic with all parameters free.
     #[serde(rename = "signed quadratic")]
     SignedQuadratic,
-    /// The signed quadratic with A and u0 held from a reference.
+    /// The signed quadratic with A and u0 held at those of a reference.
     #[serde(rename = "signed quadratic, A and u0 held")]
     SignedQuadraticHeld,
-    /// The line.
+    /// The straight line.
     #[serde(rename = "linear")]
     Linear,
-    /// What belongs to the fits of all laws.
+    /// All laws: a row about the fits as a whole.
     #[serde(rename = "both laws")]
     Both,
 }
 
 impl TableLaw {
-    /// Name in files and tables.
+    /// Name of the law in files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::SignedQuadratic => LawKind::SignedQuadratic.name(),
@@ -75,7 +75,7 @@ impl TableLaw {
         }
     }
 
-    /// The form of the law; `None` for what belongs to all laws.
+    /// Form of the law; `None` for rows about all laws.
     pub fn kind(self) -> Option<LawKind> {
         match self {
             Self::SignedQuadratic | Self::SignedQuadraticHeld => Some(LawKind::SignedQuadratic),
@@ -107,7 +107,7 @@ impl Quantity {
         Self::AddedScatter,
     ];
 
-    /// Name in files: the parameter's symbol, `chi2_nu` or `sigma_added`.
+    /// Name of the quantity in files: the parameter's symbol, `chi2_nu` or `sigma_added`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Parameter(symbol) => symbol.name(),
@@ -123,7 +123,7 @@ impl From<Quantity> for &'static str {
     }
 }
 
-/// A file's table has a row about something that is not known.
+/// Error of a table in a file: a row is about an unknown quantity, with this name.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("`{0}` is no parameter of a law, nor chi2_nu or sigma_added")]
 pub struct UnknownQuantity(String);

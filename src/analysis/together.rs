@@ -15,13 +15,14 @@ const NAMED: usize = 6;
 pub struct Remark {
     /// Slot of the drone that the remark is about, if it has one.
     pub slot: Option<u16>,
-    /// Name of the drone or log where the remark stands alone; empty: what is said names it.
+    /// Name of the drone or log, for a line about it alone; empty if the text of the remark names
+    /// it.
     pub name: String,
-    /// The remark.
+    /// Text of the remark.
     pub said: Sentence,
 }
 
-/// Lines of remarks, in the order in which their causes came first.
+/// Merges remarks into lines, in the order in which their causes came first.
 pub fn together(remarks: impl IntoIterator<Item = Remark>) -> Vec<String> {
     let mut groups: Vec<Vec<Remark>> = Vec::new();
     for remark in remarks {

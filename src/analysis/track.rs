@@ -1,4 +1,5 @@
-//! A drone that moves at constant horizontal speed measures the air along its track.
+//! Measurement along a track: a drone that moves at constant horizontal speed measures the air
+//! along its way.
 //!
 //! In the frame of the air, flying at 4 m/s through still air and standing in a wind of 4 m/s are the
 //! same: what drag and translational lift do to the pulse follows from the lean in both, and the

@@ -1,4 +1,4 @@
-//! A map beside the true air.
+//! Comparison of a map with the true air.
 
 use super::budget::TruthCheck;
 use super::result::DroneUpdraft;

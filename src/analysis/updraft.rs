@@ -55,7 +55,7 @@ pub struct Lean<'a> {
     pub calibration: &'a [WindowStats],
 }
 
-/// The longest hover among the windows: where a measurement looks.
+/// Longest hover among the windows, in which a measurement is made.
 pub fn hover(targets: &[Target]) -> Option<&Target> {
     let length = |target: &&Target| target.end_s - target.start_s;
     targets
@@ -175,7 +175,7 @@ fn law_error_mps(law: Law, fit: &Fit, pulse_us: f64) -> f64 {
     (gradient.transpose() * covariance * gradient)[(0, 0)].max(0.0).sqrt()
 }
 
-/// The common times of all drones: from the earliest first bin to the latest last one.
+/// Common times of all drones, s: from the earliest first bin to the latest last one.
 pub fn common_times(drones: &[DroneSeries]) -> Vec<i64> {
     let first = drones.iter().map(|drone| drone.first_s).min();
     let last = drones.iter().map(|drone| drone.first_s + drone.updraft_mps.len() as i64).max();
@@ -186,7 +186,7 @@ pub fn common_times(drones: &[DroneSeries]) -> Vec<i64> {
 }
 
 impl DroneSeries {
-    /// The estimates at common times, `None` outside the drone's own.
+    /// Estimates at common times, m/s; `None` outside the drone's own.
     pub fn at(&self, times_s: &[i64]) -> Vec<Option<f64>> {
         self.spread(&self.updraft_mps, times_s)
     }

@@ -30,90 +30,90 @@ pub enum Warning {
     Failed(String),
     /// A drone of a calibration flew at another time than most.
     OtherStart {
-        /// The drone.
+        /// Name of the drone.
         name: String,
-        /// How much later, s.
+        /// Delay behind the start of most drones, s.
         later_s: f64,
     },
     /// Drones of a calibration flew a part of the ladder.
     PartialLadders {
         /// Names of the drones and the ladders that they flew.
         drones: Vec<(String, PartialLadder)>,
-        /// Drones of the fleet.
+        /// Number of drones in the fleet.
         of: usize,
         /// The ladder of the fleet's middle drone.
         whole: Ladder,
     },
     /// Most drones have usable windows of a part of the ladder only.
     FleetLadder {
-        /// The usable ladder.
+        /// Ladder of the usable windows.
         usable: Ladder,
-        /// The ladder that was flown.
+        /// Ladder that was flown.
         flown: Ladder,
     },
-    /// There is no law of the drones' average.
+    /// No law was fitted to the drones' average, for this reason.
     NoFlock(CalibrationError),
     /// No law was fitted to any drone.
     NoLaw,
     /// The laws rest on very few windows.
     FewWindows {
-        /// Windows of vertical motion.
+        /// Number of windows of vertical motion.
         windows: usize,
     },
     /// The signed quadratic does not describe the flight.
     Misfit {
-        /// Its reduced chi².
+        /// Reduced chi² of the signed quadratic.
         quadratic: f64,
-        /// That of the line.
+        /// Reduced chi² of the line.
         linear: f64,
-        /// W* where it is stronger than air is, m/s.
+        /// W* if it is stronger than air moves, m/s.
         strong_w_mps: Option<f64>,
     },
     /// W* is the vertex of a parabola.
     Vertex {
-        /// W*, m/s.
+        /// Vertical air speed W* of the fit, m/s.
         w_mps: f64,
         /// Lowest and highest commanded speed of the ladder, m/s.
         speeds_mps: [f64; 2],
     },
     /// The drones leaned in a calibration.
     LadderWind {
-        /// Mean lean, degrees.
+        /// Mean lean of the drones, degrees.
         lean_deg: f64,
         /// Wind along the rotor axis, m/s.
         axial_mps: f64,
-        /// Whether it is known how the vehicle leans in wind.
+        /// Whether the lean of the vehicle in wind is known.
         known: bool,
     },
-    /// The other tilt correction would change u0 by more than its error.
+    /// The tilt correction that was not used would change u0 by more than its error.
     TiltForm {
-        /// The correction that was used.
+        /// Tilt correction that was used.
         used: Tilt,
         /// Indicator of rotor effort.
         indicator: Indicator,
-        /// How much the other form would change u0, in the indicator's unit.
+        /// Change of u0 with the correction that was not used, in the indicator's unit.
         change: f64,
-        /// The error of u0, in the indicator's unit.
+        /// Standard error of u0, in the indicator's unit.
         error: f64,
-        /// Slope of the line, indicator per m/s.
+        /// Slope of the line, the indicator's unit per m/s.
         slope: f64,
     },
-    /// There are no laws to measure the air with.
+    /// No laws are there to measure the air with.
     NoCalibration,
     /// A flight without a plan has some climbs, but too few for a calibration.
     NoLadder {
-        /// Speeds of climbs.
+        /// Number of speeds of climbs.
         up: usize,
-        /// Speeds of descents.
+        /// Number of speeds of descents.
         down: usize,
     },
     /// The drones leaned in a measurement.
     Wind {
-        /// Mean lean, degrees.
+        /// Mean lean of the drones, degrees.
         lean_deg: f64,
         /// Error that wind may leave in the map, m/s.
         error_mps: f64,
-        /// How wind was corrected for.
+        /// Correction of the map for wind.
         corrected: WindHandled,
         /// Whether drones moved along tracks.
         moved: bool,
@@ -122,27 +122,27 @@ pub enum Warning {
     Battery {
         /// Possible error, m/s, where nothing is corrected for want of voltages in the calibration.
         uncorrected_mps: Option<f64>,
-        /// Drones without a voltage in the hover, and the possible error, m/s.
+        /// Names of the drones without a voltage in the hover, and the possible error, m/s.
         in_hover: Option<(Vec<String>, f64)>,
-        /// Drones without a voltage in the calibration.
+        /// Names of the drones without a voltage in the calibration.
         in_calibration: Vec<String>,
     },
     /// The map inverts the laws of the tables.
     PlainMap,
-    /// The drones moved.
+    /// The drones moved, so that the map is of their tracks.
     Scan,
     /// A warning as it was read from a file.
     Said(String),
 }
 
-/// How a map deals with wind on leaning drones.
+/// Correction of a map for wind on leaning drones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WindHandled {
     /// Corrected with the physics of the vehicle's file.
     Physics,
     /// Corrected with the drag of the simulated vehicle.
     Drag,
-    /// Not corrected.
+    /// The map is not corrected for wind.
     Not,
 }
 

@@ -1,4 +1,4 @@
-//! What a drone did in one window.
+//! Measurements of a drone in one window.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -65,7 +65,7 @@ pub enum Rejection {
 }
 
 impl Rejection {
-    /// In words.
+    /// The reason as a clause: "the log has a gap".
     pub fn words(self) -> &'static str {
         match self {
             Self::Saturated => "a motor touched its limit",

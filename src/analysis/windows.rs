@@ -11,7 +11,7 @@ use super::window::{Rejection, WindowStats};
 use crate::flight::{Flight, Indicator, Series};
 use crate::mission::plan::{Kind, Segment};
 
-/// How rotor effort is corrected for tilt.
+/// Correction of rotor effort for tilt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Tilt {
@@ -19,14 +19,14 @@ pub enum Tilt {
     /// and takes thrust for linear in the pulse: at 8 degrees of tilt that is 12 us too much on a
     /// real drone, which reads as 0.46 m/s of updraft.
     Paper,
-    /// What the vertical part of the thrust takes: `(u - 1000) cos(phi)^p + 1000` with p the power
-    /// of thrust that the excess pulse goes with ([`Indicator::thrust_exponent`]).
+    /// The share that the vertical part of the thrust takes: `(u - 1000) cos(phi)^p + 1000` with p
+    /// the power of thrust that the excess pulse goes with ([`Indicator::thrust_exponent`]).
     #[default]
     Thrust,
 }
 
 impl Tilt {
-    /// An indicator's value at a tilt, corrected, in its unit.
+    /// Value of an indicator at a tilt, corrected to level flight, in its unit.
     pub fn correct(self, value: f64, tilt_rad: f64, indicator: Indicator, exponent: f64) -> f64 {
         let cos = tilt_rad.cos();
         match self {
@@ -39,10 +39,10 @@ impl Tilt {
     }
 }
 
-/// Window rules.
+/// Options for measuring windows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowOptions {
-    /// Tilt correction.
+    /// Correction for tilt.
     pub tilt: Tilt,
     /// Power of thrust that the indicator goes with, where the vehicle is known; else
     /// [`Indicator::thrust_exponent`].
@@ -78,12 +78,12 @@ impl WindowOptions {
     }
 }
 
-/// Where to look and what was commanded there.
+/// A window to measure: its time, and the command in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// Kind of the segment.
     pub kind: Kind,
-    /// Label for people.
+    /// Name of the window for people.
     pub label: String,
     /// Start of the window, show time, s.
     pub start_s: f64,
@@ -134,7 +134,7 @@ const OFFSET_MIN_S: f64 = 0.5;
 /// Pulse quantum, us: a motor within it of its limit is at the limit.
 const QUANTUM_US: f64 = 1.0;
 
-/// Windows of a plan's segments: legs, hovers and horizontal legs that carry one.
+/// Windows of a plan's segments: legs, hovers, and those horizontal legs that carry a window.
 pub fn planned(segments: &[Segment]) -> Vec<Target> {
     let analysed = |segment: &&Segment| {
         segment.kind.is_leg() || segment.kind.is_hover() || segment.kind == Kind::Horizontal
@@ -323,7 +323,7 @@ fn nearby(series: &Series, time_s: f64) -> Option<f64> {
     })
 }
 
-/// What the vehicle did in each window.
+/// Measures the vehicle in each window.
 pub fn measure(
     flight: &Flight,
     corrected: &Corrected,

@@ -1,4 +1,5 @@
-//! The backward check: what was named must still say something with all that came after it.
+//! Backward check: an effect that was named must still improve the model with all that came after
+//! it.
 
 use super::compare::Comparison;
 use super::error::GapError;

@@ -29,7 +29,7 @@ pub struct Bin {
     pub end_s: f64,
     /// Commanded velocity, show frame, m/s, z up positive.
     pub velocity_mps: [f64; 3],
-    /// Which segment of the group it is of; bins of one segment are held out together.
+    /// Index of the segment in the group; bins of one segment are held out together.
     pub segment: usize,
 }
 
@@ -102,7 +102,7 @@ pub struct BinValues {
     pub height_m: f64,
     /// Mean lean of the thrust axis, show frame x and y, rad.
     pub lean_rad: [f64; 2],
-    /// Battery voltage at rest, V; NaN: not logged.
+    /// Battery voltage at rest, V; NaN if it was not logged.
     pub resting_v: f64,
 }
 

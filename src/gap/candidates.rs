@@ -43,7 +43,7 @@ pub(super) struct Size {
     pub high: f64,
     /// Value in the present model; 0 without the effect.
     pub now: f64,
-    /// Usual value.
+    /// Usual value, in the parameter's unit.
     pub usual: f64,
 }
 

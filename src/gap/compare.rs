@@ -19,38 +19,38 @@ use crate::vehicle::Vehicle;
 /// The simulated side of a comparison.
 #[derive(Clone, Debug)]
 pub enum Simulated<'a> {
-    /// The embedded simulator re-flies the plan.
+    /// A simulation of the plan by the embedded simulator.
     Refly(&'a Plan),
-    /// Somebody else's simulation.
+    /// Logs of another program's simulation.
     Given {
-        /// Its bins by group.
+        /// Simulated values, by group and bin; `None` where the simulation lacks the bin.
         values: Vec<Vec<Option<BinValues>>>,
         /// The model that stands for what it flew. Nobody can fly it again with something added: what is
         /// added is what it does to the model in the embedded simulator, or, without a plan, by the closed
         /// forms.
         flew: &'a Vehicle,
     },
-    /// The model's closed forms at the climb that was flown: nobody has a plan that could be flown again.
+    /// The model's closed forms at the climb that was flown, as there is no plan to simulate.
     Closed,
 }
 
-/// Both sides in the same bins, for one state of the model.
+/// Measurement and simulation, bin by bin, for one state of the model.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// The measured side; bins that the simulated side lacks are gone.
+    /// Measured values; bins that the simulation lacks are left out.
     pub data: Data,
-    /// The simulated side, by group and bin.
+    /// Simulated values, by group and bin.
     pub side: Vec<Vec<BinValues>>,
-    /// What closed forms look at.
+    /// Signals that closed forms take.
     pub scene: Scene,
-    /// The wind.
+    /// Wind, as the leans of the flight show it.
     pub wind: Wind,
     /// What the closed loop does besides the closed form, by group and bin, us.
     closure_us: Vec<Vec<f64>>,
     /// What no effect of the vehicle adds to the response to vertical air speed; empty: nothing.
     felt: Vec<Vec<Response>>,
     amsl_m: f64,
-    /// The fleet's mean drone of the model.
+    /// Mean drone of the fleet, by the model.
     pub vehicle: Vehicle,
 }
 
@@ -184,7 +184,7 @@ impl Comparison {
             .collect())
     }
 
-    /// What the noise needs to know of the groups, for a vehicle.
+    /// Patterns of the groups that the noise model takes, for a vehicle.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
@@ -274,7 +274,7 @@ impl Comparison {
         Scene::measured(&self.data, &self.side, &wind, self.amsl_m).pulses(vehicle)
     }
 
-    /// What one standard error of the wind does to the pulse, along either axis of the show.
+    /// Change of the pulse by one standard error of the wind, along either axis of the show.
     ///
     /// # Errors
     /// Effects of the vehicle that are not valid.
@@ -327,7 +327,7 @@ impl Comparison {
         sum[0].hypot(sum[1]) / f64::max(count, 1.0)
     }
 
-    /// What a change of the vehicle adds to the pulse.
+    /// Difference between the pulses of two vehicles.
     ///
     /// # Errors
     /// Effects of a vehicle that are not valid.

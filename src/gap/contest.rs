@@ -46,13 +46,13 @@ pub(super) fn before(candidate: &Candidate) -> Option<f64> {
 
 /// What is known where a round's rivals are held against each other.
 pub(super) struct Contest<'a> {
-    /// What was found before.
+    /// Findings before the round.
     pub found: &'a Found,
-    /// Both sides, against the model with that.
+    /// Comparison of measurement and simulation, against the model with those findings.
     pub comparison: &'a Comparison,
-    /// What was looked for.
+    /// Candidates and free shapes of the round.
     pub sought: Sought<'a>,
-    /// What the round found.
+    /// Result of the round.
     pub round: &'a Round,
 }
 

@@ -1,4 +1,5 @@
-//! The measured side: all drones of a campaign's flight in the same steady bins.
+//! Measured values: all drones of a campaign's flight, in steady bins that are common to each
+//! group.
 
 use super::bins::{Bin, BinValues, cut, of_segments};
 use super::left_out::LeftOut;
@@ -19,44 +20,44 @@ const DRONE_SHARE: f64 = 0.9;
 /// one (2). Geometry.
 const NEXT_SPACINGS: f64 = 1.5;
 
-/// One drone's log, and who flew it.
+/// Log of one drone, with its slot.
 #[derive(Debug)]
 pub struct Flown<'a> {
     /// Slot of the plan; without a plan a running number from 1.
     pub slot: u16,
-    /// The log.
+    /// Flight as its log tells it.
     pub flight: &'a Flight,
 }
 
-/// Drones of a flight that is yet to be flown, which fly and weigh the same.
+/// Drones of a proposed flight that are equal in flight and weight.
 #[derive(Debug)]
 pub struct PlannedPart<'a> {
     /// Name of the group.
     pub name: String,
-    /// Who they are.
+    /// Slots of the drones.
     pub slots: Vec<&'a Slot>,
-    /// Steady bins.
+    /// Steady bins of the group.
     pub bins: &'a [Bin],
-    /// What the simulated drone does in each.
+    /// Values of the simulated drone in each bin.
     pub values: &'a [Option<BinValues>],
 }
 
 /// All drones of a command group.
 #[derive(Clone, Debug, Default)]
 pub struct Group {
-    /// Its name.
+    /// Name of the command group.
     pub name: String,
-    /// Its bins, in the order of time.
+    /// Bins of the group, in the order of time.
     pub bins: Vec<Bin>,
-    /// Slots, in order.
+    /// Slots of the drones, in order.
     pub slots: Vec<u16>,
-    /// Where each drone's home is, show frame, m.
+    /// Home of each drone, show x and y, m.
     pub place_m: Vec<[f64; 2]>,
-    /// How many drones stand next to each.
+    /// Number of drones next to each drone.
     pub neighbours: Vec<f64>,
-    /// What each drone did in each bin.
+    /// Measured values of each drone in each bin.
     pub measured: Vec<Vec<BinValues>>,
-    /// Motors started, show time, s (earliest of the drones).
+    /// Show time at which the motors started, s (earliest of the drones).
     pub armed_s: f64,
 }
 
@@ -158,9 +159,8 @@ impl Data {
         data
     }
 
-    /// A flight that is yet to be flown: all drones of a part of a group read the same simulated values,
-    /// each with its own voltage at rest (by its place in the plan, and bin). Parts are (name, slots, bins,
-    /// values).
+    /// Values of a proposed flight: all drones of a part of a group read equal simulated values,
+    /// each with its own voltage at rest (by its place in the plan, and bin).
     pub fn planned(
         plan: &Plan,
         parts: &[PlannedPart<'_>],
@@ -290,18 +290,19 @@ impl Data {
         last
     }
 
-    /// Drones in all.
+    /// Number of drones in all groups.
     pub fn drones(&self) -> usize {
         self.groups.iter().map(|group| group.slots.len()).sum()
     }
 
-    /// Drones of each group.
+    /// Number of drones in each group.
     pub fn counts(&self) -> Vec<usize> {
         self.groups.iter().map(|group| group.slots.len()).collect()
     }
 
-    /// Those that are fitted, and those that are held out: every fourth drone of each group, where there are
-    /// eight drones and four in each group: each part has all groups.
+    /// Splits the drones into those that are fitted, and those that are held out: every fourth
+    /// drone of each group, if there are eight drones and four in each group. Each part has all
+    /// groups.
     pub fn split(&self) -> (Self, Self) {
         let holds = self.drones() >= FEWEST_TO_HOLD
             && self.groups.iter().all(|group| group.slots.len() >= FEWEST_IN_GROUP);

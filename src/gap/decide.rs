@@ -1,4 +1,4 @@
-//! What a round's gains mean: nothing, an effect, a class, or a free shape.
+//! Meaning of a round's gains: nothing, an effect, a class, or a free shape.
 
 use super::explain::Options;
 use super::generic::Generic;
@@ -68,7 +68,7 @@ pub(super) enum What {
 
 /// A decision with the thresholds that it was taken by.
 pub(super) struct Decision {
-    /// What is to be done.
+    /// Conclusion of the round.
     pub what: What,
     /// Gains that chance does not reach.
     pub thresholds: Thresholds,

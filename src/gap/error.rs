@@ -1,4 +1,4 @@
-//! Why a comparison cannot be made.
+//! Errors of comparing measurement and simulation.
 
 use thiserror::Error;
 
@@ -7,7 +7,7 @@ use crate::effects::EffectError;
 use crate::mission::resolve::MissionError;
 use crate::sim::SimError;
 
-/// A comparison of measurement and simulation that cannot be made.
+/// Error of a comparison of measurement and simulation.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum GapError {
@@ -17,10 +17,10 @@ pub enum GapError {
         listed(.reasons)
     )]
     NothingMeasured {
-        /// Why each was left out.
+        /// Reasons why drones were left out.
         reasons: Vec<LeftOut>,
     },
-    /// Too few bins on both sides.
+    /// Measurement and simulation have too few bins in common.
     #[error(
         "measurement and simulation have too little steady flight in common: gaps, motors at their \
          limits (`updraft analyze` says where), or were they flown from different plans?"
@@ -33,19 +33,19 @@ pub enum GapError {
          33 to 40)"
     )]
     ConstantPulse {
-        /// Its value, us.
+        /// Value of the pulse, us.
         value_us: f64,
     },
-    /// The pulse of somebody else's simulation never changes.
+    /// The pulse of another program's simulation never changes.
     #[error(
         "the simulated pulse is the same ({value_us:.1} us) in all of the flight: its logs hold a \
          constant, not what the motors were told"
     )]
     ConstantSimulated {
-        /// Its value, us.
+        /// Value of the pulse, us.
         value_us: f64,
     },
-    /// Neither a plan nor logs of a simulation.
+    /// There is neither a plan nor logs of a simulation.
     #[error(
         "there is no simulated side: give the plan that was flown (--plan), so that it can be flown \
          again, or logs of a simulation (--simulated)"
@@ -54,7 +54,7 @@ pub enum GapError {
     /// The model could not be flown.
     #[error("the model's flight failed")]
     Simulation(#[from] SimError),
-    /// The template of a proposed flight is wrong.
+    /// The template of a proposed flight is not valid.
     #[error("the proposed flight cannot be planned for this fleet")]
     Mission(#[from] Box<MissionError>),
     /// The model is not valid.

@@ -1,4 +1,4 @@
-//! The workflow: find, name, add, and again, until nothing passes.
+//! The loop of the search: find, name, add, and again, until nothing passes.
 
 use super::candidates::{Size, Variant, drag_by_lean, library, of_the_air, read_otherwise};
 use super::compare::{Comparison, Simulated};
@@ -17,16 +17,16 @@ use crate::effects::{Role, Signals};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
-/// Choices of the workflow.
+/// Options of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Chance of naming anything in a step when there is nothing.
+    /// Probability of naming anything in a step when there is nothing to find.
     pub alpha: f64,
-    /// Simulated flights for the thresholds.
+    /// Number of simulated flights for the thresholds.
     pub replicates: usize,
-    /// Seed of everything random.
+    /// Seed of all that is random.
     pub seed: u64,
-    /// Most effects that are named.
+    /// Largest number of effects that are named.
     pub most_steps: usize,
 }
 
@@ -51,26 +51,27 @@ fn material_us(groups: &[GroupPattern], hyper: &Hyper) -> f64 {
     (2.0 * noise_us).clamp(0.75, MATERIAL_US)
 }
 
-/// What the loop knows at its end.
+/// Findings of the search at its end.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// The model with what was found.
+    /// Model with the effects that were found.
     pub vehicle: Vehicle,
-    /// The last comparison, against that model.
+    /// Last comparison, against the model with the findings.
     pub comparison: Comparison,
-    /// Regressors of what is no effect of the vehicle.
+    /// Regressors of findings that are not effects of the vehicle.
     pub extras: Vec<Column>,
-    /// What they add to the response to vertical air speed, by group and bin; empty: nothing.
+    /// Contributions of `extras` to the response to vertical air speed, by group and bin; empty if
+    /// there are none.
     pub felt: Vec<Vec<Response>>,
-    /// Fitted parameters.
+    /// Parameters that were fitted.
     pub parameters: Vec<Parameter>,
-    /// Their values and standard errors.
+    /// Values of the parameters, with their standard errors.
     pub values: Vec<(f64, f64)>,
     /// Noise with everything in the model.
     pub hyper: Hyper,
     /// Strength of gusts that the rectification was computed with, m/s.
     pub gusts_mps: f64,
-    /// What was found.
+    /// Findings, in the order in which they were made.
     pub steps: Vec<Step>,
     /// The end of the search.
     pub rest: Rest,

@@ -1,4 +1,4 @@
-//! Free shapes: what depends on something, though no effect of the library says how.
+//! Free shapes: a dependence of the pulse on a signal that no effect of the library explains.
 
 use super::gls::{Column, Pulses, means_of};
 use super::response::Response;
@@ -9,13 +9,14 @@ use crate::gap::verdict::Shape;
 /// A family of regressors that together make a free shape along one signal.
 #[derive(Clone, Debug)]
 pub(super) struct Generic {
-    /// What it depends on.
+    /// Name of the signal that the shape depends on.
     pub depends_on: &'static str,
-    /// Label with unit.
+    /// Label of the signal for an axis, with its unit.
     pub axis: &'static str,
-    /// Regressors.
+    /// Regressors that span the shape.
     pub columns: Vec<Column>,
-    /// What each adds to the response to vertical air speed, by group and bin; empty: nothing.
+    /// Contribution of each regressor to the response to vertical air speed, by group and bin;
+    /// empty if there is none.
     pub felt: Vec<Vec<Vec<Response>>>,
     /// The signal itself by group and bin, for drawing.
     pub along: Vec<Vec<f64>>,

@@ -9,12 +9,12 @@ use super::noise::{GroupPattern, Hyper, Whitener};
 /// Values of all drones, by group, drone and bin.
 pub(super) type Pulses = Vec<Vec<Vec<f64>>>;
 
-/// A regressor.
+/// A regressor, by group, drone and bin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Column {
     /// One series for all drones of a group: by group and bin.
     Shared(Vec<Vec<f64>>),
-    /// Each drone has its own: by group, drone and bin.
+    /// Values by group, drone and bin.
     Own(Pulses),
 }
 
@@ -75,7 +75,7 @@ impl Column {
         }
     }
 
-    /// Its value for one drone and bin.
+    /// Value for one drone and bin.
     pub fn at(&self, group: usize, drone: usize, bin: usize) -> f64 {
         match self {
             Self::Shared(values) => values[group][bin],
@@ -83,7 +83,7 @@ impl Column {
         }
     }
 
-    /// Largest less smallest value.
+    /// Difference between the largest and the smallest value.
     pub fn range(&self) -> f64 {
         let of = |values: &mut dyn Iterator<Item = &f64>| {
             let (low, high) =
@@ -207,7 +207,7 @@ impl White {
 pub(super) struct Problem<'a> {
     /// Patterns of the groups.
     pub groups: &'a [GroupPattern],
-    /// What is to be explained.
+    /// Pulses to explain.
     pub pulses: &'a Split,
     /// Regressors that are free: the common offset first.
     pub columns: Vec<Split>,
@@ -302,7 +302,7 @@ pub(super) enum Likelihood {
 /// A problem solved at one noise.
 #[derive(Clone, Debug)]
 pub(super) struct Solution {
-    /// The noise.
+    /// Parameters of the noise.
     pub hyper: Hyper,
     whitener: Whitener,
     y: White,
@@ -312,16 +312,16 @@ pub(super) struct Solution {
     pub beta: Vec<f64>,
     /// Weighted sum of squares that is left.
     pub chi2: f64,
-    /// Observations less regressors.
+    /// Degrees of freedom: number of observations less that of regressors.
     pub freedom: f64,
 }
 
 /// What a regressor would gain at fixed noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Gain {
-    /// Its coefficient.
+    /// Coefficient of the regressor.
     pub beta: f64,
-    /// Standard error of it.
+    /// Standard error of the coefficient.
     pub se: f64,
     /// Gain of log-likelihood, nats.
     pub nats: f64,

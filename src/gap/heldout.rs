@@ -1,4 +1,4 @@
-//! The gap before and after on data that was not used for fitting.
+//! The gap before and after, on data that was not used for fitting.
 
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -37,13 +37,13 @@ struct Residuals<'a> {
 /// A search and what was held against the logs.
 #[derive(Clone, Copy)]
 pub(super) struct Case<'a> {
-    /// The model before.
+    /// Model before the search.
     pub original: &'a Vehicle,
-    /// The simulated side.
+    /// Simulation that the logs are compared with.
     pub simulated: &'a Simulated<'a>,
     /// The plan, if there is one.
     pub plan: Option<&'a Plan>,
-    /// What was found.
+    /// Findings of the search.
     pub found: &'a Found,
     /// Seed of the bootstrap.
     pub seed: u64,

@@ -1,4 +1,4 @@
-//! The wind, from how the fleet leans.
+//! Wind from the leans of the fleet.
 
 use nalgebra::{DMatrix, DVector, Matrix2};
 
@@ -19,8 +19,8 @@ const ROUNDS: usize = 24;
 /// Fastest wind that is believed, m/s: no small multirotor holds its place in more.
 const FASTEST_MPS: f64 = 25.0;
 
-/// How a vehicle leans in horizontal air, along each axis of its body, while it climbs at V:
-/// `(a + b s sqrt(v² + V²)) v_i + b (1 - s) v_i |v_i|`, rad.
+/// Lean of a vehicle in horizontal air, along each axis of its body, while it climbs at V: `(a + b
+/// s sqrt(v² + V²)) v_i + b (1 - s) v_i |v_i|`, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeanLaw {
     /// Linear part (blade flapping, a), rad/(m/s).
@@ -33,7 +33,7 @@ pub struct LeanLaw {
 }
 
 impl LeanLaw {
-    /// What the vehicle's model says at an air density, kg/m³.
+    /// Lean law of a vehicle's model at an air density, kg/m³.
     pub fn of(vehicle: &Vehicle, density: f64) -> Self {
         let of = |role: Role| role.value(vehicle).unwrap_or(0.0);
         let factor = Drag::new(&vehicle.airframe).factor_m2();
@@ -110,23 +110,23 @@ impl LeanLaw {
 /// The horizontal air as the leans of a flight show it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wind {
-    /// Mean wind, show frame, towards, m/s.
+    /// Mean wind, show frame, the direction it blows to, m/s.
     pub mean_mps: [f64; 2],
-    /// Its standard error along either axis, m/s.
+    /// Standard error of the mean wind along either axis, m/s.
     pub mean_se_mps: f64,
     /// Air speed of each group's drones in each bin, show frame, m/s.
     pub air_mps: Vec<Vec<[f64; 2]>>,
-    /// Lean law that the flight's horizontal legs showed; `None`: it has none, and the model's was
-    /// taken.
+    /// Lean law that the flight's horizontal legs showed; `None` if it has none, so that the
+    /// model's was taken.
     pub measured: Option<Measured>,
 }
 
-/// A lean law by horizontal legs.
+/// A lean law measured by horizontal legs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// The law.
+    /// Most probable law.
     pub law: LeanLaw,
-    /// Standard error of its linear part, rad/(m/s).
+    /// Standard error of the law's linear part, rad/(m/s).
     pub linear_se: f64,
 }
 

@@ -1,5 +1,5 @@
-//! The lean as a channel of its own: how much a drone leans at known speeds over ground is its rotors'
-//! drag, whatever the pulse says.
+//! The lean as a channel of its own: the lean of a drone at known speeds over ground tells its
+//! rotors' drag, whatever the pulse tells.
 
 use super::compare::Comparison;
 use super::lean::LeanLaw;

@@ -18,19 +18,19 @@ pub enum LeftOut {
     FewBins {
         /// Slot of the drone.
         slot: u16,
-        /// Bins that can be used.
+        /// Number of bins that can be used.
         usable: usize,
-        /// Bins in all.
+        /// Number of steady bins.
         bins: usize,
     },
     /// The pulse never changes.
     ConstantPulse {
         /// Slot of the drone.
         slot: u16,
-        /// The pulse, us.
+        /// Value of the pulse, us.
         pulse_us: f64,
     },
-    /// A reason in the words of those who read the log, or as it was read from a file.
+    /// A reason in the words of the log's reader, or as it was read from a file.
     Said(String),
 }
 

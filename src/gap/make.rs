@@ -1,4 +1,4 @@
-//! From logs to a verdict and a model.
+//! Steps from logs to a verdict and a model.
 
 use super::bins::Bin;
 use super::compare::{Comparison, Simulated};
@@ -27,21 +27,21 @@ use crate::flight::table::Steps;
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
 
-/// What is compared.
+/// Input of a comparison of measurement and simulation.
 #[derive(Debug)]
 pub struct Input<'a> {
-    /// The model that is held against the logs.
+    /// Model that the logs are compared with.
     pub vehicle: &'a Vehicle,
-    /// The plan that was flown, if there is one.
+    /// Plan that was flown, if there is one.
     pub plan: Option<&'a Plan>,
-    /// The drones' logs.
+    /// Logs of the drones.
     pub flown: &'a [Flown<'a>],
-    /// Logs of somebody else's simulation; without them the plan is flown again.
+    /// Logs of another program's simulation; `None`: the plan is simulated.
     pub simulated: Option<&'a [Flown<'a>]>,
-    /// How steady flight is found in tables, which have neither plan nor commands: they are held against the
-    /// model's closed forms at the climb that was flown.
+    /// Rules for finding steady flight in tables, which have neither plan nor commands: they are
+    /// compared with the model's closed forms at the climb that was flown.
     pub table: Option<&'a Steps>,
-    /// Measured logs that there are, used or not.
+    /// Number of measured logs, used or not.
     pub logs: usize,
     /// Logs that could not be used, with their reasons.
     pub left_out: Vec<LeftOut>,
@@ -50,18 +50,18 @@ pub struct Input<'a> {
 /// A verdict with the model that it leads to.
 #[derive(Clone, Debug)]
 pub struct Explained {
-    /// The verdict.
+    /// Verdict on what the model lacks.
     pub verdict: Verdict,
-    /// The vehicle with what was found, as a vehicle file has it.
+    /// Vehicle with the effects that were found, as a vehicle file has it.
     pub model: Vehicle,
-    /// The search, for what comes after.
+    /// Findings of the search, for later steps.
     pub found: Found,
 }
 
 /// Climb speeds of one rung of the ladder differ by less, m/s. Commands are exact; rungs are 0.5 m/s apart.
 const SAME_SPEED_MPS: f64 = 0.05;
 
-/// Compares, names, adds and shows.
+/// Compares, names effects, adds them and reports the verdict.
 ///
 /// # Errors
 /// See [`GapError`].

@@ -1,4 +1,4 @@
-//! What naming is for: the error of the map of the air, by the model before and after.
+//! Gain of the map of the air: its error by the model before and after.
 //!
 //! The law of the model is inverted in a measurement flight whose true air is known. What one drone's
 //! rotors differ by from the others' is its mean residual in the calibration's hovers, as the paper's
@@ -25,13 +25,13 @@ use crate::vehicle::Vehicle;
 /// A measurement flight whose true air is known.
 #[derive(Debug)]
 pub struct Measured<'a> {
-    /// Its name.
+    /// Name of the flight.
     pub name: &'a str,
-    /// What was flown.
+    /// Plan that was flown.
     pub plan: &'a Plan,
-    /// The logs.
+    /// Logs of the drones.
     pub flown: &'a [Flown<'a>],
-    /// The true vertical air speed of each slot.
+    /// True vertical air speed of each slot, m/s, up positive.
     pub truth: &'a BTreeMap<u16, TruthSeries>,
 }
 

@@ -1,4 +1,4 @@
-//! What a log says in each steady bin.
+//! Measurement of a log in each steady bin.
 
 use super::bins::{Bin, BinValues};
 use crate::flight::{Flight, Indicator};

@@ -1,4 +1,5 @@
-//! Where simulation and measurement disagree, which physics is missing, and what cannot be known.
+//! Search for missing physics: where simulation and measurement disagree, which effect is missing,
+//! and what cannot be known.
 
 mod backward;
 mod bins;

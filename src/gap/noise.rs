@@ -1,4 +1,4 @@
-//! What pulses do besides the model: the shared air, each drone's own air, offsets and scatter.
+//! Model of the pulses' noise: the shared air, each drone's own air, offsets and scatter.
 //!
 //! The data model (docs/physics.md, 3.2): drone i in bin k of its group reads
 //!
@@ -103,7 +103,7 @@ impl Hyper {
     }
 }
 
-/// One command group as the noise needs it.
+/// Pattern of a command group that the noise model takes.
 #[derive(Clone, Debug, Default)]
 pub struct GroupPattern {
     /// Number of drones.
@@ -114,14 +114,15 @@ pub struct GroupPattern {
     pub height_m: Vec<f64>,
     /// The model's response to vertical air speed in each bin.
     pub response: Vec<Response>,
-    /// By how much the air that all share changes the speed relative to it, in each bin, m/s; empty: not known.
+    /// Change of the speed relative to the air by the air that all share, in each bin, m/s; empty
+    /// if unknown.
     pub shift_mps: Vec<f64>,
-    /// What gusts do to the mean of a curved response, us, which is as uncertain as it is large;
-    /// empty: nothing.
+    /// Change of the mean of a curved response by gusts, in each bin, us, which is as uncertain as
+    /// it is large; empty if there is none.
     pub bent_us: Vec<f64>,
     /// The model's response to horizontal air speed along either axis of the show, us/(m/s); empty: none.
     pub side_response: Vec<[f64; 2]>,
-    /// What a relative error of the response does in each bin, us.
+    /// Change of the pulse by a relative error of the response, in each bin, us.
     pub slope_us: Vec<f64>,
 }
 

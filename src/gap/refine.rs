@@ -35,15 +35,15 @@ const FEWEST_SCALES: f64 = 3.0;
 /// One fitted parameter of the model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Effect.
+    /// Name of the effect.
     pub effect: &'static str,
-    /// Name.
+    /// Name of the parameter.
     pub name: &'static str,
-    /// Unit.
+    /// Unit of the parameter.
     pub unit: &'static str,
-    /// Bounds.
+    /// Smallest and largest value, in the parameter's unit.
     pub bounds: (f64, f64),
-    /// Value in the model that was held against the logs; `None`: it lacked the effect.
+    /// Value in the model that was compared with the logs; `None` if it lacked the effect.
     pub before: Option<f64>,
 }
 
@@ -52,7 +52,7 @@ pub struct Parameter {
 pub(super) struct Fit {
     /// The vehicle with the fitted values.
     pub vehicle: Vehicle,
-    /// Its noise (restricted likelihood).
+    /// Parameters of the noise by restricted likelihood.
     pub hyper: Hyper,
     /// Value and standard error of each parameter.
     pub values: Vec<(f64, f64)>,

@@ -1,4 +1,4 @@
-//! What closed forms look at in each bin, and the pulses that a model asks for there.
+//! Signals that closed forms take in each bin, and the pulses of a model for them.
 
 use super::bins::BinValues;
 use super::compare::thrust_exponent;
@@ -25,13 +25,14 @@ pub(super) const IDLE_US: f64 = 1000.0;
 /// (endogenous regressors; docs/physics.md, 3.1).
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// By group and bin.
+    /// Signals by group and bin.
     pub signals: Vec<Vec<Signals>>,
-    /// Charge left by the voltage at rest, by group, drone and bin, 0..1; `None`: not logged.
+    /// Charge left by the voltage at rest, by group, drone and bin, 0 to 1; `None` if it was not
+    /// logged.
     pub charge: Option<Vec<Vec<Vec<f64>>>>,
-    /// Cells in series by that voltage.
+    /// Number of cells in series, by the voltage at rest.
     pub cells: f64,
-    /// Mean voltage at rest, V; 0: not logged.
+    /// Mean voltage at rest, V; 0 if it was not logged.
     pub resting_v: f64,
     /// Resistance of the batteries as the logs have it, ohm.
     pub resistance_ohm: Option<f64>,
@@ -39,7 +40,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// What the drones flew in: commanded climb as the simulator followed it, heights, air.
+    /// Signals of the measured flight: commanded climb as the simulator followed it, heights, air.
     pub fn measured(data: &Data, side: &[Vec<BinValues>], wind: &Wind, amsl_m: f64) -> Self {
         let signals = data
             .groups

@@ -1,5 +1,5 @@
-//! One round of the search: what would explain the residual best, and whether that is more than
-//! chance makes.
+//! One round of the search: the best explanation of the residual, and whether chance would give as
+//! much.
 
 use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
@@ -23,9 +23,9 @@ const MOST_BETA: f64 = 5.0;
 /// One candidate's best form in a round.
 #[derive(Clone, Debug)]
 pub(super) struct Ranked {
-    /// Place in the list of candidates.
+    /// Index in the list of candidates.
     pub candidate: usize,
-    /// Its best form.
+    /// Index of the candidate's best form.
     pub variant: usize,
     /// Gain, nats: with the noise fitted anew where [`Ranked::fitted`].
     pub gain: f64,
@@ -44,13 +44,13 @@ pub(super) struct Ranked {
 /// The best free shapes of a round.
 #[derive(Clone, Debug)]
 pub(super) struct RankedGeneric {
-    /// Place in the list.
+    /// Index in the list of free shapes.
     pub generic: usize,
     /// Gain less its penalty, nats.
     pub gain: f64,
     /// Gain as a regressor alone, without what it does to the scatter between drones, nats.
     pub plain: f64,
-    /// Coefficients.
+    /// Coefficients of the regressors.
     pub beta: Vec<f64>,
     /// Standard deviation over bins of what it does to the pulse, us.
     pub size_us: f64,
@@ -67,7 +67,7 @@ pub(super) struct Round {
     pub groups: Vec<GroupPattern>,
     /// The model so far with its noise.
     pub base: Solution,
-    /// Candidates, best first.
+    /// Candidates of the library, best first.
     pub library: Vec<Ranked>,
     /// Free shapes, best first; the best one of each signal.
     pub generics: Vec<RankedGeneric>,
@@ -90,9 +90,9 @@ impl Round {
 pub(super) struct Sought<'a> {
     /// Effects and motions of the air.
     pub library: &'a [Candidate],
-    /// Free shapes.
+    /// Free shapes to try.
     pub generics: &'a [Generic],
-    /// Drones of each group.
+    /// Number of drones in each group.
     pub drones: &'a [usize],
 }
 

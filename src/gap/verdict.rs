@@ -1,4 +1,4 @@
-//! What the comparison of measurement and simulation says: the words of `gap/verdict.json`.
+//! Verdict of the comparison of measurement and simulation, as in `gap/verdict.json`.
 //!
 //! Its JSON schema is `docs/schema/verdict.schema.json`.
 

@@ -21,26 +21,26 @@ const OTHER_WIND_DEG: f64 = 0.5;
 pub enum Warning {
     /// A single drone was compared.
     OneDrone,
-    /// There were too few drones to hold any out from fitting.
+    /// The drones were too few to hold any out from fitting.
     NoneHeldOut {
-        /// Drones compared.
+        /// Number of drones compared.
         drones: usize,
     },
     /// No more than half of the plan's drones gave a usable log.
     FewDrones {
-        /// Drones compared.
+        /// Number of drones compared.
         drones: usize,
-        /// Drones of the plan.
+        /// Number of drones in the plan.
         planned: usize,
     },
     /// A parameter was fitted to a bound of its range.
     AtBound {
-        /// The effect.
+        /// Name of the effect.
         effect: String,
-        /// The parameter.
+        /// Name of the parameter.
         parameter: String,
     },
-    /// The measured drones leaned otherwise than those of somebody else's simulation.
+    /// The measured drones leaned differently from those of another program's simulation.
     OtherWind {
         /// Difference of the leans, degrees.
         lean_deg: f64,
@@ -53,7 +53,7 @@ pub enum Warning {
     NoRestingVoltage,
     /// No plan says which vehicle flew.
     VehicleGuessed {
-        /// The vehicle that was taken.
+        /// Name of the vehicle that was assumed.
         vehicle: String,
     },
     /// A warning as it was read from a file.

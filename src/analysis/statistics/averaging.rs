@@ -24,14 +24,17 @@ const ROUND_MPS: [f64; 6] = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02];
 pub struct Seconds {
     /// Slot number, if planned.
     pub slot: Option<u16>,
-    /// Label.
+    /// Label of the drone.
     pub name: String,
     /// Means over each second, not smoothed; `None` in gaps.
     pub values_mps: Vec<Option<f64>>,
 }
 
-/// The Allan deviations of a fleet for averages from 1 s to a third of the record; or why there are
-/// none.
+/// Allan deviations of a fleet for averages from 1 s to a third of the record.
+///
+/// # Errors
+///
+/// The reason why there are none.
 pub fn averaging(fleet: &[Seconds]) -> Result<Averaging, String> {
     let length = fleet.iter().map(|drone| drone.values_mps.len()).max().unwrap_or(0);
     if length < super::field::SHORTEST_S {

@@ -24,7 +24,7 @@ const CONSTANT_MPS: f64 = 1e-6;
 pub struct FieldInput {
     /// Nominal place of each drone in the show frame, m.
     pub places_m: Vec<[f64; 2]>,
-    /// Each drone's value at the same seconds, m/s, up positive; `None` in gaps.
+    /// Values of each drone, at seconds common to all, m/s, up positive; `None` in gaps.
     pub values_mps: Vec<Vec<Option<f64>>>,
     /// Length of the running mean that the values went through, s (1: none).
     pub running_s: usize,

@@ -20,14 +20,14 @@ use crate::base::rng::{Purpose, stream};
 /// An interval needs this share of the simulated flights to have given an estimate. Chosen.
 const FEWEST_SHARE: f64 = 0.8;
 
-/// Choices of the statistics.
+/// Options of the statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StatisticsOptions {
-    /// Simulated flights for intervals and biases; 0: none.
+    /// Number of simulated flights for intervals and biases; 0: none.
     pub flights: usize,
     /// Seed of the simulated flights.
     pub seed: u64,
-    /// Whether the estimates are also made of treated data ([`Variant`]).
+    /// Whether estimates are made of treated data ([`Variant`]) as well.
     pub variants: bool,
 }
 
@@ -92,7 +92,7 @@ pub fn field_statistics(input: &FieldInput, options: &StatisticsOptions) -> Fiel
     statistics
 }
 
-/// The paper's estimates alone; `None` where a curve has no best fit.
+/// Scales of the air as the paper estimates them; `None` where a curve has no best fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PaperScales {
     /// Length over all pairs, m.
@@ -101,7 +101,7 @@ pub struct PaperScales {
     pub lambda_x_m: Option<f64>,
     /// Length along y, m.
     pub lambda_y_m: Option<f64>,
-    /// Time scale, s.
+    /// Correlation time, s.
     pub t0_s: Option<f64>,
 }
 

@@ -17,7 +17,7 @@ pub struct FieldScales {
     pub noise_mps: f64,
 }
 
-/// Draws of a field at given places.
+/// Generator of simulated flights: draws of a field at given places.
 #[derive(Clone, Debug)]
 pub struct Simulator {
     /// Transposed Cholesky factor of the covariance in space.
@@ -28,7 +28,8 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Of `seconds` values at each place, each a running mean over `running_s` seconds.
+    /// Prepares draws of `seconds` values at each place, each a running mean over `running_s`
+    /// seconds.
     pub fn new(
         places_m: &[[f64; 2]],
         scales: FieldScales,
@@ -43,7 +44,7 @@ impl Simulator {
         Some(Self { factor, scales, seconds, running: running_s.max(1) })
     }
 
-    /// One flight: a column of seconds for each place, m/s.
+    /// Draws one flight: a column of seconds for each place, m/s.
     pub fn flight<R: Rng>(&self, rng: &mut R) -> DMatrix<f64> {
         let long = self.seconds + self.running - 1;
         let keep = (-1.0 / self.scales.tau_s).exp();

@@ -1,4 +1,4 @@
-//! Horizontal wind from the lean of the drones: a drone that holds its place leans against the wind.
+//! Horizontal wind from the lean of drones that hold their place against it.
 
 use super::result::{DroneWind, TiltWind};
 use super::words::digits;
@@ -10,12 +10,12 @@ const TRIM_DEG: f64 = 0.2;
 /// Steepest lean that is taken for wind: its tangent. Convention.
 const STEEPEST: f64 = 2.0;
 
-/// How one drone leans on average.
+/// Mean lean of one drone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeanLean {
     /// Slot number, if planned.
     pub slot: Option<u16>,
-    /// Label.
+    /// Label of the drone.
     pub name: String,
     /// Angle of the mean attitude from the vertical, degrees.
     pub lean_deg: f64,
@@ -25,15 +25,15 @@ pub struct MeanLean {
     pub heading_deg: Option<f64>,
 }
 
-/// What tells the wind from a lean.
+/// Relation between wind and lean.
 #[derive(Clone, Copy, Debug)]
 pub enum LeanDrag<'a> {
     /// The drag on each pair of faces grows with the square of the flow onto them: wind onto one side,
     /// m/s, at which the vehicle would lean by 45 degrees.
     Faces(f64),
-    /// The vehicle's own table of leans.
+    /// The table of leans in the vehicle's file.
     Table(&'a LeanTable),
-    /// Nothing: the drag is not known.
+    /// The drag of the vehicle is not known.
     Unknown,
 }
 
@@ -78,8 +78,8 @@ impl MeanLean {
     }
 }
 
-/// The wind on drones that hold their place. A lean beyond the end of a vehicle's table is told as a
-/// lean alone.
+/// Wind on drones that hold their place. For a lean beyond the end of a vehicle's table, the lean
+/// alone is given.
 pub fn tilt_wind(leans: &[MeanLean], drag: LeanDrag<'_>) -> Option<TiltWind> {
     let steep = leans.iter().any(|lean| lean.flow(drag).iter().any(|flow| flow.is_nan()));
     let drag = if steep { LeanDrag::Unknown } else { drag };

@@ -1,4 +1,4 @@
-//! What a prediction starts from: the model and the noise that were found, and a plan flown by its mean
+//! Start of a prediction: the model and the noise that were found, and a plan flown by its mean
 //! drone.
 
 use crate::effects::Role;
@@ -18,7 +18,7 @@ use crate::vehicle::Vehicle;
 /// Least noise of any kind, in its own unit: keeps logarithms finite. Numerical.
 const LEAST_NOISE: f64 = 1e-3;
 
-/// What is known from the flight before.
+/// Knowledge from the flight before.
 #[derive(Clone, Debug)]
 pub struct Known {
     /// The vehicle with what was found.
@@ -102,7 +102,7 @@ impl Flight {
         Ok(Self { plan, groups })
     }
 
-    /// Its plan.
+    /// Plan of the flight.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }

@@ -1,4 +1,5 @@
-//! How well a flight will separate, without flying it: Fisher information under the noise that was found.
+//! Prediction of how well a flight will separate explanations, without flying it: Fisher
+//! information under the noise that was found.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,21 +20,21 @@ const MATTERS_US: f64 = 2.5;
 /// A new effect of more times its tried form is another effect, as the search has it.
 const MOST_TIMES: f64 = 5.0;
 
-/// How well one thing is told from another.
+/// Predicted separation of one explanation from another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separation {
-    /// From what; empty: from nothing.
+    /// Name of the other explanation; empty: no effect at all.
     pub from: String,
-    /// Fisher z.
+    /// Fisher z of the separation.
     pub z: f64,
-    /// Size of that other thing that looks most like it.
+    /// Size of the other explanation that looks most like the first.
     pub size: Option<f64>,
 }
 
-/// What a flight will tell, question by question.
+/// Predicted separations of a flight, question by question.
 pub type Predicted = Vec<Vec<Separation>>;
 
-/// The least z of a question; 0: the flight does not tell at all.
+/// Smallest Fisher z of a question; 0 if the flight cannot answer it at all.
 pub fn least(separations: &[Separation]) -> f64 {
     let least = separations.iter().map(|one| one.z).fold(f64::INFINITY, f64::min);
     if least.is_finite() { least } else { 0.0 }
