@@ -5,15 +5,12 @@
 //! fleet with a bad radio link also runs in one thread, in simulated time ([`lossy::LossyNet`]).
 
 pub mod broadcast;
-pub mod endpoint;
 mod faulty;
-pub mod files;
-pub mod ftp_server;
-pub mod log_server;
-pub mod lossy;
 mod post;
 pub mod server;
-pub mod storage;
-pub mod transfers;
 pub mod vehicle;
 pub mod world;
+
+pub use mavlink_station::simulated::{
+    endpoint, files, ftp_server, log_server, lossy, storage, transfers,
+};

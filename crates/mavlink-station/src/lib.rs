@@ -18,6 +18,8 @@ pub mod params;
 pub mod protocol;
 pub mod put_file;
 pub mod rtt;
+#[cfg(feature = "simulated")]
+pub mod simulated;
 pub mod sink;
 pub mod telemetry;
 pub mod vehicle_clock;

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use super::storage::{Storage, StorageError};
 use super::transfers::Meter;
-use crate::base::crc::ApCrc32;
+use crate::crc::ApCrc32;
 use crate::link::clock::{Micros, S};
 use crate::link::frame::{MavMessage, Sender, dialect};
 use crate::protocol::ftp::{MOST_DATA, Op, Packet};
