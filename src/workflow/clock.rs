@@ -1,36 +1,12 @@
-//! Clocks and durations. The program that runs a workflow provides the clock ([`Host::clock`]); the
-//! computer's own is here for programs that need no other.
+//! Clocks and durations. The program that runs a workflow provides the clock ([`Host::clock`]):
+//! [`SystemClock`], if it needs no other.
 
 use std::fmt;
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use super::host::Host;
-pub use crate::link::clock::{Clock, MS, Micros, S};
-
-/// The computer's clocks: monotonic time since [`SystemClock::start`], and Unix time.
-#[derive(Clone, Copy, Debug)]
-pub struct SystemClock(Instant);
-
-impl SystemClock {
-    /// A clock whose time begins now.
-    #[expect(clippy::disallowed_methods, reason = "the one place where time comes from")]
-    pub fn start() -> Self {
-        Self(Instant::now())
-    }
-}
-
-impl Clock for SystemClock {
-    fn now(&self) -> Micros {
-        self.0.elapsed().as_micros() as Micros
-    }
-
-    #[expect(clippy::disallowed_methods, reason = "the one place where time comes from")]
-    fn unix_us(&self) -> u64 {
-        let since = SystemTime::now().duration_since(UNIX_EPOCH);
-        since.map_or(0, |since| since.as_micros() as u64)
-    }
-}
+pub use crate::link::clock::{Clock, MS, Micros, S, SystemClock};
 
 /// Stopwatch for a step, by the host's clock; printed as [`Spent`].
 #[derive(Clone)]

@@ -23,3 +23,9 @@ pub mod simulated;
 pub mod sink;
 pub mod telemetry;
 pub mod vehicle_clock;
+
+pub use link::clock::{MS, Micros, S, SystemClock};
+pub use link::conversation::{Conversation, NoObserver, Observer, Progress, Step, run_all};
+pub use link::id::DroneId;
+pub use link::net::{Net, Received};
+pub use link::station::{Setup, Station};

@@ -6,13 +6,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::fleet::transfers::{content, drone};
-use updraft::fleet::log_protocol::get::LogGet;
 use updraft::fleet::logs::manifest::{Method, Verified};
 use updraft::fleet::logs::one::{OneDone, OneOptions};
 use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
-use updraft::fleet::sink::Memory;
 use updraft::link::clock::{MS, Micros, S};
-use updraft::link::conversation::{NoObserver, Observer, Progress, run_all};
+use updraft::link::conversation::{NoObserver, Observer, Progress};
 use updraft::link::frame::MavMessage;
 use updraft::link::id::DroneId;
 use updraft::link::net::{Net as _, Received};
@@ -80,53 +78,6 @@ fn limited(bytes_per_s: f64, loss: f64) -> Faults {
 
 /// Of a frame of 90 data bytes (10 header, 7 + 90 payload, 2 checksum).
 const DATA: f64 = 90.0 / 109.0;
-
-/// By the log messages alone: share of what the link's loss leaves, bytes that came again per
-/// byte.
-fn by_log_messages(bytes_per_s: f64, loss: f64, length: usize) -> (f64, f64) {
-    let mut net = fleet(1, length, Transfers::FIRMWARE, limited(bytes_per_s, loss), 5);
-    let get = LogGet::new(drone(1), 1, length as u64, Memory::default(), 60 * S);
-    let mut done =
-        run_all(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoObserver).unwrap();
-    let got = done.remove(&drone(1)).unwrap();
-    assert_eq!(got.result, Ok(length as u64));
-    assert!(got.sink.bytes == content(1, length));
-    let took_s = net.now() as f64 / 1e6;
-    let share = length as f64 / took_s / (bytes_per_s * (1.0 - loss) * DATA);
-    (share, got.tally.again_bytes as f64 / length as f64)
-}
-
-#[test]
-fn the_log_messages_use_nine_tenths_of_what_a_links_loss_leaves() {
-    let mut worst: f64 = 1.0;
-    for (bytes_per_s, length) in [(1e6, 8_000_000), (200e3, 3_000_000)] {
-        for loss in [0.0, 0.1, 0.2] {
-            let (share, again) = by_log_messages(bytes_per_s, loss, length);
-            println!("{bytes_per_s} B/s, loss {loss}: {share:.3} used, {again:.3} again");
-            worst = worst.min(share);
-        }
-    }
-    assert!(worst >= 0.9, "{worst}");
-}
-
-#[test]
-fn a_serial_radio_is_never_asked_for_more_than_it_carries_in_a_second() {
-    // 57,600 baud; the vehicle waits while its port is full.
-    let transfers = Transfers::both(5_760.0 / 109.0);
-    let faults = Faults { delay: 60 * MS, jitter: 20 * MS, ..Faults::default() };
-    for loss in [0.0, 0.1] {
-        let mut net = fleet(1, 150_000, transfers, Faults { loss, ..faults }, 2);
-        let get = LogGet::new(drone(1), 1, 150_000, Memory::default(), 60 * S);
-        let done =
-            run_all(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoObserver).unwrap();
-        assert!(done[&drone(1)].result.is_ok());
-        let most = net.vehicles[&drone(1)].windows.iter().map(|(_, count)| *count).max().unwrap();
-        let share = 150_000.0 / (net.now() as f64 / 1e6) / (5_760.0 * DATA * (1.0 - loss));
-        println!("loss {loss}: {most} bytes at once, {share:.3} used");
-        assert!((1_000..=5_760).contains(&most), "{most}");
-        assert!(share > 0.85, "{share}");
-    }
-}
 
 fn wanted(count: u8) -> Vec<Wanted> {
     let one = |system: u8| Wanted {
@@ -271,19 +222,6 @@ fn nine_drones_share_a_link() {
         println!("nine, {bytes_per_s} B/s, loss {loss}, {length} bytes: {share:.3}");
         assert!(share >= least, "{bytes_per_s} {loss} {length}: {share}");
     }
-}
-
-#[test]
-fn windows_suit_a_short_queue() {
-    // What has to wait for longer is lost: a window that takes 450 ms would be cut each time.
-    let faults = Faults { queue: 200 * MS, ..limited(1e6, 0.0) };
-    let mut net = fleet(1, 8_000_000, Transfers::FIRMWARE, faults, 3);
-    let get = LogGet::new(drone(1), 1, 8_000_000, Memory::default(), 60 * S);
-    let done = run_all(&mut net, BTreeMap::from([(drone(1), get)]), 1, &mut NoObserver).unwrap();
-    assert!(done[&drone(1)].result.is_ok());
-    let share = 8_000_000.0 / (net.now() as f64 / 1e6) / (1e6 * DATA);
-    println!("queue of 200 ms: {share:.3}");
-    assert!(share > 0.9, "{share}");
 }
 
 #[test]

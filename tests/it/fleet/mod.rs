@@ -14,7 +14,6 @@ mod logs_flight;
 mod logs_home;
 mod show;
 mod start;
-mod transfer;
 mod transfers;
 mod upload;
 mod upload_faults;

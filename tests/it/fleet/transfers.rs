@@ -1,16 +1,6 @@
-//! Vehicles with files behind a bad radio, in simulated time.
-
-#![allow(dead_code, reason = "each test uses its part")]
-#![allow(clippy::allow_attributes, reason = "unused in some tests only")]
-
-use std::collections::BTreeMap;
+//! Drones with contents of files that can be told apart.
 
 use updraft::link::id::DroneId;
-use updraft::virtual_fleet::files::FileVehicle;
-use updraft::virtual_fleet::lossy::{Faults, LossyNet};
-use updraft::virtual_fleet::storage::MemoryStorage;
-
-pub(crate) type Net = LossyNet<FileVehicle<MemoryStorage>>;
 
 pub(crate) fn drone(system: u8) -> DroneId {
     DroneId { network: 0, system }
@@ -27,22 +17,4 @@ pub(crate) fn content(seed: u64, length: usize) -> Vec<u8> {
             (state >> 24) as u8
         })
         .collect()
-}
-
-/// `count` vehicles with one log of `length` bytes each, sending `packets_per_s` at most.
-pub(crate) fn fleet(
-    count: u8,
-    length: usize,
-    packets_per_s: f64,
-    faults: Faults,
-    seed: u64,
-) -> Net {
-    let vehicle = |system: u8| {
-        let mut storage = MemoryStorage::default();
-        storage
-            .put("/APM/LOGS/00000001.BIN", content(system.into(), length))
-            .expect("a plain name");
-        (drone(system), FileVehicle::new(storage, "/APM/LOGS", packets_per_s))
-    };
-    LossyNet::new((1..=count).map(vehicle).collect::<BTreeMap<_, _>>(), faults, seed)
 }

@@ -1,6 +1,6 @@
 //! Link time: microseconds since the program's start, from an injected clock.
 
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Microseconds of link time, which never goes back.
 pub type Micros = u64;
@@ -26,4 +26,28 @@ pub trait Clock: Send + Sync {
     /// Reports that the caller has waited for this duration elsewhere; only a clock that does not
     /// go by itself takes note.
     fn waited(&self, _time: Duration) {}
+}
+
+/// The computer's clocks: monotonic time since [`SystemClock::start`], and Unix time.
+#[derive(Clone, Copy, Debug)]
+pub struct SystemClock(Instant);
+
+impl SystemClock {
+    /// A clock whose time begins now.
+    #[expect(clippy::disallowed_methods, reason = "the one place where time comes from")]
+    pub fn start() -> Self {
+        Self(Instant::now())
+    }
+}
+
+impl Clock for SystemClock {
+    fn now(&self) -> Micros {
+        self.0.elapsed().as_micros() as Micros
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "the one place where time comes from")]
+    fn unix_us(&self) -> u64 {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH);
+        since.map_or(0, |since| since.as_micros() as u64)
+    }
 }

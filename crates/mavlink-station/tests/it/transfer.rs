@@ -2,31 +2,22 @@
 
 #![expect(clippy::unwrap_used, reason = "a simulated link stays open")]
 
-use std::collections::BTreeMap;
-
-use crate::fleet::transfers::{Net, content, drone, fleet};
-use updraft::base::crc::ap_crc32;
-use updraft::fleet::ftp::get::{Get, GetOptions};
-use updraft::fleet::ftp::list::List;
-use updraft::fleet::ftp::put::Put;
-use updraft::fleet::ftp::sum::Sum;
-use updraft::fleet::ftp::{Caller, FtpError};
-use updraft::fleet::sink::Memory;
-use updraft::link::clock::{MS, S};
-use updraft::link::conversation::{Conversation, NoObserver, run_all};
-use updraft::link::net::Net as _;
-use updraft::virtual_fleet::lossy::Faults;
-use updraft::virtual_fleet::storage::Storage as _;
+use crate::support::{content, drone, fleet, one};
+use mavlink_station::crc::ap_crc32;
+use mavlink_station::ftp::get::{Get, GetOptions};
+use mavlink_station::ftp::list::List;
+use mavlink_station::ftp::put::Put;
+use mavlink_station::ftp::sum::Sum;
+use mavlink_station::ftp::{Caller, FtpError};
+use mavlink_station::simulated::lossy::Faults;
+use mavlink_station::simulated::storage::Storage as _;
+use mavlink_station::sink::Memory;
+use mavlink_station::{MS, Net as _, NoObserver, S, run_all};
 
 const LOG: &str = "/APM/LOGS/00000001.BIN";
 
 fn bad() -> Faults {
     Faults { loss: 0.2, repeat: 0.05, delay: 200 * MS, jitter: 30 * MS, ..Faults::default() }
-}
-
-fn one<C: Conversation>(net: &mut Net, conversation: C) -> C::Done {
-    let conversations = BTreeMap::from([(drone(1), conversation)]);
-    run_all(net, conversations, 1, &mut NoObserver).unwrap().remove(&drone(1)).expect("it ends")
 }
 
 fn get() -> Get<Memory> {
