@@ -6,6 +6,16 @@ use std::rc::Rc;
 use crate::link::clock::Micros;
 
 /// A limit in bytes per second, shared by the conversations on a link.
+///
+/// ```
+/// use mavlink_station::S;
+/// use mavlink_station::budget::Budget;
+///
+/// let link = Budget::new(5_760.0); // 57,600 baud
+/// assert!(link.take(S, 4_000).is_ok());
+/// let again = link.take(S, 4_000).unwrap_err();
+/// assert!(again > S && again < 2 * S);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Budget(Rc<RefCell<Bucket>>);
 

@@ -3,6 +3,16 @@
 use std::collections::BTreeMap;
 
 /// A set of byte ranges, `start..end`. Ranges that touch become one.
+///
+/// ```
+/// use mavlink_station::intervals::Intervals;
+///
+/// let mut have = Intervals::default();
+/// assert_eq!(have.insert(0, 100), 100);
+/// assert_eq!(have.insert(80, 200), 100); // 20 bytes were there
+/// assert_eq!(have.insert(300, 400), 100);
+/// assert_eq!(have.gap(0, 1_000), Some((200, 300)));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Intervals {
     /// End by start; neither overlapping nor touching.

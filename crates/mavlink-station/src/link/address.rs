@@ -8,6 +8,15 @@ use untrusted_io::file::read_whole;
 use untrusted_io::plain::{Shown as _, acts};
 
 /// A link and the network it belongs to.
+///
+/// ```
+/// use mavlink_station::link::address::{Address, Way};
+///
+/// let radio: Address = "1@serial:/dev/ttyUSB0:57600".parse()?;
+/// assert_eq!(radio.network, 1);
+/// assert_eq!(radio.way, Way::Serial("/dev/ttyUSB0".to_owned(), 57_600));
+/// # Ok::<(), mavlink_station::link::address::AddressError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
     /// Network of the link: vehicles with equal system ids in different networks are different

@@ -1,7 +1,7 @@
-//! Conversations with drones, one per drone and many at once.
+//! Sans-IO conversations with drones, and [`run_all`], which runs many at once.
 //!
-//! A conversation is a [`Conversation`]: no sockets, no clock, no threads, so that it runs the same
-//! on a radio and on a simulated link that drops, delays and repeats.
+//! A [`Conversation`] has no socket, clock or thread, so that it runs the same on a radio and on a
+//! simulated link that drops, delays and repeats.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -39,6 +39,39 @@ pub struct Progress {
 }
 
 /// A sans-IO conversation with one drone.
+///
+/// ```
+/// use std::collections::BTreeMap;
+///
+/// use mavlink_station::link::frame::MavMessage;
+/// use mavlink_station::simulated::{files::FileVehicle, lossy, storage::MemoryStorage};
+/// use mavlink_station::{Conversation, DroneId, Micros, NoObserver, S, Step, run_all};
+///
+/// /// Waits for the heartbeat of a vehicle, for 5 s.
+/// #[derive(Default)]
+/// struct Await(bool);
+///
+/// impl Conversation for Await {
+///     type Done = bool;
+///
+///     fn on_message(&mut self, _now: Micros, message: &MavMessage) {
+///         self.0 |= matches!(message, MavMessage::HEARTBEAT(_));
+///     }
+///
+///     fn poll(&mut self, now: Micros) -> Step<bool> {
+///         if self.0 || now >= 5 * S { Step::Done(self.0) } else { Step::Wait(5 * S) }
+///     }
+/// }
+///
+/// let [here, gone] = [1, 2].map(|system| DroneId { network: 0, system });
+/// let vehicle = FileVehicle::new(MemoryStorage::default(), "/APM/LOGS", 0.0);
+/// let vehicles = BTreeMap::from([(here, vehicle)]);
+/// let mut net = lossy::LossyNet::new(vehicles, lossy::Faults::default(), 1);
+/// let all = BTreeMap::from([here, gone].map(|drone| (drone, Await::default())));
+/// let heard = run_all(&mut net, all, 10, &mut NoObserver)?;
+/// assert_eq!(heard, BTreeMap::from([(here, true), (gone, false)]));
+/// # Ok::<(), mavlink_station::link::error::NetError>(())
+/// ```
 pub trait Conversation {
     /// Result of the conversation; a failure is one of its values.
     type Done;

@@ -78,6 +78,18 @@ pub fn encode(
 
 /// Finder of frames in bytes that arrive in pieces. Holds at most one frame's worth of bytes beyond
 /// the last push.
+///
+/// ```
+/// use mavlink_station::link::frame::{FrameReader, encode};
+/// use mavlink_station::link::station::{STATION, heartbeat};
+///
+/// let bytes = encode(STATION, 0, &heartbeat(), None);
+/// let mut reader = FrameReader::default();
+/// reader.push(&bytes[..5]);
+/// assert!(reader.next(None).is_none());
+/// reader.push(&bytes[5..]);
+/// assert_eq!(reader.next(None).map(|frame| frame.message), Some(heartbeat()));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct FrameReader {
     bytes: Vec<u8>,

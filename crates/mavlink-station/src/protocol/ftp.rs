@@ -121,6 +121,15 @@ impl std::fmt::Display for NakReason {
 }
 
 /// A packet of the protocol.
+///
+/// ```
+/// use mavlink_station::protocol::ftp::{NakReason, Op, Packet};
+///
+/// let request = Packet::request(Op::OpenFileRO).with_data(b"/APM/LOGS/00000001.BIN");
+/// assert_eq!(Packet::from_payload(&request.to_payload()), Some(request));
+/// let answer = Packet::request(Op::Nak).with_data(&[10]);
+/// assert_eq!(answer.refusal(), Some(NakReason::FileNotFound));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Packet {
     /// Number of the packet; an answer's is its request's plus one.
