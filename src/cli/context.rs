@@ -1,4 +1,4 @@
-//! What every command gets: where to print, how much to say, and whether to stop.
+//! Context of every command: where to print, how much to say, and whether to stop.
 
 use std::io::{self, BufRead as _, IsTerminal, Write};
 use std::path::Path;

@@ -14,27 +14,28 @@ pub use crate::workflow::error::WorkflowError as CommandError;
 pub(super) use crate::workflow::error::{BECAUSE, with_reasons};
 use crate::workflow::shows::load::LoadError;
 
-/// How a command ended. One rule for every command: what is not there or cannot be read or written
-/// is 1, what is there but wrong is 2, what is right but empty is 5. The numbers are documented in the README and do not change.
+/// Exit code of a command. One rule holds for every command: what is missing or cannot be read or
+/// written is 1, what is there but not valid is 2, what is valid but empty is 5. The numbers are
+/// documented in the README and do not change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// Done.
+    /// All of the work was done.
     Done = 0,
-    /// A file or folder is not there, or cannot be read or written; anything unexpected.
+    /// A file or folder is missing, or cannot be read or written; also anything unexpected.
     Failed = 1,
-    /// The arguments or a template are wrong, or a file is of the wrong kind or broken.
+    /// The arguments or a template are not valid, or a file is of the wrong kind or broken.
     Usage = 2,
-    /// Done, but something was lost and is named.
+    /// The work was done, but something was lost, and is named.
     Losses = 3,
     /// A check failed: the show is not safe as it is.
     Unsafe = 4,
     /// There was nothing to work on (no plan, no logs, no windows), or an analysis gave no law and no
     /// map at all.
     Nothing = 5,
-    /// Another process is writing into the same folder.
+    /// Another process is writing into the folder.
     Busy = 6,
-    /// Interrupted by the user; the same command goes on where it stopped.
+    /// The user interrupted the command; when run again it goes on where it stopped.
     Interrupted = 130,
 }
 

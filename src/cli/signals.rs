@@ -1,4 +1,5 @@
-//! Ctrl-C, SIGTERM and SIGHUP (the terminal was closed, ssh was lost): they mean the same.
+//! Handling of Ctrl-C, SIGTERM and SIGHUP (the terminal was closed, ssh was lost), which all mean
+//! an interruption.
 //!
 //! Only Ctrl-C counts a second time: a session that ends sends SIGHUP and SIGTERM one after the other,
 //! and more than once, while drones are being sent home.

@@ -1,4 +1,4 @@
-//! What is seen of logs that come home: a bar on a terminal, else a line now and then.
+//! Display of logs that come home: a bar on a terminal, otherwise a line now and then.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 

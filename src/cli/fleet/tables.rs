@@ -1,4 +1,4 @@
-//! What the steps print.
+//! Tables that the steps with a fleet print.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,4 +1,4 @@
-//! What a pull would ask for.
+//! Dry run of a pull: the logs that it would ask for.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! What logs the drones have, for people and for programs.
+//! List of the logs on the drones, for people and for programs.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! What is printed of flights through a running Skybrush Server.
+//! Output of flights through a running Skybrush Server.
 
 mod options;
 
