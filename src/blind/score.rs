@@ -8,8 +8,8 @@ use super::foreign;
 use super::hide::Hidden;
 use super::scenario::{Cell, Scenario};
 use crate::effects::{Effect, Role, find};
-use crate::gap::Verdict;
 use crate::gap::verdict::{Finding, Fitted, Interval};
+use crate::gap::{Dependence, Verdict};
 
 /// A gap that grows by less is the same: a bias of the velocity shifts a straight response as a whole, and
 /// its repair leaves the gap as it was but for rounding.
@@ -129,13 +129,13 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
             Finding::Class { effects, .. } => {
                 let fits = |effect: &String| {
                     library(truth).any(|hidden| equivalent(&hidden.effect, effect))
-                        || truth.hidden.iter().any(|hidden| accepts(hidden, effect))
+                        || truth.hidden.iter().any(|hidden| accepts_name(hidden, effect))
                 };
                 outcome.wrong_classes += usize::from(!effects.iter().any(fits));
                 outcome.found.push(effects.join(" or "));
             }
             Finding::Unknown { depends_on, .. } => {
-                let right = truth.hidden.iter().any(|hidden| accepts(hidden, depends_on));
+                let right = truth.hidden.iter().any(|hidden| accepts(hidden, *depends_on));
                 outcome.wrong_unknowns += usize::from(!right);
                 outcome.found.push(format!("unknown, depends on {depends_on}"));
             }
@@ -171,9 +171,14 @@ fn library(truth: &Scenario) -> impl Iterator<Item = &Hidden> {
 }
 
 /// Whether a hidden effect is off-library and does depend on this.
-fn accepts(hidden: &Hidden, depends_on: &str) -> bool {
+fn accepts(hidden: &Hidden, depends_on: Dependence) -> bool {
     let foreign = foreign::find(&hidden.effect).filter(|_| hidden.foreign);
     foreign.is_some_and(|foreign| foreign.depends_on.contains(&depends_on))
+}
+
+/// As [`accepts`], of a member of a class.
+fn accepts_name(hidden: &Hidden, name: &str) -> bool {
+    Dependence::of(name).is_some_and(|depends_on| accepts(hidden, depends_on))
 }
 
 fn compare(hidden: &Hidden, value: f64, verdict: &Verdict, z: Option<f64>) -> HiddenOutcome {
@@ -206,10 +211,10 @@ fn called(hidden: &Hidden, verdict: &Verdict) -> Called {
     }
     for step in &verdict.steps {
         let this = match &step.finding {
-            Finding::Unknown { depends_on, .. } if accepts(hidden, depends_on) => Called::Named,
+            Finding::Unknown { depends_on, .. } if accepts(hidden, *depends_on) => Called::Named,
             Finding::Unknown { .. } => Called::Unknown,
             _ if hidden.foreign => {
-                let fits = step.finding.effects().iter().any(|one| accepts(hidden, one));
+                let fits = step.finding.effects().iter().any(|one| accepts_name(hidden, one));
                 if fits { Called::InClass } else { Called::Silent }
             }
             Finding::Name { effect, .. } if *effect == hidden.effect => Called::Named,

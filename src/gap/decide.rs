@@ -1,5 +1,6 @@
 //! Meaning of a round's gains: nothing, an effect, a class, or a free shape.
 
+use super::dependence::Dependence;
 use super::explain::Options;
 use super::generic::Generic;
 use super::gls::{Column, Likelihood, Problem};
@@ -33,15 +34,15 @@ const FREE_LEFT: f64 = 0.25;
 /// What the air itself may depend on: such shapes need [`FREE_BETTER`] times the threshold, and matter by
 /// what they do over the whole flight. Since this was introduced none of 546 flights with nothing hidden led
 /// to a finding (docs/blind.md).
-const OF_THE_AIR: [&str; 2] = ["height", "time"];
+const OF_THE_AIR: [Dependence; 2] = [Dependence::Height, Dependence::Time];
 
 /// The product of climb and time: a response that grows during the flight (docs/physics.md, 3.5).
-pub(super) const PRODUCT: &str = "climb-time";
+pub(super) const PRODUCT: Dependence = Dependence::ClimbTime;
 /// Free shapes with only a number or two, and by how much they must be better than an effect to be believed,
 /// nats. A product of climb and time contains a line, and a line is much of what any effect of the climb is;
 /// a step resembles motors that warm up. Introduced with 2.5 after blind flights in which products were
 /// taken for drag; 6 since the scatter between drones takes part. The values are chosen.
-const SIMPLE: [(&str, f64); 2] = [(PRODUCT, 6.0), ("step", 2.5)];
+const SIMPLE: [(Dependence, f64); 2] = [(PRODUCT, 6.0), (Dependence::Step, 2.5)];
 
 /// An effect this near to a size that matters is named before a free shape that looks like it. Chosen.
 const NEARLY: f64 = 0.6;

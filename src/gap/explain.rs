@@ -192,7 +192,7 @@ pub fn search(
                     found.extras.push(variant.column.clone());
                     found.hyper = best.hyper;
                 }
-                let free = or_else.iter().map(|free| generics[free.generic].depends_on);
+                let free = or_else.iter().map(|free| generics[free.generic].depends_on.name());
                 let effects = members.iter().map(|one| candidates[one.candidate].name);
                 let names: Vec<String> = effects.chain(free).map(str::to_owned).collect();
                 let finding = finding(names, candidate.was_there, by_lean);
@@ -215,7 +215,7 @@ pub fn search(
                 found.hyper = free.hyper;
                 found.steps.push(Step {
                     finding: Finding::Unknown {
-                        depends_on: generic.depends_on.to_owned(),
+                        depends_on: generic.depends_on,
                         formula: super::formula::formula(generic.depends_on, &shape),
                     },
                     gain_nats: free.gain,
@@ -367,7 +367,7 @@ fn rivals(round: &Round, sought: Sought<'_>) -> Vec<Rival> {
         gain_nats: ranked.gain,
     });
     let free = round.generics.iter().map(|free| Rival {
-        name: sought.generics[free.generic].depends_on.to_owned(),
+        name: sought.generics[free.generic].depends_on.to_string(),
         generic: true,
         gain_nats: free.gain,
     });
@@ -383,7 +383,7 @@ fn best_name(round: &Round, sought: Sought<'_>) -> String {
         best.map_or_else(String::new, |one| sought.library[one.candidate].name.to_owned())
     } else {
         let best = round.generics.first();
-        best.map_or_else(String::new, |one| sought.generics[one.generic].depends_on.to_owned())
+        best.map_or_else(String::new, |one| sought.generics[one.generic].depends_on.to_string())
     }
 }
 

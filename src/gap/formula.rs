@@ -1,22 +1,23 @@
 //! A compact formula for a free shape, if one describes it.
 
+use super::dependence::Dependence;
 use super::verdict::Shape;
 
 /// A formula must describe this share of the shape's variance. Chosen.
 const ENOUGH: f64 = 0.95;
 
 /// A formula in plain text, for example `-12.3 sin(2 pi h / 31 m + 0.4) us`.
-pub(super) fn formula(depends_on: &str, shape: &Shape) -> Option<String> {
+pub(super) fn formula(depends_on: Dependence, shape: &Shape) -> Option<String> {
     let (x, y) = (&shape.x, &shape.us);
     if x.len() < 5 {
         return None;
     }
     let letter = match depends_on {
-        "climb" => "V",
-        "height" => "h",
-        "time" | "step" => "t",
-        "wind" => "v",
-        "voltage" => "q",
+        Dependence::Climb => "V",
+        Dependence::Height => "h",
+        Dependence::Time | Dependence::Step => "t",
+        Dependence::Wind => "v",
+        Dependence::Voltage => "q",
         _ => return None,
     };
     let mut forms: Vec<(String, f64)> = Vec::new();
@@ -102,11 +103,12 @@ mod tests {
 
     #[test]
     fn known_shapes_have_their_formulas() {
-        let line = formula("height", &shape(|x| 0.5 * x - 3.0)).unwrap();
+        let line = formula(Dependence::Height, &shape(|x| 0.5 * x - 3.0)).unwrap();
         assert_eq!(line, "0.500 h us");
-        let wave = formula("height", &shape(|x| 4.0 * (std::f64::consts::TAU * x / 31.2).sin()));
+        let wave =
+            formula(Dependence::Height, &shape(|x| 4.0 * (std::f64::consts::TAU * x / 31.2).sin()));
         assert!(wave.unwrap().contains("sin(2 pi h/31.2"), "a sinusoid");
-        let step = formula("step", &shape(|x| if x < 30.0 { 1.0 } else { 6.0 })).unwrap();
+        let step = formula(Dependence::Step, &shape(|x| if x < 30.0 { 1.0 } else { 6.0 })).unwrap();
         assert_eq!(step, "5.00 us from t = 30.0");
     }
 }

@@ -1,5 +1,6 @@
 //! Free shapes: a dependence of the pulse on a signal that no effect of the library explains.
 
+use super::dependence::Dependence;
 use super::gls::{Column, Pulses, means_of};
 use super::response::Response;
 use super::scene::Scene;
@@ -10,7 +11,7 @@ use crate::gap::verdict::Shape;
 #[derive(Clone, Debug)]
 pub(super) struct Generic {
     /// Name of the signal that the shape depends on.
-    pub depends_on: &'static str,
+    pub depends_on: Dependence,
     /// Label of the signal for an axis, with its unit.
     pub axis: &'static str,
     /// Regressors that span the shape.
@@ -56,10 +57,12 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     let height = along(&|s| s.height_m);
     let wind = along(&|s| s.horizontal_mps);
     let mut found = Vec::new();
-    found.extend(smooth("climb", "vertical velocity (m/s)", &climb, 5, 0.5).map(Generic::feels));
-    found.extend(smooth("time", "time since arming (s)", &time, 3, 30.0));
-    found.extend(smooth("height", "height (m)", &height, 3, 3.0));
-    found.extend(smooth("wind", "horizontal air speed (m/s)", &wind, 3, 1.5));
+    found.extend(
+        smooth(Dependence::Climb, "vertical velocity (m/s)", &climb, 5, 0.5).map(Generic::feels),
+    );
+    found.extend(smooth(Dependence::Time, "time since arming (s)", &time, 3, 30.0));
+    found.extend(smooth(Dependence::Height, "height (m)", &height, 3, 3.0));
+    found.extend(smooth(Dependence::Wind, "horizontal air speed (m/s)", &wind, 3, 1.5));
     found.extend(waves(&height));
     found.push(climb_times_time(&climb, &time));
     found.extend(steps(&time));
@@ -75,7 +78,7 @@ fn waves(height: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
             Column::Shared(map(height, &|h| of(std::f64::consts::TAU * h / wave_m)))
         };
         Generic {
-            depends_on: "height",
+            depends_on: Dependence::Height,
             axis: "height (m)",
             columns: vec![phase(f64::sin), phase(f64::cos)],
             felt: Vec::new(),
@@ -94,7 +97,7 @@ fn climb_times_time(climb: &[Vec<f64>], time: &[Vec<f64>]) -> Generic {
     };
     let crossed: Vec<Vec<f64>> = climb.iter().zip(time).map(product).collect();
     Generic {
-        depends_on: "climb-time",
+        depends_on: Dependence::ClimbTime,
         axis: "vertical velocity times time, scaled",
         // A product comes with its own mean part. What goes with the size of the climb and time is what a
         // drift of the air does.
@@ -113,7 +116,7 @@ fn steps(time: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
     (1..=STEPS).map(|step| {
         let at_s = least(time) + (most(time) - least(time)) * step as f64 / (STEPS + 1) as f64;
         Generic {
-            depends_on: "step",
+            depends_on: Dependence::Step,
             axis: "time since arming (s)",
             columns: vec![Column::Shared(map(time, &|t| if t < at_s { 0.0 } else { 1.0 }))],
             felt: Vec::new(),
@@ -137,7 +140,7 @@ fn by_charge(charge: &Pulses) -> Option<Generic> {
         Column::Own(charge.iter().map(group).collect())
     });
     Some(Generic {
-        depends_on: "voltage",
+        depends_on: Dependence::Voltage,
         axis: "charge by the voltage at rest (share)",
         columns: powers.collect(),
         felt: Vec::new(),
@@ -160,7 +163,7 @@ fn directions(scene: &Scene, headings: &[Vec<f64>]) -> impl Iterator<Item = Gene
         };
         let (ahead, aside) = (turns(f64::cos), turns(f64::sin));
         (span(&ahead).max(span(&aside)) > LEAST_TURN_MPS).then(|| Generic {
-            depends_on: "heading",
+            depends_on: Dependence::Heading,
             axis: "direction of the air from the nose (rad)",
             columns: vec![Column::Shared(ahead), Column::Shared(aside)],
             felt: Vec::new(),
@@ -177,7 +180,7 @@ fn straight(slopes: Vec<Vec<f64>>) -> Vec<Vec<Response>> {
 }
 
 fn smooth(
-    depends_on: &'static str,
+    depends_on: Dependence,
     axis: &'static str,
     along: &[Vec<f64>],
     order: usize,

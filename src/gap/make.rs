@@ -3,6 +3,7 @@
 use super::bins::Bin;
 use super::compare::{Comparison, Simulated};
 use super::data::{Data, Flown, constant_us};
+use super::dependence::Dependence;
 use super::detectable::detectable;
 use super::drones::drones;
 use super::error::GapError;
@@ -198,7 +199,7 @@ fn ladder(data: &Data, regimes: &[Regime]) -> Vec<Rung> {
             .map(|(_, values)| values.pulse_us)
             .collect()
     };
-    let rungs = regimes.iter().filter(|regime| regime.by == "climb");
+    let rungs = regimes.iter().filter(|regime| regime.by == Dependence::Climb);
     rungs
         .filter_map(|rung| {
             let pulses = pulses(rung.x);

@@ -8,6 +8,7 @@ mod compare;
 mod contest;
 pub mod data;
 mod decide;
+pub mod dependence;
 mod detectable;
 mod difficulty;
 mod drones;
@@ -44,6 +45,7 @@ pub mod words;
 
 pub use compare::Simulated;
 pub use data::{Data, Flown};
+pub use dependence::Dependence;
 pub use difficulty::{SteadyPulse, There, fisher_z};
 pub use error::GapError;
 pub use explain::{Found, Options, search};

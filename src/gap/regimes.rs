@@ -3,6 +3,7 @@
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::compare::Comparison;
+use super::dependence::Dependence;
 use super::error::GapError;
 use super::explain::Found;
 use super::gls::Pulses;
@@ -22,7 +23,7 @@ type Class = (String, f64, Vec<(usize, usize, usize)>);
 
 /// One way of holding bins apart: its name and the class of a bin: (label, place on the axis).
 struct Axis<'a> {
-    by: &'static str,
+    by: Dependence,
     of: ClassOf<'a>,
 }
 
@@ -51,7 +52,7 @@ pub(super) fn regimes(
         patterns.iter().map(|group| group.responses(&found.hyper)).collect();
     let mut rows = Vec::new();
     for axis in axes(after) {
-        let by_drone = axis.by == "drone" || axis.by == "place";
+        let by_drone = axis.by.is_of_drones();
         let (from, to) = if by_drone { (&start, &end) } else { (&flat_start, &flat_end) };
         let mut classes: Vec<Class> = Vec::new();
         for (group, drones) in to.iter().enumerate() {
@@ -76,7 +77,7 @@ pub(super) fn regimes(
                     / places.len() as f64;
             let before_us = mean(from);
             rows.push(Regime {
-                by: axis.by.to_owned(),
+                by: axis.by,
                 label,
                 x,
                 before_us: (before_us, (square / DRAWS as f64).sqrt()),
@@ -102,7 +103,7 @@ fn axes(after: &Comparison) -> Vec<Axis<'_>> {
     let signals = &after.scene.signals;
     let groups = &after.data.groups;
     let classed =
-        move |by: &'static str, unit: &'static str, of: fn(&crate::effects::Signals) -> f64| {
+        move |by: Dependence, unit: &'static str, of: fn(&crate::effects::Signals) -> f64| {
             let values = || signals.iter().flatten().map(of);
             let low = values().fold(f64::INFINITY, f64::min);
             let high = values().fold(f64::NEG_INFINITY, f64::max);
@@ -120,26 +121,26 @@ fn axes(after: &Comparison) -> Vec<Axis<'_>> {
         };
     let mut axes = vec![
         Axis {
-            by: "climb",
+            by: Dependence::Climb,
             of: Box::new(move |group, _, bin| {
                 let bin = groups.get(group)?.bins.get(bin)?;
                 (!bin.is_horizontal())
                     .then(|| (format!("{:+.1} m/s", bin.climb_mps()), bin.climb_mps()))
             }),
         },
-        classed("height", "m", |s| s.height_m),
-        classed("time", "s", |s| s.time_s),
-        classed("wind", "m/s", |s| s.horizontal_mps),
-        classed("lean", "deg", |s| s.tilt_rad.to_degrees()),
+        classed(Dependence::Height, "m", |s| s.height_m),
+        classed(Dependence::Time, "s", |s| s.time_s),
+        classed(Dependence::Wind, "m/s", |s| s.horizontal_mps),
+        classed(Dependence::Lean, "deg", |s| s.tilt_rad.to_degrees()),
         Axis {
-            by: "drone",
+            by: Dependence::Drone,
             of: Box::new(move |group, drone, _| {
                 let slot = *groups.get(group)?.slots.get(drone)?;
                 Some((format!("slot {slot}"), f64::from(slot)))
             }),
         },
         Axis {
-            by: "place",
+            by: Dependence::Place,
             of: Box::new(move |group, drone, _| {
                 let count = *groups.get(group)?.neighbours.get(drone)?;
                 Some((format!("{count:.0} neighbours"), count))
@@ -148,7 +149,7 @@ fn axes(after: &Comparison) -> Vec<Axis<'_>> {
     ];
     if let Some(charge) = &after.scene.charge {
         axes.push(Axis {
-            by: "voltage",
+            by: Dependence::Voltage,
             of: Box::new(move |group, drone, bin| {
                 let share = charge.get(group)?.get(drone)?.get(bin)?;
                 let class = (share * 10.0).floor().clamp(0.0, 9.0);

@@ -5,6 +5,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::dependence::Dependence;
 use super::left_out::LeftOut;
 use super::warning::Warning;
 
@@ -145,7 +146,8 @@ pub enum Finding {
     Unknown {
         /// What it depends on: `climb`, `time`, `height`, `wind`, `voltage`, `climb-time`,
         /// `heading`, `step`.
-        depends_on: String,
+        #[schemars(with = "String")]
+        depends_on: Dependence,
         /// A compact formula that describes it, if one does.
         formula: Option<String>,
     },
@@ -371,7 +373,8 @@ pub struct MapError {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Regime {
     /// What is held apart: `climb`, `height`, `time`, `place`, `drone`, `voltage`, `lean`.
-    pub by: String,
+    #[schemars(with = "String")]
+    pub by: Dependence,
     /// The regime, for people.
     pub label: String,
     /// Where it is on the axis.

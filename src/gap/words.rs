@@ -35,7 +35,9 @@ pub fn member(name: &str) -> &str {
     match name {
         "updraft-drift" => "an updraft that changes steadily",
         "updraft-profile" => "an updraft that grows with height",
-        PRODUCT => "something unknown that depends on climb speed times time",
+        name if name == PRODUCT.name() => {
+            "something unknown that depends on climb speed times time"
+        }
         effect => effect,
     }
 }

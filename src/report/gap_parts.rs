@@ -4,6 +4,7 @@ use minijinja::context;
 use minijinja::value::Value;
 
 use crate::effects;
+use crate::gap::Dependence;
 use crate::gap::Verdict;
 use crate::gap::verdict::{Detectable, Finding, Fitted, Shrink, Step};
 use crate::gap::words::{member, phrase};
@@ -69,15 +70,15 @@ pub(super) fn tiles(verdict: &Verdict) -> Vec<Value> {
 
 /// Every class of every regime.
 pub(super) fn regime_rows(verdict: &Verdict) -> Vec<Value> {
-    let place = |by: &str| ORDER.iter().position(|known| *known == by).unwrap_or(ORDER.len());
+    let place = |by: Dependence| ORDER.iter().position(|known| *known == by).unwrap_or(ORDER.len());
     let mut rows: Vec<_> = verdict.regimes.iter().collect();
-    rows.sort_by_key(|row| place(&row.by));
+    rows.sort_by_key(|row| place(row.by));
     rows.into_iter()
         .map(|row| {
             // The drones' own means are no chance of the air.
-            let own = matches!(row.by.as_str(), "drone" | "place");
+            let own = row.by.is_of_drones();
             context! {
-                by => regime_title(&row.by),
+                by => regime_title(row.by),
                 label => minus(&clean(&row.label)),
                 bins => row.bins,
                 before => signed(row.before_us.0, 1),
@@ -127,7 +128,7 @@ fn heading(finding: &Finding) -> String {
             effects.iter().map(|name| title(name)).collect::<Vec<_>>().join(" or ")
         }
         Finding::Unknown { depends_on: on, .. } => {
-            format!("Something unknown that depends on {}", depends_on(on))
+            format!("Something unknown that depends on {}", depends_on(*on))
         }
     }
 }

@@ -121,7 +121,7 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
         4,
     );
     let own = |name: &str| match &step.finding {
-        Finding::Unknown { depends_on, .. } => depends_on == name,
+        Finding::Unknown { depends_on, .. } => depends_on.name() == name,
         other => other.effects().contains(&name),
     };
     let rivals: Vec<String> = step

@@ -1,5 +1,6 @@
 //! Numbers and names of a verdict as people read them.
 
+use crate::gap::Dependence;
 use crate::gap::verdict::{Detectable, Finding, Interval, MapGain, Regime, Rest};
 use crate::gap::words::short;
 
@@ -116,44 +117,44 @@ pub(super) fn kind(finding: &Finding) -> &'static str {
 }
 
 /// What a free shape depends on.
-pub(super) fn depends_on(name: &str) -> String {
-    match name {
-        "climb" => "climb speed".to_owned(),
-        "climb-time" => "climb × time".to_owned(),
-        "wind" => "horizontal speed".to_owned(),
-        "voltage" => "charge".to_owned(),
-        "step" => "time, a step".to_owned(),
-        other => clean(other),
+pub(super) fn depends_on(on: Dependence) -> &'static str {
+    match on {
+        Dependence::Climb => "climb speed",
+        Dependence::ClimbTime => "climb × time",
+        Dependence::Wind => "horizontal speed",
+        Dependence::Voltage => "charge",
+        Dependence::Step => "time, a step",
+        other => other.name(),
     }
 }
 
 /// What a regime is by.
-pub(super) fn regime_title(by: &str) -> String {
+pub(super) fn regime_title(by: Dependence) -> &'static str {
     match by {
-        "climb" => "Climb speed".to_owned(),
-        "height" => "Height".to_owned(),
-        "time" => "Time".to_owned(),
-        "wind" => "Horizontal speed".to_owned(),
-        "lean" => "Lean".to_owned(),
-        "voltage" => "Charge".to_owned(),
-        "place" => "Place".to_owned(),
-        "drone" => "Drone".to_owned(),
-        other => clean(other),
+        Dependence::Climb => "Climb speed",
+        Dependence::Height => "Height",
+        Dependence::Time => "Time",
+        Dependence::Wind => "Horizontal speed",
+        Dependence::Lean => "Lean",
+        Dependence::Voltage => "Charge",
+        Dependence::Place => "Place",
+        Dependence::Drone => "Drone",
+        other => other.name(),
     }
 }
 
 /// The axis of a regime, with unit.
-pub(super) fn regime_axis(by: &str) -> String {
+pub(super) fn regime_axis(by: Dependence) -> &'static str {
     match by {
-        "climb" => "commanded climb speed (m/s)".to_owned(),
-        "height" => "height above ground (m)".to_owned(),
-        "time" => "time since motor start (s)".to_owned(),
-        "wind" => "horizontal speed relative to the air (m/s)".to_owned(),
-        "lean" => "lean into the wind (°)".to_owned(),
-        "voltage" => "charge of the battery (share)".to_owned(),
-        "place" => "drones next to it in the array".to_owned(),
-        "drone" => "slot".to_owned(),
-        other => clean(other),
+        Dependence::Climb => "commanded climb speed (m/s)",
+        Dependence::Height => "height above ground (m)",
+        Dependence::Time => "time since motor start (s)",
+        Dependence::Wind => "horizontal speed relative to the air (m/s)",
+        Dependence::Lean => "lean into the wind (°)",
+        Dependence::Voltage => "charge of the battery (share)",
+        Dependence::Place => "drones next to it in the array",
+        Dependence::Drone => "slot",
+        other => other.name(),
     }
 }
 

@@ -6,6 +6,7 @@ use crate::effects::{
     Class, Definition, Effect, Hook, InFlight, Now, Reference, Signal, Signals, Sought, Start,
     Values,
 };
+use crate::gap::Dependence;
 use crate::vehicle::Airframe;
 
 const SLOPE: usize = 0;
@@ -17,7 +18,7 @@ struct ClimbTime;
 
 /// What the benchmark knows of it.
 pub(super) const FOREIGN: Foreign =
-    Foreign { effect: &ClimbTime, depends_on: &["climb-time"], turns: false };
+    Foreign { effect: &ClimbTime, depends_on: &[Dependence::ClimbTime], turns: false };
 
 /// The change at a vertical air speed and a time.
 fn pulse_us(values: &Values, climb_mps: f64, time_s: f64) -> f64 {

@@ -6,6 +6,7 @@ use crate::effects::{
     Class, Definition, Effect, Hook, InFlight, Now, Reference, Signal, Signals, Sought, Start,
     Values,
 };
+use crate::gap::Dependence;
 use crate::vehicle::Airframe;
 
 const AMPLITUDE: usize = 0;
@@ -17,7 +18,7 @@ struct Heading;
 
 /// What the benchmark knows of it.
 pub(super) const FOREIGN: Foreign =
-    Foreign { effect: &Heading, depends_on: &["heading"], turns: true };
+    Foreign { effect: &Heading, depends_on: &[Dependence::Heading], turns: true };
 
 /// The change at a horizontal air velocity: forward, and to the left.
 fn pulse_us(values: &Values, forward_mps: f64, left_mps: f64) -> f64 {

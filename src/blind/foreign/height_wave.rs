@@ -6,6 +6,7 @@ use crate::effects::{
     Class, Definition, Effect, Hook, InFlight, Now, Reference, Signal, Signals, Sought, Start,
     Values,
 };
+use crate::gap::Dependence;
 use crate::vehicle::Airframe;
 
 const AMPLITUDE: usize = 0;
@@ -18,7 +19,7 @@ struct HeightWave;
 
 /// What the benchmark knows of it.
 pub(super) const FOREIGN: Foreign =
-    Foreign { effect: &HeightWave, depends_on: &["height"], turns: false };
+    Foreign { effect: &HeightWave, depends_on: &[Dependence::Height], turns: false };
 
 /// The change at a height.
 fn pulse_us(values: &Values, height_m: f64) -> f64 {

@@ -9,14 +9,15 @@ mod height_wave;
 mod step;
 
 use crate::effects::{Definition, Effect, Reference, Signals, Values};
+use crate::gap::Dependence;
 
 /// Effect that no library lists.
 #[derive(Clone, Copy)]
 pub struct Foreign {
     /// Physics, as of an effect of the library.
     pub effect: &'static dyn Effect,
-    /// Words by which a verdict may name its dependence; the first is the plainest.
-    pub depends_on: &'static [&'static str],
+    /// What a verdict may say that it depends on; the first is the plainest.
+    pub depends_on: &'static [Dependence],
     /// Whether it goes with the cosine of the direction of the oncoming air against the nose; the closed
     /// form has the air straight from ahead.
     pub turns: bool,

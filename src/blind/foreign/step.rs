@@ -6,6 +6,7 @@ use crate::effects::{
     Class, Definition, Effect, Hook, InFlight, Now, Reference, Signal, Signals, Sought, Start,
     Values,
 };
+use crate::gap::Dependence;
 use crate::vehicle::Airframe;
 
 const JUMP: usize = 0;
@@ -17,7 +18,7 @@ struct Step;
 
 /// What the benchmark knows of it.
 pub(super) const FOREIGN: Foreign =
-    Foreign { effect: &Step, depends_on: &["step", "time"], turns: false };
+    Foreign { effect: &Step, depends_on: &[Dependence::Step, Dependence::Time], turns: false };
 
 /// The change at a time.
 fn pulse_us(values: &Values, time_s: f64) -> f64 {

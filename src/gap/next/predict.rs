@@ -8,6 +8,7 @@ use super::questions::{Question, Sought};
 use super::scenery::Scenery;
 use crate::gap::GapError;
 use crate::gap::candidates::{library, set};
+use crate::gap::dependence::Dependence;
 use crate::gap::generic::{Generic, all};
 use crate::gap::gls::{Column, Solution, White};
 use crate::gap::refly::mean_drone;
@@ -66,7 +67,7 @@ pub fn predict(
                 Sought::Seen { effect } => scenery.seen(solution, effect),
                 Sought::Apart { effects, size } => scenery.apart(solution, effects, size.as_ref()),
                 Sought::Shape { depends_on, shape } => {
-                    Ok(scenery.shape(solution, depends_on, shape))
+                    Ok(scenery.shape(solution, *depends_on, shape))
                 }
             }
         })
@@ -162,7 +163,8 @@ impl Scenery<'_> {
             let Some(rival) = self.candidate(&without, other)? else {
                 // What something unknown would depend on.
                 let generics = all(scene, &self.comparison.headings());
-                separations.extend(from_shape(solution, &own, &generics, other));
+                let on = Dependence::of(other);
+                separations.extend(on.and_then(|on| from_shape(solution, &own, &generics, on)));
                 continue;
             };
             // The form and size of the rival that looks most like it, of those that it can have.
@@ -215,20 +217,20 @@ impl Scenery<'_> {
         (with, mean_drone(&without))
     }
 
-    fn shape(&self, solution: &Solution, depends_on: &str, shape: &Shape) -> Vec<Separation> {
+    fn shape(&self, solution: &Solution, depends_on: Dependence, shape: &Shape) -> Vec<Separation> {
         let generics = all(&self.comparison.scene, &self.comparison.headings());
         let Some(own) = generics.iter().find(|generic| generic.depends_on == depends_on) else {
             return Vec::new();
         };
         let along = |bins: &Vec<f64>| bins.iter().map(|x| interpolated(shape, *x)).collect();
         let target = solution.white(&Column::Shared(own.along.iter().map(along).collect()));
-        let mut others: Vec<&str> = Vec::new();
+        let mut others: Vec<Dependence> = Vec::new();
         for rival in generics.iter().map(|generic| generic.depends_on) {
             if rival != depends_on && !others.contains(&rival) {
                 others.push(rival);
             }
         }
-        let from = |other: &str| from_shape(solution, &target, &generics, other);
+        let from = |other: Dependence| from_shape(solution, &target, &generics, other);
         others.into_iter().filter_map(from).collect()
     }
 }
@@ -238,13 +240,13 @@ fn from_shape(
     solution: &Solution,
     target: &White,
     generics: &[Generic],
-    depends_on: &str,
+    depends_on: Dependence,
 ) -> Option<Separation> {
     let strength = solution.information(target).max(0.0).sqrt();
     let along = generics.iter().filter(|generic| generic.depends_on == depends_on);
     let left = along.map(|generic| (1.0 - explained(solution, target, generic)).max(0.0).sqrt());
     let z = strength * left.reduce(f64::min)?;
-    Some(Separation { from: depends_on.to_owned(), z, size: None })
+    Some(Separation { from: depends_on.to_string(), z, size: None })
 }
 
 /// Share of something that a free shape explains.

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::gap::dependence::Dependence;
 use crate::gap::verdict::{Detectable, Finding, Shape, Verdict};
 use crate::gap::words::member;
 
@@ -29,7 +30,7 @@ pub enum Sought {
     /// Something unknown: its shape, and the signal it was found along, from the other signals.
     Shape {
         /// Signal, as in the verdict.
-        depends_on: String,
+        depends_on: Dependence,
         /// Shape as in the verdict.
         shape: Shape,
     },
@@ -84,7 +85,7 @@ pub fn ask(verdict: &Verdict) -> Vec<Question> {
         Finding::Unknown { depends_on, .. } => Some(Question {
             words: format!("does the unknown depend on {depends_on}, and on nothing else?"),
             sought: Sought::Shape {
-                depends_on: depends_on.clone(),
+                depends_on: *depends_on,
                 shape: step.shape.clone().unwrap_or_default(),
             },
         }),

@@ -12,10 +12,10 @@ use updraft::blind::seal;
 use updraft::blind::series::{FIRST_SCORING_SEED, Place, Settings, run};
 use updraft::blind::table::table;
 use updraft::blind::{AirClass, Base, BlindError, Cell, Explain, Protocol, Scenario};
-use updraft::gap::Verdict;
 use updraft::gap::verdict::{
     Detectable, Finding, Fitted, Interval, SensorChannel, Shrink, Step, VERDICT_SCHEMA,
 };
+use updraft::gap::{Dependence, Verdict};
 
 fn truth(base: Base, hidden: &[&str]) -> Scenario {
     let hidden = hidden.iter().map(|name| (*name).to_owned()).collect();
@@ -61,7 +61,7 @@ fn class(effects: &[&str]) -> Finding {
 }
 
 fn unknown(depends_on: &str) -> Finding {
-    Finding::Unknown { depends_on: depends_on.to_owned(), formula: None }
+    Finding::Unknown { depends_on: Dependence::of(depends_on).unwrap(), formula: None }
 }
 
 fn scored(hidden: &[&str], findings: Vec<Finding>) -> Outcome {

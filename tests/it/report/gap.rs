@@ -2,7 +2,7 @@
 
 use crate::report::verdicts::{class, named, nothing, provenance, sensor, unknown};
 use updraft::gap::verdict::{Drones, Finding, Gap, SensorChannel};
-use updraft::gap::{LeftOut, Verdict, Warning};
+use updraft::gap::{Dependence, LeftOut, Verdict, Warning};
 use updraft::report::{gap_summary, render_gap};
 
 fn all() -> [Verdict; 5] {
@@ -185,7 +185,7 @@ fn hostile_words_and_numbers_do_no_harm() {
     verdict.data.groups = vec![(bad.to_owned(), 3)];
     verdict.rest.candidate = bad.to_owned();
     verdict.steps[0].finding =
-        Finding::Unknown { depends_on: bad.to_owned(), formula: Some(bad.to_owned()) };
+        Finding::Unknown { depends_on: Dependence::Height, formula: Some(bad.to_owned()) };
     verdict.steps[0].rivals[0].name = bad.to_owned();
     verdict.steps[0].rivals[0].gain_nats = f64::NAN;
     verdict.steps[0].threshold_nats = f64::NAN;

@@ -7,7 +7,7 @@ use updraft::gap::verdict::{
     Noise, Regime, Rest, Rival, Rung, SensorChannel, Shape, Shrink, Step, VERDICT_SCHEMA,
 };
 use updraft::gap::words::summary;
-use updraft::gap::{LeftOut, Verdict, Warning};
+use updraft::gap::{Dependence, LeftOut, Verdict, Warning};
 use updraft::report::Provenance;
 
 fn around(value: f64, half: f64) -> Interval {
@@ -46,7 +46,7 @@ fn regimes() -> Vec<Regime> {
                 let wave = (index as f64 * 1.7).sin();
                 let before_us = size_us * (index as f64 - places.len() as f64 / 2.0);
                 Regime {
-                    by: by.to_owned(),
+                    by: Dependence::of(by).unwrap(),
                     label: format!("{x:+.1}"),
                     x: *x,
                     before_us: (before_us, 2.5),
@@ -70,7 +70,7 @@ fn regimes() -> Vec<Regime> {
 }
 
 fn ladder(regimes: &[Regime]) -> Vec<Rung> {
-    let rungs = regimes.iter().filter(|regime| regime.by == "climb");
+    let rungs = regimes.iter().filter(|regime| regime.by == Dependence::Climb);
     rungs
         .map(|rung| {
             let measured_us = 1600.0 + 40.0 * rung.x;
@@ -256,7 +256,7 @@ pub(crate) fn class() -> Verdict {
 /// Something that is not in the library, with a formula; offsets of drones cannot be told then.
 pub(crate) fn unknown() -> Verdict {
     let finding = Finding::Unknown {
-        depends_on: "height".to_owned(),
+        depends_on: Dependence::Height,
         formula: Some("4.00 sin(2 pi h/31.2 + 0.10) us".to_owned()),
     };
     let rivals = vec![rival("height", true, 55.0), rival("ground-effect", false, 9.0)];

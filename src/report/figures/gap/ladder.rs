@@ -3,8 +3,8 @@
 use kuva::plot::legend::{LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 
-use crate::gap::Verdict;
 use crate::gap::verdict::Regime;
+use crate::gap::{Dependence, Verdict};
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel};
@@ -20,7 +20,8 @@ const CLIMB_LABEL: &str = "commanded climb speed (m/s)";
 
 /// Measured pulses with both models, and what these leave; `None` without a ladder.
 pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
-    let rows: Vec<&Regime> = verdict.regimes.iter().filter(|row| row.by == "climb").collect();
+    let rows: Vec<&Regime> =
+        verdict.regimes.iter().filter(|row| row.by == Dependence::Climb).collect();
     if rows.is_empty() {
         return None;
     }

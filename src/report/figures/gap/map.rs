@@ -1,8 +1,8 @@
 //! The map of disagreement: the residual by climb speed, height, time, wind, lean, charge, place and
 //! drone.
 
-use crate::gap::Verdict;
 use crate::gap::verdict::Regime;
+use crate::gap::{Dependence, Verdict};
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
@@ -15,8 +15,16 @@ use crate::report::text::fixed;
 use super::{KEY_HEIGHT, OF_95, key, of_unknown, residuals};
 
 /// The regimes in the order in which they are shown.
-pub(in crate::report) const ORDER: [&str; 8] =
-    ["climb", "height", "time", "wind", "lean", "voltage", "place", "drone"];
+pub(in crate::report) const ORDER: [Dependence; 8] = [
+    Dependence::Climb,
+    Dependence::Height,
+    Dependence::Time,
+    Dependence::Wind,
+    Dependence::Lean,
+    Dependence::Voltage,
+    Dependence::Place,
+    Dependence::Drone,
+];
 /// Size of a panel, pixels.
 const PANEL: [f64; 2] = [516.0, 246.0];
 /// From one panel to the next, pixels.
@@ -28,7 +36,7 @@ const LEAST_SPAN_US: f64 = 4.0;
 
 /// The panels of all regimes that the verdict has; `None` without any.
 pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
-    let shown: Vec<(&str, Vec<&Regime>)> = ORDER
+    let shown: Vec<(Dependence, Vec<&Regime>)> = ORDER
         .into_iter()
         .map(|by| (by, verdict.regimes.iter().filter(|row| row.by == by).collect::<Vec<_>>()))
         .filter(|(_, rows)| !rows.is_empty())
@@ -36,26 +44,27 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     if shown.is_empty() {
         return None;
     }
-    let shared = scale(shown.iter().filter(|(by, _)| !of_drones(by)).flat_map(|(_, rows)| rows));
-    let own = scale(shown.iter().filter(|(by, _)| of_drones(by)).flat_map(|(_, rows)| rows));
+    let shared =
+        scale(shown.iter().filter(|(by, _)| !by.is_of_drones()).flat_map(|(_, rows)| rows));
+    let own = scale(shown.iter().filter(|(by, _)| by.is_of_drones()).flat_map(|(_, rows)| rows));
     let height = KEY_HEIGHT + shown.len().div_ceil(2) as f64 * PANEL[1];
     let mut sheet = Sheet::new(1040.0, height);
     let mut notes = Drawing::overlay();
     key(&mut notes, [LEFT, 14.0]);
     for (index, (by, rows)) in shown.iter().enumerate() {
         let at = [(index % 2) as f64 * PITCH, KEY_HEIGHT + (index / 2) as f64 * PANEL[1]];
-        let scale = if of_drones(by) { &own } else { &shared };
+        let scale = if by.is_of_drones() { &own } else { &shared };
         let letter = char::from(b'a' + index as u8);
-        let x = abscissa(by, rows);
+        let x = abscissa(*by, rows);
         let zero = [(x.min, 0.0), (x.max, 0.0)];
-        let mut panel = Panel::new(&format!("({letter}) {}", regime_title(by)), x, scale.clone());
+        let mut panel = Panel::new(&format!("({letter}) {}", regime_title(*by)), x, scale.clone());
         panel.line(&zero, MUTED, 1.0, "5 4");
         let room = PANEL[0] - 100.0;
         residuals(
             &mut panel,
             rows,
             (0.45 * room / rows.len() as f64).clamp(3.0, 16.0),
-            !of_drones(by),
+            !by.is_of_drones(),
         );
         sheet.place(panel.draw(PANEL[0], PANEL[1]), at[0], at[1]);
         let style = TextStyle { size: 12.0, bold: false, colour: MUTED, anchor: Anchor::End };
@@ -82,16 +91,11 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     })
 }
 
-/// Whether the drones' own means are in it.
-fn of_drones(by: &str) -> bool {
-    matches!(by, "drone" | "place")
-}
-
 /// One scale around zero for all of these.
 fn scale<'a>(rows: impl Iterator<Item = &'a &'a Regime>) -> Axis {
     let most = rows
         .flat_map(|row| {
-            let chance = if of_drones(&row.by) { 0.0 } else { OF_95 * row.before_us.1 };
+            let chance = if row.by.is_of_drones() { 0.0 } else { OF_95 * row.before_us.1 };
             [row.before_us.0.abs(), row.after_us.abs(), chance]
         })
         .filter(|value| value.is_finite())
@@ -99,18 +103,18 @@ fn scale<'a>(rows: impl Iterator<Item = &'a &'a Regime>) -> Axis {
     Axis::around("measured − model (µs)", [-most, most].into_iter(), LEAST_SPAN_US)
 }
 
-fn abscissa(by: &str, rows: &[&Regime]) -> Axis {
+fn abscissa(by: Dependence, rows: &[&Regime]) -> Axis {
     let (least, unit) = match by {
-        "voltage" => (0.1, 0.05),
-        "place" | "drone" => (2.0, 0.5),
+        Dependence::Voltage => (0.1, 0.05),
+        Dependence::Place | Dependence::Drone => (2.0, 0.5),
         _ => (1.0, 0.0),
     };
     let values = rows.iter().flat_map(|row| [row.x - unit, row.x + unit]);
-    let mut axis = Axis::around(&regime_axis(by), values, least);
-    if of_drones(by) {
+    let mut axis = Axis::around(regime_axis(by), values, least);
+    if by.is_of_drones() {
         axis.step = axis.step.max(1.0);
     }
-    if by == "voltage" {
+    if by == Dependence::Voltage {
         (axis.min, axis.max) = (axis.min.max(0.0), axis.max.min(1.0));
     }
     axis

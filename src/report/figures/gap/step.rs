@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::gap::Dependence;
 use crate::gap::verdict::{Finding, Rival, Shape, Step};
 use crate::report::Figure;
 use crate::report::axis::{Axis, nice_step};
@@ -66,7 +67,7 @@ pub(in crate::report) fn figure(step: &Step, number: usize) -> Option<Figure> {
 /// Whether a rival is what was found.
 fn is_found(step: &Step, rival: &Rival) -> bool {
     match &step.finding {
-        Finding::Unknown { depends_on, .. } => rival.generic && rival.name == *depends_on,
+        Finding::Unknown { depends_on, .. } => rival.generic && rival.name == depends_on.name(),
         other => !rival.generic && other.effects().contains(&rival.name.as_str()),
     }
 }
@@ -106,7 +107,8 @@ fn bars(step: &Step, number: usize) -> Drawing {
         let y = TOP + PITCH * index as f64;
         let found = is_found(step, rival);
         let words = if rival.generic {
-            format!("any shape in {}", depends_on(&rival.name))
+            let on = Dependence::of(&rival.name).map(depends_on);
+            format!("any shape in {}", on.map_or_else(|| clean(&rival.name), str::to_owned))
         } else {
             clean(&rival.name)
         };

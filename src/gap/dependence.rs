@@ -1,0 +1,99 @@
+//! Dependences: the quantities that a residual may depend on.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Quantity along which a residual is held apart, or on which a free shape depends.
+///
+/// Files have the names of [`Dependence::name`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Dependence {
+    /// Vertical air speed, m/s.
+    #[default]
+    Climb,
+    /// Height above ground, m.
+    Height,
+    /// Time since the motors started, s.
+    Time,
+    /// Horizontal air speed, m/s.
+    Wind,
+    /// Lean into the wind, degrees.
+    Lean,
+    /// Charge of the battery by its voltage at rest, share.
+    Voltage,
+    /// Drones next to one in the array.
+    Place,
+    /// Slot of a drone.
+    Drone,
+    /// Direction of the oncoming air against the nose.
+    Heading,
+    /// Instant from which the residual is another.
+    Step,
+    /// Product of vertical air speed and time.
+    ClimbTime,
+}
+
+impl Dependence {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Climb => "climb",
+            Self::Height => "height",
+            Self::Time => "time",
+            Self::Wind => "wind",
+            Self::Lean => "lean",
+            Self::Voltage => "voltage",
+            Self::Place => "place",
+            Self::Drone => "drone",
+            Self::Heading => "heading",
+            Self::Step => "step",
+            Self::ClimbTime => "climb-time",
+        }
+    }
+
+    /// Dependence of a name in files; `None` for another word.
+    pub fn of(name: &str) -> Option<Self> {
+        ALL.into_iter().find(|one| one.name() == name)
+    }
+
+    /// Whether drones are held apart, not moments of a flight.
+    pub fn is_of_drones(self) -> bool {
+        matches!(self, Self::Place | Self::Drone)
+    }
+}
+
+const ALL: [Dependence; 11] = [
+    Dependence::Climb,
+    Dependence::Height,
+    Dependence::Time,
+    Dependence::Wind,
+    Dependence::Lean,
+    Dependence::Voltage,
+    Dependence::Place,
+    Dependence::Drone,
+    Dependence::Heading,
+    Dependence::Step,
+    Dependence::ClimbTime,
+];
+
+impl fmt::Display for Dependence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_have_the_names() {
+        for one in ALL {
+            assert_eq!(serde_json::to_value(one).unwrap(), one.name());
+            assert_eq!(Dependence::of(one.name()), Some(one));
+        }
+        assert_eq!(Dependence::of("Climb"), None);
+    }
+}
