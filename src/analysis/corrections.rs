@@ -96,7 +96,7 @@ impl Raw {
     }
 }
 
-/// The same referred to level flight, the ground's density and the reference voltage.
+/// Values of a window referred to level flight, the ground's density and the reference voltage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Referred {
     /// Vertical speed with what the wind adds along the rotor axis, m/s.

@@ -19,7 +19,8 @@ use crate::mission::plan::Plan;
 /// How far a home may read from its slot besides half the spacing, m: metres of plain GPS, and the
 /// show's origin set by hand on a map.
 const GPS_TOLERANCE_M: f64 = 5.0;
-/// The same for a plan of one slot, which has no neighbour to be mixed up with, m.
+/// Distance that a home may read from the slot of a plan of one slot, which has no neighbour to be
+/// mixed up with, m.
 const LONE_TOLERANCE_M: f64 = 20.0;
 /// Digits of the names that the autopilot gives its logs (`00000012.BIN`): they count its flights.
 const AUTOPILOT_DIGITS: usize = 8;

@@ -133,7 +133,7 @@ pub fn estimate(
     })
 }
 
-/// The same from a calibration that knows its errors.
+/// The updraft of a drone with its errors, from values that a calibration with errors gave.
 pub(super) fn with_errors(
     flight: &Flight,
     hover: &Target,

@@ -194,7 +194,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// The same error with what was given on the command line as plain text.
+/// An error of clap in which the words of the command line are plain text.
 fn quoting_plainly(error: &clap::Error) -> clap::Error {
     let given = std::env::args_os().map(|word| plain(&word.to_string_lossy()).into_owned());
     // Whether it is an error may hang on such a character.

@@ -294,7 +294,8 @@ pub(super) fn flags(drone: &DroneAnalysis) -> Vec<String> {
     flags_of(drone, drone.warnings.iter())
 }
 
-/// The same without what of its log is lost, where that is told with the logs.
+/// Everything doubtful about a drone but the losses of its log, for pages that list those with the
+/// logs.
 pub(super) fn flags_without_losses(drone: &DroneAnalysis) -> Vec<String> {
     let is_loss = |warning: &&Warning| matches!(warning, Warning::Log(flight::Warning::Loss(_)));
     flags_of(drone, drone.warnings.iter().filter(|warning| !is_loss(warning)))

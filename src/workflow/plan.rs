@@ -47,7 +47,8 @@ pub fn write(
     Ok(write_index(root, mission)?)
 }
 
-/// The same plan may be written again; another one only with `--force`, and never over logs.
+/// Refuses to replace another plan that has logs, or any other plan without `--force`. The plan that is
+/// there may be written again.
 fn refuse_occupied(
     root: &Path,
     folder: &FlightFolder,

@@ -59,7 +59,7 @@ impl Estimators {
         }
     }
 
-    /// The same without halves of the record and without the likelihood.
+    /// Estimators of the paper alone: without halves of the record and without the likelihood.
     pub(super) fn of_paper(field: &Field) -> Self {
         let columns = field.columns();
         let shared = common_seconds(&columns);

@@ -160,8 +160,8 @@ fn with_crew(
     body(&mut crew)
 }
 
-/// The same for a step that flies: `fleet abort` of other terminals is carried out meanwhile. It
-/// listens itself.
+/// Opens the links and runs a step that flies: `fleet abort` of other terminals is carried out
+/// meanwhile. The step listens for drones itself.
 fn with_desk(
     context: &Context,
     args: &StepArgs,
@@ -206,7 +206,7 @@ fn look(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<Preflight, CommandErro
     look_at(crew, args)
 }
 
-/// The same for drones whose slots are known.
+/// The preflight table of drones whose slots are known.
 fn look_at(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<Preflight, CommandError> {
     crew.params(args.set_params)?;
     crew.look_at_files()?;

@@ -38,7 +38,7 @@ pub(crate) type Lines = BTreeMap<DroneId, Vec<String>>;
 /// Most messages shown of a conversation.
 const MOST: usize = 20_000;
 
-/// The same of a flight by streaming: three hours.
+/// Most messages shown of a flight by streaming: three hours.
 const MOST_STREAMED: usize = 100_000;
 
 /// No links at all.

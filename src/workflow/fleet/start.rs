@@ -66,7 +66,7 @@ pub(crate) fn fly_now(
     Ok((landed(host, crew, &alarms), alarms))
 }
 
-/// The same for drones that the station flies itself.
+/// The two steps of a start of drones that the station flies itself, and their flight.
 pub(crate) fn guide_now(
     host: &dyn Host,
     crew: &mut Crew<'_>,

@@ -39,8 +39,8 @@ pub fn fly_virtual(
     rehearse(host, folder, plan, simulation, None).map(|(flown, _)| flown)
 }
 
-/// The same, with what became of each drone and log. `rehearsed`: people practise, and are shown and
-/// asked what they are in the field.
+/// Flies a flight as [`fly_virtual`] does, and returns the outcome of each drone and log as well. With
+/// `rehearsed` people practise: they are shown and asked all that they are in the field.
 pub(crate) fn rehearse(
     host: &dyn Host,
     folder: &FlightFolder,

@@ -75,7 +75,8 @@ pub(super) fn one_flight(
     chosen(work.flights, path, name)
 }
 
-/// The same of what was measured; says which logs are taken.
+/// The measured flight of a path that is compared, and the others in their order; reports which logs
+/// are taken.
 fn measured_in(
     host: &dyn Host,
     path: &Path,

@@ -17,7 +17,7 @@ use crate::workflow::words;
 pub(super) struct Both<'a> {
     /// The flight that was measured.
     pub(super) measured: &'a Found,
-    /// The same, simulated by somebody else.
+    /// The flight as another program simulated it.
     pub(super) simulated: Option<&'a Found>,
     /// A measurement flight whose true air is known.
     pub(super) hover: Option<&'a Found>,

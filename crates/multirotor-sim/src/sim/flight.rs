@@ -21,7 +21,7 @@ use untrusted_io::file::write_with;
 
 /// Length of a control and physics step, us.
 pub(super) const STEP_US: i64 = 2_500;
-/// The same, s.
+/// Length of a control and physics step, s.
 pub(super) const STEP_S: f64 = STEP_US as f64 * 1e-6;
 /// SHOW_TAKEOFF_ERR, m.
 const TAKEOFF_ERR_M: f64 = 3.0;

@@ -346,7 +346,8 @@ impl<'a> Crew<'a> {
         Ok(write_note(self.host, self.folder, &Note { step, text, drones: outcomes(drones) })?)
     }
 
-    /// The same where a disk that is full must not stand in the way: warns then.
+    /// Writes down what became of each drone, and only warns if that fails: a full disk must not stand in
+    /// the way.
     fn try_note(&mut self, step: &str, drones: &BTreeMap<DroneId, String>) {
         if let Err(error) = self.note_each(step, None, drones) {
             self.host.warn(&format!("not in the journal: {error}"));

@@ -6,7 +6,7 @@ pub struct LowPass {
     /// Shares of a sample and of the output before in the output. Two products side by side are
     /// done earlier than one after a difference, and a control step waits for filters in a row.
     usual: (f64, f64),
-    /// The same for the next sample: 1 and 0 when that is to pass as it is.
+    /// Shares for the next sample: 1 and 0 if it is to pass unfiltered.
     share: (f64, f64),
     /// Present output of the filter, in the unit of its input.
     pub value: f64,

@@ -15,7 +15,7 @@ const VERSION: &str = "ArduCopter V4.4.4 (updraft)";
 const FRAME: &str = "Frame: QUAD/X";
 /// ModeNum of the show mode, and the reason that the fork gives for entering it by itself.
 const SHOW_MODE: (i64, i64) = (127, 32);
-/// The same of GUIDED, entered because a ground station asked for it.
+/// ModeNum of GUIDED, and the reason for entering it: a command of a ground station.
 const GUIDED: (i64, i64) = (4, 2);
 /// AP_Arming::Method of the show manager, and of a ground station's command.
 const ARMED_BY_SHOW: i64 = 4;
