@@ -57,7 +57,7 @@ pub struct Kind {
     pub range: (f64, f64),
     /// Unit of [`Kind::range`], for people.
     pub unit: &'static str,
-    /// How the value of the parameter follows from the magnitude.
+    /// Rule by which the value of the parameter follows from the magnitude.
     pub magnitude: Magnitude,
     /// Further parameters that are stated, in the order in which they are drawn.
     pub also: &'static [(&'static str, Also)],
@@ -65,14 +65,14 @@ pub struct Kind {
     pub bases: &'static [Base],
 }
 
-/// How a parameter's value follows from a magnitude.
+/// Rule by which a parameter's value follows from a magnitude.
 #[derive(Clone, Copy, Debug)]
 pub enum Magnitude {
-    /// It is the magnitude.
+    /// The value is the magnitude.
     Value,
-    /// It is the magnitude, of either sign.
+    /// The value is the magnitude, of either sign.
     EitherSign,
-    /// It is the magnitude, negative with this probability.
+    /// The value is the magnitude, negative with this probability.
     Negative(f64),
     /// The magnitude is the slope of the pulse by climb at hover, us/(m/s).
     HoverSlope,

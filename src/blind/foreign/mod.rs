@@ -16,9 +16,9 @@ use crate::gap::Dependence;
 pub struct Foreign {
     /// Physics, as of an effect of the library.
     pub effect: &'static dyn Effect,
-    /// What a verdict may say that it depends on; the first is the plainest.
+    /// Dependences that a verdict may name for the effect; the first is the plainest.
     pub depends_on: &'static [Dependence],
-    /// Whether it goes with the cosine of the direction of the oncoming air against the nose; the closed
+    /// Whether the effect goes with the cosine of the direction of the oncoming air against the nose; the closed
     /// form has the air straight from ahead.
     pub turns: bool,
 }
