@@ -177,3 +177,75 @@ impl Corrections<'_> {
         Referred { velocity_mps, pulse_us, doubts_us, steeper }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SLOPE: f64 = 26.0;
+
+    fn flown() -> Raw {
+        Raw {
+            time_s: 0.0,
+            pulse_us: 1540.0,
+            velocity_mps: 0.1,
+            climb_mps: 0.1,
+            lean_deg: 4.0,
+            height_m: 0.0,
+            resting_v: None,
+        }
+    }
+
+    #[test]
+    fn wind_that_is_known_is_taken_away_and_doubted() {
+        let leaning = Leaning { thrust_exponent: 1.0, drag_speed_mps: 38.0 };
+        let corrections = Corrections { leaning: Some(leaning), ..Corrections::default() };
+        let referred = corrections.refer(&flown(), None, SLOPE);
+        let tan = 4_f64.to_radians().tan();
+        let axial_mps = 38.0 * tan.sqrt() * tan;
+        let level_us = 1000.0 + 540.0 / 4_f64.to_radians().cos();
+        assert!((referred.velocity_mps - (0.1 + axial_mps)).abs() < 1e-9);
+        assert!((referred.pulse_us - level_us).abs() < 1e-9);
+        let doubt_us = SLOPE * axial_mps + level_us - 1540.0;
+        assert!((referred.doubts_us[WIND] - doubt_us).abs() < 1e-9);
+        assert_eq!(corrections.sigmas(None)[WIND], WIND_SHARE);
+    }
+
+    #[test]
+    fn wind_that_is_not_known_is_left_in_and_doubted_by_all_that_it_may_do() {
+        let corrections = Corrections::default();
+        let referred = corrections.refer(&flown(), None, SLOPE);
+        assert_eq!((referred.velocity_mps, referred.pulse_us), (0.1, 1540.0));
+        let doubt_us = 1.5 * 16.0 + 300.0 * (1.0 - 4_f64.to_radians().cos());
+        assert!((referred.doubts_us[WIND] - doubt_us).abs() < 1e-9);
+        assert_eq!(corrections.sigmas(None)[WIND], UNKNOWN_WIND_SHARE);
+        let level = Raw { lean_deg: 0.0, ..flown() };
+        assert_eq!(corrections.refer(&level, None, SLOPE).doubts_us[WIND], 0.0);
+    }
+
+    #[test]
+    fn the_doubt_of_the_density_is_by_what_is_known_of_the_thrust_curve() {
+        let density = |exponent| Some(Density { ground_amsl_m: 190.0, exponent });
+        let sigma = |density| Corrections { density, ..Corrections::default() }.sigmas(None)[DENSITY];
+        assert_eq!(sigma(density(1.0)), 0.0, "by definition");
+        assert_eq!(sigma(density(0.4)), DENSITY_EXPONENT);
+        assert_eq!(sigma(None), UNKNOWN_DENSITY_EXPONENT);
+        let corrections = Corrections { density: density(0.4), ..Corrections::default() };
+        let high = corrections.refer(&Raw { height_m: 100.0, ..flown() }, None, SLOPE);
+        let log_density = density(0.4).unwrap().log_ratio(100.0);
+        assert!(log_density < 0.0);
+        assert!((high.pulse_us - (1000.0 + 540.0 * (0.4 * log_density).exp())).abs() < 1e-9);
+        assert!((high.doubts_us[DENSITY] - (high.pulse_us - 1000.0) * log_density).abs() < 1e-9);
+    }
+
+    #[test]
+    fn drift_is_doubted_where_a_battery_acts_and_more_without_its_voltage() {
+        let late = Raw { time_s: 600.0, ..flown() };
+        let corrections = Corrections { has_battery: true, ..Corrections::default() };
+        assert_eq!(corrections.sigmas(None)[DRIFT], 1.0);
+        assert_eq!(Corrections::default().sigmas(None)[DRIFT], 0.0);
+        let doubt_us = corrections.refer(&late, None, SLOPE).doubts_us[DRIFT];
+        // Ten minutes of 3 us each, and motors that are warm.
+        assert!((doubt_us - 30_f64.hypot(3.0 * (1.0 - (-6_f64).exp()))).abs() < 1e-9, "{doubt_us}");
+    }
+}

@@ -5,9 +5,9 @@
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 
-use super::aware::Aware;
+use super::aware::{Aware, Measured};
 use super::battery::Sag;
-use super::budget::Supply;
+use super::budget::{CommonError, Supply};
 use super::calibrate::FitOptions;
 use super::corrections::Corrections;
 use super::density::Density;
@@ -350,4 +350,65 @@ fn many_campaigns() {
             cover(1000, weather, shape);
         }
     }
+}
+
+/// What drone 0 measures in a hover at a lean, by a calibration in still air: its values, the noise of a second
+/// in us, the law's true slope, and what it shares with the others.
+fn at_a_lean(lean_rad: f64, corrections: Corrections<'_>) -> (Measured, f64, f64, CommonError) {
+    let mut rng = stream(5, 0, Stream::Sensors);
+    let world = World::new(&mut rng, MapLaw::Linear);
+    let calibration = calibration(&mut rng, &world, STILL);
+    let corrections = Corrections { density: Some(World::density()), ..corrections };
+    let sag = Some(Sag::default());
+    let aware = Aware::new(&calibration, corrections, sag, Some(MapLaw::Linear)).unwrap();
+    let still = vec![0.0; (HOVER_S / STEP_S) as usize];
+    let (mut flight, _) = hover(&mut rng, &world, STILL, 0, &still);
+    flight.roll_rad.value.fill(lean_rad);
+    let label = String::new();
+    let target =
+        Target { kind: Kind::Hover, label, start_s: 0.0, end_s: HOVER_S, commanded_mps: 0.0 };
+    let seconds = Hover::of(&flight, &target, &WindowOptions::default());
+    let measured = aware.measure(&flight, &seconds, Some(1), "").unwrap();
+    let common = aware.common(&[&measured]);
+    (measured, seconds.noise_us(0.0), world.laws[0][1], common)
+}
+
+#[test]
+fn the_noise_of_ten_seconds_is_that_of_one_over_the_root_of_ten() {
+    let (measured, noise_us, slope, _) = at_a_lean(0.0, Corrections::default());
+    let sd: Vec<f64> = measured.sd_mps.iter().flatten().copied().collect();
+    assert_eq!(sd.len(), 231, "the values of 240 s");
+    let one_second_mps = noise_us / slope;
+    for sd_mps in sd {
+        let ratio = sd_mps / one_second_mps;
+        assert!((ratio - 10_f64.sqrt().recip()).abs() < 0.03, "{ratio}");
+    }
+    let ratio = measured.errors.window_mps / one_second_mps;
+    assert!((ratio - 231_f64.sqrt().recip()).abs() < 0.006, "{ratio}");
+}
+
+#[test]
+fn every_origin_of_an_error_is_in_the_total() {
+    let (measured, .., common) = at_a_lean(5_f64.to_radians(), Corrections::default());
+    let errors = measured.errors;
+    let parts = [
+        errors.window_mps,
+        errors.law_mps,
+        errors.zero_mps,
+        errors.battery_mps,
+        errors.wind_mps,
+        errors.density_mps,
+    ];
+    assert!(parts.iter().all(|part| *part > 0.0), "{errors:?}");
+    assert!(errors.wind_mps > 0.3, "at 5 degrees nobody knows what the wind does: {errors:?}");
+    let sum = parts.iter().map(|part| part * part).sum::<f64>() + errors.velocity_mps.powi(2);
+    assert!((errors.total_mps - sum.sqrt()).abs() < 1e-9, "{errors:?}");
+    let [low, high] = measured.mean_interval_mps;
+    assert!((high - low) / 2.0 > 1.9 * errors.total_mps, "{low} {high} {errors:?}");
+    let parts =
+        [common.zero_mps, common.battery_mps, common.wind_mps, common.density_mps, common.law_mps];
+    assert!(parts.iter().all(|part| *part > 0.0), "{common:?}");
+    let sum: f64 = parts.iter().map(|part| part * part).sum();
+    assert!((common.se_mps - sum.sqrt()).abs() < 1e-9, "{common:?}");
+    assert!(common.half_width_mps >= 1.95 * common.se_mps, "{common:?}");
 }

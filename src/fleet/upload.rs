@@ -454,3 +454,76 @@ impl Conversation for Upload {
         Progress { done: self.step, total: STEPS }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mission::resolve::resolve;
+
+    const ALL_WELL: u8 = flag::LOADED | flag::ORIGIN_SET | flag::ORIENTATION_SET | flag::FENCE_ON;
+
+    fn status(flags: u8) -> MavMessage {
+        let status = Status { flags, ..Status::from_data(&[]) };
+        MavMessage::DATA16(dialect::DATA16_DATA {
+            mavtype: FROM_DRONE,
+            len: Status::LENGTH,
+            data: status.to_data(),
+        })
+    }
+
+    /// An upload whose show has just been loaded, at time 0.
+    fn loaded() -> Upload {
+        let plan = resolve("hover", &[]).unwrap().flights.remove(0).plan;
+        let fence = Fence::of(&plan, &plan.to_show()).unwrap();
+        let load = Load { skyb: Vec::new(), site: plan.site.clone(), fence };
+        let mut upload = Upload::new(DroneId { network: 0, system: 1 }, load, 1);
+        upload.phase = Phase::Flags { since: 0, agreeing: 0, last: None };
+        upload
+    }
+
+    fn is_done(upload: &mut Upload, now: Micros) -> bool {
+        match upload.poll(now) {
+            Step::Done(done) => {
+                assert!(done.is_ok(), "{done:?}");
+                true
+            }
+            _ => false,
+        }
+    }
+
+    #[test]
+    fn two_status_packets_in_a_row_must_say_that_all_is_well() {
+        let mut upload = loaded();
+        upload.on_message(2 * S, &status(ALL_WELL));
+        assert!(!is_done(&mut upload, 2 * S), "one may be of before");
+        upload.on_message(3 * S, &status(ALL_WELL & !flag::FENCE_ON));
+        upload.on_message(4 * S, &status(ALL_WELL));
+        assert!(!is_done(&mut upload, 4 * S), "two, but not in a row");
+        upload.on_message(5 * S, &status(ALL_WELL));
+        assert!(is_done(&mut upload, 5 * S));
+    }
+
+    #[test]
+    fn what_was_sent_before_the_vehicle_set_its_flags_does_not_count() {
+        let mut upload = loaded();
+        upload.on_message(SETTLE - 1, &status(ALL_WELL));
+        upload.on_message(SETTLE, &status(ALL_WELL));
+        assert!(!is_done(&mut upload, SETTLE));
+        upload.on_message(SETTLE + 1, &status(ALL_WELL));
+        assert!(is_done(&mut upload, SETTLE + 1));
+    }
+
+    #[test]
+    fn each_flag_is_needed_and_named() {
+        for (flag, wanted) in [
+            (flag::LOADED, UploadError::NotLoaded),
+            (flag::ORIGIN_SET, UploadError::NoOrigin),
+            (flag::ORIENTATION_SET, UploadError::NoOrientation),
+            (flag::FENCE_ON, UploadError::FenceOff),
+        ] {
+            let status = Status { flags: ALL_WELL & !flag, ..Status::from_data(&[]) };
+            assert_eq!(missing(&status), Some(wanted));
+        }
+        assert_eq!(missing(&Status { flags: ALL_WELL, ..Status::from_data(&[]) }), None);
+    }
+}

@@ -542,4 +542,83 @@ mod tests {
         assert_eq!((mean.value.len(), mean.time_s[0]), (50, 0.1));
         assert_eq!(Messages::read_identity(&log).output_times().unwrap().time_s.len(), 50);
     }
+
+    static RCOU: MessageDef = MessageDef {
+        id: 135,
+        name: "RCOU",
+        format: "QHHHHHHHHHHHHHH",
+        fields: "TimeUS,C1,C2,C3,C4,C5,C6,C7,C8,C9,C10,C11,C12,C13,C14",
+        units: "s--------------",
+        multipliers: "F--------------",
+    };
+
+    /// Outputs 1..8 at 1500 us, 9..12 at 1800 us; 13 and 14 carry a gimbal at 1100 us.
+    fn twelve_outputs() -> Messages {
+        let mut writer = LogWriter::new(Vec::new(), &[&RCOU]).unwrap();
+        for row in 0..50 {
+            let outputs = (1..=14).map(|output| match output {
+                1..=8 => 1500,
+                9..=12 => 1800,
+                _ => 1100,
+            });
+            let values = [100_000 + 20_000 * row].into_iter().chain(outputs).map(Value::Int);
+            writer.row(&RCOU, &values.collect::<Vec<_>>()).unwrap();
+        }
+        Messages::read(&Log::from_bytes(writer.finish().unwrap()))
+    }
+
+    /// SERVOn_FUNCTION of output n by ArduPilot's numbers: Motor1..8 are 33..40, Motor9..12 are 82..85.
+    fn assign(messages: &mut Messages, functions: &[f64]) {
+        for (index, function) in functions.iter().enumerate() {
+            messages.parameters.insert(format!("SERVO{}_FUNCTION", index + 1), *function);
+        }
+    }
+
+    fn first_row(messages: &Messages) -> (f64, f64, f64) {
+        let [mean, largest, smallest] = messages.motors().unwrap();
+        (mean.value[0], largest.value[0], smallest.value[0])
+    }
+
+    #[test]
+    fn the_effort_of_a_dodecarotor_is_that_of_all_twelve() {
+        let mut messages = twelve_outputs();
+        let twelve = [33., 34., 35., 36., 37., 38., 39., 40., 82., 83., 84., 85., 7., 8.];
+        assign(&mut messages, &twelve);
+        assert_eq!(first_row(&messages), (1600.0, 1800.0, 1500.0));
+    }
+
+    #[test]
+    fn functions_next_to_the_motors_are_none() {
+        let mut messages = twelve_outputs();
+        // 32, 41, 81 and 86 are other functions of ArduPilot.
+        let some = [33., 34., 35., 40., 0., 0., 0., 0., 82., 85., 32., 41., 81., 86.];
+        assign(&mut messages, &some);
+        assert_eq!(messages.motor_channels(), [1, 2, 3, 4, 9, 10]);
+        messages.parameters.clear();
+        assert_eq!(messages.motor_channels(), [1, 2, 3, 4], "nothing is assigned: a quadrotor");
+    }
+
+    #[test]
+    fn the_rotor_speed_is_the_mean_of_all_controllers() {
+        static ESC: MessageDef = MessageDef {
+            id: 136,
+            name: "ESC",
+            format: "QBf",
+            fields: "TimeUS,Instance,RPM",
+            units: "s#q",
+            multipliers: "F--",
+        };
+        let mut writer = LogWriter::new(Vec::new(), &[&ESC]).unwrap();
+        for row in 0..50 {
+            for id in 0..12 {
+                let time_us = 100_000 + 100_000 * row + 1_000 * id;
+                let rpm = if id < 8 { 5000.0 } else { 8000.0 };
+                let values = [Value::Int(time_us), Value::Int(id), Value::Float(rpm)];
+                writer.row(&ESC, &values).unwrap();
+            }
+        }
+        let messages = Messages::read(&Log::from_bytes(writer.finish().unwrap()));
+        let speed = messages.rotor_speed().unwrap();
+        assert!(speed.value.iter().all(|rpm| (rpm - 6000.0).abs() < 1e-6), "{:?}", speed.value);
+    }
 }

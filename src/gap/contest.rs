@@ -220,3 +220,84 @@ struct Free<'a> {
 fn is_felt(candidate: &Candidate) -> bool {
     candidate.variants.iter().any(|variant| !variant.felt.is_empty())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates::Variant;
+    use super::super::data::Data;
+    use super::super::search::round;
+    use super::super::trial;
+    use super::*;
+
+    fn found(data: &Data) -> (Found, Comparison) {
+        let comparison = trial::comparison(data);
+        let vehicle = comparison.vehicle.clone();
+        let found = Found {
+            vehicle,
+            comparison: comparison.clone(),
+            extras: Vec::new(),
+            felt: Vec::new(),
+            parameters: Vec::new(),
+            values: Vec::new(),
+            hyper: Hyper::default(),
+            gusts_mps: 0.0,
+            steps: Vec::new(),
+            rest: super::super::verdict::Rest::default(),
+        };
+        (found, comparison)
+    }
+
+    fn ranked(candidate: usize, gain: f64) -> Ranked {
+        Ranked {
+            candidate,
+            variant: 0,
+            gain,
+            beta: 1.0,
+            size_us: 3.0,
+            range_us: 3.0,
+            hyper: Hyper::default(),
+            fitted: true,
+        }
+    }
+
+    #[test]
+    fn rivals_within_the_margin_stay_a_class_and_others_are_beaten() {
+        let data = trial::data(3, |_, _| 0.0);
+        let (found, comparison) = found(&data);
+        let patterns = comparison.patterns(&found.vehicle, 0.0).unwrap();
+        let split = Split::of(&comparison.residual(&found.vehicle, 0.0).unwrap());
+        let problem = Problem::new(&patterns, &split);
+        let bins = data.groups[0].bins.len();
+        let line = |slope: f64| {
+            Column::Shared(vec![(0..bins).map(|bin| slope * bin as f64).collect()])
+        };
+        let wave = Column::Shared(vec![(0..bins).map(|bin| (bin as f64 * 1.9).sin()).collect()]);
+        // Motions of the air: they stand by their gains as regressors.
+        let air = |name, column| Candidate {
+            name,
+            was_there: false,
+            size: None,
+            variants: vec![Variant { vehicle: None, size: 0.0, column, felt: Vec::new() }],
+        };
+        let library = [air("one", line(1.0)), air("its like", line(2.0)), air("another", wave)];
+        let sought = Sought { library: &library, generics: &[], drones: &[3] };
+        let round = round(&problem, Hyper::default(), sought, false);
+        let contest =
+            Contest { found: &found, comparison: &comparison, sought, round: &round };
+        let settled = |members: Vec<Ranked>| {
+            let what = What::Effects { members, or_else: None };
+            match contest.settle(&problem, what).unwrap() {
+                What::Effects { members, .. } => {
+                    members.iter().map(|member| member.candidate).collect::<Vec<_>>()
+                }
+                _ => panic!("effects were held against each other"),
+            }
+        };
+        assert_eq!(settled(vec![ranked(0, 30.0), ranked(1, 24.0 + 1e-9)]), [0, 1]);
+        assert_eq!(settled(vec![ranked(0, 30.0), ranked(1, 24.0)]), [0]);
+        assert_eq!(settled(vec![ranked(0, 100.0), ranked(1, 90.0 + 1e-9)]), [0, 1]);
+        assert_eq!(settled(vec![ranked(0, 100.0), ranked(1, 90.0)]), [0]);
+        assert_eq!(settled(vec![ranked(1, 29.0), ranked(0, 30.0)]), [0, 1], "the best is first");
+        assert_eq!(settled(vec![ranked(0, 30.0), ranked(2, 29.0)]), [0], "another trace");
+    }
+}

@@ -413,3 +413,109 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
         resting_v: sum.resting_v / count,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::*;
+
+    fn slots(data: &Data) -> Vec<u16> {
+        data.groups.iter().flat_map(|group| group.slots.clone()).collect()
+    }
+
+    #[test]
+    fn no_drone_is_fitted_and_held_out() {
+        let (train, held) = trial::data(12, |_, _| 0.0).split();
+        assert_eq!(slots(&held), [3, 7, 11]);
+        assert_eq!(slots(&train), [1, 2, 4, 5, 6, 8, 9, 10, 12]);
+        let group = &train.groups[0];
+        assert_eq!((group.measured.len(), group.place_m.len()), (9, 9));
+        assert_eq!((group.neighbours.len(), group.place_m[2][0]), (9, 30.0));
+    }
+
+    #[test]
+    fn small_fleets_hold_nobody_out() {
+        for (drones, held) in [(7, 0), (8, 2)] {
+            let data = trial::data(drones, |_, _| 0.0);
+            assert_eq!(data.split().1.drones(), held, "of {drones}");
+            assert_eq!(data.split().0.drones(), drones - held);
+        }
+        // Two groups of which one is too small to miss a drone.
+        let mut data = trial::data(8, |_, _| 0.0);
+        data.groups.extend(trial::data(3, |_, _| 0.0).groups);
+        assert_eq!(data.split().1.drones(), 0);
+        data.groups[1] = trial::data(4, |_, _| 0.0).groups.remove(0);
+        assert_eq!(data.split().1.counts(), [2, 1]);
+    }
+
+    /// Pulse by drone and bin, us; 0 is a hole.
+    fn added(pulses: &[[i32; 10]]) -> Data {
+        let bins = &trial::ladder()[..10];
+        let value = |us: &i32| {
+            let pulse_us = f64::from(*us);
+            (*us > 0).then(|| BinValues { pulse_us, height_m: pulse_us, ..BinValues::default() })
+        };
+        let drone = |(index, pulses): (usize, &[i32; 10])| {
+            (index as u16 + 1, [0.0; 2], pulses.iter().map(value).collect())
+        };
+        let mut data = Data::default();
+        data.add("all", bins, pulses.iter().enumerate().map(drone).collect(), 0.0);
+        data
+    }
+
+    #[test]
+    fn a_hole_is_filled_by_what_the_others_measured_and_the_drones_own_offset() {
+        let mut pulses = [[1500; 10], [1510; 10], [1520; 10], [1530; 10], [1540; 10]];
+        // All read 8 us more in bin 3, and drone 5 did not say.
+        pulses.iter_mut().for_each(|drone| drone[3] += 8);
+        pulses[4][3] = 0;
+        let data = added(&pulses);
+        let filled = data.groups[0].measured[4][3];
+        // The others' mean is 1523 us, and drone 5 is 20 us above the mean of all.
+        assert!((filled.pulse_us - 1543.0).abs() < 1e-9, "{filled:?}");
+        assert!((filled.height_m - 1523.0).abs() < 1e-9, "nothing else has an offset: {filled:?}");
+        assert_eq!(data.groups[0].measured[0][3].pulse_us, 1508.0, "what was measured stays");
+    }
+
+    #[test]
+    fn a_drone_that_is_mostly_holes_is_no_data() {
+        let mut pulses = [[1500; 10]; 5];
+        pulses[4][3] = 0;
+        assert_eq!(slots(&added(&pulses)), [1, 2, 3, 4, 5], "nine of ten bins");
+        pulses[4][7] = 0;
+        let data = added(&pulses);
+        assert_eq!(slots(&data), [1, 2, 3, 4]);
+        assert_eq!(
+            data.left_out,
+            [
+                "slot 5: only 8 of 10 steady bins are usable (gaps in the log, motors at a limit, \
+                 or another flight)"
+            ]
+        );
+        pulses[4] = [0; 10];
+        let data = added(&pulses);
+        assert_eq!(data.left_out, ["slot 5: no steady flight of the plan in its log"]);
+    }
+
+    #[test]
+    fn a_bin_that_few_have_is_no_data() {
+        let mut pulses = [[1500; 10]; 5];
+        pulses[4][3] = 0;
+        assert_eq!(added(&pulses).groups[0].bins.len(), 10, "four of five");
+        pulses[3][3] = 0;
+        let data = added(&pulses);
+        assert_eq!(data.groups[0].bins.len(), 9, "three of five");
+        assert_eq!(data.groups[0].bins[3].start_s, trial::ladder()[4].start_s);
+        assert_eq!(slots(&data), [1, 2, 3, 4, 5], "it is nobody's hole then");
+    }
+
+    #[test]
+    fn a_pulse_that_never_moves_is_of_no_rotor() {
+        let mut data = trial::data(3, |_, _| 0.0);
+        for value in &mut data.groups[0].measured[1] {
+            value.pulse_us = 1500.0;
+        }
+        assert_eq!(data.drop_constant(1.0), Some(1500.0));
+        assert_eq!(slots(&data), [1, 3]);
+    }
+}

@@ -192,3 +192,192 @@ fn left_with(
     let both = with.with(&generic.columns).fit(free.hyper, Likelihood::Profile);
     both.log_posterior() - before.log_posterior() - generic.penalty
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates::{Candidate, Size, Variant};
+    use super::super::gls::{Pulses, Split};
+    use super::super::noise::{GroupPattern, Hyper};
+    use super::super::trial::{patterns, pulses};
+    use super::*;
+
+    const MATERIAL_US: f64 = 2.5;
+    /// No simulated flights: the thresholds are the floors.
+    const BY_FLOORS: Options = Options { alpha: 0.005, replicates: 0, seed: 1, most_steps: 4 };
+
+    /// Two effects that look alike, one that looks like neither, and free shapes.
+    struct Case {
+        groups: Vec<GroupPattern>,
+        pulses: Pulses,
+        library: Vec<Candidate>,
+        generics: Vec<Generic>,
+    }
+
+    fn effect(name: &'static str, column: Column, is_of_the_vehicle: bool) -> Candidate {
+        let size = Size { name: "size", unit: "", low: 0.0, high: 1.0, now: 0.0, usual: 0.1 };
+        let variant = Variant { vehicle: None, size: 0.1, column, felt: Vec::new() };
+        Candidate {
+            name,
+            was_there: false,
+            size: is_of_the_vehicle.then_some(size),
+            variants: vec![variant],
+        }
+    }
+
+    fn case() -> Case {
+        let groups = patterns();
+        let column = |value: fn(f64) -> f64| {
+            let bins = |group: &GroupPattern| group.time_s.iter().map(|time| value(*time)).collect();
+            Column::Shared(groups.iter().map(bins).collect())
+        };
+        let (line, wave) = (column(|time| 0.1 * time), column(|time| 9.0 * (0.7 * time).sin()));
+        let library = vec![
+            effect("one", line.clone(), true),
+            effect("its like", line, true),
+            effect("another", wave.clone(), true),
+            effect("of the air", wave.clone(), false),
+        ];
+        let free = |depends_on| Generic {
+            depends_on,
+            axis: "",
+            columns: vec![wave.clone()],
+            felt: Vec::new(),
+            along: Vec::new(),
+            penalty: 0.0,
+        };
+        let generics = vec![free("climb"), free("height"), free("step"), free(PRODUCT)];
+        let mut pulses = pulses(&groups);
+        for (group, drones) in pulses.iter_mut().enumerate() {
+            for drone in drones {
+                for (bin, value) in drone.iter_mut().enumerate() {
+                    *value += 4.0 * wave.at(group, 0, bin);
+                }
+            }
+        }
+        Case { groups, pulses, library, generics }
+    }
+
+    fn ranked(candidate: usize, gain: f64) -> Ranked {
+        Ranked {
+            candidate,
+            variant: 0,
+            gain,
+            beta: 1.0,
+            size_us: 3.0,
+            range_us: 3.0,
+            hyper: Hyper::default(),
+            fitted: true,
+        }
+    }
+
+    fn free(generic: usize, gain: f64) -> RankedGeneric {
+        let hyper = Hyper::default();
+        let beta = vec![4.0];
+        RankedGeneric { generic, gain, plain: gain, beta, size_us: 3.0, range_us: 3.0, hyper }
+    }
+
+    impl Case {
+        /// What is decided, as a word and the members of the class.
+        fn decided(&self, library: &[Ranked], generics: &[RankedGeneric]) -> (&'static str, Vec<usize>) {
+            let split = Split::of(&self.pulses);
+            let problem = Problem::new(&self.groups, &split);
+            let (mut library, mut generics) = (library.to_vec(), generics.to_vec());
+            library.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            generics.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            let base = problem.at(&Hyper::default());
+            let round = Round { groups: self.groups.clone(), base, library, generics };
+            let drones = [3, 2];
+            let sought =
+                Sought { library: &self.library, generics: &self.generics, drones: &drones };
+            let decision = decide(&problem, &round, sought, MATERIAL_US, &BY_FLOORS, 0);
+            let limits = Thresholds { library: 8.0, generic: 14.0 };
+            assert_eq!(decision.thresholds, limits, "the floors");
+            match decision.what {
+                What::Nothing => ("nothing", vec![]),
+                What::Free(free) => ("free", vec![free.generic]),
+                What::Effects { members, or_else } => {
+                    assert!(or_else.is_none());
+                    ("effects", members.iter().map(|member| member.candidate).collect())
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_effect_is_named_above_its_threshold_and_not_at_it() {
+        let case = case();
+        assert_eq!(case.decided(&[ranked(0, 7.9)], &[]).0, "nothing");
+        assert_eq!(case.decided(&[ranked(0, 8.0)], &[]).0, "nothing");
+        assert_eq!(case.decided(&[ranked(0, 8.0 + 1e-9)], &[]), ("effects", vec![0]));
+    }
+
+    #[test]
+    fn so_is_a_free_shape() {
+        let case = case();
+        assert_eq!(case.decided(&[], &[free(0, 13.9)]).0, "nothing");
+        assert_eq!(case.decided(&[], &[free(0, 14.0)]).0, "nothing");
+        assert_eq!(case.decided(&[], &[free(0, 14.0 + 1e-9)]), ("free", vec![0]));
+        // What the air may depend on as well must say a quarter more.
+        assert_eq!(case.decided(&[], &[free(1, 17.5)]).0, "nothing");
+        assert_eq!(case.decided(&[], &[free(1, 17.5 + 1e-9)]), ("free", vec![1]));
+    }
+
+    #[test]
+    fn what_is_too_small_to_matter_is_not_named() {
+        let case = case();
+        let small = |size_us| Ranked { size_us, range_us: 0.0, ..ranked(0, 30.0) };
+        assert_eq!(case.decided(&[small(MATERIAL_US)], &[]).0, "effects");
+        assert_eq!(case.decided(&[small(MATERIAL_US - 1e-9)], &[]).0, "nothing");
+        let small = |size_us| RankedGeneric { size_us, range_us: 0.0, ..free(0, 30.0) };
+        assert_eq!(case.decided(&[], &[small(MATERIAL_US)]).0, "free");
+        assert_eq!(case.decided(&[], &[small(MATERIAL_US - 1e-9)]).0, "nothing");
+        // What is plain matters by what it does where it is largest.
+        let short = |gain| Ranked { size_us: 0.1, range_us: MATERIAL_US, ..ranked(0, gain) };
+        assert_eq!(case.decided(&[short(14.0)], &[]).0, "nothing");
+        assert_eq!(case.decided(&[short(14.0 + 1e-9)], &[]).0, "effects");
+    }
+
+    #[test]
+    fn what_is_no_effect_of_the_vehicle_must_say_as_much_as_a_free_shape() {
+        let case = case();
+        assert_eq!(case.decided(&[ranked(3, 14.0)], &[]).0, "nothing");
+        assert_eq!(case.decided(&[ranked(3, 14.0 + 1e-9)], &[]).0, "effects");
+        let unfitted = Ranked { fitted: false, ..ranked(0, 30.0) };
+        assert_eq!(case.decided(&[unfitted], &[]).0, "nothing");
+    }
+
+    #[test]
+    fn a_free_shape_must_be_a_quarter_better_than_an_effect() {
+        let case = case();
+        assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(0, 25.0)]).0, "effects");
+        assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(0, 25.0 + 1e-9)]).0, "free");
+        // A shape of a number or two by some nats.
+        assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(2, 22.5)]).0, "effects");
+        assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(2, 22.5 + 1e-9)]).0, "free");
+        assert_eq!(case.decided(&[ranked(0, 30.0)], &[free(3, 36.0)]).0, "effects");
+        assert_eq!(case.decided(&[ranked(0, 30.0)], &[free(3, 36.0 + 1e-9)]).0, "free");
+    }
+
+    #[test]
+    fn effects_that_look_alike_and_explain_nearly_as_well_are_a_class() {
+        let case = case();
+        let members = |best: f64, rival: f64| case.decided(&[ranked(0, best), ranked(1, rival)], &[]).1;
+        // Twice the margin of 6 nats are held against each other in full.
+        assert_eq!(members(30.0, 29.9), [0, 1]);
+        assert_eq!(members(30.0, 18.0 + 1e-9), [0, 1]);
+        assert_eq!(members(30.0, 18.0), [0]);
+        // Of a large gain, twice a tenth.
+        assert_eq!(members(100.0, 80.0 + 1e-9), [0, 1]);
+        assert_eq!(members(100.0, 80.0), [0]);
+        let other = case.decided(&[ranked(0, 30.0), ranked(2, 29.9)], &[]);
+        assert_eq!(other.1, [0], "it leaves another trace");
+        let better = Ranked { size_us: 0.1, range_us: 0.1, ..ranked(2, 31.0) };
+        let passed_over = case.decided(&[ranked(0, 30.0), better], &[]);
+        assert_eq!(passed_over.1, [0, 2], "what is better though too small is not passed over");
+    }
+
+    #[test]
+    fn the_margin_of_a_class_is_six_nats_or_a_tenth() {
+        assert_eq!([0.0, 10.0, 60.0, 200.0].map(margin_nats), [6.0, 6.0, 6.0, 20.0]);
+    }
+}

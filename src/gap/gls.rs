@@ -440,3 +440,182 @@ impl Solution {
         self.whitener.simulate(draw)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::noise::{
+        GRADIENT, GUST_TIME, GUSTS, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SLOPES, WHITE,
+    };
+    use super::super::trial::{patterns, pulses};
+    use super::*;
+
+    /// How the gradient of the updraft changes with height, as the data model has it.
+    const CURVED: f64 = 0.3;
+
+    /// The data model of the noise, term by term, for each pair of observations; with what is doubted.
+    struct Dense {
+        factor: Cholesky<f64, Dyn>,
+        y: DVector<f64>,
+        places: Vec<(usize, usize, usize)>,
+    }
+
+    impl Dense {
+        fn new(groups: &[GroupPattern], pulses: &Pulses, hyper: &Hyper, doubts: &[Column]) -> Self {
+            let places: Vec<(usize, usize, usize)> = pulses
+                .iter()
+                .enumerate()
+                .flat_map(|(g, drones)| {
+                    drones
+                        .iter()
+                        .enumerate()
+                        .flat_map(move |(d, bins)| (0..bins.len()).map(move |bin| (g, d, bin)))
+                })
+                .collect();
+            let y = places.iter().map(|(g, d, bin)| pulses[*g][*d][*bin]);
+            let y = DVector::from_iterator(places.len(), y);
+            let square = |place: usize| hyper.get(place).powi(2);
+            let covariance = DMatrix::from_fn(places.len(), places.len(), |one, other| {
+                let ((g, d, k), (h, e, l)) = (places[one], places[other]);
+                let (a, b) = (&groups[g], &groups[h]);
+                let answer = |of: &GroupPattern, bin: usize| {
+                    of.response[bin].over(0.0).abs() + hyper.get(LEAST)
+                };
+                let answers = answer(a, k) * answer(b, l);
+                let apart_s = (a.time_s[k] - b.time_s[l]).abs();
+                let slowly = (-apart_s / hyper.get(SHARED_TIME)).exp();
+                let aloft = (a.height_m[k] - 45.0) / 50.0 * (b.height_m[l] - 45.0) / 50.0;
+                let gradient = square(GRADIENT) * (aloft + (CURVED * aloft).powi(2));
+                let mut sum = answers * slowly * (square(SHARED) + gradient);
+                if (g, d) == (h, e) {
+                    let quickly = (-apart_s / hyper.get(GUST_TIME)).exp();
+                    sum += answers * (square(OWN) * slowly + square(GUSTS) * quickly);
+                    sum += square(OFFSETS) + square(SLOPES) * a.slope_us[k] * b.slope_us[l];
+                }
+                if one == other {
+                    sum += square(WHITE);
+                }
+                let doubted = |doubt: &Column| doubt.at(g, d, k) * doubt.at(h, e, l);
+                sum + doubts.iter().map(doubted).sum::<f64>()
+            });
+            Self { factor: covariance.cholesky().unwrap(), y, places }
+        }
+
+        fn ln_det(of: &Cholesky<f64, Dyn>) -> f64 {
+            2.0 * of.l().diagonal().iter().map(|value| value.ln()).sum::<f64>()
+        }
+
+        /// Log-likelihood without its constant, coefficients, and their covariance.
+        fn solve(
+            &self,
+            columns: &[Column],
+            likelihood: Likelihood,
+        ) -> (f64, DVector<f64>, DMatrix<f64>) {
+            let x = DMatrix::from_fn(self.y.len(), columns.len() + 1, |row, column| {
+                let (g, d, bin) = self.places[row];
+                column.checked_sub(1).map_or(1.0, |column| columns[column].at(g, d, bin))
+            });
+            let normal = (x.transpose() * self.factor.solve(&x)).cholesky().unwrap();
+            let right = x.transpose() * self.factor.solve(&self.y);
+            let beta = normal.solve(&right);
+            let mut twice = Self::ln_det(&self.factor) + self.y.dot(&self.factor.solve(&self.y))
+                - right.dot(&beta);
+            if likelihood == Likelihood::Restricted {
+                twice += Self::ln_det(&normal);
+            }
+            (-0.5 * twice, beta, normal.inverse())
+        }
+    }
+
+    /// The noise of the prior, and one in which every term is another.
+    fn noises() -> [Hyper; 2] {
+        let mut other = Hyper::default();
+        for (place, ln) in other.0.iter_mut().enumerate() {
+            *ln += 0.25 * (place as f64 - 4.3);
+        }
+        [Hyper::default(), other]
+    }
+
+    fn regressors(groups: &[GroupPattern]) -> [Column; 2] {
+        let shared = |group: &GroupPattern| -> Vec<f64> {
+            (0..6).map(|bin| f64::from(bin * bin) - group.time_s[0]).collect()
+        };
+        let own = |(g, group): (usize, &GroupPattern)| {
+            let value = |d: usize, bin: i32| ((d + 2 * g) as f64 + 0.3 * f64::from(bin)).cos();
+            let drone = |d: usize| (0..6).map(|bin| value(d, bin)).collect();
+            (0..group.drones).map(drone).collect()
+        };
+        [
+            Column::Shared(groups.iter().map(shared).collect()),
+            Column::Own(groups.iter().enumerate().map(own).collect()),
+        ]
+    }
+
+    #[test]
+    fn likelihoods_are_those_of_the_whole_covariance() {
+        let groups = patterns();
+        let pulses = pulses(&groups);
+        let split = Split::of(&pulses);
+        let columns = regressors(&groups);
+        let doubts = [columns[0].each(|group, _, bin| 0.4 * (group + bin) as f64)];
+        for likelihood in [Likelihood::Profile, Likelihood::Restricted] {
+            for doubts in [&doubts[..0], &doubts[..]] {
+                // That a doubt was fitted only the restricted likelihood knows.
+                if likelihood == Likelihood::Profile && !doubts.is_empty() {
+                    continue;
+                }
+                // What depends on the number of drones alone is left out of both.
+                let apart = noises().map(|hyper| {
+                    let dense = Dense::new(&groups, &pulses, &hyper, doubts);
+                    let solution =
+                        Problem::new(&groups, &split).doubting(doubts).with(&columns).at(&hyper);
+                    let (wanted, beta, covariance) = dense.solve(&columns, likelihood);
+                    let skipped = doubts.len();
+                    for (place, beta) in beta.iter().enumerate() {
+                        let own = if place == 0 { 0 } else { place + skipped };
+                        assert!((solution.beta[own] - beta).abs() < 1e-8, "{:?}", solution.beta);
+                        let variance = solution.covariance()[(own, own)];
+                        assert!((variance - covariance[(place, place)]).abs() < 1e-8);
+                    }
+                    solution.log_likelihood(likelihood) - wanted
+                });
+                assert!((apart[0] - apart[1]).abs() < 1e-7, "{likelihood:?}: {apart:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_restricted_likelihood_falls_by_what_the_regressors_know() {
+        // By itself: log |X' V⁻¹ X| of one regressor is the logarithm of its information.
+        let groups = patterns();
+        let split = Split::of(&pulses(&groups));
+        let solution = Problem::new(&groups, &split).at(&Hyper::default());
+        let information = solution.covariance()[(0, 0)].recip();
+        let less = solution.log_likelihood(Likelihood::Profile)
+            - solution.log_likelihood(Likelihood::Restricted);
+        assert!((less - 0.5 * information.ln()).abs() < 1e-9, "{less} {information}");
+        assert!(less.abs() > 0.1, "else its sign does not show: {less}");
+    }
+
+    #[test]
+    fn the_gain_of_a_regressor_is_what_the_likelihood_gains_with_it() {
+        let groups = patterns();
+        let split = Split::of(&pulses(&groups));
+        let [shared, own] = regressors(&groups);
+        let problem = Problem::new(&groups, &split).with([&shared]);
+        let (hyper, without) = (Hyper::default(), problem.at(&Hyper::default()));
+        let with = problem.with([&own]).at(&hyper);
+        let gain = without.gain(&own);
+        let wanted = with.log_likelihood(Likelihood::Profile)
+            - without.log_likelihood(Likelihood::Profile);
+        assert!((gain.nats - wanted).abs() < 1e-8 && wanted > 1e-3, "{gain:?} {wanted}");
+        assert!((gain.beta - with.beta[2]).abs() < 1e-8);
+        assert!((gain.se - with.covariance()[(2, 2)].sqrt()).abs() < 1e-8);
+        let (beta, nats) = without.gain_of_all(std::slice::from_ref(&own));
+        assert!((beta[0] - gain.beta).abs() < 1e-5 && (nats - gain.nats).abs() < 1e-5);
+        // A regressor that is in the model has nothing more to say.
+        assert_eq!(without.gain(&shared), Gain::default());
+        let white = without.white(&own);
+        assert!((without.likeness(&white, &white) - 1.0).abs() < 1e-9);
+        assert!((without.information(&white).recip().sqrt() - gain.se).abs() < 1e-9);
+    }
+}

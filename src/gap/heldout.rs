@@ -362,3 +362,128 @@ fn floor(patterns: &[GroupPattern], held: &[usize], hyper: &Hyper, seed: u64) ->
     }
     if count > 0.0 { (squares / count).sqrt() } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::noise::WHITE;
+    use super::super::refine::Parameter;
+    use super::super::trial;
+    use super::super::verdict::Rest;
+    use super::*;
+    use crate::gap::bins::Bin;
+
+    const INFLOW: &str = "rotor-inflow";
+    /// The rung that is held out, m/s and as it is keyed.
+    const RUNG_MPS: f64 = 2.0;
+    const RUNG: i64 = 2000;
+
+    /// A fleet whose inflow was found, against which its size is fitted.
+    fn found(data: &Data) -> Found {
+        let mut vehicle = trial::vehicle();
+        super::super::candidates::set(&mut vehicle, INFLOW, "inflow_share", 0.1);
+        let comparison =
+            Comparison::new(data, &vehicle, &Simulated::Closed, None).unwrap();
+        let parameter = Parameter {
+            effect: INFLOW,
+            name: "inflow_share",
+            unit: "",
+            bounds: (0.0, 1.0),
+            before: None,
+        };
+        Found {
+            vehicle: comparison.vehicle.clone(),
+            comparison,
+            extras: Vec::new(),
+            felt: Vec::new(),
+            parameters: vec![parameter],
+            values: vec![(0.1, 0.01)],
+            hyper: Hyper::default(),
+            gusts_mps: 0.2,
+            steps: Vec::new(),
+            rest: Rest::default(),
+        }
+    }
+
+    fn speed(bin: &Bin) -> i64 {
+        (bin.climb_mps().abs() * 1000.0).round() as i64
+    }
+
+    /// Residuals of the first drone off the rung, with sizes that were fitted without the rung `held`.
+    fn off_the_rung(data: &Data, held: i64) -> Vec<f64> {
+        let found = found(data);
+        let vehicle = trial::vehicle();
+        let simulated = Simulated::Closed;
+        let case =
+            Case { original: &vehicle, simulated: &simulated, plan: None, found: &found, seed: 1 };
+        let bins = &data.groups[0].bins;
+        let left = case.refit_without(held, &|_, bin| speed(&bins[bin])).unwrap();
+        let others = left[0][0].iter().zip(bins).filter(|(_, bin)| speed(bin) != RUNG);
+        others.map(|(value, _)| *value).collect()
+    }
+
+    #[test]
+    fn a_rung_that_is_held_out_is_not_fitted() {
+        let bend = |_: usize, bin: &Bin| 2.0 * bin.climb_mps() * bin.climb_mps().abs();
+        let clean = trial::data(4, bend);
+        let poisoned = trial::data(4, |drone, bin| {
+            bend(drone, bin) + if speed(bin) == RUNG { 30.0 * bin.climb_mps() } else { 0.0 }
+        });
+        assert_eq!(speed(&poisoned.groups[0].bins[8]), (RUNG_MPS * 1000.0) as i64);
+        assert_eq!(off_the_rung(&clean, RUNG), off_the_rung(&poisoned, RUNG));
+        // Where another rung is held out, what is on this one moves the fit.
+        assert_ne!(off_the_rung(&clean, 1000), off_the_rung(&poisoned, 1000));
+    }
+
+    /// Two drones in two segments of two bins.
+    fn shrunk(before: [[f64; 4]; 2], after: [[f64; 4]; 2], air: [f64; 4], floor_us: f64) -> Shrink {
+        let residuals = Residuals {
+            before: vec![before.map(|drone| drone.to_vec()).to_vec()],
+            after: vec![after.map(|drone| drone.to_vec()).to_vec()],
+            air: &[air.to_vec()],
+            response: &[vec![Response::straight(20.0); 4]],
+            gusts_mps: 0.2,
+            segments: &[vec![0, 0, 1, 1]],
+        };
+        shrink(&residuals, floor_us, 1)
+    }
+
+    #[test]
+    fn the_gap_is_that_of_residuals_about_each_drones_mean() {
+        let before = [[14.0, 6.0, 14.0, 6.0], [-6.0, -14.0, -6.0, -14.0]];
+        let after = [[2.0, 0.0, 2.0, 0.0], [9.0, 7.0, 9.0, 7.0]];
+        let found = shrunk(before, after, [0.0; 4], 0.0);
+        assert!((found.before_us.value - 4.0).abs() < 1e-12 && (found.after_us.value - 1.0).abs() < 1e-12);
+        assert!((found.before_mps - 0.2).abs() < 1e-12 && (found.after_mps - 0.05).abs() < 1e-12);
+        assert!((found.mean_us.0 - 4.0).abs() < 1e-12 && (found.mean_us.1 - 1.0).abs() < 1e-12);
+        // Of squares: 16 before, 1 after.
+        assert!((found.excess_shrink.value - 15.0 / 16.0).abs() < 1e-12);
+        assert!((found.excess_shrink.low - 15.0 / 16.0).abs() < 1e-12, "all blocks are alike");
+        // A floor of 1 us is what nobody can do better than.
+        let found = shrunk(before, after, [0.0; 4], 1.0);
+        assert!((found.excess_shrink.value - 1.0).abs() < 1e-12, "{:?}", found.excess_shrink);
+        assert!((found.chi2.0 - 16.0).abs() < 1e-12 && (found.chi2.1 - 1.0).abs() < 1e-12);
+        // Where the gap before is the floor there is nothing to shrink.
+        assert_eq!(shrunk(before, after, [0.0; 4], 4.0).excess_shrink.value, 0.0);
+    }
+
+    #[test]
+    fn the_air_that_the_fitted_drones_saw_is_taken_away() {
+        let air = [3.0, -1.0, -3.0, 1.0];
+        let found = shrunk([air; 2], [air; 2], air, 0.5);
+        assert!(found.before_without_air_us < 1e-12 && found.after_without_air_us < 1e-12);
+        assert!((found.before_us.value - 5_f64.sqrt()).abs() < 1e-12, "it is in the gap itself");
+    }
+
+    #[test]
+    fn the_floor_is_the_noise_that_is_left_about_a_mean() {
+        // White noise alone: of n bins about their mean, (n - 1) / n of its variance.
+        let mut hyper = Hyper(Hyper::default().0.map(|_| f64::ln(1e-6)));
+        hyper.0[super::super::noise::SHARED_TIME] = f64::ln(60.0);
+        hyper.0[super::super::noise::GUST_TIME] = f64::ln(8.0);
+        hyper.0[WHITE] = f64::ln(2.0);
+        let patterns = trial::patterns();
+        let found = floor(&patterns, &[2, 1], &hyper, 1);
+        assert!((found - 2.0 * (5.0_f64 / 6.0).sqrt()).abs() < 0.15, "{found}");
+        assert_eq!(floor(&patterns, &[0, 0], &hyper, 1), 0.0, "nobody is held out");
+    }
+}

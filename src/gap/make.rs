@@ -278,3 +278,84 @@ fn add_others(model: &mut Vehicle, steps: &[Step]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::*;
+    use crate::flight::{Flight, Series};
+    use crate::gap::bins::BinValues;
+
+    /// Logs of a small fleet that flies as its model says, and what the held-out drones have more in their
+    /// pulses, us by m/s of climb.
+    fn logs(drones: usize, held_us_per_mps: f64) -> Vec<Flight> {
+        let data = trial::data(drones, |drone, bin: &Bin| {
+            let is_held = drone % 4 == 2;
+            drone as f64 + if is_held { held_us_per_mps * bin.climb_mps() } else { 0.0 }
+        });
+        let group = &data.groups[0];
+        let log = |values: &Vec<BinValues>| {
+            let mut flight = Flight::default();
+            let (mut pulse, mut climb) = (Series::default(), Series::default());
+            for (bin, values) in group.bins.iter().zip(values) {
+                for tick in 0..30 {
+                    // Steps of 12 s: the transients are cut off.
+                    let start_s = 12.0 * bin.segment as f64 + 6.0 * f64::from(bin.start_s as i32 % 10 / 3);
+                    let time_s = start_s + 0.2 * f64::from(tick);
+                    for (series, value) in
+                        [(&mut pulse, values.pulse_us), (&mut climb, values.climb_mps)]
+                    {
+                        series.time_s.push(time_s);
+                        series.value.push(value);
+                    }
+                }
+            }
+            let flat = |value: f64| Series {
+                time_s: pulse.time_s.clone(),
+                value: vec![value; pulse.time_s.len()],
+            };
+            flight.height_m = flat(30.0);
+            (flight.roll_rad, flight.pitch_rad) = (flat(0.0), flat(0.0));
+            flight.pulse_limits_us = (1100.0, 1950.0);
+            flight.pulse_max_us = pulse.clone();
+            flight.pulse_min_us = pulse.clone();
+            flight.armed_s = vec![(0.0, 200.0)];
+            flight.pulse_us = pulse;
+            flight.velocity_up_mps = climb;
+            flight
+        };
+        group.measured.iter().map(log).collect()
+    }
+
+    fn explained(held_us_per_mps: f64) -> Explained {
+        let flights = logs(8, held_us_per_mps);
+        let flown: Vec<Flown<'_>> = flights
+            .iter()
+            .zip(1..)
+            .map(|(flight, slot)| Flown { slot, flight })
+            .collect();
+        let vehicle = trial::vehicle();
+        let input = Input {
+            vehicle: &vehicle,
+            plan: None,
+            flown: &flown,
+            simulated: None,
+            table: Some(&Steps::default()),
+            logs: flown.len(),
+            left_out: Vec::new(),
+        };
+        let options = Options { replicates: 0, most_steps: 0, ..Options::default() };
+        explain(&input, &options).unwrap()
+    }
+
+    #[test]
+    fn what_held_out_drones_do_moves_the_gap_and_never_the_fit() {
+        let (clean, poisoned) = (explained(0.0), explained(6.0));
+        assert_eq!(poisoned.verdict.data.held_out, [3, 7]);
+        assert_eq!(poisoned.found.hyper, clean.found.hyper, "the noise is that of the others");
+        assert_eq!(poisoned.verdict.rest, clean.verdict.rest, "so is what is left to be found");
+        let gap = |explained: &Explained| explained.verdict.gap.drones.clone().unwrap().before_us.value;
+        assert!(gap(&clean) < 1.0, "{}", gap(&clean));
+        assert!(gap(&poisoned) > 5.0, "{}", gap(&poisoned));
+    }
+}

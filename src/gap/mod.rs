@@ -39,6 +39,8 @@ mod scene;
 mod search;
 mod sensor;
 mod table;
+#[cfg(test)]
+mod trial;
 pub mod verdict;
 mod warning;
 pub mod words;

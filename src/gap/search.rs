@@ -385,4 +385,38 @@ mod tests {
         let found = quantile(values, 0.005);
         assert!((found - 200_f64.ln()).abs() < 0.1, "{found}");
     }
+
+    use super::super::trial::{patterns, pulses};
+
+    #[test]
+    fn thresholds_are_never_below_their_floors() {
+        let groups = patterns();
+        let split = Split::of(&pulses(&groups));
+        let problem = Problem::new(&groups, &split);
+        let base = problem.at(&Hyper::default());
+        let sought = Sought { library: &[], generics: &[], drones: &[3, 2] };
+        // Nothing is looked for, so that nothing is found; and not one flight says nothing.
+        for replicates in [0, 3] {
+            let found = thresholds(&problem, &base, sought, replicates, 0.005, 1);
+            assert_eq!(found, Thresholds { library: 8.0, generic: 14.0 });
+        }
+    }
+
+    #[test]
+    fn a_size_that_an_effect_cannot_have_is_none() {
+        use super::super::candidates::Size;
+        let column = Column::Shared(vec![]);
+        let variant = Variant { vehicle: None, size: 0.2, column, felt: Vec::new() };
+        let size = Size { name: "size", unit: "", low: 0.0, high: 0.5, now: 0.1, usual: 0.1 };
+        let new = Candidate { name: "", was_there: false, size: Some(size), variants: vec![] };
+        let is = |candidate: &Candidate, beta| admissible(candidate, &variant, beta);
+        assert!(is(&new, 1e-9) && is(&new, 5.0));
+        assert!(!is(&new, 0.0) && !is(&new, -0.1) && !is(&new, 5.0 + 1e-9));
+        // A size that the model has may become any that it can be: here 0.1 + 0.1 beta.
+        let there = Candidate { was_there: true, ..new.clone() };
+        assert!(is(&there, -1.0) && is(&there, 3.9));
+        assert!(!is(&there, -1.1) && !is(&there, 4.1) && !is(&there, f64::NAN));
+        let air = Candidate { size: None, ..new };
+        assert!(is(&air, -3.0) && !is(&air, 0.0));
+    }
 }

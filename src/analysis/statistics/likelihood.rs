@@ -381,3 +381,112 @@ fn contrasts(count: usize) -> DMatrix<f64> {
         }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{E, PI};
+
+    use nalgebra::DVector;
+
+    use super::*;
+
+    const SECONDS: usize = 44;
+    const RUNNING: usize = 4;
+
+    /// Five drones with values that no process has made.
+    fn field() -> Field {
+        let places = vec![[0.0, 0.0], [20.0, 0.0], [3.0, 22.0], [24.0, 31.0], [50.0, 8.0]];
+        let value = |drone: usize, second: usize| {
+            ((drone + 1) as f64 * (second as f64 + 2.0) * E).sin() + 0.02 * second as f64
+        };
+        let row = |drone: usize| (0..SECONDS).map(|second| value(drone, second)).collect();
+        let rows = (0..places.len()).map(row).collect();
+        Field { places, rows, seconds: SECONDS, running: RUNNING }
+    }
+
+    /// The restricted log-likelihood at the best variance by the textbook: with the whole covariance.
+    fn dense(field: &Field, blocks: &Blocks, unknown: Unknown, length_m: f64, at: [f64; 2]) -> f64 {
+        let places: Vec<[f64; 2]> = blocks.drones.iter().map(|drone| field.places[*drone]).collect();
+        let mut space = covariance(&places, [length_m; 2]);
+        let mut values = blocks.take(&field.columns());
+        if unknown.common {
+            let contrasts = contrasts(places.len());
+            space = &contrasts * space * contrasts.transpose();
+            values = contrasts * values;
+        }
+        let (rows, count) = values.shape();
+        let starts: Vec<usize> = blocks
+            .steps
+            .iter()
+            .scan(0, |sum, step| {
+                *sum += step;
+                Some(*sum)
+            })
+            .collect();
+        let time = DMatrix::from_fn(count, count, |one, other| {
+            let seconds = |block: usize| (0..RUNNING).map(move |s| (block * RUNNING + s) as f64);
+            let each = seconds(starts[one]).flat_map(|a| {
+                seconds(starts[other]).map(move |b| (-(a - b).abs() / at[0].exp()).exp())
+            });
+            each.sum::<f64>() / (RUNNING * RUNNING) as f64
+        });
+        let whole = space.kronecker(&time) + DMatrix::identity(rows * count, rows * count) * at[1].exp();
+        let y = DVector::from_fn(rows * count, |place, _| values[(place / count, place % count)]);
+        let half = blocks.steps.iter().sum::<usize>() as f64 / 2.0;
+        let powers = 1 + usize::from(unknown.slope);
+        let x = DMatrix::from_fn(rows * count, rows * powers, |place, column| {
+            let clock = (starts[place % count] as f64 - half) / half;
+            let is_own = column / powers == place / count;
+            if is_own { clock.powi((column % powers) as i32) } else { 0.0 }
+        });
+        let factor = whole.cholesky().unwrap();
+        let normal = (x.transpose() * factor.solve(&x)).cholesky().unwrap();
+        let right = x.transpose() * factor.solve(&y);
+        let squares = y.dot(&factor.solve(&y)) - right.dot(&normal.solve(&right));
+        let free = (rows * (count - powers)) as f64;
+        let ln_det = |l: DMatrix<f64>| 2.0 * l.diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let dets = ln_det(factor.l()) + ln_det(normal.l());
+        -0.5 * (free * ((squares / free).ln() + 1.0) + dets)
+    }
+
+    #[test]
+    fn it_is_the_restricted_likelihood_of_the_whole_covariance() {
+        let mut with_gap = field();
+        for row in &mut with_gap.rows {
+            row[17..19].fill(f64::NAN);
+        }
+        for field in [field(), with_gap] {
+            let blocks = Blocks::of(&field).unwrap();
+            for (slope, common) in [(false, false), (true, false), (false, true), (true, true)] {
+                let unknown = Unknown { slope, common };
+                let likelihood = Likelihood::new(&field, &blocks, unknown);
+                let values = blocks.take(&field.columns());
+                for (place, tau_s, noise) in [(4, 3.0_f64, 0.2_f64), (9, 15.0 * PI, 0.01)] {
+                    let modes = &likelihood.grid[place];
+                    let at = [tau_s.ln(), noise.ln()];
+                    let (found, _) = likelihood.profile(modes, &(&modes.vectors * &values), at);
+                    let wanted = dense(&field, &blocks, unknown, modes.ln_length.exp(), at);
+                    assert!((found - wanted).abs() < 1e-6, "{unknown:?}: {found} {wanted}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_gap_is_no_value() {
+        let whole = Blocks::of(&field()).unwrap();
+        let mut field = field();
+        // One drone misses most of the record, all others one block.
+        field.rows[3][10..].fill(f64::NAN);
+        for row in &mut field.rows {
+            row[whole.seconds[5]] = f64::NAN;
+        }
+        let blocks = Blocks::of(&field).unwrap();
+        assert_eq!(blocks.drones, [0, 1, 2, 4]);
+        assert_eq!(blocks.count(), whole.count() - 1);
+        assert_eq!(blocks.steps.iter().max(), Some(&2));
+        let values = blocks.take(&field.columns());
+        assert!(values.iter().all(|value| value.is_finite()), "no number stands for a gap");
+        assert_eq!(values[(3, 0)], field.rows[4][blocks.seconds[0]]);
+    }
+}

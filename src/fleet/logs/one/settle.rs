@@ -101,3 +101,124 @@ impl PullOne {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+    use std::path::Path;
+    use std::rc::Rc;
+
+    use super::super::{MOST_RESTARTS, MOST_ROUNDS, OneOptions, Target};
+    use super::*;
+    use crate::fleet::logs::manifest::Shelf;
+    use crate::fleet::logs::part::sums_of;
+    use crate::link::id::DroneId;
+
+    const BYTES: u64 = 1_000;
+
+    /// All bytes of a log have come; the drone said that it has so many.
+    fn complete(folder: &Path) -> (PullOne, PartFile) {
+        let shelf = Rc::new(RefCell::new(Shelf::open(folder, "updraft test").unwrap()));
+        let drone = DroneId { network: 0, system: 1 };
+        let mut one = PullOne::new(drone, 1, "01.BIN", shelf, OneOptions::default(), None);
+        let source = "/APM/LOGS/00000002.BIN".to_owned();
+        one.target = Some(Target { file: "01.BIN".to_owned(), number: 2, source, size: BYTES });
+        one.size = BYTES;
+        let mut part = PartFile::open(&folder.join("01.BIN"), "drone=1").unwrap();
+        part.put(0, 0, &[7; BYTES as usize]).unwrap();
+        (one, part)
+    }
+
+    #[test]
+    fn a_log_that_has_shrunk_is_another_and_nothing_of_it_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut one, part) = complete(folder.path());
+        let stage = one.on_resized(part, Some(BYTES - 1));
+        assert!(!matches!(stage, Stage::Sum(..) | Stage::Sample(..)), "{stage:?}");
+        assert_eq!((one.restarts, one.held, one.size), (1, 0, BYTES - 1));
+    }
+
+    #[test]
+    fn so_is_one_that_is_smaller_than_what_an_earlier_run_has_brought() {
+        let folder = tempfile::tempdir().unwrap();
+        for (size, restarts, held) in [(BYTES, 0, BYTES), (BYTES - 1, 1, 0)] {
+            let (mut one, part) = complete(folder.path());
+            one.size = size;
+            one.begin(part, true);
+            assert_eq!((one.restarts, one.held), (restarts, held));
+        }
+    }
+
+    #[test]
+    fn one_that_goes_on_shrinking_is_given_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut one, part) = complete(folder.path());
+        one.reason = Some("no MAVFTP".to_owned());
+        one.restarts = MOST_RESTARTS;
+        let stage = one.on_resized(part, Some(BYTES - 1));
+        assert!(matches!(stage, Stage::Over), "{stage:?}");
+        let failure = one.done.failure.unwrap();
+        assert!(failure.reason.contains("smaller than what came of it"), "{failure:?}");
+    }
+
+    #[test]
+    fn one_that_has_grown_is_continued_for_a_while_and_then_called_a_beginning() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut one, part) = complete(folder.path());
+        one.now = 5 * S;
+        let stage = one.on_resized(part, Some(BYTES + 1));
+        assert!(!matches!(stage, Stage::Sum(..) | Stage::Sample(..)), "{stage:?}");
+        assert_eq!((one.restarts, one.held, one.size), (0, BYTES, BYTES + 1));
+        drop(stage);
+        let (_, part) = complete(folder.path());
+        one.now = 5 * S + FOLLOWED;
+        let stage = one.on_resized(part, Some(BYTES + 2));
+        assert!(matches!(stage, Stage::Sample(..)), "its checksum is right for a moment only");
+        assert!(one.incomplete.is_some());
+    }
+
+    #[test]
+    fn one_that_stays_is_proved_by_its_checksum() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut one, part) = complete(folder.path());
+        let stage = one.on_resized(part, Some(BYTES));
+        assert!(matches!(stage, Stage::Sum(..)), "{stage:?}");
+        drop(stage);
+        let (mut one, part) = complete(folder.path());
+        let stage = one.on_resized(part, None);
+        assert!(matches!(stage, Stage::Sample(..)), "a file that is not listed has none: {stage:?}");
+    }
+
+    #[test]
+    fn another_checksum_is_asked_for_again_and_then_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut one, mut part) = complete(folder.path());
+        let sums = sums_of(&[7; BYTES as usize]);
+        for round in 1..=MOST_ROUNDS {
+            let stage = one.on_summed(part, sums.clone(), Ok(sums.crc32 ^ 1));
+            let Stage::Settle(same) = stage else { panic!("{stage:?}") };
+            assert_eq!((one.rounds, one.restarts), (round, 0));
+            part = same;
+        }
+        drop(one.on_summed(part, sums.clone(), Ok(sums.crc32 ^ 1)));
+        assert_eq!((one.restarts, one.held), (1, 0));
+        assert!(one.done.pulled.is_empty());
+    }
+
+    #[test]
+    fn only_a_calm_log_of_a_drone_that_says_it_is_disarmed_settles() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut one, part) = complete(folder.path());
+        one.now = 10 * S;
+        one.resize(BYTES);
+        one.heartbeat = Some(10 * S);
+        assert_eq!(one.settles(), Some(10 * S + SETTLED));
+        one.now = 10 * S + SETTLED;
+        assert_eq!(one.settles(), None);
+        one.heartbeat = Some(10 * S - 1);
+        assert_eq!(one.settles(), Some(10 * S + FTP_PATIENCE), "it may have been armed since");
+        let stage = one.relist(part);
+        assert!(matches!(stage, Stage::Over), "{stage:?}");
+        assert!(one.done.failure.unwrap().reason.contains("heartbeats do not come"));
+    }
+}
