@@ -226,7 +226,8 @@ mod tests {
     #[test]
     fn the_doubt_of_the_density_is_by_what_is_known_of_the_thrust_curve() {
         let density = |exponent| Some(Density { ground_amsl_m: 190.0, exponent });
-        let sigma = |density| Corrections { density, ..Corrections::default() }.sigmas(None)[DENSITY];
+        let sigma =
+            |density| Corrections { density, ..Corrections::default() }.sigmas(None)[DENSITY];
         assert_eq!(sigma(density(1.0)), 0.0, "by definition");
         assert_eq!(sigma(density(0.4)), DENSITY_EXPONENT);
         assert_eq!(sigma(None), UNKNOWN_DENSITY_EXPONENT);

@@ -268,9 +268,8 @@ mod tests {
         let split = Split::of(&comparison.residual(&found.vehicle, 0.0).unwrap());
         let problem = Problem::new(&patterns, &split);
         let bins = data.groups[0].bins.len();
-        let line = |slope: f64| {
-            Column::Shared(vec![(0..bins).map(|bin| slope * bin as f64).collect()])
-        };
+        let line =
+            |slope: f64| Column::Shared(vec![(0..bins).map(|bin| slope * bin as f64).collect()]);
         let wave = Column::Shared(vec![(0..bins).map(|bin| (bin as f64 * 1.9).sin()).collect()]);
         // Motions of the air: they stand by their gains as regressors.
         let air = |name, column| Candidate {
@@ -282,8 +281,7 @@ mod tests {
         let library = [air("one", line(1.0)), air("its like", line(2.0)), air("another", wave)];
         let sought = Sought { library: &library, generics: &[], drones: &[3] };
         let round = round(&problem, Hyper::default(), sought, false);
-        let contest =
-            Contest { found: &found, comparison: &comparison, sought, round: &round };
+        let contest = Contest { found: &found, comparison: &comparison, sought, round: &round };
         let settled = |members: Vec<Ranked>| {
             let what = What::Effects { members, or_else: None };
             match contest.settle(&problem, what).unwrap() {

@@ -487,10 +487,8 @@ mod tests {
         assert_eq!(slots(&data), [1, 2, 3, 4]);
         assert_eq!(
             data.left_out,
-            [
-                "slot 5: only 8 of 10 steady bins are usable (gaps in the log, motors at a limit, \
-                 or another flight)"
-            ]
+            ["slot 5: only 8 of 10 steady bins are usable (gaps in the log, motors at a limit, \
+                 or another flight)"]
         );
         pulses[4] = [0; 10];
         let data = added(&pulses);

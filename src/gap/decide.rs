@@ -227,7 +227,8 @@ mod tests {
     fn case() -> Case {
         let groups = patterns();
         let column = |value: fn(f64) -> f64| {
-            let bins = |group: &GroupPattern| group.time_s.iter().map(|time| value(*time)).collect();
+            let bins =
+                |group: &GroupPattern| group.time_s.iter().map(|time| value(*time)).collect();
             Column::Shared(groups.iter().map(bins).collect())
         };
         let (line, wave) = (column(|time| 0.1 * time), column(|time| 9.0 * (0.7 * time).sin()));
@@ -278,7 +279,11 @@ mod tests {
 
     impl Case {
         /// What is decided, as a word and the members of the class.
-        fn decided(&self, library: &[Ranked], generics: &[RankedGeneric]) -> (&'static str, Vec<usize>) {
+        fn decided(
+            &self,
+            library: &[Ranked],
+            generics: &[RankedGeneric],
+        ) -> (&'static str, Vec<usize>) {
             let split = Split::of(&self.pulses);
             let problem = Problem::new(&self.groups, &split);
             let (mut library, mut generics) = (library.to_vec(), generics.to_vec());
@@ -361,7 +366,8 @@ mod tests {
     #[test]
     fn effects_that_look_alike_and_explain_nearly_as_well_are_a_class() {
         let case = case();
-        let members = |best: f64, rival: f64| case.decided(&[ranked(0, best), ranked(1, rival)], &[]).1;
+        let members =
+            |best: f64, rival: f64| case.decided(&[ranked(0, best), ranked(1, rival)], &[]).1;
         // Twice the margin of 6 nats are held against each other in full.
         assert_eq!(members(30.0, 29.9), [0, 1]);
         assert_eq!(members(30.0, 18.0 + 1e-9), [0, 1]);

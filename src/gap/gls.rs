@@ -605,8 +605,8 @@ mod tests {
         let (hyper, without) = (Hyper::default(), problem.at(&Hyper::default()));
         let with = problem.with([&own]).at(&hyper);
         let gain = without.gain(&own);
-        let wanted = with.log_likelihood(Likelihood::Profile)
-            - without.log_likelihood(Likelihood::Profile);
+        let wanted =
+            with.log_likelihood(Likelihood::Profile) - without.log_likelihood(Likelihood::Profile);
         assert!((gain.nats - wanted).abs() < 1e-8 && wanted > 1e-3, "{gain:?} {wanted}");
         assert!((gain.beta - with.beta[2]).abs() < 1e-8);
         assert!((gain.se - with.covariance()[(2, 2)].sqrt()).abs() < 1e-8);

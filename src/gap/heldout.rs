@@ -381,8 +381,7 @@ mod tests {
     fn found(data: &Data) -> Found {
         let mut vehicle = trial::vehicle();
         super::super::candidates::set(&mut vehicle, INFLOW, "inflow_share", 0.1);
-        let comparison =
-            Comparison::new(data, &vehicle, &Simulated::Closed, None).unwrap();
+        let comparison = Comparison::new(data, &vehicle, &Simulated::Closed, None).unwrap();
         let parameter = Parameter {
             effect: INFLOW,
             name: "inflow_share",
@@ -452,7 +451,10 @@ mod tests {
         let before = [[14.0, 6.0, 14.0, 6.0], [-6.0, -14.0, -6.0, -14.0]];
         let after = [[2.0, 0.0, 2.0, 0.0], [9.0, 7.0, 9.0, 7.0]];
         let found = shrunk(before, after, [0.0; 4], 0.0);
-        assert!((found.before_us.value - 4.0).abs() < 1e-12 && (found.after_us.value - 1.0).abs() < 1e-12);
+        assert!(
+            (found.before_us.value - 4.0).abs() < 1e-12
+                && (found.after_us.value - 1.0).abs() < 1e-12
+        );
         assert!((found.before_mps - 0.2).abs() < 1e-12 && (found.after_mps - 0.05).abs() < 1e-12);
         assert!((found.mean_us.0 - 4.0).abs() < 1e-12 && (found.mean_us.1 - 1.0).abs() < 1e-12);
         // Of squares: 16 before, 1 after.

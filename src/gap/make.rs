@@ -300,7 +300,8 @@ mod tests {
             for (bin, values) in group.bins.iter().zip(values) {
                 for tick in 0..30 {
                     // Steps of 12 s: the transients are cut off.
-                    let start_s = 12.0 * bin.segment as f64 + 6.0 * f64::from(bin.start_s as i32 % 10 / 3);
+                    let start_s =
+                        12.0 * bin.segment as f64 + 6.0 * f64::from(bin.start_s as i32 % 10 / 3);
                     let time_s = start_s + 0.2 * f64::from(tick);
                     for (series, value) in
                         [(&mut pulse, values.pulse_us), (&mut climb, values.climb_mps)]
@@ -329,11 +330,8 @@ mod tests {
 
     fn explained(held_us_per_mps: f64) -> Explained {
         let flights = logs(8, held_us_per_mps);
-        let flown: Vec<Flown<'_>> = flights
-            .iter()
-            .zip(1..)
-            .map(|(flight, slot)| Flown { slot, flight })
-            .collect();
+        let flown: Vec<Flown<'_>> =
+            flights.iter().zip(1..).map(|(flight, slot)| Flown { slot, flight }).collect();
         let vehicle = trial::vehicle();
         let input = Input {
             vehicle: &vehicle,
@@ -354,7 +352,8 @@ mod tests {
         assert_eq!(poisoned.verdict.data.held_out, [3, 7]);
         assert_eq!(poisoned.found.hyper, clean.found.hyper, "the noise is that of the others");
         assert_eq!(poisoned.verdict.rest, clean.verdict.rest, "so is what is left to be found");
-        let gap = |explained: &Explained| explained.verdict.gap.drones.clone().unwrap().before_us.value;
+        let gap =
+            |explained: &Explained| explained.verdict.gap.drones.clone().unwrap().before_us.value;
         assert!(gap(&clean) < 1.0, "{}", gap(&clean));
         assert!(gap(&poisoned) > 5.0, "{}", gap(&poisoned));
     }

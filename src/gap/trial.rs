@@ -42,7 +42,8 @@ pub(super) fn data(drones: usize, more_us: impl Fn(usize, &Bin) -> f64) -> Data 
     let (bins, model) = (ladder(), Model::of(&vehicle()).unwrap());
     let values = |drone: usize, bin: &Bin| {
         let climb_mps = bin.climb_mps();
-        let signals = Signals { climb_mps, height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
+        let signals =
+            Signals { climb_mps, height_m: 30.0, density_ratio: 1.0, ..Signals::default() };
         BinValues {
             pulse_us: model.pulse_us(&signals) + more_us(drone, bin),
             climb_mps,
@@ -91,6 +92,7 @@ pub(super) fn pulses(patterns: &[GroupPattern]) -> Vec<Vec<Vec<f64>>> {
     let bins = |group: usize, drone: usize| {
         (0..patterns[group].time_s.len()).map(|bin| value(group, drone, bin)).collect()
     };
-    let drones = |group: usize| (0..patterns[group].drones).map(|drone| bins(group, drone)).collect();
+    let drones =
+        |group: usize| (0..patterns[group].drones).map(|drone| bins(group, drone)).collect();
     (0..patterns.len()).map(drones).collect()
 }

@@ -406,7 +406,8 @@ mod tests {
 
     /// The restricted log-likelihood at the best variance by the textbook: with the whole covariance.
     fn dense(field: &Field, blocks: &Blocks, unknown: Unknown, length_m: f64, at: [f64; 2]) -> f64 {
-        let places: Vec<[f64; 2]> = blocks.drones.iter().map(|drone| field.places[*drone]).collect();
+        let places: Vec<[f64; 2]> =
+            blocks.drones.iter().map(|drone| field.places[*drone]).collect();
         let mut space = covariance(&places, [length_m; 2]);
         let mut values = blocks.take(&field.columns());
         if unknown.common {
@@ -430,7 +431,8 @@ mod tests {
             });
             each.sum::<f64>() / (RUNNING * RUNNING) as f64
         });
-        let whole = space.kronecker(&time) + DMatrix::identity(rows * count, rows * count) * at[1].exp();
+        let whole =
+            space.kronecker(&time) + DMatrix::identity(rows * count, rows * count) * at[1].exp();
         let y = DVector::from_fn(rows * count, |place, _| values[(place / count, place % count)]);
         let half = blocks.steps.iter().sum::<usize>() as f64 / 2.0;
         let powers = 1 + usize::from(unknown.slope);
@@ -444,7 +446,8 @@ mod tests {
         let right = x.transpose() * factor.solve(&y);
         let squares = y.dot(&factor.solve(&y)) - right.dot(&normal.solve(&right));
         let free = (rows * (count - powers)) as f64;
-        let ln_det = |l: DMatrix<f64>| 2.0 * l.diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let ln_det =
+            |l: DMatrix<f64>| 2.0 * l.diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let dets = ln_det(factor.l()) + ln_det(normal.l());
         -0.5 * (free * ((squares / free).ln() + 1.0) + dets)
     }

@@ -186,7 +186,10 @@ mod tests {
         drop(stage);
         let (mut one, part) = complete(folder.path());
         let stage = one.on_resized(part, None);
-        assert!(matches!(stage, Stage::Sample(..)), "a file that is not listed has none: {stage:?}");
+        assert!(
+            matches!(stage, Stage::Sample(..)),
+            "a file that is not listed has none: {stage:?}"
+        );
     }
 
     #[test]
