@@ -8,13 +8,30 @@ use std::net::SocketAddr;
 use std::path::Path;
 
 use nalgebra::Vector3;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use updraft::analysis::result::Analysis;
 use updraft::base::crc::ap_crc32;
 use updraft::base::frame::{Geodetic, ShowFrame};
+use updraft::base::parse;
+use updraft::campaign::start::StartRecord;
 use updraft::campaign::{parse_plan, to_json};
 use updraft::check::{CheckInput, check};
+use updraft::fleet::ftp::Caller;
+use updraft::fleet::ftp::get::{Get, GetOptions};
+use updraft::fleet::ftp::list::List;
+use updraft::fleet::ftp::put::Put;
+use updraft::fleet::log_protocol::get::LogGet;
+use updraft::fleet::log_protocol::list::LogList;
+use updraft::fleet::logs::manifest::Manifest;
+use updraft::fleet::sink::Memory;
 use updraft::fleet::slots::{FleetTable, check_table};
 use updraft::flight::table::{Mapping, read_from};
-use updraft::link::frame::{FrameReader, MAX_FRAME, encode};
+use updraft::gap::Verdict;
+use updraft::link::clock::S;
+use updraft::link::conversation::{Conversation, Step};
+use updraft::link::frame::{FrameReader, MAX_FRAME, MavMessage, dialect, encode};
+use updraft::link::id::DroneId;
 use updraft::log::{Log, Select};
 use updraft::mission::Plan;
 use updraft::mission::resolve::{resolve, resolve_text};
@@ -24,11 +41,13 @@ use updraft::show::derive::DeriveParams;
 use updraft::show::summary::{summarise, summarise_skyb};
 use updraft::show::{Show, csv, skyb, skyc};
 use updraft::sim::Uniform;
+use updraft::sim::air::spec::{AirSpec, from_toml};
 use updraft::sim::json::{Instance, InstanceSetup, ServoPacket};
 use updraft::skybrush_server::lines::Lines;
 use updraft::skybrush_server::watch::Monitor;
 use updraft::skybrush_server::{log_bytes, log_entries, message};
-use updraft::vehicle::library;
+use updraft::study::StudyPlan;
+use updraft::vehicle::{Vehicle, library};
 
 /// Shows of more drones or segments are read, but not checked: that takes too long for a fuzzer.
 const MAX_DRONES: usize = 16;
@@ -39,6 +58,8 @@ pub(crate) type Target = (&'static str, fn(&[u8]));
 
 /// All of them.
 pub(crate) const TARGETS: &[Target] = &[
+    ("air", air),
+    ("conversation", conversation),
     ("csv", csv),
     ("fleet_table", fleet_table),
     ("frame", frame),
@@ -46,12 +67,15 @@ pub(crate) const TARGETS: &[Target] = &[
     ("json_packet", json_packet),
     ("log", log),
     ("plan", plan),
+    ("records", records),
     ("server_line", server_line),
     ("show_status", show_status),
     ("skyb", skyb),
     ("skyc", skyc),
+    ("study", study),
     ("table", table),
     ("template", template),
+    ("vehicle", vehicle),
 ];
 
 /// Feeds `bytes` to the target `name`.
@@ -349,4 +373,143 @@ fn use_plan(plan: &Plan) {
     if plan.slots.len() <= MAX_DRONES && segments <= MAX_SEGMENTS {
         checked(&plan.to_show(), plan);
     }
+}
+
+/// A file of air: what is read is said again in the same words.
+fn air(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    match from_toml(text, "fuzz.toml") {
+        Err(error) => assert!(!error.to_string().is_empty()),
+        Ok(specs) => {
+            for spec in specs {
+                let again: AirSpec = spec.to_string().parse().expect("what is said can be read");
+                assert_eq!(again.to_string(), spec.to_string());
+            }
+        }
+    }
+}
+
+/// A vehicle's file: what is read can fly, and is written as it was read.
+fn vehicle(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    match Vehicle::from_toml(text, "fuzz.toml") {
+        Err(error) => assert!(!error.to_string().is_empty()),
+        Ok(vehicle) => {
+            let json = to_json(&vehicle).expect("a vehicle is JSON");
+            let again: Vehicle = parse::json(&json).expect("what is written can be read");
+            assert_eq!(again, vehicle);
+        }
+    }
+}
+
+/// A study's template.
+fn study(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    if let Err(error) = StudyPlan::parse("fuzz.toml", text) {
+        assert!(!error.to_string().is_empty());
+    }
+}
+
+/// What other programs, or an older one, may have written into a campaign: what can be read is written as it
+/// was read.
+fn records(bytes: &[u8]) {
+    record::<Verdict>(bytes);
+    record::<Manifest>(bytes);
+    record::<StartRecord>(bytes);
+    record::<Analysis>(bytes);
+}
+
+fn record<T: Serialize + DeserializeOwned>(bytes: &[u8]) {
+    let Ok(record) = parse::json::<T>(bytes) else { return };
+    let json = to_json(&record).expect("a record is JSON");
+    // By its text: numbers that are none are not equal to themselves.
+    let again: T = parse::json(&json).expect("what is written can be read");
+    assert_eq!(to_json(&again).expect("a record is JSON"), json);
+}
+
+/// Answers of a drone, in pieces of 40 bytes, to everything that asks for files and logs: each conversation
+/// ends, whatever it is told.
+fn conversation(bytes: &[u8]) {
+    let messages: Vec<MavMessage> = bytes.chunks(40).take(200).map(answer).collect();
+    let drone = DroneId { network: 0, system: 1 };
+    let caller = || Caller::new(drone, 1);
+    let options = GetOptions { most_size: 200_000, ..GetOptions::default() };
+    survives(Get::new(caller(), "/log", Memory::default(), options), &messages);
+    survives(List::new(caller(), "/", 20 * S), &messages);
+    survives(Put::new(caller(), "/log", vec![1; 3000], 20 * S), &messages);
+    survives(LogGet::new(drone, 1, 100_000, Memory::default(), 20 * S), &messages);
+    survives(LogList::new(drone, 20 * S), &messages);
+}
+
+/// A message that is near enough to be believed.
+fn answer(piece: &[u8]) -> MavMessage {
+    let byte = |place: usize| piece.get(place).copied().unwrap_or(0);
+    let number = |place: usize| u32::from_le_bytes([0, 1, 2, 3].map(|more| byte(place + more)));
+    let id = u16::from(byte(1));
+    match byte(0) % 4 {
+        0 => MavMessage::LOG_DATA(dialect::LOG_DATA_DATA {
+            ofs: number(2) % 100_000,
+            id: id % 4,
+            count: byte(6),
+            data: [byte(7); 90],
+        }),
+        1 => MavMessage::LOG_ENTRY(dialect::LOG_ENTRY_DATA {
+            time_utc: number(10),
+            size: number(2),
+            id: id % 300,
+            num_logs: u16::from(byte(6)),
+            last_log_num: u16::from(byte(7)),
+        }),
+        _ => {
+            let mut payload = [0; PAYLOAD];
+            let own = piece.get(1..).unwrap_or_default();
+            payload[..own.len()].copy_from_slice(own);
+            payload[3] = 128 + payload[3] % 2;
+            payload[5] %= 16;
+            payload[4] %= 240;
+            payload[10..12].fill(0);
+            MavMessage::FILE_TRANSFER_PROTOCOL(dialect::FILE_TRANSFER_PROTOCOL_DATA {
+                target_network: 0,
+                target_system: 0,
+                target_component: 0,
+                payload,
+            })
+        }
+    }
+}
+
+/// Feeds a conversation messages, those about files with its own numbers; it must end.
+fn survives<C: Conversation>(mut conversation: C, messages: &[MavMessage]) {
+    let (mut now, mut asked) = (0, [0_u8; 4]);
+    let mut messages = messages.iter();
+    for _ in 0..200_000 {
+        match conversation.poll(now) {
+            Step::Done(_) => return,
+            Step::Wait(until) => {
+                let Some(message) = messages.next() else {
+                    assert!(until > now, "it waits for the past");
+                    now = until;
+                    continue;
+                };
+                let mut message = message.clone();
+                if let MavMessage::FILE_TRANSFER_PROTOCOL(file) = &mut message {
+                    let step = 1 + u16::from(file.payload[0] % 3);
+                    let number = u16::from_le_bytes([asked[0], asked[1]]).wrapping_add(step);
+                    file.payload[..2].copy_from_slice(&number.to_le_bytes());
+                    file.payload[2] = asked[2];
+                    if file.payload[6] % 4 != 0 {
+                        file.payload[5] = asked[3];
+                    }
+                }
+                now += 1000;
+                conversation.on_message(now, &message);
+            }
+            Step::Send(message) => {
+                if let MavMessage::FILE_TRANSFER_PROTOCOL(file) = &*message {
+                    asked = [0, 1, 2, 3].map(|place| file.payload[place]);
+                }
+            }
+        }
+    }
+    panic!("it never ends");
 }

@@ -54,21 +54,25 @@ pub fn load(text: &str) -> Result<Vec<AirSpec>, AirSpecError> {
     let plain = plain.strip_suffix(".toml").unwrap_or(plain);
     if is_toml && Path::new(text).is_file() {
         let bytes = read_whole(Path::new(text), MAX_BYTES)?;
-        return parse(&String::from_utf8_lossy(&bytes), text);
+        return from_toml(&String::from_utf8_lossy(&bytes), text);
     }
     let builtin = BUILTIN.iter().find(|(name, _)| *name == plain);
     match builtin {
-        Some((_, toml)) if is_toml || super::kind(plain).is_none() => parse(toml, text),
+        Some((_, toml)) if is_toml || super::kind(plain).is_none() => from_toml(toml, text),
         _ if is_toml => {
             // Says which file and why it cannot be read.
             let bytes = read_whole(Path::new(text), MAX_BYTES)?;
-            parse(&String::from_utf8_lossy(&bytes), text)
+            from_toml(&String::from_utf8_lossy(&bytes), text)
         }
         _ => Ok(vec![text.parse()?]),
     }
 }
 
-fn parse(toml: &str, file: &str) -> Result<Vec<AirSpec>, AirSpecError> {
+/// The components of a TOML text; `file` is its name for messages.
+///
+/// # Errors
+/// [`AirSpecError`] says what is wrong and what is allowed.
+pub fn from_toml(toml: &str, file: &str) -> Result<Vec<AirSpec>, AirSpecError> {
     let wrong = |reason: String| AirSpecError::Toml { file: file.to_owned(), reason };
     let parsed: AirFile = parse::toml(toml).map_err(|error| wrong(error.to_string()))?;
     if parsed.schema != AIR_SCHEMA {

@@ -12,7 +12,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 pub use build::{Air, build};
-pub use file::{AIR_SCHEMA, builtin_names, load};
+pub use file::{AIR_SCHEMA, builtin_names, from_toml, load};
 pub use kinds::{KINDS, Key, Kind, Preset, help_text, kind};
 
 use untrusted_io::file::FileError;
