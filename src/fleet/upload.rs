@@ -458,6 +458,7 @@ impl Conversation for Upload {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fleet::fence::fence_of;
     use crate::mission::resolve::resolve;
 
     const ALL_WELL: u8 = flag::LOADED | flag::ORIGIN_SET | flag::ORIENTATION_SET | flag::FENCE_ON;
@@ -474,8 +475,8 @@ mod tests {
     /// An upload whose show has just been loaded, at time 0.
     fn loaded() -> Upload {
         let plan = resolve("hover", &[]).unwrap().flights.remove(0).plan;
-        let fence = Fence::of(&plan, &plan.to_show()).unwrap();
-        let load = Load { skyb: Vec::new(), site: plan.site.clone(), fence };
+        let fence = fence_of(&plan, &plan.to_show()).unwrap();
+        let load = ShowLoad { skyb: Vec::new(), site: plan.site.clone(), fence };
         let mut upload = Upload::new(DroneId { network: 0, system: 1 }, load, 1);
         upload.phase = Phase::Flags { since: 0, agreeing: 0, last: None };
         upload

@@ -1,24 +1,63 @@
 //! What the program says about itself.
 
-use std::fmt::Write as _;
-
 use snapbox::cmd::Command;
 
 use crate::cli::support::Bench;
 
+/// What every command has; its own help says the same of them.
+const GLOBAL: [&str; 6] = ["--json", "-q, ", "--color ", "--no-progress", "-h, ", "-V, "];
+
+/// What a help says of each of these options.
+fn of_options(help: &str, options: &[&str]) -> Vec<(String, String)> {
+    let starts = |line: &str| {
+        let option = line.trim_start();
+        let is_option = option.starts_with('-') && line.len() - option.len() <= 6;
+        is_option.then(|| options.iter().find(|known| option.starts_with(**known))).flatten()
+    };
+    let mut found: Vec<(String, String)> = Vec::new();
+    let mut is_inside = false;
+    for line in help.lines() {
+        let is_new = !line.is_empty() && !line.starts_with("          ");
+        if is_new {
+            is_inside = false;
+        }
+        if let Some(option) = starts(line).filter(|_| is_new) {
+            is_inside = true;
+            found.push(((*option).to_owned(), String::new()));
+        }
+        if let (true, Some((_, said))) = (is_inside, found.last_mut()) {
+            said.push_str(line.trim_end());
+            said.push('\n');
+        }
+    }
+    found.iter_mut().for_each(|(_, said)| said.truncate(said.trim_end().len()));
+    found
+}
+
+#[test]
+fn the_program_has_its_help() {
+    insta::assert_snapshot!(Bench::new().expect(0, &["--help"]).out);
+}
+
+/// Each command's own options, without blank lines.
 #[test]
 fn every_command_has_its_help() {
     let bench = Bench::new();
-    let mut all = String::new();
-    let commands: [&[&str]; 7] =
-        [&[], &["run"], &["plan"], &["check"], &["simulate"], &["analyze"], &["inspect"]];
-    for command in commands {
-        let ended = bench.expect(0, &[command, &["--help"]].concat());
+    let whole = bench.expect(0, &["--help"]).out;
+    let global = of_options(&whole, &GLOBAL);
+    assert_eq!(global.len(), GLOBAL.len());
+    for command in ["run", "plan", "check", "simulate", "analyze", "inspect"] {
+        let ended = bench.expect(0, &[command, "--help"]);
         assert!(ended.err.is_empty(), "{ended}");
-        let args = [command, &["--help"]].concat().join(" ");
-        let _ = writeln!(all, "$ updraft {args}\n{}", ended.out);
+        let mut own = ended.out.clone();
+        for (option, said) in of_options(&ended.out, &GLOBAL) {
+            assert!(global.contains(&(option.clone(), said.clone())), "{command} {option}: {said}");
+            own = own.replace(&said, "");
+        }
+        let lines: Vec<&str> =
+            own.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
+        insta::assert_snapshot!(format!("help_of_{command}"), lines.join("\n"));
     }
-    insta::assert_snapshot!(all);
 }
 
 #[test]

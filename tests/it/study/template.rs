@@ -42,7 +42,7 @@ fn wrong_studies_are_told_where_and_what_is_allowed() {
         assert!(SMALL.contains(from), "the study no longer has {from}");
         let text = SMALL.replacen(from, to, 1);
         let error = StudyPlan::parse("mine.toml", &text).expect_err(to);
-        let _ = writeln!(told, "{from}  ->  {to}\n{error}\n");
+        let _ = writeln!(told, "{from}  ->  {to}\n{error}");
     }
     insta::assert_snapshot!(told);
 }
