@@ -5,7 +5,7 @@
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 
-use super::aware::{Aware, Measured};
+use super::aware::Aware;
 use super::battery::Sag;
 use super::budget::{CommonError, Supply};
 use super::calibrate::FitOptions;
@@ -13,6 +13,7 @@ use super::corrections::Corrections;
 use super::density::Density;
 use super::hover::Hover;
 use super::law::LawKind;
+use super::measured::Measured;
 use super::result::{DroneAnalysis, FlightAnalysis, SampleStats, Trace, WindowStats};
 use super::windows::{Target, WindowOptions};
 use crate::base::rng::{Purpose as Stream, stream};
@@ -356,11 +357,11 @@ fn many_campaigns() {
 /// in us, the law's true slope, and what it shares with the others.
 fn at_a_lean(lean_rad: f64, corrections: Corrections<'_>) -> (Measured, f64, f64, CommonError) {
     let mut rng = stream(5, 0, Stream::Sensors);
-    let world = World::new(&mut rng, MapLaw::Linear);
+    let world = World::new(&mut rng, LawKind::Linear);
     let calibration = calibration(&mut rng, &world, STILL);
     let corrections = Corrections { density: Some(World::density()), ..corrections };
     let sag = Some(Sag::default());
-    let aware = Aware::new(&calibration, corrections, sag, Some(MapLaw::Linear)).unwrap();
+    let aware = Aware::new(&calibration, corrections, sag, Some(LawKind::Linear)).unwrap();
     let still = vec![0.0; (HOVER_S / STEP_S) as usize];
     let (mut flight, _) = hover(&mut rng, &world, STILL, 0, &still);
     flight.roll_rad.value.fill(lean_rad);

@@ -275,6 +275,7 @@ mod tests {
         let air = |name, column| Candidate {
             name,
             was_there: false,
+            by_lean: false,
             size: None,
             variants: vec![Variant { vehicle: None, size: 0.0, column, felt: Vec::new() }],
         };

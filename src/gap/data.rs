@@ -487,12 +487,14 @@ mod tests {
         assert_eq!(slots(&data), [1, 2, 3, 4]);
         assert_eq!(
             data.left_out,
-            ["slot 5: only 8 of 10 steady bins are usable (gaps in the log, motors at a limit, \
-                 or another flight)"]
+            ["slot 5: only 8 of 10 steady bins are usable (gaps in the log, motors at a limit, or another \
+              flight)"]
+            .map(|text| LeftOut::from(text.to_owned()))
         );
         pulses[4] = [0; 10];
         let data = added(&pulses);
-        assert_eq!(data.left_out, ["slot 5: no steady flight of the plan in its log"]);
+        let why = "slot 5: no steady flight of the plan in its log".to_owned();
+        assert_eq!(data.left_out, [LeftOut::from(why)]);
     }
 
     #[test]

@@ -219,6 +219,7 @@ mod tests {
         Candidate {
             name,
             was_there: false,
+            by_lean: false,
             size: is_of_the_vehicle.then_some(size),
             variants: vec![variant],
         }

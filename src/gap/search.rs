@@ -408,7 +408,8 @@ mod tests {
         let column = Column::Shared(vec![]);
         let variant = Variant { vehicle: None, size: 0.2, column, felt: Vec::new() };
         let size = Size { name: "size", unit: "", low: 0.0, high: 0.5, now: 0.1, usual: 0.1 };
-        let new = Candidate { name: "", was_there: false, size: Some(size), variants: vec![] };
+        let (was_there, by_lean) = (false, false);
+        let new = Candidate { name: "", was_there, by_lean, size: Some(size), variants: vec![] };
         let is = |candidate: &Candidate, beta| admissible(candidate, &variant, beta);
         assert!(is(&new, 1e-9) && is(&new, 5.0));
         assert!(!is(&new, 0.0) && !is(&new, -0.1) && !is(&new, 5.0 + 1e-9));
