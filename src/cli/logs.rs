@@ -17,15 +17,14 @@ use super::fleet::server;
 use super::simulate::parse_slots;
 use super::words;
 use crate::base::plain::Shown as _;
-use crate::campaign::origin::LogOrigin;
 use crate::fleet::logs::one::Which;
 use crate::mission::Plan;
-use crate::workflow::fleet::bring::{Brought, Wish, bring};
+use crate::workflow::fleet::bring::Wish;
 use crate::workflow::fleet::crew::Crew;
-use crate::workflow::fleet::output::{ListRow, ListedLog};
+use crate::workflow::fleet::logs::{self, has_slots};
+use crate::workflow::fleet::one_flight;
 use crate::workflow::fleet::server::{list as list_through, pull as pull_through};
 use crate::workflow::fleet::verify::{VerifyRow, verify_all};
-use crate::workflow::fleet::{one_flight, who};
 use crate::workflow::slots::SlotSet;
 
 /// How long a drone may be silent, s.
@@ -154,50 +153,8 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
     };
     let mut station = args.connect.open(context, links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait)?;
-    let listed = crew.list_logs()?;
-    let mut rows: Vec<ListRow> = crew
-        .table
-        .drones
-        .iter()
-        .map(|line| {
-            let (logs, reason) = match listed.get(&line.drone) {
-                Some(Ok(logs)) => (logs.as_slice(), None),
-                Some(Err(error)) => (&[][..], Some(error.clone())),
-                None => (&[][..], Some("it was not asked".to_owned())),
-            };
-            let logs = logs.iter().map(|log| ListedLog {
-                number: log.id,
-                bytes: log.size,
-                unix_s: log.time_utc_s,
-            });
-            ListRow {
-                drone: line.drone.to_string(),
-                slot: Some(line.slot),
-                logs: logs.collect(),
-                reason,
-            }
-        })
-        .collect();
-    rows.extend(nobody.into_iter().map(|(slot, why)| ListRow {
-        drone: "-".to_owned(),
-        slot: Some(slot),
-        logs: Vec::new(),
-        reason: Some(why),
-    }));
-    rows.sort_by_key(|row| row.slot);
-    listing::show(context, rows)
-}
-
-/// The plan has these slots.
-fn has_slots(plan: &Plan, slots: Option<&SlotSet>) -> Result<(), CommandError> {
-    match slots.and_then(|slots| slots.stray(plan)) {
-        None => Ok(()),
-        Some(stray) => Err(CommandError::Usage(format!(
-            "the plan has no slot {stray}: it has {}",
-            plan.slots.len()
-        ))),
-    }
+    let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
+    listing::show(context, logs::list(context, &mut crew, slots, wait_s)?)
 }
 
 fn gone() -> CommandError {
@@ -283,32 +240,8 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     };
     let mut station = args.connect.open(context, links)?;
     let mut crew = Crew::new(context, &mut station, &folder, &plan);
-    let nobody = who::find(context, &mut crew, args.slots.as_ref(), args.connect.wait);
-    let nobody = nobody.map_err(|error| match error {
-        CommandError::Nothing(text) if folder.has_simulated_logs() => {
-            CommandError::Nothing(format!(
-                "{text}\n  (the simulated logs need no pull: they lie in {})",
-                folder.logs_of(LogOrigin::Simulated).folder.shown()
-            ))
-        }
-        error => error,
-    })?;
-    let table = crew.table.clone();
-    let mut brought = bring(context, &mut crew.net, &folder, &plan, &table, &wish)?;
-    let nobody = nobody.into_iter().map(|(slot, why)| Brought {
-        slot,
-        drone: None,
-        state: "missing",
-        bytes: 0,
-        reason: Some(why),
-        unchecked: None,
-    });
-    let nobody: Vec<Brought> = nobody.collect();
-    for loss in nobody.iter().filter_map(Brought::loss) {
-        context.warn(&loss);
-    }
-    brought.extend(nobody);
-    brought.sort_by_key(|one| one.slot);
+    let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
+    let brought = logs::pull(context, &mut crew, slots, wait_s, &wish)?;
     let lost: Vec<u16> =
         brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
     end_pull(context, args, &plan, brought, &lost)

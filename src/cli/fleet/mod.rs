@@ -18,15 +18,13 @@ use self::connect::{ConnectArgs, Target};
 use self::start::LeadArgs;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
-use super::words;
 use crate::fleet::abort::Action;
-use crate::fleet::preflight::Preflight;
 use crate::link::address::Address;
 use crate::link::id::DroneId;
 use crate::link::station::Station;
 use crate::workflow::fleet::crew::Crew;
 use crate::workflow::fleet::end::{flying, order_handler};
-use crate::workflow::fleet::start::fly_now;
+use crate::workflow::fleet::steps::{self, Started, StepWish};
 use crate::workflow::fleet::{lock, one_flight};
 
 /// Arguments of `updraft fleet`.
@@ -191,26 +189,11 @@ fn step_station(context: &Context, args: &StepArgs) -> Result<Station, CommandEr
     }
 }
 
-/// Clocks and slots; refuses to go on when a drone stands wrong.
-fn prepare(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<(), CommandError> {
-    crew.greet()?;
-    if crew.assign(args.assign)? {
-        return Ok(());
+impl UploadArgs {
+    fn wish(&self) -> StepWish {
+        let Self { step, set_params, assign } = self;
+        StepWish { set_params: *set_params, assign: *assign, wait_s: step.connect.wait }
     }
-    Err(CommandError::Unsafe("nothing was sent: the drones do not stand as planned".to_owned()))
-}
-
-/// The table of drones that were loaded by an earlier command.
-fn look(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<Preflight, CommandError> {
-    prepare(crew, args)?;
-    look_at(crew, args)
-}
-
-/// The preflight table of drones whose slots are known.
-fn look_at(crew: &mut Crew<'_>, args: &UploadArgs) -> Result<Preflight, CommandError> {
-    crew.params(args.set_params)?;
-    crew.look_at_files()?;
-    crew.preflight(args.step.connect.wait)
 }
 
 /// Options of an upload that do nothing through a server.
@@ -242,7 +225,9 @@ fn preflight(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError>
         let (folder, plan) = one_flight(&args.step.campaign, args.step.flight.as_deref())?;
         return server::preflight(context, &address, &folder, &plan, args.step.connect.wait);
     }
-    with_crew(context, &args.step, |crew| tables::preflight(context, &look(crew, args)?))
+    with_crew(context, &args.step, |crew| {
+        tables::preflight(context, &steps::preflight(crew, args.wish())?)
+    })
 }
 
 fn status(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
@@ -268,20 +253,12 @@ fn upload(context: &Context, args: &UploadArgs) -> Result<Exit, CommandError> {
         return server::upload(context, &address, &folder, &plan, args.step.connect.wait);
     }
     with_crew(context, &args.step, |crew| {
-        prepare(crew, args)?;
-        let refused = crew.upload()?;
-        // The fence's own switch is one of the parameters.
-        let right = crew.params(args.set_params)?;
+        let (refused, ending) = steps::upload(crew, args.wish())?;
         if context.json {
             context.print_json(&tables::UploadOutput::new(&crew.table, &refused))?;
         }
-        Ok(uploaded(refused.is_empty(), right, args.set_params))
+        Ok(ending.into())
     })
-}
-
-/// How an upload ends. Without `--set-params` no parameter was to be set, and nothing is lost.
-fn uploaded(all_loaded: bool, params_right: bool, set_params: bool) -> Exit {
-    if all_loaded && (params_right || !set_params) { Exit::Done } else { Exit::Losses }
 }
 
 /// Opens the links, and says who holds them if another command of this campaign does.
@@ -309,18 +286,10 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
     }
     let _lock = lock(context, &args.upload.step.campaign)?;
     with_desk(context, &args.upload.step, |crew| {
-        crew.listen(args.upload.step.connect.wait)?;
-        if let Some(words) = crew.in_flight() {
-            return Err(CommandError::Unsafe(words));
+        match steps::start(context, crew, args.upload.wish(), &args.lead.lead())? {
+            Started::NoGo(table) => tables::preflight(context, &table),
+            Started::Flown(ending) => Ok(ending.into()),
         }
-        prepare(crew, &args.upload)?;
-        crew.clear_leftover()?;
-        let table = look_at(crew, &args.upload)?;
-        crew.not_ordered_down()?;
-        if !table.go() {
-            return tables::preflight(context, &table);
-        }
-        fly_now(context, crew, &args.lead.lead()).map(|(ending, _)| ending.into())
     })
 }
 
@@ -337,33 +306,5 @@ fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> 
         return dry::restore(context, &args.step, args.fence_off);
     }
     let _lock = lock(context, &args.step.campaign)?;
-    with_crew(context, &args.step, |crew| {
-        let (put_back, left) = crew.restore(args.fence_off)?;
-        if left.is_empty() {
-            context.say("Parameters are as they were");
-            return Ok(Exit::Done);
-        }
-        context.insist(&match put_back {
-            0 => "No parameter was put back, for the reasons above".to_owned(),
-            drones => format!(
-                "Put back on {}; not on all of {}, for the reasons above",
-                words::count(drones, "drone"),
-                words::count(left.len(), "drone")
-            ),
-        });
-        Ok(Exit::Losses)
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parameters_that_could_not_be_set_cost_the_exit_code_of_an_upload() {
-        assert_eq!(uploaded(true, true, true), Exit::Done);
-        assert_eq!(uploaded(true, false, true), Exit::Losses);
-        assert_eq!(uploaded(true, false, false), Exit::Done);
-        assert_eq!(uploaded(false, true, false), Exit::Losses);
-    }
+    with_crew(context, &args.step, |crew| Ok(steps::restore(context, crew, args.fence_off)?.into()))
 }

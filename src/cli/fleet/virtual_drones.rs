@@ -3,31 +3,24 @@
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 use clap::Args;
 
 use super::connect::read_key;
-use crate::base::file::read_whole;
-use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
-use crate::campaign::origin::default_of;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::cli::simulate::{AirArgs, parse_slots, updraft};
-use crate::cli::words;
 use crate::link::clock::{MS, Micros, S};
 use crate::mission::Plan;
 use crate::sim::air::spec;
-use crate::virtual_fleet::broadcast::{BROADCAST_PORT, Broadcasts};
 use crate::virtual_fleet::lossy::Faults;
 use crate::virtual_fleet::server::Pace;
 use crate::virtual_fleet::vehicle::BootTimes;
-use crate::workflow::clock::SinceNow;
 use crate::workflow::fleet::hangar::{Hangar, Mishaps};
 use crate::workflow::fleet::one_flight;
+use crate::workflow::fleet::practice::{cards, serve};
 use crate::workflow::simulate::resolved_vehicle;
 use crate::workflow::slots::SlotSet;
 
@@ -101,35 +94,6 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The ear for broadcasts. The usual port may be another fleet's: this one does without it then,
-/// but says so; a port that was asked for is needed.
-fn broadcasts(context: &Context, asked: Option<u16>) -> Result<Option<Broadcasts>, CommandError> {
-    let port = asked.unwrap_or(BROADCAST_PORT);
-    if port == 0 {
-        return Ok(None);
-    }
-    let error = match Broadcasts::open(port) {
-        Ok(broadcasts) => return Ok(Some(broadcasts)),
-        Err(error) => error,
-    };
-    let taken = format!(
-        "UDP port {port}, at which Skybrush Server's starts are heard, cannot be listened to: \
-         {error}\n  Another `fleet virtual` has it, or a drone's simulator: end that one, or give \
-         --broadcast-port another port and the server the same (broadcast_port in its connection \
-         udp-listen://:14550?broadcast_port=PORT)"
-    );
-    if asked.is_some() {
-        return Err(CommandError::Failed(taken));
-    }
-    context.warn(&format!(
-        "{taken}; everything else works, and --broadcast-port 0 is without this warning"
-    ));
-    Ok(None)
-}
-
-/// Largest log that virtual drones have on their cards, bytes.
-const MOST_LOG: u64 = 1 << 28;
-
 fn mishaps(
     args: &VirtualArgs,
     folder: &FlightFolder,
@@ -142,22 +106,7 @@ fn mishaps(
             plan.slots.len()
         )));
     }
-    let mut cards = BTreeMap::new();
-    let at = folder.logs_of(default_of(std::slice::from_ref(folder)));
-    if args.flown {
-        for slot in &plan.slots {
-            let path = at.log(slot.slot, plan.slots.len());
-            if path.exists() {
-                cards.insert(slot.slot, read_whole(&path, MOST_LOG)?);
-            }
-        }
-        if cards.is_empty() {
-            return Err(CommandError::Nothing(format!(
-                "{} has no logs for the drones' cards: `updraft simulate` makes them",
-                at.folder.shown()
-            )));
-        }
-    }
+    let cards = if args.flown { cards(folder, plan)? } else { BTreeMap::new() };
     let at = (args.after * S as f64) as Micros;
     let (gone, reboot, stock) = (args.gone.clone(), args.reboot.clone(), args.stock.clone());
     Ok(Mishaps { gone, reboot, stock, at, cards })
@@ -195,26 +144,6 @@ pub(in crate::cli) fn run(context: &Context, args: &VirtualArgs) -> Result<Exit,
         mishaps,
         key: read_key(args.key.as_deref())?,
     };
-    let broadcasts = broadcasts(context, args.broadcast_port)?;
-    let stations: Vec<String> = args.station.iter().map(ToString::to_string).collect();
-    context.say(&format!(
-        "{} are switched on and speak to {}; Ctrl-C switches them off",
-        words::count(plan.slots.len(), "virtual drone"),
-        stations.join(", ")
-    ));
-    let link_clock = SinceNow::of(clock);
-    hangar.serve(args.station.clone(), broadcasts.as_ref(), &link_clock, |running| {
-        let mut told = false;
-        while !context.stop_flag().load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(100));
-            if running.refused() > 0 && !told {
-                told = true;
-                context.warn(
-                    "the drones refuse what is not signed with their key: give the station the \
-                     same --key",
-                );
-            }
-        }
-    })?;
+    serve(context, &hangar, args.station.clone(), args.broadcast_port)?;
     Ok(Exit::Done)
 }

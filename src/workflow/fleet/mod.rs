@@ -10,14 +10,17 @@ pub(crate) mod fly;
 pub(crate) mod hangar;
 pub(crate) mod interrupt;
 pub(crate) mod links;
+pub(crate) mod logs;
 pub(crate) mod output;
+pub(crate) mod practice;
 pub(crate) mod preflight;
 pub(crate) mod server;
 pub(crate) mod start;
+pub(crate) mod steps;
 pub(crate) mod verify;
 mod virtual_flight;
 pub(crate) mod watch;
-pub(crate) mod who;
+mod who;
 
 use std::path::Path;
 
