@@ -247,7 +247,8 @@ mod tests {
             along: Vec::new(),
             penalty: 0.0,
         };
-        let generics = vec![free("climb"), free("height"), free("step"), free(PRODUCT)];
+        let generics = [Dependence::Climb, Dependence::Height, Dependence::Step, PRODUCT];
+        let generics = generics.map(free).to_vec();
         let mut pulses = pulses(&groups);
         for (group, drones) in pulses.iter_mut().enumerate() {
             for drone in drones {
