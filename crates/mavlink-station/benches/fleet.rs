@@ -1,4 +1,4 @@
-//! File transfer: `cargo bench --bench fleet`.
+//! File transfer: `cargo bench -p mavlink-station`.
 //!
 //! CPU for a megabyte, with frames encoded and decoded on both ends, over a link without limits.
 
@@ -6,14 +6,13 @@ use std::collections::BTreeMap;
 
 use divan::Bencher;
 use divan::counter::BytesCount;
-use updraft::fleet::ftp::Caller;
-use updraft::fleet::ftp::get::{Get, GetOptions};
-use updraft::fleet::sink::Memory;
-use updraft::link::conversation::{NoObserver, run_all};
-use updraft::link::id::DroneId;
-use updraft::virtual_fleet::files::FileVehicle;
-use updraft::virtual_fleet::lossy::{Faults, LossyNet};
-use updraft::virtual_fleet::storage::MemoryStorage;
+use mavlink_station::ftp::Caller;
+use mavlink_station::ftp::get::{Get, GetOptions};
+use mavlink_station::simulated::files::FileVehicle;
+use mavlink_station::simulated::lossy::{Faults, LossyNet};
+use mavlink_station::simulated::storage::MemoryStorage;
+use mavlink_station::sink::Memory;
+use mavlink_station::{DroneId, NoObserver, run_all};
 
 const SIZE: usize = 1_000_000;
 const LOG: &str = "/APM/LOGS/00000001.BIN";
