@@ -23,7 +23,7 @@ const SHORT_BUSY: Micros = 20 * MS;
 
 /// A request with its number, repeated until it is answered.
 #[derive(Clone, Debug)]
-pub struct Exchange {
+pub(super) struct Exchange {
     packet: Packet,
     first: Option<Micros>,
     sent: Micros,
@@ -39,7 +39,7 @@ pub struct Exchange {
 }
 
 /// Next action of an exchange.
-pub enum Wish {
+pub(super) enum ExchangeStep {
     /// Send this message, and poll again.
     Send(Box<MavMessage>),
     /// Wait until this time, us.
@@ -50,7 +50,7 @@ pub enum Wish {
 
 impl Exchange {
     /// Makes a request; `patience` without any answer, us, ends it.
-    pub fn new(caller: &Caller, request: Packet, patience: Micros) -> Self {
+    pub(super) fn new(caller: &Caller, request: Packet, patience: Micros) -> Self {
         Self {
             packet: caller.number(request),
             first: None,
@@ -66,25 +66,25 @@ impl Exchange {
 
     /// Sets the time that the vehicle may need for the request itself, us.
     #[must_use]
-    pub fn with_work(mut self, work: Micros) -> Self {
+    pub(super) fn with_work(mut self, work: Micros) -> Self {
         self.work = work;
         self.patience = self.patience.max(4 * work);
         self
     }
 
     /// Next action at time `now`.
-    pub fn poll(&mut self, now: Micros, caller: &Caller) -> Wish {
+    pub(super) fn poll(&mut self, now: Micros, caller: &Caller) -> ExchangeStep {
         let first = *self.first.get_or_insert(now);
         if now >= first + self.patience {
-            return Wish::Silent(FtpError::Silent { seconds: self.patience / S });
+            return ExchangeStep::Silent(FtpError::Silent { seconds: self.patience / S });
         }
         if let Some(session) = self.close_first.take() {
             let mut packet = caller.number(Packet::request(Op::TerminateSession));
             packet.session = session;
-            return Wish::Send(Box::new(caller.message(&packet)));
+            return ExchangeStep::Send(Box::new(caller.message(&packet)));
         }
         if now < self.not_before {
-            return Wish::Wait(self.not_before.min(first + self.patience));
+            return ExchangeStep::Wait(self.not_before.min(first + self.patience));
         }
         let timeout = caller.timeout();
         let (timeout, tries) = if caller.knows_rtt() {
@@ -99,16 +99,16 @@ impl Exchange {
         let work = self.work.min(MOST_PAUSE) / 8 * Micros::from(self.tries.min(8));
         let pause = pause.max(timeout).min(most) + work;
         if self.tries > 0 && now < self.sent + pause {
-            return Wish::Wait((self.sent + pause).min(first + self.patience));
+            return ExchangeStep::Wait((self.sent + pause).min(first + self.patience));
         }
         self.tries += 1;
         self.sent = now;
-        Wish::Send(Box::new(caller.message(&self.packet)))
+        ExchangeStep::Send(Box::new(caller.message(&self.packet)))
     }
 
     /// Answer to the request, if the message is one. Its session may differ from the request's:
     /// newer vehicles assign their own.
-    pub fn on_message(
+    pub(super) fn on_message(
         &mut self,
         now: Micros,
         message: &MavMessage,

@@ -15,7 +15,7 @@ mod heard;
 
 use std::collections::VecDeque;
 
-use super::exchange::Wish;
+use super::exchange::ExchangeStep;
 use super::reads::Reads;
 use super::{Caller, Exchange, FtpError, answer};
 use crate::budget::Budget;
@@ -298,9 +298,9 @@ impl<S: Sink> Conversation for Get<S> {
             Stage::Closed(_) => self.open(now),
             Stage::Reading => self.poll_reading(now),
             Stage::Opening(exchange) => match exchange.poll(now, &self.caller) {
-                Wish::Send(message) => Step::Send(message),
-                Wish::Wait(until) => Step::Wait(until),
-                Wish::Silent(_) => {
+                ExchangeStep::Send(message) => Step::Send(message),
+                ExchangeStep::Wait(until) => Step::Wait(until),
+                ExchangeStep::Silent(_) => {
                     let seconds = self.options.patience / S;
                     self.close(Err(FtpError::Silent { seconds }));
                     self.poll(now)
@@ -311,14 +311,14 @@ impl<S: Sink> Conversation for Get<S> {
                 let is_silent = matches!(result, Err(FtpError::Silent { .. }));
                 let wish = waiting.as_mut().filter(|_| !is_silent);
                 match wish.map(|exchange| exchange.poll(now, &self.caller)) {
-                    Some(Wish::Send(message)) => {
+                    Some(ExchangeStep::Send(message)) => {
                         if self.options.is_left {
                             *waiting = None;
                         }
                         Step::Send(message)
                     }
-                    Some(Wish::Wait(until)) => Step::Wait(until),
-                    Some(Wish::Silent(_)) | None => match self.sink.take() {
+                    Some(ExchangeStep::Wait(until)) => Step::Wait(until),
+                    Some(ExchangeStep::Silent(_)) | None => match self.sink.take() {
                         Some(sink) => {
                             Step::Done(Got { sink, result: result.clone(), tally: self.tally })
                         }

@@ -1,6 +1,6 @@
 //! Conversation that lists a folder of a drone.
 
-use super::exchange::Wish;
+use super::exchange::ExchangeStep;
 use super::{Caller, Exchange, FtpError};
 use crate::link::clock::Micros;
 use crate::link::conversation::{Conversation, Step};
@@ -99,9 +99,9 @@ impl Conversation for List {
             None => {}
         }
         match self.exchange.poll(now, &self.caller) {
-            Wish::Send(message) => Step::Send(message),
-            Wish::Wait(until) => Step::Wait(until),
-            Wish::Silent(error) => Step::Done(Err(error)),
+            ExchangeStep::Send(message) => Step::Send(message),
+            ExchangeStep::Wait(until) => Step::Wait(until),
+            ExchangeStep::Silent(error) => Step::Done(Err(error)),
         }
     }
 }

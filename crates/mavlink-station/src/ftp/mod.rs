@@ -18,7 +18,7 @@ use crate::protocol::ftp::{NakReason, Packet};
 
 use super::rtt::Rtt;
 
-pub use exchange::Exchange;
+use exchange::Exchange;
 
 /// A burst of any known firmware has fewer packets, so that the number of a packet names its
 /// burst.

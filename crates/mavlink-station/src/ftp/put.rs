@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::exchange::Wish;
+use super::exchange::ExchangeStep;
 use super::{Caller, Exchange, FtpError, answer};
 use crate::crc::ap_crc32;
 use crate::link::clock::{Micros, S};
@@ -224,9 +224,9 @@ impl Conversation for Put {
         match &mut self.stage {
             Stage::Create(exchange) | Stage::Close(exchange) | Stage::Compare(exchange) => {
                 match exchange.poll(now, &self.caller) {
-                    Wish::Send(message) => Step::Send(message),
-                    Wish::Wait(until) => Step::Wait(until),
-                    Wish::Silent(error) => Step::Done(Err(error)),
+                    ExchangeStep::Send(message) => Step::Send(message),
+                    ExchangeStep::Wait(until) => Step::Wait(until),
+                    ExchangeStep::Silent(error) => Step::Done(Err(error)),
                 }
             }
             Stage::Over(result) => Step::Done(result.clone()),

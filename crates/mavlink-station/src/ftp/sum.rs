@@ -1,6 +1,6 @@
 //! Conversation that asks for the checksum of a drone's file.
 
-use super::exchange::Wish;
+use super::exchange::ExchangeStep;
 use super::{Caller, Exchange, FtpError};
 use crate::link::clock::{Micros, S};
 use crate::link::conversation::{Conversation, Step};
@@ -48,9 +48,9 @@ impl Conversation for Sum {
             return Step::Done(over.clone());
         }
         match self.exchange.poll(now, &self.caller) {
-            Wish::Send(message) => Step::Send(message),
-            Wish::Wait(until) => Step::Wait(until),
-            Wish::Silent(error) => Step::Done(Err(error)),
+            ExchangeStep::Send(message) => Step::Send(message),
+            ExchangeStep::Wait(until) => Step::Wait(until),
+            ExchangeStep::Silent(error) => Step::Done(Err(error)),
         }
     }
 }
