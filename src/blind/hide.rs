@@ -314,8 +314,8 @@ mod tests {
 
     #[test]
     fn a_seed_hides_what_it_always_hid() {
-        // Streams are keyed by the place in the list.
-        assert_eq!(KINDS.len(), DRAWN.len());
+        // Streams are keyed by the place in the list, which grows at its end only.
+        assert!(KINDS.len() >= DRAWN.len());
         for (kind, (name, parameters)) in KINDS.iter().zip(DRAWN) {
             let hidden = kind.draw(7_340_032, kind.bases[0], Protocol::Paper, 14.0).unwrap();
             let drawn: Vec<(&str, f64)> =

@@ -2,13 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot read the sources fails")]
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use updraft::effects::LIBRARY;
 
 /// Where effects have their names: their own files, and the tables of what the benchmark hides.
-const OWN: [&str; 2] = ["crates/multirotor-sim/src/effects/", "src/blind/tables.rs"];
+const OWN: [&str; 2] = ["crates/multirotor-sim/src/effects/", TABLES];
+const TABLES: &str = "src/blind/tables.rs";
 /// Tests that are files of the library.
 const TESTS: [&str; 1] = ["src/gap/null_flights.rs"];
 /// Help, which shows commands by example.
@@ -67,7 +69,7 @@ fn no_effect_is_named_outside_its_file_its_tests_and_data() {
         sources(&crate_folder.unwrap().path().join("src"), &mut files);
     }
     let mut named = Vec::new();
-    let mut in_their_own = 0;
+    let mut homes: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
     for path in files {
         let place = path.strip_prefix(root).unwrap().display().to_string();
         let text = fs::read_to_string(&path).unwrap();
@@ -82,16 +84,19 @@ fn no_effect_is_named_outside_its_file_its_tests_and_data() {
                 if !says(&literal, name) || is_help || OTHER.contains(&(place.as_str(), name)) {
                     continue;
                 }
-                if is_own {
-                    in_their_own += 1;
-                } else {
+                if is_own && place != TABLES {
+                    homes.entry(name).or_default().insert(place.clone());
+                } else if !is_own {
                     named.push(format!("{place}: {name}"));
                 }
             }
         }
     }
-    assert!(in_their_own > LIBRARY.len(), "the sources are elsewhere");
     assert!(named.is_empty(), "{named:#?}");
+    for name in LIBRARY.iter().map(|effect| effect.definition().name) {
+        let homes = homes.remove(name).unwrap_or_default();
+        assert_eq!(homes.len(), 1, "{name} is named in {homes:?}");
+    }
 }
 
 #[test]
