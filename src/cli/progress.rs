@@ -16,7 +16,7 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 /// Counts units of work; may be shared between threads.
 #[derive(Debug)]
 pub(super) struct Bar {
-    bar: ProgressBar,
+    line: ProgressBar,
     what: String,
     watch: Stopwatch,
     lines: Option<Context>,
@@ -39,7 +39,7 @@ impl Bar {
         }
         bar.set_message(plain(what).into_owned());
         Self {
-            bar,
+            line: bar,
             what: what.to_owned(),
             watch: Stopwatch::start(context),
             lines: (!context.interactive && !context.quiet).then(|| context.clone()),
@@ -50,17 +50,17 @@ impl Bar {
 
 impl Progress for Bar {
     fn advance(&self) {
-        self.bar.inc(1);
+        self.line.inc(1);
         if let Some(context) = &self.lines {
             let period = self.watch.elapsed().as_secs() / LINE_EVERY.as_secs();
             if self.said.fetch_max(period, Ordering::Relaxed) < period {
-                let (done, total) = (self.bar.position(), self.bar.length().unwrap_or(0));
+                let (done, total) = (self.line.position(), self.line.length().unwrap_or(0));
                 context.say(&format!("{} {done}/{total} after {}", self.what, self.watch));
             }
         }
     }
 
     fn finish(&self) {
-        self.bar.finish_and_clear();
+        self.line.finish_and_clear();
     }
 }

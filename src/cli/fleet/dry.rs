@@ -51,7 +51,7 @@ impl StepArgs {
 /// What a look at the fleet would send.
 pub(in crate::cli) fn status(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
     if args.is_through_server()? {
-        return print(context, server::dry_look(&args.of().plan()?)?);
+        return print(context, server::dry_look(&args.of().plan()?));
     }
     print(context, dry::status(args.of())?)
 }
@@ -59,7 +59,7 @@ pub(in crate::cli) fn status(context: &Context, args: &StepArgs) -> Result<Exit,
 /// What the preflight table would send.
 pub(in crate::cli) fn preflight(context: &Context, args: &StepArgs) -> Result<Exit, CommandError> {
     if args.is_through_server()? {
-        return print(context, server::dry_look(&args.of().plan()?)?);
+        return print(context, server::dry_look(&args.of().plan()?));
     }
     print(context, dry::preflight(args.of())?)
 }
@@ -118,7 +118,7 @@ pub(in crate::cli) fn end(
     action: Action,
 ) -> Result<Exit, CommandError> {
     if args.is_through_server()? {
-        return print(context, server::dry_end(&args.of().plan()?, action)?);
+        return print(context, server::dry_end(&args.of().plan()?, action));
     }
     print(context, dry::end(args.of(), action)?)
 }

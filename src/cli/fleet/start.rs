@@ -33,7 +33,7 @@ fn lead_seconds(text: &str) -> Result<f64, String> {
 impl LeadArgs {
     pub(in crate::cli) fn lead(&self) -> Lead {
         let on_interrupt = self.interrupt.on_interrupt.into();
-        Lead { lead_s: self.lead, yes: self.yes, on_interrupt }
+        Lead { ahead_s: self.lead, yes: self.yes, on_interrupt }
     }
 }
 

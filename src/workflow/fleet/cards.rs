@@ -119,7 +119,8 @@ impl Imported {
         let all = slots.len() == flight.plan.slots.len();
         let is_doubted = self.decision.doubts.iter().any(|doubt| doubt.is_of(index));
         let is_free = all && !came && !is_doubted && flight.record.is_none();
-        !slots.is_empty() && !(is_free && wanted > 1 && !self.outcomes.is_empty())
+        let is_left = is_free && wanted > 1 && !self.outcomes.is_empty();
+        !(slots.is_empty() || is_left)
     }
 
     fn doubt(&self, doubt: &Doubt) -> String {

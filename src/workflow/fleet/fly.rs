@@ -16,6 +16,7 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::host::Host;
 
 /// How a flight is to be flown.
+#[expect(clippy::struct_excessive_bools, reason = "each is a choice of whoever flies")]
 pub(crate) struct FlyWish {
     pub(crate) lead: Lead,
     /// Whether parameters are set that must be others.

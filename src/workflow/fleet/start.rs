@@ -19,7 +19,7 @@ use crate::workflow::words::time_of_day;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lead {
     /// From now to the start, s of the drones' time.
-    pub(crate) lead_s: f64,
+    pub(crate) ahead_s: f64,
     /// Whether it is authorized without asking.
     pub(crate) yes: bool,
     /// What drones in the air do when the work is interrupted.
@@ -28,7 +28,7 @@ pub(crate) struct Lead {
 
 impl Lead {
     fn options(&self) -> StartOptions {
-        StartOptions { lead_s: self.lead_s, ..StartOptions::default() }
+        StartOptions { lead_s: self.ahead_s, ..StartOptions::default() }
     }
 }
 

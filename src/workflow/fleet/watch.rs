@@ -55,7 +55,7 @@ pub(crate) fn follow(
     match over {
         Some(over) if lost.is_empty() => host.say(&format!("{over}; its logs are at home")),
         Some(over) => {
-            host.warn(&format!("{over}; not at home are the logs of slots {}", lost.join(", ")))
+            host.warn(&format!("{over}; not at home are the logs of slots {}", lost.join(", ")));
         }
         None => {}
     }

@@ -92,6 +92,6 @@ fn left_out(read: &Read, others: Option<&Read>) -> Vec<LeftOut> {
 }
 
 fn unusable(logs: &str, reasons: &[LeftOut]) -> WorkflowError {
-    let reasons: String = reasons.iter().map(|reason| format!("\n  {reason}")).collect();
-    WorkflowError::Nothing(format!("none of the {logs} can be used:{reasons}"))
+    let reasons: Vec<String> = reasons.iter().map(ToString::to_string).collect();
+    WorkflowError::Nothing(format!("none of the {logs} can be used:\n  {}", reasons.join("\n  ")))
 }

@@ -12,7 +12,7 @@ use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::Action;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
-use crate::workflow::fleet::server::{self, Status, StatusRow, write_aligned};
+use crate::workflow::fleet::server::{self, Status, StatusRow, Uploaded, write_aligned};
 
 pub(in crate::cli) use options::{of_air, refuse};
 
@@ -84,7 +84,7 @@ pub(in crate::cli) fn upload(
     plan: &Plan,
     wait_s: f64,
 ) -> Result<Exit, CommandError> {
-    let (drones, refused) = server::upload(context, address, folder, plan, wait_s)?;
+    let Uploaded { drones, refused } = server::upload(context, address, folder, plan, wait_s)?;
     context.say(&format!(
         "{} of {} drones have the show",
         drones.len().saturating_sub(refused.len()),

@@ -43,7 +43,7 @@ pub(crate) use self::attach::take_over;
 pub(crate) use self::dry::{dry_end, dry_fly, dry_look, dry_upload};
 pub(crate) use self::gate::write_aligned;
 pub(crate) use self::logs::{list, pull};
-pub(crate) use self::steps::{Status, StatusRow, preflight, status, upload};
+pub(crate) use self::steps::{Status, StatusRow, Uploaded, preflight, status, upload};
 
 /// Distance of the fence's circle beyond the farthest corner, m.
 const BEYOND_M: f64 = 10.0;

@@ -37,7 +37,7 @@ pub(super) fn start(
     lead: &Lead,
 ) -> Result<Started, WorkflowError> {
     let now_us = host.clock().unix_us();
-    let unix_s = (now_us / 1_000_000) as i64 + lead.lead_s.ceil() as i64;
+    let unix_s = (now_us / 1_000_000) as i64 + lead.ahead_s.ceil() as i64;
     let start = StartConfig {
         unix_s: Some(unix_s),
         authorized: false,

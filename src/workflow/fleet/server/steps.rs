@@ -89,20 +89,27 @@ fn on_slots<T>(
     Ok((drones, done))
 }
 
-/// Gives every drone its show, origin and fence, and switches it to show mode. The drones by slot, and
-/// those that have refused, with their reasons.
+/// Who was given a show.
+pub(crate) struct Uploaded {
+    /// The drones by slot.
+    pub(crate) drones: BTreeMap<u16, String>,
+    /// Those that have refused, with their reasons.
+    pub(crate) refused: BTreeMap<String, String>,
+}
+
+/// Gives every drone its show, origin and fence, and switches it to show mode.
 pub(crate) fn upload(
     host: &dyn Host,
     address: &str,
     folder: &FlightFolder,
     plan: &Plan,
     wait_s: f64,
-) -> Result<(BTreeMap<u16, String>, BTreeMap<String, String>), WorkflowError> {
+) -> Result<Uploaded, WorkflowError> {
     let shows = Shows::of(plan)?;
     let (drones, loaded) = on_slots(host, address, folder, plan, wait_s, |client, flight| {
         load(host, client, flight, &shows, wait_s)
     })?;
-    Ok((drones, loaded.err().unwrap_or_default()))
+    Ok(Uploaded { drones, refused: loaded.err().unwrap_or_default() })
 }
 
 /// Whether every drone may be started. Nothing is sent to them.
