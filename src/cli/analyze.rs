@@ -32,16 +32,17 @@ const WIDTH: usize = 100;
   updraft analyze flight.BIN
   updraft analyze windy --hold still/analysis.json
 
-A campaign's results go into its folder, others into --output. Without a plan, windows are found in
-the log's own desired velocity. Whose a log is, it says itself: by its home position, else by its
+A campaign's results go into its folder, others into --output. Without a plan, windows are found from
+the desired velocity in the log. A log is assigned to its drone by its home position, else by its
 file name (07.BIN), else by its system id. Exit code 3: done, but logs are missing, unusable,
-copies, damaged, from another place or end in the air, or drones gave no law, one of a part of the
-ladder, or no value of the map; each is named with its reason. Exit code 5: no law and no map at all.")]
+duplicates, damaged, from another place or end in the air, or drones gave no law, a law from only
+part of the ladder, or no value in the map; each is named, with its reason. Exit code 5: no law and
+no map at all.")]
 pub(super) struct AnalyzeArgs {
     /// Campaign folders, folders of logs, or logs
     #[arg(required_unless_present = "csv")]
     paths: Vec<PathBuf>,
-    /// Analyse tables: a mapping file says which columns are what (docs/csv.md)
+    /// Analyse tables: a mapping file says what each column is (docs/csv.md)
     #[arg(long, value_name = "MAPPING.toml", conflicts_with_all = ["paths", "plan", "start", "indicator"])]
     csv: Option<PathBuf>,
     /// Plan that the logs were flown from: plan.json, a flight's folder, .skyc or .skyb
@@ -53,13 +54,13 @@ pub(super) struct AnalyzeArgs {
     /// Unix time of show time 0, s: aligns logs without SHOW rows by their GPS time
     #[arg(long, value_name = "UNIX_S")]
     start: Option<i64>,
-    /// Which logs of a campaign: real or simulated [default: real where there are any]
+    /// Which logs of a campaign to use [default: real ones if there are any]
     #[arg(long, value_name = "WHICH", value_enum, conflicts_with = "csv")]
     logs: Option<OriginChoice>,
     /// Folder for analysis.json and report/ [default: the campaign, or NAME-analysis]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
-    /// Print the results, write nothing
+    /// Print the results, but write nothing
     #[arg(long)]
     no_report: bool,
     #[command(flatten)]
@@ -73,11 +74,11 @@ pub(super) struct AnalyzeOptions {
     /// Law for the map of the air
     #[arg(long, value_enum, default_value_t = LawChoice::Auto)]
     law: LawChoice,
-    /// What stands for rotor effort
+    /// What is used as rotor effort
     #[arg(long, value_enum, default_value_t = IndicatorChoice::Pulse)]
     indicator: IndicatorChoice,
-    /// How it is corrected for tilt (in windows and laws; the map of simulated flights of known drag
-    /// has its own, see --no-wind)
+    /// How pulses are corrected for tilt (in windows and laws; the map of simulated flights with
+    /// known drag has its own correction, see --no-wind)
     #[arg(long, value_enum, default_value_t = TiltChoice::Thrust)]
     tilt: TiltChoice,
     #[command(flatten)]
@@ -86,8 +87,9 @@ pub(super) struct AnalyzeOptions {
     /// fitted
     #[arg(long, value_enum, default_value_t = OffsetChoice::Field)]
     offset: OffsetChoice,
-    /// As in the paper: windows by their medians (means where the offset is subtracted), weighted by
-    /// the samples' standard deviation, tilt as --tilt paper; the map from those laws alone
+    /// Analyse as in the paper: windows by their medians (means where the offset is subtracted),
+    /// weighted by the samples' standard deviation, tilt as with --tilt paper; the map from those
+    /// laws alone
     #[arg(long)]
     paper: bool,
 }
@@ -99,10 +101,10 @@ struct Uncorrected {
     /// Do not correct the map for air density at different heights
     #[arg(long)]
     no_density: bool,
-    /// Do not correct the map for the battery's voltage: what it may have done is then in its error
+    /// Do not correct the map for the battery's voltage; its possible effect then widens the error
     #[arg(long)]
     no_battery: bool,
-    /// Do not correct the map for wind on leaning drones (vehicles of known drag)
+    /// Do not correct the map for wind on leaning drones (vehicles with known drag)
     #[arg(long)]
     no_wind: bool,
 }
@@ -111,7 +113,7 @@ struct Uncorrected {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum LawChoice {
     /// A line that may bend, unless the calibration's windows make the signed quadratic clearly more
-    /// probable (with --paper: the law of lower chi2)
+    /// probable (with --paper: the law with the lower chi2)
     #[default]
     Auto,
     /// u = A' V + u0
@@ -145,7 +147,7 @@ impl From<Indicator> for IndicatorChoice {
 /// Form of the tilt correction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum TiltChoice {
-    /// What the vertical part of the thrust takes
+    /// By the vertical part of the thrust
     #[default]
     Thrust,
     /// u cos(phi), as in the paper
@@ -155,7 +157,7 @@ enum TiltChoice {
 /// When the slow offset is subtracted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum OffsetChoice {
-    /// As the paper: in the field, not in simulations of uniform air
+    /// As in the paper: in the field, not in simulations of uniform air
     #[default]
     Field,
     /// In all calibrations

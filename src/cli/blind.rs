@@ -22,9 +22,10 @@ const NONE: &str = "none";
 enum Which {
     /// The paper's ladder (template `calibration`)
     Paper,
-    /// The counter-phase ladder (template `calibration-counterphase`), charge and warmth staggered
+    /// The counter-phase ladder (template `calibration-counterphase`), with staggered charge and
+    /// motor warmth
     Enhanced,
-    /// One as often as the other
+    /// Each equally often
     Both,
 }
 
@@ -36,50 +37,51 @@ enum Which {
   updraft blind --seed 20270102 --protocol paper --effects none --air field --flights 200
   updraft blind --seed 20270103 --effects battery,rotor-inflow+battery --base airsim --keep
 
-Each flight is drawn from the seed, its truth is sealed (the SHA-256 is published before it is flown),
-and it is flown with physics that the vehicle's file does not have. The search gets template, vehicle,
-plan and logs, as from any campaign. Only when its verdict is on the disk the seal is opened, and the
-two are compared. Finished flights are kept in flights/: the same command goes on where an interrupted
-one stopped. The table is in table.json and table.md. Method and metrics: docs/blind.md.
+Each flight is drawn from the seed, its truth is sealed (the SHA-256 is published before the flight),
+and it is flown with physics that the vehicle's file does not have. The search sees template,
+vehicle, plan and logs, as for any campaign. Only when its verdict is on disk is the seal opened and
+the two are compared. Finished flights are kept in flights/: running the same command again resumes
+an interrupted run. The table is in table.json and table.md. Method and metrics: docs/blind.md.
 
 What can be hidden:
 {}", kinds_text()))]
 pub(super) struct BlindArgs {
-    /// Which protocol is flown
+    /// Which protocol to fly
     #[arg(long, value_enum, default_value_t = Which::Both)]
     protocol: Which,
-    /// Flights in all; the cells (protocol, air, vehicle, what is hidden) take turns
+    /// Number of flights; the cells (protocol, air, vehicle, hidden effects) take turns
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     flights: u32,
-    /// Seed of all flights: 1000000 or more for a score; below, with --tuning, for trying things out
+    /// Seed for all flights: 1000000 or more for scoring; below that, with --tuning, for trying
+    /// things out
     #[arg(long, value_name = "SEED")]
     seed: u64,
-    /// What is hidden, separated by commas; NAME+NAME is hidden together, `none` is nothing [default:
-    /// each by itself, and nothing six times as often]
+    /// What to hide, separated by commas; NAME+NAME hides both together, `none` hides nothing
+    /// [default: each by itself, and nothing six times as often]
     #[arg(long, value_name = "NAMES", value_parser = hidden_sets)]
     effects: Option<Sets>,
-    /// Also pairs and triples
+    /// Also hide pairs and triples
     #[arg(long)]
     pairs: bool,
     /// How much the air moves, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "calm,moderate,field")]
     air: Vec<AirWord>,
-    /// Known vehicles, separated by commas: AirSim's law, that with rotor inflow, or one like pixel
+    /// Known vehicles, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "airsim,inflow,pixel")]
     base: Vec<BaseWord>,
-    /// Drones along each side of the grid: fewer fly faster, and see less
+    /// Drones along each side of the grid: fewer take less time and show less
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u16).range(3..=15))]
     grid: u16,
-    /// Take a seed that is for tuning; the table says so
+    /// Accept a seed reserved for tuning; the table says so
     #[arg(long)]
     tuning: bool,
-    /// Folder of the finished flights and the table
+    /// Folder for the finished flights and the table
     #[arg(short, long, value_name = "FOLDER", default_value = "blind")]
     output: PathBuf,
     /// Keep each flight with its logs, seal and verdict in work/
     #[arg(long)]
     keep: bool,
-    /// What is said in the table's head, such as date and commit
+    /// Text for the table's head, such as date and commit
     #[arg(long, value_name = "TEXT")]
     note: Option<String>,
     /// Flights at the same time [default: one per core]

@@ -28,19 +28,19 @@ const FEW: usize = 5;
   updraft check my-campaign --allow endurance
 
 A campaign is checked against its plan's limits and fence, and its files against the plan: each
-that is missing, damaged, different or of no slot is named. A file that lies in a campaign is
-checked against the plan beside it. Shows made by others are checked against their own limits and,
-where they have none, the vehicle's. Of distance, altitude and speeds the stricter one counts: only a
-plan loosens those, or --allow. Every polygon of a show's fence counts (inside all that
-include, outside all that exclude); without a fence of its own a show is checked against none.
+file that is missing, damaged, different or belongs to no slot is named. A file inside a campaign is
+checked against the plan beside it. Other people's shows are checked against their own limits and,
+where they have none, the vehicle's. For distance, altitude and speeds the stricter limit applies:
+only a plan, or --allow, loosens those. Every polygon of a show's fence counts (inside all inclusion
+zones, outside all exclusion zones); a show without a fence is checked against none.
 Exit code 4: not safe.")]
 pub(super) struct CheckArgs {
     /// Campaign folder, .skyc, .skyb, zipped CSV, or a folder of .skyb files
     path: PathBuf,
-    /// Vehicle whose limits apply where the show has none, or looser ones
+    /// Vehicle whose limits apply where the show has none or has looser ones
     #[arg(long, value_name = "NAME", default_value = "airsim-generic-quad")]
     vehicle: String,
-    /// Pass although this check fails (by its name; may be repeated)
+    /// Pass even if this check (given by name) fails; can be repeated
     #[arg(long, value_name = "CHECK")]
     allow: Vec<String>,
     /// List every finding, not only the first few of each kind (--json always does)

@@ -31,7 +31,7 @@ const POINTS: usize = 141;
 pub(super) struct EffectsArgs {
     #[command(subcommand)]
     command: Option<EffectsCommand>,
-    /// Vehicle whose sizes are given: a file or a built-in name
+    /// Vehicle to state sizes for: a file or a built-in name
     #[arg(long, value_name = "NAME", default_value = "pixel", global = true)]
     vehicle: String,
 }

@@ -26,39 +26,39 @@ use crate::workflow::fleet::{lock, one_flight, rehearse};
   updraft fly my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --set-params
   updraft fly my-campaign --flight hover --connect tcp:10.0.0.7:5760 --key swarm.key --lead 60
   updraft fly my-campaign --flight hover --connect skybrush://localhost:5001
-  updraft fly my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --guided  # stock firmware
-  updraft fly my-campaign --connect sim             # every flight, by virtual drones
+  updraft fly my-campaign --flight calibration --guided   # stock firmware
+  updraft fly my-campaign --connect sim                   # every flight, with virtual drones
 
-The steps of a flight: find who flies which slot (from where they stand), check parameters, load show,
-origin and fence, the preflight table, the start time, its authorization (asked for, or --yes), the
-show, the logs. Each is a command of its own, too: see `updraft fleet` and `updraft logs`. Exit codes:
-3 done with losses, 4 no-go: nothing was started.
+The steps of a flight: assign drones to slots by where they stand, check parameters, upload show,
+origin and fence, print the preflight table, set the start time, authorize it (after a question, or
+with --yes), watch the show, download the logs. Each is also a command of its own: see `updraft
+fleet` and `updraft logs`. Exit codes: 3 done with losses, 4 no-go: nothing was started.
 
 {}", air_help()))]
 pub(super) struct FlyArgs {
     /// Campaign folder
     campaign: PathBuf,
-    /// Which flight, if the campaign has several
+    /// Which flight to use, if the campaign has several
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
     #[command(flatten)]
     connect: ConnectArgs,
     #[command(flatten)]
     lead: LeadArgs,
-    /// Set parameters that must be others (old values are kept for `fleet restore`)
+    /// Set parameters that have the wrong value (old values are kept for `fleet restore`)
     #[arg(long)]
     set_params: bool,
-    /// Find anew which drone flies which slot, from where they stand
+    /// Assign drones to slots again, by where they stand
     #[arg(long)]
     assign: bool,
-    /// Fly the drones by streaming targets in GUIDED: needs no show firmware, but a link without
-    /// gaps until everyone has landed
+    /// Fly the drones by streaming targets in GUIDED mode: needs no show firmware, but a link without
+    /// gaps until every drone has landed
     #[arg(long)]
     guided: bool,
-    /// Leave the logs on the drones; `updraft logs pull` brings them
+    /// Leave the logs on the drones; `updraft logs pull` downloads them
     #[arg(long)]
     no_logs: bool,
-    /// Print the messages of the upload and the start, and send nothing
+    /// Print the messages of the upload and the start, but send nothing
     #[arg(long)]
     dry_run: bool,
     /// Vertical air speed for virtual drones, m/s, up positive

@@ -21,7 +21,8 @@ const SIDES: std::ops::RangeInclusive<i64> = 3..=15;
 enum Which {
     /// The paper's ladder (template `calibration`)
     Paper,
-    /// The counter-phase ladder (template `calibration-counterphase`), charge and warmth staggered
+    /// The counter-phase ladder (template `calibration-counterphase`), with staggered charge and
+    /// motor warmth
     Enhanced,
 }
 
@@ -40,9 +41,9 @@ enum Day {
 #[derive(Clone, Copy, Debug, Args)]
 #[command(next_help_heading = "Hidden physics")]
 pub(super) struct HideArgs {
-    /// Fly a calibration whose drones have an effect that the analysis is not told of: this seed
-    /// chooses it. It is sealed, the search for missing physics gives its verdict, then the seal is
-    /// opened. Takes --grid NxN and --vehicle airsim-generic-quad or pixel
+    /// Fly a calibration whose drones have an effect, chosen by this seed, that the analysis does not
+    /// know about. The truth is sealed, the search for missing physics gives its verdict, then the
+    /// seal is opened. Accepts --grid NxN and --vehicle airsim-generic-quad or pixel
     #[arg(
         long,
         value_name = "SEED",
@@ -57,7 +58,7 @@ pub(super) struct HideArgs {
     /// Protocol of the flight with hidden physics [default: enhanced]
     #[arg(long, value_enum, requires = "hide")]
     protocol: Option<Which>,
-    /// How much the air moves in it [default: moderate]
+    /// How much the air moves [default: moderate]
     #[arg(long, value_enum, requires = "hide")]
     day: Option<Day>,
 }

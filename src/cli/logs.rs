@@ -34,18 +34,18 @@ const PATIENCE_S: f64 = 60.0;
 #[derive(Debug, Args)]
 #[command(after_long_help = "Examples:
   updraft logs list my-campaign --flight hover
-  updraft logs pull my-campaign --flight hover              # go on after Ctrl-C: the same command
+  updraft logs pull my-campaign --flight hover              # after Ctrl-C: the same command
   updraft logs pull my-campaign --flight hover --log all --rate 400000
   updraft logs verify my-campaign
-  updraft logs import my-campaign /media/card1 /media/card2   # each log to the flight it is of
+  updraft logs import my-campaign /media/card1 /media/card2   # each log to its own flight
 
-Logs come over MAVFTP or over the log messages, whichever is faster. What has come is kept at every
-interruption; a log is given its name when its checksum (or size, and pieces read again) agrees with
-the drone's, and logs/manifest.json says how. A log that is home is compared with the drone's: a
-longer one is continued, and a file that was damaged since goes to logs/older and comes again. An
-armed drone gives no logs. Drones that are off are waited for (--wait) while the others' logs come.
-Exit code 3: some logs are missing; each is named with
-the reason and what to do.")]
+Logs are downloaded over MAVFTP or by log messages, whichever is faster. What has arrived is kept at
+every interruption. A log gets its name once its checksum (or its size, and pieces read again)
+agrees with the drone's; logs/manifest.json says how. A log that is already here is compared with
+the drone's: if that is longer, the download continues; a file that was damaged since moves to
+logs/older and is downloaded again. An armed drone gives no logs. Drones that are switched off are
+waited for (--wait) while other logs are downloaded. Exit code 3: some logs are missing; each is
+named, with the reason and what to do.")]
 pub(super) struct LogsArgs {
     #[command(subcommand)]
     command: LogsCommand,
@@ -53,14 +53,14 @@ pub(super) struct LogsArgs {
 
 #[derive(Debug, Subcommand)]
 enum LogsCommand {
-    /// What logs the drones have
+    /// List the logs that the drones have
     List(ListArgs),
-    /// Bring logs home
+    /// Download logs
     Pull(PullArgs),
-    /// Check logs against their manifest (simulated ones: their record): size, checksum, and whether
-    /// they are logs
+    /// Check logs against their manifest (simulated ones against their record): size, checksum, and
+    /// whether they are logs
     Verify(VerifyArgs),
-    /// Take logs from SD cards; whose they are and of which flight, they say themselves
+    /// Import logs from SD cards, each to the drone and flight it belongs to
     Import(cards::ImportArgs),
 }
 
@@ -68,7 +68,7 @@ enum LogsCommand {
 struct ListArgs {
     /// Campaign folder
     campaign: PathBuf,
-    /// Which flight, if the campaign has several
+    /// Which flight to use, if the campaign has several
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
     #[command(flatten)]
@@ -82,33 +82,33 @@ struct ListArgs {
 struct PullArgs {
     /// Campaign folder
     campaign: PathBuf,
-    /// Which flight, if the campaign has several
+    /// Which flight to use, if the campaign has several
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
     #[command(flatten)]
     connect: ConnectArgs,
-    /// Which log of each drone: that of the flight's start, newest, all, or its number
+    /// Which log of each drone: `flight` (that of the flight's start), newest, all, or a number
     #[arg(long, value_name = "WHICH", default_value = "flight", value_parser = which)]
     log: Which,
-    /// Bring logs again that have come before; those at home move to logs/flight-K
+    /// Download logs again; those already here move to logs/flight-K
     #[arg(long)]
     again: bool,
     /// Only these slots: 1-10,12
     #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
     slots: Option<SlotSet>,
-    /// What is asked of each network, bytes per second [default: what it carries]
+    /// Requested rate of each network, bytes per second [default: as much as it carries]
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(1..))]
     rate: Option<u32>,
-    /// Drones of a network at once, at most
+    /// Most drones of a network served at once
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=1000))]
     at_once: u16,
     /// Refuse larger logs, MB
     #[arg(long, value_name = "MB", default_value_t = 2048, value_parser = clap::value_parser!(u32).range(1..))]
     max_size: u32,
-    /// Give a drone up after so long without an answer, s
+    /// Give up on a drone after this long without an answer, s
     #[arg(long, value_name = "S", default_value_t = PATIENCE_S, value_parser = super::fleet::connect::seconds)]
     patience: f64,
-    /// Tell what would be asked for, and ask nobody
+    /// Print what would be requested, but send nothing
     #[arg(long)]
     dry_run: bool,
 }

@@ -11,10 +11,10 @@ use crate::workflow::mission;
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Mission")]
 pub(super) struct MissionArgs {
-    /// Grid of the fleet: rows x columns
+    /// Grid of the fleet, rows x columns
     #[arg(long, value_name = "RxC", value_parser = parse_grid)]
     pub(super) grid: Option<(i64, i64)>,
-    /// Number of drones, when the grid is not full
+    /// Number of drones, if the grid is not full
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) drones: Option<i64>,
     /// Distance between neighbours, m

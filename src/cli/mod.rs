@@ -51,18 +51,18 @@ use crate::base::plain::{for_terminal, plain};
     after_long_help = "Examples:
   updraft run                                     the paper's campaign, simulated, with its report
   updraft plan templates/calibration.toml --grid 7x7 --spacing 7 -o my-campaign
-  updraft check my-campaign                       also any .skyc or .skyb
+  updraft check my-campaign                       or any .skyc or .skyb
   updraft simulate my-campaign
   updraft physics                                 the real firmware's simulator in our air
   updraft sweep                                   the paper's simulation study, with its figure 2
-  updraft analyze my-campaign                     also a folder of logs, or one log
-  updraft gap my-campaign                         which physics the model lacks
+  updraft analyze my-campaign                     or a folder of logs, or one log
+  updraft gap my-campaign                         what physics the model lacks
   updraft inspect my-campaign/show.skyc
 
-Exit codes: 0 done; 1 failed: a file or folder is not there, or cannot be read or written; 2 wrong
-arguments or template, or a file that is of the wrong kind or broken; 3 done with losses; 4 a check
-failed; 5 nothing to work on: a folder without plan or logs, or no result at all;
-6 another updraft is writing there; 130 interrupted."
+Exit codes: 0 done; 1 a file or folder does not exist, or cannot be read or written; 2 wrong
+arguments or template, or a file that is broken or of the wrong kind; 3 done with losses; 4 a check
+failed; 5 nothing to work on (a folder without a plan or logs), or no result at all; 6 another
+updraft is writing into the same folder; 130 interrupted."
 )]
 pub struct Cli {
     #[command(flatten)]
@@ -74,23 +74,24 @@ pub struct Cli {
 /// Options that every command takes.
 #[derive(Clone, Debug, Args)]
 pub struct Global {
-    /// One JSON object on standard output instead of tables
+    /// Print one JSON object on standard output instead of tables
     ///
-    /// When the command fails, standard output stays empty and the last line of standard error is one
-    /// JSON object with the schema updraft.error/1; warnings are lines of text there.
+    /// If the command fails, standard output stays empty and the last line of standard error is one
+    /// JSON object with the schema updraft.error/1; warnings are plain lines there.
     #[arg(long, global = true)]
     json: bool,
-    /// Say only what is wrong, and print only the path of what was made
+    /// Print only warnings and errors, and the path of the result
     ///
-    /// Standard error then has warnings and errors alone, standard output one line: the folder
-    /// (plan), the page (analyze, run, sweep), or nothing (check, simulate, physics). What was asked
-    /// for itself is printed as ever: --json, inspect, effects, completions, man, schema.
+    /// Standard error then has only warnings and errors. Standard output has one line, the folder
+    /// (plan) or the page (analyze, run, sweep), or nothing (check, simulate, physics). Output that
+    /// is the purpose of a command is printed as usual: --json, inspect, effects, completions, man,
+    /// schema.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// When to use colours (NO_COLOR is honoured)
+    /// When to use colours (NO_COLOR is respected)
     #[arg(long, global = true, value_enum, default_value_t = ColorChoice::Auto)]
     color: ColorChoice,
-    /// No progress bars
+    /// Show no progress bars
     #[arg(
         long,
         global = true,
@@ -119,7 +120,7 @@ pub enum ColorChoice {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Do it all: plan, check, fly, collect, analyse, report
+    /// Do everything: plan, check, fly, collect, analyse, report
     Run(run::RunArgs),
     /// Make a campaign folder from a mission template
     Plan(plan::PlanArgs),
@@ -129,23 +130,23 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     /// Fly a campaign: upload, preflight, start, watch, logs
     Fly(fly::FlyArgs),
-    /// The steps of a flight one by one
+    /// Run the steps of a flight one by one
     Fleet(fleet::FleetArgs),
-    /// List, bring home, check and import logs
+    /// List, download, verify and import logs
     Logs(logs::LogsArgs),
-    /// Fly the real firmware's simulator in our physics and our air
+    /// Provide the physics and the air for the real firmware's simulator
     Physics(physics::PhysicsArgs),
     /// Turn logs into calibration laws, a map of the air and a report
     Analyze(analyze::AnalyzeArgs),
-    /// Fly the ladder in every wind and updraft of a study, and correlate what is found with the truth
+    /// Fly the ladder in every wind and updraft of a study, and correlate the results with the truth
     Sweep(sweep::SweepArgs),
-    /// Find where simulation and measurement disagree, name the missing physics, add it
+    /// Find where simulation and measurement disagree, name the missing physics, and add it
     Gap(gap::GapArgs),
-    /// Test the search for missing physics on flights that hide some
+    /// Test the search for missing physics on flights with hidden effects
     Blind(blind::BlindArgs),
-    /// List the physics that can be flown, or explain one piece
+    /// List the physical effects that can be flown, or explain one
     Effects(effects::EffectsArgs),
-    /// Say what is in a file
+    /// Show what is in a file
     Inspect(inspect::InspectArgs),
     /// Print a shell's completion script
     Completions(tools::CompletionsArgs),

@@ -22,24 +22,24 @@ use crate::workflow::physics::{self, Home, Physics, Served};
 
 Then start ArduCopter's simulator with the --home that is printed for each instance:
   arducopter --model JSON:127.0.0.1 -I0 --home=47.4733,19.0621,190,59
-Instance n is expected n times ten ports above the first. Ctrl-C ends it. See docs/sitl.md.")]
+Instance n listens n times ten ports above the first. Ctrl-C stops it. See docs/sitl.md.")]
 pub(super) struct PhysicsArgs {
     /// Address and port of the first instance (port 0: any free port for each)
     #[arg(long, value_name = "ADDRESS:PORT", default_value_t = SocketAddr::from(([127, 0, 0, 1], BASE_PORT)))]
     listen: SocketAddr,
-    /// Number of instances; with a campaign all its slots unless stated
+    /// Number of instances [default: 1; with a campaign, all its slots]
     #[arg(long, value_name = "N")]
     instances: Option<usize>,
     /// Campaign folder: instance 0 stands at slot 1, and so on
     #[arg(long, value_name = "FOLDER", conflicts_with = "home")]
     campaign: Option<PathBuf>,
-    /// Flight of the campaign; the first unless stated
+    /// Flight of the campaign [default: the first]
     #[arg(long, value_name = "NAME", requires = "campaign")]
     flight: Option<String>,
     /// Where every instance stands: degrees, m above sea level, degrees clockwise from north
     #[arg(long, value_name = "LAT,LON,AMSL,HEADING", value_parser = parse_home, allow_hyphen_values = true)]
     home: Option<Home>,
-    /// Vehicle: a built-in name or a vehicle file; the campaign's unless stated
+    /// Vehicle: a built-in name or a vehicle file [default: the campaign's]
     #[arg(long, value_name = "NAME")]
     vehicle: Option<String>,
     /// Vertical air speed, m/s, up positive
@@ -50,7 +50,7 @@ pub(super) struct PhysicsArgs {
     /// Seconds between status lines (0: none)
     #[arg(long, value_name = "S", default_value_t = 5, value_parser = clap::value_parser!(u64).range(0..=3600))]
     status: u64,
-    /// End when every instance has flown so many simulated seconds
+    /// End when every instance has flown this many simulated seconds
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
 }

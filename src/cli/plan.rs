@@ -40,13 +40,13 @@ pub(super) struct PlanArgs {
     /// is refused: logs are never deleted or overwritten.
     #[arg(long)]
     force: bool,
-    /// Plan and check, write nothing
+    /// Plan and check, but write nothing
     #[arg(long)]
     dry_run: bool,
     /// List every finding, not only the first few of each kind (--json always does)
     #[arg(short, long)]
     verbose: bool,
-    /// Write the show although this check fails (by its name; may be repeated)
+    /// Write the show even if this check (given by name) fails; can be repeated
     #[arg(long, value_name = "CHECK")]
     allow: Vec<String>,
     #[command(flatten)]

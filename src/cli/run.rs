@@ -22,20 +22,20 @@ const SHOW_DRONE: &str = "pixel";
 /// Arguments of `updraft run`.
 #[derive(Debug, Args)]
 #[command(after_long_help = format!("Examples:
-  updraft run                                       # a field-like day: the show drone, moving air
+  updraft run                                       # a field day: the show drone, moving air
   updraft run --lose 7 --seed 3 -o another-day      # 7 logs of each flight are lost
   updraft run --vehicle airsim-generic-quad --air still -o study-day
   updraft run --grid 3x3 --duration 120 --air still --updraft -0.8 -o small
   updraft run calibration-counterphase -o counterphase
-  updraft run --hide 7 -o hidden                    # an effect is hidden, named, and then revealed
+  updraft run --hide 7 -o hidden                    # an effect is hidden, searched for, and revealed
 
-Without a choice of vehicle the paper's campaign (`campaign`) is flown by the show drone (`pixel`), any
-other template by the vehicle that it names (the built-in ones: airsim-generic-quad). Without a choice
-of air it is a field day: turbulent air, light wind, gusts. --air says another air for both flights (`still`: none);
---calibration-air, --calibration-wind and --calibration-updraft say one for the calibration. --wind and
---updraft are uniform and of the measurement. What the air truly did is kept beside the logs and
-compared with. The paper's simulation study is flown into study/, for Fig. 2 and Table I.
-The same command goes on where an interrupted one stopped.
+Without --vehicle, the paper's campaign (`campaign`) is flown by the show drone (`pixel`), and any
+other template by the vehicle it names (airsim-generic-quad in the built-in ones). Without --air it
+is a field day: turbulent air, light wind, gusts. --air sets the air of both flights (`still` for
+none); --calibration-air, --calibration-wind and --calibration-updraft set that of the calibration.
+--wind and --updraft are uniform and apply to the measurement. The true air is kept beside the logs
+and compared with the results. The paper's simulation study is flown into study/, for Fig. 2 and
+Table I. Running the same command again resumes an interrupted run.
 
 {}", air_help()))]
 pub(super) struct RunArgs {
@@ -52,14 +52,15 @@ pub(super) struct RunArgs {
     /// Vertical air speed in measurement flights, m/s, up positive [default: 1 in still air, else 0]
     #[arg(long, value_name = "MPS", value_parser = updraft, allow_hyphen_values = true)]
     updraft: Option<f64>,
-    /// Lose the logs of so many drones of each flight, chosen by the seed (in the paper 7 and 6 of 49)
+    /// Lose the logs of this many drones in each flight, chosen by the seed (in the paper, 7 and 6 of
+    /// 49)
     #[arg(long, value_name = "N", default_value_t = 0)]
     lose: u16,
     /// Leave out the simulation study (Fig. 2 and Table I)
     #[arg(long)]
     no_study: bool,
-    /// Fly in the simulator without MAVLink in between: the same logs, sooner (fleets of more than
-    /// 800 drones always)
+    /// Fly in the simulator without MAVLink: the same logs, sooner (always so for fleets of more than
+    /// 800 drones)
     #[arg(long)]
     direct: bool,
     /// Vertical air speed in calibration flights, m/s, up positive
@@ -68,7 +69,7 @@ pub(super) struct RunArgs {
     /// Horizontal wind speed in calibration flights, m/s
     #[arg(long, value_name = "MPS", default_value_t = 0.0, value_parser = speed, allow_negative_numbers = true)]
     calibration_wind: f64,
-    /// Air to add in calibration flights, repeatable; as --air
+    /// Air to add in calibration flights, as with --air; can be repeated
     #[arg(long, value_name = "SPEC", value_parser = air_specs)]
     calibration_air: Vec<AirSpecs>,
     #[command(flatten)]

@@ -24,20 +24,20 @@ pub(super) struct AirArgs {
     /// Where the wind comes from, degrees clockwise from north
     #[arg(long, value_name = "DEG", default_value_t = 270.0, allow_hyphen_values = true)]
     pub(super) wind_from: f64,
-    /// Air to add, repeatable: KIND:KEY=VALUE,... or a TOML file or its name (see below)
+    /// Air to add: KIND:KEY=VALUE,..., a TOML file or the name of one (see below); can be repeated
     #[arg(long = "air", value_name = "SPEC", value_parser = air_specs)]
     pub(super) specs: Vec<AirSpecs>,
-    /// Write the true air at each drone's planned place to truth/, beside the logs
+    /// Write the true air at each drone's planned position to truth/, beside the logs
     #[arg(long)]
     pub(super) truth: bool,
-    /// Seed of sensor noise, clock offsets and random air
+    /// Seed for sensor noise, clock offsets and random air
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
     /// Log the firmware's whole default set of messages (about ten times larger)
     #[arg(long)]
     pub(super) full_logs: bool,
-    /// Switch a piece of physics on or off, or set a parameter: NAME, NAME=off, NAME.PARAMETER=NUMBER
-    /// (`updraft effects` lists them)
+    /// Switch an effect on or off, or set one of its parameters: NAME, NAME=off,
+    /// NAME.PARAMETER=NUMBER (`updraft effects` lists them)
     #[arg(long = "effect", value_name = "NAME[=off]", value_parser = effect)]
     pub(super) effects: Vec<String>,
 }
@@ -128,8 +128,8 @@ impl AirArgs {
   updraft simulate my-campaign --flight hover --air field:sd=0.5,lambda=145 --truth
   updraft simulate my-campaign --drones 1-10,12 --full-logs
 
-Logs that are there and were flown with the same settings are kept: an interrupted run goes on where
-it stopped. Logs that are not as they were flown (cut short, damaged) are flown again.
+Existing logs that were flown with the same settings are kept, so an interrupted run can be resumed.
+Logs that have changed since (truncated, damaged) are flown again.
 
 {}", air_help()))]
 pub(super) struct SimulateArgs {

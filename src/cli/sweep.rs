@@ -25,18 +25,18 @@ const MIN_WIDTH: usize = 60;
   updraft sweep my-study.toml -o my-study --seed 7
   updraft sweep --keep-logs
 
-Flies the ladder in every wind and updraft of the study, fits the updraft of each flight with A and u0
-held from the one in still air, and writes study.json and report/index.html. Finished flights are kept
-in cells/: the same command goes on where an interrupted one stopped, and a changed study flies only
-what changed. The grammar is in docs/study.md. Exit code 3: done, but some flights were lost.")]
+Flies the ladder in every wind and updraft of the study, fits the updraft of each flight with A and
+u0 held fixed at those of still air, and writes study.json and report/index.html. Finished flights
+are kept in cells/: running the same command again resumes an interrupted study, and after a change
+to the study only what changed is flown. The grammar is in docs/study.md. Exit code 3: done, but some flights were lost.")]
 pub(super) struct SweepArgs {
     /// Study: a file or the built-in name
     #[arg(default_value = BUILT_IN)]
     study: String,
-    /// Folder of the study's flights and results
+    /// Folder for the study's flights and results
     #[arg(short, long, value_name = "FOLDER", default_value = "study")]
     output: PathBuf,
-    /// Seed of sensor noise and clock offsets; every flight has its own from it
+    /// Seed for sensor noise and clock offsets; each flight derives its own
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Flights at the same time [default: one per core]
@@ -45,7 +45,7 @@ pub(super) struct SweepArgs {
     /// Keep the log of every flight in logs/
     #[arg(long)]
     keep_logs: bool,
-    /// Fly again what is finished
+    /// Fly finished flights again
     #[arg(long)]
     force: bool,
 }

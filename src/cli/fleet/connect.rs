@@ -20,18 +20,18 @@ const DEFAULT_LINK: &str = "udpin:0.0.0.0:14550";
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Links")]
 pub(in crate::cli) struct ConnectArgs {
-    /// Where the drones are, repeatable: udpin:HOST:PORT (listen), udpout:HOST:PORT, tcp:HOST:PORT,
+    /// How to reach the drones: udpin:HOST:PORT (listen), udpout:HOST:PORT, tcp:HOST:PORT,
     /// serial:DEVICE:BAUD, a file with one of these per line, skybrush://HOST:PORT (through Skybrush
-    /// Server), or sim (virtual drones)
+    /// Server), or sim (virtual drones); can be repeated
     ///
-    /// 1@udpin:... puts a link into network 1: system ids are one byte, and the same id in another
+    /// 1@udpin:... puts a link into network 1. System ids are one byte; the same id in another
     /// network is another drone.
     #[arg(long, value_name = "LINK", default_value = DEFAULT_LINK)]
     pub(in crate::cli) connect: Vec<String>,
-    /// File with the signing key: everything is signed, and what is not signed with it is refused
+    /// File with the signing key: every frame is signed, and frames not signed with it are refused
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) key: Option<PathBuf>,
-    /// Wait so long for drones to be heard, s
+    /// How long to wait for drones to be heard, s
     #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = seconds)]
     pub(in crate::cli) wait: f64,
 }

@@ -34,18 +34,18 @@ use crate::workflow::fleet::{lock, one_flight};
   updraft fleet upload my-campaign --flight calibration --set-params
   updraft fleet preflight my-campaign --flight calibration
   updraft fleet start my-campaign --flight calibration --lead 60
-  updraft fleet watch my-campaign --flight calibration        # when the station that started it died
-  updraft fleet abort my-campaign --flight calibration        # everyone returns
+  updraft fleet watch my-campaign --flight calibration        # if the station that started it died
+  updraft fleet abort my-campaign --flight calibration        # all drones return
   updraft fleet land my-campaign --drones 7,1:12              # these land where they are
   updraft fleet virtual my-campaign --station 127.0.0.1:14550 # drones to practise with
 
-Which drone flies which slot is found from where they stand, and kept in fleet.json; `upload
---assign` finds it anew. Everything that happens is in fleet-journal.ndjson.
+Drones are assigned to slots by where they stand, and the assignment is kept in fleet.json; `upload
+--assign` makes a new one. Everything that happens is recorded in fleet-journal.ndjson.
 
-Ctrl-C, SIGTERM and SIGHUP (a lost terminal) mean the same. In flight they ask on a terminal whether
-the drones land, return or are left flying; elsewhere --on-interrupt says it, and without it they
-return. `fleet watch` takes a flight over whose station is gone. Exit codes: 3 some drones
-refused, 4 no-go.")]
+Ctrl-C, SIGTERM and SIGHUP (a lost terminal) mean the same. In flight, on a terminal, you are asked
+whether the drones should land, return or be left flying; elsewhere --on-interrupt decides, and by
+default they return. `fleet watch` takes over a flight whose station is gone. Exit codes: 3 some
+drones refused, 4 no-go.")]
 pub(super) struct FleetArgs {
     #[command(subcommand)]
     command: FleetCommand,
@@ -53,23 +53,23 @@ pub(super) struct FleetArgs {
 
 #[derive(Debug, Subcommand)]
 enum FleetCommand {
-    /// Who is heard, where they stand, what they say
+    /// Show which drones are heard, where they stand and what they report
     Status(StepArgs),
-    /// Load the show onto the drones: file, origin, fence, all read back
+    /// Upload the show to the drones: file, origin and fence, all read back
     Upload(UploadArgs),
-    /// Everything that must be right before a start, drone by drone
+    /// Check everything that must be right before a start, drone by drone
     Preflight(UploadArgs),
     /// Set a start time and authorize it, then watch the show
     Start(StartArgs),
-    /// Watch a flight that another station has started, and bring its logs home
+    /// Watch a flight that another station has started, and download its logs
     Watch(watch::WatchArgs),
-    /// Send drones home (those on the ground: take their start back)
+    /// Send drones home (for those on the ground, cancel the start)
     Abort(EndArgs),
-    /// Land drones where they are (those on the ground: take their start back)
+    /// Land drones where they are (for those on the ground, cancel the start)
     Land(EndArgs),
-    /// Put back the parameters that were changed; the fence stays on, unless --fence-off is given
+    /// Restore the parameters that were changed; the fence stays on unless --fence-off is given
     Restore(RestoreArgs),
-    /// Virtual drones at the plan's slots, to practise with
+    /// Run virtual drones at the plan's slots, to practise with
     Virtual(Box<virtual_drones::VirtualArgs>),
 }
 
@@ -78,12 +78,12 @@ enum FleetCommand {
 pub(super) struct StepArgs {
     /// Campaign folder
     pub(super) campaign: PathBuf,
-    /// Which flight, if the campaign has several
+    /// Which flight to use, if the campaign has several
     #[arg(long, value_name = "NAME")]
     pub(super) flight: Option<String>,
     #[command(flatten)]
     pub(super) connect: ConnectArgs,
-    /// Print the messages that would be sent, and send nothing
+    /// Print the messages that would be sent, but send nothing
     #[arg(long)]
     pub(super) dry_run: bool,
 }
@@ -93,10 +93,10 @@ pub(super) struct StepArgs {
 pub(super) struct UploadArgs {
     #[command(flatten)]
     step: StepArgs,
-    /// Set parameters that must be others (old values are kept for `fleet restore`)
+    /// Set parameters that have the wrong value (old values are kept for `fleet restore`)
     #[arg(long)]
     set_params: bool,
-    /// Find anew which drone flies which slot, from where they stand
+    /// Assign drones to slots again, by where they stand
     #[arg(long)]
     assign: bool,
 }
@@ -115,7 +115,7 @@ pub(super) struct StartArgs {
 pub(super) struct RestoreArgs {
     #[command(flatten)]
     step: StepArgs,
-    /// Also put back values that leave a drone without a fence: FENCE_ENABLE, FENCE_TYPE and
+    /// Also restore values that leave a drone without a fence: FENCE_ENABLE, FENCE_TYPE and
     /// FENCE_ACTION, where they were 0
     #[arg(long)]
     fence_off: bool,
@@ -126,7 +126,8 @@ pub(super) struct RestoreArgs {
 pub(super) struct EndArgs {
     #[command(flatten)]
     step: StepArgs,
-    /// Only these drones: system ids, or network:system, with commas [default: all that are heard]
+    /// Only these drones: system ids, or network:system, separated by commas [default: all that are
+    /// heard]
     #[arg(long, value_name = "IDS", value_delimiter = ',')]
     drones: Option<Vec<DroneId>>,
 }

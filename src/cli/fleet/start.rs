@@ -9,7 +9,7 @@ use crate::workflow::fleet::start::Lead;
 /// How a start is given.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct LeadArgs {
-    /// From now to the start, s of the drones' time: 20 to 43200
+    /// Time from now to the start, s of the drones' time, 20 to 43200
     #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = lead_seconds)]
     pub(in crate::cli) lead: f64,
     /// Authorize the start without asking

@@ -29,21 +29,21 @@ use crate::workflow::slots::SlotSet;
 pub(in crate::cli) struct VirtualArgs {
     /// Campaign folder
     campaign: PathBuf,
-    /// Which flight, if the campaign has several
+    /// Which flight to use, if the campaign has several
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
-    /// Where the ground station listens; several: one for each network, among which the drones
-    /// are divided evenly (a network has 253 system ids)
+    /// Where the ground station listens; repeat it for several networks, among which the drones are
+    /// divided evenly (a network has 253 system ids)
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:14550")]
     station: Vec<SocketAddr>,
-    /// UDP port at which all drones hear what a station broadcasts: Skybrush Server sends starts
-    /// to it; 0: none [default: 14555]
+    /// UDP port at which all drones listen for broadcasts, such as Skybrush Server's starts; 0 for
+    /// none [default: 14555]
     #[arg(long, value_name = "PORT")]
     broadcast_port: Option<u16>,
-    /// File with the signing key: the drones sign everything, and refuse what is not signed with it
+    /// File with the signing key: the drones sign every frame, and refuse frames not signed with it
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
-    /// Time goes so many times as fast as the clock on the wall
+    /// How many times faster than real time the drones' time runs
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     speed: f64,
     /// Share of frames that are lost, each way, 0 to 0.95
@@ -52,13 +52,13 @@ pub(in crate::cli) struct VirtualArgs {
     /// Delay each way, ms
     #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=10_000))]
     delay: u64,
-    /// Largest addition to the delay, ms: frames overtake each other
+    /// Largest random addition to the delay, ms; reorders frames
     #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=10_000))]
     jitter: u64,
     /// Share of frames that arrive twice, 0 to 0.95
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
     repeat: f64,
-    /// What all drones together can send, bytes per second; 0: no limit
+    /// How much all drones together can send, bytes per second; 0 for no limit
     #[arg(long, value_name = "BYTES", default_value_t = 0)]
     rate: u32,
     /// Boot as slowly as real drones do (45 s to a position)
@@ -68,7 +68,7 @@ pub(in crate::cli) struct VirtualArgs {
     #[arg(long, value_name = "SLOTS", num_args = 0..=1, value_parser = parse_slots)]
     #[expect(clippy::option_option, reason = "an option whose value may be left out")]
     stock: Option<Option<SlotSet>>,
-    /// Their cards hold the logs that are in the campaign, to practise bringing logs home
+    /// Put the campaign's logs on the drones' cards, to practise downloading them
     #[arg(long)]
     flown: bool,
     /// These slots' drones are switched off for good: 1-10,12
@@ -77,7 +77,7 @@ pub(in crate::cli) struct VirtualArgs {
     /// These slots' drones reboot once: 1-10,12
     #[arg(long, value_name = "SLOTS", value_parser = parse_slots)]
     reboot: Option<SlotSet>,
-    /// When --gone and --reboot happen, s of the drones' time after they are switched on
+    /// When --gone and --reboot take effect, s of the drones' time after they are switched on
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = super::connect::seconds)]
     after: f64,
     /// Vertical air speed, m/s, up positive

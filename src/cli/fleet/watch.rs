@@ -18,15 +18,15 @@ use crate::workflow::fleet::{lock, one_flight};
   updraft fleet watch my-campaign --flight calibration --connect udpin:0.0.0.0:14550 --no-logs
   updraft fleet watch my-campaign --flight calibration --connect skybrush://localhost:5001
 
-Who flies which slot is in fleet.json; the start is what the drones say, or logs/start.json, which through
-Skybrush Server tells both. Drones that
-were flown with --guided have lost who flew them: they are watched as they come down. `fleet abort` and
-`fleet land` of other terminals are carried out. Exit codes: 3 somebody has not landed, gave an alarm, or
-a log is missing; 5 nobody flies, and no start is set.")]
+Which drone flies which slot is in fleet.json; the start is what the drones report, or is in
+logs/start.json, which says both for flights through Skybrush Server. Drones that were flown with
+--guided no longer receive targets: they are watched as they come down. `fleet abort` and `fleet
+land` in other terminals are carried out. Exit codes: 3 a drone has not landed or raised an alarm,
+or a log is missing; 5 no drone is flying, and no start is set.")]
 pub(in crate::cli) struct WatchArgs {
     #[command(flatten)]
     step: StepArgs,
-    /// Leave the logs on the drones; `updraft logs pull` brings them
+    /// Leave the logs on the drones; `updraft logs pull` downloads them
     #[arg(long)]
     no_logs: bool,
     #[command(flatten)]

@@ -27,15 +27,15 @@ use crate::workflow::gap::{self, Compared, Request};
   updraft gap --csv phantom4-mast.toml --vehicle phantom4 --flight hover
   updraft gap next my-campaign                    # what to fly next
 
-The plan is flown again in the simulator (or the logs of another simulation are taken), and the
-drones' pulses are held against it in steady flight. What is missing is named only when a flight with
-nothing missing would hardly ever show as much; effects that this flight cannot tell apart are named
-together, and what it could not have shown is listed. A quarter of the drones is not fitted: on these
-the gap is taken before and after.
+The plan is flown again in the simulator (or the logs of another simulation are used), and the
+drones' pulses in steady flight are compared with it. An effect is named only if a flight with
+nothing missing would hardly ever show as much. Effects that this flight cannot separate are named
+together, and effects that it could not have shown are listed. A quarter of the drones takes no part
+in the fit: on these, the gap is computed before and after.
 
-gap/verdict.json has all of it, gap/model.toml is the vehicle with what was found: `simulate
---vehicle gap/model.toml` flies it. Exit code 3: done, but logs could not be used. Exit code 5: no
-log has steady flight to compare.")]
+gap/verdict.json has all results; gap/model.toml is the vehicle with what was found, and `simulate
+--vehicle gap/model.toml` flies it. Exit code 3: done, but some logs could not be used. Exit code 5:
+no log has steady flight to compare.")]
 pub(super) struct GapArgs {
     #[command(subcommand)]
     command: Option<GapCommand>,
@@ -45,10 +45,10 @@ pub(super) struct GapArgs {
     /// Logs of the drones: a folder, or one log
     #[arg(long, value_name = "LOGS")]
     measured: Option<PathBuf>,
-    /// Tables instead of logs: a mapping file says which columns are what (docs/csv.md)
+    /// Tables instead of logs: a mapping file says what each column is (docs/csv.md)
     #[arg(long, value_name = "MAPPING.toml", conflicts_with_all = ["measured", "simulated", "plan"])]
     csv: Option<PathBuf>,
-    /// Logs of somebody else's simulation of the same flight, instead of flying the plan again
+    /// Logs of another simulator's flight of the same plan, instead of flying it again
     #[arg(long, value_name = "LOGS")]
     simulated: Option<PathBuf>,
     /// Plan that was flown, for --measured: plan.json, a flight's folder, .skyc or .skyb
@@ -57,29 +57,29 @@ pub(super) struct GapArgs {
     /// Flight of the campaign [default: its calibration]
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
-    /// Which logs of a campaign: real or simulated [default: real where there are any]
+    /// Which logs of a campaign to use [default: real ones if there are any]
     #[arg(long, value_name = "WHICH", value_enum, conflicts_with_all = ["measured", "csv"])]
     logs: Option<OriginChoice>,
-    /// Model to hold against the logs: a vehicle's name or file [default: the planned one]
+    /// Model to compare with the logs: a vehicle's name or file [default: the planned one]
     #[arg(long, value_name = "VEHICLE")]
     vehicle: Option<String>,
     /// Folder for the verdict, the model and the page [default: CAMPAIGN/gap, else gap]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
-    /// Chance of naming anything in a step when nothing is missing
+    /// Probability that a step names something when nothing is missing
     #[arg(long, value_name = "SHARE", default_value_t = 0.005, value_parser = share)]
     alpha: f64,
     /// Simulated flights for the threshold of each step
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(20..=5000))]
     replicates: u16,
-    /// Seed of everything random
+    /// Seed for everything random
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
 #[derive(Debug, Subcommand)]
 enum GapCommand {
-    /// Propose the shortest flight that would tell what the verdict left open
+    /// Propose the shortest flight that would settle what the verdict left open
     Next(next::NextArgs),
 }
 

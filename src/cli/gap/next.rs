@@ -18,13 +18,14 @@ use crate::workflow::gap::next::{self, Proposed, Wish};
   updraft gap next my-campaign --longest 500 --no-verify
   updraft plan my-campaign/gap/next.toml -o second-flight
 
-Takes gap/verdict.json of the campaign: classes that the flight cannot separate, unknowns, and effects
-that matter at their usual size and were too small to see. Of what a flight can be made of
-(counter-phase, shuffled and repeated rungs, horizontal legs, hovers at two heights, a low hover,
-staggered charge, payload) it looks for the shortest flight that tells them, by the noise that was
-found, and simulates it with each answer in turn. Exit code 5: there is no verdict, or nothing to ask.")]
+Reads the open questions from the campaign's gap/verdict.json: classes that the flight cannot
+separate, unknowns, and effects that matter at their usual size but were too small to see. From the
+elements of a flight (counter-phase, shuffled and repeated rungs, horizontal legs, hovers at two
+heights, a low hover, staggered charge, payload) it composes the shortest flight that answers them
+in the noise that was found, and simulates it with each answer in turn. Exit code 5: there is no
+verdict, or nothing to ask.")]
 pub(super) struct NextArgs {
-    /// Campaign folder that `updraft gap` has compared
+    /// Campaign folder that `updraft gap` has analysed
     campaign: PathBuf,
     /// Folder of the comparison [default: CAMPAIGN/gap]
     #[arg(long, value_name = "FOLDER")]
@@ -32,19 +33,19 @@ pub(super) struct NextArgs {
     /// Fisher z that every question should reach: 5 is found nearly always
     #[arg(long, value_name = "Z", default_value_t = 5.0, value_parser = z)]
     z: f64,
-    /// Longest flight, s [default: the vehicle's endurance less its reserve]
+    /// Longest flight, s [default: the vehicle's endurance minus its reserve]
     #[arg(long, value_name = "S", value_parser = seconds)]
     longest: Option<f64>,
     /// Flight of the campaign [default: its calibration]
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
-    /// Horizontal wind that is expected, m/s
+    /// Expected horizontal wind, m/s
     #[arg(long, value_name = "MPS", default_value_t = 3.0, value_parser = wind)]
     wind: f64,
     /// Do not simulate the proposed flight
     #[arg(long)]
     no_verify: bool,
-    /// Seed of the simulated flights
+    /// Seed for the simulated flights
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder for next.toml and next.json [default: that of the comparison]

@@ -23,26 +23,27 @@ use crate::workflow::times::utc;
   updraft logs import my-campaign --flight hover cards/
   updraft logs import my-campaign --flight hover cards/ --start 1795143537
 
-A card holds the logs of a day, or of a month. A log is taken if it is of the start of a flight: the one
-that was written down when it was authorized (logs/start.json), else --start, else the one at which most
-drones flew the plan. Its drone is that of its system id and of the place where it stood, whatever folder
-or file it lies in. What is taken, and what is left and why, is printed. Where two logs fit equally, or a
-log contradicts itself, it asks on a terminal, else leaves them: exit code 3. So does a log that is cut or damaged, which is taken. Logs of another start that
-are home go to logs/flight-K/, those that --again replaces to logs/older/; nothing is overwritten.
-A card that is not there is exit code 1.")]
+A card may hold the logs of a day or of a month. A log is imported if it belongs to the start of a
+flight: the start recorded when it was authorized (logs/start.json), else --start, else the start at
+which most drones flew the plan. Its drone follows from its system id and from where it stood,
+whatever its folder or file name. The command prints what it imports, what it leaves behind, and
+why. If two logs fit equally well, or a log contradicts itself, you are asked on a terminal;
+otherwise they are left behind, with exit code 3. A truncated or damaged log is imported, also with
+exit code 3. Logs of another start that are already here move to logs/flight-K/, logs replaced by
+--again to logs/older/; nothing is overwritten. A missing card is exit code 1.")]
 pub(super) struct ImportArgs {
     /// Campaign folder
     campaign: PathBuf,
     /// Folders of cards, or files
     #[arg(required = true)]
     cards: Vec<PathBuf>,
-    /// Only this flight's logs [default: of a campaign of several flights, each log's own]
+    /// Only this flight's logs [default: each log goes to its own flight]
     #[arg(long, value_name = "NAME")]
     flight: Option<String>,
-    /// When the show started, Unix time in seconds
+    /// When the show started, as Unix time in seconds
     #[arg(long, value_name = "UNIX_S", allow_negative_numbers = true)]
     start: Option<i64>,
-    /// Take the place of logs of the same start that are home
+    /// Replace logs of the same start that are already here
     #[arg(long)]
     again: bool,
 }

@@ -17,8 +17,8 @@ pub(crate) enum Choice {
     Land,
     /// They return to where they took off, and land there
     Return,
-    /// They are left flying: a show goes on by itself; those flown by --guided stop within 3 s and
-    /// return by their own failsafe
+    /// They are left flying: a show continues by itself; drones flown with --guided stop within 3 s
+    /// and return by their own failsafe
     Leave,
 }
 
