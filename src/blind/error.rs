@@ -74,8 +74,8 @@ pub enum BlindError {
     },
     /// A seed for scoring was given where flights are for tuning.
     #[error(
-        "seed {seed} is for tuning: scores count only with seeds of {first} or more, which nobody has \
-         tuned with; give --tuning to score with it all the same, and the table will say so"
+        "seed {seed} is for tuning: scores count only with seeds of {first} or more, which were \
+         never used for tuning; give --tuning to score with it anyway, and the table will say so"
     )]
     TuningSeed {
         /// Seed as asked for.
@@ -105,7 +105,7 @@ pub enum BlindError {
     },
     /// The seal was to be opened before there is a verdict.
     #[error(
-        "the truth in {} stays sealed: there is no verdict at {}; write the verdict first",
+        "the truth in {} stays sealed: there is no verdict at {}; write it first",
         sealed.shown(), verdict.shown()
     )]
     NoVerdict {
@@ -168,6 +168,6 @@ pub enum BlindError {
         reason: String,
     },
     /// The user stopped the run.
-    #[error("interrupted; the same command goes on where it stopped")]
+    #[error("interrupted; run the same command again to resume")]
     Stopped,
 }

@@ -160,14 +160,14 @@ pub enum CampaignError {
         reason: String,
     },
     /// The folder holds neither a plan nor a campaign.
-    #[error("{} holds no plan.json and no campaign.json; make one with `updraft plan`", path.shown())]
+    #[error("{} has neither a plan.json nor a campaign.json; make one with `updraft plan`", path.shown())]
     NoPlan {
         /// Path of the folder.
         path: PathBuf,
     },
     /// Another process is writing into the folder.
     #[error(
-        "another updraft is writing into {}; wait until it is done, or choose another folder",
+        "another updraft is writing into {}; wait until it has finished, or choose another folder",
         path.shown()
     )]
     Busy {
@@ -412,7 +412,7 @@ fn validate_plan(plan: &Plan) -> Result<(), String> {
         }
         if usize::from(slot.group) >= plan.groups.len() {
             return Err(format!(
-                "slot {} is in group {}, which is not there",
+                "slot {} is in group {}, which does not exist",
                 slot.slot, slot.group
             ));
         }

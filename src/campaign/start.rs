@@ -170,8 +170,10 @@ impl StartRecord {
             return Ok(None);
         }
         let record: Self = read_json(path).map_err(|error: CampaignError| {
-            error
-                .with_remedy("mend it, or move it away: the start of this flight is then not known")
+            error.with_remedy(
+                "repair it, or move it away; without it the start of this flight is \
+                              unknown",
+            )
         })?;
         if ![START_SCHEMA, FIRST_SCHEMA].contains(&record.schema.as_str()) {
             let reason =

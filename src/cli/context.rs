@@ -89,7 +89,7 @@ impl Context {
             clock: RunClock::of(global),
         };
         if let Err(error) = installed {
-            context.warn(&format!("Ctrl-C ends the program at once ({error})"));
+            context.warn(&format!("Ctrl-C will end the program at once ({error})"));
         }
         context
     }
@@ -158,7 +158,7 @@ impl Context {
     /// Says that something was lost if nobody has said what: no command ends so in silence.
     pub(super) fn account_for_losses(&self) {
         if !self.insisted.load(Ordering::Relaxed) {
-            self.insist("warning: done, with losses that are named above (exit code 3)");
+            self.insist("warning: done, with the losses named above (exit code 3)");
         }
     }
 

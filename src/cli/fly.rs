@@ -88,7 +88,7 @@ pub(super) fn run(context: &Context, args: &FlyArgs) -> Result<Exit, CommandErro
     let target = args.connect.target()?;
     if args.guided && !matches!(target, Target::Links(_)) {
         return Err(CommandError::Usage(
-            "--guided streams to the drones themselves: give their own links with --connect"
+            "--guided streams to the drones directly: give their own links with --connect"
                 .to_owned(),
         ));
     }

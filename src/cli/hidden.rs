@@ -87,7 +87,7 @@ impl HideArgs {
                 bases.into_iter().find(of_name).ok_or_else(|| {
                     let names = bases.map(Base::vehicle_name);
                     CommandError::Usage(format!(
-                        "physics can be hidden from {}, not from {name}",
+                        "physics can be hidden in {}, not in {name}",
                         words::list(&names)
                     ))
                 })?
@@ -100,7 +100,7 @@ impl HideArgs {
             }
             Some((rows, columns)) => {
                 return Err(CommandError::Usage(format!(
-                    "with --hide the grid is square, {}x{} to {}x{}; {rows}x{columns} is not",
+                    "with --hide the grid must be square, {}x{} to {}x{}; {rows}x{columns} is not",
                     SIDES.start(),
                     SIDES.start(),
                     SIDES.end(),

@@ -159,8 +159,7 @@ fn list(context: &Context, args: &ListArgs) -> Result<Exit, CommandError> {
 
 fn gone() -> CommandError {
     CommandError::Usage(
-        "virtual drones are gone with their program: `updraft fly --connect sim` brings their logs \
-         itself"
+        "virtual drones end with their program: `updraft fly --connect sim` saves their logs itself"
             .to_owned(),
     )
 }
@@ -220,9 +219,9 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let links = match target {
         Target::Links(links) => links,
         Target::Server(address) => {
-            let rate = "it asks the drones at its own pace; --at-once bounds how many drones at a \
-                        time";
-            let patience = "it gives a drone up by itself, after 90 s without progress";
+            let rate = "it queries the drones at its own pace; --at-once limits how many drones \
+                        at a time";
+            let patience = "it gives up on a drone by itself, after 90 s without progress";
             server::refuse(
                 &args.connect,
                 &[
@@ -274,8 +273,8 @@ fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
     let rows = verify_all(&args.campaign)?;
     if rows.is_empty() {
         return Err(CommandError::Nothing(
-            "there are no logs yet: no manifest of logs that came (`updraft logs pull` or `import`), \
-             and no record of simulated ones (`updraft simulate`)"
+            "there are no logs yet: no manifest of downloaded logs (`updraft logs pull` or \
+             `import`), and no record of simulated ones (`updraft simulate`)"
                 .to_owned(),
         ));
     }
@@ -284,7 +283,7 @@ fn check(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandError> {
         context.warn(&format!("{}/{} {}", row.flight, row.file, row.faults.join("; ")));
     }
     context.say(&format!(
-        "{} of {} are as they came",
+        "{} of {} are unchanged",
         rows.len() - bad,
         words::count(rows.len(), "log")
     ));

@@ -76,10 +76,9 @@ pub(super) fn air_specs(text: &str) -> Result<AirSpecs, String> {
 pub(super) fn air_help() -> String {
     let files: Vec<_> = spec::builtin_names().collect();
     format!(
-        "Kinds of air for --air, with their keys and [defaults]; several --air add up (`still`: \
-         none):\n{}\n\
-         Mean wind: that of the uniform parts, and of profiles at their reference height.\n\
-         Files of several that come with the program: {}\n",
+        "Kinds of air for --air, with their keys and [defaults]; several --air add up (`still` \
+         for none):\n{}\nMean wind: that of the uniform parts, and of profiles at their reference \
+         height.\nCombinations that come with the program: {}\n",
         spec::help_text(),
         files.join(", ")
     )

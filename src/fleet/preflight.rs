@@ -299,7 +299,7 @@ impl Look<'_> {
         } else if no_time {
             bad(text, "has an invalid GPS timestamp: wait for the time")
         } else if self.of.clock.gps_ms(self.now).is_none() {
-            bad(text, "does not tell its GPS time")
+            bad(text, "does not report its GPS time")
         } else {
             good(text)
         }

@@ -29,7 +29,7 @@ pub enum GapError {
     /// The pulse never changes.
     #[error(
         "the pulse is the same ({value_us:.1} us) in all of the flight: RCOU in the logs holds a \
-         constant, not what the motors were told; log the outputs that they hang on (SERVOn_FUNCTION \
+         constant, not the motor commands; log the outputs they are connected to (SERVOn_FUNCTION \
          33 to 40)"
     )]
     ConstantPulse {
@@ -38,8 +38,8 @@ pub enum GapError {
     },
     /// The pulse of another program's simulation never changes.
     #[error(
-        "the simulated pulse is the same ({value_us:.1} us) in all of the flight: its logs hold a \
-         constant, not what the motors were told"
+        "the simulated pulse is the same ({value_us:.1} us) in all of the flight: its logs hold \
+         a constant, not the motor commands"
     )]
     ConstantSimulated {
         /// Value of the pulse, us.
@@ -47,8 +47,8 @@ pub enum GapError {
     },
     /// There is neither a plan nor logs of a simulation.
     #[error(
-        "there is no simulated side: give the plan that was flown (--plan), so that it can be flown \
-         again, or logs of a simulation (--simulated)"
+        "there is nothing to compare with: give the plan that was flown (--plan), so that it can \
+         be flown again, or logs of a simulation (--simulated)"
     )]
     NoSimulatedSide,
     /// The model could not be flown.

@@ -60,7 +60,7 @@ pub enum MissionError {
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
     /// The name is neither a file nor a built-in template.
-    #[error("there is no template {}; built in are {}", plain(name), names().join(", "))]
+    #[error("there is no template {}; the built-in ones are {}", plain(name), names().join(", "))]
     NoTemplate {
         /// Name of the template, as asked for.
         name: String,

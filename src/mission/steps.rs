@@ -281,7 +281,7 @@ impl<'a> Timeline<'a> {
             (None, None) => Err(self
                 .source
                 .error(span_of(&step.kind), "this step needs `speed_mps`")
-                .with_help("only inside a repeat over `speeds_mps` may it be left out")),
+                .with_help("it may be omitted only inside a repeat over `speeds_mps`")),
         }
     }
 

@@ -314,7 +314,7 @@ fn flags_of<'a>(drone: &DroneAnalysis, warnings: impl Iterator<Item = &'a Warnin
     flags.extend(reasons.iter().map(|(words, n)| format!("{} {words}", count(*n, "window"))));
     flags.extend(warnings.map(|warning| clean(&warning.to_string())));
     flags.extend(drone.partial_ladder.map(|partial| {
-        format!("partial ladder ({}): not in the fleet's numbers", partial.short())
+        format!("partial ladder ({}): not included in the fleet's numbers", partial.short())
     }));
     if let Some(laws) = &drone.laws {
         let fits = [&laws.signed_quadratic, &laws.signed_quadratic_held, &laws.linear];

@@ -53,7 +53,7 @@ pub enum ServerError {
     /// A line longer than anything the server has reason to send.
     #[error(
         "Skybrush Server sent a line longer than {most} bytes; logs of that size cannot come \
-         through it: take them from the drone's card and `updraft logs import` them"
+         through it: take them from the drone's card with `updraft logs import`"
     )]
     TooLong {
         /// Longest line that is accepted, bytes.

@@ -98,7 +98,8 @@ fn of_show_mode(state: &State, step: Step, now_unix_s: f64) -> Option<String> {
     let mode = state.mode.as_str();
     if !state.is_in_show_mode() {
         if mode.is_empty() {
-            let silent = "does not tell its flight mode: is it heard, and has it show firmware?";
+            let silent = "does not report its flight mode: is it heard, and does it have show \
+                          firmware?";
             return Some(silent.to_owned());
         }
         // The server tells the number of a mode that it has no name for: "mode 5".
@@ -109,7 +110,7 @@ fn of_show_mode(state: &State, step: Step, now_unix_s: f64) -> Option<String> {
         ));
     }
     let Some(show) = &state.show else {
-        return Some("tells nothing of its show: it sends no show status".to_owned());
+        return Some("reports nothing about its show: it sends no show status".to_owned());
     };
     let text = show.text.as_str();
     let counts_down = COUNTS_DOWN.contains(&text);

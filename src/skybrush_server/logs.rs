@@ -61,7 +61,7 @@ pub fn fetch_log(drone: &str, log: &str) -> Job {
 /// # Errors
 /// When it is no list.
 pub fn log_entries(value: &Value) -> Result<Vec<LogEntry>, String> {
-    let list = value.as_array().ok_or("the server's list of logs is no list")?;
+    let list = value.as_array().ok_or("the server's list of logs is not a list")?;
     Ok(list
         .iter()
         .filter(|entry| text(entry, "kind") == Some("ardupilot"))

@@ -93,7 +93,7 @@ pub enum ServerError {
     #[error("no thread for the virtual fleet")]
     Thread(#[source] io::Error),
     /// The speed is not a number above 0 and at most 1000.
-    #[error("a speed of {0} is none: give a number above 0 and at most 1000")]
+    #[error("{0} is not a valid speed: give a number above 0 and at most 1000")]
     Pace(f64),
     /// The thread of the fleet panicked.
     #[error("the virtual fleet has stopped: its thread panicked")]

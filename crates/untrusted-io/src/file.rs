@@ -124,7 +124,7 @@ pub fn open_regular(path: &Path) -> io::Result<(File, Metadata)> {
         of if of.is_dir() => Err(io::Error::from(io::ErrorKind::IsADirectory)),
         _ => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
-            "it is no file, but a pipe, a socket or a device",
+            "it is not a file but a pipe, a socket or a device",
         )),
     };
     regular(&fs::metadata(path)?)?;

@@ -10,7 +10,7 @@ use std::path::Path;
 fn foreign(what: &str) -> io::Error {
     io::Error::new(
         io::ErrorKind::PermissionDenied,
-        format!("{what}: remove it, or work as the user whose it is"),
+        format!("{what}: remove it, or work as the user who owns it"),
     )
 }
 

@@ -74,7 +74,9 @@ impl ConnectArgs {
         let mut all = Vec::new();
         for words in &self.connect {
             if words == "sim" || words.starts_with("skybrush://") {
-                return Err(usage(format!("--connect {words} goes with no other link")));
+                return Err(usage(format!(
+                    "--connect {words} cannot be combined with another link"
+                )));
             }
             all.extend(links(words).map_err(|error| usage(error.to_string()))?);
         }

@@ -203,9 +203,9 @@ pub(super) fn refuse_of_upload(
     set_params: bool,
     assign: bool,
 ) -> Result<(), CommandError> {
-    let params = "parameters are not looked at through it; set them over the drones' own links, or \
+    let params = "parameters are not checked through it; set them over the drones' own links, or \
                   in Skybrush Live";
-    let found = "who flies which slot is found anew every time, from where the drones stand";
+    let found = "drones are assigned to slots anew every time, by where they stand";
     server::refuse(connect, &[("--set-params", set_params, params), ("--assign", assign, found)])
 }
 
@@ -272,9 +272,9 @@ fn open(
     connect.open(context, links).map_err(|error| match error {
         CommandError::Failed(text) if !flying(campaign).is_empty() => {
             CommandError::Failed(format!(
-                "{text}\n  the link is held by the command that flies this campaign: it tells what \
-                 happens and writes it into fleet-journal.ndjson; `fleet abort` and `fleet land` \
-                 reach it"
+                "{text}\n  the link is held by the command that flies this campaign: it reports \
+                 what happens and records it in fleet-journal.ndjson; `fleet abort` and `fleet \
+                 land` reach it"
             ))
         }
         other => other,
@@ -297,9 +297,9 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
 fn restore(context: &Context, args: &RestoreArgs) -> Result<Exit, CommandError> {
     if let Target::Server(_) = args.step.connect.target()? {
         return Err(CommandError::Usage(
-            "no parameter is put back through Skybrush Server, as none is set through it: those in \
-             fleet-changes.json were set over the drones' own links, and are put back over these \
-             (--connect), or one by one in Skybrush Live; nothing was sent"
+            "parameters are not restored through Skybrush Server, because none are set through \
+             it: those in fleet-changes.json were set over the drones' own links, and are \
+             restored over those (--connect), or one by one in Skybrush Live; nothing was sent"
                 .to_owned(),
         ));
     }

@@ -141,8 +141,8 @@ pub(in crate::cli) fn status(context: &Context, crew: &mut Crew<'_>) -> Result<E
     for of in networks(crew) {
         let _ = writeln!(
             text,
-            "network {}: {} frames heard; {} not signed and {} forged or repeated (refused), {} of \
-             MAVLink 1 (ignored), {} bytes that are no frame",
+            "network {}: {} frames heard; {} not signed and {} forged or repeated (refused), {} \
+             of MAVLink 1 (ignored), {} bytes that are not frames",
             of.network, of.frames_in, of.unsigned, of.forged, of.mavlink_1, of.noise_bytes
         );
     }

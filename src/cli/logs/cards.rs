@@ -182,7 +182,7 @@ impl Report<'_> {
     /// Warns of a log that may not hold all of its flight.
     fn say_incomplete(&self, file: &str, why: Option<&str>) {
         if let Some(why) = why {
-            self.context.warn(&format!("{file} is not known to be whole: {why}"));
+            self.context.warn(&format!("{file} may not be complete: {why}"));
         }
     }
 

@@ -26,7 +26,7 @@ pub(super) fn lines(
         let path = folder.log(slot, plan.slots.len());
         let place = path.strip_prefix(&folder.0).unwrap_or(&path).shown();
         let line = if path.exists() && !args.again && args.log == Which::Flight {
-            format!("the list of its logs, and what {place} lacks")
+            format!("the list of its logs, and what {place} is missing")
         } else {
             format!("the list of its logs, and {what}, for {place}")
         };

@@ -166,8 +166,8 @@ impl Shelf {
         let manifest = if path.exists() {
             let mut manifest: Manifest = read_json(&path).map_err(|error: CampaignError| {
                 error.with_remedy(
-                    "mend it, or move it away: `updraft logs pull --again` brings the logs again and \
-                     makes a new one",
+                    "repair it, or move it away: `updraft logs pull --again` downloads the logs \
+                     again and makes a new one",
                 )
             })?;
             let wrong = if manifest.schema == schema {

@@ -316,8 +316,8 @@ impl PullOne {
         }
         if self.home == AtHome::Foreign && !self.options.again {
             return self.fail(
-                format!("{} is there, but the manifest does not know it", self.file),
-                "move the file away, or bring the log again in its place (--again)",
+                format!("{} exists, but is not in the manifest", self.file),
+                "move the file away, or replace it by downloading the log again (--again)",
             );
         }
         match self.list(FTP_PATIENCE) {

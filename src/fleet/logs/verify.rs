@@ -27,7 +27,7 @@ pub enum Fault {
     #[error("cannot be read: {0}; pull or import it again")]
     Unreadable(String),
     /// The file has another size than when it came.
-    #[error("has {found} bytes, {right} when it came; pull or import it again")]
+    #[error("has {found} bytes, but had {right} when it was downloaded; pull or import it again")]
     Size {
         /// Present size, bytes.
         found: u64,
@@ -35,7 +35,7 @@ pub enum Fault {
         right: u64,
     },
     /// The file has another content than when it came.
-    #[error("has changed since it came (another SHA-256); pull or import it again")]
+    #[error("has changed since it was downloaded (different SHA-256); pull or import it again")]
     Changed,
     /// The log is incomplete, as the text says.
     #[error("is not known to be whole: {0}; pull it again, or import its card")]

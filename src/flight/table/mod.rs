@@ -32,7 +32,8 @@ pub enum TableError {
     },
     /// A column that the mapping names is not in the table.
     #[error(
-        "{}: there is no column \"{column}\", which the mapping names for {channel}; there are: {there}",
+        "{}: there is no column \"{column}\", which the mapping names for {channel}; the columns \
+         are: {there}",
         path.shown()
     )]
     Column {
@@ -105,7 +106,7 @@ fn left_out(backward: usize) -> String {
         return String::new();
     }
     format!(
-        " ({backward} more were left out, as their time does not go forward: is the column of \
-         times the right one, and its format?)"
+        " ({backward} more were skipped, because their time does not advance: are the time \
+         column and its format right?)"
     )
 }

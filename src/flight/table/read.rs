@@ -43,9 +43,9 @@ impl Wanted<'_> {
                 self.left_out += 1;
                 return Ok(());
             }
-            let value: f64 = cell
-                .parse()
-                .map_err(|_| ((*name).to_owned(), format!("\"{}\" is no number", short(cell))))?;
+            let value: f64 = cell.parse().map_err(|_| {
+                ((*name).to_owned(), format!("\"{}\" is not a number", short(cell)))
+            })?;
             sum += value;
         }
         let value =
@@ -156,8 +156,9 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
             reason,
         };
         let text = row.get(time_index).unwrap_or_default();
-        let time = time_of(text, mapping.time.format)
-            .ok_or_else(|| cell(&mapping.time.column, format!("\"{}\" is no time", short(text))))?;
+        let time = time_of(text, mapping.time.format).ok_or_else(|| {
+            cell(&mapping.time.column, format!("\"{}\" is not a time", short(text)))
+        })?;
         let show_s = time - *first.get_or_insert(time);
         if show_s <= last {
             backward += 1;

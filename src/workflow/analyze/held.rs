@@ -46,9 +46,9 @@ pub(super) fn doubts(
     reasons.dedup();
     (!reasons.is_empty()).then(|| {
         format!(
-            "{}: the laws seem to be those of other drones: {}. A law is a drone's own; with another \
-             fleet's the map is wrong by as much as the fleets differ, which no error here says. Hold \
-             the laws of a calibration of these drones",
+            "{}: the laws seem to be those of other drones: {}. Each drone has its own law; with \
+             another fleet's laws the map is wrong by as much as the fleets differ, which the \
+             stated errors do not include. Use the laws of a calibration of these drones",
             path.shown(),
             reasons.join("; ")
         )

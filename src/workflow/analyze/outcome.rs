@@ -52,7 +52,7 @@ fn lost(flight: &FlightAnalysis) -> Vec<String> {
     });
     let what = match flight.purpose {
         Purpose::Calibration => "no law",
-        Purpose::Measurement => "no value of the map",
+        Purpose::Measurement => "no value in the map",
     };
     let unmeasured = flight.unmeasured.iter().map(|one| Remark {
         slot: one.slot,
@@ -79,23 +79,23 @@ pub(crate) fn nothing_found(analysis: &Analysis, reasons: bool) -> WorkflowError
         // A flight that failed is a warning of the whole.
         (false, _) if analysis.warnings.is_empty() => {
             "a map of the air needs laws: analyse the calibration flight together with this one \
-             (updraft analyze CALIBRATION HOVER), or take the laws of another analysis of these \
+             (updraft analyze CALIBRATION HOVER), or use the laws of another analysis of these \
              drones (--hold analysis.json)"
         }
         (false, _) => {
-            "the calibration cannot be used: put right what is named of it, or take the laws of \
+            "the calibration cannot be used: correct the problems named, or use the laws of \
              another analysis of these drones (--hold analysis.json)"
         }
         (true, true) => {
-            "neither the calibration nor the measurement can be used: put right what is named, or \
-             fetch the logs again (updraft logs pull)"
+            "neither the calibration nor the measurement can be used: correct the problems \
+             named, or download the logs again (updraft logs pull)"
         }
         (true, false) => {
-            "the calibration cannot be used: put right what is named, fetch the logs again (updraft \
-             logs pull), or give the plan that they flew (--plan)"
+            "the calibration cannot be used: correct the problems named, download the logs again \
+             (updraft logs pull), or give the plan that they flew (--plan)"
         }
     };
-    let mut text = format!("nothing found: no law and no value of the air; {remedy}");
+    let mut text = format!("no results: no law and no value of the air; {remedy}");
     if reasons {
         let problems = problems(analysis, true);
         for problem in problems.iter().take(LISTED) {

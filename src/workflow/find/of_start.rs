@@ -58,12 +58,12 @@ pub(super) fn refuse(
         match belongs {
             Some(Belongs::No(why)) => {
                 log.refused = Some(format!(
-                    "{why} ({written}): it is of another flight; {}",
+                    "{why} ({written}): it belongs to another flight; {}",
                     where_the_right_one_is(flight, start, &log.path)
                 ));
             }
             Some(Belongs::Unknown(why)) => notes.push(format!(
-                "{}: it is not known to be of the flight that began {start}: {why}",
+                "{}: it is not known to belong to the flight that began {start}: {why}",
                 log.path.shown()
             )),
             Some(Belongs::Yes) | None => {}
@@ -74,10 +74,10 @@ pub(super) fn refuse(
 
 fn where_the_right_one_is(flight: &Flight<'_>, start: GpsTime, path: &Path) -> String {
     if let Some(kept) = kept(flight.logs, start, path) {
-        return format!("the log of this one is {}: put it in its place", kept.shown());
+        return format!("this flight's log is {}: put it in its place", kept.shown());
     }
     let Some((campaign, name)) = flight.campaign else {
-        return "put the log of this one in its place".to_owned();
+        return "put this flight's log in its place".to_owned();
     };
     let campaign = words::shell(&campaign.shown().to_string());
     let name = words::shell(name);
@@ -86,8 +86,9 @@ fn where_the_right_one_is(flight: &Flight<'_>, start: GpsTime, path: &Path) -> S
         None => String::new(),
     };
     format!(
-        "that of this one comes from the drone with `updraft logs pull {campaign} --flight \
-         {name}{slots}`, from its card with `updraft logs import {campaign} --flight {name} CARD`"
+        "download this flight's from the drone with `updraft logs pull {campaign} --flight \
+         {name}{slots}`, or import it from its card with `updraft logs import {campaign} --flight \
+         {name} CARD`"
     )
 }
 

@@ -179,9 +179,17 @@ fn binaries(folder: &FlightFolder, plan: &Plan, planned: &Show, problems: &mut V
         .map(|entry| entry.path())
         .filter(|path| has_extension(path, "skyb") && !wanted.contains(path))
         .map(|path| {
-            format!("{} is of no slot of the plan, but would be uploaded with them", path.shown())
+            format!(
+                "{} belongs to no slot of the plan, but would be uploaded with the others",
+                path.shown()
+            )
         })
         .collect();
     stray.sort();
-    name_some(stray, &format!("{}: and", place.shown()), "more files of no slot", problems);
+    name_some(
+        stray,
+        &format!("{}: and", place.shown()),
+        "more files that belong to no slot",
+        problems,
+    );
 }

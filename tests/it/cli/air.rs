@@ -123,7 +123,7 @@ fn nothing_is_set_on_drones_that_perform_whatever_is_asked() {
         },
     );
     assert!(said.contains("`updraft fleet watch` follows the flight"), "{said}");
-    assert!(said.contains("No parameter was put back"), "{said}");
+    assert!(said.contains("No parameter was restored"), "{said}");
     assert!(said.contains("so no parameter was set"), "{said}");
 }
 
@@ -183,11 +183,11 @@ fn a_signal_in_flight_sends_everyone_home_whichever_it_is() {
 #[test]
 fn what_a_signal_does_in_flight_is_chosen_by_an_option() {
     for (stock, choice, said, wanted) in [
-        (false, "land", "has told them to land", ["LAND", "LAND"]),
+        (false, "land", "has ordered them to land", ["LAND", "LAND"]),
         (false, "leave", "the drones fly on by themselves", ["DRONE_SHOW", "DRONE_SHOW"]),
-        (true, "land", "has told them to land", ["LAND", "LAND"]),
+        (true, "land", "has ordered them to land", ["LAND", "LAND"]),
         // Nobody streams, nobody is there: they have come home by themselves.
-        (true, "leave", "nobody flies the drones any more", ["RTL", "RTL"]),
+        (true, "leave", "the drones no longer receive targets", ["RTL", "RTL"]),
     ] {
         let more = if stock { &["--stock", "--speed", "5"][..] } else { &["--speed", "5"] };
         let (bench, _fleet, link) = stage(more);
@@ -243,7 +243,7 @@ fn signals_end_every_command_and_nohup_is_respected() {
 #[test]
 fn on_a_terminal_ctrl_c_asks_what_the_drones_do() {
     for (typed, said, wanted) in [
-        ("x\nl\n", "has told them to land", "LAND"),
+        ("x\nl\n", "has ordered them to land", "LAND"),
         ("\x03", "has sent them home", "RTL"),
         ("f\n", "the drones fly on by themselves", "DRONE_SHOW"),
     ] {
@@ -347,5 +347,5 @@ fn a_folder_from_which_nobody_started_has_nothing_to_watch() {
     assert!(ended.err.contains("fleet.json is not there"), "{ended}");
     bench.expect(0, &step(&["fleet", "upload"], &link));
     let ended = bench.expect(5, &step(&["fleet", "watch"], &link));
-    assert!(ended.err.contains("nobody is in the air, and no drone has a start"), "{ended}");
+    assert!(ended.err.contains("no drone is in the air or has a start"), "{ended}");
 }

@@ -43,7 +43,7 @@ fn a_study_that_cannot_be_read_is_told_and_left_out() {
     let study = bench.path("campaign/study/study.json");
     fs::write(&study, "{\"schema\": ").unwrap();
     let broken = bench.expect(0, &["analyze", "campaign"]);
-    assert!(broken.err.contains("goes without Fig. 2 and Table I"), "{broken}");
+    assert!(broken.err.contains("does without Fig. 2 and Table I"), "{broken}");
     assert!(broken.err.contains("study.json is not valid"), "{broken}");
 }
 

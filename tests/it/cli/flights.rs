@@ -44,7 +44,7 @@ fn the_logs_of_an_aborted_flight_never_stand_for_those_of_the_next() {
     let again = bench.expect(0, &fly(&link));
     assert!(again.err.contains("Moved 2 logs of an earlier flight to campaign/logs/flight-1"));
     assert!(again.err.contains("Brought 2 of 2 logs home"), "{again}");
-    assert!(!again.err.contains("had come before"), "{again}");
+    assert!(!again.err.contains("already here"), "{again}");
     for (slot, aborted) in (1..).zip(&aborted) {
         let now = log(&bench, &format!("logs/{slot:02}.BIN"));
         assert!(now != *aborted, "log {slot}");
@@ -61,7 +61,7 @@ fn the_logs_of_an_aborted_flight_never_stand_for_those_of_the_next() {
     assert_eq!(json(&bench, "logs/flight-1/start.json"), first);
     bench.expect(0, &["logs", "verify", "campaign"]);
     let pulled = bench.expect(0, &["logs", "pull", "campaign", "--connect", &link]);
-    assert!(pulled.err.contains("(2 had come before)"), "{pulled}");
+    assert!(pulled.err.contains("(2 already here)"), "{pulled}");
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn records_that_cannot_be_read_are_told_before_anybody_flies() {
     fs::create_dir_all(bench.path("campaign/logs")).unwrap();
     for (file, hint) in [
         ("manifest.json", "or move it away: `updraft logs pull --again` brings the logs again"),
-        ("start.json", "or move it away: the start of this flight is then not known"),
+        ("start.json", "or move it away; without it the start of this flight is unknown"),
     ] {
         let path = bench.path(&format!("campaign/logs/{file}"));
         fs::write(&path, "{").unwrap();
@@ -210,7 +210,7 @@ fn logs_of_an_aborted_flight_that_stay_on_the_drones_are_told() {
     // What no manifest knows was not verified.
     fs::remove_file(bench.path("campaign/logs/manifest.json")).unwrap();
     let verified = bench.expect(3, &["logs", "verify", "campaign"]);
-    let why = "logs/01.BIN has no record of how it came (manifest.json): it cannot be verified";
+    let why = "logs/01.BIN has no record of its download (manifest.json), so it cannot be verified";
     assert!(verified.err.contains(why), "{verified}");
 }
 
@@ -221,15 +221,15 @@ fn practice_and_the_field_have_folders_of_their_own() {
     let practised = log(&bench, "simulated/01.BIN");
     assert!(!bench.path("campaign/logs").exists());
     let flown = bench.expect(0, &fly(&link));
-    assert!(!flown.err.contains("had come before"), "{flown}");
+    assert!(!flown.err.contains("already here"), "{flown}");
     let real = log(&bench, "logs/01.BIN");
     assert!(real != practised);
     // Practice after the field leaves the field's logs alone.
     bench.expect(0, &["simulate", "campaign", "--updraft", "1", "--force"]);
     assert!(log(&bench, "logs/01.BIN") == real && log(&bench, "simulated/01.BIN") != practised);
     let analysed = bench.run(&["analyze", "campaign", "--no-report"]);
-    let words = "Using the logs of real drones (logs/); the simulated ones are left (--logs simulated \
-                 takes them)";
+    let words = "Using the logs of real drones (logs/); the simulated ones are ignored (--logs \
+                 simulated uses them)";
     assert!(analysed.err.contains(words), "{analysed}");
     let practice = bench.run(&["analyze", "campaign", "--no-report", "--logs", "simulated"]);
     assert!(practice.err.contains("Using the simulated logs (simulated/)"), "{practice}");
@@ -243,7 +243,7 @@ fn practice_and_the_field_have_folders_of_their_own() {
 fn practice_asks_and_shows_what_the_field_does() {
     let (bench, _fleet, _link) = stage(&["--speed", "1"]);
     let refused = bench.expect(2, &["fly", "campaign", "--connect", "sim"]);
-    let words = "a start is authorized by a person, or with --yes; nothing was started";
+    let words = "a start must be authorized by a person or with --yes; nothing was started";
     assert!(refused.err.contains(words), "{refused}");
     assert!(!bench.path("campaign/simulated").exists());
     let practised = bench.expect(0, &["fly", "campaign", "--connect", "sim", "--yes"]);

@@ -149,7 +149,7 @@ fn a_hover_that_is_compared_is_not_its_own_map() {
     let told = |flight: &str| {
         let ended = bench.expect(0, &["gap", "campaign", "--flight", flight, "--json"]);
         let map = ended.json("updraft.gap/1")["verdict"]["map"]["flight"].clone();
-        (map.as_str().map(str::to_owned), ended.err.contains("the error of the map is not told"))
+        (map.as_str().map(str::to_owned), ended.err.contains("the error of the map is not given"))
     };
     assert_eq!(told("calibration"), (Some("hover".to_owned()), false));
     assert_eq!(told("hover"), (None, true));

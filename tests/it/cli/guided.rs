@@ -142,7 +142,7 @@ fn a_second_ctrl_c_ends_at_once_and_says_what_becomes_of_drones() {
     // Nobody is there to confirm anything.
     drop(fleet);
     flight.signal("-INT");
-    flight.hear("Ctrl-C again ends it at once");
+    flight.hear("Ctrl-C again to end at once");
     flight.signal("-INT");
     assert_eq!(flight.end(), Some(130), "{}", flight.said());
     assert!(flight.said().contains("Ended at once: drones that had not"), "{}", flight.said());

@@ -51,8 +51,8 @@ fn a_second_writer_is_refused_until_the_first_is_gone() {
         assert_eq!(
             refused.err.lines().last(),
             Some(
-                "error: another updraft is writing into campaign; wait until it is done, or choose \
-                 another folder"
+                "error: another updraft is writing into campaign; wait until it has finished, or \
+                 choose another folder"
             ),
             "{refused}"
         );

@@ -85,10 +85,10 @@ fn a_log_of_another_start_is_refused_by_name() {
     shift(&two, -1_204_000);
     let ended = bench.expect(3, &["analyze", "campaign", "--no-report"]);
     let told = words(&ended);
-    let refused = "02.BIN: its show began 1,204 s before this flight's start (start.json): it is of \
-                   another flight; that of this one comes from the drone with `updraft logs pull \
-                   campaign --flight hover --slots 2`, from its card with `updraft logs import \
-                   campaign --flight hover CARD`";
+    let refused = "02.BIN: its show began 1,204 s before this flight's start (start.json): it is \
+                   of another flight; download this flight's from the drone with `updraft logs \
+                   pull campaign --flight hover --slots 2`, or import it from its card with \
+                   `updraft logs import campaign --flight hover CARD`";
     assert!(told.contains(refused), "{ended}");
     assert!(told.contains("hover 1 of 2 drones") || told.contains("slot 2"), "{ended}");
     // Where the right one was set aside, that is said instead.
@@ -208,7 +208,7 @@ fn cards_are_imported_into_the_flights_they_are_of() {
         write_start(&bench.path("campaign").join(flight), start);
     }
     let ended = bench.expect(0, &import);
-    assert!(ended.err.contains("Took 0 logs from cards (4 had come before)"), "{ended}");
+    assert!(ended.err.contains("Took 0 logs from cards (4 already here)"), "{ended}");
     let json = bench.expect(0, &[&import[..], &["--json"]].concat()).json("updraft.import/1");
     assert_eq!(json["there"].as_array().unwrap().len(), 4, "{json}");
     assert_eq!(json["flights"][1]["logs"][0]["card"], "cards/drone-2/00000009.BIN");
@@ -268,7 +268,7 @@ fn logs_that_are_cut_or_damaged_are_taken_and_never_passed_over_in_silence() {
     fs::create_dir(&hover).unwrap();
     write_start(&bench.path("campaign/hover"), start);
     let import = ["logs", "import", "campaign", "card", "--flight", "hover"];
-    for took in ["Took 2 logs from cards", "Took 0 logs from cards (2 had come before)"] {
+    for took in ["Took 2 logs from cards", "Took 0 logs from cards (2 already here)"] {
         let ended = bench.expect(3, &import);
         assert!(ended.err.contains(took), "{ended}");
         assert!(
@@ -293,10 +293,10 @@ fn a_card_that_is_not_there_and_starts_that_contradict_are_refused() {
     fs::create_dir(bench.path("empty")).unwrap();
     let import = ["logs", "import", "campaign", "empty"];
     let ended = bench.expect(2, &[&import[..], &["--start", &other]].concat());
-    assert!(ended.err.contains("--start is of one flight: say which with --flight"), "{ended}");
+    assert!(ended.err.contains("--start is for one flight: say which with --flight"), "{ended}");
     let named = [&import[..], &["--flight", "hover", "--start", &other]].concat();
     let ended = bench.expect(2, &named);
-    assert!(ended.err.contains("the logs of another start have no place beside it"), "{ended}");
+    assert!(ended.err.contains("the logs of another start cannot be placed beside it"), "{ended}");
     let ended = bench.run(&import);
     assert!(ended.err.contains("warning: empty holds no log (.BIN)"), "{ended}");
 }

@@ -83,7 +83,7 @@ fn an_abort_before_the_start_takes_the_start_back_for_everyone() {
         assert!(ended.out.contains(ended_by), "{ended}");
         assert!(ended.out.contains("on the ground, its start is taken back"), "{ended}");
         assert_eq!(flight.end(), Some(3), "{}", flight.said());
-        assert!(flight.said().contains("taken back for everyone"), "{}", flight.said());
+        assert!(flight.said().contains("cancelled on all drones"), "{}", flight.said());
     }
 }
 
@@ -180,7 +180,7 @@ fn a_drone_that_does_not_confirm_is_left_to_its_remote_control_in_time() {
     assert!(ended.out.contains("drone 77: NOT HEARD"), "{ended}");
     assert!(ended.err.contains("not confirmed after 10 s: 2. Use the remote controls"), "{ended}");
     flight.signal("-INT");
-    flight.hear("Ctrl-C again ends it at once");
+    flight.hear("Ctrl-C again to end at once");
     flight.signal("-INT");
     flight.end();
 }
@@ -224,7 +224,7 @@ fn a_start_that_was_left_on_drones_stands_in_nobodys_way() {
         said.contains("Took back a start that an earlier flight has left: drones 1, 2"),
         "{said}"
     );
-    assert!(said.contains("Loaded 2 of 2 drones (they had the file)"), "{said}");
+    assert!(said.contains("Loaded 2 of 2 drones (they already had the file)"), "{said}");
     bench.expect(0, &[&ends("abort", &link)[..], &["--drones", "2"]].concat());
     assert_eq!(flight.end(), Some(3), "{}", flight.said());
     let printed = flight.printed();
@@ -285,7 +285,7 @@ fn arguments_are_refused_before_anything_is_sent() {
     let ended = bench.expect(2, &["fly", "campaign", "--lead", "8"]);
     assert!(ended.err.contains("a lead between 20 and 43200 s"), "{ended}");
     let ended = bench.expect(2, &["fleet", "upload", "campaign/plan.json"]);
-    assert!(ended.err.contains("is a file: give the campaign's folder"), "{ended}");
+    assert!(ended.err.contains("is a file; give the campaign's folder"), "{ended}");
     let host = ["fleet", "status", "campaign", "--connect", "udpin:no-such-host.invalid:14550"];
     let ended = bench.expect(1, &host);
     assert!(ended.err.contains("the host name is not known"), "{ended}");

@@ -142,7 +142,7 @@ fn an_interrupted_run_leaves_whole_logs_and_goes_on() {
     assert!(signal.success());
     let ended = Ended::of(&child.wait_with_output().unwrap());
     assert_eq!(ended.code, Some(130), "{ended}");
-    assert_eq!(ended.err, "error: interrupted; the same command goes on where it stopped\n");
+    assert_eq!(ended.err, "error: interrupted; run the same command again to resume\n");
     let left: Vec<_> = contents(&logs).into_iter().map(|(path, _)| path).collect();
     let half = left
         .iter()

@@ -201,11 +201,11 @@ fn what_has_no_end_is_refused_and_what_never_begins_is_not_waited_for() {
     fs::write(bench.path("mapping.toml"), MAPPING).unwrap();
     let waiting = bench.run(&["analyze", "--csv", "mapping.toml", "--no-report"]);
     let said = format!("{}{}", waiting.out, waiting.err);
-    assert!(waiting.code != Some(0) && said.contains("it is no file, but a pipe"), "{waiting}");
+    assert!(waiting.code != Some(0) && said.contains("it is not a file but a pipe"), "{waiting}");
     let mapping = MAPPING.replace("ladder.csv", "/dev/zero");
     fs::write(bench.path("mapping.toml"), mapping).unwrap();
     let zeros = bench.run(&["analyze", "--csv", "mapping.toml", "--no-report"]);
     assert!(zeros.code != Some(0), "{zeros}");
     let mapping = bench.expect(1, &["analyze", "--csv", "ladder.csv", "--no-report"]);
-    assert!(mapping.err.contains("it is no file, but a pipe"), "{mapping}");
+    assert!(mapping.err.contains("it is not a file but a pipe"), "{mapping}");
 }

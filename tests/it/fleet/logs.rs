@@ -217,7 +217,7 @@ fn a_log_that_grows_is_a_prefix_of_what_is_on_the_drone() {
     let folder = tempfile::tempdir().unwrap();
     let done = one(&mut net, folder.path(), &options(1));
     let failure = done.failure.unwrap();
-    assert_eq!(failure.reason, "its log still grows, and what is home is its beginning");
+    assert_eq!(failure.reason, "its log still grows, and only its beginning has been downloaded");
     assert_eq!(done.pulled[0].verified, Verified::Sample);
     assert!(done.pulled[0].incomplete.is_some());
     let bytes = fs::read(folder.path().join("01.BIN")).unwrap();

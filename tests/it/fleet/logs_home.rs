@@ -174,7 +174,10 @@ fn a_log_that_is_longer_on_the_drone_is_continued() {
     let ours = home(logs);
     logging(&mut net).vehicle.storage.put(LOG, content(5, 600_000)).unwrap();
     let done = pull_again(&mut net, logs, 4);
-    assert_eq!(done.unchecked.unwrap(), "the drone's log is another (--again brings it)");
+    assert_eq!(
+        done.unchecked.unwrap(),
+        "the drone's log is a different one (--again downloads it)"
+    );
     assert!(home(logs) == ours && !logs.join("01.BIN.part").exists());
 }
 

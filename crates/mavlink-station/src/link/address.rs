@@ -44,7 +44,7 @@ pub enum Way {
 pub enum AddressError {
     /// The address has no known form.
     #[error(
-        "{text:?} is no link: give udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, \
+        "{text:?} is not a link: give udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, \
          serial:DEVICE:BAUD or a file with one of these per line; N@ before it puts it into \
          network N"
     )]

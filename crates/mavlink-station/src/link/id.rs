@@ -29,7 +29,7 @@ impl fmt::Display for DroneId {
 
 /// Error of a text that is not a drone id.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{text:?} is no drone id: give a system id (1 to 255) or network:system, such as 1:12")]
+#[error("{text:?} is not a drone id: give a system id (1 to 255) or network:system, such as 1:12")]
 pub struct NoDroneId {
     text: String,
 }

@@ -36,7 +36,7 @@ pub enum VehicleError {
     #[error(transparent)]
     File(#[from] untrusted_io::file::FileError),
     /// There is no built-in vehicle of this name.
-    #[error("there is no built-in vehicle {}; there are: {known}", plain(name))]
+    #[error("there is no built-in vehicle {}; the built-in ones are: {known}", plain(name))]
     Unknown {
         /// Name as asked for.
         name: String,

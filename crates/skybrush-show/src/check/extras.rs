@@ -8,7 +8,7 @@ use crate::ShowDrone;
 
 pub(super) fn check(input: &CheckInput<'_>, collector: &mut Collector) {
     for doubt in &input.show.doubts {
-        let remedy = "mend it in the program that made the show";
+        let remedy = "correct it in the program that made the show";
         collector.add(0, Finding::new(Severity::Warning, "file", doubt.clone(), remedy));
     }
     let with = |has: fn(&ShowDrone) -> bool| -> Vec<String> {

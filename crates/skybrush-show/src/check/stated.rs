@@ -67,7 +67,7 @@ impl Stated {
                 verb: "turns at",
                 unit: "deg/s",
                 severity: Severity::Warning,
-                remedy: "turn slower, or state the rate that is meant",
+                remedy: "turn more slowly, or state the intended rate",
                 limit,
                 tolerance: TOLERANCE_DPS,
                 squared: false,

@@ -111,7 +111,7 @@ pub enum Command {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LightError {
     /// A command that does not exist; players end the program there.
-    #[error("byte {offset}: {code:#04x} is no light command; the program ends there")]
+    #[error("byte {offset}: {code:#04x} is not a light command; the program ends there")]
     UnknownCommand {
         /// Offset of the command in the program, bytes.
         offset: usize,

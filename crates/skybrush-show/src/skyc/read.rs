@@ -197,7 +197,8 @@ impl Reader<'_> {
             // People's timelines: a cue that cannot be read is not worth a show.
             let items = cues.value.get("items").and_then(Value::as_array);
             if items.is_none() {
-                show.doubts.push(format!("{}: the cues are no list and are left out", cues.entry));
+                show.doubts
+                    .push(format!("{}: the cues are not a list and were skipped", cues.entry));
             }
             let mut bad = Vec::new();
             for (index, item) in items.into_iter().flatten().enumerate() {
@@ -214,7 +215,7 @@ impl Reader<'_> {
                     count => format!(" (and {} more)", count - 1),
                 };
                 show.doubts.push(format!(
-                    "{}: cue {number}, {}, has no time and is left out{others}",
+                    "{}: cue {number}, {}, has no time and was skipped{others}",
                     cues.entry,
                     short(item)
                 ));

@@ -18,7 +18,7 @@ pub(in crate::cli) fn refuse(
     match [&key].into_iter().chain(options).find(|(_, is_given, _)| *is_given) {
         None => Ok(()),
         Some((option, _, instead)) => Err(CommandError::Usage(format!(
-            "{option} does nothing through Skybrush Server: {instead}; nothing was sent"
+            "{option} has no effect through Skybrush Server: {instead}; nothing was sent"
         ))),
     }
 }

@@ -192,12 +192,12 @@ impl Home<'_> {
                 Ok(Room::Free(None))
             }
             Some(Belongs::Yes) => Ok(Room::Kept(format!(
-                "{file} is home, of the same start (--again takes its place)"
+                "{file} of the same start is already here (--again replaces it)"
             ))),
             Some(Belongs::Unknown(why)) => {
-                Ok(Room::Kept(format!("{file} is home: {why} (--again takes its place)")))
+                Ok(Room::Kept(format!("{file} is already here: {why} (--again replaces it)")))
             }
-            None => Ok(Room::Kept(format!("{file} is home (--again takes its place)"))),
+            None => Ok(Room::Kept(format!("{file} is already here (--again replaces it)"))),
         }
     }
 

@@ -38,7 +38,7 @@ pub(super) fn slot_of(
         }
     });
     let Some(home) = identity.home(start) else {
-        let nowhere = "its system id is of no slot, and it does not say where it stood";
+        let nowhere = "its system id belongs to no slot, and it does not say where it stood";
         return by_id.ok_or_else(|| NoSlot::Elsewhere(nowhere.to_owned()));
     };
     let frame = plan.site.frame();
@@ -57,17 +57,18 @@ pub(super) fn slot_of(
         (_, _) if is_clear && !has_table => Ok(near),
         (None, _) if is_clear => Ok(near),
         (Some(own), Some(own_m)) if is_clear => Err(NoSlot::Contradiction(format!(
-            "its system id is of slot {own}, but it stood {near_m:.1} m from the home of slot {near} \
-             and {own_m:.1} m from its own"
+            "its system id belongs to slot {own}, but it stood {near_m:.1} m from the home of \
+             slot {near} and {own_m:.1} m from its own"
         ))),
         (Some(own), Some(own_m)) if own_m <= FAR_M => Ok(own),
         (Some(own), Some(own_m)) => Err(NoSlot::Elsewhere(format!(
-            "its system id is of slot {own}, but it stood {} from there: it was flown elsewhere",
+            "its system id belongs to slot {own}, but it stood {} from there: it was flown \
+             elsewhere",
             metres(own_m)
         ))),
         (_, _) if near_m < FAR_M => Err(NoSlot::Contradiction(format!(
-            "its system id is of no slot, and it stood {near_m:.1} m from the home of slot {near}, the \
-             nearest"
+            "its system id belongs to no slot, and it stood {near_m:.1} m from the home of slot \
+             {near}, the nearest"
         ))),
         (_, _) => {
             Err(NoSlot::Elsewhere("neither its system id nor its home is in the plan".to_owned()))

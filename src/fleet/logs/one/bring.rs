@@ -18,7 +18,11 @@ impl PullOne {
         self.held = part.have().total();
         let is_shrunk = part.have().end() > self.size;
         if is_shrunk {
-            return self.restart(part, "the log on the drone is smaller than what came of it");
+            return self.restart(
+                part,
+                "the log on the drone is smaller than what was downloaded \
+                                       of it",
+            );
         }
         let Some(target) = self.target.clone() else { return Stage::Over };
         if looks && part.have().total() > 0 {
@@ -102,7 +106,7 @@ impl PullOne {
             _ if sample.differs => self.on_another(part),
             Ok(_) => self.begin(part, false),
             Err(FtpError::Changed { .. }) => {
-                self.restart(part, "the log on the drone is smaller than what came of it")
+                self.restart(part, "the log on the drone is smaller than what was downloaded of it")
             }
             Err(error) => self.on_ftp_failed(part, error),
         }
@@ -117,11 +121,10 @@ impl PullOne {
             FtpError::Silent { .. } => self.fail_silent(error.to_string()),
             FtpError::Sink(reason) => self.fail(reason, "make room and run again"),
             FtpError::Changed { .. } => {
-                self.restart(part, "the log on the drone is smaller than what came of it")
+                self.restart(part, "the log on the drone is smaller than what was downloaded of it")
             }
-            FtpError::TooLarge { .. } => {
-                self.fail(error.to_string(), "allow more (--max-size), if that is its size")
-            }
+            FtpError::TooLarge { .. } => self
+                .fail(error.to_string(), "raise the limit (--max-size) if that is its real size"),
             error => self.fall_back(format!("MAVFTP: {error}")),
         }
     }

@@ -93,16 +93,17 @@ impl PullOne {
                 // The one at home is looked after all the same.
                 self.done.failure.get_or_insert(Failure {
                     reason: format!(
-                        "the drone has a newer log (number {newest}) than the one at home (number \
-                         {known}), and no start was written down that tells which is of this flight"
+                        "the drone has a newer log (number {newest}) than the one here (number \
+                         {known}), and no start was recorded that says which belongs to this \
+                         flight"
                     ),
-                    advice: "`--log newest` brings it; the one at home then moves to logs/flight-0",
+                    advice: "`--log newest` downloads it; the one here then moves to logs/flight-0",
                     kept_bytes: 0,
                 });
             }
         }
         if self.number_at_home().is_some() && known.is_none() && self.is_excused() {
-            let why = "the drone has this log no more".to_owned();
+            let why = "the drone no longer has this log".to_owned();
             self.leave(self.file.clone(), Some(why));
             return Stage::Over;
         }
@@ -130,7 +131,7 @@ impl PullOne {
         if targets.is_empty() {
             let last = logs.iter().map(|(number, ..)| number.to_string()).collect::<Vec<_>>();
             let reason = format!("the drone has no such log, only {}", last.join(", "));
-            return self.fail(reason, "choose one of them (--log)");
+            return self.fail(reason, "choose one of these (--log)");
         }
         self.targets = targets;
         self.next_target()
@@ -156,7 +157,11 @@ impl PullOne {
         if target.size > self.options.most_size {
             let most = self.options.most_size;
             let error = FtpError::TooLarge { size: target.size, most };
-            return self.fail(error.to_string(), "allow more (--max-size), if that is its size");
+            return self.fail(
+                error.to_string(),
+                "raise the limit (--max-size) if that is its \
+                 real size",
+            );
         }
         (self.rounds, self.restarts, self.grows) = (0, 0, None);
         self.ways = Ways::default();

@@ -171,7 +171,8 @@ impl PullOne {
     pub(super) fn ends_without(&mut self, reason: String) -> Stage {
         self.fail_for_sure(
             reason,
-            "its log may be on its card: `updraft logs import`; or bring another by its number (--log)",
+            "its log may be on its card: `updraft logs import`; or download another by its \
+             number (--log)",
         )
     }
 

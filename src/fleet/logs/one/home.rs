@@ -105,7 +105,9 @@ impl PullOne {
                 self.begun = if is_whole { Begun::Whole } else { Begun::Beginning };
                 Needed::Rest
             }
-            _ => Needed::Nothing(Some("the drone's log is another, and not longer".to_owned())),
+            _ => Needed::Nothing(Some(
+                "the drone's log is a different one, and not longer".to_owned(),
+            )),
         }
     }
 
@@ -113,13 +115,13 @@ impl PullOne {
     pub(super) fn on_another(&mut self, part: PartFile) -> Stage {
         if self.begun == Begun::Whole {
             part.discard();
-            let why = "the drone's log is another (--again brings it)".to_owned();
+            let why = "the drone's log is a different one (--again downloads it)".to_owned();
             if let Some(target) = self.target.take() {
                 self.leave(target.file, Some(why));
             }
             return self.next_target();
         }
-        self.restart(part, "the log on the drone is another")
+        self.restart(part, "the log on the drone is a different one")
     }
 
     /// It is there.

@@ -99,7 +99,7 @@ impl PullOne {
                 Found::Others { why, is_later } => return self.put_by(part, entry, &why, is_later),
                 Found::Unknown(why) => {
                     self.done.failure.get_or_insert(Failure {
-                        reason: format!("its log does not say of which flight it is: {why}"),
+                        reason: format!("its log does not say which flight it belongs to: {why}"),
                         advice: "look at it (`updraft inspect`); it is kept as this flight's",
                         kept_bytes: entry.size_bytes,
                     });
@@ -122,7 +122,8 @@ impl PullOne {
         }
         if entry.incomplete.is_some() {
             self.done.failure.get_or_insert(Failure {
-                reason: "its log still grows, and what is home is its beginning".to_owned(),
+                reason: "its log still grows, and only its beginning has been downloaded"
+                    .to_owned(),
                 advice: "wait until 15 s after disarming (with LOG_DISARMED 1: reboot it), then \
                          run again",
                 kept_bytes: entry.size_bytes,

@@ -37,7 +37,7 @@ impl PullOne {
         if self.heartbeat.is_none_or(|at| at < self.sized) {
             self.held = part.have().total();
             return self.fail_silent(
-                "its heartbeats do not come, so it may be armed and its log grow".to_owned(),
+                "no heartbeats arrive, so it may be armed and its log may be growing".to_owned(),
             );
         }
         if self.reason.is_some() {
@@ -94,7 +94,7 @@ impl PullOne {
             }
             Some(size) if size < self.size => {
                 self.resize(size);
-                self.restart(part, "the log on the drone is smaller than what came of it")
+                self.restart(part, "the log on the drone is smaller than what was downloaded of it")
             }
             // The log messages know no checksum.
             size => self.compare(part, size.is_some() && self.reason.is_none()),

@@ -41,8 +41,8 @@ impl Crew<'_> {
             flying.iter().map(|(drone, words)| format!("drone {drone} {words}")).collect();
         (!words.is_empty()).then(|| {
             format!(
-                "{}: nothing was sent. `updraft fleet watch` follows the flight and brings its logs, \
-                 `updraft fleet abort` sends everyone home",
+                "{}: nothing was sent. `updraft fleet watch` follows the flight and downloads \
+                 its logs, `updraft fleet abort` sends all drones home",
                 words.join(", ")
             )
         })

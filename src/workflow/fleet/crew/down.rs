@@ -35,10 +35,17 @@ pub(super) fn bring_down(
         |drone: &DroneId| eyes.telemetry().get(*drone).and_then(Drone::is_armed) == Some(false);
     host.insist(match action {
         _ if drones.iter().all(is_down) => {
-            "Stopped: nobody is in the air; the start is taken back. Ctrl-C again ends it at once"
+            "Stopped: no drone is in the air; the start is being cancelled. Press Ctrl-C again \
+             to end at once"
         }
-        Action::Return => "Stopped: the drones are sent home. Ctrl-C again ends it at once",
-        Action::Land => "Stopped: the drones land where they are. Ctrl-C again ends it at once",
+        Action::Return => {
+            "Stopped: the drones are being sent home. Press Ctrl-C again to end at \
+                           once"
+        }
+        Action::Land => {
+            "Stopped: the drones are ordered to land where they are. Press Ctrl-C \
+                         again to end at once"
+        }
     });
     host.next_ends();
     eyes.finishes = true;
@@ -79,32 +86,32 @@ pub(super) fn stopped(
     let confirmed = all(Aborted::is_confirmed);
     WorkflowError::Stopped(match (choice, is_guided) {
         (Choice::Return | Choice::Land, _) if grounded => {
-            "stopped: everyone is on the ground, and nobody has a start any more"
+            "stopped: all drones are on the ground, and none has a start any more"
         }
         (Choice::Return, _) if confirmed => {
             "stopped: this program has sent them home, and all have confirmed it; `updraft fleet \
              watch` follows them"
         }
         (Choice::Land, _) if confirmed => {
-            "stopped: this program has told them to land, and all have confirmed it; `updraft fleet \
-             watch` follows them"
+            "stopped: this program has ordered them to land, and all have confirmed it; `updraft \
+             fleet watch` follows them"
         }
         (Choice::Return, _) => {
             "stopped: this program has sent them home; those above that have not confirmed it need \
              their remote controls; `updraft fleet watch` follows them"
         }
         (Choice::Land, _) => {
-            "stopped: this program has told them to land; those above that have not confirmed it \
-             need their remote controls; `updraft fleet watch` follows them"
+            "stopped: this program has ordered them to land; those above that have not confirmed \
+             it need their remote controls; `updraft fleet watch` follows them"
         }
         (Choice::Leave, false) => {
-            "stopped: nobody watches any more, and the drones fly on by themselves (those on the \
-             ground take off at their time); `updraft fleet watch` goes on watching, `updraft fleet \
-             abort` sends them home, `updraft fleet land` lands them where they are"
+            "stopped: the flight is no longer watched, and the drones fly on by themselves \
+             (those on the ground take off on time); `updraft fleet watch` resumes watching, \
+             `updraft fleet abort` sends them home, `updraft fleet land` lands them where they are"
         }
         (Choice::Leave, true) => {
-            "stopped: nobody flies the drones any more. Those in the air stop where they are within \
-             3 s (GUID_TIMEOUT) and return when they have missed the station for 5 s \
+            "stopped: the drones no longer receive targets. Those in the air stop where they are \
+             within 3 s (GUID_TIMEOUT) and return when they have not heard the station for 5 s \
              (FS_GCS_ENABLE); `updraft fleet watch` follows them, `updraft fleet land` lands them \
              where they are"
         }

@@ -32,9 +32,7 @@ impl std::fmt::Display for Ended {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Landed => f.write_str("has landed"),
-            Self::Fell => {
-                f.write_str("restarted in the air and did not land by itself: look for it")
-            }
+            Self::Fell => f.write_str("restarted in the air and fell: look for it"),
             Self::NeverTookOff => f.write_str("never took off"),
             Self::OnGround => f.write_str("is on the ground, its flight was not seen"),
             Self::NotSeen(words) => f.write_str(words),

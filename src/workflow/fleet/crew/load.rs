@@ -201,10 +201,12 @@ impl Crew<'_> {
 fn loaded(loaded: usize, count: usize, written: usize) -> String {
     let how = match (written, loaded - written.min(loaded)) {
         (_, 0) => "",
-        (0, _) => " (they had the file)",
-        (_, 1) => " (1 of them had the file)",
+        (0, _) => " (they already had the file)",
+        (_, 1) => " (1 of them already had the file)",
         (_, had) => {
-            return format!("Loaded {loaded} of {count} drones ({had} of them had the file)");
+            return format!(
+                "Loaded {loaded} of {count} drones ({had} of them already had the file)"
+            );
         }
     };
     format!("Loaded {loaded} of {count} drones{how}")
@@ -218,8 +220,8 @@ mod tests {
     fn who_had_the_file_is_said_where_there_is_somebody() {
         assert_eq!(loaded(0, 2, 0), "Loaded 0 of 2 drones");
         assert_eq!(loaded(2, 2, 2), "Loaded 2 of 2 drones");
-        assert_eq!(loaded(2, 2, 0), "Loaded 2 of 2 drones (they had the file)");
-        assert_eq!(loaded(3, 4, 2), "Loaded 3 of 4 drones (1 of them had the file)");
+        assert_eq!(loaded(2, 2, 0), "Loaded 2 of 2 drones (they already had the file)");
+        assert_eq!(loaded(3, 4, 2), "Loaded 3 of 4 drones (1 of them already had the file)");
         assert_eq!(loaded(9, 9, 4), "Loaded 9 of 9 drones (5 of them had the file)");
     }
 }

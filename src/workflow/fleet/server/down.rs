@@ -127,13 +127,13 @@ pub(super) fn interrupted(
              their remote controls, or Skybrush Live"
         }
         Choice::Land => {
-            "stopped: this program has told them to land; those above that have not confirmed it \
-             need their remote controls, or Skybrush Live"
+            "stopped: this program has ordered them to land; those above that have not confirmed \
+             it need their remote controls, or Skybrush Live"
         }
         Choice::Leave => {
-            "stopped: nobody watches any more, and the drones fly on by themselves; `updraft fleet \
-             abort` through the server sends them home; so do Skybrush Live and their remote \
-             controls"
+            "stopped: the flight is no longer watched, and the drones fly on by themselves; \
+             `updraft fleet abort` through the server sends them home; so do Skybrush Live and \
+             their remote controls"
         }
     })
 }

@@ -29,8 +29,8 @@ pub(super) fn not_authorized_yet(
     if client.authorized()?.is_some() {
         return Err(WorkflowError::Unsafe(format!(
             "a start is authorized on this server already, by Skybrush Live or another updraft: \
-             nothing was sent; `updraft fleet watch` follows a flight of this folder to its end, and if \
-             nobody flies, `{}` takes the start back",
+             nothing was sent; `updraft fleet watch` follows a flight of this folder to its end, \
+             and if no drone is flying, `{}` cancels the start",
             flight.abort()
         )));
     }
@@ -63,7 +63,7 @@ pub(super) fn load(
 fn refusals(host: &dyn Host, table: &Table) -> BTreeMap<String, String> {
     let reason = |row: &Row| {
         if row.no_go.is_empty() {
-            return "nothing was sent, as others are not ready".to_owned();
+            return "nothing was sent, because others are not ready".to_owned();
         }
         let why = row.no_go.join(", ");
         host.warn(&format!("drone {} (slot {}) {why}: nothing was sent", row.drone, row.slot));

@@ -13,7 +13,7 @@ pub(super) fn sum_up(host: &dyn Host, rows: &[LogOutput]) {
         rows.len(),
         match there {
             0 => String::new(),
-            there => format!(" ({there} had come before)"),
+            there => format!(" ({there} already here)"),
         }
     ));
 }

@@ -137,7 +137,7 @@ pub(super) fn take_back(
 /// What went wrong, and what became of the start.
 fn after(error: WorkflowError, back: Option<WorkflowError>) -> WorkflowError {
     let Some(failed) = back else {
-        let back = "the start was taken back";
+        let back = "the start was cancelled";
         return match error {
             WorkflowError::Unsafe(text) => WorkflowError::Unsafe(format!("{text}; {back}")),
             WorkflowError::Usage(text) => WorkflowError::Usage(format!("{text}; {back}")),

@@ -82,7 +82,7 @@ impl<'a> Shows<'a> {
             let reason = match uploads.ended.remove(id) {
                 Some(Ok(_)) => continue,
                 Some(Err(reason)) => reason,
-                None => "the server says nothing of it".to_owned(),
+                None => "the server does not report on it".to_owned(),
             };
             host.warn(&format!("drone {id} (slot {slot}): {reason}"));
             refused.insert(id.clone(), reason);

@@ -33,7 +33,8 @@ impl Puller<'_> {
     pub(super) fn not_listed(&self, one: &mut One, reason: &str) -> Option<Job> {
         if one.has_flight_home() && self.wish.which == Which::Flight && !self.wish.again {
             one.unchecked = Some(format!(
-                "{} is home and of this flight, but was not compared with the drone's: {reason}",
+                "{} is here and belongs to this flight, but was not compared with the drone's: \
+                 {reason}",
                 one.file
             ));
             one.over = true;
@@ -65,7 +66,7 @@ impl Puller<'_> {
         if logs.is_empty() {
             let known = known.join(", ");
             return one.fail(format!(
-                "the drone has no such log, only {known}; choose one of them (--log)"
+                "the drone has no such log, only {known}: choose one of these (--log)"
             ));
         }
         for log in logs {
@@ -110,8 +111,8 @@ impl Puller<'_> {
                 _ if one.has_flight_home() => {
                     one.newer = Some(number(newest));
                     one.unchecked = Some(format!(
-                        "{} is home and of this flight; the drone has this log no more, or the \
-                         server numbers it otherwise",
+                        "{} is here and belongs to this flight; the drone no longer has this \
+                         log, or the server numbers it differently",
                         one.file
                     ));
                     return None;
@@ -120,9 +121,9 @@ impl Puller<'_> {
                 _ => {
                     let newest = number(newest);
                     return one.fail(format!(
-                        "the drone has a newer log (number {newest}) than the one at home, and no \
-                         start was written down that tells which is of this flight: `--log newest` \
-                         brings it; the one at home then moves to logs/flight-0"
+                        "the drone has a newer log (number {newest}) than the one here, and no \
+                         start was recorded that says which belongs to this flight: `--log \
+                         newest` downloads it; the one here then moves to logs/flight-0"
                     ));
                 }
             }
@@ -143,8 +144,8 @@ impl Puller<'_> {
     fn add_target(&self, one: &mut One, file: String, log: LogEntry) -> Option<()> {
         if log.size > self.wish.most_bytes {
             one.fail(format!(
-                "log {} has {} bytes, and at most {} are allowed; allow more (--max-size), if \
-                 that is its size",
+                "log {} has {} bytes, and at most {} are allowed; raise the limit (--max-size) \
+                 if that is its real size",
                 log.id, log.size, self.wish.most_bytes
             ));
             return None;

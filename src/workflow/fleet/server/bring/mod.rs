@@ -82,7 +82,8 @@ pub(super) fn bring(
         .iter()
         .filter_map(|(slot, id)| {
             let one = puller.ones.get(id)?;
-            let open = || broke.clone().unwrap_or_else(|| "nothing was said of it".to_owned());
+            let open =
+                || broke.clone().unwrap_or_else(|| "the server did not report on it".to_owned());
             let reason = one.failure.clone().or_else(|| (!one.over).then(open));
             let state = match &reason {
                 Some(_) => "missing",

@@ -91,8 +91,8 @@ impl One {
         let Some(target) = self.targets.pop() else {
             let reason = self.not_it.take()?;
             return self.fail(format!(
-                "{reason}; it may be on its card: `updraft logs import`; or bring another by its \
-                 number (--log)"
+                "{reason}; it may be on its card: `updraft logs import`; or download another by \
+                 its number (--log)"
             ));
         };
         Some(self.fetch(drone, target))
@@ -166,7 +166,7 @@ impl Puller<'_> {
                     return Some(one.check(drone, bytes));
                 }
                 let why = format!(
-                    "its size could not be asked for after the download: {}",
+                    "its size could not be requested after the download: {}",
                     advised(&reason)
                 );
                 return self.keep_beginning(drone, one, &target, &bytes, &why);
@@ -174,7 +174,7 @@ impl Puller<'_> {
         };
         one.lists = 0;
         let Some(log) = logs.into_iter().find(|log| log.id == target.log.id) else {
-            return one.fail(format!("the drone has log {} no more", target.log.id));
+            return one.fail(format!("the drone no longer has log {}", target.log.id));
         };
         target.log = log;
         if target.log.size == came && one.grows {
@@ -188,7 +188,7 @@ impl Puller<'_> {
             return Some(one.fetch(drone, target));
         }
         let why = format!(
-            "it was listed with {} bytes after {came} came: it is still being written",
+            "it was listed with {} bytes after {came} had arrived: it is still being written",
             target.log.size
         );
         self.keep_beginning(drone, one, &target, &bytes, &why)

@@ -19,8 +19,8 @@ impl Puller<'_> {
         self.make_room(one)?;
         if one.home == AtHome::Foreign && !self.wish.again {
             one.fail(format!(
-                "{} is there, but the manifest does not know it; move the file away, or bring the \
-                 log again in its place (--again)",
+                "{} exists, but is not in the manifest; move the file away, or replace it by \
+                 downloading the log again (--again)",
                 one.file
             ));
         }
@@ -100,7 +100,7 @@ impl Puller<'_> {
         // The server tells no checksum: a log is taken when it can be read.
         let log = Log::from_bytes(bytes.to_vec());
         if let Some(reason) = log.why_not_a_log() {
-            return one.fail(format!("what came as log {id} is no DataFlash log: {reason}"));
+            return one.fail(format!("log {id} as received is not a DataFlash log: {reason}"));
         }
         let identity = identify(&log);
         drop(log);
@@ -113,8 +113,7 @@ impl Puller<'_> {
         if let Some(name) = of_other.filter(|_| self.wish.which == Which::Flight) {
             file = older(one, &target.log);
             one.newer.get_or_insert(number(&target.log));
-            one.not_it =
-                Some(format!("log {id} of the drone is of another flight: it is of {name}"));
+            one.not_it = Some(format!("log {id} of the drone belongs to another flight: {name}"));
         }
         if let (Some(wanted), Some(start)) = (wanted, start) {
             let is_wanted = self.wish.which == Which::Flight;
@@ -134,12 +133,15 @@ impl Puller<'_> {
                     } else {
                         one.targets.clear();
                     }
-                    one.not_it = Some(format!("log {id} of the drone is of another flight: {why}"));
+                    one.not_it = Some(format!(
+                        "log {id} of the drone belongs to another flight: \
+                         {why}"
+                    ));
                 }
                 Belongs::Unknown(why) if is_wanted => {
                     one.failure.get_or_insert(format!(
-                        "its log does not say of which flight it is: {why}; look at it (`updraft \
-                         inspect`): it is kept as this flight's"
+                        "its log does not say which flight it belongs to: {why}; look at it \
+                         (`updraft inspect`): it is kept as this flight's"
                     ));
                 }
                 _ => {}
@@ -178,7 +180,7 @@ impl Puller<'_> {
                 || matches!(home, AtHome::Intact(entry) if entry.incomplete.is_none())
         };
         if log.why_not_a_log().is_some() || is_whole(&self.shelf.at_home(&target.file)) {
-            return one.fail(format!("log {id} did not come whole: {why}; {advice}"));
+            return one.fail(format!("log {id} did not arrive complete: {why}; {advice}"));
         }
         let flight = LogFlight::of(&identify(&log), None);
         drop(log);

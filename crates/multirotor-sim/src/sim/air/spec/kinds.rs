@@ -54,7 +54,7 @@ const DEGREES: (f64, f64) = (-360.0, 360.0);
 const LENGTH: (f64, f64) = (1.0, 1e6);
 const MEAN_WIND: Preset = Derived("the mean wind");
 
-const WIND: Key = key("wind", "m/s", MEAN_WIND, SPEED, "speed it moves along with");
+const WIND: Key = key("wind", "m/s", MEAN_WIND, SPEED, "speed at which it is carried along");
 const FROM: Key = key("from", "deg", Value(270.0), DEGREES, "where the wind comes from");
 const MODES: Key = key("modes", "", Value(600.0), (50.0, 20_000.0), "number of waves");
 const W_STAR: Key = key("w_star", "m/s", Value(2.0), (0.0, 10.0), "convective velocity scale w*");
@@ -90,7 +90,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "drone-constant",
-        help: "a constant updraft of its own for each drone",
+        help: "a separate constant updraft for each drone",
         keys: &[key("sd", "m/s", Required, (0.0, 10.0), "standard deviation between drones")],
     },
     Kind {
@@ -99,7 +99,7 @@ pub const KINDS: &[Kind] = &[
         keys: &[
             W_STAR,
             ZI,
-            key("n", "", Value(3.0), (1.0, 1_000.0), "thermals on the square that repeats"),
+            key("n", "", Value(3.0), (1.0, 1_000.0), "thermals in the repeating square"),
             key("x", "m", Derived("random"), (-1e5, 1e5), "show x of the first one at time 0"),
             key("y", "m", Derived("random"), (-1e5, 1e5), "show y of the first one at time 0"),
             WIND,
@@ -112,7 +112,13 @@ pub const KINDS: &[Kind] = &[
         keys: &[
             W_STAR,
             ZI,
-            key("height", "m", Value(100.0), (1.0, 5_000.0), "height that lambda and tau are for"),
+            key(
+                "height",
+                "m",
+                Value(100.0),
+                (1.0, 5_000.0),
+                "height at which lambda and tau apply",
+            ),
             key("lambda", "m", Derived("0.28 zi sqrt(height/zi)"), LENGTH, "correlation length"),
             key("tau", "s", Derived("lambda / sd at height"), LENGTH, "correlation time"),
             WIND,

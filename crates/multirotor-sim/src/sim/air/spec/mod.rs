@@ -34,7 +34,8 @@ pub struct AirSpec {
 pub enum AirSpecError {
     /// The kind of air does not exist.
     #[error(
-        "there is no air \"{}\"; there is {known}; or a .toml file of several ({builtin})",
+        "there is no kind of air \"{}\"; the kinds are {known}; or give a .toml file of several \
+         ({builtin})",
         plain(name)
     )]
     UnknownKind {
