@@ -163,7 +163,7 @@ impl PullOne {
             // Logs before it ended even earlier.
             self.targets.clear();
         }
-        self.not_it = Some(format!("log {number} of the drone is of another flight: {why}"));
+        self.not_it = Some(format!("log {number} of the drone belongs to another flight: {why}"));
         self.next_target()
     }
 
