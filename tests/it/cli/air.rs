@@ -267,7 +267,7 @@ fn a_station_that_died_is_replaced_and_the_logs_come_home() {
     let ended = bench.expect(0, &step(&["fleet", "watch"], &link));
     assert!(ended.err.contains("Watching: the start is"), "{ended}");
     assert!(ended.err.contains("2 of 2 drones have landed"), "{ended}");
-    assert!(ended.err.contains("Brought 2 of 2 logs home"), "{ended}");
+    assert!(ended.err.contains("Downloaded 2 of 2 logs"), "{ended}");
     assert!(!ended.err.contains("from its trajectory"), "{ended}");
     let journal = journal(&bench);
     let (_, after) = journal.split_once("\"step\":\"attached\"").unwrap();
@@ -280,7 +280,7 @@ fn a_station_that_died_is_replaced_and_the_logs_come_home() {
         }
         let ended = bench.expect(0, &step(&["fleet", "watch"], &link));
         assert!(!ended.err.contains("have landed"), "{ended}");
-        assert!(ended.err.contains("UTC is over; its logs are at home"), "{ended}");
+        assert!(ended.err.contains("UTC is over; its logs are downloaded"), "{ended}");
         assert!(bench.path("campaign/logs/02.BIN").exists());
     }
 }

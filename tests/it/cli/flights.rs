@@ -43,7 +43,7 @@ fn the_logs_of_an_aborted_flight_never_stand_for_those_of_the_next() {
 
     let again = bench.expect(0, &fly(&link));
     assert!(again.err.contains("Moved 2 logs of an earlier flight to campaign/logs/flight-1"));
-    assert!(again.err.contains("Brought 2 of 2 logs home"), "{again}");
+    assert!(again.err.contains("Downloaded 2 of 2 logs"), "{again}");
     assert!(!again.err.contains("already here"), "{again}");
     for (slot, aborted) in (1..).zip(&aborted) {
         let now = log(&bench, &format!("logs/{slot:02}.BIN"));
@@ -137,11 +137,11 @@ fn the_logs_of_one_flight_never_stand_for_those_of_another_that_nobody_flew() {
     let with = [&flights("hover")[..], &["--speed", "10"]].concat();
     let _fleet = bench.fleet(&station, &with);
     let ended = bench.expect(0, &[&fly(&link)[..], &flights("hover")].concat());
-    assert!(ended.err.contains("Brought 2 of 2 logs home"), "{ended}");
+    assert!(ended.err.contains("Downloaded 2 of 2 logs"), "{ended}");
     let pull = ["logs", "pull", "campaign", "--connect", &link, "--flight", "calibration"];
     for _ in 0..2 {
         let ended = bench.expect(3, &pull);
-        let why = "log 1 of the drone is of another flight: it is of hover";
+        let why = "log 1 of the drone belongs to another flight: that of hover";
         assert!(ended.err.contains(why), "{ended}");
         assert!(!bench.path("campaign/calibration/logs/01.BIN").exists(), "{ended}");
     }
@@ -173,7 +173,7 @@ fn records_that_cannot_be_read_are_told_before_anybody_flies() {
     let (bench, _fleet, link) = stage(&["--speed", "10"]);
     fs::create_dir_all(bench.path("campaign/logs")).unwrap();
     for (file, hint) in [
-        ("manifest.json", "or move it away: `updraft logs pull --again` brings the logs again"),
+        ("manifest.json", "or move it away: `updraft logs pull --again` downloads the logs again"),
         ("start.json", "or move it away; without it the start of this flight is unknown"),
     ] {
         let path = bench.path(&format!("campaign/logs/{file}"));

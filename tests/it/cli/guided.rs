@@ -128,7 +128,10 @@ fn ctrl_c_sends_guided_drones_home() {
     assert_eq!(flight.end(), Some(130), "{}", flight.said());
     let said = flight.said();
     assert!(said.contains("drone 1: returns") && said.contains("drone 2: returns"), "{said}");
-    assert!(said.contains("has sent them home") && !said.contains("run the same command"), "{said}");
+    assert!(
+        said.contains("has sent them home") && !said.contains("run the same command"),
+        "{said}"
+    );
     let journal = fs::read_to_string(bench.path("campaign/fleet-journal.ndjson")).unwrap();
     assert!(journal.contains("\"step\":\"abort\"") && journal.contains("returns"), "{journal}");
     assert_eq!(modes(&bench, &link), ["RTL", "RTL"]);

@@ -122,8 +122,8 @@ fn gap_refuses_a_log_of_another_start() {
     shift(&logs[1], 3_000_000);
     let gap = ["gap", "campaign", "--replicates", "20"];
     let ended = bench.expect(3, &gap);
-    let refused = "02.BIN: its show began 3,000 s after this flight's start (start.json): it is of \
-                   another flight";
+    let refused = "02.BIN: its show began 3,000 s after this flight's start (start.json): it belongs \
+                   to another flight";
     assert!(words(&ended).contains(refused), "{ended}");
     shift(&logs[0], 3_000_000);
     let ended = bench.expect(5, &gap);
@@ -189,7 +189,7 @@ fn cards_are_imported_into_the_flights_they_are_of() {
     assert!(told.contains("warning: no log of slots 1, 2 of hover"), "{ended}");
     let taken = "cards/drone-1/00000007.BIN -> drone 2 -> slot 2 -> calibration (02.BIN)";
     assert!(ended.out.lines().any(|line| line == taken), "{ended}");
-    assert!(ended.err.contains("Took 2 logs from cards"), "{ended}");
+    assert!(ended.err.contains("Imported 2 logs from cards"), "{ended}");
     // As it advised.
     let unix_s = unix_s.to_string();
     let named = [&import[..], &["--flight", "hover", "--start", &unix_s]].concat();
@@ -208,7 +208,7 @@ fn cards_are_imported_into_the_flights_they_are_of() {
         write_start(&bench.path("campaign").join(flight), start);
     }
     let ended = bench.expect(0, &import);
-    assert!(ended.err.contains("Took 0 logs from cards (4 already here)"), "{ended}");
+    assert!(ended.err.contains("Imported 0 logs from cards (4 already here)"), "{ended}");
     let json = bench.expect(0, &[&import[..], &["--json"]].concat()).json("updraft.import/1");
     assert_eq!(json["there"].as_array().unwrap().len(), 4, "{json}");
     assert_eq!(json["flights"][1]["logs"][0]["card"], "cards/drone-2/00000009.BIN");
@@ -268,7 +268,7 @@ fn logs_that_are_cut_or_damaged_are_taken_and_never_passed_over_in_silence() {
     fs::create_dir(&hover).unwrap();
     write_start(&bench.path("campaign/hover"), start);
     let import = ["logs", "import", "campaign", "card", "--flight", "hover"];
-    for took in ["Took 2 logs from cards", "Took 0 logs from cards (2 already here)"] {
+    for took in ["Imported 2 logs from cards", "Imported 0 logs from cards (2 already here)"] {
         let ended = bench.expect(3, &import);
         assert!(ended.err.contains(took), "{ended}");
         assert!(

@@ -31,12 +31,12 @@ fn one_drone_that_is_off_keeps_nobody_elses_log_away() {
     // Nobody has said who flies what: where they stand tells.
     let pull = ["logs", "pull", "home", "--connect", &link, "--wait", "8"];
     let two = bench.expect(0, &[&pull[..], &["--slots", "1,2"]].concat());
-    assert!(two.err.contains("Brought 2 of 2 logs home"), "{two}");
+    assert!(two.err.contains("Downloaded 2 of 2 logs"), "{two}");
     let ended = bench.expect(3, &pull);
     for line in [
         "waiting for a drone on slot 3",
         "no log of slot 3: no drone is known to stand on it",
-        "Brought 3 of 3 logs home",
+        "Downloaded 3 of 3 logs",
         &format!(
             "To try again: updraft logs pull home --flight calibration --connect {link} --slots 3"
         ),

@@ -221,7 +221,7 @@ fn a_start_that_was_left_on_drones_stands_in_nobodys_way() {
     flight.hear("Authorized.");
     let said = flight.said();
     assert!(
-        said.contains("Took back a start that an earlier flight has left: drones 1, 2"),
+        said.contains("Cancelled a start left over from an earlier flight: drones 1, 2"),
         "{said}"
     );
     assert!(said.contains("Loaded 2 of 2 drones (they already had the file)"), "{said}");

@@ -243,7 +243,7 @@ fn where_it_stood_tells_unless_a_table_says_otherwise() {
     let (taken, doubts) = slot(&flights);
     assert_eq!(taken, None);
     let [Doubt::Slot { why, .. }] = doubts.as_slice() else { panic!("{doubts:?}") };
-    let said = "its system id is of slot 7, but it stood 0.3 m from the home of slot 2 and ";
+    let said = "its system id belongs to slot 7, but it stood 0.3 m from the home of slot 2 and ";
     assert!(why.starts_with(said), "{why}");
 }
 
@@ -380,7 +380,7 @@ fn logs_at_home_of_another_start_make_room_and_nothing_is_overwritten() {
     fs::remove_file(home.join("manifest.json")).unwrap();
     let tried = Tried::of(&cards, &[wanted(second)], &CARRY());
     let Carried::Left(why) = &tried.outcomes[0].1 else { panic!("{:?}", tried.outcomes) };
-    assert_eq!(why, "01.BIN is home, of the same start (--again takes its place)");
+    assert_eq!(why, "01.BIN of the same start is already here (--again replaces it)");
     let how = Carry { again: true, ..CARRY() };
     Tried::of(&cards, &[wanted(second)], &how);
     assert_eq!(fs::read(home.join("01.BIN")).unwrap(), second_log);
@@ -490,5 +490,5 @@ fn forty_nine_cards_of_two_flights() {
     flights[0].is_wanted = false;
     let tried = Tried::of(&cards, &flights, &CARRY());
     assert_eq!(tried.taken(&cards), expected[1]);
-    assert!(tried.left(&cards).contains("it is of calibration"));
+    assert!(tried.left(&cards).contains("it belongs to calibration"));
 }

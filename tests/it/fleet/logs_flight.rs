@@ -140,7 +140,7 @@ fn a_drone_that_did_not_log_the_flight_is_named() {
     let mut net = net(&[(1, log_of(&[100])), (2, log_of(&[1000]))]);
     let failure = pulled(&mut net, logs, Which::Flight, Some(flight(1, 9000))).failure.unwrap();
     assert!(
-        failure.reason.starts_with("log 2 of the drone is of another flight: "),
+        failure.reason.starts_with("log 2 of the drone belongs to another flight: "),
         "{}",
         failure.reason
     );
@@ -180,8 +180,8 @@ fn without_a_start_a_newer_log_on_the_drone_is_never_passed_over_in_silence() {
     let failure = pulled(&mut net, logs, Which::Flight, None).failure.unwrap();
     assert_eq!(
         failure.reason,
-        "the drone has a newer log (number 2) than the one at home (number 1), and no start was \
-         written down that tells which is of this flight"
+        "the drone has a newer log (number 2) than the one here (number 1), and no start was \
+         recorded that says which belongs to this flight"
     );
     assert!(file(logs, "01.BIN") == first);
     assert_eq!(pulled(&mut net, logs, Which::Newest, None).failure, None);

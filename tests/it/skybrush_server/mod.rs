@@ -183,7 +183,10 @@ fn the_logs_of_a_second_flight_do_not_stay_those_of_the_first() {
     let others = Fake::start(&plan(&bench), Fault::None);
     let pulled = run(&bench, &others, &["logs", "pull", "campaign", "--again"]);
     assert_eq!(pulled.code, Some(3), "{pulled}");
-    assert!(pulled.err.contains("log 2 of the drone is of another flight: its show"), "{pulled}");
+    assert!(
+        pulled.err.contains("log 2 of the drone belongs to another flight: its show"),
+        "{pulled}"
+    );
     assert!(at_home("01.BIN") == support::log_of("02", start));
     bench.expect(0, &["logs", "verify", "campaign"]);
 }
@@ -202,7 +205,7 @@ fn a_recorded_flight_through_the_real_server_is_flown_again() {
     assert_eq!(ended.code, Some(0), "{ended}");
     assert!(ended.out.contains("GO: 2 of 2 drones are ready"), "{ended}");
     assert!(ended.err.contains("2 of 2 drones have landed"), "{ended}");
-    assert!(ended.err.contains("Brought 2 of 2 logs home"), "{ended}");
+    assert!(ended.err.contains("Downloaded 2 of 2 logs"), "{ended}");
     bench.expect(0, &["logs", "verify", "campaign"]);
 }
 
@@ -684,7 +687,7 @@ fn who_watches_in_place_of_another_station_can_end_the_flight() {
     server.let_go();
     let (said, code) = watching.end();
     assert_eq!(code, Some(130), "{said}");
-    assert!(said.contains("the start was taken back, nobody takes off"), "{said}");
+    assert!(said.contains("the start was cancelled; no drone takes off"), "{said}");
     assert!(!server.is_authorized());
     assert!(!bench.path("campaign/logs/start.json").exists());
 }
@@ -720,7 +723,7 @@ fn who_is_on_the_ground_when_the_watch_begins_is_not_said_to_have_landed() {
     assert!(ended.err.contains(found), "{ended}");
     // The other says that it has landed.
     assert!(ended.err.contains("1 of 2 drones have landed"), "{ended}");
-    assert!(ended.err.contains("Brought 2 of 2 logs home"), "{ended}");
+    assert!(ended.err.contains("Downloaded 2 of 2 logs"), "{ended}");
 }
 
 #[test]
@@ -767,7 +770,7 @@ fn a_flight_that_is_aborted_is_none_without_loss() {
     assert_eq!(code, Some(3), "{said}");
     assert!(said.contains("drone 01 left the show before its end (flight mode rth)"), "{said}");
     assert!(said.contains("2 of 2 drones have landed"), "{said}");
-    assert!(said.contains("Brought 2 of 2 logs home"), "{said}");
+    assert!(said.contains("Downloaded 2 of 2 logs"), "{said}");
 }
 
 #[test]
@@ -809,7 +812,7 @@ fn a_start_that_comes_too_late_or_cannot_be_taken_back_is_said() {
     assert_eq!(ended.code, Some(2), "{ended}");
     assert!(!late.is_authorized());
     assert!(ended.err.contains("s before the start it is too late to authorize it"), "{ended}");
-    assert!(ended.err.contains("the start was taken back"), "{ended}");
+    assert!(ended.err.contains("the start was cancelled"), "{ended}");
     let mut said = refusals(&[Fault::Gone("SHOW-SETCFG")]);
     let (uncleared, _) = fly(&planned(), Fault::NakClear);
     assert_eq!(uncleared.code, Some(0), "{uncleared}");
@@ -861,7 +864,7 @@ fn a_signal_before_the_start_takes_it_back() {
     assert_eq!(code, Some(130), "{said}");
     assert!(!server.is_authorized(), "{said}");
     assert!(!server.asked().iter().any(|body| body["type"] == "UAV-RTH"), "{said}");
-    assert!(said.contains("the start was taken back, nobody takes off"), "{said}");
+    assert!(said.contains("the start was cancelled; no drone takes off"), "{said}");
 }
 
 #[test]

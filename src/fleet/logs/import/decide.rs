@@ -286,7 +286,7 @@ impl Work<'_> {
             .collect();
         for take in others {
             let name = &self.flights[take.flight].name;
-            self.reasons.entry(take.log).or_insert_with(|| format!("it is of {name}"));
+            self.reasons.entry(take.log).or_insert_with(|| format!("it belongs to {name}"));
         }
         for index in 0..self.logs.len() {
             if taken.contains(&index) || doubtful.contains(&index) {

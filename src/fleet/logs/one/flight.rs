@@ -48,7 +48,7 @@ impl PullOne {
             let of_none = LogFlight { number: 0, ..LogFlight::of(&identity, None) };
             let found = match identity.of_any(&self.options.other_starts) {
                 // The one before it may be of this flight.
-                Some(name) => Found::Others { why: format!("it is of {name}"), is_later: true },
+                Some(name) => Found::Others { why: format!("that of {name}"), is_later: true },
                 None => Found::Ours,
             };
             return (found, Some(of_none));
