@@ -170,8 +170,8 @@ pub(super) fn no_measurement(analysis: &Analysis) -> Option<&'static str> {
     let laws = analysis.flights.iter().any(|flight| flight.results() > 0)
         && analysis.flights.iter().all(|flight| flight.purpose == Purpose::Calibration);
     laws.then_some(
-        "No measurement flight: these are laws, and no map of the air. With a hover or a scan in the \
-         same campaign, or with --hold analysis.json beside one, they measure it.",
+        "No measurement flight: there are laws, but no map of the air. For a map, analyse a \
+         hover or a scan in the same campaign, or another one with --hold analysis.json.",
     )
 }
 
@@ -190,8 +190,8 @@ pub(super) fn nothing(flight: &FlightAnalysis) -> Option<String> {
                 "No result: no drone of this flight could be analysed."
             }
             (true, false, _) => {
-                "No ladder found: this flight has no legs of constant vertical speed, \
-                             so that no law could be fitted."
+                "No ladder found: this flight has no legs of constant vertical speed, so no law \
+                 could be fitted."
             }
             (true, true, _) => {
                 "No calibration: the ladder was found, but no law could be fitted to it \
@@ -203,7 +203,7 @@ pub(super) fn nothing(flight: &FlightAnalysis) -> Option<String> {
             }
             (false, true, false) => "No hover found: there is nothing to measure the air in.",
             (false, _, true) if flight.unmeasured.is_empty() => {
-                "No calibration: without its laws there is no value of the air."
+                "No calibration: without its laws the air cannot be measured."
             }
             (false, _, true) => {
                 "No value of the air: no drone has a usable hover (the reasons follow)."

@@ -140,8 +140,8 @@ fn what_it_means(finding: &Finding) -> String {
         }
         Finding::Name { .. } => "The model did not have this effect.".to_owned(),
         Finding::Class { effects, .. } => format!(
-            "One of these {} is missing; in this flight they leave the same trace, so that choosing \
-             one would be a guess. The first stands for them in the model.",
+            "One of these {} is missing; in this flight they leave the same trace, so choosing \
+             one would be a guess. The first one represents them in the model.",
             effects.len()
         ),
         Finding::Unknown { formula, .. } => {
@@ -150,7 +150,7 @@ fn what_it_means(finding: &Finding) -> String {
                 .map_or_else(String::new, |text| format!(" It is about {}.", micro(text)));
             format!(
                 "No effect of the library explains this, but it is too regular for air and \
-                 noise.{formula} It is not in the model file, as there is no effect to put there."
+                 noise.{formula} It is not in the model file, because there is no effect to add."
             )
         }
     }

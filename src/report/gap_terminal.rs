@@ -111,8 +111,8 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
     page.say(
         "",
         &format!(
-            "  gain {:.1} nats (by chance at most {} flights of 1,000 pass {:.1}); moves the pulse by \
-             {:.1} us",
+            "  gain {:.1} nats (by chance, at most {} flights in 1,000 exceed {:.1}); moves the \
+             pulse by {:.1} us",
             step.gain_nats,
             per_thousand(step.alpha),
             step.threshold_nats,
@@ -186,7 +186,11 @@ fn undetectable(page: &mut Page, all: &[Detectable]) {
         all.iter().filter(|one| !one.would_be_seen).partition(|one| !one.parameter.is_empty());
     if sought.is_empty() && all.iter().any(|one| one.would_be_seen) {
         page.line("", "");
-        page.say("", "At its usual size every effect that is looked for would have been seen.", 2);
+        page.say(
+            "",
+            "Every effect that is searched for would have been seen at its usual size.",
+            2,
+        );
     }
     if !sought.is_empty() {
         let rows: Vec<Vec<String>> = sought.iter().map(|one| hidden_row(one)).collect();

@@ -62,9 +62,10 @@ pub(super) fn percent(Interval { value, low, high }: Interval) -> (String, Strin
 pub(super) fn map_words(map: &MapGain) -> String {
     let signed = |value: f64| format!("{}{}", if value < 0.0 { "" } else { "+" }, fixed(value, 2));
     format!(
-        "The map of the air of {} by the model, against the truth ({}, running means of 10 s): rms \
-         error {} m/s before, {} m/s after (answering zero: {}); what all drones have in common {} \
-         before, {} after (by the air that both flights shared ±{} is to be expected); the rest {} and {}",
+        "The map of the air of {} by the model, against the truth ({}, running means of 10 s): \
+         rms error {} m/s before, {} m/s after (answering zero: {}); the part common to all \
+         drones: {} before, {} after (the air that both flights shared makes ±{} likely); the \
+         rest: {} and {}",
         clean(&map.flight),
         count(map.drones, "drone"),
         fixed(map.before.rms_mps, 2),
@@ -84,7 +85,7 @@ const EVEN_Z: f64 = 4.0;
 /// Why an effect of the usual size would not have been seen for sure.
 pub(super) fn lost(one: &Detectable) -> &'static str {
     if one.usual_z.abs() >= EVEN_Z {
-        "at its usual size it is seen in some of such flights only"
+        "at its usual size it is seen in only some such flights"
     } else {
         "at its usual size it is lost in air and noise; larger ones are seen"
     }

@@ -64,7 +64,7 @@ pub fn text(next: &Next) -> String {
 fn misses(next: &Next) -> String {
     let missed: Vec<&Asked> = next.questions.iter().filter(|asked| !asked.reached).collect();
     format!(
-        "it misses what is wanted in {} of {} questions, by z {}",
+        "it falls short in {} of {} questions, by z {}",
         missed.len(),
         next.questions.len(),
         missed

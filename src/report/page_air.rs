@@ -52,7 +52,7 @@ pub(super) fn air_section(
     let no_map = if map.is_scan() {
         Some("The drones moved: what they measured is shown along their tracks.")
     } else if map.drones.iter().all(|drone| drone.position_m.is_none()) {
-        Some("Where the drones stood is not known, so that there is no map of the ground.")
+        Some("Where the drones stood is not known, so there is no map over the ground.")
     } else {
         Some("No drone gave an estimate of the vertical air speed.")
     };

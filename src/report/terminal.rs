@@ -337,9 +337,9 @@ impl Output {
                 "",
                 "  ",
                 &format!(
-                    "against the truth: rms error of the 10 s values {} m/s{} (answering zero: {}), bias \
-                     {}, rms without it {}; {} % of {} values and {} % of {} means inside of their 95 % \
-                     intervals",
+                    "against the truth: rms error of the 10 s values {} m/s{} (answering zero: \
+                     {}), bias {}, rms without it {}; {} % of {} values and {} % of {} means \
+                     inside their 95 % intervals",
                     fixed(truth.rms_mps, 3),
                     air.rms_error.map_or_else(String::new, |rms| {
                         format!(", of the drones' means {}", fixed(rms, 3))

@@ -96,11 +96,11 @@ pub(in crate::report) fn figure(
         name,
         title,
         caption: format!(
-            "The grid from above (forward is up), at the show times above the \
-             panels: {} s apart in the first row, {} s in the second, which goes on from the third \
-             panel of the first. Running 10 s estimates, linear between the drones (Delaunay \
-             triangles), nothing outside of their hull. One scale for all panels, white is still \
-             air. Crosses in the first panel are the drones; grey ones have no value.{truth}{wind}",
+            "The grid from above (forward is up), at the show times above the panels: {} s apart \
+             in the first row, {} s in the second, which goes on from the third panel of the \
+             first. Running 10 s estimates, linear between the drones (Delaunay triangles), \
+             nothing outside their hull. One scale for all panels, white is still air. Crosses in \
+             the first panel are the drones; grey ones have no value.{truth}{wind}",
             fixed(coarse_s, 0),
             fixed(fine_s, 0),
         ),

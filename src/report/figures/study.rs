@@ -162,7 +162,7 @@ fn still(study: &StudyResult) -> Option<Figure> {
             match unused {
                 0 => "No window was left out".to_owned(),
                 n => format!(
-                    "{} not used, as a motor was at its limit or the drone did not follow",
+                    "{} not used, because a motor was at its limit or the drone did not follow",
                     count(n, "window")
                 ),
             }

@@ -49,20 +49,21 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     let name = "gap-ladder".to_owned();
     let title = "The speed ladder with the model before and after".to_owned();
     let panels = if whole {
-        "(a) Mean pulse of all drones at each commanded speed, measured (with 95 % bars for air and \
-         noise) and modelled: dashed before, solid with everything found. A constant that differs \
-         from drone to drone is no error of the model and is removed. (b) Measured less modelled. "
+        "(a) Mean pulse of all drones at each commanded speed, measured (with 95 % bars for air \
+         and noise) and modelled: dashed before, solid with everything found. A constant that \
+         differs from drone to drone is not an error of the model and is removed. (b) Measured \
+         minus modelled. "
     } else {
-        "Measured less modelled pulse at each commanded speed. "
+        "Measured minus modelled pulse at each commanded speed. "
     };
     Some(Figure {
         svg: sheet.svg(&name, &title),
         name,
         title,
         caption: format!(
-            "{panels}Grey bars: where 95 of 100 flights of a right model would lie. The air that all \
-             drones share moves every rung, as each was flown at its own time; only what leaves the \
-             bars in a pattern is the model's.{}",
+            "{panels}Grey bars: where 95 of 100 flights of a correct model would lie. The air \
+             that all drones share moves every rung, as each was flown at its own time; only what \
+             leaves the bars in a pattern is the model's.{}",
             of_unknown(verdict)
         ),
     })

@@ -78,14 +78,14 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
         name,
         title,
         caption: format!(
-            "Mean of measured less modelled pulse in each class: squares before, circles with \
-                  everything found in the model. Above zero the drones needed more pulse than the \
-                  model says. Grey bars: where 95 of 100 flights of a right model would lie, as the \
-                  air that all drones share and the noise allow. Each drone's own mean is removed, \
-                  except in the panels of places and drones, which have a scale of their own. Above \
-                  each panel: root mean square over the classes by their numbers of bins, as a pulse \
-                  and as the vertical air speed that would make it. All panels look at the same \
-                  bins: what depends on one of these often shows in others that went along with it.{}",
+            "Mean of measured minus modelled pulse in each class: squares before, circles with \
+             everything found in the model. Above zero the drones needed more pulse than the \
+             model says. Grey bars: where 95 of 100 flights of a correct model would lie, as the \
+             air that all drones share and the noise allow. Each drone's own mean is removed, \
+             except in the panels of places and drones, which have a scale of their own. Above \
+             each panel: root mean square over the classes by their numbers of bins, as a pulse \
+             and as the vertical air speed that would make it. All panels look at the same bins: \
+             what depends on one of these often shows in others that went along with it.{}",
             of_unknown(verdict)
         ),
     })

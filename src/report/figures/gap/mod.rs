@@ -79,7 +79,7 @@ fn key(drawing: &mut Drawing, [x, y]: [f64; 2]) {
 fn of_unknown(verdict: &Verdict) -> &'static str {
     let unknown = |step: &Step| matches!(step.finding, Finding::Unknown { .. });
     if verdict.steps.iter().any(unknown) {
-        " What is unknown is not in the model: it is still there after."
+        " What is unknown is not in the model, so it remains afterwards."
     } else {
         ""
     }

@@ -48,16 +48,16 @@ pub(in crate::report) fn figure(step: &Step, number: usize) -> Option<Figure> {
     let mut caption = String::new();
     if rivals > 0 {
         caption.push_str(
-            "(a) How much better each candidate explains the flight when it is added alone (gain of \
-             log-likelihood; bars go with its square root). Blue: found; grey: other effects; \
-             hatched: free shapes, less their penalty. Beyond the dashed line chance hardly ever \
-             gets. ",
+            "(a) How much better each candidate explains the flight when it is added alone (gain \
+             of log-likelihood; bars go with its square root). Blue: found; grey: other effects; \
+             hatched: free shapes, minus their penalty. Chance hardly ever reaches beyond the \
+             dashed line. ",
         );
     }
     if shape.is_some() {
         let _ = write!(
             caption,
-            "{}What it does to the pulse, by what it is drawn against.",
+            "{}What it does to the pulse, against the variable it is drawn along.",
             if rivals > 0 { "(b) " } else { "" }
         );
     }
