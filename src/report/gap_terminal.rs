@@ -208,7 +208,7 @@ fn undetectable(page: &mut Page, all: &[Detectable]) {
     if !other.is_empty() {
         let names: Vec<&str> = other.iter().map(|one| one.effect.as_str()).collect();
         page.line("", "");
-        page.say(DIM, &format!("Not looked for in the pulse: {}", names.join(", ")), 2);
+        page.say(DIM, &format!("Not searched for in the pulse: {}", names.join(", ")), 2);
     }
 }
 
