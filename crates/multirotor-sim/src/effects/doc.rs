@@ -13,14 +13,15 @@ use crate::vehicle::Vehicle;
 /// The vehicle's file sets an effect wrongly.
 pub fn markdown(vehicle: &Vehicle) -> Result<String, EffectError> {
     let mut text = format!(
-        "# Effects\n\nMade by `UPDATE=1 cargo test --test it effects::docs` from `crates/multirotor-sim/src/effects/`; do not \
-         edit.\n\nPhysics beyond the base model, each piece stated once: the simulator flies it, \
-         the analysis explains with it. `updraft effects show NAME` explains one for a vehicle, \
-         `updraft simulate --effect NAME` switches it on, `--effect NAME=off` off, and \
-         `--effect NAME.PARAMETER=NUMBER` sets a parameter; a vehicle's file does the same in \
+        "# Effects\n\nMade by `UPDATE=1 cargo test --test it effects::docs` from \
+         `crates/multirotor-sim/src/effects/`; do not edit.\n\nPhysics beyond the base model. \
+         Each effect is written once: the simulator flies it, and the analysis uses its closed \
+         form. `updraft effects show NAME` explains one for a vehicle, `updraft simulate \
+         --effect NAME` switches it on, `--effect NAME=off` off, and `--effect \
+         NAME.PARAMETER=NUMBER` sets a parameter; a vehicle's file does the same in \
          `[effects.NAME]`. Sizes and defaults below are those of `{}`. `du` is the change of the \
          rotor control pulse that steady flight needs, `L` its change per relative change of \
-         thrust ({:.0} us), `S` its change per vertical air speed.\n\n\
+         thrust ({:.0} us), `S` its change per vertical air speed.\n\n\\
          | effect | class | what it does | size (us) |\n|---|---|---|---|\n",
         vehicle.name,
         Reference::of(vehicle).sensitivity_us(),
