@@ -21,7 +21,7 @@ pub fn markdown(vehicle: &Vehicle) -> Result<String, EffectError> {
          NAME.PARAMETER=NUMBER` sets a parameter; a vehicle's file does the same in \
          `[effects.NAME]`. Sizes and defaults below are those of `{}`. `du` is the change of the \
          rotor control pulse that steady flight needs, `L` its change per relative change of \
-         thrust ({:.0} us), `S` its change per vertical air speed.\n\n\\
+         thrust ({:.0} us), `S` its change per vertical air speed.\n\n\
          | effect | class | what it does | size (us) |\n|---|---|---|---|\n",
         vehicle.name,
         Reference::of(vehicle).sensitivity_us(),
