@@ -417,7 +417,7 @@ fn validate_plan(plan: &Plan) -> Result<(), String> {
             ));
         }
         if slot.home_m.iter().any(|value| !value.is_finite()) {
-            return Err(format!("the home of slot {} is not a place", slot.slot));
+            return Err(format!("the home of slot {} is not a valid position", slot.slot));
         }
     }
     for group in &plan.groups {

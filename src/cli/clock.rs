@@ -21,7 +21,8 @@ impl TrialClock {
     /// When there is no such file, or no time before it.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
         let (unix_s, path) = text.split_once(':').ok_or("UNIX_S:FILE is meant")?;
-        let unix_s = unix_s.parse().map_err(|_| "its time is no number of seconds".to_owned())?;
+        let unix_s =
+            unix_s.parse().map_err(|_| "its time is not a number of seconds".to_owned())?;
         let file = std::fs::File::options().write(true).open(path);
         let file = std::sync::Arc::new(file.map_err(|error| format!("{path}: {error}"))?);
         let begun_ms = length(&file);

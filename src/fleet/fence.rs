@@ -52,7 +52,7 @@ pub fn fence_of(plan: &Plan, show: &Show) -> Result<Fence, FenceRefusal> {
     }
     let numbers = fence.polygon_m.iter().flatten().chain([&fence.margin_m]);
     if numbers.chain([&fence.max_altitude_m]).any(|number| !number.is_finite()) {
-        return Err(unusable("one of its numbers is none"));
+        return Err(unusable("one of its numbers is not a number"));
     }
     if fence.margin_m < 0.0 {
         return Err(unusable("its margin is negative"));

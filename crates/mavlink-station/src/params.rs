@@ -218,7 +218,10 @@ impl Conversation for SetParams {
 
 /// Error of reading all parameters: the list is incomplete.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("only {got} of {total} parameters came: bring the drone nearer to the radio and try again")]
+#[error(
+    "only {got} of {total} parameters arrived: bring the drone nearer to the radio and try \
+         again"
+)]
 pub struct ListError {
     /// Number of parameters that came.
     pub got: usize,

@@ -283,7 +283,7 @@ impl PullOne {
     fn fail_silent(&mut self, reason: String) -> Stage {
         self.fail(
             reason,
-            "switch it on and bring it within reach, then run again; or take its card and import",
+            "switch it on and bring it within reach, then run again; or import its card",
         )
     }
 
@@ -300,7 +300,7 @@ impl PullOne {
     /// By the log messages instead.
     fn fall_back(&mut self, reason: String) -> Stage {
         if self.reason.is_some() {
-            return self.fail(reason, "run again; or take its card and import");
+            return self.fail(reason, "run again; or import its card");
         }
         self.reason = Some(reason);
         self.targets.clear();

@@ -64,8 +64,8 @@ impl Stamps {
                 "understand",
                 path,
                 std::io::Error::other(format!(
-                    "{reason}; without it, frames of earlier days can be sent again: remove it only if \
-                 nobody could have recorded any"
+                    "{reason}; without it, frames of earlier days can be replayed: remove it \
+                     only if nobody can have recorded any"
                 )),
             )
         };

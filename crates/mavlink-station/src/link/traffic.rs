@@ -61,8 +61,8 @@ pub fn troubles(traffic: &BTreeMap<u16, Traffic>, doubled: &BTreeSet<DroneId>) -
             tell(
                 "dropped",
                 format!(
-                    "{} thrown away: more comes than can be looked at. Does somebody flood this \
-                     port? Drones may be heard late or not at all",
+                    "{} thrown away: more arrives than can be processed. Is somebody flooding \
+                     this port? Drones may be heard late or not at all",
                     if of.dropped == 1 {
                         "1 datagram was".to_owned()
                     } else {
@@ -92,8 +92,8 @@ pub fn troubles(traffic: &BTreeMap<u16, Traffic>, doubled: &BTreeSet<DroneId>) -
             tell(
                 "forged",
                 format!(
-                    "{} with a wrong signature, or sent before: refused. Somebody has another \
-                     key, or repeats what was said",
+                    "{} with a wrong signature, or replayed: refused. Somebody has another key, \
+                     or replays recorded frames",
                     frames(forged)
                 ),
             );

@@ -152,7 +152,7 @@ impl PullOne {
         match error {
             LogProtocolError::Silent { .. } => self.fail_silent(error.to_string()),
             LogProtocolError::Sink(reason) => self.fail(reason.clone(), "make room and run again"),
-            _ => self.fail(error.to_string(), "run again; or take its card and import"),
+            _ => self.fail(error.to_string(), "run again; or import its card"),
         }
     }
 

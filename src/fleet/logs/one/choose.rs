@@ -56,7 +56,7 @@ impl PullOne {
     }
 
     pub(super) fn on_log_list(&mut self, outcome: Result<Vec<Entry>, LogProtocolError>) -> Stage {
-        let advice = "run again; or take its card and import";
+        let advice = "run again; or import its card";
         match outcome {
             Ok(entries) => {
                 // Firmware counts from the oldest log that is there, and on beyond the newest by
