@@ -110,7 +110,7 @@ pub fn known(allow: &[String]) -> Result<(), WorkflowError> {
     names.sort_unstable();
     match allow.iter().find(|name| !names.contains(&name.as_str())) {
         Some(unknown) => Err(WorkflowError::Usage(format!(
-            "there is no check \"{unknown}\"; there are {}",
+            "there is no check \"{unknown}\"; the checks are {}",
             names.join(", ")
         ))),
         None => Ok(()),

@@ -85,7 +85,7 @@ pub enum WorkflowError {
     #[error("{0}")]
     Nothing(String),
     /// The work was stopped from outside.
-    #[error("interrupted; the same command goes on where it stopped")]
+    #[error("interrupted; run the same command again to resume")]
     Interrupted,
     /// The work was stopped from outside, with the fate of what was going on.
     #[error("{0}")]

@@ -65,7 +65,7 @@ pub fn hide(
 fn tell(host: &dyn Host, folder: &Path, cell: &Cell, truth: &Scenario, act: Act<'_>) {
     match act {
         Act::Sealed(hash) => host.say(&format!(
-            "Sealed: an effect that {} does not have, of a size that is usual\n  SHA-256 {hash} -> {}",
+            "Sealed: an effect that {} does not have, of a usual size\n  SHA-256 {hash} -> {}",
             cell.base.vehicle_name(),
             seal::truth_path(folder).shown()
         )),
@@ -112,7 +112,7 @@ fn make_room(folder: &Path, force: bool) -> Result<(), WorkflowError> {
     }
     if flight.exists() {
         return Err(WorkflowError::Usage(format!(
-            "{} is there and was not made by `run --hide`; choose another folder with -o",
+            "{} exists and was not made by `run --hide`; choose another folder with -o",
             flight.shown()
         )));
     }

@@ -50,7 +50,7 @@ impl Transfer for LogsBar<'_> {
         let tens = self.watch.elapsed().as_secs() / 10;
         if !self.context.interactive && self.said.fetch_max(tens, Ordering::Relaxed) < tens {
             self.context.say(&format!(
-                "bringing logs home: {:.1} of {:.1} MB, {} done after {}",
+                "downloading logs: {:.1} of {:.1} MB, {} done after {}",
                 done as f64 / 1e6,
                 total as f64 / 1e6,
                 words::count(drones_done, "drone"),

@@ -44,8 +44,8 @@ pub(in crate::cli) enum OnInterrupt {
     Land,
     /// They return to where they took off, and land there
     Return,
-    /// They are left flying: a show goes on by itself; those flown by --guided stop within 3 s and
-    /// return by their own failsafe
+    /// They are left flying: a show continues by itself; drones flown with --guided stop within 3 s
+    /// and return by their own failsafe
     Leave,
 }
 
@@ -62,7 +62,7 @@ impl From<OnInterrupt> for Choice {
 /// What Ctrl-C does in flight.
 #[derive(Clone, Copy, Debug, Args)]
 pub(in crate::cli) struct InterruptArgs {
-    /// What drones in the air do at Ctrl-C, SIGTERM or SIGHUP (a lost terminal)
+    /// What drones in the air do on Ctrl-C, SIGTERM or SIGHUP (a lost terminal)
     ///
     /// On a terminal it is asked, and this is the answer after 15 s, at Enter, and at a second
     /// Ctrl-C; elsewhere it is done at once. While it is done, another Ctrl-C ends the program at

@@ -44,15 +44,15 @@ pub(super) fn read_study(host: &dyn Host, root: &Path) -> Option<StudyResult> {
         Ok(study) if study.schema == STUDY_RESULT_SCHEMA => Some(study),
         Ok(study) => {
             host.warn(&format!(
-                "{} has the format \"{}\", this program reads \"{STUDY_RESULT_SCHEMA}\": the report \
-                 goes without Fig. 2 and Table I; fly the study again",
+                "{} has the format \"{}\", this program reads \"{STUDY_RESULT_SCHEMA}\": the \
+                 report does without Fig. 2 and Table I; fly the study again",
                 path.shown(),
                 study.schema
             ));
             None
         }
         Err(error) => {
-            host.warn(&format!("the report goes without Fig. 2 and Table I: {error}"));
+            host.warn(&format!("the report does without Fig. 2 and Table I: {error}"));
             None
         }
     }

@@ -105,7 +105,7 @@ fn held_record(
         match difference {
             Ok(None) => held += 1,
             Ok(Some(how)) => notes.push(format!(
-                "{} is not the log that flight.json speaks of: {how}",
+                "{} is not the log described in flight.json: {how}",
                 path_of(log).shown()
             )),
             // The analysis says why it cannot be read.
@@ -115,7 +115,7 @@ fn held_record(
     let holds = record.logs.is_empty() || (held > 0 && 2 * held >= files.len());
     if !holds && !files.is_empty() {
         *notes = vec![format!(
-            "{} speaks of other logs than those beside it: it is not used",
+            "{} describes other logs than those beside it: it is not used",
             at.record().shown()
         )];
     }

@@ -151,7 +151,7 @@ pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Wor
     };
     if logs.is_empty() {
         return Err(WorkflowError::Nothing(format!(
-            "{} holds no .BIN logs: give a campaign, or the folder in which they are",
+            "{} holds no .BIN logs: give a campaign, or the folder that contains them",
             path.shown()
         )));
     }
@@ -217,8 +217,10 @@ fn used(folders: &[FlightFolder], origin: LogOrigin) -> Option<String> {
     let any = others || folders.iter().any(|folder| folder.logs_of(origin).folder.is_dir());
     let left = match (others, origin) {
         (false, _) => "",
-        (true, LogOrigin::Real) => "; the simulated ones are left (--logs simulated takes them)",
-        (true, LogOrigin::Simulated) => "; those of real drones are left (--logs real takes them)",
+        (true, LogOrigin::Real) => "; the simulated ones are ignored (--logs simulated uses them)",
+        (true, LogOrigin::Simulated) => {
+            "; those of real drones are ignored (--logs real uses them)"
+        }
     };
     any.then(|| format!("Using the {}{left}", origin.words()))
 }

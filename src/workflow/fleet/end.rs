@@ -45,7 +45,7 @@ pub(crate) fn word(action: Action) -> &'static str {
 }
 
 /// Nobody is heard whom an order could reach.
-const NOBODY: &str = "no drone was heard: use their remote controls";
+const NOBODY: &str = "no drone was heard: use the remote controls";
 
 fn own_name(host: &dyn Host) -> String {
     format!("{:020}-{}", host.clock().unix_us(), std::process::id())
@@ -89,7 +89,7 @@ fn tell(host: &dyn Host, folder: &FlightFolder, notice: &Notice) {
             (format!("drone {drone}: {done}"), word(*action), outcome)
         }
         Notice::NoAnswer { reason } => {
-            (format!("warning: the order is carried out, but {reason}"), "", BTreeMap::new())
+            (format!("warning: the order is being carried out, but {reason}"), "", BTreeMap::new())
         }
     };
     host.insist(&text);
@@ -176,9 +176,9 @@ fn give_to(
             }
             if order.flight.is_some_and(|wanted| wanted != flight) {
                 // Whoever orders drones down in a hurry means those that fly.
-                host.insist(&format!("{flight} is flying: its station carries the order out"));
+                host.insist(&format!("{flight} is flying: its station will carry out the order"));
             } else {
-                host.say("The link is held by a running station: it carries the order out");
+                host.say("The link is held by a running station: it will carry out the order");
             }
             return follow(host, taken, patience).map(Some);
         }
@@ -234,12 +234,12 @@ fn follow(
         }
         if beat.1.elapsed() >= DEAD_AFTER {
             return Err(WorkflowError::Failed(format!(
-                "the station took the order and does not answer any more: {INSTEAD}"
+                "the station accepted the order and no longer answers: {INSTEAD}"
             )));
         }
         if host.check_stop().is_err() {
             return Err(WorkflowError::Stopped(
-                "stopped: nobody waits any more, and the running station goes on with the order",
+                "stopped waiting; the running station continues with the order",
             ));
         }
         host.clock().pause(PAUSE);
@@ -249,15 +249,15 @@ fn follow(
 /// Who has not confirmed yet.
 pub(crate) fn waiting(drones: impl Iterator<Item = DroneId>) -> String {
     let names: Vec<String> = drones.map(|drone| drone.to_string()).collect();
-    format!("not confirmed yet, told again and again: {}", names.join(", "))
+    format!("not confirmed yet, the order is being repeated: {}", names.join(", "))
 }
 
 /// What people do about drones that have not confirmed for a while.
 pub(crate) fn by_hand(drones: impl Iterator<Item = DroneId>) -> String {
     let names: Vec<String> = drones.map(|drone| drone.to_string()).collect();
     format!(
-        "warning: not confirmed after {} s: {}. Use the remote controls of these drones; they are told \
-         on",
+        "warning: not confirmed after {} s: {}. Use the remote controls of these drones; the \
+         order is still being repeated",
         PATIENCE.as_secs(),
         names.join(", ")
     )
@@ -299,9 +299,9 @@ pub(crate) fn end(
             return Ok(CarriedOut::ByStation(done));
         }
         unanswered = "no station answered within 3 s";
-        host.warn(&format!("{unanswered}; the drones are told from here"));
+        host.warn(&format!("{unanswered}; the order is sent from here"));
     } else if is_busy(campaign) {
-        unanswered = "another updraft works in this campaign and takes no orders";
+        unanswered = "another updraft is working in this campaign and accepts no orders";
     }
     let (folder, plan) = find(campaign, *flight)?;
     let mut station = open().map_err(|error| match error {

@@ -52,7 +52,7 @@ pub(crate) fn fly(
     let stands = crew.assign(wish.assign)?;
     crew.not_ordered_down()?;
     if !stands {
-        host.insist("NO-GO: nothing was sent, as the drones do not stand as planned");
+        host.insist("NO-GO: nothing was sent, because the drones do not stand as planned");
         return Ok((FlightOutput::no_go(&crew.plan.name, Vec::new(), None), Ending::NoGo));
     }
     crew.clear_leftover()?;

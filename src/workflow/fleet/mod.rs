@@ -37,7 +37,7 @@ use crate::mission::Plan;
 fn needs_folder(campaign: &Path) -> Result<(), WorkflowError> {
     if campaign.is_file() {
         return Err(WorkflowError::Usage(format!(
-            "{} is a file: give the campaign's folder",
+            "{} is a file; give the campaign's folder",
             campaign.shown()
         )));
     }

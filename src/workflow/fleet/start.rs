@@ -33,8 +33,9 @@ impl Lead {
 }
 
 /// What a person is told once a start is authorized.
-const AUTHORIZED: &str = "Authorized. Ctrl-C asks whether the drones land, return or fly on (without a \
-    terminal: --on-interrupt, by default they return); `updraft fleet abort` sends everyone home";
+const AUTHORIZED: &str = "Authorized. Ctrl-C asks whether the drones land, return or fly on \
+                          (without a terminal: --on-interrupt, by default they return); `updraft \
+                          fleet abort` sends all drones home";
 
 /// What gave an alarm, by drone.
 pub(crate) type Alarms = BTreeMap<DroneId, Vec<String>>;
@@ -56,7 +57,7 @@ pub(crate) fn fly_now(
         answer?
     };
     if !yes {
-        return Err(WorkflowError::Unsafe("not authorized: the start was taken back".to_owned()));
+        return Err(WorkflowError::Unsafe("not authorized: the start was cancelled".to_owned()));
     }
     crew.authorize(&mut start)?;
     crew.on_interrupt = lead.on_interrupt;
@@ -76,7 +77,7 @@ pub(crate) fn guide_now(
     let start = crew.set_guided_start(lead.options())?;
     say_start(host, crew, &start, "The start time, by the drones' clocks");
     if !lead.yes && !asked(host, "Authorize the start? Type yes: ", || crew.idle())? {
-        return Err(WorkflowError::Unsafe("not authorized: nobody takes off".to_owned()));
+        return Err(WorkflowError::Unsafe("not authorized: no drone takes off".to_owned()));
     }
     crew.authorize_guided(&start)?;
     crew.on_interrupt = lead.on_interrupt;
@@ -89,7 +90,7 @@ pub(crate) fn guide_now(
 pub(crate) fn needs_person(host: &dyn Host, lead: &Lead) -> Result<(), WorkflowError> {
     if !lead.yes && !host.is_attended() {
         return Err(WorkflowError::Usage(
-            "a start is authorized by a person, or with --yes; nothing was started".to_owned(),
+            "a start must be authorized by a person or with --yes; nothing was started".to_owned(),
         ));
     }
     Ok(())
@@ -151,7 +152,7 @@ pub(crate) fn landed(host: &dyn Host, crew: &Crew<'_>, alarms: &Alarms) -> Endin
     if why.is_empty() {
         return Ending::Done;
     }
-    host.warn(&format!("not a flight without loss: {}", why.join("; ")));
+    host.warn(&format!("the flight had losses: {}", why.join("; ")));
     Ending::Losses
 }
 

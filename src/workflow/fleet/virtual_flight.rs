@@ -89,7 +89,7 @@ fn virtual_crew<'a>(
 /// Everything before the start; virtual drones have no reason to refuse.
 fn make_start_ready(crew: &mut Crew<'_>) -> Result<Preflight, WorkflowError> {
     let no_go =
-        |what: &str| WorkflowError::Failed(format!("the virtual drones do not start: {what}"));
+        |what: &str| WorkflowError::Failed(format!("the virtual drones did not start: {what}"));
     if !crew.assign(true)? {
         return Err(no_go("they do not stand as planned"));
     }
@@ -141,7 +141,7 @@ fn launch(
             let table = make_start_ready(&mut crew)?;
             host.show(&table.to_string()).map_err(WorkflowError::Output)?;
             if !lead.yes && !asked(host, "Authorize the start? Type yes: ", || crew.idle())? {
-                return Err(WorkflowError::Unsafe("not authorized: nobody takes off".to_owned()));
+                return Err(WorkflowError::Unsafe("not authorized: no drone takes off".to_owned()));
             }
             Ok(Some(PreflightOutput::of(&table)))
         })?;

@@ -21,9 +21,9 @@ pub(crate) fn follow(
 ) -> Result<Ending, WorkflowError> {
     if !FleetTable::path(&crew.folder.0).exists() {
         return Err(WorkflowError::Nothing(format!(
-            "{} is not there, so nobody knows which drone flies which slot: no flight was \
-                 started from this folder. `updraft fleet status` shows who is heard, `updraft fleet \
-                 abort` needs no table",
+            "{} does not exist, so it is not known which drone flies which slot: no flight was \
+             started from this folder. `updraft fleet status` shows which drones are heard, \
+             `updraft fleet abort` needs no table",
             FleetTable::path(&crew.folder.0).shown()
         )));
     }
@@ -38,7 +38,7 @@ pub(crate) fn follow(
         Found::Over(start) => {
             crew.clear_leftover()?;
             let over = format!("The flight of {} is over", time_of_day(start));
-            host.say(&format!("{over}: everyone is on the ground"));
+            host.say(&format!("{over}: all drones are on the ground"));
             (Ending::Done, Some(over))
         }
     };
@@ -53,7 +53,7 @@ pub(crate) fn follow(
         .map(|one| one.slot.to_string())
         .collect();
     match over {
-        Some(over) if lost.is_empty() => host.say(&format!("{over}; its logs are at home")),
+        Some(over) if lost.is_empty() => host.say(&format!("{over}; its logs are downloaded")),
         Some(over) => {
             host.warn(&format!("{over}; not at home are the logs of slots {}", lost.join(", ")));
         }

@@ -32,7 +32,8 @@ pub(super) fn measured(
         (Some(campaign), _) => {
             if plan.is_some() {
                 return Err(WorkflowError::Usage(
-                    "a campaign has its own plan; --plan goes with --measured".to_owned(),
+                    "a campaign has its own plan; --plan can only be used with --measured"
+                        .to_owned(),
                 ));
             }
             is_campaign(campaign)?;
@@ -56,8 +57,8 @@ fn is_campaign(campaign: &Path) -> Result<(), WorkflowError> {
     match campaign::flights(campaign) {
         Ok(_) => Ok(()),
         Err(CampaignError::NoPlan { path }) => Err(WorkflowError::Nothing(format!(
-            "{} is no campaign folder: it has no plan.json and no campaign.json (for logs alone: \
-             --measured LOGS with --plan or --simulated)",
+            "{} is not a campaign folder: it has neither a plan.json nor a campaign.json (for \
+             logs alone: --measured LOGS with --plan or --simulated)",
             path.shown()
         ))),
         Err(error) => Err(error.into()),
@@ -103,7 +104,7 @@ fn chosen(
     {
         let names: Vec<&str> = flights.iter().map(|flight| flight.name.as_str()).collect();
         return Err(WorkflowError::Usage(format!(
-            "there is no flight \"{name}\"; flights are {}",
+            "there is no flight \"{name}\"; the flights are {}",
             names.join(", ")
         )));
     }

@@ -85,8 +85,8 @@ pub fn run(host: &dyn Host, request: &Request) -> Result<Compared, WorkflowError
     let hover = request.campaign.as_ref().and_then(|_| known_air(others));
     if request.campaign.is_some() && hover.is_none() && knows_air(&found) {
         host.say(&format!(
-            "the error of the map is not told: {} is the flight that is compared, and the campaign \
-             has no other measurement flight whose true air is known",
+            "the error of the map is not given: {} is the flight that is compared, and the \
+             campaign has no other measurement flight whose true air is known",
             found.name
         ));
     }
@@ -138,7 +138,7 @@ fn has_room(folder: &Path) -> Result<(), WorkflowError> {
     let theirs = [Path::new(MODEL), &page].into_iter().find(|file| folder.join(file).exists());
     match theirs {
         Some(file) if !folder.join(VERDICT).exists() => Err(WorkflowError::Usage(format!(
-            "{} is there and was not made by `updraft gap`; choose another folder with -o",
+            "{} exists and was not made by `updraft gap`; choose another folder with -o",
             folder.join(file).shown()
         ))),
         _ => Ok(()),

@@ -55,7 +55,7 @@ pub(super) fn prepare(
     match folder.read_record()? {
         Some(existing) if existing.source != record.source => {
             return Err(WorkflowError::Usage(format!(
-                "{} holds logs of real drones, which belong into logs/; move them there",
+                "{} holds logs of real drones, which belong in logs/; move them there",
                 folder.simulated().shown()
             )));
         }

@@ -118,8 +118,8 @@ pub(in crate::cli) fn preflight(
         context.emit(&table.to_string())?;
     }
     context.say(
-        "Which show they carry, their parameters and their fences the server does not tell: \
-         `updraft fly` uploads show and fence anew, and looks again before the start",
+        "The server does not report which show they carry, their parameters or their fences: \
+         `updraft fly` uploads show and fence anew, and checks again before the start",
     );
     Ok(if table.go() { Exit::Done } else { Exit::Unsafe })
 }
@@ -143,9 +143,12 @@ pub(in crate::cli) fn end(
     }
     if only.is_none() {
         ended.take_start_back()?;
-        context.emit("the start is taken back\n")?;
+        context.emit("the start is cancelled\n")?;
     } else if !ended.on_ground.is_empty() {
-        context.warn("the start stays for drones on the ground: without --drones it is taken back");
+        context.warn(
+            "the start stays valid for drones on the ground: without --drones it is \
+                      cancelled",
+        );
     }
     Ok(ended.ending().into())
 }

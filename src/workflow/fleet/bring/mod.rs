@@ -177,11 +177,9 @@ fn wanted(
     for line in table.drones.iter().filter(|_| !wish.quiet) {
         if let Some(drone) = flew(line) {
             host.warn(&format!(
-                "slot {} was flown by drone {drone}; {} says {} now: the log of drone {drone} is the \
-                 flight's",
-                line.slot,
-                FLEET_FILE,
-                line.drone
+                "slot {} was flown by drone {drone}; {} says {} now: the log of drone {drone} \
+                 belongs to the flight",
+                line.slot, FLEET_FILE, line.drone
             ));
         }
     }

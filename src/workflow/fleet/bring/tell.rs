@@ -33,7 +33,7 @@ pub(super) fn all(
         .filter_map(|one| Some((one.drone?, one.slot, one.unchecked.as_ref()?)));
     for (drone, slot, why) in unchecked {
         host.warn(&format!(
-            "the log of drone {drone} (slot {slot}) is there, but was not compared with the \
+            "the log of drone {drone} (slot {slot}) is here, but was not compared with the \
              drone's: {why}"
         ));
     }
@@ -53,7 +53,7 @@ pub(super) fn sum(host: &dyn Host, brought: &[Brought], watch: &Stopwatch) {
         bytes as f64 / 1e6,
         match state("there") {
             0 => String::new(),
-            there => format!(" ({there} had come before)"),
+            there => format!(" ({there} already here)"),
         }
     ));
 }
@@ -87,8 +87,8 @@ fn say_left_behind(host: &dyn Host, logs: &Path) {
         let is_of = |began: &GpsTime| later_s(*began, record.start).abs() <= SAME_START_S;
         if logs_in(&folder).is_empty() && !began.iter().any(is_of) {
             host.say(&format!(
-                "Nothing of flight {number} ({}) is at home: its logs may still be on the drones \
-                 (`updraft logs pull --log all`)",
+                "No log of flight {number} ({}) has been downloaded: they may still be on the \
+                 drones (`updraft logs pull --log all`)",
                 time_of_day(record.start)
             ));
         }
@@ -104,8 +104,8 @@ fn say_newer(host: &dyn Host, outcomes: &BTreeMap<DroneId, Outcome>) {
     let newer: Vec<String> = newer.collect();
     if !newer.is_empty() {
         host.warn(&format!(
-            "{} newer logs than those of this flight, which stay as they are: drones {}; `updraft \
-             logs pull --log newest` brings them",
+            "{} newer logs than those of this flight, which were left where they are: drones {}; \
+             `updraft logs pull --log newest` downloads them",
             if newer.len() == 1 { "one drone has" } else { "some drones have" },
             newer.join(", ")
         ));

@@ -84,12 +84,12 @@ impl Crew<'_> {
         };
         if open.is_empty() {
             self.host.say(&format!(
-                "Took back a start that an earlier flight has left: drones {}",
+                "Cancelled a start left over from an earlier flight: drones {}",
                 names(&left)
             ));
         } else {
             self.host.warn(&format!(
-                "an earlier start is left on drones {}, and they do not give it up",
+                "drones {} still have a start from an earlier flight, and it could not be cancelled",
                 names(&open)
             ));
         }
@@ -139,14 +139,14 @@ impl Crew<'_> {
             Some(start) => self.host.say(&format!("Watching: the start is {}", time_of_day(start))),
             None if nobody => {
                 return Err(WorkflowError::Nothing(
-                    "nobody is in the air, and no drone has a start: `updraft fly` flies, `updraft \
-                     logs pull` brings the logs of a flight that is over"
+                    "no drone is in the air or has a start: fly with `updraft fly`, or download \
+                     the logs of a finished flight with `updraft logs pull`"
                         .to_owned(),
                 ));
             }
             None => self.host.warn(
-                "no drone says when it started, and logs/start.json does not: they are watched, but \
-                 not held against their trajectories",
+                "neither the drones nor logs/start.json say when the flight started: the drones \
+                 are watched, but not compared with their trajectories",
             ),
         }
         let text = start.map(|start| format!("start at {}", start.tow_ms / 1000));

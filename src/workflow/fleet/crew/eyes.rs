@@ -59,7 +59,7 @@ impl<'a> Eyes<'a> {
         match journal {
             Ok(journal) => self.journal = Some(journal),
             Err(error) => {
-                self.host.warn(&format!("{error}; the flight is watched all the same"));
+                self.host.warn(&format!("{error}; the flight is still being watched"));
                 self.failed = Some(error);
             }
         }

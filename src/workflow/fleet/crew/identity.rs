@@ -66,7 +66,7 @@ impl Crew<'_> {
         let Some(record) = self.begun.take() else { return };
         if let Err(error) = record.withdraw(self.folder) {
             self.host.warn(&format!(
-                "{error}: logs/start.json still speaks of the start that was taken back"
+                "{error}: logs/start.json still describes the start that was cancelled"
             ));
         }
     }

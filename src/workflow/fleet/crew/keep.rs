@@ -102,9 +102,9 @@ impl Crew<'_> {
                 changes.drones.iter().filter(kept).map(|entry| entry.drone).collect();
             if !kept.is_empty() {
                 self.host.warn(&format!(
-                    "fences and failsafes stay as they are, as {why}: they are put back once every \
-                     drone of the fleet is heard and disarmed (one that is gone for good is taken \
-                     out of fleet.json)"
+                    "fences and failsafes stay as they are, because {why}: they are restored \
+                     once every drone of the fleet is heard and disarmed (remove a drone that is \
+                     gone for good from fleet.json)"
                 ));
                 left.extend(kept);
             }
@@ -141,8 +141,8 @@ impl Crew<'_> {
                 changes.unfenced_before().iter().map(ToString::to_string).collect();
             if !fenced.is_empty() {
                 self.host.warn(&format!(
-                    "the fence stays on, although it was off or without effect before: drones {}; \
-                     --fence-off puts that back, too",
+                    "the fence stays on, although it was off or without effect before: drones \
+                     {}; --fence-off restores that, too",
                     fenced.join(", ")
                 ));
             }

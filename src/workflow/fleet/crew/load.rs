@@ -54,7 +54,7 @@ impl Crew<'_> {
         if changed > 0 && !self.is_virtual {
             changes.write(&self.folder.0)?;
             self.host.say(&format!(
-                "Changed {} on {}; `updraft fleet restore` puts them back",
+                "Changed {} on {}; `updraft fleet restore` restores the old values",
                 words::count(changed, "parameter"),
                 words::count(
                     standings.values().filter(|standing| !standing.changed.is_empty()).count(),
@@ -98,7 +98,7 @@ impl Crew<'_> {
         self.known.params.extend(standings);
         if wrong > 0 && !may_change {
             self.host.warn(&format!(
-                "{} parameters that must be others; --set-params lets this program set them",
+                "{} parameters with wrong values; --set-params lets this program set them",
                 if wrong == 1 { "1 drone has".to_owned() } else { format!("{wrong} drones have") }
             ));
         }

@@ -86,7 +86,7 @@ impl<'a> Crew<'a> {
                 let names: Vec<String> =
                     late.iter().map(|(drone, what)| format!("drone {drone}: {what}")).collect();
                 return Err(WorkflowError::Failed(format!(
-                    "the start was cancelled, as not every drone has taken it ({}); try again",
+                    "the start was cancelled, because not every drone accepted it ({}); try again",
                     names.join("; ")
                 )));
             }
@@ -159,7 +159,7 @@ impl<'a> Crew<'a> {
             let before = start.left_s(eyes.telemetry(), now).is_some_and(|left_s| left_s > 0.0);
             if !ordered.is_empty() && before && start.phase() != StartPhase::Cancelled {
                 // A start packet has no address: who goes on needs a new one.
-                self.host.insist("The start is taken back for everyone");
+                self.host.insist("The start is being cancelled on all drones");
                 start.cancel(now);
                 self.withdraw_start();
             }

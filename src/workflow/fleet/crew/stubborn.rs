@@ -32,8 +32,8 @@ impl<'a> Stubborn<'a> {
         if self.failed.is_none() {
             let text = with_reasons(error);
             self.host.warn(&format!(
-                "{text}; this program goes on trying. Drones that hear nothing stop after 3 s, and \
-                 return by themselves when they miss the station (FS_GCS_ENABLE)"
+                "{text}; this program keeps trying. Drones that hear nothing stop after 3 s, and \
+                 return by themselves when they lose the station (FS_GCS_ENABLE)"
             ));
             self.failed = Some(text);
         }

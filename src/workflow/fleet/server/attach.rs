@@ -31,15 +31,15 @@ fn recorded(folder: &FlightFolder) -> Result<StartRecord, WorkflowError> {
     let path = StartRecord::path(folder);
     let Some(record) = StartRecord::read(folder)? else {
         return Err(WorkflowError::Nothing(format!(
-            "{} is not there, so nobody knows which drone flies which slot: no flight was started \
-             from this folder. `updraft fleet status` shows who is heard, `updraft fleet abort` \
-             needs no record",
+            "{} does not exist, so it is not known which drone flies which slot: no flight was \
+             started from this folder. `updraft fleet status` shows which drones are heard, \
+             `updraft fleet abort` needs no record",
             path.shown()
         )));
     };
     if record.flying != Flying::SkybrushServer {
         return Err(WorkflowError::Usage(format!(
-            "{} speaks of a flight over the drones' own links: give these with --connect",
+            "{} describes a flight over the drones' own links: give those with --connect",
             path.shown()
         )));
     }
@@ -80,8 +80,8 @@ pub(crate) fn take_over(
     let now_s = (host.clock().unix_us() / S) as i64;
     if authorized.is_none() && up.is_empty() {
         return Err(WorkflowError::Nothing(
-            "nobody is in the air, and no start is authorized on the server: `updraft fly` flies, \
-             `updraft logs pull` brings the logs of a flight that is over"
+            "no drone is in the air, and no start is authorized on the server: fly with `updraft \
+             fly`, or download the logs of a finished flight with `updraft logs pull`"
                 .to_owned(),
         ));
     }

@@ -66,7 +66,7 @@ pub(super) fn bring_down(
             Some(Ok(_)) if action == Action::Return => "returns".to_owned(),
             Some(Ok(_)) => "lands where it is".to_owned(),
             Some(Err(reason)) => format!("NOT CONFIRMED: {reason}"),
-            None => "NOT CONFIRMED: the server says nothing of it".to_owned(),
+            None => "NOT CONFIRMED: the server does not report on it".to_owned(),
         };
         let confirmed = matches!(outcome, Some(Ok(_)));
         down.told.insert(id, Answer { text, confirmed });

@@ -46,7 +46,7 @@ impl Begun {
         let Some(record) = self.0 else { return };
         if let Err(error) = record.withdraw(folder) {
             host.warn(&format!(
-                "{error}: logs/start.json still speaks of the start that was taken back"
+                "{error}: logs/start.json still describes the start that was cancelled"
             ));
         }
     }

@@ -104,14 +104,14 @@ pub(crate) fn fly(
     let table = gate(host, &mut client, &flight, Step::Ready, patience(wait_s))?;
     host.show(&table.to_string()).map_err(WorkflowError::Output)?;
     if !table.go() {
-        host.insist("NO-GO: nothing was started; Skybrush Live tells more of these drones");
+        host.insist("NO-GO: nothing was started; Skybrush Live shows more about these drones");
         let reasons = table.rows.iter().map(|row| (row.drone.clone(), row.no_go.join(", ")));
         return Ok((not_started(reasons.collect()), Ending::NoGo));
     }
     let started = start::start(host, &mut client, &flight, lead)?;
     host.say(&format!(
         "Authorized. Ctrl-C asks whether the drones land, return or fly on (without a terminal: \
-         --on-interrupt, by default they return); `{}` sends everyone home",
+         --on-interrupt, by default they return); `{}` sends all drones home",
         flight.abort()
     ));
     let watched = watch::watch(host, &mut client, &flight, started, lead.on_interrupt)?;

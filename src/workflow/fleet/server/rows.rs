@@ -8,7 +8,7 @@ pub(super) fn sum_up(host: &dyn Host, rows: &[LogOutput]) {
     let count = |state: &str| rows.iter().filter(|row| row.state == state).count();
     let (pulled, there) = (count("pulled"), count("there"));
     host.say(&format!(
-        "Brought {} of {} logs home{}",
+        "Downloaded {} of {} logs{}",
         pulled + there,
         rows.len(),
         match there {

@@ -61,7 +61,7 @@ pub(super) fn standing(
         if now.placed >= wanted || clock.now() >= until {
             if !now.silent.is_empty() {
                 host.say(&format!(
-                    "Left out, as the server has not heard them for a while: drones {}",
+                    "Left out, because the server has not heard them for a while: drones {}",
                     now.silent.join(", ")
                 ));
             }

@@ -111,7 +111,7 @@ fn steps(
     let table = gate(host, client, flight, Step::Authorized(unix_s), TAKE.min(patience))?;
     if !table.go() {
         return Err(WorkflowError::Unsafe(format!(
-            "not every drone has taken the authorization: {}",
+            "not every drone accepted the authorization: {}",
             table.words()
         )));
     }
@@ -143,13 +143,13 @@ fn after(error: WorkflowError, back: Option<WorkflowError>) -> WorkflowError {
             WorkflowError::Usage(text) => WorkflowError::Usage(format!("{text}; {back}")),
             WorkflowError::Failed(text) => WorkflowError::Failed(format!("{text}\n  {back}")),
             WorkflowError::Interrupted => {
-                WorkflowError::Stopped("stopped: the start was taken back")
+                WorkflowError::Stopped("stopped: the start was cancelled")
             }
             other => other,
         };
     };
     WorkflowError::Failed(format!(
-        "{error}\n  THE START MAY BE AUTHORIZED all the same, and it could not be taken back \
+        "{error}\n  THE START MAY BE AUTHORIZED all the same, and it could not be cancelled \
          ({failed}): use Skybrush Live, or `updraft fleet abort`"
     ))
 }

@@ -97,7 +97,7 @@ impl Watched {
     /// Says how it ended, with names; and the exit code of it.
     pub(super) fn tell(&self, host: &dyn Host, flight: &Flight<'_>) -> Ending {
         if self.taken_back {
-            host.insist("The start was taken back elsewhere: nobody takes off");
+            host.insist("The start was cancelled elsewhere: no drone takes off");
             return Ending::NoGo;
         }
         for id in &self.not_flown {
@@ -108,8 +108,8 @@ impl Watched {
         }
         for id in &self.found_down {
             host.warn(&format!(
-                "drone {id} was on the ground when this watch began: whether it has flown, its log \
-                 says"
+                "drone {id} was on the ground when this watch began: its log will show whether \
+                 it flew"
             ));
         }
         for (id, mode) in &self.left {
@@ -121,8 +121,8 @@ impl Watched {
         host.say(&format!("{landed} of {all} drones have landed"));
         if !self.in_the_air.is_empty() {
             host.insist(&format!(
-                "STILL IN THE AIR, for all that the server tells: {}; `{}` sends them home, Skybrush \
-                 Live and their remote controls do, too",
+                "STILL IN THE AIR, as far as the server reports: {}; `{}` sends them home; so do \
+                 Skybrush Live and their remote controls",
                 self.in_the_air.join(", "),
                 flight.abort()
             ));
@@ -168,7 +168,7 @@ pub(super) fn watch(
     }
     match watched {
         Err(WorkflowError::Interrupted) => {
-            Err(WorkflowError::Stopped("stopped: the start was taken back, nobody takes off"))
+            Err(WorkflowError::Stopped("stopped: the start was cancelled; no drone takes off"))
         }
         other => other,
     }
@@ -223,7 +223,7 @@ fn look_on(
                 if !away {
                     alarms = true;
                     host.warn(&format!(
-                        "{}\n  The drones fly on by themselves, but nobody sees them until the \
+                        "{}\n  The drones fly on by themselves, but cannot be seen until the \
                          server is back; keep their remote controls at hand",
                         with_reasons(&error)
                     ));
@@ -245,7 +245,7 @@ fn look_on(
                     if let Err(error) = journal.write(&Entry { unix_us, drone: None, event: &line })
                         && !std::mem::replace(&mut unwritten, true)
                     {
-                        host.warn(&format!("{error}; the flight is watched all the same"));
+                        host.warn(&format!("{error}; the flight is still being watched"));
                     }
                     if event.is_alarm() {
                         alarms = true;

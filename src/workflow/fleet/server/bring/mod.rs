@@ -156,7 +156,7 @@ impl Foreman for Puller<'_> {
             let parts =
                 if parts.is_empty() { String::new() } else { format!("; {}", parts.join(", ")) };
             self.host.say(&format!(
-                "bringing logs home: {over} of {} drones done after {}{parts}",
+                "downloading logs: {over} of {} drones done after {}{parts}",
                 self.ones.len(),
                 Spent(Duration::from_micros(spent)),
             ));
@@ -192,8 +192,8 @@ impl Puller<'_> {
         if !newer.is_empty() {
             let newer: Vec<String> = newer.into_iter().collect();
             self.host.warn(&format!(
-                "there are newer logs than those of this flight, which stay on the drones: {}; \
-                 `updraft logs pull --log newest` brings them",
+                "there are newer logs than those of this flight, which were left on the drones: \
+                 {}; `updraft logs pull --log newest` downloads them",
                 newer.join(", ")
             ));
         }

@@ -43,7 +43,7 @@ impl Puller<'_> {
                 return Ok(());
             }
             self.host.say(&format!(
-                "The autopilots write on for a while after a flight: waiting {} s for {}",
+                "The autopilots keep writing for a while after a flight: waiting {} s for {}",
                 WAIT.as_secs(),
                 words::count(sizes.len(), "log")
             ));
