@@ -138,7 +138,7 @@ fn a_campaign_without_its_hover_gives_laws() {
     assert_snapshot!(analyze(&bench, 3));
     // A calibration alone was all that was asked for.
     let alone = bench.expect(0, &["analyze", "campaign/calibration", "--no-report"]);
-    assert!(alone.out.contains("No measurement flight: these are laws"), "{alone}");
+    assert!(alone.out.contains("No measurement flight: there are laws"), "{alone}");
     fs::remove_file(bench.path("campaign/calibration/plan.json")).unwrap();
     let none = bench.expect(1, &["analyze", "campaign", "--no-report"]);
     assert!(none.err.contains("campaign/calibration/plan.json"), "{none}");

@@ -158,7 +158,7 @@ fn what_cannot_be_seen_comes_first() {
         "Would have been seen",
         "<td>rotor-inflow</td>",
         "<td>battery</td>",
-        "Not looked for",
+        "Not searched for",
         "<dt>mass-spread</dt>",
     ];
     assert!(order.windows(2).all(|pair| place(pair[0]) < place(pair[1])), "{text}");
