@@ -144,9 +144,9 @@ impl Report<'_> {
         };
         let there = count(is_there);
         context.say(&format!(
-            "Took {} from cards{}",
+            "Imported {} from cards{}",
             words::count(count(is_taken), "log"),
-            if there == 0 { String::new() } else { format!(" ({there} had come before)") }
+            if there == 0 { String::new() } else { format!(" ({there} already here)") }
         ));
         let whole = !lost && !imported.in_part() && doubts.is_empty();
         if context.json {
@@ -162,7 +162,7 @@ impl Report<'_> {
                 self.say_incomplete(&entry.file, entry.incomplete.as_deref());
                 if let Some(moved) = moved {
                     self.context.say(&format!(
-                        "{} was of another start, and is {} now",
+                        "{} belonged to another start, and is {} now",
                         entry.file,
                         moved.shown()
                     ));
@@ -171,7 +171,7 @@ impl Report<'_> {
             Carried::There(incomplete) => {
                 let file = self.imported.flights[take.flight].files.get(&take.slot);
                 let file = file.map_or("", String::as_str);
-                self.say_taken(take, file, ", had come before")?;
+                self.say_taken(take, file, ", already here")?;
                 self.say_incomplete(file, incomplete.as_deref());
             }
             Carried::Left(_) => {}

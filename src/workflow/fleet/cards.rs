@@ -141,7 +141,8 @@ impl Imported {
                     })
                     .collect();
                 format!(
-                    "{} was flown several times: {}; none is taken: say which with --flight {} --start",
+                    "{} was flown several times: {}; none was imported: say which with --flight \
+                     {} --start",
                     name(flight),
                     times.join(", "),
                     name(flight)
@@ -150,19 +151,19 @@ impl Imported {
             Doubt::Log { flight, slot, logs, why } => {
                 let logs: Vec<String> = logs.iter().map(|log| about(&self.found, *log)).collect();
                 format!(
-                    "no log is taken for slot {slot} of {}: {}: {why}; give the file of the right one \
-                     alone, or run this on a terminal",
+                    "no log was imported for slot {slot} of {}: {}: {why}; give only the right \
+                     file, or run this on a terminal",
                     name(flight),
                     logs.join("; ")
                 )
             }
             Doubt::Slot { flight, log, why } => {
-                format!("{} is of {}, but of which slot? {why}", path(log), name(flight))
+                format!("{} belongs to {}, but to which slot? {why}", path(log), name(flight))
             }
             Doubt::Flight { log, flights } => {
                 let names: Vec<&str> = flights.iter().map(name).collect();
                 format!(
-                    "{} fits {} equally: say which with --flight",
+                    "{} fits {} equally well: say which with --flight",
                     path(log),
                     words::list(&names)
                 )
@@ -214,15 +215,16 @@ fn flights(wish: &Import) -> Result<Vec<ImportFlight>, WorkflowError> {
         let start = start
             .ok_or_else(|| WorkflowError::Usage(format!("--start {unix_s} is not a GPS time")))?;
         if wanted > 1 {
-            let reason = "--start is of one flight: say which with --flight";
+            let reason = "--start is for one flight: say which with --flight";
             return Err(WorkflowError::Usage(reason.to_owned()));
         }
         for flight in flights.iter_mut().filter(|flight| flight.is_wanted) {
             let known = flight.start.filter(|known| later_s(start, *known).abs() > SAME_START_S);
             if let Some(known) = known {
                 return Err(WorkflowError::Usage(format!(
-                    "--start is {}, but {} says that {} began {}: the logs of another start have no \
-                     place beside it (leave --start out, or move the file away if it is not true)",
+                    "--start is {}, but {} says that {} began {}: the logs of another start \
+                     cannot be placed beside it (omit --start, or move the file away if it is \
+                     wrong)",
                     utc(start),
                     flight.logs.join("start.json").shown(),
                     flight.name,
@@ -269,7 +271,7 @@ fn decided(
             }
             Doubt::Log { flight, slot, logs, why } => {
                 let name = &flights[*flight].name;
-                let question = format!("Which log is of slot {slot} of {name}? ({why})");
+                let question = format!("Which log belongs to slot {slot} of {name}? ({why})");
                 let choices = logs.iter().map(|log| about(found, *log));
                 let choice = choose(&question, &choices.collect::<Vec<_>>())?;
                 answers.logs.insert((*flight, *slot), choice.map(|choice| logs[choice]));

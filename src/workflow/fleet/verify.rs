@@ -45,7 +45,8 @@ pub(crate) fn verify_all(campaign: &Path) -> Result<Vec<VerifyRow>, WorkflowErro
                 rows.push(row(&logs, &checked.entry.file, faults));
             }
             for file in unknown(&logs)? {
-                let fault = "has no record of how it came (manifest.json): it cannot be verified";
+                let fault = "has no record of its download (manifest.json), so it cannot be \
+                             verified";
                 rows.push(row(&logs, &file, vec![fault.to_owned()]));
             }
         }
@@ -67,9 +68,9 @@ fn simulated(folder: &FlightFolder) -> Result<Vec<Checked>, CampaignError> {
         let difference: Result<Option<String>, FileError> = log.difference(&path);
         let fault = match difference {
             Err(error) => Some(format!("cannot be read: {}; {again}", error.source)),
-            Ok(Some(how)) => Some(format!("is not as it was simulated: {how}; {again}")),
+            Ok(Some(how)) => Some(format!("has changed since it was simulated: {how}; {again}")),
             Ok(None) => Log::open(&path).err().map(|error| {
-                format!("is as it was simulated, but no log that can be read: {error}")
+                format!("is unchanged since it was simulated, but cannot be read as a log: {error}")
             }),
         };
         (at.folder.clone(), log.file.clone(), fault.into_iter().collect())
