@@ -235,7 +235,7 @@ pub(super) fn better_words(flight: &FlightAnalysis) -> Option<String> {
     };
     let note = match law::vertex_mps(flight) {
         Some(_) if better == LawKind::SignedQuadratic => {
-            "; its W* is the vertex of a parabola, no air"
+            "; its W* is the vertex of a parabola, not air"
         }
         _ => "",
     };

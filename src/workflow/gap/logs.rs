@@ -99,7 +99,7 @@ fn tables(found: &Found) -> Read {
         let shown = log.path.shown();
         match table::read(&log.path, mapping) {
             Ok(flight) if flight.indicator == Indicator::Power => read.left_out.push(
-                format!("{shown}: electrical power is no pulse; give pulses or rotor speeds")
+                format!("{shown}: electrical power is not a pulse; give pulses or rotor speeds")
                     .into(),
             ),
             Ok(flight) => read.flights.push((number, flight)),
