@@ -326,7 +326,7 @@ fn a_drone_that_restarts_in_the_air_has_not_landed() {
     let (bench, _fleet, link) = stage(&["--speed", "5", "--reboot", "2", "--after", "60"]);
     let ended = bench.expect(3, &shown(&link, &["--no-logs"]));
     assert!(ended.err.contains("warning: drone 2: restarted in the air"), "{ended}");
-    let said = "1 of 2 drones have landed; drone 2 (slot 2) restarted in the air and did not land";
+    let said = "1 of 2 drones have landed; drone 2 (slot 2) restarted in the air and fell";
     assert!(ended.err.contains(said), "{ended}");
     assert!(ended.err.contains("not seen to land: drones 2"), "{ended}");
 }
@@ -344,7 +344,7 @@ fn a_drone_that_restarts_before_the_start_is_named_and_flies_without_an_alarm() 
 fn a_folder_from_which_nobody_started_has_nothing_to_watch() {
     let (bench, _fleet, link) = stage(&["--speed", "1"]);
     let ended = bench.expect(5, &step(&["fleet", "watch"], &link));
-    assert!(ended.err.contains("fleet.json is not there"), "{ended}");
+    assert!(ended.err.contains("fleet.json does not exist"), "{ended}");
     bench.expect(0, &step(&["fleet", "upload"], &link));
     let ended = bench.expect(5, &step(&["fleet", "watch"], &link));
     assert!(ended.err.contains("no drone is in the air or has a start"), "{ended}");

@@ -95,7 +95,7 @@ fn nothing_to_work_on() {
     assert_eq!(planned.err.matches("error").count(), 1, "{planned}");
     fs::create_dir(bench.path("empty")).unwrap();
     let empty = bench.expect(5, &["analyze", "empty"]);
-    let words = "empty holds no .BIN logs: give a campaign, or the folder in which they are";
+    let words = "empty holds no .BIN logs: give a campaign, or the folder that contains them";
     assert_eq!(empty.err, format!("error: {words}\n"));
     assert_eq!(contents(&bench.path("campaign")), before);
     let missing = bench.run(&["analyze", "not-there"]);
@@ -113,7 +113,7 @@ fn nothing_found_is_no_success() {
     assert!(analysed.out.contains("No calibration"), "{analysed}");
     // The page says so too, but it is not offered as something to read.
     assert!(!analysed.err.contains("index.html"), "{analysed}");
-    assert!(analysed.err.contains(": nothing found\nerror: nothing found: no law"), "{analysed}");
+    assert!(analysed.err.contains(": nothing found\nerror: no results: no law"), "{analysed}");
     assert_eq!(bench.expect(5, &["analyze", "campaign", "--quiet"]).out, "");
     let failed = bench.expect(5, &["analyze", "campaign", "--json"]);
     assert_eq!(failed.out, "", "as of every command that fails");

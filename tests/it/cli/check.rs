@@ -75,10 +75,10 @@ fn every_file_of_a_campaign_is_held_to_the_plan() {
     bench.expect(0, &[&other[..], &["--leg", "6", "--hover", "4", "--baseline", "10"]].concat());
     bench.expect(0, &["check", "campaign"]);
     let changes: [(&str, &str, Change); 9] = [
-        ("stray", "skyb/03.skyb is of no slot of the plan", |here, _| {
+        ("stray", "skyb/03.skyb belongs to no slot of the plan", |here, _| {
             fs::copy(here.join("skyb/01.skyb"), here.join("skyb/03.skyb")).unwrap();
         }),
-        ("named", "skyb/1.SKYB is of no slot of the plan", |here, _| {
+        ("named", "skyb/1.SKYB belongs to no slot of the plan", |here, _| {
             fs::copy(here.join("skyb/01.skyb"), here.join("skyb/1.SKYB")).unwrap();
         }),
         ("gone", "skyb/02.skyb is missing", |here, _| {

@@ -159,8 +159,8 @@ fn who_flew_a_slot_is_what_was_written_down_at_its_start() {
     }
     fs::write(&table, swapped.to_string()).unwrap();
     let pulled = bench.expect(0, &["logs", "pull", "campaign", "--connect", &link]);
-    let warning = "slot 1 was flown by drone 1; fleet.json says 2 now: the log of drone 1 is the \
-                   flight's";
+    let warning = "slot 1 was flown by drone 1; fleet.json says 2 now: the log of drone 1 \
+                   belongs to the flight";
     assert!(pulled.err.contains(warning), "{pulled}");
     let manifest = json(&bench, "logs/manifest.json");
     for entry in manifest["logs"].as_array().unwrap() {
@@ -196,7 +196,7 @@ fn logs_of_an_aborted_flight_that_stay_on_the_drones_are_told() {
     std::thread::sleep(Duration::from_secs(4));
     flight.signal("-TERM");
     assert_eq!(flight.end(), Some(130), "{}", flight.said());
-    let told = "Nothing of flight 1 (";
+    let told = "No log of flight 1 (";
     let again = bench.expect(0, &fly(&link));
     assert!(again.err.contains(told), "{again}");
     let pulled = bench.expect(0, &["logs", "pull", "campaign", "--connect", &link]);

@@ -158,7 +158,7 @@ fn an_order_reaches_the_flight_that_is_in_the_air_whichever_is_named() {
     let ended = bench.expect(0, &abort);
     assert_eq!(ended.out, "drone 1: returns\n", "{ended}");
     assert!(
-        ended.err.contains("calibration is flying: its station carries the order out"),
+        ended.err.contains("calibration is flying: its station will carry out the order"),
         "{ended}"
     );
     let ended = bench.expect(0, &["fleet", "land", "both/hover", "--drones", "2"]);

@@ -64,7 +64,7 @@ fn drones_too_near_are_not_written() {
     let allowed = bench.expect(0, &[&args[..], SHORT, &["--allow", "distance"]].concat());
     assert!(allowed.err.contains("allowed: error[distance]"), "{allowed}");
     let unknown = bench.expect(2, &[&args[..], SHORT, &["--allow", "nonsense"]].concat());
-    assert!(unknown.err.contains("there is no check \"nonsense\"; there are "), "{unknown}");
+    assert!(unknown.err.contains("there is no check \"nonsense\"; the checks are "), "{unknown}");
     bench.expect(4, &["check", "near"]);
     bench.expect(0, &["check", "near", "--allow", "distance"]);
 }
