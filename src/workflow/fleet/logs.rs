@@ -76,7 +76,7 @@ pub(crate) fn pull(
     let nobody = who::find(host, crew, slots, wait_s).map_err(|error| match error {
         WorkflowError::Nothing(text) if folder.has_simulated_logs() => {
             WorkflowError::Nothing(format!(
-                "{text}\n  (the simulated logs need no pull: they lie in {})",
+                "{text}\n  (simulated logs need no download: they are in {})",
                 folder.logs_of(LogOrigin::Simulated).folder.shown()
             ))
         }

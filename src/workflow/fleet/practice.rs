@@ -53,8 +53,8 @@ fn broadcasts(host: &dyn Host, asked: Option<u16>) -> Result<Option<Broadcasts>,
         Err(error) => error,
     };
     let taken = format!(
-        "UDP port {port}, at which Skybrush Server's starts are heard, cannot be listened to: \
-         {error}\n  Another `fleet virtual` has it, or a drone's simulator: end that one, or give \
+        "UDP port {port}, on which Skybrush Server's starts are received, cannot be opened: \
+         {error}\n  Another `fleet virtual` or a drone's simulator uses it: end that one, or give \
          --broadcast-port another port and the server the same (broadcast_port in its connection \
          udp-listen://:14550?broadcast_port=PORT)"
     );
@@ -62,7 +62,7 @@ fn broadcasts(host: &dyn Host, asked: Option<u16>) -> Result<Option<Broadcasts>,
         return Err(WorkflowError::Failed(taken));
     }
     host.warn(&format!(
-        "{taken}; everything else works, and --broadcast-port 0 is without this warning"
+        "{taken}; everything else works, and --broadcast-port 0 avoids this warning"
     ));
     Ok(None)
 }
@@ -78,7 +78,7 @@ pub(crate) fn serve(
     let broadcasts = broadcasts(host, broadcast_port)?;
     let shown: Vec<String> = stations.iter().map(ToString::to_string).collect();
     host.say(&format!(
-        "{} are switched on and speak to {}; Ctrl-C switches them off",
+        "{} are switched on and talk to {}; Ctrl-C switches them off",
         words::count(hangar.slots.len(), "virtual drone"),
         shown.join(", ")
     ));
@@ -90,8 +90,8 @@ pub(crate) fn serve(
             if running.refused() > 0 && !told {
                 told = true;
                 host.warn(
-                    "the drones refuse what is not signed with their key: give the station the \
-                     same --key",
+                    "the drones refuse frames that are not signed with their key: give the \
+                     station the same --key",
                 );
             }
         }

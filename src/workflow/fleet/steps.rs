@@ -100,13 +100,13 @@ pub(crate) fn restore(
 ) -> Result<Ending, WorkflowError> {
     let (put_back, left) = crew.restore(fence_off)?;
     if left.is_empty() {
-        host.say("Parameters are as they were");
+        host.say("Parameters have their old values");
         return Ok(Ending::Done);
     }
     host.insist(&match put_back {
-        0 => "No parameter was put back, for the reasons above".to_owned(),
+        0 => "No parameter was restored, for the reasons above".to_owned(),
         drones => format!(
-            "Put back on {}; not on all of {}, for the reasons above",
+            "Restored on {}; not on all of {}, for the reasons above",
             words::count(drones, "drone"),
             words::count(left.len(), "drone")
         ),

@@ -14,13 +14,15 @@ use crate::workflow::fleet::interrupt::Choice;
 use crate::workflow::host::Host;
 
 /// Words for ending the program at once while a show is in the air.
-pub(super) const SHOW_LEFT: &str = "Ended at once: drones that have not confirmed a return or a landing fly on \
-    by themselves. `updraft fleet watch` follows them, `updraft fleet abort` sends them home; else their \
-    remote controls";
+pub(super) const SHOW_LEFT: &str = "Ended at once: drones that have not confirmed a return or a \
+                                    landing fly on by themselves. `updraft fleet watch` follows \
+                                    them, `updraft fleet abort` sends them home; otherwise use \
+                                    their remote controls";
 /// Words for ending the program at once while it flies the drones itself.
-pub(super) const GUIDED_LEFT: &str = "Ended at once: drones that had not confirmed their return stop within 3 s \
-    (GUID_TIMEOUT) and return when they miss the station (FS_GCS_ENABLE). Watch them: `updraft fleet \
-    watch`, `updraft fleet abort`, their remote controls";
+pub(super) const GUIDED_LEFT: &str = "Ended at once: drones that had not confirmed their return \
+                                      stop within 3 s (GUID_TIMEOUT) and return when they lose \
+                                      the station (FS_GCS_ENABLE). Watch them: `updraft fleet \
+                                      watch`, `updraft fleet abort`, their remote controls";
 
 /// Tells all of these to return or land, except those that were ordered down already, until each
 /// has confirmed it; how it ended for each.
