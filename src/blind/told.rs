@@ -94,9 +94,7 @@ pub fn words(outcome: &Outcome, verdict: &Verdict) -> Vec<String> {
             ));
         }
         if outcome.wrong_classes > 0 {
-            words.push(
-                "Wrong: a class was named that contains nothing of what was hidden.".to_owned(),
-            );
+            words.push("Wrong: a class was given that has nothing of what was hidden.".to_owned());
         }
         if outcome.wrong_unknowns > 0
             && outcome.hidden.iter().any(|one| one.called != Called::Unknown)
