@@ -457,7 +457,7 @@ fn parameters_are_listed_read_and_set_over_a_bad_link() {
     let list = run(&mut net, ListParams::new(drone(1)));
     assert_snapshot!(format!("{}\n{}", set.unwrap_err(), list.unwrap_err()), @"
     no answer when P7 is set to 1.5: the firmware has no such parameter, or the radio does not reach the drone
-    only 0 of 0 parameters came: bring the drone nearer to the radio and try again
+    only 0 of 0 parameters arrived: bring the drone nearer to the radio and try again
     ");
 }
 
