@@ -55,7 +55,10 @@ pub(crate) fn follow(
     match over {
         Some(over) if lost.is_empty() => host.say(&format!("{over}; its logs are downloaded")),
         Some(over) => {
-            host.warn(&format!("{over}; not at home are the logs of slots {}", lost.join(", ")));
+            host.warn(&format!(
+                "{over}; not yet downloaded: the logs of slots {}",
+                lost.join(", ")
+            ));
         }
         None => {}
     }
