@@ -418,6 +418,7 @@ fn average<'a>(values: impl Iterator<Item = &'a BinValues>) -> Option<BinValues>
 mod tests {
     use super::super::trial;
     use super::*;
+    use crate::mission::resolve::{Override, resolve};
 
     fn slots(data: &Data) -> Vec<u16> {
         data.groups.iter().flat_map(|group| group.slots.clone()).collect()
@@ -517,5 +518,19 @@ mod tests {
         }
         assert_eq!(data.drop_constant(1.0), Some(1500.0));
         assert_eq!(slots(&data), [1, 3]);
+    }
+
+    #[test]
+    fn neighbours_stand_beside_or_across_a_corner() {
+        let grid = [Override::new("grid.rows", 3), Override::new("grid.columns", 3)];
+        let plan = resolve("calibration", &grid).unwrap().flights.remove(0).plan;
+        let mut data = trial::data(9, |_, _| 0.0);
+        for (place_m, slot) in data.groups[0].place_m.iter_mut().zip(&plan.slots) {
+            *place_m = [slot.home_m[0], slot.home_m[1]];
+        }
+        data.count_neighbours(&plan.slots, plan.grid.unwrap().spacing_m);
+        let mut counts = data.groups[0].neighbours.clone();
+        counts.sort_by(f64::total_cmp);
+        assert_eq!(counts, [3.0, 3.0, 3.0, 3.0, 5.0, 5.0, 5.0, 5.0, 8.0]);
     }
 }
