@@ -476,7 +476,7 @@ mod tests {
     fn loaded() -> Upload {
         let plan = resolve("hover", &[]).unwrap().flights.remove(0).plan;
         let fence = fence_of(&plan, &plan.to_show()).unwrap();
-        let load = ShowLoad { skyb: Vec::new(), site: plan.site.clone(), fence };
+        let load = ShowLoad { skyb: Vec::new(), site: plan.site, fence };
         let mut upload = Upload::new(DroneId { network: 0, system: 1 }, load, 1);
         upload.phase = Phase::Flags { since: 0, agreeing: 0, last: None };
         upload

@@ -468,7 +468,9 @@ mod tests {
     fn a_hole_is_filled_by_what_the_others_measured_and_the_drones_own_offset() {
         let mut pulses = [[1500; 10], [1510; 10], [1520; 10], [1530; 10], [1540; 10]];
         // All read 8 us more in bin 3, and drone 5 did not say.
-        pulses.iter_mut().for_each(|drone| drone[3] += 8);
+        for drone in &mut pulses {
+            drone[3] += 8;
+        }
         pulses[4][3] = 0;
         let data = added(&pulses);
         let filled = data.groups[0].measured[4][3];

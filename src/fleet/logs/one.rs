@@ -423,7 +423,7 @@ impl Conversation for PullOne {
         }
         match &mut self.stage {
             Stage::List(conversation) | Stage::Relist(conversation, _) => {
-                conversation.on_message(now, message)
+                conversation.on_message(now, message);
             }
             Stage::Probe(conversation, _) | Stage::Sample(conversation, ..) => {
                 conversation.on_message(now, message);
