@@ -31,8 +31,8 @@ const FASTEST_MPS: f64 = 12.0;
 /// Least slope of a line's bend as a share of its slope in hover: keeps the inverse unique where bends
 /// extrapolate. Chosen.
 const LEAST_SLOPE: f64 = 0.2;
-/// A signed quadratic must be this much more probable than a line (logarithm of the evidence): odds of 7 to
-/// 1. Chosen in favour of the line, because the inverse of the quadratic is useless in hover
+/// A signed quadratic must be this much more probable than a line (logarithm of the evidence: odds of
+/// seven to one). Chosen in favour of the line, because the inverse of the quadratic is useless in hover
 /// (docs/physics.md, 1.2).
 const CLEARLY: f64 = 2.0;
 /// Why a law that was not chosen here is the map's.

@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn every_name_is_an_effect_and_every_parameter_its() {
         for kind in KINDS {
-            let library = || effects::find(kind.effect).map(|effect| effect.definition());
+            let library = || effects::find(kind.effect).map(effects::Effect::definition);
             let own = if kind.foreign {
                 foreign::find(kind.effect).map(|one| one.effect.definition())
             } else {

@@ -352,8 +352,7 @@ mod tests {
         assert_eq!(poisoned.verdict.data.held_out, [3, 7]);
         assert_eq!(poisoned.found.hyper, clean.found.hyper, "the noise is that of the others");
         assert_eq!(poisoned.verdict.rest, clean.verdict.rest, "so is what is left to be found");
-        let gap =
-            |explained: &Explained| explained.verdict.gap.drones.unwrap().before_us.value;
+        let gap = |explained: &Explained| explained.verdict.gap.drones.unwrap().before_us.value;
         assert!(gap(&clean) < 1.0, "{}", gap(&clean));
         assert!(gap(&poisoned) > 5.0, "{}", gap(&poisoned));
     }

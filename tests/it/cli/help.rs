@@ -30,7 +30,9 @@ fn of_options(help: &str, options: &[&str]) -> Vec<(String, String)> {
             said.push('\n');
         }
     }
-    found.iter_mut().for_each(|(_, said)| said.truncate(said.trim_end().len()));
+    for (_, said) in &mut found {
+        said.truncate(said.trim_end().len());
+    }
     found
 }
 

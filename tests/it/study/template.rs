@@ -1,7 +1,5 @@
 //! Wrong studies are told where, why and what is allowed.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot read its study fails")]
-
 use std::fmt::Write as _;
 
 use crate::study::support::{SMALL, small, small_with};
