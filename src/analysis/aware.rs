@@ -440,7 +440,7 @@ fn point(
         time_s: f64::midpoint(window.start_s, window.end_s),
         velocity_mps: referred.velocity_mps,
         pulse_us: referred.pulse_us,
-        noise_us: window.pulse_phi_us.se.hypot(slope * window.velocity_mps.se),
+        noise_us: window.effort_phi.se.hypot(slope * window.velocity_mps.se),
         doubts_us: referred.doubts_us,
     }
 }

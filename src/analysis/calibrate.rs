@@ -142,14 +142,13 @@ pub fn is_used(window: &WindowStats, options: &FitOptions) -> bool {
 /// A window as a point of a law.
 fn point(window: &WindowStats, options: &FitOptions) -> Point {
     let (sigma_us, velocity_sigma_mps) = match options.weights {
-        Weights::WindowSd => (window.pulse_phi_us.sd, 0.0),
-        Weights::BlockError => (window.pulse_phi_us.se, window.velocity_mps.se),
+        Weights::WindowSd => (window.effort_phi.sd, 0.0),
+        Weights::BlockError => (window.effort_phi.se, window.velocity_mps.se),
         Weights::Equal => (1.0, 0.0),
     };
     Point {
         velocity_mps: location(&window.velocity_mps, options.location),
-        pulse_us: location(&window.pulse_phi_us, options.location)
-            - window.offset_us.unwrap_or(0.0),
+        pulse_us: location(&window.effort_phi, options.location) - window.offset_us.unwrap_or(0.0),
         sigma_us: sigma_us.max(options.indicator.quantum()),
         velocity_sigma_mps,
     }

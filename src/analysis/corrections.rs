@@ -86,7 +86,7 @@ impl Raw {
     pub(super) fn of(window: &WindowStats) -> Self {
         Self {
             time_s: f64::midpoint(window.start_s, window.end_s),
-            pulse_us: window.pulse_us.mean,
+            pulse_us: window.effort.mean,
             velocity_mps: window.velocity_mps.mean,
             climb_mps: window.velocity_mps.mean,
             lean_deg: window.lean_deg,

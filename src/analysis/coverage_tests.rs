@@ -17,7 +17,7 @@ use super::measured::Measured;
 use super::result::{DroneAnalysis, FlightAnalysis, SampleStats, Trace, WindowStats};
 use super::windows::{Target, WindowOptions};
 use crate::base::rng::{Purpose as Stream, stream};
-use crate::flight::{Clock, Flight, Series};
+use crate::flight::{Clock, Effort, Flight, Series};
 use crate::mission::plan::{Kind, Purpose};
 
 const DRONES: usize = 4;
@@ -151,8 +151,8 @@ fn calibration(rng: &mut Pcg64, world: &World, weather: Weather) -> FlightAnalys
                         commanded_mps: climb,
                         height_m,
                         velocity_mps: stats(climb, 0.001),
-                        pulse_us: stats(pulse, noise.hypot(scatter / n.sqrt())),
-                        pulse_phi_us: stats(pulse, noise.hypot(scatter / n.sqrt())),
+                        effort: stats(pulse, noise.hypot(scatter / n.sqrt())),
+                        effort_phi: stats(pulse, noise.hypot(scatter / n.sqrt())),
                         tilt_deg: stats(0.0, 0.0),
                         lean_deg: 0.0,
                         offset_us: None,
@@ -223,7 +223,7 @@ fn hover(
     let flight = Flight {
         pulse_max_us: series(pulse.clone()),
         pulse_min_us: series(pulse.clone()),
-        pulse_us: series(pulse),
+        effort: Effort { values: series(pulse), ..Effort::default() },
         pulse_limits_us: (1150.0, 1950.0),
         velocity_up_mps: flat(0.0),
         height_m: flat(100.0),

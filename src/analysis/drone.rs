@@ -195,7 +195,7 @@ fn measure(
         return Err(Cause::TooShort { length_s });
     }
     let leveled = input.leaning.map(|leaning| leaning.level_series(seen.flight, seen.corrected));
-    let pulse_us = leveled.as_ref().unwrap_or(&seen.corrected.pulse_phi_us);
+    let pulse_us = leveled.as_ref().unwrap_or(&seen.corrected.effort);
     let referred =
         input.density.map(|density| density.refer_series(pulse_us, &seen.flight.height_m));
     let pulse_us = referred.as_ref().unwrap_or(pulse_us);
@@ -239,7 +239,7 @@ fn trace(flight: &Flight, corrected: &Corrected, points: usize) -> Trace {
         let (Some(height), Some(velocity), Some(pulse)) = (
             mean(flight.height_m.between(from, to)),
             mean(flight.velocity_up_mps.between(from, to)),
-            mean(corrected.pulse_phi_us.between(from, to)),
+            mean(corrected.effort.between(from, to)),
         ) else {
             continue;
         };

@@ -71,12 +71,12 @@ impl Hover {
         let (start_s, end_s) = (target.start_s, target.end_s);
         let half = RUNNING_S / 2.0;
         let running = |series| Running::new(series, start_s, end_s);
-        let pulse = running(&flight.pulse_us);
+        let pulse = running(&flight.effort.values);
         let velocity = running(&flight.velocity_up_mps);
         let (roll, pitch) = (running(&flight.roll_rad), running(&flight.pitch_rad));
         let (first_s, last_s) = ((start_s + half).ceil() as i64, (end_s - half).floor() as i64);
         let last_s = last_s.min(first_s.saturating_add(LONGEST_S));
-        let log_ends_s = [&flight.pulse_us, &flight.velocity_up_mps]
+        let log_ends_s = [&flight.effort.values, &flight.velocity_up_mps]
             .iter()
             .map(|series| series.span().map_or(f64::NEG_INFINITY, |(_, last)| last))
             .fold(f64::INFINITY, f64::min);
@@ -161,7 +161,10 @@ impl Hover {
         for second in &self.seconds {
             let now = second.and_then(|second| {
                 let (from, to) = (second.time_s - 0.5, second.time_s + 0.5);
-                Some([mean(&flight.pulse_us, from, to)?, mean(&flight.velocity_up_mps, from, to)?])
+                Some([
+                    mean(&flight.effort.values, from, to)?,
+                    mean(&flight.velocity_up_mps, from, to)?,
+                ])
             });
             if let (Some(now), Some(last)) = (now, last) {
                 self.steps.push([now[0] - last[0], now[1] - last[1]]);
@@ -226,7 +229,7 @@ impl Hover {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flight::{Clock, Series};
+    use crate::flight::{Clock, Effort, Series};
     use crate::mission::plan::Kind;
 
     fn flown(pulse: impl Fn(f64) -> f64) -> Flight {
@@ -234,7 +237,7 @@ mod tests {
         let series = |value: Vec<f64>| Series { time_s: time_s.clone(), value };
         let pulses: Vec<f64> = time_s.iter().map(|time| pulse(*time)).collect();
         Flight {
-            pulse_us: series(pulses.clone()),
+            effort: Effort { values: series(pulses.clone()), ..Effort::default() },
             pulse_max_us: series(pulses.clone()),
             pulse_min_us: series(pulses),
             pulse_limits_us: (1150.0, 1950.0),
@@ -294,8 +297,8 @@ mod tests {
     fn a_gap_is_no_end() {
         let mut flight = flown(|_| 1540.0);
         let kept = |time: &f64| !(100.0..103.0).contains(time);
-        let time_s: Vec<f64> = flight.pulse_us.time_s.iter().copied().filter(kept).collect();
-        flight.pulse_us = Series { value: vec![1540.0; time_s.len()], time_s };
+        let time_s: Vec<f64> = flight.effort.values.time_s.iter().copied().filter(kept).collect();
+        flight.effort.values = Series { value: vec![1540.0; time_s.len()], time_s };
         assert_eq!(flags(&look(&flight, 199.0)), [(Quality::Gap, 96.0, 106.0)]);
     }
 

@@ -39,7 +39,7 @@ impl HoverSeen {
                     (values.len() >= FEWEST_PER_SECOND)
                         .then(|| values.iter().sum::<f64>() / values.len() as f64)
                 };
-                mean(&corrected.pulse_phi_us).zip(mean(&flight.velocity_up_mps))
+                mean(&corrected.effort).zip(mean(&flight.velocity_up_mps))
             })
             .collect();
         Self {

@@ -69,7 +69,7 @@ impl OffsetMap {
     /// than two.
     pub fn of(windows: &[WindowStats], by: Location) -> Option<Self> {
         let hovers = || windows.iter().filter(|one| one.kind.is_hover() && one.rejected.is_empty());
-        let pulses: Vec<f64> = hovers().map(|one| location(&one.pulse_phi_us, by)).collect();
+        let pulses: Vec<f64> = hovers().map(|one| location(&one.effort_phi, by)).collect();
         if pulses.len() < FEWEST || pulses.iter().any(|pulse| !pulse.is_finite()) {
             return None;
         }

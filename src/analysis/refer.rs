@@ -12,9 +12,9 @@ use super::wind::Leaning;
 fn refer_window(density: Density, window: &WindowStats) -> WindowStats {
     let factor = density.factor(window.height_m);
     let refer = |pulse_us: f64| density.refer_us(pulse_us, window.height_m);
-    let stats = &window.pulse_phi_us;
+    let stats = &window.effort_phi;
     WindowStats {
-        pulse_phi_us: SampleStats {
+        effort_phi: SampleStats {
             median: refer(stats.median),
             mean: refer(stats.mean),
             trimmed: refer(stats.trimmed),

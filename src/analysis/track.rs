@@ -199,7 +199,7 @@ mod tests {
         let series = |value: Vec<f64>| Series { time_s: time_s.clone(), value };
         let flat = |value: f64| series(vec![value; 800]);
         Flight {
-            pulse_us: flat(1540.0),
+            effort: crate::flight::Effort { values: flat(1540.0), ..Default::default() },
             pulse_max_us: flat(1540.0),
             pulse_min_us: flat(1540.0),
             pulse_limits_us: (1150.0, 1950.0),

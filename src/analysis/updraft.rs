@@ -119,7 +119,7 @@ pub fn estimate(
     let from_law = law_error_mps(law, fit, mean_pulse);
     let mean_rad = |angle: &Series| mean_sd(angle.between(hover.start_s, hover.end_s)).0;
     let tilt_deg = lean_deg(mean_rad(&flight.roll_rad), mean_rad(&flight.pitch_rad));
-    let raw_pulse = mean_sd(flight.pulse_us.between(hover.start_s, hover.end_s)).0;
+    let raw_pulse = mean_sd(flight.effort.values.between(hover.start_s, hover.end_s)).0;
     let at_hover = (if raw_pulse > 0.0 { raw_pulse } else { mean_pulse }, tilt_deg);
     Some(DroneSeries {
         first_s,

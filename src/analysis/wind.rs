@@ -64,7 +64,7 @@ impl Leaning {
             .iter()
             .zip(&tilt.value)
             .filter_map(|(time, tilt_deg)| {
-                let pulse_us = flight.pulse_us.at(*time, GAP_S)?;
+                let pulse_us = flight.effort.values.at(*time, GAP_S)?;
                 Some((*time, self.level_us(pulse_us, *tilt_deg)))
             })
             .unzip();
@@ -74,17 +74,17 @@ impl Leaning {
     /// A window brought to level flight in air without wind.
     pub(super) fn level_window(self, window: &WindowStats) -> WindowStats {
         let tilt_deg = window.lean_deg;
-        let raw = &window.pulse_us;
+        let raw = &window.effort;
         let level = |pulse_us: f64| self.level_us(pulse_us, tilt_deg);
         let axial = self.axial_mps(tilt_deg);
         let moved = &window.velocity_mps;
         WindowStats {
-            pulse_phi_us: SampleStats {
+            effort_phi: SampleStats {
                 median: level(raw.median),
                 mean: level(raw.mean),
                 trimmed: level(raw.trimmed),
                 // The spread of the corrected pulse: without that of the tilt itself.
-                ..window.pulse_phi_us
+                ..window.effort_phi
             },
             velocity_mps: SampleStats {
                 median: moved.median + axial,
@@ -129,7 +129,7 @@ pub(super) fn systematic_mps(
     let used: Vec<f64> = calibration
         .iter()
         .filter(|window| window.kind.is_leg() && window.rejected.is_empty())
-        .map(|window| whole(window.pulse_us.mean, window.lean_deg))
+        .map(|window| whole(window.effort.mean, window.lean_deg))
         .collect();
     let mean = if used.is_empty() { 0.0 } else { used.iter().sum::<f64>() / used.len() as f64 };
     let (pulse_us, tilt_deg) = hover;

@@ -25,9 +25,11 @@ pub struct WindowStats {
     /// Vertical velocity V_U, m/s.
     pub velocity_mps: SampleStats,
     /// Rotor control pulse width u, us.
-    pub pulse_us: SampleStats,
+    #[serde(rename = "pulse_us")]
+    pub effort: SampleStats,
     /// Tilt-corrected pulse width u_phi, us.
-    pub pulse_phi_us: SampleStats,
+    #[serde(rename = "pulse_phi_us")]
+    pub effort_phi: SampleStats,
     /// Tilt from the vertical, degrees.
     pub tilt_deg: SampleStats,
     /// Angle of the mean attitude from the vertical, degrees: what wind does, without noise.

@@ -264,9 +264,10 @@ fn steady_runs(desired: &Series) -> Vec<Run> {
 fn flies(flight: &Flight, run: &Run) -> bool {
     let middle = f64::midpoint(run.start_s, run.end_s);
     let armed = flight.armed_s.iter().any(|(start, end)| (*start..=*end).contains(&middle));
-    let pulses = flight.pulse_us.between(run.start_s, run.end_s);
+    let effort = flight.effort.values.between(run.start_s, run.end_s);
     // Standing, the motors idle well below the lowest output in flight.
-    let spins = mean(pulses) > flight.pulse_limits_us.0 - QUANTUM_US;
+    let spins = flight.effort.indicator != Indicator::Pulse
+        || mean(effort) > flight.pulse_limits_us.0 - QUANTUM_US;
     (armed || flight.armed_s.is_empty()) && spins
 }
 
@@ -279,30 +280,30 @@ fn mean(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
 }
 
-/// Channels derived from a flight at the times of its pulses.
+/// Channels derived from a flight at the times of its rotor effort.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Corrected {
-    /// Tilt-corrected pulse width u_phi, us.
-    pub pulse_phi_us: Series,
+    /// Tilt-corrected rotor effort (u_phi), in the unit of the flight's indicator.
+    pub effort: Series,
     /// Tilt from the vertical, degrees.
     pub tilt_deg: Series,
 }
 
-/// Corrects pulses for tilt, `phi = arctan sqrt(tan² pitch + tan² roll)`, with roll and pitch
-/// interpolated to the pulses' times. Pulses without attitude within 1 s are left out.
+/// Corrects rotor effort for tilt, `phi = arctan sqrt(tan² pitch + tan² roll)`, with roll and pitch
+/// interpolated to its times. Samples without attitude within 1 s are left out.
 pub fn correct_tilt(flight: &Flight, options: &WindowOptions) -> Corrected {
-    let exponent = options.exponent(flight.indicator);
+    let exponent = options.exponent(flight.effort.indicator);
     let mut corrected = Corrected::default();
-    for (time, pulse) in flight.pulse_us.time_s.iter().zip(&flight.pulse_us.value) {
+    for (time, value) in flight.effort.values.time_s.iter().zip(&flight.effort.values.value) {
         let (Some(roll), Some(pitch)) =
             (nearby(&flight.roll_rad, *time), nearby(&flight.pitch_rad, *time))
         else {
             continue;
         };
         let phi = pitch.tan().hypot(roll.tan()).atan();
-        let value = options.tilt.correct(*pulse, phi, flight.indicator, exponent);
-        corrected.pulse_phi_us.time_s.push(*time);
-        corrected.pulse_phi_us.value.push(value);
+        let value = options.tilt.correct(*value, phi, flight.effort.indicator, exponent);
+        corrected.effort.time_s.push(*time);
+        corrected.effort.value.push(value);
         corrected.tilt_deg.time_s.push(*time);
         corrected.tilt_deg.value.push(phi.to_degrees());
     }
@@ -344,7 +345,7 @@ fn measure_one(
         sample_stats(series.times_between(start, end), series.between(start, end), options.block_s)
     };
     let velocity = stats(&flight.velocity_up_mps);
-    let pulse_phi = stats(&corrected.pulse_phi_us);
+    let effort_phi = stats(&corrected.effort);
     let mut rejected = Vec::new();
     let (low, high) = flight.pulse_limits_us;
     let touches = flight.pulse_max_us.between(start, end).iter().any(|u| *u >= high - QUANTUM_US)
@@ -352,14 +353,14 @@ fn measure_one(
     if touches {
         rejected.push(Rejection::Saturated);
     }
-    let needed = [&flight.velocity_up_mps, &corrected.pulse_phi_us];
+    let needed = [&flight.velocity_up_mps, &corrected.effort];
     let ends_early =
         needed.iter().any(|series| series.span().is_none_or(|(_, last)| last < end - GAP_S));
     if ends_early {
         rejected.push(Rejection::Incomplete);
     } else if needed.iter().any(|series| series.longest_gap_s(start, end) > GAP_S)
         || velocity.n < FEWEST_SAMPLES
-        || pulse_phi.n < FEWEST_SAMPLES
+        || effort_phi.n < FEWEST_SAMPLES
     {
         rejected.push(Rejection::Gap);
     }
@@ -377,17 +378,17 @@ fn measure_one(
         commanded_mps: target.commanded_mps,
         height_m: mean(flight.height_m.between(start, end)),
         velocity_mps: velocity,
-        pulse_us: stats(&flight.pulse_us),
-        pulse_phi_us: pulse_phi,
+        effort: stats(&flight.effort.values),
+        effort_phi,
         tilt_deg: stats(&corrected.tilt_deg),
         lean_deg: lean_deg(
             mean(flight.roll_rad.between(start, end)),
             mean(flight.pitch_rad.between(start, end)),
         ),
         tilt_form_us: options.other_form(
-            mean(flight.pulse_us.between(start, end)),
+            mean(flight.effort.values.between(start, end)),
             mean(corrected.tilt_deg.between(start, end)).to_radians(),
-            flight.indicator,
+            flight.effort.indicator,
         ),
         offset_us: None,
         offset_outside: false,

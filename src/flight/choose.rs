@@ -115,7 +115,7 @@ fn away_s(flight: &Flight, start: GpsTime) -> f64 {
         return apart_s;
     }
     // Its show time was made with this start: then it must have been armed about that time.
-    let (from_s, to_s) = flight.pulse_us.span().unwrap_or_default();
+    let (from_s, to_s) = flight.effort.values.span().unwrap_or_default();
     (from_s - NEAR_S).max(-to_s).max(0.0)
 }
 

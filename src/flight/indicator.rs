@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Series;
+
 /// The number that rises with the work of the rotors, from which the air's motion is told.
 ///
 /// Wherever a name says "pulse", a flight that was read with another indicator has that one there,
@@ -18,6 +20,15 @@ pub enum Indicator {
     RotorSpeed,
     /// Electrical power, W: battery voltage times current.
     Power,
+}
+
+/// Rotor effort over a flight.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Effort {
+    /// Indicator that the values are of.
+    pub indicator: Indicator,
+    /// Values over time, in the indicator's unit.
+    pub values: Series,
 }
 
 impl Indicator {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::align::{Evidence, align};
 use super::channels::Messages;
-use super::{Flight, FlightError, FlightOptions, Indicator, Loss, Series, Warning, pick};
+use super::{Effort, Flight, FlightError, FlightOptions, Indicator, Loss, Series, Warning, pick};
 use crate::log::Log;
 
 /// Kept before arming and after disarming, s.
@@ -209,8 +209,7 @@ pub(super) fn load(
         height_m,
         north_m: cut(ekf.north),
         east_m: cut(ekf.east),
-        indicator: options.indicator,
-        pulse_us: cut(effort.unwrap_or(pulse)),
+        effort: Effort { indicator: options.indicator, values: cut(effort.unwrap_or(pulse)) },
         pulse_max_us: cut(pulse_max),
         pulse_min_us: cut(pulse_min),
         roll_rad: cut(roll),

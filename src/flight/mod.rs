@@ -40,7 +40,7 @@ use crate::mission::plan::Segment;
 
 pub use fit::share_flown;
 pub use identity::{Belongs, Identity, identify};
-pub use indicator::Indicator;
+pub use indicator::{Effort, Indicator};
 pub use warning::{Loss, Warning};
 
 /// A channel: samples with their own times.
@@ -69,10 +69,8 @@ pub struct Flight {
     pub north_m: Series,
     /// Position east of the EKF origin, m.
     pub east_m: Series,
-    /// Indicator of rotor effort that [`Flight::pulse_us`] holds.
-    pub indicator: Indicator,
-    /// Rotor control pulse width: mean over the motors, us; or another [`Indicator`] in its unit.
-    pub pulse_us: Series,
+    /// Rotor effort: mean over the motors.
+    pub effort: Effort,
     /// Largest motor output over time, us (for saturation).
     pub pulse_max_us: Series,
     /// Smallest motor output over time, us.

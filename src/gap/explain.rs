@@ -1,17 +1,19 @@
 //! The loop of the search: find, name, add, and again, until nothing passes.
 
-use super::candidates::{Size, Variant, drag_by_lean, library, of_the_air, read_otherwise};
+use super::candidates::{
+    Candidate, Size, Variant, drag_by_lean, library, of_the_air, read_otherwise,
+};
 use super::compare::{Comparison, Simulated};
 use super::contest::{Contest, before, entered};
 use super::data::Data;
 use super::decide::{What, decide};
 use super::error::GapError;
-use super::generic::{all, drawn};
+use super::generic::{Generic, all, drawn};
 use super::gls::{Column, Likelihood, Problem, Split};
 use super::noise::{GroupPattern, Hyper, WHITE};
 use super::refine::{Parameter, doubts, fitted, half_interval, parameters_of, refine, slopes};
 use super::response::{self, Response, gusts_mps};
-use super::search::{Round, Sought, round};
+use super::search::{Ranked, RankedGeneric, Round, Sought, Thresholds, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::effects::{Role, Signals};
 use crate::mission::plan::Plan;
@@ -88,8 +90,8 @@ pub fn search(
     plan: Option<&Plan>,
     options: &Options,
 ) -> Result<Found, GapError> {
-    let mut comparison = Comparison::new(data, vehicle, simulated, plan)?;
-    let mut found = Found {
+    let comparison = Comparison::new(data, vehicle, simulated, plan)?;
+    let found = Found {
         vehicle: comparison.vehicle.clone(),
         comparison: comparison.clone(),
         extras: Vec::new(),
@@ -101,150 +103,241 @@ pub fn search(
         steps: Vec::new(),
         rest: Rest::default(),
     };
-    let mut refused: Vec<&'static str> = Vec::new();
-    let mut last: Option<(Found, f64)> = None;
+    let refused = Vec::new();
+    let mut search =
+        Search { data, vehicle, simulated, plan, options, comparison, found, refused, last: None };
     for step in 0..=options.most_steps {
+        if !search.takes_step(step)? {
+            break;
+        }
+    }
+    let mut found = search.found;
+    told_once(&mut found.steps);
+    settle(&mut found);
+    Ok(found)
+}
+
+/// A search that goes on.
+struct Search<'a> {
+    data: &'a Data,
+    /// The model that the search began with.
+    vehicle: &'a Vehicle,
+    simulated: &'a Simulated<'a>,
+    plan: Option<&'a Plan>,
+    options: &'a Options,
+    /// The data against the model with what was found so far.
+    comparison: Comparison,
+    found: Found,
+    /// Effects that were taken back.
+    refused: Vec<&'static str>,
+    /// The state before the last free shape, and how probable that was.
+    last: Option<(Found, f64)>,
+}
+
+/// What is looked at in one round, and for what.
+struct Look {
+    patterns: Vec<GroupPattern>,
+    residual: Split,
+    /// Regressors that are not judged: what was found before, whose size may change with what comes after.
+    free: Vec<Column>,
+    doubts: Vec<Column>,
+    /// Noise and air before anything is sought.
+    hyper: Hyper,
+    candidates: Vec<Candidate>,
+    generics: Vec<Generic>,
+    drones: Vec<usize>,
+}
+
+impl Look {
+    fn problem(&self) -> Problem<'_> {
+        Problem::new(&self.patterns, &self.residual).doubting(&self.doubts).with(&self.free)
+    }
+
+    fn sought(&self) -> Sought<'_> {
+        let Self { candidates, generics, drones, .. } = self;
+        Sought { library: candidates, generics, drones }
+    }
+}
+
+impl Search<'_> {
+    /// Looks once and takes up what passes; whether the search goes on.
+    fn takes_step(&mut self, step: usize) -> Result<bool, GapError> {
+        let look = self.look()?;
+        let (problem, sought) = (look.problem(), look.sought());
+        let round = round(&problem, look.hyper, sought, true);
+        let problem = problem.among(&round.groups);
+        let likely = round.base.log_posterior();
+        if let Some((before, was)) = self.last.take()
+            && likely < was - WORSE_NATS
+        {
+            // Fitted together with the rest it explains less than was explained without.
+            self.found = before;
+            return Ok(false);
+        }
+        self.found.hyper = round.base.hyper;
+        let material_us = material_us(&look.patterns, &round.base.hyper);
+        let mut decision = decide(&problem, &round, sought, material_us, self.options, step);
+        let (found, comparison) = (&self.found, &self.comparison);
+        decision.what =
+            Contest { found, comparison, sought, round: &round }.settle(&problem, decision.what)?;
+        self.found.rest = rest(&round, sought, &decision.thresholds);
+        if step == self.options.most_steps || matches!(decision.what, What::Nothing) {
+            self.found.comparison = self.comparison.clone();
+            return Ok(false);
+        }
+        let rivals = rivals(&round, sought);
+        match decision.what {
+            What::Nothing => {}
+            What::Effects { members, or_else } => {
+                let free = or_else.iter().map(|free| look.generics[free.generic].depends_on.name());
+                let effects = members.iter().map(|one| look.candidates[one.candidate].name);
+                let names: Vec<String> = effects.chain(free).map(str::to_owned).collect();
+                let threshold_nats = decision.thresholds.library;
+                let best = &members[0];
+                let candidate = &look.candidates[best.candidate];
+                self.take_effect(candidate, best, &round, names, (threshold_nats, rivals))?;
+            }
+            What::Free(free) => {
+                let before = Found { comparison: self.comparison.clone(), ..self.found.clone() };
+                self.last = Some((before, likely));
+                let threshold_nats = decision.thresholds.generic;
+                self.take_shape(&look.generics[free.generic], &free, (threshold_nats, rivals));
+            }
+        }
+        self.fly_again()?;
+        Ok(true)
+    }
+
+    /// What is left, and everything that may explain it.
+    fn look(&mut self) -> Result<Look, GapError> {
+        let Self { comparison, found, refused, .. } = self;
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
-        let mut split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
+        let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         // Gusts that the residual shows bend the model's curve: known physics first.
         let mut free = found.extras.clone();
-        free.extend(slopes(&comparison, &found.vehicle, &found.parameters)?);
-        let doubts = doubts(&comparison, &found.vehicle, &found.parameters)?;
-        let quick = Problem::new(&patterns, &split)
+        free.extend(slopes(comparison, &found.vehicle, &found.parameters)?);
+        let doubts = doubts(comparison, &found.vehicle, &found.parameters)?;
+        let quick = Problem::new(&patterns, &residual)
             .doubting(&doubts)
             .with(&free)
             .fit(found.hyper, Likelihood::Profile);
         found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
-        split = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
-        // What was named before stays free: its size may change with what comes after.
-        let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&free);
+        let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         let mut candidates = library(&found.vehicle, &comparison.scene)?;
-        candidates.extend(read_otherwise(&comparison, &found.vehicle)?);
+        candidates.extend(read_otherwise(comparison, &found.vehicle)?);
         candidates.retain(|candidate| !refused.contains(&candidate.name));
         candidates.extend(of_the_air(&comparison.scene, &patterns, &quick.hyper));
         let generics = all(&comparison.scene, &comparison.headings());
         let drones = comparison.data.counts();
-        let sought = Sought { library: &candidates, generics: &generics, drones: &drones };
-        let round = round(&problem, quick.hyper, sought, true);
-        let problem = problem.among(&round.groups);
-        let likely = round.base.log_posterior();
-        if let Some((before, was)) = last.take()
-            && likely < was - WORSE_NATS
-        {
-            // Fitted together with the rest it explains less than was explained without.
-            found = before;
-            break;
-        }
-        found.hyper = round.base.hyper;
-        let material_us = material_us(&patterns, &round.base.hyper);
-        let mut decision = decide(&problem, &round, sought, material_us, options, step);
-        decision.what = Contest { found: &found, comparison: &comparison, sought, round: &round }
-            .settle(&problem, decision.what)?;
-        found.rest = Rest {
-            gain_nats: round.best().max(round.best_generic()),
-            candidate: best_name(&round, sought),
-            threshold_nats: if round.best() >= round.best_generic() {
-                decision.thresholds.library
-            } else {
-                decision.thresholds.generic
-            },
-            reduced_chi2: round.base.chi2 / round.base.freedom.max(1.0),
-        };
-        if step == options.most_steps {
-            found.comparison = comparison;
-            break;
-        }
-        match decision.what {
-            What::Nothing => {
-                found.comparison = comparison;
-                break;
-            }
-            What::Effects { members, or_else } => {
-                let best = &members[0];
-                let candidate = &candidates[best.candidate];
-                let variant = &candidate.variants[best.variant];
-                let rivals = rivals(&round, sought);
-                let mut by_lean = None;
-                if let Some(mut next) = entered(candidate, best) {
-                    if let Some(size) = candidate.size.filter(|_| candidate.by_lean)
-                        && let Some((drag, se)) =
-                            drag_by_lean(&comparison, &found.vehicle, &round.base)?
-                    {
-                        Role::RotorDrag.set(&mut next, drag);
-                        by_lean = Some(lean_parameter(size, drag, se));
-                    }
-                    let known = found.parameters.iter().any(|p| p.effect == candidate.name);
-                    if !known {
-                        let more = parameters_of(
-                            &comparison,
-                            &next,
-                            candidate.name,
-                            before(candidate),
-                            &round.base,
-                        )?;
-                        found.parameters.extend(more);
-                    }
-                    found.vehicle = next;
-                    found.hyper = best.hyper;
-                    found.refit(&comparison)?;
-                } else {
-                    found.extras.push(variant.column.clone());
-                    found.hyper = best.hyper;
-                }
-                let free = or_else.iter().map(|free| generics[free.generic].depends_on.name());
-                let effects = members.iter().map(|one| candidates[one.candidate].name);
-                let names: Vec<String> = effects.chain(free).map(str::to_owned).collect();
-                let finding = finding(names, candidate.was_there, by_lean);
-                found.steps.push(Step {
-                    finding,
-                    gain_nats: best.gain,
-                    threshold_nats: decision.thresholds.library,
-                    alpha: options.alpha,
-                    size_us: best.size_us,
-                    rivals,
-                    shape: Some(along_its_signal(&comparison, variant, best.beta)),
-                });
-            }
-            What::Free(free) => {
-                last = Some((Found { comparison: comparison.clone(), ..found.clone() }, likely));
-                let generic = &generics[free.generic];
-                let shape = generic.shape(&free.beta);
-                found.extras.extend(generic.columns.iter().cloned());
-                found.felt = with_felt(&found.felt, &generic.felt, &free.beta);
-                found.hyper = free.hyper;
-                found.steps.push(Step {
-                    finding: Finding::Unknown {
-                        depends_on: generic.depends_on,
-                        formula: super::formula::formula(generic.depends_on, &shape),
-                    },
-                    gain_nats: free.gain,
-                    threshold_nats: decision.thresholds.generic,
-                    alpha: options.alpha,
-                    size_us: free.size_us,
-                    rivals: rivals(&round, sought),
-                    shape: Some(shape),
-                });
-            }
-        }
-        comparison = Comparison::new(data, &found.vehicle, simulated, plan)?.feeling(&found.felt);
-        if !found.parameters.is_empty() {
-            // Against the re-flown model: what closed forms leave is small, and taken up here.
-            found.refit(&comparison)?;
-        }
-        if let Some(gone) = found.weakest(&comparison, vehicle)? {
-            // Explained by what came after it, or a size of nothing.
-            found.drop_effect(gone, vehicle);
-            refused.push(gone);
-            comparison =
-                Comparison::new(data, &found.vehicle, simulated, plan)?.feeling(&found.felt);
-            found.refit(&comparison)?;
-        }
-        found.comparison = comparison.clone();
+        let hyper = quick.hyper;
+        Ok(Look { patterns, residual, free, doubts, hyper, candidates, generics, drones })
     }
-    told_once(&mut found.steps);
-    settle(&mut found);
-    Ok(found)
+
+    /// Takes an effect into the model, or a motion of the air into the regressors. `names` are those of
+    /// its class; the threshold that it passed and its rivals go into the step.
+    fn take_effect(
+        &mut self,
+        candidate: &Candidate,
+        best: &Ranked,
+        round: &Round,
+        names: Vec<String>,
+        (threshold_nats, rivals): (f64, Vec<Rival>),
+    ) -> Result<(), GapError> {
+        let Self { comparison, found, .. } = self;
+        let variant = &candidate.variants[best.variant];
+        let mut by_lean = None;
+        if let Some(mut next) = entered(candidate, best) {
+            if let Some(size) = candidate.size.filter(|_| candidate.by_lean)
+                && let Some((drag, se)) = drag_by_lean(comparison, &found.vehicle, &round.base)?
+            {
+                Role::RotorDrag.set(&mut next, drag);
+                by_lean = Some(lean_parameter(size, drag, se));
+            }
+            let known = found.parameters.iter().any(|p| p.effect == candidate.name);
+            if !known {
+                let before = before(candidate);
+                let more = parameters_of(comparison, &next, candidate.name, before, &round.base)?;
+                found.parameters.extend(more);
+            }
+            found.vehicle = next;
+            found.hyper = best.hyper;
+            found.refit(comparison)?;
+        } else {
+            found.extras.push(variant.column.clone());
+            found.hyper = best.hyper;
+        }
+        found.steps.push(Step {
+            finding: finding(names, candidate.was_there, by_lean),
+            gain_nats: best.gain,
+            threshold_nats,
+            alpha: self.options.alpha,
+            size_us: best.size_us,
+            rivals,
+            shape: Some(along_its_signal(comparison, variant, best.beta)),
+        });
+        Ok(())
+    }
+
+    /// Takes a free shape into the regressors.
+    fn take_shape(
+        &mut self,
+        generic: &Generic,
+        free: &RankedGeneric,
+        (threshold_nats, rivals): (f64, Vec<Rival>),
+    ) {
+        let found = &mut self.found;
+        let shape = generic.shape(&free.beta);
+        found.extras.extend(generic.columns.iter().cloned());
+        found.felt = with_felt(&found.felt, &generic.felt, &free.beta);
+        found.hyper = free.hyper;
+        found.steps.push(Step {
+            finding: Finding::Unknown {
+                depends_on: generic.depends_on,
+                formula: super::formula::formula(generic.depends_on, &shape),
+            },
+            gain_nats: free.gain,
+            threshold_nats,
+            alpha: self.options.alpha,
+            size_us: free.size_us,
+            rivals,
+            shape: Some(shape),
+        });
+    }
+
+    /// Flies the model with what was found, and takes back what is not needed with it.
+    fn fly_again(&mut self) -> Result<(), GapError> {
+        self.comparison = self.against_model()?;
+        if !self.found.parameters.is_empty() {
+            // Against the re-flown model: what closed forms leave is small, and taken up here.
+            self.found.refit(&self.comparison)?;
+        }
+        if let Some(gone) = self.found.weakest(&self.comparison, self.vehicle)? {
+            // Explained by what came after it, or a size of nothing.
+            self.found.drop_effect(gone, self.vehicle);
+            self.refused.push(gone);
+            self.comparison = self.against_model()?;
+            self.found.refit(&self.comparison)?;
+        }
+        self.found.comparison = self.comparison.clone();
+        Ok(())
+    }
+
+    fn against_model(&self) -> Result<Comparison, GapError> {
+        let Self { data, simulated, plan, found, .. } = self;
+        Ok(Comparison::new(data, &found.vehicle, simulated, *plan)?.feeling(&found.felt))
+    }
+}
+
+/// The end of the search, if this round is the last.
+fn rest(round: &Round, sought: Sought<'_>, thresholds: &Thresholds) -> Rest {
+    let library = round.best() >= round.best_generic();
+    Rest {
+        gain_nats: round.best().max(round.best_generic()),
+        candidate: best_name(round, sought),
+        threshold_nats: if library { thresholds.library } else { thresholds.generic },
+        reduced_chi2: round.base.chi2 / round.base.freedom.max(1.0),
+    }
 }
 
 /// An effect that was found again, when it had been flown with its first size, is one finding.

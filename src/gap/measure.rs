@@ -32,11 +32,11 @@ pub(super) fn measured(
 
 fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Option<BinValues> {
     let (start_s, end_s) = (bin.start_s, bin.end_s);
-    let pulses = flight.pulse_us.between(start_s, end_s);
-    if pulses.len() < FEWEST_SAMPLES || flight.pulse_us.longest_gap_s(start_s, end_s) > GAP_S {
+    let pulses = flight.effort.values.between(start_s, end_s);
+    if pulses.len() < FEWEST_SAMPLES || flight.effort.values.longest_gap_s(start_s, end_s) > GAP_S {
         return None;
     }
-    if flight.indicator == Indicator::Pulse && is_saturated(flight, start_s, end_s) {
+    if flight.effort.indicator == Indicator::Pulse && is_saturated(flight, start_s, end_s) {
         return None;
     }
     let climb_mps = mean(flight.velocity_up_mps.between(start_s, end_s))?;
@@ -45,8 +45,8 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
     }
     let lean_rad = lean(flight, start_s, end_s, turn)?;
     let pulse = mean(pulses)?;
-    let zero = flight.indicator.without_thrust();
-    let exponent = match flight.indicator {
+    let zero = flight.effort.indicator.without_thrust();
+    let exponent = match flight.effort.indicator {
         Indicator::Pulse => thrust_exponent,
         other => other.thrust_exponent(),
     };

@@ -44,18 +44,18 @@ pub fn as_pulses(flight: &Flight, lossless: &Vehicle) -> Flight {
         let climb_mps = flight.velocity_up_mps.at(*time_s, 1.0);
         climb_mps.is_none_or(|climb_mps| climb_mps.abs() < HOVER_MPS)
     };
-    let seen = flight.pulse_us.time_s.iter().zip(&flight.pulse_us.value);
+    let seen = flight.effort.values.time_s.iter().zip(&flight.effort.values.value);
     let mut speeds: Vec<f64> =
         seen.filter(|(time_s, _)| hovers(time_s)).map(|(_, rpm)| *rpm).collect();
     if speeds.is_empty() {
-        speeds.clone_from(&flight.pulse_us.value);
+        speeds.clone_from(&flight.effort.values.value);
     }
     speeds.sort_by(f64::total_cmp);
     let hover_rpm = speeds.get(speeds.len() / 2).copied().unwrap_or(1.0).max(1.0);
     let at = Reference::of(lossless);
     let pulses = |rpm: &mut f64| *rpm = at.pulse_us(*rpm / hover_rpm, 1.0);
-    flight.pulse_us.value.iter_mut().for_each(pulses);
-    flight.indicator = Indicator::Pulse;
+    flight.effort.values.value.iter_mut().for_each(pulses);
+    flight.effort.indicator = Indicator::Pulse;
     // Limits of pulses say nothing of rotor speeds.
     flight.pulse_max_us = crate::flight::Series::default();
     flight.pulse_min_us = crate::flight::Series::default();

@@ -16,9 +16,9 @@ const CURVE_POINTS: u32 = 81;
 pub(super) fn mark(window: &WindowStats) -> Mark {
     Mark {
         x: window.velocity_mps.median,
-        y: window.pulse_phi_us.median - window.offset_us.unwrap_or(0.0),
+        y: window.effort_phi.median - window.offset_us.unwrap_or(0.0),
         x_error: window.velocity_mps.sd,
-        y_error: window.pulse_phi_us.sd,
+        y_error: window.effort_phi.sd,
     }
 }
 

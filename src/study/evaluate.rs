@@ -85,7 +85,7 @@ fn study_window(window: &WindowStats) -> StudyWindow {
         label: window.label.clone(),
         commanded_mps: window.commanded_mps,
         velocity_mps: window.velocity_mps,
-        pulse_phi_us: window.pulse_phi_us,
+        pulse_phi_us: window.effort_phi,
         rejected: window.rejected.clone(),
     }
 }
@@ -221,7 +221,7 @@ fn pooled(entries: &[Entry<'_>], options: &FitOptions) -> Option<Fit> {
 
 fn widened(window: &WindowStats, factor: f64) -> WindowStats {
     let mut window = window.clone();
-    for stats in [&mut window.pulse_phi_us, &mut window.velocity_mps] {
+    for stats in [&mut window.effort_phi, &mut window.velocity_mps] {
         stats.sd *= factor;
         stats.se *= factor;
     }

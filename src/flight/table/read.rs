@@ -10,7 +10,7 @@ use super::mapping::{Channel, Mapping, TimeFormat};
 use super::time::seconds_of;
 use crate::base::file::{FileError, open_named};
 use crate::base::plain::plain;
-use crate::flight::{Clock, Flight, Series};
+use crate::flight::{Clock, Effort, Flight, Series};
 
 /// Rows that are read at most.
 const MOST_ROWS: usize = 20_000_000;
@@ -186,7 +186,7 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
     warnings.extend(wanted.iter().filter_map(|(name, one)| holes(name, one)));
     let mut flight = Flight {
         source: path.to_owned(),
-        indicator: mapping.indicator,
+        effort: Effort { indicator: mapping.indicator, ..Effort::default() },
         pulse_limits_us: (f64::NEG_INFINITY, f64::INFINITY),
         clock: Clock::default(),
         warnings: warnings.into_iter().map(Into::into).collect(),
@@ -194,7 +194,7 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
     };
     for (name, Wanted { series, .. }) in wanted {
         match name {
-            "effort" => flight.pulse_us = series,
+            "effort" => flight.effort.values = series,
             "velocity_up" => flight.velocity_up_mps = series,
             "height" => flight.height_m = from_start(series),
             "roll" => flight.roll_rad = series,

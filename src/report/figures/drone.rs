@@ -113,7 +113,7 @@ impl Axes {
 
 /// The window's pulse without the slow offset, us.
 fn adjusted(window: &WindowStats) -> f64 {
-    window.pulse_phi_us.median - window.offset_us.unwrap_or(0.0)
+    window.effort_phi.median - window.offset_us.unwrap_or(0.0)
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {

@@ -32,7 +32,7 @@ pub(super) fn compare(
     let Both { measured: found, simulated, hover } = *both;
     let mut read = logs::read(found, Path::new(""));
     let mapping = found.logs.iter().find_map(|log| log.table.clone());
-    let has_speeds = |(_, flight): &(u16, Flight)| flight.indicator == Indicator::RotorSpeed;
+    let has_speeds = |(_, flight): &(u16, Flight)| flight.effort.indicator == Indicator::RotorSpeed;
     let by_speed = read.flights.iter().any(has_speeds);
     let planned = vehicle;
     let lossless = lossless(planned);

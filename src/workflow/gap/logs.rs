@@ -98,7 +98,7 @@ fn tables(found: &Found) -> Read {
         let number = u16::try_from(index + 1).unwrap_or(u16::MAX);
         let shown = log.path.shown();
         match table::read(&log.path, mapping) {
-            Ok(flight) if flight.indicator == Indicator::Power => read.left_out.push(
+            Ok(flight) if flight.effort.indicator == Indicator::Power => read.left_out.push(
                 format!("{shown}: electrical power is not a pulse; give pulses or rotor speeds")
                     .into(),
             ),

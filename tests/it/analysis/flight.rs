@@ -180,7 +180,7 @@ fn a_log_that_ends_on_the_ground_is_no_flight() {
         }
     }
     let (length, flight) = shortest.unwrap();
-    let (_, last) = flight.pulse_us.span().unwrap();
+    let (_, last) = flight.effort.values.span().unwrap();
     assert!((0.0..12.0).contains(&last), "{length} bytes reach to {last} s");
 }
 
@@ -195,7 +195,7 @@ fn two_boots_in_one_file_are_told_apart() {
         "{:?}",
         flight.warnings
     );
-    assert_eq!(flight.pulse_us, once.pulse_us);
+    assert_eq!(flight.effort.values, once.effort.values);
     assert_eq!(flight.velocity_up_mps, once.velocity_up_mps);
     assert_eq!(flight.clock, once.clock);
 }
@@ -211,7 +211,7 @@ fn damage_never_panics() {
         }
         damaged.truncate(all.len() - seed * 17_321);
         if let Ok(flight) = load(damaged, FlightOptions::default()) {
-            for series in [&flight.pulse_us, &flight.velocity_up_mps, &flight.roll_rad] {
+            for series in [&flight.effort.values, &flight.velocity_up_mps, &flight.roll_rad] {
                 assert!(series.time_s.is_sorted(), "times increase");
                 assert!(series.value.iter().all(|value| value.is_finite()));
             }

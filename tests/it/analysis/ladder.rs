@@ -79,7 +79,7 @@ fn the_still_air_ladder_has_the_law_of_its_plant() {
         for window in legs(windows) {
             let v = window.velocity_mps.mean;
             let law = 1591.04 + 7.05 * v + 0.281 * v * v + 1.237 * v * v.abs();
-            let residual = window.pulse_phi_us.mean - 0.036 * (window.height_m - 20.0) - law;
+            let residual = window.effort_phi.mean - 0.036 * (window.height_m - 20.0) - law;
             squares += residual * residual;
         }
         let rms = (squares / 14.0).sqrt();
@@ -88,7 +88,7 @@ fn the_still_air_ladder_has_the_law_of_its_plant() {
         let ground: Vec<f64> = windows
             .iter()
             .filter(|window| window.kind.is_hover() && window.height_m < 21.0)
-            .map(|window| window.pulse_phi_us.median)
+            .map(|window| window.effort_phi.median)
             .collect();
         assert_eq!(ground.len(), 8);
         assert!(ground.iter().all(|pulse| (pulse - 1591.0).abs() < 0.1), "{ground:?}");
@@ -429,7 +429,7 @@ fn whole_logs_agree_with_the_fixtures() {
         let base = |flight: &FlightAnalysis| {
             let window = flight.drones[0].windows[4].clone();
             assert!(window.kind.is_hover() && window.height_m < 21.0);
-            (window.pulse_us.mean, window.pulse_phi_us.mean, window.tilt_deg.mean)
+            (window.effort.mean, window.effort_phi.mean, window.tilt_deg.mean)
         };
         let ((u, u_phi, _), (wind_u, wind_u_phi, tilt)) = (base(&calm), base(&windy));
         println!("wind: u {:+.2} u_phi {:+.2} us, tilt {tilt:.2}", wind_u - u, wind_u_phi - u_phi);

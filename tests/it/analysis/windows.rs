@@ -4,7 +4,7 @@ use updraft::analysis::result::Rejection;
 use updraft::analysis::windows::{
     Target, Tilt, WindowOptions, contradiction, correct_tilt, inferred, measure,
 };
-use updraft::flight::{Flight, Series};
+use updraft::flight::{Effort, Flight, Series};
 use updraft::mission::plan::Kind;
 
 fn series(duration_s: f64, value: impl Fn(f64) -> f64) -> Series {
@@ -16,7 +16,7 @@ fn series(duration_s: f64, value: impl Fn(f64) -> f64) -> Series {
 fn flight(command: impl Fn(f64) -> f64 + Copy) -> Flight {
     Flight {
         velocity_up_mps: series(100.0, command),
-        pulse_us: series(100.0, |_| 1550.0),
+        effort: Effort { values: series(100.0, |_| 1550.0), ..Effort::default() },
         pulse_max_us: series(100.0, |_| 1560.0),
         pulse_min_us: series(100.0, |_| 1540.0),
         roll_rad: series(100.0, |_| 0.0),
@@ -53,8 +53,8 @@ fn tilt_is_that_of_the_rotor_axis_and_both_forms_use_it() {
     for (tilt, thrust_exponent, expected) in forms {
         let options = WindowOptions { tilt, thrust_exponent, ..WindowOptions::default() };
         let corrected = correct_tilt(&tilted, &options);
-        assert_eq!(corrected.pulse_phi_us.len(), 1000);
-        let pulse = corrected.pulse_phi_us.at(50.0, 1.0).unwrap();
+        assert_eq!(corrected.effort.len(), 1000);
+        let pulse = corrected.effort.at(50.0, 1.0).unwrap();
         assert!((pulse - expected).abs() < 0.01, "{tilt:?}: {pulse}");
         assert!((corrected.tilt_deg.at(50.0, 1.0).unwrap() - 11.6005).abs() < 0.001);
     }

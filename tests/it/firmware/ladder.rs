@@ -59,7 +59,7 @@ fn windows_of_a_log() {
     let path = std::env::var_os("UPDRAFT_LOG").expect("UPDRAFT_LOG, the log");
     let log = Log::open(path.as_ref()).expect("a log");
     for window in windows(&read(&log)) {
-        let (pulse, tilt) = (&window.pulse_phi_us, &window.tilt_deg);
+        let (pulse, tilt) = (&window.effort_phi, &window.tilt_deg);
         println!("({:.2}, {:.2}, {:.3}),", pulse.median, pulse.mean, tilt.mean);
     }
     for (start_s, speed) in steps() {
@@ -71,8 +71,8 @@ fn differences(ours: &[WindowStats], firmware: &[WindowStats]) -> f64 {
     assert_eq!((ours.len(), firmware.len()), (29, 29));
     let mut most: f64 = 0.0;
     for (our, their) in ours.iter().zip(firmware) {
-        let median = our.pulse_phi_us.median - their.pulse_phi_us.median;
-        let mean = our.pulse_phi_us.mean - their.pulse_phi_us.mean;
+        let median = our.effort_phi.median - their.effort_phi.median;
+        let mean = our.effort_phi.mean - their.effort_phi.mean;
         println!("{}: median {median:+.2}, mean {mean:+.2} us", our.label);
         most = most.max(median.abs()).max(mean.abs());
     }
@@ -96,8 +96,8 @@ fn windows_in_wind_are_the_firmwares() {
     for seed in 1..=seeds {
         let flight = read(&flown(&sitl(), &ladder(), Vector3::new(5.0, 0.0, 0.0), seed));
         for (sum, window) in pulses.iter_mut().zip(windows(&flight)) {
-            sum.0 += window.pulse_phi_us.median / seeds as f64;
-            sum.1 += window.pulse_phi_us.mean / seeds as f64;
+            sum.0 += window.effort_phi.median / seeds as f64;
+            sum.1 += window.effort_phi.mean / seeds as f64;
             sum.2 += window.tilt_deg.mean / seeds as f64;
         }
     }
@@ -171,7 +171,7 @@ fn square_law_ladder_is_the_firmwares() {
         .filter(|window| window.commanded_mps != 0.0)
         .map(|window| Point {
             velocity_mps: window.velocity_mps.median,
-            pulse_us: window.pulse_phi_us.median,
+            pulse_us: window.effort_phi.median,
             sigma_us: 0.1,
             velocity_sigma_mps: 0.0,
         })

@@ -291,7 +291,7 @@ fn numbers_that_are_none_do_no_harm() {
                 for window in &mut drone.windows {
                     window.velocity_mps.sd = bad;
                     if index % 2 == 0 {
-                        window.pulse_phi_us.median = bad;
+                        window.effort_phi.median = bad;
                         window.start_s = bad;
                         window.offset_us = Some(bad);
                     }

@@ -212,8 +212,8 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
             commanded_mps: v,
             height_m: height + v * (end - start) / 2.0,
             velocity_mps: stats(v + 0.01 * noise.normal(), 0.04),
-            pulse_us: stats(measured + 0.4, 4.0),
-            pulse_phi_us: stats(measured, 4.0),
+            effort: stats(measured + 0.4, 4.0),
+            effort_phi: stats(measured, 4.0),
             tilt_deg: stats(1.2, 0.4),
             lean_deg: 1.1,
             tilt_form_us: 0.0,
@@ -283,7 +283,7 @@ fn straight_line(windows: &[WindowStats]) -> (f64, f64) {
     let moving: Vec<(f64, f64)> = windows
         .iter()
         .filter(|window| window.kind.is_leg())
-        .map(|window| (window.velocity_mps.median, window.pulse_phi_us.median))
+        .map(|window| (window.velocity_mps.median, window.effort_phi.median))
         .collect();
     let n = moving.len() as f64;
     let (mx, my) =
