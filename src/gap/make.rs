@@ -321,7 +321,7 @@ mod tests {
             flight.pulse_max_us = pulse.clone();
             flight.pulse_min_us = pulse.clone();
             flight.armed_s = vec![(0.0, 200.0)];
-            flight.pulse_us = pulse;
+            flight.effort.values = pulse;
             flight.velocity_up_mps = climb;
             flight
         };

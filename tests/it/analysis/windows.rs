@@ -130,9 +130,9 @@ fn each_reason_to_reject_a_window_is_found() {
 
     let mut holed = flight(|_| 1.0);
     let keep = |time: f64| !(33.0..34.5).contains(&time);
-    holed.pulse_us.value.truncate(0);
-    holed.pulse_us.time_s.retain(|time| keep(*time));
-    holed.pulse_us.value.resize(holed.pulse_us.time_s.len(), 1550.0);
+    holed.effort.values.value.truncate(0);
+    holed.effort.values.time_s.retain(|time| keep(*time));
+    holed.effort.values.value.resize(holed.effort.values.time_s.len(), 1550.0);
     assert_eq!(rejections(&holed, &leg(30.0, 39.0, 1.0)), [Rejection::Gap]);
     assert_eq!(rejections(&holed, &leg(36.0, 45.0, 1.0)), []);
 }
