@@ -336,7 +336,8 @@ fn table(bytes: &[u8]) {
         Ok(flight) => flight,
         Err(error) => return assert!(!error.to_string().is_empty()),
     };
-    let always = [&flight.pulse_us, &flight.velocity_up_mps, &flight.height_m, &flight.roll_rad];
+    let always =
+        [&flight.effort.values, &flight.velocity_up_mps, &flight.height_m, &flight.roll_rad];
     let sometimes = [&flight.desired_up_mps, &flight.truth_up_mps];
     for series in always.into_iter().chain(sometimes.into_iter().flatten()) {
         assert_eq!(series.time_s.len(), series.value.len());

@@ -105,7 +105,7 @@ fn windows_are_found_in_the_commands_of_the_log() {
 #[test]
 fn a_vehicle_that_stands_has_no_windows() {
     let mut standing = flight(|_| 0.0);
-    standing.pulse_us = series(100.0, |_| 1100.0);
+    standing.effort.values = series(100.0, |_| 1100.0);
     assert!(inferred(&standing).is_empty());
     let mut disarmed = flight(|_| 0.0);
     disarmed.armed_s = vec![(0.0, 1.0)];

@@ -101,7 +101,7 @@ fn the_pulse_changes_by_what_they_say() {
         let motors_s = with.armed_s[0].0 + 2.0;
         let (mut largest, mut count) = (0.0_f64, 0);
         for window in steady() {
-            let found = mean(&with.pulse_us, window) - mean(&without.pulse_us, window);
+            let found = mean(&with.effort.values, window) - mean(&without.effort.values, window);
             // Along a window that climbs the wave is not flat: mean of the closed form.
             let times = with.height_m.times_between(window.0, window.1);
             let heights = with.height_m.between(window.0, window.1);
@@ -147,7 +147,7 @@ fn the_door_unused_changes_no_byte_and_another_step_hardly_a_pulse() {
     assert!(standard != finer);
     let (standard, finer) = (read(standard), read(finer));
     for window in steady() {
-        let moved = mean(&finer.pulse_us, window) - mean(&standard.pulse_us, window);
+        let moved = mean(&finer.effort.values, window) - mean(&standard.effort.values, window);
         assert!(moved.abs() < 1.0, "{window:?}: {moved}");
     }
 }
