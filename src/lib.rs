@@ -11,6 +11,7 @@
 //! and [`check`] are of `skybrush-show`, [`link`] and [`protocol`] of `mavlink-station`, [`sim`],
 //! [`effects`] and [`vehicle`] of `multirotor-sim`.
 //!
+//! * [`numeric`]: means, medians, quantiles and straight lines.
 //! * [`mission`]: TOML templates become a [`mission::plan::Plan`], the timetable that everything
 //!   downstream reads.
 //! * [`show`]: plans become trajectories and Skybrush files (`.skyc`, `.skyb`, zipped CSV), and back.
@@ -52,6 +53,7 @@ pub use multirotor_sim::{effects, sim, vehicle};
 pub use skybrush_show as show;
 pub use skybrush_show::check;
 pub mod mission;
+pub mod numeric;
 pub mod report;
 pub mod skybrush_server;
 pub mod study;

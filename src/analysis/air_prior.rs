@@ -11,6 +11,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
+use crate::numeric::most;
+
 /// Time scale that is most likely before the windows are seen, s: a few minutes, as over a field at show
 /// heights (docs/physics.md, 5.3). Found by trial: 120 s before, chosen while looking at the coverage of
 /// simulated campaigns (docs/errors.md). A shorter scale makes intervals of the zero narrower, as s sqrt(2
@@ -163,7 +165,7 @@ pub(super) fn weigh<T: Send>(
         Some(Weighed { air: *air, weight: log_likelihood + air.prior().ln(), fit })
     };
     let mut weighed: Vec<Weighed<T>> = grid.par_iter().filter_map(one).collect();
-    let most = weighed.iter().map(|one| one.weight).fold(f64::NEG_INFINITY, f64::max);
+    let most = most(weighed.iter().map(|one| one.weight)).unwrap_or(f64::NEG_INFINITY);
     for one in &mut weighed {
         one.weight = (one.weight - most).exp();
     }

@@ -19,6 +19,7 @@ use super::split::Point;
 use super::stats::mean_sd;
 use super::zero::{DroneLaw, Fleet, Zero};
 use crate::flight::Flight;
+use crate::numeric::{least, mean};
 
 /// Standard errors to each side of a normal 95 % interval.
 const NORMAL: f64 = 1.96;
@@ -284,7 +285,7 @@ impl<'a> Aware<'a> {
         }
         if let Some(pack) = pack {
             let volts = referred.iter().flatten().filter_map(|(_, raw)| raw.resting_v);
-            let least = volts.fold(f64::INFINITY, f64::min);
+            let least = least(volts).unwrap_or(f64::INFINITY);
             let share = pack.volts(least) / pack.correction.reference_v;
             if share < battery::LOW_SHARE {
                 flag(
@@ -310,22 +311,23 @@ impl<'a> Aware<'a> {
         sigmas: &[f64; DOUBTS],
     ) {
         let n = known.len() as f64;
-        let mean =
-            |value: &dyn Fn(&(Referred, f64)) -> f64| known.iter().map(value).sum::<f64>() / n;
-        let air_mps = mean(&|(_, air)| *air);
-        measured.mean_mps = mean(&|(one, air)| one.velocity_mps - air);
+        let over = |value: &dyn Fn(&(Referred, f64)) -> f64| {
+            mean(known.iter().map(value)).unwrap_or(f64::NAN)
+        };
+        let air_mps = over(&|(_, air)| *air);
+        measured.mean_mps = over(&|(one, air)| one.velocity_mps - air);
         let doubts_us: [f64; DOUBTS] =
-            std::array::from_fn(|doubt| mean(&|(one, _)| one.doubts_us[doubt]));
+            std::array::from_fn(|doubt| over(&|(one, _)| one.doubts_us[doubt]));
         let mut error = values.error(&doubts_us, air_mps, sigmas);
         // The mean of the derivatives, not the derivatives at the mean.
         error.basis =
-            std::array::from_fn(|column| mean(&|(_, air)| values.shape.basis(*air)[column]));
+            std::array::from_fn(|column| over(&|(_, air)| values.shape.basis(*air)[column]));
         error.common_us2 = values.common_us2(&error.basis);
         let slope = values.slope(air_mps);
         let noise_us = hover.noise_us(slope) / n.sqrt();
         let half_us = error.half_us(self.zero.width, noise_us);
         let end = |offset: f64| {
-            mean(&|(one, air)| {
+            over(&|(one, air)| {
                 let offset = values.level_us(one, *air, offset);
                 let moved = values.air_mps(one.pulse_us + offset).unwrap_or(*air);
                 one.velocity_mps - moved
@@ -369,16 +371,14 @@ impl<'a> Aware<'a> {
 
     /// The error that these drones share.
     pub(super) fn common(&self, drones: &[&Measured]) -> CommonError {
-        let n = drones.len().max(1) as f64;
-        let basis: [f64; PARAMETERS] = std::array::from_fn(|column| {
-            drones.iter().map(|drone| drone.basis[column]).sum::<f64>() / n
-        });
+        let over =
+            |value: &dyn Fn(&&Measured) -> f64| mean(drones.iter().map(value)).unwrap_or_default();
+        let basis: [f64; PARAMETERS] =
+            std::array::from_fn(|column| over(&|drone| drone.basis[column]));
         let values = Values { shape: self.zero.shape, law: &self.zero.flock, zero: &self.zero };
         let shared2 = values.common_us2(&basis);
         let zero2 = (self.zero.common[(0, 0)].max(0.0) * basis[0] * basis[0]).min(shared2);
-        let doubt = |index: usize| {
-            (drones.iter().map(|drone| drone.doubts_mps[index]).sum::<f64>() / n).abs()
-        };
+        let doubt = |index: usize| over(&|drone| drone.doubts_mps[index]).abs();
         let battery_mps = doubt(BATTERY).hypot(doubt(DRIFT));
         let rest = battery_mps.hypot(doubt(WIND)).hypot(doubt(DENSITY));
         CommonError {

@@ -15,6 +15,7 @@ use super::budget::{BatteryCorrection, Supply};
 use super::stats::mean_sd;
 use super::window::WindowStats;
 use crate::flight::{Flight, Series};
+use crate::numeric::mean;
 
 /// Pulse at which the rotors make no thrust, us.
 const NO_THRUST_US: f64 = 1000.0;
@@ -102,13 +103,9 @@ pub(super) struct Pack {
 impl Pack {
     /// The correction for the drone of these calibration windows; `None` where voltages are missing.
     pub(super) fn of(supplies: &[Supply], correction: BatteryCorrection) -> Option<Self> {
-        let mean = |value: fn(&Supply) -> f64| {
-            (!supplies.is_empty())
-                .then(|| supplies.iter().map(value).sum::<f64>() / supplies.len() as f64)
-        };
         Some(Self {
-            power_w: mean(|supply| supply.power_w)?,
-            resistance_ohm: mean(|supply| supply.resistance_ohm)?,
+            power_w: mean(supplies.iter().map(|supply| supply.power_w))?,
+            resistance_ohm: mean(supplies.iter().map(|supply| supply.resistance_ohm))?,
             correction,
         })
     }

@@ -8,6 +8,7 @@ use super::law::{self, ErrorScale, Law, Point};
 use super::stats::SampleStats;
 use super::window::WindowStats;
 use crate::flight::Indicator;
+use crate::numeric::mean;
 
 /// Statistic that represents the samples of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -288,18 +289,18 @@ pub fn flock<'a>(
     }
     let average = |points: &Vec<Point>| {
         let n = points.len() as f64;
-        let mean = |value: fn(&Point) -> f64| points.iter().map(value).sum::<f64>() / n;
+        let over = |value: fn(&Point) -> f64| mean(points.iter().map(value)).unwrap_or(f64::NAN);
         let error = |value: fn(&Point) -> f64| {
             points.iter().map(|point| value(point).powi(2)).sum::<f64>().sqrt() / n
         };
         let sigma_us = match options.weights {
-            Weights::WindowSd => mean(|point| point.sigma_us),
+            Weights::WindowSd => over(|point| point.sigma_us),
             Weights::BlockError => error(|point| point.sigma_us),
             Weights::Equal => 1.0,
         };
         Point {
-            velocity_mps: mean(|point| point.velocity_mps),
-            pulse_us: mean(|point| point.pulse_us),
+            velocity_mps: over(|point| point.velocity_mps),
+            pulse_us: over(|point| point.pulse_us),
             sigma_us,
             velocity_sigma_mps: error(|point| point.velocity_sigma_mps),
         }

@@ -15,6 +15,8 @@ use nalgebra::{DMatrix, DVector, Dyn};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 
+use crate::numeric::least;
+
 /// Error of a fit.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -153,7 +155,7 @@ fn inverse_gram(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         column /= *length;
     }
     let r = scaled.qr().r();
-    let smallest = (0..n).map(|i| r[(i, i)].abs()).fold(f64::INFINITY, f64::min);
+    let smallest = least((0..n).map(|i| r[(i, i)].abs())).unwrap_or(f64::INFINITY);
     if smallest < 1e-13 {
         return None;
     }

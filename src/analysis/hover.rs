@@ -8,7 +8,8 @@ use super::cause::Cause;
 use super::running::{RUNNING_S, Running};
 use super::stats::mean_sd;
 use super::windows::{Target, WindowOptions, lean_deg};
-use crate::flight::{Alignment, Flight};
+use crate::flight::{Alignment, Flight, Series};
+use crate::numeric::{self, Line};
 
 /// Quantum of a logged pulse, us: a motor within it of its limit is at the limit.
 const QUANTUM_US: f64 = 1.0;
@@ -76,10 +77,8 @@ impl Hover {
         let (roll, pitch) = (running(&flight.roll_rad), running(&flight.pitch_rad));
         let (first_s, last_s) = ((start_s + half).ceil() as i64, (end_s - half).floor() as i64);
         let last_s = last_s.min(first_s.saturating_add(LONGEST_S));
-        let log_ends_s = [&flight.effort.values, &flight.velocity_up_mps]
-            .iter()
-            .map(|series| series.span().map_or(f64::NEG_INFINITY, |(_, last)| last))
-            .fold(f64::INFINITY, f64::min);
+        let ends_s = |series: &Series| series.span().map_or(f64::NEG_INFINITY, |(_, last)| last);
+        let log_ends_s = ends_s(&flight.effort.values).min(ends_s(&flight.velocity_up_mps));
         let (low, high) = flight.pulse_limits_us;
         let mut hover = Self { start_s, end_s, first_s, ..Self::default() };
         let mut bad: Vec<Option<Quality>> = Vec::new();
@@ -153,10 +152,7 @@ impl Hover {
 
     /// Second means for the noise, and the velocity against the height.
     fn look_closer(&mut self, flight: &Flight) {
-        let mean = |series: &crate::flight::Series, from: f64, to: f64| {
-            let values = series.between(from, to);
-            (!values.is_empty()).then(|| mean_sd(values).0)
-        };
+        let mean = |series: &Series, from: f64, to: f64| numeric::mean(series.between(from, to));
         let mut last: Option<[f64; 2]> = None;
         for second in &self.seconds {
             let now = second.and_then(|second| {
@@ -176,9 +172,8 @@ impl Hover {
             let length_s = last.time_s - first.time_s;
             if good.len() as f64 > length_s && length_s > RUNNING_S {
                 let climbed = (last.height_m - first.height_m) / length_s;
-                let velocity =
-                    good.iter().map(|second| second.velocity_mps).sum::<f64>() / good.len() as f64;
-                self.velocity_bias_mps = (velocity - climbed).abs();
+                let velocity = numeric::mean(good.iter().map(|second| second.velocity_mps));
+                self.velocity_bias_mps = (velocity.unwrap_or_default() - climbed).abs();
             }
         }
     }
@@ -194,15 +189,8 @@ impl Hover {
     /// Trend of pulses through the hover, us per minute, if it is worth a flag.
     pub(super) fn trend_us_per_min(pulses: &[(f64, f64)]) -> Option<f64> {
         let (first, last) = (pulses.first()?.0, pulses.last()?.0);
-        let n = pulses.len() as f64;
-        let mean = |value: fn(&(f64, f64)) -> f64| pulses.iter().map(value).sum::<f64>() / n;
-        let (time, pulse) = (mean(|one| one.0), mean(|one| one.1));
-        let (mut tt, mut tu) = (0.0, 0.0);
-        for one in pulses {
-            tt += (one.0 - time).powi(2);
-            tu += (one.0 - time) * (one.1 - pulse);
-        }
-        let per_minute = 60.0 * tu / tt;
+        let line = Line::through(pulses.iter().copied())?;
+        let per_minute = 60.0 * line.xy / line.xx;
         (last - first >= DRIFT_S && per_minute.abs() > DRIFT_US_PER_MIN).then_some(per_minute)
     }
 

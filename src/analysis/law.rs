@@ -18,6 +18,7 @@ use crate::base::estimate::Estimate;
 use crate::flight::Indicator;
 
 pub use super::kind::{LawKind, LawOf, Symbol};
+use crate::numeric::Line;
 
 /// Step of the profile over W, m/s (docs/physics.md, 5.2). Chosen.
 const W_STEP_MPS: f64 = 0.05;
@@ -263,24 +264,12 @@ fn weighted_line(
     sigmas: &[f64],
     x: impl Fn(&Point) -> f64,
 ) -> Option<(f64, f64)> {
-    let (mut weight, mut mean_x, mut mean_u) = (0.0, 0.0, 0.0);
-    for (point, sigma) in points.iter().zip(sigmas) {
-        let w = 1.0 / (sigma * sigma);
-        weight += w;
-        mean_x += w * x(point);
-        mean_u += w * point.pulse_us;
-    }
-    mean_x /= weight;
-    mean_u /= weight;
-    let (mut xx, mut xu) = (0.0, 0.0);
-    for (point, sigma) in points.iter().zip(sigmas) {
-        let w = 1.0 / (sigma * sigma);
-        let dx = x(point) - mean_x;
-        xx += w * dx * dx;
-        xu += w * dx * (point.pulse_us - mean_u);
-    }
+    let weighed = points.iter().zip(sigmas);
+    let line = Line::weighted(
+        weighed.map(|(point, sigma)| (x(point), point.pulse_us, 1.0 / (sigma * sigma))),
+    )?;
     // Squared spread of x below (1e-6)²: all velocities equal.
-    (xx > weight * 1e-12).then(|| (xu / xx, mean_u - xu / xx * mean_x))
+    (line.xx > line.weight * 1e-12).then(|| (line.slope(), line.intercept()))
 }
 
 fn grid() -> impl Iterator<Item = f64> {

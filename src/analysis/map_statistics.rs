@@ -9,6 +9,7 @@ use super::statistics::{FieldInput, StatisticsOptions, field_statistics};
 use super::updraft;
 use super::windows::{Corrected, Target};
 use crate::flight::{Flight, Series};
+use crate::numeric::mean;
 
 /// Fewest samples in a second.
 const FEWEST_PER_SECOND: usize = 3;
@@ -34,12 +35,11 @@ impl HoverSeen {
         let seconds = (0..length.min(LONGEST_S))
             .map(|second| {
                 let from = hover.start_s + second as f64;
-                let mean = |series: &Series| {
+                let over = |series: &Series| {
                     let values = series.between(from, from + 1.0);
-                    (values.len() >= FEWEST_PER_SECOND)
-                        .then(|| values.iter().sum::<f64>() / values.len() as f64)
+                    mean(values).filter(|_| values.len() >= FEWEST_PER_SECOND)
                 };
-                mean(&corrected.effort).zip(mean(&flight.velocity_up_mps))
+                over(&corrected.effort).zip(over(&flight.velocity_up_mps))
             })
             .collect();
         Self {
@@ -52,11 +52,9 @@ impl HoverSeen {
 
 /// Tangents of the mean attitude: forward with the nose down, right with the right side down.
 fn forward_right(flight: &Flight, hover: &Target) -> [f64; 2] {
-    let mean = |series: &Series| {
-        let values = series.between(hover.start_s, hover.end_s);
-        if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
-    };
-    let (roll, pitch) = (mean(&flight.roll_rad), mean(&flight.pitch_rad));
+    let over =
+        |series: &Series| mean(series.between(hover.start_s, hover.end_s)).unwrap_or_default();
+    let (roll, pitch) = (over(&flight.roll_rad), over(&flight.pitch_rad));
     [-pitch.tan(), roll.tan() / pitch.cos()]
 }
 

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::numeric::{Line, mean};
+
 use super::corrections::DOUBTS;
 use super::shape::Shape;
 
@@ -34,8 +36,8 @@ fn cells(points: &[Point]) -> (Vec<Cell>, Vec<usize>) {
         cell_of.push(cell);
     }
     for cell in &mut cells {
-        let sum: f64 = cell.members.iter().map(|index| points[*index].velocity_mps).sum();
-        cell.velocity_mps = sum / cell.members.len() as f64;
+        let velocities = cell.members.iter().map(|index| points[*index].velocity_mps);
+        cell.velocity_mps = mean(velocities).unwrap_or_default();
     }
     (cells, cell_of)
 }
@@ -67,12 +69,12 @@ impl Split {
         let mut parts =
             Parts { cells: vec![0.0; self.cells.len()], drones: vec![[0.0; 2]; self.drones] };
         for _ in 0..ROUNDS {
-            for (cell, mean) in self.cells.iter().zip(&mut parts.cells) {
+            for (cell, average) in self.cells.iter().zip(&mut parts.cells) {
                 let rest = |index: &usize| {
                     let [constant, slope] = parts.drones[points[*index].drone];
                     values[*index] - constant - slope * self.own[*index]
                 };
-                *mean = cell.members.iter().map(rest).sum::<f64>() / cell.members.len() as f64;
+                *average = mean(cell.members.iter().map(rest)).unwrap_or_default();
             }
             let mut sums = vec![[0.0; 5]; self.drones];
             for (index, point) in points.iter().enumerate() {
@@ -97,10 +99,10 @@ impl Split {
                 }
             }
             for part in 0..2 {
-                let mean = flown.iter().map(|drone| parts.drones[*drone][part]).sum::<f64>()
-                    / flown.len().max(1) as f64;
+                let deviations = flown.iter().map(|drone| parts.drones[*drone][part]);
+                let average = mean(deviations).unwrap_or_default();
                 for drone in &flown {
-                    parts.drones[*drone][part] -= mean;
+                    parts.drones[*drone][part] -= average;
                 }
             }
         }
@@ -125,15 +127,8 @@ pub(super) struct Point {
 
 /// Slope of an unweighted line through the points, us per unit of the shape's second term.
 pub(super) fn rough_slope(split: &Split, points: &[Point]) -> f64 {
-    let n = points.len() as f64;
-    let mean_x = split.own.iter().sum::<f64>() / n;
-    let mean_y = points.iter().map(|point| point.pulse_us).sum::<f64>() / n;
-    let (mut xx, mut xy) = (0.0, 0.0);
-    for (point, x) in points.iter().zip(&split.own) {
-        xx += (x - mean_x).powi(2);
-        xy += (x - mean_x) * (point.pulse_us - mean_y);
-    }
-    if xx > 1e-9 { xy / xx } else { 0.0 }
+    let line = Line::through(points.iter().zip(&split.own).map(|(point, x)| (*x, point.pulse_us)));
+    line.filter(|line| line.xx > 1e-9).map_or(0.0, |line| line.slope())
 }
 
 pub(super) fn noise_us(points: &[Point], members: &[usize]) -> f64 {

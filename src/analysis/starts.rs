@@ -3,6 +3,7 @@
 
 use super::drone::One;
 use crate::flight::Alignment;
+use crate::numeric::upper_median;
 
 /// Shows that began within this of each other are one flight, s. A start is told to the drones in
 /// whole seconds, and clocks without a show's own rows are known to some tenths.
@@ -32,9 +33,9 @@ fn later_than_most(starts_s: &[Option<f64>]) -> Vec<Option<f64>> {
     let Some(first) = sorted.iter().copied().max_by_key(|start| group(*start)) else {
         return vec![None; starts_s.len()];
     };
-    let members: Vec<f64> =
+    let members =
         sorted.iter().copied().filter(|start| (first..=first + APART_S).contains(start)).collect();
-    let middle = members.get(members.len() / 2).copied().unwrap_or(first);
+    let middle = upper_median(members).unwrap_or(first);
     let later = |start: &Option<f64>| {
         start.map(|start| start - middle).filter(|later| later.abs() > APART_S)
     };

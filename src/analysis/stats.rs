@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::numeric::{Moments, Sorted, mean};
+
 /// Share cut off at each end for the trimmed mean (docs/physics.md, 5.1).
 const TRIM: f64 = 0.1;
 
@@ -34,42 +36,24 @@ pub(crate) fn sample_stats(times_s: &[f64], values: &[f64], block_s: f64) -> Sam
         return SampleStats::default();
     }
     let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let (mean, sd) = mean_sd(values);
+    let sorted = Sorted::of(&mut sorted);
+    let (average, sd) = mean_sd(values);
     let cut = (n as f64 * TRIM).floor() as usize;
-    let kept = sorted.get(cut..n - cut).filter(|kept| !kept.is_empty()).unwrap_or(&sorted);
+    let inner = sorted.values().get(cut..n - cut).filter(|inner| !inner.is_empty());
     SampleStats {
-        median: median_of_sorted(&sorted),
-        mean,
+        median: sorted.median().unwrap_or_default(),
+        mean: average,
         sd,
         n,
-        trimmed: mean_sd(kept).0,
+        trimmed: mean(inner.unwrap_or(sorted.values())).unwrap_or_default(),
         se: block_error(times_s, values, block_s).unwrap_or(sd / (n as f64).sqrt()),
     }
 }
 
 /// Mean and sample standard deviation (0 for fewer than two values).
 pub(crate) fn mean_sd(values: &[f64]) -> (f64, f64) {
-    let n = values.len();
-    if n == 0 {
-        return (0.0, 0.0);
-    }
-    let mean = values.iter().sum::<f64>() / n as f64;
-    if n == 1 {
-        return (mean, 0.0);
-    }
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    (mean, (squares / (n - 1) as f64).sqrt())
-}
-
-fn median_of_sorted(sorted: &[f64]) -> f64 {
-    let middle = sorted.len() / 2;
-    let upper = sorted.get(middle).copied().unwrap_or(0.0);
-    if sorted.len() % 2 == 1 {
-        return upper;
-    }
-    let lower = middle.checked_sub(1).and_then(|lower| sorted.get(lower)).copied();
-    f64::midpoint(lower.unwrap_or(upper), upper)
+    Moments::of(values)
+        .map_or((0.0, 0.0), |moments| (moments.mean, moments.deviation().unwrap_or_default()))
 }
 
 /// Standard error of the mean from block means; `None` with fewer than three blocks.

@@ -4,6 +4,7 @@ use super::windows::Target;
 use crate::flight::table::Steps;
 use crate::flight::{Flight, Series};
 use crate::mission::plan::Kind;
+use crate::numeric::mean;
 
 /// Running mean before steps are told apart, s: rotor and position control jitter faster.
 const SMOOTH_S: f64 = 1.0;
@@ -22,9 +23,9 @@ pub fn steady(flight: &Flight, steps: &Steps) -> Vec<Target> {
     let mut targets = Vec::new();
     let mut run: Vec<(f64, f64)> = Vec::new();
     for (time_s, velocity_mps) in smoothed(&flight.velocity_up_mps) {
-        let mean = run.iter().map(|(_, value)| value).sum::<f64>() / run.len().max(1) as f64;
+        let average = mean(run.iter().map(|(_, value)| value)).unwrap_or_default();
         let follows = run.last().is_some_and(|(last, _)| time_s - last < 2.0 * STEP_S);
-        let goes_on = follows && (velocity_mps - mean).abs() <= steps.wobble_mps;
+        let goes_on = follows && (velocity_mps - average).abs() <= steps.wobble_mps;
         if !run.is_empty() && !goes_on {
             targets.extend(target(&run, steps));
             run.clear();
@@ -42,8 +43,7 @@ fn smoothed(velocity: &Series) -> Vec<(f64, f64)> {
     let value = |index: usize| {
         let time_s = start + index as f64 * STEP_S;
         let near = velocity.between(time_s - SMOOTH_S / 2.0, time_s + SMOOTH_S / 2.0);
-        let mean = near.iter().sum::<f64>() / near.len().max(1) as f64;
-        (!near.is_empty()).then_some((time_s, mean))
+        mean(near).map(|average| (time_s, average))
     };
     (0..=count).filter_map(value).collect()
 }
@@ -53,9 +53,8 @@ fn target(run: &[(f64, f64)], steps: &Steps) -> Option<Target> {
     if end_s - start_s < steps.shortest_s {
         return None;
     }
-    let settled: Vec<f64> =
-        run.iter().filter(|(time_s, _)| *time_s >= start_s).map(|(_, value)| *value).collect();
-    let mean = settled.iter().sum::<f64>() / settled.len().max(1) as f64;
+    let settled = run.iter().filter(|(time_s, _)| *time_s >= start_s);
+    let mean = mean(settled.map(|(_, value)| value)).unwrap_or_default();
     let (kind, label, commanded_mps) = if mean.abs() < HOVER_MPS {
         (Kind::Hover, "hover".to_owned(), 0.0)
     } else {

@@ -20,6 +20,7 @@ use super::stats::SampleStats;
 use super::window::WindowStats;
 use super::windows::Corrected;
 use crate::flight::{Flight, Series};
+use crate::numeric::mean;
 
 /// Pulse at which the rotors make no thrust, us.
 const NO_THRUST_US: f64 = 1000.0;
@@ -126,15 +127,12 @@ pub(super) fn systematic_mps(
         let form = law.air_velocity_mps(level) - law.air_velocity_mps(paper);
         assumed.axial_mps(tilt_deg) + if form.is_finite() { form.abs() } else { 0.0 }
     };
-    let used: Vec<f64> = calibration
-        .iter()
-        .filter(|window| window.kind.is_leg() && window.rejected.is_empty())
-        .map(|window| whole(window.effort.mean, window.lean_deg))
-        .collect();
-    let mean = if used.is_empty() { 0.0 } else { used.iter().sum::<f64>() / used.len() as f64 };
+    let used =
+        calibration.iter().filter(|window| window.kind.is_leg() && window.rejected.is_empty());
+    let of_ladder = mean(used.map(|window| whole(window.effort.mean, window.lean_deg)));
     let (pulse_us, tilt_deg) = hover;
     let share = if leaning.is_some() { DOUBTED_SHARE } else { 1.0 };
-    share * whole(pulse_us, tilt_deg).max(mean)
+    share * whole(pulse_us, tilt_deg).max(of_ladder.unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use super::stats::{SampleStats, sample_stats};
 use super::window::{Rejection, WindowStats};
 use crate::flight::{Flight, Indicator, Series};
 use crate::mission::plan::{Kind, Segment};
+use crate::numeric::{self, extent, upper_median};
 
 /// Correction of rotor effort for tilt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -240,15 +241,14 @@ fn steady_runs(desired: &Series) -> Vec<Run> {
             (None, _) => false,
         };
         if !goes_on {
-            let mut window = values.get(start..index).unwrap_or_default().to_vec();
-            window.sort_by(f64::total_cmp);
+            let window = values.get(start..index).unwrap_or_default().to_vec();
             if let (Some(start_s), Some(last), Some(median)) =
-                (times.get(start), before, window.get(window.len() / 2))
+                (times.get(start), before, upper_median(window))
             {
                 // The command held until the row that says otherwise, unless the log was silent.
                 let end_s = current
                     .map_or(last, |(time, _)| if time - last <= RUN_GAP_S { time } else { last });
-                let velocity_mps = round_mmps(*median);
+                let velocity_mps = round_mmps(median);
                 runs.push(Run { start_s: *start_s, steady_s: *start_s, end_s, velocity_mps });
             }
             start = index;
@@ -277,7 +277,7 @@ fn round_mmps(velocity_mps: f64) -> f64 {
 }
 
 fn mean(values: &[f64]) -> f64 {
-    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+    numeric::mean(values).unwrap_or_default()
 }
 
 /// Channels derived from a flight at the times of its rotor effort.
@@ -452,9 +452,8 @@ fn time_offset_s(flight: &Flight, targets: &[Target]) -> Option<f64> {
     if planned.len() < OFFSET_LEGS || planned.len() != flown.len() || !same {
         return None;
     }
-    let mut offsets: Vec<f64> = planned.iter().zip(&flown).map(|(a, b)| b.1 - a.1).collect();
-    offsets.sort_by(f64::total_cmp);
-    let (least, most) = (offsets.first()?, offsets.last()?);
-    let median = *offsets.get(offsets.len() / 2)?;
+    let offsets: Vec<f64> = planned.iter().zip(&flown).map(|(a, b)| b.1 - a.1).collect();
+    let (least, most) = extent(&offsets)?;
+    let median = upper_median(offsets)?;
     (most - least <= OFFSET_SPREAD_S && median.abs() >= OFFSET_MIN_S).then_some(median)
 }

@@ -17,6 +17,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4};
 
+use crate::numeric::extent;
+
 use super::air_prior::{Air, Gls, Record, Weighed, grid, quantile, weigh};
 use super::budget::CalibrationAir;
 use super::corrections::{BATTERY, DOUBTS, DRIFT};
@@ -183,7 +185,8 @@ impl<'a> Fleet<'a> {
         let interval = |value: fn(&Air) -> f64| {
             [0.025, 0.975].map(|share| quantile(&weighed, share, |one| value(&one.air)))
         };
-        let speeds = points.iter().map(|point| point.velocity_mps);
+        let speeds = extent(points.iter().map(|point| point.velocity_mps));
+        let (slowest, fastest) = speeds.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
         Zero {
             shape,
             common,
@@ -197,10 +200,7 @@ impl<'a> Fleet<'a> {
                 local_sd_mps: local.sd_mps,
             },
             width,
-            speeds_mps: [
-                speeds.clone().fold(f64::INFINITY, f64::min),
-                speeds.fold(f64::NEG_INFINITY, f64::max),
-            ],
+            speeds_mps: [slowest, fastest],
         }
     }
 }

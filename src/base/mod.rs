@@ -2,8 +2,10 @@
 //! files.
 
 pub mod causes;
+pub mod digest;
 pub mod estimate;
 pub mod json;
+pub mod layout;
 pub(crate) mod said;
 pub mod sentence;
 

@@ -34,16 +34,9 @@ pub fn power(z: f64) -> f64 {
     0.5 * (1.0 + erf((z - 4.0) / std::f64::consts::SQRT_2))
 }
 
-/// Median; `None` of an empty slice.
+/// Median of what is not NaN; `None` of an empty slice.
 pub fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    let upper = *sorted.get(middle)?;
-    if sorted.len() % 2 == 1 {
-        return Some(upper);
-    }
-    sorted.get(middle.wrapping_sub(1)).map(|lower| f64::midpoint(*lower, upper))
+    crate::numeric::median(values.iter().copied().filter(|value| !value.is_nan()).collect())
 }
 
 #[cfg(test)]
@@ -80,7 +73,7 @@ mod tests {
     #[test]
     fn medians() {
         assert_eq!(median(&[]), None);
-        assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&[3.0, f64::NAN, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
     }
 }

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use rand::Rng as _;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 
 use super::error::BlindError;
 use super::scenario::{SCENARIO_SCHEMA, Scenario};
+use crate::base::digest::sha256;
 use crate::base::file::{create_folder, read_whole, write_whole};
 use crate::base::rng::{Purpose, stream};
 use crate::campaign::to_json;
@@ -101,12 +101,4 @@ pub fn open(beside: &Path, verdict: &Path, told: Option<&str>) -> Result<Opened,
         return Err(BlindError::Schema { path, found, wanted: SCENARIO_SCHEMA });
     }
     Ok(Opened { truth: sealed.truth, truth_sha256: found, verdict_sha256 })
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    use std::fmt::Write as _;
-    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }

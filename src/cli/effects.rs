@@ -11,6 +11,7 @@ use super::effects_plot::{svg, text_plot};
 use super::exit::{CommandError, Exit};
 use super::words::wrap;
 use crate::base::file::write_whole;
+use crate::base::layout;
 use crate::base::plain::Shown as _;
 use crate::effects::definition::{Hook, Signal};
 use crate::effects::doc::{curve, number, size_text};
@@ -120,7 +121,7 @@ fn list(context: &Context, vehicle: &Vehicle) -> Result<(), CommandError> {
         return context.print_json(&output(vehicle, LIBRARY)?);
     }
     let width = |text: fn(&'static dyn Effect) -> &'static str| {
-        LIBRARY.iter().map(|effect| text(*effect).chars().count()).max().unwrap_or(0)
+        LIBRARY.iter().map(|effect| layout::columns(text(*effect))).max().unwrap_or(0)
     };
     let names = width(|effect| effect.definition().name);
     let classes = width(|effect| effect.definition().class.name());
@@ -160,9 +161,9 @@ fn explained(effect: &dyn Effect, vehicle: &Vehicle) -> Result<String, CommandEr
         definition.title,
         definition.name,
         definition.what,
-        wrapped(definition.explanation, "", 80),
-        wrapped(definition.formula, "            ", 80),
-        wrapped(definition.source, "            ", 80),
+        wrapped(definition.explanation, ""),
+        wrapped(definition.formula, "            "),
+        wrapped(definition.source, "            "),
         definition.class.name(),
     );
     let acts = if definition.hooks.is_empty() {
@@ -203,26 +204,12 @@ fn explained(effect: &dyn Effect, vehicle: &Vehicle) -> Result<String, CommandEr
     Ok(text)
 }
 
-/// Text in lines of at most `width` characters; all but the first start with `indent`.
-fn wrapped(text: &str, indent: &str, width: usize) -> String {
-    let mut out = String::new();
-    let mut column = indent.len();
-    for word in text.split_whitespace() {
-        let length = word.chars().count();
-        if !out.is_empty() {
-            if column + 1 + length > width {
-                out.push('\n');
-                out.push_str(indent);
-                column = indent.len();
-            } else {
-                out.push(' ');
-                column += 1;
-            }
-        }
-        out.push_str(word);
-        column += length;
-    }
-    out
+/// Text in lines of at most 80 columns. All but the first start with `indent`; on the first, a label of
+/// its length stands already.
+fn wrapped(text: &str, indent: &str) -> String {
+    let options = layout::options(80).initial_indent(indent).subsequent_indent(indent);
+    let text = layout::wrapped(text, options.break_words(false)).join("\n");
+    text.strip_prefix(indent).unwrap_or(&text).to_owned()
 }
 
 fn output(

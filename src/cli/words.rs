@@ -1,14 +1,14 @@
 //! Small pieces of sentences, and lines that fit a terminal.
 
+use crate::base::layout;
 pub(super) use crate::workflow::words::{count, list, range, shell};
 
 /// The text, or its beginning with dots if it has more characters.
 pub(super) fn shorten(text: &str, width: usize) -> String {
-    if text.chars().count() <= width {
+    if layout::columns(text) <= width {
         return text.to_owned();
     }
-    let kept: String = text.chars().take(width.saturating_sub(3)).collect();
-    format!("{kept}...")
+    format!("{}...", layout::beginning(text, width.saturating_sub(3)))
 }
 
 /// Breaks lines longer than the terminal between words; what follows is indented by four. A word
@@ -17,29 +17,19 @@ pub(super) fn wrap(text: &str, width: Option<usize>) -> String {
     let Some(width) = width else { return text.to_owned() };
     let mut out = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
-        let (mut rest, end) = match line.strip_suffix('\n') {
-            Some(line) => (line, "\n"),
-            None => (line, ""),
-        };
-        let mut indent = "";
-        while indent.len() + rest.chars().count() > width {
-            let room = width.saturating_sub(indent.len());
-            let limit = rest.char_indices().nth(room).map_or(rest.len(), |(at, _)| at);
-            // A space right after the room still ends a line that fits; leading ones are layout.
-            let first = rest.len() - rest.trim_start().len();
-            let until = rest[limit..].chars().next().map_or(limit, |next| limit + next.len_utf8());
-            let Some(at) = rest[first..until.max(first)].rfind(' ').map(|at| first + at) else {
-                break;
-            };
-            out.push_str(indent);
-            out.push_str(rest[..at].trim_end());
-            out.push('\n');
-            rest = rest[at..].trim_start();
-            indent = "    ";
+        if layout::columns(line.trim_end_matches('\n')) <= width {
+            out.push_str(line);
+            continue;
         }
-        out.push_str(indent);
-        out.push_str(rest);
-        out.push_str(end);
+        // Spaces before are layout, spaces behind part a prompt from its answer.
+        let words = line.trim();
+        let (before, behind) = (line.len() - line.trim_start().len(), line.trim_end().len());
+        let options = layout::options(width)
+            .initial_indent(line.get(..before).unwrap_or_default())
+            .subsequent_indent("    ")
+            .break_words(false);
+        out.push_str(&textwrap::fill(words, options));
+        out.push_str(line.get(behind..).unwrap_or_default());
     }
     out
 }

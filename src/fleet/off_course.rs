@@ -9,6 +9,7 @@
 
 use nalgebra::Vector3;
 
+use crate::numeric::least;
 use crate::show::Trajectory;
 
 /// Distance that a step of velocity costs at most, s: so many seconds of the step. Measured: 0.65.
@@ -111,13 +112,12 @@ impl Course {
     fn distance_m(&self, place: Vector3<f64>, at: Moment) -> f64 {
         let intervals = ((2.0 * at.doubt_s / APART_S).ceil() as usize).clamp(1, INSTANTS);
         let mut cursor = crate::show::trajectory::Cursor::new(&self.trajectory);
-        (0..=intervals)
-            .map(|index| {
-                let share = index as f64 / intervals as f64;
-                let time_s = at.show_s + at.doubt_s * (2.0 * share - 1.0);
-                (place - cursor.state_at(time_s.max(0.0)).position_m).norm()
-            })
-            .fold(f64::INFINITY, f64::min)
+        let away_m = (0..=intervals).map(|index| {
+            let share = index as f64 / intervals as f64;
+            let time_s = at.show_s + at.doubt_s * (2.0 * share - 1.0);
+            (place - cursor.state_at(time_s.max(0.0)).position_m).norm()
+        });
+        least(away_m).unwrap_or(f64::INFINITY)
     }
 
     /// What a drone in order may be away from its trajectory because of its steps, m.

@@ -9,6 +9,7 @@ use super::required::{Difference, Standing};
 use super::slots::{self, FleetTable, SlotProblem, geodetic};
 use super::start::{ClockSpread, clocks};
 use super::telemetry::{Drone, SILENT_AFTER, Telemetry};
+use crate::base::layout;
 use crate::link::clock::Micros;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
@@ -410,15 +411,8 @@ impl std::fmt::Display for Preflight {
             }));
             lines.push(line);
         }
-        let widths: Vec<usize> = (0..COLUMNS.len() + 2)
-            .map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0))
-            .collect();
-        for line in &lines {
-            let mut text = String::new();
-            for (cell, width) in line.iter().zip(&widths) {
-                let _ = std::fmt::Write::write_fmt(&mut text, format_args!("{cell:<width$}  "));
-            }
-            writeln!(f, "{}", text.trim_end())?;
+        for line in layout::aligned(&lines) {
+            writeln!(f, "{line}")?;
         }
         for row in &self.rows {
             // Of a silent drone nothing else is known either.

@@ -12,6 +12,7 @@ use crate::base::time::{GpsTime, WEEK_S};
 use crate::link::clock::{Micros, S};
 use crate::link::frame::MavMessage;
 use crate::link::id::DroneId;
+use crate::numeric::upper_median;
 use crate::protocol::show::{CLEAR_TIME, LEAVE_TIME, StartConfig, flag};
 
 /// Options for setting a start.
@@ -291,9 +292,7 @@ impl Start {
 
     fn gps_ms(&self, telemetry: &Telemetry, now: Micros) -> Option<f64> {
         let clock = |drone: &DroneId| telemetry.get(*drone)?.clock.gps_ms(now);
-        let mut times: Vec<f64> = self.drones.iter().filter_map(clock).collect();
-        times.sort_by(f64::total_cmp);
-        times.get(times.len() / 2).copied()
+        upper_median(self.drones.iter().filter_map(clock).collect())
     }
 
     fn rate(&self, telemetry: &Telemetry) -> f64 {

@@ -5,6 +5,7 @@ use super::pick::PERFORMING;
 use super::{Alignment, Clock, FlightOptions, Series, Warning};
 use crate::base::time::GpsTime;
 use crate::mission::plan::Segment;
+use crate::numeric::{Line, Sorted, mean};
 
 /// ClockMS of a SHOW row while no start time is set.
 const NO_CLOCK_MS: f64 = -86_400_000.0;
@@ -122,16 +123,9 @@ fn gps_offset_s(evidence: &Evidence<'_>) -> Option<(f64, f64)> {
 
 /// Median and half the distance between the 5 % and 95 % points.
 fn median_and_spread(values: &mut [f64]) -> Option<(f64, f64)> {
-    values.sort_by(f64::total_cmp);
-    let at = |share: f64| values.get(((values.len().saturating_sub(1)) as f64 * share) as usize);
-    let (low, high) = (*at(0.05)?, *at(0.95)?);
-    let middle = values.len() / 2;
-    let median = if values.len() % 2 == 1 {
-        *values.get(middle)?
-    } else {
-        f64::midpoint(*values.get(middle)?, *values.get(middle.checked_sub(1)?)?)
-    };
-    Some((median, (high - low) / 2.0))
+    let sorted = Sorted::of(values);
+    let (low, high) = (sorted.lower_quantile(0.05)?, sorted.lower_quantile(0.95)?);
+    Some((sorted.median()?, (high - low) / 2.0))
 }
 
 /// Commanded vertical velocity of a plan at a show time, up positive, m/s.
@@ -219,22 +213,21 @@ fn refine_by_height(height: &Series, segments: &[Segment], offset_s: f64) -> Opt
             let since = time - offset_s - segment.start_ms as f64 / 1000.0;
             segment.from_m[2] + segment.velocity_mps[2] * since
         };
-        let sum: f64 = times.iter().zip(logged).map(|(time, height)| height - planned(*time)).sum();
-        if times.len() >= 5 {
-            points.push((segment.velocity_mps[2], sum / times.len() as f64));
+        let above = times.iter().zip(logged).map(|(time, height)| height - planned(*time));
+        if let Some(above) = mean(above).filter(|_| times.len() >= 5) {
+            points.push((segment.velocity_mps[2], above));
         }
     }
     let n = points.len() as f64;
-    let (mean_v, mean_d) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
-    let vv: f64 = points.iter().map(|(v, _)| (v - mean_v).powi(2)).sum();
-    if points.len() < 4 || vv < 0.1 {
+    // A sum of shares, not the share of a sum: stored results have its last digit.
+    let centre = points.iter().fold([0.0; 2], |m, (v, d)| [m[0] + v / n, m[1] + d / n]);
+    let line = Line::about(centre, points.iter().map(|(v, d)| (*v, *d, 1.0)));
+    if points.len() < 4 || line.xx < 0.1 {
         return None;
     }
-    let vd: f64 = points.iter().map(|(v, d)| (v - mean_v) * (d - mean_d)).sum();
-    let slope = vd / vv;
-    let squares: f64 =
-        points.iter().map(|(v, d)| (d - mean_d - slope * (v - mean_v)).powi(2)).sum();
-    let error = (squares / (n - 2.0) / vv).sqrt();
+    let slope = line.slope();
+    let squares: f64 = points.iter().map(|point| line.residual(*point).powi(2)).sum();
+    let error = (squares / (n - 2.0) / line.xx).sqrt();
     // A large or uncertain shift means that the heights are not those of the plan.
     (slope.abs() < 1.0 && error < UNREFINED_S).then_some((offset_s - slope, error.max(FINE_S)))
 }

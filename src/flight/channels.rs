@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::Series;
 use super::clean::Rows;
 use crate::log::{Log, ScanStats, Select, Table};
+use crate::numeric::upper_median;
 
 /// With less feed-forward than this the logged commands say nothing about velocity.
 const LEAST_FEED_FORWARD: f64 = 0.05;
@@ -365,9 +366,8 @@ impl Messages {
         if let Some(instances) = rows.column("Instance").map(<[f64]>::to_vec) {
             rows.retain(|row| instances.get(row) == Some(&0.0));
         }
-        let mut volts: Vec<f64> = rows.column("Volt").map(<[f64]>::to_vec).unwrap_or_default();
-        volts.sort_by(f64::total_cmp);
-        let centi = volts.get(volts.len() / 2).is_some_and(|median| *median > HIGHEST_VOLTAGE_V);
+        let volts = rows.column("Volt").map(<[f64]>::to_vec).unwrap_or_default();
+        let centi = upper_median(volts).is_some_and(|median| median > HIGHEST_VOLTAGE_V);
         let scale = if centi { 0.01 } else { 1.0 };
         (rows.series("Volt", |v| v * scale), rows.series("Curr", |v| v * scale))
     }
@@ -428,11 +428,7 @@ impl Messages {
             rows.retain(|row| instances.get(row) == Some(&0.0));
         }
         let positive = |value: f64| if value > 0.0 { value } else { f64::NAN };
-        let resistance = rows.series("Res", positive).and_then(|series| {
-            let mut values = series.value;
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied()
-        });
+        let resistance = rows.series("Res", positive).and_then(|series| upper_median(series.value));
         (rows.series("VoltR", positive), resistance.filter(|ohm| *ohm < HIGHEST_OHM))
     }
 

@@ -8,6 +8,7 @@ use super::pick;
 use crate::base::frame::Geodetic;
 use crate::base::time::GpsTime;
 use crate::log::{Log, LogError};
+use crate::numeric::{least, upper_median};
 
 /// Largest difference between the start of a show and a given start at which they are one start, s.
 /// The drones get a start in whole seconds, and the clocks of logs are known to some tenths.
@@ -141,7 +142,7 @@ impl Identity {
     /// Time between a start and the nearest show of the log, s; without a show, between the start
     /// and the time that the log covers.
     pub fn away_s(&self, start: GpsTime) -> f64 {
-        self.boots.iter().map(|boot| boot.away_s(start)).fold(f64::INFINITY, f64::min)
+        least(self.boots.iter().map(|boot| boot.away_s(start))).unwrap_or(f64::INFINITY)
     }
 
     /// The show that began at a start, if the log has its clock.
@@ -380,9 +381,8 @@ fn clocks(fixes: &[(f64, f64)]) -> Vec<Clock> {
     runs.retain(|(first, end)| end - first >= FEWEST_ROWS.min(rows));
     let mut clocks: Vec<Clock> = Vec::new();
     for (first, end) in runs {
-        let mut own = offsets.get(first..end).unwrap_or_default().to_vec();
-        own.sort_by(f64::total_cmp);
-        let Some(offset_ms) = own.get(own.len() / 2).copied() else { continue };
+        let own = offsets.get(first..end).unwrap_or_default().to_vec();
+        let Some(offset_ms) = upper_median(own) else { continue };
         let from_s = fixes.get(first).map_or(0.0, |(time, _)| *time);
         // After a damaged stretch the same clock goes on.
         if clocks.last().is_none_or(|last| !same_boot(last.offset_ms, offset_ms))
@@ -426,12 +426,8 @@ fn shows(messages: &Messages, holds: impl Fn(f64) -> bool) -> Vec<(f64, bool)> {
         }
     }
     starts.retain(|start| start.offsets_s.len() >= FEWEST_ROWS);
-    let median = |mut start: Start| {
-        start.offsets_s.sort_by(f64::total_cmp);
-        let middle = start.offsets_s.get(start.offsets_s.len() / 2).copied();
-        Some((middle?, start.flown >= FEWEST_ROWS))
-    };
-    starts.into_iter().filter_map(median).collect()
+    let of = |start: Start| Some((upper_median(start.offsets_s)?, start.flown >= FEWEST_ROWS));
+    starts.into_iter().filter_map(of).collect()
 }
 
 /// The home that the autopilot set in this time, or the first fix.

@@ -14,6 +14,7 @@ use super::scene::Scene;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::effects::{EffectError, Model, Reference, Signals};
 use crate::mission::plan::Plan;
+use crate::numeric::mean;
 use crate::vehicle::Vehicle;
 
 /// The simulated side of a comparison.
@@ -206,17 +207,14 @@ impl Comparison {
             .enumerate()
             .map(|(group, of)| {
                 let pulse = |bin: usize| {
-                    let count = of.slots.len().max(1);
-                    (0..count).map(|drone| closed.at(group, drone, bin)).sum::<f64>() / count as f64
+                    let drones = 0..of.slots.len().max(1);
+                    mean(drones.map(|drone| closed.at(group, drone, bin))).unwrap_or_default()
                 };
                 let pulses: Vec<f64> = (0..of.bins.len()).map(pulse).collect();
                 let hovers = of.bins.iter().zip(&pulses).filter(|(bin, _)| bin.kind.is_hover());
-                let (sum, count) = hovers.fold((0.0, 0.0), |(s, c), (_, p)| (s + p, c + 1.0));
-                let hover_us = if count > 0.0 {
-                    sum / count
-                } else {
-                    pulses.iter().sum::<f64>() / pulses.len().max(1) as f64
-                };
+                let hover_us = mean(hovers.map(|(_, pulse_us)| pulse_us))
+                    .or_else(|| mean(&pulses))
+                    .unwrap_or_default();
                 GroupPattern {
                     drones: of.slots.len(),
                     time_s: of.bins.iter().map(Bin::middle_s).collect(),
@@ -359,8 +357,9 @@ fn fly_groups(
         .par_iter()
         .map(|group| {
             // The drone nearest to the group's middle stands for all.
-            let count = group.place_m.len().max(1) as f64;
-            let middle = |axis: usize| group.place_m.iter().map(|p| p[axis]).sum::<f64>() / count;
+            let middle = |axis: usize| {
+                mean(group.place_m.iter().map(|place| place[axis])).unwrap_or_default()
+            };
             let (x, y) = (middle(0), middle(1));
             let apart = |place: &[f64; 2]| (place[0] - x).hypot(place[1] - y);
             let nearest = group.slots.iter().zip(&group.place_m);

@@ -10,6 +10,7 @@ use crate::analysis::windows::inferred;
 use crate::flight::Flight;
 use crate::flight::table::Steps;
 use crate::mission::plan::{Plan, Slot};
+use crate::numeric::{least, mean, upper_median};
 
 /// A bin is kept when this share of the drones has it. Chosen: a missing bin is imputed, and imputed values
 /// must stay few.
@@ -64,8 +65,7 @@ pub struct Group {
 impl Group {
     /// Mean over the drones of something in a bin.
     pub fn mean(&self, bin: usize, of: impl Fn(&BinValues) -> f64) -> f64 {
-        let sum: f64 = self.measured.iter().map(|drone| of(&drone[bin])).sum();
-        sum / self.measured.len().max(1) as f64
+        mean(self.measured.iter().map(|drone| of(&drone[bin]))).unwrap_or_default()
     }
 
     /// Only some of its drones.
@@ -119,8 +119,7 @@ impl Data {
                     (slot.slot, place, values)
                 })
                 .collect();
-            let armed = drones.iter().filter_map(|(_, flight)| flight.armed_s.first());
-            let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
+            let armed_s = first_armed_s(drones.iter().map(|(_, flight)| *flight));
             data.add(&group.name, &bins, values, armed_s);
         }
         data.resistance_ohm = resistance_ohm(flown);
@@ -152,8 +151,7 @@ impl Data {
             .iter()
             .map(|one| (one.slot, [0.0; 2], measured(one.flight, &bins, 0.0, thrust_exponent)))
             .collect();
-        let armed = flown.iter().filter_map(|one| one.flight.armed_s.first());
-        let armed_s = armed.map(|(start, _)| *start).fold(f64::INFINITY, f64::min);
+        let armed_s = first_armed_s(flown.iter().map(|one| one.flight));
         data.add("all", &bins, values, armed_s);
         data.resistance_ohm = resistance_ohm(flown);
         data
@@ -366,8 +364,13 @@ pub(super) fn constant_us<'a>(
 fn resistance_ohm(flown: &[Flown<'_>]) -> Option<f64> {
     let mut known: Vec<f64> = flown.iter().filter_map(|one| one.flight.resistance_ohm).collect();
     known.retain(|ohm| *ohm > 0.0 && *ohm < 1.0);
-    known.sort_by(f64::total_cmp);
-    known.get(known.len() / 2).copied()
+    upper_median(known)
+}
+
+/// When the first of the drones armed, show time, s; infinity if none did.
+fn first_armed_s<'a>(flights: impl Iterator<Item = &'a Flight>) -> f64 {
+    let armed = flights.filter_map(|flight| flight.armed_s.first());
+    least(armed.map(|(start, _)| *start)).unwrap_or(f64::INFINITY)
 }
 
 /// Fills holes with the group's mean of the bin, moved by the drone's own offset from it.
@@ -384,7 +387,7 @@ fn fill(drones: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
                 .zip(&means)
                 .filter_map(|(own, mean)| Some((*own)?.pulse_us - (*mean)?.pulse_us))
                 .collect();
-            let offset_us = apart.iter().sum::<f64>() / apart.len().max(1) as f64;
+            let offset_us = mean(&apart).unwrap_or_default();
             let value = |(own, mean): (&Option<BinValues>, &Option<BinValues>)| {
                 own.or_else(|| mean.map(|m| BinValues { pulse_us: m.pulse_us + offset_us, ..m }))
             };

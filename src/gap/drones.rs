@@ -12,6 +12,7 @@ use super::noise::{
 use super::verdict::{DroneOffset, Drones, Finding, Fitted, Interval, Step};
 use crate::effects::role::Place;
 use crate::effects::{Model, Reference, Role, Signals};
+use crate::numeric::{Line, Moments, mean};
 use crate::vehicle::Vehicle;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
@@ -110,8 +111,8 @@ fn spread(
     let count = each.len() as f64;
     let sensitivity = Reference::of(&found.vehicle).sensitivity_us();
     let relative: Vec<f64> = each.iter().map(|drone| drone.offset_us / sensitivity).collect();
-    let mean = relative.iter().sum::<f64>() / count;
-    let square = relative.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    let moments = Moments::of(&relative)?;
+    let (centre, square) = (moments.mean, moments.squares);
     let freedom = count - 1.0;
     let sd = (square / freedom).sqrt();
     let chi2 = ChiSquared::new(freedom).ok()?;
@@ -125,13 +126,14 @@ fn spread(
         return None;
     }
     // Thrust makes the response of a drone follow its offset, mass does not.
-    let slopes = each.iter().map(|drone| drone.slope).sum::<f64>() / count;
-    let cross: f64 = each.iter().zip(&relative).map(|(d, r)| (d.slope - slopes) * (r - mean)).sum();
+    let slopes = mean(each.iter().map(|drone| drone.slope))?;
+    let cross: f64 =
+        each.iter().zip(&relative).map(|(d, r)| (d.slope - slopes) * (r - centre)).sum();
     let follows = cross / square;
     let rest: f64 = each
         .iter()
         .zip(&relative)
-        .map(|(d, r)| (d.slope - slopes - follows * (r - mean)).powi(2))
+        .map(|(d, r)| (d.slope - slopes - follows * (r - centre)).powi(2))
         .sum();
     let se = (rest / (count - 2.0) / square).sqrt() / reliability.max(0.05);
     let follows = follows / reliability.max(0.05);
@@ -219,18 +221,8 @@ fn response_follows(vehicle: &Vehicle, change: fn(&mut Vehicle)) -> f64 {
 const SPREAD_NATS: f64 = 1.92;
 
 fn correlation(each: &[DroneOffset]) -> f64 {
-    let count = each.len() as f64;
-    let mean = |of: fn(&DroneOffset) -> f64| each.iter().map(of).sum::<f64>() / count;
-    let (offset, slope) = (mean(|d| d.offset_us), mean(|d| d.slope));
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for drone in each {
-        let (x, y) = (drone.offset_us - offset, drone.slope - slope);
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-    }
-    let product = (xx * yy).sqrt();
-    if product > 0.0 { xy / product } else { 0.0 }
+    let line = Line::through(each.iter().map(|drone| (drone.offset_us, drone.slope)));
+    line.and_then(|line| line.correlation()).unwrap_or_default()
 }
 
 fn words(each: &[DroneOffset], correlation: Option<f64>, found: &Found) -> Vec<String> {

@@ -17,6 +17,7 @@ use super::search::{Ranked, RankedGeneric, Round, Sought, Thresholds, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::effects::{Role, Signals};
 use crate::mission::plan::Plan;
+use crate::numeric::mean;
 use crate::vehicle::Vehicle;
 
 /// Options of the search.
@@ -47,9 +48,8 @@ const MATERIAL_US: f64 = 2.5;
 /// Smallest effect that is named, us: where air and noise are much smaller than in the field (a single
 /// drone in a simulator's still air), smaller effects are real.
 fn material_us(groups: &[GroupPattern], hyper: &Hyper) -> f64 {
-    let responses: Vec<f64> = groups.iter().flat_map(|group| group.responses(hyper)).collect();
-    let mean = responses.iter().sum::<f64>() / responses.len().max(1) as f64;
-    let noise_us = hyper.get(WHITE) + mean * gusts_mps(hyper);
+    let responses = groups.iter().flat_map(|group| group.responses(hyper));
+    let noise_us = hyper.get(WHITE) + mean(responses).unwrap_or_default() * gusts_mps(hyper);
     (2.0 * noise_us).clamp(0.75, MATERIAL_US)
 }
 

@@ -2,6 +2,7 @@
 
 use super::dependence::Dependence;
 use super::verdict::Shape;
+use crate::numeric::mean;
 
 /// A formula must describe this share of the shape's variance. Chosen.
 const ENOUGH: f64 = 0.95;
@@ -67,10 +68,9 @@ pub(super) fn formula(depends_on: Dependence, shape: &Shape) -> Option<String> {
 
 /// Coefficients of one or two regressors beside a constant, and the share of variance explained.
 fn explained(columns: &[Vec<f64>], y: &[f64]) -> Option<(Vec<f64>, f64)> {
-    let count = y.len() as f64;
     let centred = |values: &[f64]| -> Vec<f64> {
-        let mean = values.iter().sum::<f64>() / count;
-        values.iter().map(|value| value - mean).collect()
+        let centre = mean(values).unwrap_or_default();
+        values.iter().map(|value| value - centre).collect()
     };
     let y = centred(y);
     let columns: Vec<Vec<f64>> = columns.iter().map(|column| centred(column)).collect();

@@ -6,6 +6,7 @@ use super::response::Response;
 use super::scene::Scene;
 use crate::effects::Signals;
 use crate::gap::verdict::Shape;
+use crate::numeric;
 
 /// A family of regressors that together make a free shape along one signal.
 #[derive(Clone, Debug)]
@@ -216,11 +217,11 @@ fn map(values: &[Vec<f64>], of: &dyn Fn(f64) -> f64) -> Vec<Vec<f64>> {
 }
 
 fn least(values: &[Vec<f64>]) -> f64 {
-    values.iter().flatten().copied().fold(f64::INFINITY, f64::min)
+    numeric::least(values.iter().flatten()).unwrap_or(f64::INFINITY)
 }
 
 fn most(values: &[Vec<f64>]) -> f64 {
-    values.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max)
+    numeric::most(values.iter().flatten()).unwrap_or(f64::NEG_INFINITY)
 }
 
 fn span(values: &[Vec<f64>]) -> f64 {
@@ -269,9 +270,8 @@ const POINTS: usize = 40;
 pub(super) fn drawn(axis: &str, mut points: Vec<(f64, f64)>) -> Shape {
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let size = points.len().div_ceil(POINTS).max(1);
-    let mean = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
-        let chunks = points.chunks(size);
-        chunks.map(|chunk| chunk.iter().map(of).sum::<f64>() / chunk.len() as f64).collect()
+    let means = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+        points.chunks(size).filter_map(|chunk| numeric::mean(chunk.iter().map(of))).collect()
     };
-    Shape { axis: axis.to_owned(), x: mean(|point| point.0), us: mean(|point| point.1) }
+    Shape { axis: axis.to_owned(), x: means(|point| point.0), us: means(|point| point.1) }
 }

@@ -3,6 +3,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use crate::numeric::{extent, mean};
+
 use super::minimise::minimise;
 use super::noise::{GroupPattern, Hyper, Whitener};
 
@@ -85,15 +87,11 @@ impl Column {
 
     /// Difference between the largest and the smallest value.
     pub fn range(&self) -> f64 {
-        let of = |values: &mut dyn Iterator<Item = &f64>| {
-            let (low, high) =
-                values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-            (high - low).max(0.0)
+        let extent = match self {
+            Self::Shared(values) => extent(values.iter().flatten()),
+            Self::Own(values) => extent(values.iter().flatten().flatten()),
         };
-        match self {
-            Self::Shared(values) => of(&mut values.iter().flatten()),
-            Self::Own(values) => of(&mut values.iter().flatten().flatten()),
-        }
+        extent.map_or(0.0, |(low, high)| high - low)
     }
 
     /// Standard deviation over all bins and drones.
@@ -124,12 +122,11 @@ impl Column {
 
 /// Means over each group's drones, by group and bin.
 pub(super) fn means_of(pulses: &Pulses) -> Vec<Vec<f64>> {
-    let mean = |drones: &Vec<Vec<f64>>| -> Vec<f64> {
-        let count = drones.len() as f64;
+    let of_group = |drones: &Vec<Vec<f64>>| -> Vec<f64> {
         let bins = drones.first().map_or(0, Vec::len);
-        (0..bins).map(|bin| drones.iter().map(|drone| drone[bin]).sum::<f64>() / count).collect()
+        (0..bins).filter_map(|bin| mean(drones.iter().map(|drone| drone[bin]))).collect()
     };
-    pulses.iter().map(mean).collect()
+    pulses.iter().map(of_group).collect()
 }
 
 /// Pulses split into groups' means and drones' deviations.

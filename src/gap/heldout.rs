@@ -15,6 +15,7 @@ use super::response::Response;
 use super::verdict::{Gap, Interval, Shrink};
 use crate::base::rng::{Purpose, stream};
 use crate::mission::plan::Plan;
+use crate::numeric::{Moments, Sorted, mean};
 use crate::vehicle::Vehicle;
 
 /// Draws of the bootstrap, usual for intervals of 95 %.
@@ -244,8 +245,8 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
             let air = &residuals.air[group];
             let without = |values: &[f64], air: &[f64]| -> Vec<f64> {
                 let rest: Vec<f64> = values.iter().zip(air).map(|(v, a)| v - a).collect();
-                let mean = rest.iter().sum::<f64>() / rest.len().max(1) as f64;
-                rest.into_iter().map(|value| value - mean).collect()
+                let centre = mean(&rest).unwrap_or_default();
+                rest.into_iter().map(|value| value - centre).collect()
             };
             let nothing = vec![0.0; air.len()];
             let raw = [without(before, &nothing), without(after, &nothing)];
@@ -309,8 +310,8 @@ fn shrink(residuals: &Residuals<'_>, floor_us: f64, seed: u64) -> Shrink {
         .collect();
     let interval = |of: fn(&(f64, f64, f64)) -> f64, value: f64| {
         let mut values: Vec<f64> = draws.iter().map(of).collect();
-        values.sort_by(f64::total_cmp);
-        let at = |share: f64| values[((values.len() - 1) as f64 * share) as usize];
+        let sorted = Sorted::of(&mut values);
+        let at = |share: f64| sorted.lower_quantile(share).unwrap_or(value);
         Interval { value, low: at(0.025), high: at(0.975) }
     };
     let floor = (floor_us * floor_us).max(1e-12);
@@ -354,9 +355,10 @@ fn floor(patterns: &[GroupPattern], held: &[usize], hyper: &Hyper, seed: u64) ->
         for ((drones, group), air) in pulses.iter().zip(patterns).zip(&air) {
             for drone in drones.iter().skip(group.drones) {
                 let rest: Vec<f64> = drone.iter().zip(air).map(|(v, a)| v - a).collect();
-                let mean = rest.iter().sum::<f64>() / rest.len().max(1) as f64;
-                squares += rest.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-                count += rest.len() as f64;
+                if let Some(rest) = Moments::of(&rest) {
+                    squares += rest.squares;
+                    count += rest.count as f64;
+                }
             }
         }
     }

@@ -6,6 +6,7 @@ use super::bins::BinValues;
 use super::data::Data;
 use super::lean_fit::{Point, fit, hovering_wind};
 use crate::effects::Role;
+use crate::numeric::Moments;
 use crate::sim::plant::drag::Drag;
 use crate::vehicle::Vehicle;
 
@@ -234,8 +235,8 @@ fn smooth(group: &super::data::Group, raw: &[[f64; 2]]) -> Vec<[f64; 2]> {
 /// Posterior mean of a series that is exponentially correlated with white scatter on top.
 fn smoothed(group: &super::data::Group, values: &[f64]) -> Vec<f64> {
     let count = values.len();
-    let mean = values.iter().sum::<f64>() / count.max(1) as f64;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count.max(1) as f64;
+    let Some(moments) = Moments::of(values) else { return Vec::new() };
+    let (mean, variance) = (moments.mean, moments.population_variance());
     if variance < 1e-6 || count < 4 {
         return values.to_vec();
     }

@@ -26,6 +26,7 @@ use crate::effects::Role;
 use crate::effects::select;
 use crate::flight::table::Steps;
 use crate::mission::plan::Plan;
+use crate::numeric::mean;
 use crate::vehicle::Vehicle;
 
 /// Input of a comparison of measurement and simulation.
@@ -203,7 +204,7 @@ fn ladder(data: &Data, regimes: &[Regime]) -> Vec<Rung> {
     rungs
         .filter_map(|rung| {
             let pulses = pulses(rung.x);
-            let measured_us = pulses.iter().sum::<f64>() / pulses.len() as f64;
+            let measured_us = mean(&pulses)?;
             measured_us.is_finite().then_some(Rung {
                 climb_mps: rung.x,
                 measured_us,

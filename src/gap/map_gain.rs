@@ -20,6 +20,7 @@ use super::verdict::{MapError, MapGain};
 use crate::analysis::TruthSeries;
 use crate::effects::{Model, Signals};
 use crate::mission::plan::Plan;
+use crate::numeric::{mean, rms};
 use crate::vehicle::Vehicle;
 
 /// A measurement flight whose true air is known.
@@ -80,7 +81,7 @@ pub fn map_gain(
         flight: measured.name.to_owned(),
         drones,
         values: after.off.len(),
-        zero_mps: rms(&after.truth),
+        zero_mps: rms(&after.truth).unwrap_or_default(),
         common_sd_mps: after.common_sd,
         before: summed(&before.off),
         after: summed(&after.off),
@@ -123,7 +124,7 @@ impl Zero {
 
 /// Offsets of drones shifted to another mean, us.
 fn about(mean_us: f64, offsets_us: &BTreeMap<u16, f64>) -> BTreeMap<u16, f64> {
-    let was_us = offsets_us.values().sum::<f64>() / offsets_us.len().max(1) as f64;
+    let was_us = mean(offsets_us.values()).unwrap_or_default();
     offsets_us.iter().map(|(slot, offset_us)| (*slot, offset_us - was_us + mean_us)).collect()
 }
 
@@ -179,20 +180,23 @@ fn errors_of(
                 let near = |other: &usize| {
                     (group.bins[*other].middle_s() - middle.middle_s()).abs() < HALF_S
                 };
-                let near: Vec<usize> = (0..group.bins.len()).filter(near).collect();
-                let mean = near.iter().map(|other| updraft_mps[*other]).sum::<f64>()
-                    / near.len().max(1) as f64;
+                let near = (0..group.bins.len()).filter(near).map(|other| updraft_mps[other]);
+                let mean_mps = mean(near).unwrap_or_default();
                 let true_mps = truth.at_second(middle.middle_s().round() as i64);
                 if group.bins[bin].kind.is_hover()
                     && let Some(true_mps) = true_mps.filter(|value| value.is_finite())
                 {
-                    errors_mps.push(mean - true_mps);
+                    errors_mps.push(mean_mps - true_mps);
                     truths_mps.push(true_mps);
                 }
             }
         }
     }
-    Ok(Errors { off: errors_mps, truth: truths_mps, common_sd: rms(&doubts_mps) })
+    Ok(Errors {
+        off: errors_mps,
+        truth: truths_mps,
+        common_sd: rms(&doubts_mps).unwrap_or_default(),
+    })
 }
 
 /// The updraft in which the model asks for so much more pulse, m/s.
@@ -210,13 +214,9 @@ fn inverted(model: &Model, signals: &Signals, more_us: f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
 fn summed(errors: &[f64]) -> MapError {
-    let bias_mps = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
-    let rms_mps = rms(errors);
+    let bias_mps = mean(errors).unwrap_or_default();
+    let rms_mps = rms(errors).unwrap_or_default();
     let without_bias_mps = (rms_mps * rms_mps - bias_mps * bias_mps).max(0.0).sqrt();
     MapError { rms_mps, bias_mps, without_bias_mps }
 }

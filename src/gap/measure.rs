@@ -120,7 +120,7 @@ fn acceleration(flight: &Flight, start_s: f64, end_s: f64) -> Option<(f64, f64)>
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
 
+/// Mean of logged values; `None` of nothing, and if a value is not finite.
 pub(super) fn mean(values: &[f64]) -> Option<f64> {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    mean.is_finite().then_some(mean)
+    crate::numeric::mean(values).filter(|mean| mean.is_finite())
 }

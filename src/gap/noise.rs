@@ -12,6 +12,8 @@
 //! and H the model's response to them. Within a command group the likelihood splits exactly into the group's
 //! mean and the deviations of its drones; both are whitened by filters.
 
+use crate::numeric;
+
 use super::filter::{Filter, Observation, State};
 use super::response::{Response, gusts_mps};
 
@@ -348,10 +350,9 @@ impl Whitener {
                 let drones: Vec<Vec<f64>> = (0..self.drones[group])
                     .map(|_| filter.colour(&mean.iter().map(|_| draw()).collect::<Vec<_>>()))
                     .collect();
-                let count = drones.len() as f64;
-                let centre: Vec<f64> = (0..mean.len())
-                    .map(|bin| drones.iter().map(|drone| drone[bin]).sum::<f64>() / count)
-                    .collect();
+                let of_bin = |bin: usize| numeric::mean(drones.iter().map(|drone| drone[bin]));
+                let centre: Vec<f64> =
+                    (0..mean.len()).map(|bin| of_bin(bin).unwrap_or(f64::NAN)).collect();
                 drones
                     .into_iter()
                     .map(|drone| {

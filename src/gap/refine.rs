@@ -12,6 +12,7 @@ use super::response::shifted;
 use super::verdict::{Fitted, Interval};
 use crate::effects::select::value_of;
 use crate::effects::{Definition, Sought, find};
+use crate::numeric::extent;
 use crate::vehicle::Vehicle;
 
 /// Rounds of Gauss-Newton; the forms are nearly linear in their sizes, and a fit ends when no size moves by
@@ -150,12 +151,8 @@ fn form_of(size: &Parameter) -> Option<(Parameter, f64)> {
     if *name != size.name {
         return None;
     }
-    let (low, high) = range(values);
+    let (low, high) = extent(*values)?;
     Some((parameter(definition, form)?, (high - low) / 2.0))
-}
-
-fn range(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
 }
 
 /// Derivatives of the model's pulse by each parameter.
@@ -213,7 +210,7 @@ pub(super) fn parameters_of(
             let (size, form) = (base.white(size), base.white(form));
             let alike = base.likeness(&size, &form);
             let information = base.information(&form) * (1.0 - alike * alike).max(0.0);
-            let (low, high) = range(values);
+            let (low, high) = extent(*values).unwrap_or_default();
             if information.sqrt() * (high - low) > FORM_Z {
                 found.push(parameter);
             }
@@ -268,9 +265,8 @@ pub(super) fn size_errors(
 /// Standard errors in half of a 95 % interval: the strength of the shared air is estimated from as many
 /// pieces as its time scale goes into the flight, so Student's law with so many degrees of freedom.
 pub(super) fn half_interval(comparison: &Comparison, hyper: &Hyper) -> f64 {
-    let times = || comparison.data.groups.iter().flat_map(|group| &group.bins).map(Bin::middle_s);
-    let first = times().fold(f64::INFINITY, f64::min);
-    let last = times().fold(f64::NEG_INFINITY, f64::max);
+    let times = comparison.data.groups.iter().flat_map(|group| &group.bins).map(Bin::middle_s);
+    let (first, last) = extent(times).unwrap_or_default();
     let scales = ((last - first) / hyper.get(SHARED_TIME)).max(FEWEST_SCALES);
     StudentsT::new(0.0, 1.0, scales).map_or(INTERVAL, |law| law.inverse_cdf(0.975).max(INTERVAL))
 }

@@ -10,6 +10,7 @@ use super::gls::Pulses;
 use super::noise::Whitener;
 use super::verdict::Regime;
 use crate::base::rng::{Purpose, stream};
+use crate::numeric::{extent, mean, rms};
 
 /// Classes of a continuous regime. For drawing only.
 const CLASSES: usize = 8;
@@ -68,21 +69,18 @@ pub(super) fn regimes(
         }
         classes.sort_by(|a, b| a.1.total_cmp(&b.1));
         for (label, x, places) in classes {
-            let mean = |pulses: &Pulses| {
-                places.iter().map(|(g, d, b)| pulses[*g][*d][*b]).sum::<f64>() / places.len() as f64
+            let over = |pulses: &Pulses| {
+                mean(places.iter().map(|(g, d, b)| pulses[*g][*d][*b])).unwrap_or(f64::NAN)
             };
-            let square = draws.iter().map(|draw| mean(draw).powi(2)).sum::<f64>();
-            let response =
-                places.iter().map(|(group, _, bin)| responses[*group][*bin]).sum::<f64>()
-                    / places.len() as f64;
-            let before_us = mean(from);
+            let response = mean(places.iter().map(|(group, _, bin)| responses[*group][*bin]));
+            let before_us = over(from);
             rows.push(Regime {
                 by: axis.by,
                 label,
                 x,
-                before_us: (before_us, (square / DRAWS as f64).sqrt()),
-                after_us: mean(to),
-                before_mps: before_us / response.max(1.0),
+                before_us: (before_us, rms(draws.iter().map(over)).unwrap_or_default()),
+                after_us: over(to),
+                before_mps: before_us / response.unwrap_or_default().max(1.0),
                 bins: places.len(),
             });
         }
@@ -93,8 +91,8 @@ pub(super) fn regimes(
 /// Pulses without each drone's mean.
 fn centred(pulses: &Pulses) -> Pulses {
     let drone = |bins: &Vec<f64>| {
-        let mean = bins.iter().sum::<f64>() / bins.len().max(1) as f64;
-        bins.iter().map(|value| value - mean).collect()
+        let centre = mean(bins).unwrap_or_default();
+        bins.iter().map(|value| value - centre).collect()
     };
     pulses.iter().map(|drones| drones.iter().map(drone).collect()).collect()
 }
@@ -104,9 +102,7 @@ fn axes(after: &Comparison) -> Vec<Axis<'_>> {
     let groups = &after.data.groups;
     let classed =
         move |by: Dependence, unit: &'static str, of: fn(&crate::effects::Signals) -> f64| {
-            let values = || signals.iter().flatten().map(of);
-            let low = values().fold(f64::INFINITY, f64::min);
-            let high = values().fold(f64::NEG_INFINITY, f64::max);
+            let (low, high) = extent(signals.iter().flatten().map(of)).unwrap_or_default();
             let width = ((high - low) / CLASSES as f64).max(1e-9);
             Axis {
                 by,

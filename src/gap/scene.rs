@@ -10,6 +10,7 @@ use crate::base::air::density_ratio;
 use crate::effects::cell::charge_of_cell;
 use crate::effects::select::looks_at;
 use crate::effects::{EffectError, Model, Reference, Role, Signal, Signals};
+use crate::numeric::mean;
 use crate::vehicle::Vehicle;
 
 /// Open-circuit voltage above which there must be another cell, V: a full lithium polymer cell has 4.20 V.
@@ -84,10 +85,9 @@ impl Scene {
             // What it started with, and how its group declined, do not.
             let exogenous = |drones: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
                 let bins = drones.first().map_or(0, Vec::len);
-                let count = drones.len().max(1) as f64;
-                let decline: Vec<f64> = (0..bins)
-                    .map(|bin| drones.iter().map(|d| d[bin] - d[0]).sum::<f64>() / count)
-                    .collect();
+                let declined = |bin: usize| mean(drones.iter().map(|d| d[bin] - d[0]));
+                let decline: Vec<f64> =
+                    (0..bins).map(|bin| declined(bin).unwrap_or_default()).collect();
                 // By some bins: the scatter of one voltage is worth some percent of charge.
                 let first = |drone: &Vec<f64>| {
                     let early = drone.iter().zip(&decline).take(EARLY_BINS);
@@ -100,7 +100,7 @@ impl Scene {
             };
             data.groups.iter().map(drones).map(exogenous).collect()
         });
-        let resting_v = if logged { volts.iter().sum::<f64>() / volts.len() as f64 } else { 0.0 };
+        let resting_v = mean(&volts).filter(|_| logged).unwrap_or_default();
         let neighbours = data.groups.iter().map(|group| group.neighbours.clone()).collect();
         let resistance_ohm = data.resistance_ohm;
         Self { signals, charge, cells, resting_v, resistance_ohm, neighbours }

@@ -5,6 +5,7 @@ use super::data::Flown;
 use super::verdict::{Interval, SensorChannel};
 use crate::flight::{Flight, Series};
 use crate::mission::plan::Segment;
+use crate::numeric::Moments;
 
 /// A bias beyond this is named, m/s: 1.3 us on the show drone, half of what is material in the pulse, and
 /// more than RTK receivers have (0.02 m/s). Chosen.
@@ -59,15 +60,10 @@ pub(super) fn sensor<'a>(
 
 /// Mean with the interval that the drones' scatter and a doubt they share give.
 fn interval(values: &[f64], doubt: f64) -> Option<Interval> {
-    let count = values.len() as f64;
-    if values.is_empty() {
-        return None;
-    }
-    let mean = values.iter().sum::<f64>() / count;
-    let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-    let se = if values.len() > 1 { (square / (count - 1.0) / count).sqrt() } else { f64::NAN };
+    let moments = Moments::of(values)?;
+    let (mean, se) = (moments.mean, moments.standard_error().filter(|se| se.is_finite()));
     // One drone has no scatter: what a filter's velocity is usually off by.
-    let se = if se.is_finite() { se.hypot(doubt) } else { 0.02 };
+    let se = se.map_or(0.02, |se| se.hypot(doubt));
     Some(Interval { value: mean, low: mean - 2.1 * se, high: mean + 2.1 * se })
 }
 

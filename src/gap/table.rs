@@ -4,6 +4,7 @@
 
 use crate::effects::Reference;
 use crate::flight::{Flight, Indicator};
+use crate::numeric::{least, upper_median};
 use crate::vehicle::{RotorLaw, Vehicle};
 
 /// Slower is a hover, m/s. As in the analysis of tables; chosen.
@@ -17,7 +18,7 @@ const ALOFT_M: f64 = 30.0;
 #[must_use]
 pub fn aloft(flight: &Flight) -> Flight {
     let mut flight = flight.clone();
-    let lowest_m = flight.height_m.value.iter().copied().fold(f64::INFINITY, f64::min);
+    let lowest_m = least(&flight.height_m.value).unwrap_or(f64::INFINITY);
     if lowest_m < ALOFT_M {
         flight.height_m.value.iter_mut().for_each(|height_m| *height_m += ALOFT_M - lowest_m);
     }
@@ -50,8 +51,7 @@ pub fn as_pulses(flight: &Flight, lossless: &Vehicle) -> Flight {
     if speeds.is_empty() {
         speeds.clone_from(&flight.effort.values.value);
     }
-    speeds.sort_by(f64::total_cmp);
-    let hover_rpm = speeds.get(speeds.len() / 2).copied().unwrap_or(1.0).max(1.0);
+    let hover_rpm = upper_median(speeds).unwrap_or(1.0).max(1.0);
     let at = Reference::of(lossless);
     let pulses = |rpm: &mut f64| *rpm = at.pulse_us(*rpm / hover_rpm, 1.0);
     flight.effort.values.value.iter_mut().for_each(pulses);

@@ -10,7 +10,7 @@ use super::build::build_plan;
 use super::error::TemplateError;
 use super::keys::{TOP_LEVEL, keys_of, short_numbers};
 use super::plan::Plan;
-use super::template::{FlightTemplate, Template, span_of};
+use super::template::{CampaignTemplate, FlightReference, FlightTemplate, Template, span_of};
 use crate::base::file::{FileError, read_whole};
 use crate::base::parse;
 use crate::base::plain::Shown as _;
@@ -184,116 +184,116 @@ pub fn resolve_text(
     overrides: &[Override],
 ) -> Result<Mission, MissionError> {
     match Template::parse(path, text)? {
-        Template::Flight(_) => {
-            let refused = |key: &Override| MissionError::Override {
-                key: key.key.clone(),
-                reason: format!("{path} has no such key; {}", keys_of(&key.key, &[text])),
-            };
-            let (flight, used) = resolve_flight(path, text, overrides)?;
-            if let Some(unused) = used.iter().zip(overrides).find(|(used, _)| !**used) {
-                return Err(refused(unused.1));
-            }
-            Ok(Mission {
-                name: flight.plan.name.clone(),
-                title: flight.plan.title.clone(),
-                campaign_text: None,
-                flights: vec![flight],
-            })
-        }
-        Template::Campaign(campaign) => {
-            let folder = Path::new(path).parent().map(Path::to_owned);
-            let common: Vec<_> = table_overrides(&campaign.set);
-            let mut used_any = vec![false; overrides.len()];
-            let mut flights: Vec<ResolvedFlight> = Vec::new();
-            for reference in campaign.flights.get_ref() {
-                let name = reference.template.get_ref();
-                let (flight_path, flight_text) =
-                    load(name, folder.as_deref()).map_err(|error| match error {
-                        MissionError::NoTemplate { .. } => TemplateError::new(
-                            path,
-                            text,
-                            span_of(&reference.template),
-                            format!("there is no template {name}"),
-                        )
-                        .with_help(format!("built in are {}", names().join(", ")))
-                        .into(),
-                        other => other,
-                    })?;
-                let Template::Flight(parsed) = Template::parse(&flight_path, &flight_text)? else {
-                    return Err(TemplateError::new(
-                        path,
-                        text,
-                        span_of(&reference.template),
-                        "a campaign cannot contain a campaign",
-                    )
-                    .into());
-                };
-                let own_name = parsed.name.get_ref();
-                let mut all = common.clone();
-                all.extend(table_overrides(&reference.set));
-                let from_user = all.len();
-                let mut index = Vec::new();
-                for (i, item) in overrides.iter().enumerate() {
-                    let mut item = item.clone();
-                    if let Some((first, rest)) = item.key.split_once('.')
-                        && campaign_has(&campaign.flights, first)
-                    {
-                        if first != flight_stem(name) && first != own_name {
-                            continue;
-                        }
-                        item = Override { key: rest.to_owned(), value: item.value };
-                    }
-                    index.push(i);
-                    all.push(item);
-                }
-                let (flight, used) = resolve_flight(&flight_path, &flight_text, &all)?;
-                for (used, i) in used[from_user..].iter().zip(index) {
-                    used_any[i] |= used;
-                }
-                if flights.iter().any(|other| other.plan.name == flight.plan.name) {
-                    return Err(TemplateError::new(
-                        path,
-                        text,
-                        span_of(&reference.template),
-                        format!("two flights are named \"{}\"", flight.plan.name),
-                    )
-                    .into());
-                }
-                flights.push(flight);
-            }
-            if flights.is_empty() {
-                let span = span_of(&campaign.flights);
-                return Err(TemplateError::new(path, text, span, "a campaign needs flights").into());
-            }
-            if let Some(unused) = used_any.iter().zip(overrides).find(|(used, _)| !**used) {
-                let texts: Vec<_> =
-                    flights.iter().map(|flight| flight.template_text.as_str()).collect();
-                return Err(MissionError::Override {
-                    key: unused.1.key.clone(),
-                    reason: format!(
-                        "none of the campaign's flights has such a key; {}",
-                        keys_of(&unused.1.key, &texts)
-                    ),
-                });
-            }
-            Ok(Mission {
-                name: campaign.name.get_ref().clone(),
-                title: campaign.title.clone(),
-                campaign_text: Some(text.to_owned()),
-                flights,
-            })
-        }
+        Template::Flight(_) => one_flight(path, text, overrides),
+        Template::Campaign(campaign) => campaign_of(&campaign, path, text, overrides),
     }
+}
+
+fn one_flight(path: &str, text: &str, overrides: &[Override]) -> Result<Mission, MissionError> {
+    let (flight, used) = resolve_flight(path, text, overrides)?;
+    if let Some(key) = unused(overrides, &used) {
+        return Err(MissionError::Override {
+            key: key.to_owned(),
+            reason: format!("{path} has no such key; {}", keys_of(key, &[text])),
+        });
+    }
+    Ok(Mission {
+        name: flight.plan.name.clone(),
+        title: flight.plan.title.clone(),
+        campaign_text: None,
+        flights: vec![flight],
+    })
+}
+
+fn campaign_of(
+    campaign: &CampaignTemplate,
+    path: &str,
+    text: &str,
+    overrides: &[Override],
+) -> Result<Mission, MissionError> {
+    let refused = |span, reason: &str| TemplateError::new(path, text, span, reason);
+    let folder = Path::new(path).parent();
+    let mut used = vec![false; overrides.len()];
+    let mut flights: Vec<ResolvedFlight> = Vec::new();
+    for reference in campaign.flights.get_ref() {
+        let name = reference.template.get_ref();
+        let span = || span_of(&reference.template);
+        let (flight_path, flight_text) = load(name, folder).map_err(|error| match error {
+            MissionError::NoTemplate { .. } => {
+                refused(span(), &format!("there is no template {name}"))
+                    .with_help(format!("built in are {}", names().join(", ")))
+                    .into()
+            }
+            other => other,
+        })?;
+        let Template::Flight(parsed) = Template::parse(&flight_path, &flight_text)? else {
+            return Err(refused(span(), "a campaign cannot contain a campaign").into());
+        };
+        let from_user = overrides_of(campaign, reference, parsed.name.get_ref(), overrides);
+        let mut all = table_overrides(&campaign.set);
+        all.extend(table_overrides(&reference.set));
+        let own = all.len();
+        all.extend(from_user.iter().map(|(_, item)| item.clone()));
+        let (flight, used_here) = resolve_flight(&flight_path, &flight_text, &all)?;
+        for (used_here, (index, _)) in used_here.iter().skip(own).zip(&from_user) {
+            used[*index] |= used_here;
+        }
+        if flights.iter().any(|other| other.plan.name == flight.plan.name) {
+            let reason = format!("two flights are named \"{}\"", flight.plan.name);
+            return Err(refused(span(), &reason).into());
+        }
+        flights.push(flight);
+    }
+    if flights.is_empty() {
+        return Err(refused(span_of(&campaign.flights), "a campaign needs flights").into());
+    }
+    if let Some(key) = unused(overrides, &used) {
+        let texts: Vec<_> = flights.iter().map(|flight| flight.template_text.as_str()).collect();
+        return Err(MissionError::Override {
+            key: key.to_owned(),
+            reason: format!(
+                "none of the campaign's flights has such a key; {}",
+                keys_of(key, &texts)
+            ),
+        });
+    }
+    Ok(Mission {
+        name: campaign.name.get_ref().clone(),
+        title: campaign.title.clone(),
+        campaign_text: Some(text.to_owned()),
+        flights,
+    })
+}
+
+/// The overrides that are for one flight of a campaign, each with its place among all: those that name no
+/// flight, and those that name this one, without its name.
+fn overrides_of(
+    campaign: &CampaignTemplate,
+    reference: &FlightReference,
+    own_name: &str,
+    overrides: &[Override],
+) -> Vec<(usize, Override)> {
+    let of = |(index, item): (usize, &Override)| match item.key.split_once('.') {
+        Some((first, rest)) if campaign_has(&campaign.flights, first) => {
+            let named = first == flight_stem(reference.template.get_ref()) || first == own_name;
+            named.then(|| (index, Override { key: rest.to_owned(), value: item.value.clone() }))
+        }
+        _ => Some((index, item.clone())),
+    };
+    overrides.iter().enumerate().filter_map(of).collect()
+}
+
+/// Key of the first override that had no place.
+fn unused<'a>(overrides: &'a [Override], used: &[bool]) -> Option<&'a str> {
+    let unused = overrides.iter().zip(used).find(|(_, used)| !**used);
+    unused.map(|(item, _)| item.key.as_str())
 }
 
 fn flight_stem(name: &str) -> &str {
     Path::new(name).file_stem().and_then(|stem| stem.to_str()).unwrap_or(name)
 }
 
-fn campaign_has(
-    flights: &toml::Spanned<Vec<super::template::FlightReference>>,
-    first: &str,
-) -> bool {
+fn campaign_has(flights: &toml::Spanned<Vec<FlightReference>>, first: &str) -> bool {
     flights.get_ref().iter().any(|flight| flight_stem(flight.template.get_ref()) == first)
 }
 

@@ -2,6 +2,8 @@
 
 use kuva::render::layout::TickFormat;
 
+use crate::numeric;
+
 use super::text::{fixed, usable};
 
 /// Distances of ticks on a time axis.
@@ -72,12 +74,9 @@ pub(super) fn nice_step(raw: f64) -> f64 {
 }
 
 fn extent(values: impl Iterator<Item = f64>, span: f64) -> (f64, f64) {
-    let (low, high) = values
-        .filter(|&value| usable(value))
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    if low > high {
+    let Some((low, high)) = numeric::extent(values.filter(|&value| usable(value))) else {
         return (0.0, span);
-    }
+    };
     let lacking = (span - (high - low)).max(0.0) / 2.0;
     (low - lacking, high + lacking)
 }

@@ -5,6 +5,7 @@ use minijinja::value::Value;
 
 use crate::analysis::law::LawOf;
 use crate::analysis::result::{CommonError, DroneUpdraft, ErrorBudget, UpdraftMap};
+use crate::numeric::Sorted;
 
 use super::fleet_air::fleet_air;
 use super::text::{NONE, clean, count, fixed, shortened, signed, usable};
@@ -80,11 +81,10 @@ fn budget(map: &UpdraftMap) -> Option<Value> {
     let row = |of: &dyn Fn(&ErrorBudget) -> f64, common: Option<f64>| {
         let mut values: Vec<f64> =
             drones.iter().map(|drone| of(&drone.errors)).filter(|v| usable(*v)).collect();
-        values.sort_by(f64::total_cmp);
-        let at = |share: f64| values.get((share * (values.len() as f64 - 1.0)).round() as usize);
-        let words = |v: Option<&f64>| v.map_or(NONE.to_owned(), |v| fixed(*v, 3));
-        let common = common.filter(|v| usable(*v)).map_or(NONE.to_owned(), |v| fixed(v, 3));
-        (words(at(0.5)), words(values.last()), common)
+        let sorted = Sorted::of(&mut values);
+        let words =
+            |v: Option<f64>| v.filter(|v| usable(*v)).map_or(NONE.to_owned(), |v| fixed(v, 3));
+        (words(sorted.nearest_quantile(0.5)), words(sorted.nearest_quantile(1.0)), words(common))
     };
     let mut rows: Vec<Value> = KINDS
         .iter()

@@ -1,6 +1,7 @@
 //! Results of a map for the fleet as a whole: the mean with all of its error, and the spread.
 
 use crate::analysis::result::{DroneUpdraft, UpdraftMap};
+use crate::numeric::{least, most};
 
 use super::figures::air::{deviation, mean, mean_truth};
 use super::text::{count, fixed, usable};
@@ -94,8 +95,8 @@ pub(super) fn fleet_air(map: &UpdraftMap) -> Option<FleetAir> {
         mean: mean(means.clone())?,
         sd: deviation(means.clone()).unwrap_or(0.0),
         error: MeanError::of(map),
-        lowest: means.clone().fold(f64::INFINITY, f64::min),
-        highest: means.clone().fold(f64::NEG_INFINITY, f64::max),
+        lowest: least(means.clone())?,
+        highest: most(means.clone())?,
         se: mean(map.drones.iter().map(|drone| drone.mean.se)).unwrap_or(0.0),
         systematic: mean(map.drones.iter().map(|drone| drone.systematic_mps)).unwrap_or(0.0),
         rms_error: mean(squares).map(f64::sqrt),

@@ -6,6 +6,7 @@ use super::gap_parts::first_gap;
 use super::gap_words::{kind, left_over, lost, map_words, per_thousand, percent};
 use super::table::{Align, Column, column, lines};
 use super::text::{clean, count, fixed, reduced};
+use crate::base::layout;
 use crate::gap::Verdict;
 use crate::gap::verdict::{Detectable, Finding, Shrink, Step};
 use crate::gap::words::{phrase, short};
@@ -228,26 +229,14 @@ fn hidden_row(one: &Detectable) -> Vec<String> {
     ]
 }
 
-/// Lines of at most `width` characters, broken between words; those after the first are indented.
+/// Lines of at most `width` columns, broken between words; those after the first are indented.
 fn wrapped(text: &str, width: usize, indent: usize) -> Vec<String> {
     let first = text.len() - text.trim_start().len();
-    let mut lines = Vec::new();
-    let mut line = " ".repeat(first);
-    let mut empty = true;
-    for word in text.split_whitespace() {
-        // A word that fits no line is cut.
-        let word = super::text::shortened(word, width.saturating_sub(indent.max(first)));
-        let length = line.chars().count() + usize::from(!empty) + word.chars().count();
-        if !empty && length > width {
-            lines.push(std::mem::replace(&mut line, " ".repeat(indent)));
-            empty = true;
-        }
-        if !empty {
-            line.push(' ');
-        }
-        line.push_str(&word);
-        empty = false;
-    }
-    lines.push(line);
-    lines
+    // A word that fits no line is cut.
+    let most = width.saturating_sub(indent.max(first));
+    let words: Vec<String> =
+        text.split_whitespace().map(|word| super::text::shortened(word, most)).collect();
+    let (first, indent) = (" ".repeat(first), " ".repeat(indent));
+    let options = layout::options(width).initial_indent(&first).subsequent_indent(&indent);
+    layout::wrapped(&words.join(" "), options)
 }

@@ -1,5 +1,7 @@
 //! Aligned tables for terminals.
 
+use crate::base::layout;
+
 /// A last column of words is cut to this before others are dropped.
 const FEW_WORDS: usize = 24;
 
@@ -25,14 +27,14 @@ pub(super) const fn column(head: &'static str, align: Align, drop: u8) -> Column
     Column { head, align, drop }
 }
 
-/// Lines of a table, heading first, each at most `width` characters: a last
+/// Lines of a table, heading first, each at most `width` columns of the terminal: a last
 /// column of words is cut, then columns with the highest `drop` go. Columns that say nothing in any row are left out.
 pub(super) fn lines(columns: &[Column], rows: &[Vec<String>], width: usize) -> Vec<String> {
     let cell = |row: &Vec<String>, index: usize| row.get(index).cloned().unwrap_or_default();
     let size = |index: usize, column: &Column| {
         rows.iter()
-            .map(|row| cell(row, index).chars().count())
-            .chain([column.head.chars().count()])
+            .map(|row| layout::columns(&cell(row, index)))
+            .chain([layout::columns(column.head)])
             .max()
             .unwrap_or(0)
     };
@@ -73,8 +75,8 @@ pub(super) fn lines(columns: &[Column], rows: &[Vec<String>], width: usize) -> V
             .map(|(index, column, size)| {
                 let text = super::text::shortened(&values(*index, column), *size);
                 match column.align {
-                    Align::Left => format!("{text:<size$}"),
-                    Align::Right => format!("{text:>size$}"),
+                    Align::Left => layout::left(&text, *size),
+                    Align::Right => layout::right(&text, *size),
                 }
             })
             .collect();

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::analysis::result::{Analysis, FlightAnalysis, UpdraftMap};
+use crate::base::layout;
 use crate::flight::Indicator;
 use crate::mission::plan::Purpose;
 
@@ -75,25 +76,13 @@ impl Output {
 
     /// A line that may be longer than the terminal, broken at spaces.
     fn wrapped(&mut self, style: &str, indent: &str, text: &str) {
-        let room = self.width.saturating_sub(indent.chars().count()).max(10);
-        let mut current = String::new();
         // A word longer than the line (a path, say) is broken: nothing is left out.
-        let pieces = text.split(' ').flat_map(|word| {
-            let letters: Vec<char> = word.chars().collect();
-            letters.chunks(room).map(|piece| piece.iter().collect()).collect::<Vec<String>>()
-        });
-        for word in pieces {
-            let longer = current.chars().count() + 1 + word.chars().count();
-            if !current.is_empty() && longer > room {
-                self.line(style, &format!("{indent}{current}"));
-                current.clear();
-            }
-            if !current.is_empty() {
-                current.push(' ');
-            }
-            current.push_str(&word);
+        let options = layout::options(self.width.max(layout::columns(indent) + 10))
+            .initial_indent(indent)
+            .subsequent_indent(indent);
+        for line in layout::wrapped(text, options) {
+            self.line(style, &line);
         }
-        self.line(style, &format!("{indent}{current}"));
     }
 
     fn table(&mut self, columns: &[Column], rows: &[Vec<String>]) {

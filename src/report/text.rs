@@ -4,6 +4,7 @@ use crate::analysis::law::Symbol;
 use crate::analysis::result::Rejection;
 use crate::analysis::table::Quantity;
 use crate::base::estimate::Estimate;
+use crate::base::layout;
 use crate::base::plain::plain;
 use crate::flight::Indicator;
 use crate::mission::plan::{Kind, Purpose};
@@ -25,14 +26,13 @@ pub(super) fn clean(text: &str) -> String {
     plain(text).into_owned()
 }
 
-/// [`clean`] cut to `limit` characters with an ellipsis.
+/// [`clean`] cut to `limit` columns of a terminal with an ellipsis.
 pub(super) fn shortened(text: &str, limit: usize) -> String {
     let text = clean(text);
-    if text.chars().count() <= limit {
+    if layout::columns(&text) <= limit {
         return text;
     }
-    let cut: String = text.chars().take(limit.saturating_sub(1)).collect();
-    format!("{}…", cut.trim_end())
+    format!("{}…", layout::beginning(&text, limit.saturating_sub(1)).trim_end())
 }
 
 /// A file name part of lower-case letters, digits and hyphens; never empty, never a path.

@@ -1,13 +1,12 @@
 //! One flight of a study: its air, its name, and what its result depends on.
 
-use std::fmt::Write as _;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::fly::{CELL_SCHEMA, START};
 use super::template::StudyPlan;
+use crate::base::digest::sha256;
 use crate::base::time::GpsTime;
 use crate::mission::plan::{Segment, Site, Slot};
 use crate::vehicle::Vehicle;
@@ -107,14 +106,6 @@ impl Cell {
         };
         Ok(sha256(&serde_json::to_vec(&settings)?))
     }
-}
-
-/// SHA-256, hexadecimal.
-pub(super) fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 #[cfg(test)]

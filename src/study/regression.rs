@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use statrs::function::beta::checked_beta_reg;
 
 use crate::base::estimate::Estimate;
+use crate::numeric::{Line, rms};
 
 /// Least-squares line `y = slope x + intercept` and Pearson's correlation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -30,36 +31,23 @@ pub fn regression(points: &[(f64, f64)]) -> Option<Regression> {
     if points.len() < 3 || points.iter().any(|(x, y)| !x.is_finite() || !y.is_finite()) {
         return None;
     }
-    let mean_x = points.iter().map(|point| point.0).sum::<f64>() / n;
-    let mean_y = points.iter().map(|point| point.1).sum::<f64>() / n;
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for (x, y) in points {
-        let (dx, dy) = (x - mean_x, y - mean_y);
-        xx += dx * dx;
-        xy += dx * dy;
-        yy += dy * dy;
-    }
-    if xx <= 0.0 || yy <= 0.0 {
-        return None;
-    }
-    let slope = xy / xx;
-    let residual = |(x, y): &(f64, f64)| y - mean_y - slope * (x - mean_x);
-    let residuals: f64 = points.iter().map(|point| residual(point).powi(2)).sum();
+    let line = Line::through(points.iter().copied())?;
+    let rho = line.correlation()?.clamp(-1.0, 1.0);
+    let residuals: f64 = points.iter().map(|point| line.residual(*point).powi(2)).sum();
     // From the residuals and not as 1 - rho²: rho is within 1e-5 of 1 here, and p needs the digits.
-    let unexplained = (residuals / yy).clamp(0.0, 1.0);
+    let unexplained = (residuals / line.yy).clamp(0.0, 1.0);
     let p_value = checked_beta_reg((n - 2.0) / 2.0, 0.5, unexplained).ok()?;
     let variance = residuals / (n - 2.0);
-    let errors: f64 = points.iter().map(|(x, y)| (y - x).powi(2)).sum();
     Some(Regression {
         n: points.len(),
-        rho: (xy / (xx * yy).sqrt()).clamp(-1.0, 1.0),
+        rho,
         p_value,
-        slope: Estimate::new(slope, (variance / xx).sqrt()),
+        slope: Estimate::new(line.slope(), (variance / line.xx).sqrt()),
         intercept: Estimate::new(
-            mean_y - slope * mean_x,
-            (variance * (1.0 / n + mean_x * mean_x / xx)).sqrt(),
+            line.intercept(),
+            (variance * (1.0 / n + line.mean[0] * line.mean[0] / line.xx)).sqrt(),
         ),
-        rms_error: (errors / n).sqrt(),
+        rms_error: rms(points.iter().map(|(x, y)| y - x))?,
     })
 }
 

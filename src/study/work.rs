@@ -5,10 +5,11 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::cell::{Cell, sha256};
+use super::cell::Cell;
 use super::error::StudyError;
 use super::fly::{CELL_SCHEMA, CellLog, CellRecord, FlyError, fly_cell};
 use super::template::StudyPlan;
+use crate::base::digest::sha256;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::parse;
 use crate::sim::SimError;

@@ -7,6 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 use sha2::{Digest, Sha256};
 
+use crate::base::digest::hexadecimal;
 use crate::base::file::{FileError, read_pieces};
 
 /// SHA-256 hashes of files, by path; each file is read once.
@@ -38,15 +39,6 @@ impl Hashes {
         read_pieces(path, |piece| sha256.update(piece))?;
         Ok(hexadecimal(sha256))
     }
-}
-
-/// SHA-256 of bytes in hexadecimal.
-pub(crate) fn sha256_of(bytes: &[u8]) -> String {
-    hexadecimal(Sha256::new_with_prefix(bytes))
-}
-
-fn hexadecimal(sha256: Sha256) -> String {
-    format!("{:x}", sha256.finalize())
 }
 
 #[cfg(test)]

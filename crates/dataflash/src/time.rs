@@ -1,6 +1,13 @@
 //! GPS time, the clock that all drones share.
+//!
+//! GPS time has no leap seconds, Unix time leaves them out: what lies between is the table of leap seconds,
+//! which is `hifitime`'s. The last one it knows of came at the end of 2016 (18 s); the IERS has announced
+//! none since. Should there be another one, times after it are a second off until `hifitime` is updated:
+//! only conversions from and to Unix time are, GPS times among themselves never.
 
 use std::fmt;
+
+use hifitime::{Duration, Epoch, Unit};
 
 #[cfg(feature = "schemars")]
 use schemars::JsonSchema;
@@ -13,8 +20,6 @@ pub const WEEK_S: u32 = 604_800;
 pub const WEEK_MS: u64 = 604_800_000;
 /// Unix time of the GPS epoch, 1980-01-06 00:00:00 UTC, s.
 pub const GPS_EPOCH_UNIX_S: i64 = 315_964_800;
-/// GPS minus UTC since 2017-01-01, s.
-pub const LEAP_S: i64 = 18;
 
 /// An instant on the GPS time scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,16 +45,30 @@ impl GpsTime {
         Some(Self { week, tow_ms: (total % WEEK_MS) as u32 })
     }
 
-    /// GPS time from Unix time in milliseconds, with today's 18 leap seconds; `None` outside weeks
-    /// 0 to 65535.
+    /// GPS time from Unix time in milliseconds, with the leap seconds of its date; `None`
+    /// outside weeks 0 to 65535. No Unix time stands for the instants of a leap second itself.
     pub fn from_unix_ms(unix_ms: i64) -> Option<Self> {
-        Self::from_total_ms(unix_ms - GPS_EPOCH_UNIX_S * 1000 + LEAP_S * 1000)
+        Self::from_total_ms(ms(
+            Epoch::from_unix_duration(Unit::Millisecond * unix_ms).to_gpst_duration()
+        ))
     }
 
-    /// Unix time in milliseconds, with today's 18 leap seconds.
+    /// Unix time in milliseconds, with the leap seconds of its date.
     pub fn to_unix_ms(self) -> i64 {
-        self.total_ms() + GPS_EPOCH_UNIX_S * 1000 - LEAP_S * 1000
+        let unix =
+            Epoch::from_gpst_duration(Unit::Millisecond * self.total_ms()).to_unix_duration();
+        let unix_ms = ms(unix);
+        // hifitime 4.3 counts a leap second on the way back some seconds before it comes: the time that
+        // leads here is right.
+        let later_ms = unix_ms + 1000;
+        if Self::from_unix_ms(later_ms) == Some(self) { later_ms } else { unix_ms }
     }
+}
+
+/// Whole milliseconds.
+fn ms(duration: Duration) -> i64 {
+    // A duration holds 66 thousand centuries at most, which is 2e14 ms.
+    duration.total_nanoseconds().div_euclid(1_000_000) as i64
 }
 
 impl fmt::Display for GpsTime {
@@ -60,7 +79,55 @@ impl fmt::Display for GpsTime {
 
 #[cfg(test)]
 mod tests {
-    use super::GpsTime;
+    use super::{GPS_EPOCH_UNIX_S, GpsTime};
+
+    /// First Unix second from which so many leap seconds separate GPS time and UTC (IERS Bulletin C).
+    const LEAPS: [(i64, i64); 19] = [
+        (315_964_800, 0),
+        (362_793_600, 1),
+        (394_329_600, 2),
+        (425_865_600, 3),
+        (489_024_000, 4),
+        (567_993_600, 5),
+        (631_152_000, 6),
+        (662_688_000, 7),
+        (709_948_800, 8),
+        (741_484_800, 9),
+        (773_020_800, 10),
+        (820_454_400, 11),
+        (867_715_200, 12),
+        (915_148_800, 13),
+        (1_136_073_600, 14),
+        (1_230_768_000, 15),
+        (1_341_100_800, 16),
+        (1_435_708_800, 17),
+        (1_483_228_800, 18),
+    ];
+
+    fn leap_s(unix_s: i64) -> i64 {
+        LEAPS.iter().rev().find(|(from_s, _)| unix_s >= *from_s).unwrap().1
+    }
+
+    #[test]
+    fn every_day_has_its_leap_seconds() {
+        // To the year 2105, and the minutes around each leap second.
+        let days = (0..46_000).map(|day| GPS_EPOCH_UNIX_S + 86_400 * day + 43_200);
+        let around = LEAPS.iter().flat_map(|(from_s, _)| from_s - 60..from_s + 60);
+        for unix_s in days.chain(around).filter(|unix_s| *unix_s >= GPS_EPOCH_UNIX_S) {
+            let time = GpsTime::from_unix_ms(unix_s * 1000 + 250).unwrap();
+            assert_eq!(time.total_ms(), (unix_s - GPS_EPOCH_UNIX_S + leap_s(unix_s)) * 1000 + 250);
+            assert_eq!(time.to_unix_ms(), unix_s * 1000 + 250, "{time}");
+        }
+    }
+
+    #[test]
+    fn times_far_away_are_refused() {
+        assert_eq!(GpsTime::from_unix_ms(i64::MAX), None);
+        assert_eq!(GpsTime::from_unix_ms(i64::MIN), None);
+        let last = GpsTime { week: u16::MAX, tow_ms: 604_799_999 };
+        assert_eq!(GpsTime::from_unix_ms(last.to_unix_ms()), Some(last));
+        assert_eq!(GpsTime::from_unix_ms(last.to_unix_ms() + 1), None);
+    }
 
     #[test]
     fn agrees_with_a_show_flown_on_the_real_firmware() {

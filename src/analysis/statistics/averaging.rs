@@ -6,8 +6,9 @@
 
 use std::fmt::Write as _;
 
+use crate::numeric::Sorted;
+
 use super::result::{Averaging, DroneAveraging, Interval, Reached};
-use super::space::quantile;
 use super::words::digits;
 
 /// Each averaging time is longer than the one before by about this factor.
@@ -74,12 +75,11 @@ pub fn averaging(fleet: &[Seconds]) -> Result<Averaging, String> {
         if values.is_empty() || 2 * values.len() < fleet.len() {
             break;
         }
-        values.sort_unstable_by(f64::total_cmp);
+        let sorted = Sorted::of(&mut values);
+        let at = |share: f64| sorted.quantile(share).unwrap_or(f64::NAN);
         found.averaging_s.push(*span as f64);
-        found.median_mps.push(quantile(&values, 0.5));
-        found
-            .quartiles_mps
-            .push(Interval { low: quantile(&values, 0.25), high: quantile(&values, 0.75) });
+        found.median_mps.push(at(0.5));
+        found.quartiles_mps.push(Interval { low: at(0.25), high: at(0.75) });
     }
     let kept = found.averaging_s.len();
     for drone in &mut found.drones {

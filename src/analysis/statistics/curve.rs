@@ -2,6 +2,7 @@
 //! are scaled by the residuals, and points are taken for independent.
 
 use crate::base::estimate::Estimate;
+use crate::numeric::{Line, least};
 
 /// Steps of the search over the logarithm of the length.
 const STEPS: usize = 48;
@@ -86,7 +87,7 @@ pub(super) fn exponential_with_nugget(points: &[Point]) -> Option<(Estimate, Est
 /// The best logarithm of a length: the best of a grid, refined; `None` at its ends.
 fn search(points: &[Point], loss: &impl Fn(f64) -> f64) -> Option<f64> {
     let distances = || points.iter().map(|point| point.distance);
-    let low = (distances().fold(f64::INFINITY, f64::min) * SHORTEST).ln();
+    let low = (least(distances()).unwrap_or(f64::INFINITY) * SHORTEST).ln();
     let high = (distances().fold(0.0, f64::max) * LONGEST).ln();
     if !(low.is_finite() && high.is_finite()) {
         return None;
@@ -121,10 +122,8 @@ pub(super) fn line(x: &[f64], y: &[f64]) -> Option<(Estimate, Estimate)> {
         return None;
     }
     let count = n as f64;
-    let (mean_x, mean_y) = (x.iter().sum::<f64>() / count, y.iter().sum::<f64>() / count);
-    let sxx: f64 = x.iter().map(|x| (x - mean_x).powi(2)).sum();
-    let sxy: f64 = x.iter().zip(y).map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
-    let slope = sxy / sxx;
+    let line = Line::through(x.iter().copied().zip(y.iter().copied()))?;
+    let (slope, sxx, [mean_x, mean_y]) = (line.slope(), line.xx, line.mean);
     let zero = mean_x - mean_y / slope;
     let loss: f64 = x.iter().zip(y).map(|(x, y)| (y - slope * (x - zero)).powi(2)).sum();
     let variance = loss / (count - 2.0);

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::DMatrix;
 
 use super::result::FieldRecord;
+use crate::numeric::{self, Line, least};
 
 /// Shorter records say nothing about correlations, s: a few of the shortest time scales. Chosen.
 pub(super) const SHORTEST_S: usize = 60;
@@ -171,7 +172,7 @@ impl Field {
 
     /// Smallest distance of two drones that are not in the same place, m.
     pub(super) fn spacing_m(&self) -> f64 {
-        self.distances().filter(|distance| *distance > 0.01).fold(f64::INFINITY, f64::min)
+        least(self.distances().filter(|distance| *distance > 0.01)).unwrap_or(f64::INFINITY)
     }
 
     /// Mean over the drones at each second; NaN where there is none.
@@ -232,10 +233,7 @@ impl Field {
 
 /// Mean of what is finite; NaN of nothing.
 pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values
-        .filter(|value| value.is_finite())
-        .fold((0.0, 0_usize), |(sum, count), value| (sum + value, count + 1));
-    sum / count as f64
+    numeric::mean(values.filter(|value| value.is_finite())).unwrap_or(f64::NAN)
 }
 
 /// Standard deviation (divided by n) of what is finite.
@@ -245,17 +243,11 @@ pub(super) fn sd(values: &[f64]) -> f64 {
 }
 
 fn without_line(row: &[f64]) -> Vec<f64> {
-    let known = || row.iter().enumerate().filter(|(_, value)| value.is_finite());
-    let time = mean(known().map(|(second, _)| second as f64));
-    let level = mean(row.iter().copied());
-    let (mut up, mut across) = (0.0, 0.0);
-    for (second, value) in known() {
-        up += (second as f64 - time) * (value - level);
-        across += (second as f64 - time).powi(2);
-    }
-    let slope = if across > 0.0 { up / across } else { 0.0 };
-    row.iter()
-        .enumerate()
-        .map(|(second, value)| value - level - slope * (second as f64 - time))
-        .collect()
+    let points = || row.iter().enumerate().map(|(second, value)| (second as f64, *value));
+    let Some(line) = Line::through(points().filter(|(_, value)| value.is_finite())) else {
+        return row.to_vec();
+    };
+    let slope = if line.xx > 0.0 { line.slope() } else { 0.0 };
+    let [time, level] = line.mean;
+    points().map(|(second, value)| value - level - slope * (second - time)).collect()
 }

@@ -12,10 +12,11 @@ use super::result::{
     Reads, Scale, Simulated, SpaceCorrelation, TimeCorrelation, Treatment, Undetermined, Variant,
 };
 use super::simulate::{FieldScales, Simulator};
-use super::space::{Class, described, length, medians, points, quantile};
+use super::space::{Class, described, length, medians, points};
 use super::time::autocorrelation;
 use super::words;
 use crate::base::rng::{Purpose, stream};
+use crate::numeric::{Moments, Sorted};
 
 /// An interval needs this share of the simulated flights to have given an estimate. Chosen.
 const FEWEST_SHARE: f64 = 0.8;
@@ -161,7 +162,7 @@ impl Flights<'_> {
         if (values.len() as f64) < FEWEST_SHARE * self.estimates.len() as f64 {
             values.clear();
         }
-        values.sort_unstable_by(f64::total_cmp);
+        Sorted::of(&mut values);
         values
     }
 
@@ -179,7 +180,7 @@ impl Flights<'_> {
         if sorted.is_empty() {
             return scale.judged();
         }
-        let at = |share: f64| quantile(&sorted, share);
+        let at = |share: f64| Sorted::taken(&sorted).quantile(share).unwrap_or(f64::NAN);
         let truth = truth.unwrap_or_else(|| at(0.5));
         let interval = Interval { low: value * truth / at(0.975), high: value * truth / at(0.025) };
         scale.interval_95 =
@@ -257,15 +258,13 @@ fn space(
 
 /// Errors of the medians from the simulated flights, and the fit weighted by them.
 fn weigh(all: &mut DistanceCorrelation, classes: &[Class], flights: &Flights<'_>) {
-    let n = flights.estimates.len() as f64;
-    if n < 20.0 {
+    if flights.estimates.len() < 20 {
         return;
     }
     for (index, class) in all.classes.iter_mut().enumerate() {
-        let values = || flights.estimates.iter().filter_map(|one| one.medians.get(index));
-        let mean = values().sum::<f64>() / n;
-        let variance = values().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        class.median_se = variance.is_finite().then(|| variance.sqrt());
+        let values = flights.estimates.iter().filter_map(|one| one.medians.get(index));
+        let scatter = Moments::of(values).and_then(|moments| moments.deviation());
+        class.median_se = scatter.filter(|scatter| scatter.is_finite());
     }
     let weights: Vec<f64> =
         all.classes.iter().map(|class| class.median_se.map_or(0.0, |se| se.powi(-2))).collect();
@@ -317,16 +316,22 @@ fn time(
             first_t0_s,
             second_t0_s,
             ratio: half / whole,
-            simulated_ratio: (!ratios.is_empty()).then(|| Reads {
-                truth: 1.0,
-                median: quantile(&ratios, 0.5),
-                range_90: Interval { low: quantile(&ratios, 0.05), high: quantile(&ratios, 0.95) },
-                flights: ratios.len(),
-            }),
+            simulated_ratio: simulated_ratio(&ratios),
             words: String::new(),
         }
     });
     found
+}
+
+/// What a ratio that is truly 1 read in the simulated flights, ascending.
+fn simulated_ratio(ratios: &[f64]) -> Option<Reads> {
+    let at = |share: f64| Sorted::taken(ratios).quantile(share);
+    Some(Reads {
+        truth: 1.0,
+        median: at(0.5)?,
+        range_90: Interval { low: at(0.05)?, high: at(0.95)? },
+        flights: ratios.len(),
+    })
 }
 
 fn field_model(

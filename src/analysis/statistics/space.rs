@@ -6,6 +6,7 @@ use super::curve::{Point, exponential};
 use super::field::Field;
 use super::result::{DistanceClass, Interval};
 use crate::base::estimate::Estimate;
+use crate::numeric::{Sorted, mean};
 
 /// Distances that differ by less than this share of the spacing are the same nominal distance.
 const SAME_SHARE: f64 = 0.03;
@@ -98,7 +99,7 @@ fn grouped(pairs: &[(f64, (usize, usize))], same: impl Fn(f64, f64) -> bool) -> 
         .into_iter()
         .map(|group| {
             let distances: Vec<f64> = group.iter().map(|pair| pair.0).collect();
-            let middle = quantile(&distances, 0.5);
+            let middle = Sorted::taken(&distances).quantile(0.5).unwrap_or(f64::NAN);
             Class {
                 nominal_m: middle,
                 distance_m: middle,
@@ -116,8 +117,7 @@ pub(super) fn medians(classes: &[Class], correlations: &DMatrix<f64>) -> Vec<f64
         .map(|class| {
             values.clear();
             values.extend(class.pairs.iter().filter_map(|pair| correlations.get(*pair).copied()));
-            values.sort_unstable_by(f64::total_cmp);
-            quantile(&values, 0.5)
+            Sorted::of(&mut values).quantile(0.5).unwrap_or(f64::NAN)
         })
         .collect()
 }
@@ -153,27 +153,17 @@ pub(super) fn described(classes: &[Class], correlations: &DMatrix<f64>) -> Vec<D
         .map(|class| {
             let mut values: Vec<f64> =
                 class.pairs.iter().filter_map(|pair| correlations.get(*pair).copied()).collect();
-            values.sort_unstable_by(f64::total_cmp);
+            let sorted = Sorted::of(&mut values);
+            let at = |share: f64| sorted.quantile(share).unwrap_or(f64::NAN);
             DistanceClass {
                 nominal_m: class.nominal_m,
                 distance_m: class.distance_m,
-                median: quantile(&values, 0.5),
-                mean: values.iter().sum::<f64>() / values.len() as f64,
-                quartiles: Interval { low: quantile(&values, 0.25), high: quantile(&values, 0.75) },
+                median: at(0.5),
+                mean: mean(sorted.values()).unwrap_or(f64::NAN),
+                quartiles: Interval { low: at(0.25), high: at(0.75) },
                 correlations: values,
                 median_se: None,
             }
         })
         .collect()
-}
-
-/// Quantile of ascending values, interpolated; NaN of nothing.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let place = share.clamp(0.0, 1.0) * last as f64;
-    let low = place.floor() as usize;
-    let (Some(below), Some(above)) = (sorted.get(low), sorted.get((low + 1).min(last))) else {
-        return f64::NAN;
-    };
-    below + (above - below) * (place - low as f64)
 }

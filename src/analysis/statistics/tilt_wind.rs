@@ -4,6 +4,7 @@ use super::result::{DroneWind, TiltWind};
 use super::words::digits;
 use crate::analysis::lean_table::LeanTable;
 use crate::base::estimate::Estimate;
+use crate::numeric::{Moments, mean};
 
 /// A lean that is no wind: trim of the accelerometers, a centre of mass off the middle, degrees. Chosen.
 const TRIM_DEG: f64 = 0.2;
@@ -84,7 +85,6 @@ pub fn tilt_wind(leans: &[MeanLean], drag: LeanDrag<'_>) -> Option<TiltWind> {
     let steep = leans.iter().any(|lean| lean.flow(drag).iter().any(|flow| flow.is_nan()));
     let drag = if steep { LeanDrag::Unknown } else { drag };
     let known_speed = !matches!(drag, LeanDrag::Unknown);
-    let count = leans.len() as f64;
     if leans.is_empty() {
         return None;
     }
@@ -114,14 +114,10 @@ pub fn tilt_wind(leans: &[MeanLean], drag: LeanDrag<'_>) -> Option<TiltWind> {
         }
     }
     let from_deg = (known > 0.0).then(|| east.atan2(north).to_degrees().rem_euclid(360.0));
-    let lean_deg = leans.iter().map(|lean| lean.lean_deg).sum::<f64>() / count;
-    let speeds: Vec<f64> = drones.iter().filter_map(|drone| drone.speed_mps).collect();
-    let mean = speeds.iter().sum::<f64>() / count;
-    let variance =
-        speeds.iter().map(|speed| (speed - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    let speed_mps = known_speed.then(|| {
-        let speed = if known > 0.0 { north.hypot(east) / known } else { mean };
-        Estimate::new(speed, (variance / count).sqrt())
+    let lean_deg = mean(leans.iter().map(|lean| lean.lean_deg)).unwrap_or(f64::NAN);
+    let speed_mps = Moments::of(drones.iter().filter_map(|drone| drone.speed_mps)).map(|speeds| {
+        let speed = if known > 0.0 { north.hypot(east) / known } else { speeds.mean };
+        Estimate::new(speed, speeds.standard_error().unwrap_or_default())
     });
     let from = from_deg.map_or_else(
         || " from a direction that is not known (the logs have no heading)".to_owned(),

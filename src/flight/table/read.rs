@@ -109,101 +109,159 @@ pub fn read_from(bytes: impl Read, path: &Path, mapping: &Mapping) -> Result<Fli
     let broken =
         |error: csv::Error| TableError::Row { path: path.to_owned(), reason: error.to_string() };
     let heads = reader.headers().map_err(broken)?.clone();
-    if heads.iter().all(|head| head.trim().is_empty()) {
-        return Err(TableError::Empty { path: path.to_owned() });
-    }
-    let find = |column: &str, channel: &'static str| {
-        heads.iter().position(|head| plain(head.trim()) == column).ok_or_else(|| {
-            TableError::Column {
-                path: path.to_owned(),
-                column: column.to_owned(),
-                channel,
-                there: short(&heads.iter().collect::<Vec<_>>().join(", ")).into_owned(),
-            }
-        })
+    let table = Columns::of(&heads, path, mapping)?;
+    let mut rows = Rows {
+        path,
+        mapping,
+        table,
+        first: None,
+        last_s: f64::NEG_INFINITY,
+        taken: 0,
+        backward: 0,
     };
-    let time_index = find(&mapping.time.column, "time")?;
-    let mut wanted = Vec::new();
-    for (name, channel) in mapping.channels() {
-        let columns: Result<Vec<_>, TableError> = channel
-            .columns
-            .iter()
-            .map(|column| Ok((find(column, name)?, column.as_str())))
-            .collect();
-        let (columns, series) = (columns?, Series::default());
-        wanted.push((name, Wanted { channel, columns, series, left_out: 0 }));
-    }
     let mut row = csv::StringRecord::new();
-    let (mut first, mut last, mut rows, mut backward) = (None, f64::NEG_INFINITY, 0, 0);
     let mut cut_off: Option<TableError> = None;
-    while rows < MOST_ROWS && reader.read_record(&mut row).map_err(broken)? {
+    while rows.taken < MOST_ROWS && reader.read_record(&mut row).map_err(broken)? {
         since_row.set(0);
         // A row with another number of cells is only forgiven as the last one.
         if let Some(error) = cut_off {
             return Err(error);
         }
-        let line = row.position().map_or(0, csv::Position::line);
-        if row.len() != heads.len() {
+        if row.len() == heads.len() {
+            rows.take(&row)?;
+        } else {
+            let line = row.position().map_or(0, csv::Position::line);
             let reason =
                 format!("line {line} has {} cells, the first line {}", row.len(), heads.len());
             cut_off = Some(TableError::Row { path: path.to_owned(), reason });
-            continue;
         }
+    }
+    if rows.taken < FEWEST_ROWS {
+        let Rows { taken, backward, .. } = rows;
+        return Err(TableError::Short { path: path.to_owned(), rows: taken, backward });
+    }
+    Ok(rows.flight(cut_off.is_some()))
+}
+
+/// Where a table's columns are.
+struct Columns<'a> {
+    time: usize,
+    /// Each channel by its name.
+    channels: Vec<(&'static str, Wanted<'a>)>,
+}
+
+impl<'a> Columns<'a> {
+    fn of(
+        heads: &csv::StringRecord,
+        path: &Path,
+        mapping: &'a Mapping,
+    ) -> Result<Self, TableError> {
+        if heads.iter().all(|head| head.trim().is_empty()) {
+            return Err(TableError::Empty { path: path.to_owned() });
+        }
+        let find = |column: &str, channel: &'static str| {
+            heads.iter().position(|head| plain(head.trim()) == column).ok_or_else(|| {
+                TableError::Column {
+                    path: path.to_owned(),
+                    column: column.to_owned(),
+                    channel,
+                    there: short(&heads.iter().collect::<Vec<_>>().join(", ")).into_owned(),
+                }
+            })
+        };
+        let time = find(&mapping.time.column, "time")?;
+        let mut channels = Vec::new();
+        for (name, channel) in mapping.channels() {
+            let columns: Result<Vec<_>, TableError> = channel
+                .columns
+                .iter()
+                .map(|column| Ok((find(column, name)?, column.as_str())))
+                .collect();
+            let (columns, series) = (columns?, Series::default());
+            channels.push((name, Wanted { channel, columns, series, left_out: 0 }));
+        }
+        Ok(Self { time, channels })
+    }
+}
+
+/// The rows of a table as they are read.
+struct Rows<'a> {
+    path: &'a Path,
+    mapping: &'a Mapping,
+    table: Columns<'a>,
+    /// Time of the first row, s: show time counts from it.
+    first: Option<f64>,
+    /// Show time of the last row, s.
+    last_s: f64,
+    taken: usize,
+    /// Rows whose time does not go forward.
+    backward: usize,
+}
+
+impl Rows<'_> {
+    fn take(&mut self, row: &csv::StringRecord) -> Result<(), TableError> {
         let cell = |column: &str, reason: String| TableError::Cell {
-            path: path.to_owned(),
-            line,
+            path: self.path.to_owned(),
+            line: row.position().map_or(0, csv::Position::line),
             column: column.to_owned(),
             reason,
         };
-        let text = row.get(time_index).unwrap_or_default();
-        let time = time_of(text, mapping.time.format).ok_or_else(|| {
-            cell(&mapping.time.column, format!("\"{}\" is not a time", short(text)))
-        })?;
-        let show_s = time - *first.get_or_insert(time);
-        if show_s <= last {
-            backward += 1;
-            continue;
+        let time = &self.mapping.time;
+        let text = row.get(self.table.time).unwrap_or_default();
+        let time_s = time_of(text, time.format)
+            .ok_or_else(|| cell(&time.column, format!("\"{}\" is not a time", short(text))))?;
+        let show_s = time_s - *self.first.get_or_insert(time_s);
+        if show_s <= self.last_s {
+            self.backward += 1;
+            return Ok(());
         }
-        last = show_s;
-        rows += 1;
-        for (_, one) in &mut wanted {
-            one.take(show_s, &row).map_err(|(column, reason)| cell(&column, reason))?;
+        self.last_s = show_s;
+        self.taken += 1;
+        for (_, one) in &mut self.table.channels {
+            one.take(show_s, row).map_err(|(column, reason)| cell(&column, reason))?;
         }
+        Ok(())
     }
-    if rows < FEWEST_ROWS {
-        return Err(TableError::Short { path: path.to_owned(), rows, backward });
-    }
-    let mut warnings: Vec<String> = Vec::new();
-    if cut_off.is_some() {
-        warnings.push("the table's last line is cut off and was left out".to_owned());
-    }
-    if rows == MOST_ROWS {
-        warnings.push(format!("only the first {MOST_ROWS} rows were read"));
-    }
-    if backward > 0 {
-        warnings.push(format!("{backward} rows whose time does not go forward were left out"));
-    }
-    warnings.extend(wanted.iter().filter_map(|(name, one)| holes(name, one)));
-    let mut flight = Flight {
-        source: path.to_owned(),
-        effort: Effort { indicator: mapping.indicator, ..Effort::default() },
-        pulse_limits_us: (f64::NEG_INFINITY, f64::INFINITY),
-        clock: Clock::default(),
-        warnings: warnings.into_iter().map(Into::into).collect(),
-        ..Flight::default()
-    };
-    for (name, Wanted { series, .. }) in wanted {
-        match name {
-            "effort" => flight.effort.values = series,
-            "velocity_up" => flight.velocity_up_mps = series,
-            "height" => flight.height_m = from_start(series),
-            "roll" => flight.roll_rad = series,
-            "pitch" => flight.pitch_rad = series,
-            "command_up" => flight.desired_up_mps = Some(series),
-            _ => flight.truth_up_mps = Some(series),
+
+    /// What must be known of how the table was read.
+    fn warnings(&self, cut_off: bool) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if cut_off {
+            warnings.push("the table's last line is cut off and was left out".to_owned());
         }
+        if self.taken == MOST_ROWS {
+            warnings.push(format!("only the first {MOST_ROWS} rows were read"));
+        }
+        if self.backward > 0 {
+            let backward = self.backward;
+            warnings.push(format!("{backward} rows whose time does not go forward were left out"));
+        }
+        warnings.extend(self.table.channels.iter().filter_map(|(name, one)| holes(name, one)));
+        warnings
     }
-    Ok(flight)
+
+    fn flight(self, cut_off: bool) -> Flight {
+        let mut flight = Flight {
+            source: self.path.to_owned(),
+            effort: Effort { indicator: self.mapping.indicator, ..Effort::default() },
+            pulse_limits_us: (f64::NEG_INFINITY, f64::INFINITY),
+            clock: Clock::default(),
+            warnings: self.warnings(cut_off).into_iter().map(Into::into).collect(),
+            ..Flight::default()
+        };
+        for (name, Wanted { series, .. }) in self.table.channels {
+            match name {
+                "effort" => flight.effort.values = series,
+                "velocity_up" => flight.velocity_up_mps = series,
+                "height" => flight.height_m = from_start(series),
+                "roll" => flight.roll_rad = series,
+                "pitch" => flight.pitch_rad = series,
+                "command_up" => flight.desired_up_mps = Some(series),
+                _ => flight.truth_up_mps = Some(series),
+            }
+        }
+        flight
+    }
 }
 
 /// That cells of a channel are no measurement: how many, and the longest time without one.

@@ -13,6 +13,7 @@ use crate::gap::generic::{Generic, all};
 use crate::gap::gls::{Column, Solution, White};
 use crate::gap::refly::mean_drone;
 use crate::gap::verdict::Shape;
+use crate::numeric;
 use crate::vehicle::Vehicle;
 
 /// Effects with a smaller trace at their usual size do not matter for the pulse, us: 0.1 m/s, as in the
@@ -37,8 +38,8 @@ pub type Predicted = Vec<Vec<Separation>>;
 
 /// Smallest Fisher z of a question; 0 if the flight cannot answer it at all.
 pub fn least(separations: &[Separation]) -> f64 {
-    let least = separations.iter().map(|one| one.z).fold(f64::INFINITY, f64::min);
-    if least.is_finite() { least } else { 0.0 }
+    let least = numeric::least(separations.iter().map(|one| one.z));
+    least.filter(|z| z.is_finite()).unwrap_or_default()
 }
 
 /// Predicts what a flight will tell.
@@ -96,17 +97,9 @@ pub fn matters(known: &Known, flight: &Flight, effect: &str) -> Result<bool, Gap
         return Ok(false);
     };
     let Some(size) = candidate.size else { return Ok(false) };
-    let range = |column: &Column| {
-        let values: Vec<f64> = match column {
-            Column::Shared(values) => values.iter().flatten().copied().collect(),
-            Column::Own(values) => values.iter().flatten().flatten().copied().collect(),
-        };
-        let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        most - values.iter().copied().fold(f64::INFINITY, f64::min)
-    };
     Ok(candidate.variants.iter().any(|variant| {
         let times = (size.usual / step(variant.size, size.now)).abs();
-        range(&variant.column) * times >= MATTERS_US
+        variant.column.range() * times >= MATTERS_US
     }))
 }
 

@@ -4,6 +4,7 @@ use kuva::plot::legend::{LegendPosition, LegendShape};
 use kuva::plot::scatter::MarkerShape;
 
 use crate::analysis::result::{DroneUpdraft, FlightAnalysis, UpdraftMap};
+use crate::numeric::{self, Moments};
 
 use crate::report::Figure;
 use crate::report::axis::Axis;
@@ -29,19 +30,12 @@ pub(in crate::report) fn mean_truth(drone: &DroneUpdraft) -> Option<f64> {
 
 /// Mean of the usable values.
 pub(in crate::report) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, n) = values
-        .filter(|&value| usable(value))
-        .fold((0.0, 0_usize), |(sum, n), value| (sum + value, n + 1));
-    (n > 0).then(|| sum / n as f64)
+    numeric::mean(values.filter(|&value| usable(value)))
 }
 
 /// Standard deviation (n - 1) of the usable values; `None` below two.
 pub(in crate::report) fn deviation(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
-    let middle = mean(values.clone())?;
-    let (sum, n) = values
-        .filter(|&value| usable(value))
-        .fold((0.0, 0_usize), |(sum, n), value| (sum + (value - middle).powi(2), n + 1));
-    (n > 1).then(|| (sum / (n - 1) as f64).sqrt())
+    Moments::of(values.filter(|&value| usable(value)))?.deviation()
 }
 
 fn instants(map: &UpdraftMap) -> Vec<Instant> {

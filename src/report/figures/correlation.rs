@@ -6,6 +6,7 @@ use crate::analysis::result::FlightAnalysis;
 use crate::analysis::statistics::result::{
     DistanceClass, DistanceCorrelation, FieldStatistics, Scale, TimeCorrelation,
 };
+use crate::numeric::Moments;
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::Panel;
@@ -202,8 +203,7 @@ fn outline(class: &DistanceClass, half: f64) -> Option<Vec<(f64, f64)>> {
         return None;
     }
     let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let sd = (values.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    let sd = Moments::of(&values)?.deviation()?;
     // Scott's rule.
     let width = (sd * n.powf(-0.2)).max(1e-9);
     let levels: Vec<(f64, f64)> = (0..=OUTLINE)

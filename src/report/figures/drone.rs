@@ -9,6 +9,7 @@ use super::plan_view::narrow_bar;
 use crate::analysis::law::LawKind;
 use crate::analysis::offset::OffsetMap;
 use crate::analysis::result::{DroneAnalysis, FlightAnalysis, WindowStats};
+use crate::numeric::upper_median;
 use crate::report::Figure;
 use crate::report::axis::{Axis, decimals_of, nice_step};
 use crate::report::chart::{Panel, frame, thinned};
@@ -65,8 +66,8 @@ impl Axes {
         // Centred on hover, where the windows of vertical motion lie on both sides.
         let pulses: Vec<f64> =
             windows().filter(|w| w.kind.is_hover()).map(adjusted).filter(|u| usable(*u)).collect();
-        let middle = median(pulses)
-            .or_else(|| median(windows().map(adjusted).filter(|u| usable(*u)).collect()))
+        let middle = upper_median(pulses)
+            .or_else(|| upper_median(windows().map(adjusted).filter(|u| usable(*u)).collect()))
             .unwrap_or(1500.0);
         let pulse_limit = end(&mut windows().map(|window| adjusted(window) - middle), 5.0);
         Self {
@@ -114,11 +115,6 @@ impl Axes {
 /// The window's pulse without the slow offset, us.
 fn adjusted(window: &WindowStats) -> f64 {
     window.effort_phi.median - window.offset_us.unwrap_or(0.0)
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// Whether there is anything to draw for this drone.

@@ -6,6 +6,7 @@ use kuva::plot::scatter::MarkerShape;
 use crate::analysis::law::{LawKind, Symbol};
 use crate::analysis::result::{Analysis, FlightAnalysis};
 use crate::base::estimate::Estimate;
+use crate::numeric::extent;
 
 use crate::report::Figure;
 use crate::report::axis::Axis;
@@ -101,8 +102,7 @@ fn flight_colours(flights: &[&FlightAnalysis]) -> Vec<String> {
         .collect();
     let known = flights.iter().all(|flight| flight.true_updraft_mps.is_some_and(usable));
     let keys = if known { order } else { (0..flights.len()).map(|i| i as f64).collect() };
-    let low = keys.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = keys.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (low, high) = extent(&keys).unwrap_or_default();
     let span = if high > low { high - low } else { 1.0 };
     keys.iter().map(|key| sequential((key - low) / span)).collect()
 }

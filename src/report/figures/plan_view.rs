@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::analysis::result::{Analysis, DroneUpdraft, FlightAnalysis};
+use crate::numeric::extent;
 use crate::report::axis::{decimals_of, nice_step};
 use crate::report::colour::{FAINT, INK, MUTED, diverging};
 use crate::report::svg::{Anchor, Drawing, TextStyle};
@@ -25,16 +26,8 @@ impl Projection {
         size: [f64; 2],
         margin: f64,
     ) -> Option<Self> {
-        let range = |axis: usize| {
-            positions
-                .iter()
-                .map(|p| p[axis])
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)))
-        };
-        let (forward, left) = (range(0), range(1));
-        if forward.0 > forward.1 {
-            return None;
-        }
+        let range = |axis: usize| extent(positions.iter().map(|p| p[axis]));
+        let (forward, left) = (range(0)?, range(1)?);
         let extent = (forward.1 - forward.0).max(left.1 - left.0);
         let cell_m = closest(positions).unwrap_or(1.0).max(extent / 120.0).max(1e-3);
         let forward_m = (forward.0 - margin * cell_m, forward.1 + margin * cell_m);

@@ -6,6 +6,7 @@ use kuva::plot::scatter::MarkerShape;
 
 use crate::analysis::law::Symbol;
 use crate::base::estimate::Estimate;
+use crate::numeric::{extent, least};
 use crate::study::Condition;
 use crate::study::result::{ConditionResult, StudyFlight, StudyResult};
 
@@ -49,7 +50,7 @@ fn law(study: &StudyResult) -> Option<(f64, f64)> {
 }
 
 fn of_condition(study: &StudyResult, condition: Condition) -> Coloured<'_> {
-    let (low, high) = extent(&study.updrafts_mps);
+    let (low, high) = extent(&study.updrafts_mps).unwrap_or_default();
     let colour = |updraft_mps: f64| sequential((updraft_mps - low) / (high - low).max(1e-9));
     let flights = study
         .flights
@@ -58,10 +59,6 @@ fn of_condition(study: &StudyResult, condition: Condition) -> Coloured<'_> {
         .map(|flight| (flight, colour(flight.updraft_mps)))
         .collect();
     Coloured { flights, law: law(study) }
-}
-
-fn extent(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
 }
 
 /// Axes around all windows of the study, so that panels compare.
@@ -121,7 +118,7 @@ fn still(study: &StudyResult) -> Option<Figure> {
     u.step = nice_step((u.max - u.min) / 10.0);
     u.max += u.step;
     let lowest = study.flights.iter().flat_map(|flight| &flight.windows);
-    let lowest = lowest.map(|w| w.pulse_phi_us.median).fold(f64::INFINITY, f64::min);
+    let lowest = least(lowest.map(|w| w.pulse_phi_us.median)).unwrap_or(f64::INFINITY);
     while u.min + 1.5 * u.step < lowest && u.min + 5.0 * u.step < u.max {
         u.min += u.step;
     }

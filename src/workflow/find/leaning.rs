@@ -3,6 +3,7 @@
 use crate::analysis::lean_table::LeanTable;
 use crate::analysis::wind::Leaning;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
+use crate::base::digest::sha256;
 use crate::campaign::FlightRecord;
 use crate::effects::select::without;
 use crate::effects::{Model, Role, Signal, Signals};
@@ -10,13 +11,12 @@ use crate::mission::Plan;
 use crate::sim::plant::GRAVITY;
 use crate::sim::plant::drag::Drag;
 use crate::vehicle::Vehicle;
-use crate::workflow::hashes::sha256_of;
 
 /// How the simulated vehicle leans in wind, where its drag is that of its box alone: neither
 /// effects nor another airframe model shape it, and it is the vehicle that was flown.
 pub(super) fn leaning(plan: &Plan, record: &FlightRecord, vehicle: &Vehicle) -> Option<Leaning> {
     let text = toml::to_string(vehicle).ok()?;
-    let known = sha256_of(text.as_bytes()) == record.vehicle_sha256
+    let known = sha256(text.as_bytes()) == record.vehicle_sha256
         && vehicle.airframe.sitl.is_none()
         && vehicle.autopilot.mot_thst_expo == 0.0
         && !vehicle.effects.values().any(|effect| effect.on);

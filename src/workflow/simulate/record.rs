@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::Simulation;
+use crate::base::digest::sha256;
 use crate::base::file::{FileError, create_folder, read_whole, sweep_partial, write_whole};
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
@@ -15,7 +16,6 @@ use crate::mission::Plan;
 use crate::mission::plan::Slot;
 use crate::vehicle::Vehicle;
 use crate::workflow::error::WorkflowError;
-use crate::workflow::hashes::sha256_of;
 use crate::workflow::made_by;
 
 /// When simulated shows start: 2026-06-01 12:00 UTC, a summer noon with thermals. Fixed, so that the
@@ -42,12 +42,12 @@ pub(super) fn prepare(
         source: "simulator".to_owned(),
         seed: simulation.seed,
         vehicle: vehicle.name.clone(),
-        vehicle_sha256: sha256_of(vehicle_text.as_bytes()),
+        vehicle_sha256: sha256(vehicle_text.as_bytes()),
         air_mps: simulation.air.uniform_mps,
         air: simulation.air.texts(),
         start,
         full_logs: simulation.full_logs,
-        plan_sha256: sha256_of(&plan_bytes),
+        plan_sha256: sha256(&plan_bytes),
         logs: Vec::new(),
     };
     create_folder(&folder.simulated())?;

@@ -140,14 +140,9 @@ pub fn exposure(path: &Path) -> Option<String> {
 }
 
 fn from_hex(text: &str) -> Option<[u8; 32]> {
-    if text.len() != 64 || !text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
-        return None;
-    }
     let mut key = [0; 32];
-    for (byte, digits) in key.iter_mut().zip(text.as_bytes().chunks(2)) {
-        *byte = u8::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
-    }
-    Some(key)
+    let whole = base16ct::mixed::decode(text, &mut key).is_ok_and(|bytes| bytes.len() == 32);
+    whole.then_some(key)
 }
 
 /// Signer of the frames that one station sends.

@@ -6,13 +6,14 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
+use crate::base::layout;
 use crate::campaign::FlightFolder;
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::fleet::abort::Action;
 use crate::link::id::DroneId;
 use crate::mission::Plan;
-use crate::workflow::fleet::server::{self, Status, StatusRow, Uploaded, write_aligned};
+use crate::workflow::fleet::server::{self, Status, StatusRow, Uploaded};
 
 pub(in crate::cli) use options::{of_air, refuse};
 
@@ -47,10 +48,7 @@ pub(in crate::cli) fn status(
             line.push(row.states.join(", "));
             lines.push(line);
         }
-        let mut text = String::new();
-        // Writing into a text does not fail.
-        let _ = write_aligned(&mut text, &lines);
-        context.print(&text)?;
+        context.print(&format!("{}\n", layout::aligned(&lines).join("\n")))?;
     }
     for problem in problems {
         context.warn(problem);

@@ -5,6 +5,7 @@ use kuva::plot::scatter::MarkerShape;
 
 use crate::gap::Verdict;
 use crate::gap::verdict::DroneOffset;
+use crate::numeric::rms;
 use crate::report::Figure;
 use crate::report::axis::Axis;
 use crate::report::chart::{Mark, Panel, frame};
@@ -61,9 +62,8 @@ pub(in crate::report) fn figure(verdict: &Verdict) -> Option<Figure> {
     sheet.place(panel.draw(SIZE[0], SIZE[1]), 0.0, 0.0);
     let [left, top, width, height] = frame(SIZE[0], SIZE[1], false);
     let mut labels = Drawing::overlay();
-    let sd = |of: fn(&DroneOffset) -> f64| {
-        (each.iter().map(|drone| of(drone).powi(2)).sum::<f64>() / each.len() as f64).sqrt()
-    };
+    let sd =
+        |of: fn(&DroneOffset) -> f64| rms(each.iter().map(|drone| of(drone))).unwrap_or(f64::NAN);
     let far = [FAR * sd(|drone| drone.offset_us), FAR * sd(|drone| drone.slope)];
     for drone in &each {
         let is_far = drone.offset_us.abs() > far[0] || drone.slope.abs() > far[1];

@@ -13,6 +13,7 @@ use crate::link::clock::{MS, Micros, S};
 use crate::link::conversation::Observer as _;
 use crate::link::id::DroneId;
 use crate::link::net::Net as _;
+use crate::numeric::upper_median;
 use crate::protocol::show::{CLEAR_TIME, StartConfig, flag};
 use crate::workflow::error::WorkflowError;
 use crate::workflow::words::time_of_day;
@@ -165,9 +166,8 @@ impl Crew<'_> {
     fn gps_ms(&self) -> Option<i64> {
         let now = self.net.now();
         let clock = |drone: DroneId| self.telemetry.get(drone)?.clock.gps_ms(now);
-        let mut clocks: Vec<f64> = self.drones().into_iter().filter_map(clock).collect();
-        clocks.sort_by(f64::total_cmp);
-        clocks.get(clocks.len() / 2).map(|gps_ms| *gps_ms as i64)
+        let clocks = self.drones().into_iter().filter_map(clock).collect();
+        upper_median(clocks).map(|gps_ms| gps_ms as i64)
     }
 
     /// The start by the word of most drones, else as it was written down.

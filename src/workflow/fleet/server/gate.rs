@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::Flight;
+use crate::base::layout;
 use crate::fleet::preflight::{Limits, charge_needed};
 use crate::link::clock::{Micros, S};
 use crate::mission::Plan;
@@ -132,7 +133,9 @@ impl fmt::Display for Table {
             line.extend(cells(&row.state));
             line
         }));
-        write_aligned(f, &lines)?;
+        for line in layout::aligned(&lines) {
+            writeln!(f, "{line}")?;
+        }
         for row in &self.rows {
             for why in &row.no_go {
                 writeln!(f, "NO-GO drone {} (slot {}): {why}", row.drone, row.slot)?;
@@ -142,24 +145,6 @@ impl fmt::Display for Table {
         let verdict = if self.go() { "GO" } else { "NO-GO" };
         writeln!(f, "{verdict}: {ready} of {} drones are ready", self.rows.len())
     }
-}
-
-/// Lines in columns.
-pub(crate) fn write_aligned(f: &mut impl fmt::Write, lines: &[Vec<String>]) -> fmt::Result {
-    let columns = lines.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |column| {
-        let cells = lines.iter().filter_map(|line: &Vec<String>| line.get(column));
-        cells.map(|cell: &String| cell.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    for line in lines {
-        let mut text = String::new();
-        for (cell, width) in line.iter().zip(&widths) {
-            fmt::Write::write_fmt(&mut text, format_args!("{cell:<width$}  "))?;
-        }
-        writeln!(f, "{}", text.trim_end())?;
-    }
-    Ok(())
 }
 
 /// Looks at all drones of a flight until they are as a step needs them, or so long.

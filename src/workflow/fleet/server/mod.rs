@@ -41,7 +41,6 @@ use crate::workflow::host::Host;
 
 pub(crate) use self::attach::take_over;
 pub(crate) use self::dry::{dry_end, dry_fly, dry_look, dry_upload};
-pub(crate) use self::gate::write_aligned;
 pub(crate) use self::logs::{list, pull};
 pub(crate) use self::steps::{Status, StatusRow, Uploaded, preflight, status, upload};
 

@@ -1,0 +1,25 @@
+//! SHA-256 hashes of bytes as hexadecimal text.
+
+use sha2::{Digest as _, Sha256};
+
+/// SHA-256 of bytes, in lower-case hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    hexadecimal(Sha256::new_with_prefix(bytes))
+}
+
+/// Result of a SHA-256, in lower-case hexadecimal.
+pub fn hexadecimal(hash: Sha256) -> String {
+    base16ct::lower::encode_string(&hash.finalize())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_hash_is_the_standards() {
+        // FIPS 180-2, appendix B.1.
+        assert_eq!(
+            super::sha256(b"abc"),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
+    }
+}
