@@ -101,7 +101,7 @@ fn options_that_do_not_go_with_hidden_physics_are_refused() {
     let ended = bench.expect(2, &["run", "--hide", "3", "--grid", "3x4"]);
     assert!(ended.err.contains("3x4 is not"), "{ended}");
     let ended = bench.expect(2, &["run", "--hide", "3", "--vehicle", "phantom4"]);
-    assert!(ended.err.contains("airsim-generic-quad and pixel, not from phantom4"), "{ended}");
+    assert!(ended.err.contains("airsim-generic-quad and pixel, not in phantom4"), "{ended}");
     bench.expect(2, &["run", "--protocol", "paper"]);
     bench.expect(0, &["plan", "calibration", "--grid", "2x2", "-o", "campaign"]);
     let ended = bench.expect(2, &["run", "--hide", "3", "-o", "campaign"]);

@@ -243,7 +243,7 @@ fn on_a_terminal_doubts_are_asked() {
     *other.last_mut().unwrap() ^= 1;
     fs::write(card.join("00000010.BIN"), other).unwrap();
     let named = [&import[..], &["--flight", "hover"]].concat();
-    let talk = [("or none:", "2\n"), ("of slot 1 of hover?", "1\n")];
+    let talk = [("or none:", "2\n"), ("to slot 1 of hover?", "1\n")];
     let (code, told) = on_a_terminal(&bench, &named, &talk).unwrap();
     assert!(told.contains("1: cards/drone-2/00000009.BIN, drone 1, from "), "{told}");
     assert_eq!(code, 0, "{told}");

@@ -526,7 +526,7 @@ fn a_drone_that_the_server_only_remembers_stands_nowhere() {
     let server = Fake::start(&plan(&bench), Fault::Remembers);
     let ended = run(&bench, &server, &["logs", "pull", "campaign"]);
     assert_eq!(ended.code, Some(0), "{ended}");
-    let left = "Left out, as the server has not heard them for a while: drones 77";
+    let left = "Left out, because the server has not heard them for a while: drones 77";
     assert!(ended.err.contains(left), "{ended}");
 }
 
@@ -675,7 +675,7 @@ fn who_watches_in_place_of_another_station_can_end_the_flight() {
     server.let_go();
     let (said, code) = watching.end();
     assert_eq!(code, Some(130), "{said}");
-    assert!(said.contains("this program has told them to land"), "{said}");
+    assert!(said.contains("this program has ordered them to land"), "{said}");
     let asked = server.asked();
     assert_eq!(asked.iter().filter(|body| body["type"] == "UAV-LAND").count(), 1);
 
@@ -719,7 +719,7 @@ fn who_is_on_the_ground_when_the_watch_begins_is_not_said_to_have_landed() {
     let ended = run(&bench, &server, &["fleet", "watch", "campaign"]);
     assert_eq!(ended.code, Some(3), "{ended}");
     let found =
-        "drone 02 was on the ground when this watch began: whether it has flown, its log says";
+        "drone 02 was on the ground when this watch began: its log will show whether it flew";
     assert!(ended.err.contains(found), "{ended}");
     // The other says that it has landed.
     assert!(ended.err.contains("1 of 2 drones have landed"), "{ended}");
@@ -872,7 +872,7 @@ fn a_signal_before_the_start_takes_it_back() {
 fn a_signal_in_flight_does_what_was_chosen() {
     for (signal, chosen, order, word) in [
         ("-INT", "return", "UAV-RTH", "this program has sent them home"),
-        ("-TERM", "land", "UAV-LAND", "this program has told them to land"),
+        ("-TERM", "land", "UAV-LAND", "this program has ordered them to land"),
         ("-HUP", "leave", "", "the drones fly on by themselves"),
     ] {
         let more = ["--lead", "60", "--on-interrupt", chosen];

@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn says_where_a_program_is_broken() {
         let text = |bytes: &[u8]| decode(bytes).unwrap_err().to_string();
-        assert_eq!(text(&[1, 0x0f]), "byte 1: 0x0f is no light command; the program ends there");
+        assert_eq!(text(&[1, 0x0f]), "byte 1: 0x0f is not a light command; the program ends there");
         assert_eq!(text(&[1, 4, 1, 2]), "byte 1: the last command is cut off");
         assert_eq!(text(&[2, 0x80, 0x80]), "byte 0: the last command is cut off");
         let long = [2, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255];

@@ -47,7 +47,7 @@ pub(super) fn sum(host: &dyn Host, brought: &[Brought], watch: &Stopwatch) {
     let bytes: u64 = brought.iter().map(|one| one.bytes).sum();
     let state = |state: &str| brought.iter().filter(|one| one.state == state).count();
     host.say(&format!(
-        "Brought {} of {} logs home, {:.1} MB in {watch}{}",
+        "Downloaded {} of {} logs, {:.1} MB in {watch}{}",
         state("pulled") + state("there"),
         brought.len(),
         bytes as f64 / 1e6,

@@ -88,7 +88,7 @@ pub(super) fn stopped(
     let confirmed = all(Aborted::is_confirmed);
     WorkflowError::Stopped(match (choice, is_guided) {
         (Choice::Return | Choice::Land, _) if grounded => {
-            "stopped: all drones are on the ground, and none has a start any more"
+            "stopped: all drones are on the ground, and none has a start pending"
         }
         (Choice::Return, _) if confirmed => {
             "stopped: this program has sent them home, and all have confirmed it; `updraft fleet \
@@ -134,7 +134,7 @@ mod tests {
         };
         let (home, down) = (Aborted::Confirmed(Action::Return), Aborted::Grounded);
         for (ended, wanted, by_hand) in [
-            (&[(1, down), (2, down)][..], "everyone is on the ground", false),
+            (&[(1, down), (2, down)][..], "all drones are on the ground", false),
             (&[(1, home), (2, down)], "all have confirmed it", false),
             (&[(1, home), (2, Aborted::Unheard)], "sent them home", true),
             // Somebody else was told by another terminal.

@@ -222,6 +222,6 @@ mod tests {
         assert_eq!(loaded(2, 2, 2), "Loaded 2 of 2 drones");
         assert_eq!(loaded(2, 2, 0), "Loaded 2 of 2 drones (they already had the file)");
         assert_eq!(loaded(3, 4, 2), "Loaded 3 of 4 drones (1 of them already had the file)");
-        assert_eq!(loaded(9, 9, 4), "Loaded 9 of 9 drones (5 of them had the file)");
+        assert_eq!(loaded(9, 9, 4), "Loaded 9 of 9 drones (5 of them already had the file)");
     }
 }

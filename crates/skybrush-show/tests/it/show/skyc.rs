@@ -105,8 +105,7 @@ fn what_others_write_is_read() {
     let cues = json!({"version": 1, "items": [{"time": 1, "name": "a"}, {"name": "b"}, 5]});
     let show = with(json!({ "cues": cues }), json!({}));
     assert_eq!(show.cues, [Cue { time_s: 1.0, name: "a".into() }]);
-    insta::assert_snapshot!(show.doubts.join("\n"), @r#"show.json: cue 2, {"name":"b"}, has no \
-         time and was skipped (and 1 more)"#);
+    insta::assert_snapshot!(show.doubts.join("\n"), @r#"show.json: cue 2, {"name":"b"}, has no time and was skipped (and 1 more)"#);
     // Places with four values, pyro and a plan to return are there, and are known to be.
     let four = json!([[0, [0, 0, 0, 1], []], [10, [0, 0, 10, 1], []]]);
     let mut show = inline(&with_points(&four));
