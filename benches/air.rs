@@ -9,7 +9,7 @@ use divan::{Bencher, black_box};
 use nalgebra::Vector3;
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::base::time::GpsTime;
-use updraft::show::{Path, Segment, Trajectory};
+use updraft::show::{Segment, SegmentPath, Trajectory};
 use updraft::sim::air::Sum;
 use updraft::sim::air::spec::{Air, build, load};
 use updraft::sim::{Atmosphere, FlightSetup, Hooks, fly_without_log};
@@ -66,9 +66,9 @@ fn hover(bencher: Bencher<'_, '_>, spec: &str) {
     let vehicle = builtin("airsim-generic-quad").expect("a built-in vehicle");
     let to = |height_m: f64, duration_ms| Segment {
         duration_ms,
-        path: Path::Line(Vector3::new(0.0, 0.0, height_m)),
+        path: SegmentPath::Line(Vector3::new(0.0, 0.0, height_m)),
     };
-    let hold = Segment { duration_ms: 600_000, path: Path::Hold };
+    let hold = Segment { duration_ms: 600_000, path: SegmentPath::Hold };
     let segments = vec![to(100.0, 30_000), hold, to(2.5, 40_000)];
     let trajectory = Trajectory { start_m: Vector3::zeros(), segments };
     let air = air(spec);

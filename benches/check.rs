@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use updraft::check::{CheckInput, CheckReport, check};
 use updraft::mission::plan::Fence;
-use updraft::show::trajectory::{Path, Segment, Trajectory};
+use updraft::show::trajectory::{Segment, SegmentPath, Trajectory};
 use updraft::show::{Show, ShowDrone};
 use updraft::vehicle::Limits;
 
@@ -31,9 +31,9 @@ fn ladder(count: usize, phase_ms: fn(usize, usize) -> u32) -> Show {
         let home = Vector3::new(7.0 * row as f64, 7.0 * column as f64, 0.0);
         let line = |duration_ms, z| Segment {
             duration_ms,
-            path: Path::Line(home + Vector3::new(0.0, 0.0, z)),
+            path: SegmentPath::Line(home + Vector3::new(0.0, 0.0, z)),
         };
-        let hold = |duration_ms| Segment { duration_ms, path: Path::Hold };
+        let hold = |duration_ms| Segment { duration_ms, path: SegmentPath::Hold };
         let mut segments = vec![hold(1000 + phase_ms(row, column)), line(20_000, 20.0)];
         for rung in 0..14 {
             let top = 20.0 + 10.0 * f64::from(rung % 7 + 1);
@@ -68,10 +68,10 @@ fn wander(count: usize) -> Show {
         let mut point = || {
             home + Vector3::new(9.0 * random() - 4.5, 9.0 * random() - 4.5, 20.0 + 40.0 * random())
         };
-        let climb = Path::Line(home + Vector3::new(0.0, 0.0, 20.0));
+        let climb = SegmentPath::Line(home + Vector3::new(0.0, 0.0, 20.0));
         let mut segments = vec![Segment { duration_ms: 20_000, path: climb }];
         for _ in 0..59 {
-            let path = Path::Cubic([point(), point(), point()]);
+            let path = SegmentPath::Cubic([point(), point(), point()]);
             segments.push(Segment { duration_ms: 10_000, path });
         }
         drone(i, home, segments)
@@ -87,7 +87,7 @@ fn transition(count: usize) -> Show {
     let drones = (0..count).map(|i| {
         let home = place(i);
         let level = Vector3::new(0.0, 0.0, 15.0 + 2.5 * (i % 40) as f64);
-        let line = |duration_ms, to| Segment { duration_ms, path: Path::Line(to) };
+        let line = |duration_ms, to| Segment { duration_ms, path: SegmentPath::Line(to) };
         let mut segments = vec![line(30_000, home + level)];
         let mut at = i;
         for _ in 0..10 {

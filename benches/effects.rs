@@ -9,7 +9,7 @@ use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::base::time::GpsTime;
 use updraft::effects::LIBRARY;
 use updraft::effects::select::choose;
-use updraft::show::{Path, Segment, Trajectory};
+use updraft::show::{Segment, SegmentPath, Trajectory};
 use updraft::sim::{FlightSetup, Hooks, Uniform, fly_without_log};
 use updraft::vehicle::Vehicle;
 use updraft::vehicle::library::builtin;
@@ -21,7 +21,7 @@ fn main() {
 fn bench(bencher: Bencher<'_, '_>, vehicle: &Vehicle) {
     let to = |height_m: f64, duration_ms| Segment {
         duration_ms,
-        path: Path::Line(Vector3::new(0.0, 0.0, height_m)),
+        path: SegmentPath::Line(Vector3::new(0.0, 0.0, height_m)),
     };
     let segments = vec![to(20.0, 10_000), to(60.0, 20_000), to(20.0, 20_000), to(2.5, 9_000)];
     let trajectory = Trajectory { start_m: Vector3::zeros(), segments };

@@ -3,7 +3,9 @@
 use nalgebra::Vector3;
 use updraft::show::derive::{DeriveParams, Firmware, derive};
 use updraft::show::skyb::SkybOptions;
-use updraft::show::{Path, Segment, Show, ShowDrone, Trajectory, csv, lights, quantise, skyc};
+use updraft::show::{
+    Segment, SegmentPath, Show, ShowDrone, Trajectory, csv, lights, quantise, skyc,
+};
 
 fn main() {
     divan::main();
@@ -16,9 +18,9 @@ fn show() -> Show {
             let z = f64::from(i % 7) * 3.217 + 2.5;
             let to = home + Vector3::new(f64::from(i % 5) * 0.731, 0.0, z);
             let path = match i % 3 {
-                0 => Path::Hold,
-                1 => Path::Line(to),
-                _ => Path::Cubic([home + (to - home) * 0.25, to - Vector3::z(), to]),
+                0 => SegmentPath::Hold,
+                1 => SegmentPath::Line(to),
+                _ => SegmentPath::Cubic([home + (to - home) * 0.25, to - Vector3::z(), to]),
             };
             Segment { duration_ms: 5000 + i * 37, path }
         });

@@ -8,7 +8,7 @@ use divan::{Bencher, black_box};
 use nalgebra::Vector3;
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::base::time::GpsTime;
-use updraft::show::{Path, Segment, Trajectory};
+use updraft::show::{Segment, SegmentPath, Trajectory};
 use updraft::sim::air::Surroundings;
 use updraft::sim::autopilot::Autopilot;
 use updraft::sim::plant::Plant;
@@ -24,14 +24,14 @@ fn main() {
 fn ladder() -> Trajectory {
     let to = |height_m: f64, duration_ms| Segment {
         duration_ms,
-        path: Path::Line(Vector3::new(0.0, 0.0, height_m)),
+        path: SegmentPath::Line(Vector3::new(0.0, 0.0, height_m)),
     };
     let mut segments = vec![to(20.0, 10_000)];
     for _ in 0..8 {
         segments.push(to(60.0, 20_000));
-        segments.push(Segment { duration_ms: 10_000, path: Path::Hold });
+        segments.push(Segment { duration_ms: 10_000, path: SegmentPath::Hold });
         segments.push(to(20.0, 20_000));
-        segments.push(Segment { duration_ms: 10_000, path: Path::Hold });
+        segments.push(Segment { duration_ms: 10_000, path: SegmentPath::Hold });
     }
     segments.push(to(2.5, 8_750));
     Trajectory { start_m: Vector3::zeros(), segments }

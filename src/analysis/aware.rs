@@ -15,7 +15,7 @@ use super::measured::Measured;
 use super::reference::same_drone;
 use super::result::{DroneAnalysis, FlightAnalysis, WindowStats};
 use super::shape::{PARAMETERS, Shape};
-use super::split::Point;
+use super::split::WindowPoint;
 use super::stats::mean_sd;
 use super::zero::{DroneLaw, Fleet, Zero};
 use crate::flight::Flight;
@@ -400,7 +400,7 @@ fn points(
     battery: Option<BatteryCorrection>,
     slope: f64,
     hovers: bool,
-) -> Vec<Point> {
+) -> Vec<WindowPoint> {
     let mut points = Vec::new();
     for (index, drone) in reference.drones.iter().enumerate() {
         if !counts(reference, drone) {
@@ -433,8 +433,8 @@ fn point(
     window: &WindowStats,
     referred: &Referred,
     slope: f64,
-) -> Point {
-    Point {
+) -> WindowPoint {
+    WindowPoint {
         drone,
         key,
         time_s: f64::midpoint(window.start_s, window.end_s),

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::fit::FitError;
 use super::fitted::{Fit, Laws};
-use super::law::{self, ErrorScale, Law, Point};
+use super::law::{self, ErrorScale, Law, LawPoint};
 use super::stats::SampleStats;
 use super::window::WindowStats;
 use crate::flight::Indicator;
@@ -141,13 +141,13 @@ pub fn is_used(window: &WindowStats, options: &FitOptions) -> bool {
 }
 
 /// A window as a point of a law.
-fn point(window: &WindowStats, options: &FitOptions) -> Point {
+fn point(window: &WindowStats, options: &FitOptions) -> LawPoint {
     let (sigma_us, velocity_sigma_mps) = match options.weights {
         Weights::WindowSd => (window.effort_phi.sd, 0.0),
         Weights::BlockError => (window.effort_phi.se, window.velocity_mps.se),
         Weights::Equal => (1.0, 0.0),
     };
-    Point {
+    LawPoint {
         velocity_mps: location(&window.velocity_mps, options.location),
         pulse_us: location(&window.effort_phi, options.location) - window.offset_us.unwrap_or(0.0),
         sigma_us: sigma_us.max(options.indicator.quantum()),
@@ -157,7 +157,7 @@ fn point(window: &WindowStats, options: &FitOptions) -> Point {
 
 /// Fits the laws to one drone's windows.
 pub fn calibrate(windows: &[WindowStats], options: &FitOptions) -> Result<Laws, CalibrationError> {
-    let points: Vec<Point> =
+    let points: Vec<LawPoint> =
         windows.iter().filter(|w| is_used(w, options)).map(|w| point(w, options)).collect();
     let moving = windows.iter().filter(|window| window.kind.is_leg());
     let rejected = moving.filter(|window| !window.rejected.is_empty()).count();
@@ -166,12 +166,12 @@ pub fn calibrate(windows: &[WindowStats], options: &FitOptions) -> Result<Laws, 
 }
 
 fn fit_points(
-    points: &[Point],
+    points: &[LawPoint],
     options: &FitOptions,
     empty: CalibrationError,
 ) -> Result<Laws, CalibrationError> {
     let Some(first) = points.first() else { return Err(empty) };
-    let spread = |value: fn(&Point) -> f64| {
+    let spread = |value: fn(&LawPoint) -> f64| {
         points.iter().map(|point| (value(point) - value(first)).abs()).fold(0.0, f64::max)
     };
     // A held fit needs one window only; the free laws need two speeds.
@@ -228,16 +228,16 @@ fn in_units_of(indicator: Indicator, mut fit: Fit) -> Fit {
     fit
 }
 
-fn widened(points: &[Point], added_us: f64) -> Vec<Point> {
+fn widened(points: &[LawPoint], added_us: f64) -> Vec<LawPoint> {
     points
         .iter()
-        .map(|point| Point { sigma_us: point.sigma_us.hypot(added_us), ..*point })
+        .map(|point| LawPoint { sigma_us: point.sigma_us.hypot(added_us), ..*point })
         .collect()
 }
 
 /// Standard deviation to add to every point's error so that the better law's reduced chi² is 1
 /// (Paule and Mandel 1982); 0 when it is below 1 already, `None` without degrees of freedom.
-fn added_sigma_us(points: &[Point]) -> Option<f64> {
+fn added_sigma_us(points: &[LawPoint]) -> Option<f64> {
     let best = |added_us: f64| -> Option<f64> {
         let points = widened(points, added_us);
         let scale = ErrorScale::Unscaled;
@@ -273,7 +273,7 @@ pub fn flock<'a>(
     drones: impl IntoIterator<Item = &'a [WindowStats]>,
     options: &FitOptions,
 ) -> Result<Laws, CalibrationError> {
-    let mut groups: std::collections::BTreeMap<(String, i64, usize), Vec<Point>> =
+    let mut groups: std::collections::BTreeMap<(String, i64, usize), Vec<LawPoint>> =
         std::collections::BTreeMap::new();
     for windows in drones {
         let mut seen = std::collections::BTreeMap::<(String, i64), usize>::new();
@@ -287,10 +287,10 @@ pub fn flock<'a>(
             *count += 1;
         }
     }
-    let average = |points: &Vec<Point>| {
+    let average = |points: &Vec<LawPoint>| {
         let n = points.len() as f64;
-        let over = |value: fn(&Point) -> f64| mean(points.iter().map(value)).unwrap_or(f64::NAN);
-        let error = |value: fn(&Point) -> f64| {
+        let over = |value: fn(&LawPoint) -> f64| mean(points.iter().map(value)).unwrap_or(f64::NAN);
+        let error = |value: fn(&LawPoint) -> f64| {
             points.iter().map(|point| value(point).powi(2)).sum::<f64>().sqrt() / n
         };
         let sigma_us = match options.weights {
@@ -298,13 +298,13 @@ pub fn flock<'a>(
             Weights::BlockError => error(|point| point.sigma_us),
             Weights::Equal => 1.0,
         };
-        Point {
+        LawPoint {
             velocity_mps: over(|point| point.velocity_mps),
             pulse_us: over(|point| point.pulse_us),
             sigma_us,
             velocity_sigma_mps: error(|point| point.velocity_sigma_mps),
         }
     };
-    let points: Vec<Point> = groups.values().map(average).collect();
+    let points: Vec<LawPoint> = groups.values().map(average).collect();
     fit_points(&points, options, CalibrationError::NoLadder { rejected: 0, hovers: 0 })
 }

@@ -18,7 +18,7 @@ use super::result::{DroneAnalysis, FlightAnalysis, SampleStats, Trace, WindowSta
 use super::windows::{Target, WindowOptions};
 use crate::base::rng::{Purpose as Stream, stream};
 use crate::flight::{Clock, Effort, Flight, Series};
-use crate::mission::plan::{Kind, Purpose};
+use crate::mission::plan::{Purpose, SegmentKind};
 
 const DRONES: usize = 4;
 const HOVER_S: f64 = 240.0;
@@ -99,16 +99,16 @@ fn volts(full: f64, time_s: f64) -> f64 {
 }
 
 /// The ladder: (kind, climb, start and end of the window, height).
-fn ladder() -> Vec<(Kind, f64, f64, f64, f64)> {
-    let mut rungs = vec![(Kind::Hover, 0.0, 13.0, 19.0, 20.0)];
+fn ladder() -> Vec<(SegmentKind, f64, f64, f64, f64)> {
+    let mut rungs = vec![(SegmentKind::Hover, 0.0, 13.0, 19.0, 20.0)];
     let mut time = 20.0;
     for rung in 1..=7 {
         let speed = 0.5 * f64::from(rung);
         let top = 20.0 + 20.0 * speed;
-        rungs.push((Kind::LegUp, speed, time + 10.0, time + 19.0, top - 5.5 * speed));
-        rungs.push((Kind::Hover, 0.0, time + 23.0, time + 29.0, top));
-        rungs.push((Kind::LegDown, -speed, time + 40.0, time + 49.0, 20.0 + 5.5 * speed));
-        rungs.push((Kind::Hover, 0.0, time + 53.0, time + 59.0, 20.0));
+        rungs.push((SegmentKind::LegUp, speed, time + 10.0, time + 19.0, top - 5.5 * speed));
+        rungs.push((SegmentKind::Hover, 0.0, time + 23.0, time + 29.0, top));
+        rungs.push((SegmentKind::LegDown, -speed, time + 40.0, time + 49.0, 20.0 + 5.5 * speed));
+        rungs.push((SegmentKind::Hover, 0.0, time + 53.0, time + 59.0, 20.0));
         time += 60.0;
     }
     rungs
@@ -272,7 +272,7 @@ fn campaign(seed: u64, weather: Weather, shape: LawKind) -> [f64; 3] {
     for drone in 0..DRONES {
         let (flight, truth) = hover(&mut rng, &world, weather, drone, &shared);
         let target = Target {
-            kind: Kind::Hover,
+            kind: SegmentKind::Hover,
             label: String::new(),
             start_s: 0.0,
             end_s: HOVER_S,
@@ -366,8 +366,13 @@ fn at_a_lean(lean_rad: f64, corrections: Corrections<'_>) -> (Measured, f64, f64
     let (mut flight, _) = hover(&mut rng, &world, STILL, 0, &still);
     flight.roll_rad.value.fill(lean_rad);
     let label = String::new();
-    let target =
-        Target { kind: Kind::Hover, label, start_s: 0.0, end_s: HOVER_S, commanded_mps: 0.0 };
+    let target = Target {
+        kind: SegmentKind::Hover,
+        label,
+        start_s: 0.0,
+        end_s: HOVER_S,
+        commanded_mps: 0.0,
+    };
     let seconds = Hover::of(&flight, &target, &WindowOptions::default());
     let measured = aware.measure(&flight, &seconds, Some(1), "").unwrap();
     let common = aware.common(&[&measured]);

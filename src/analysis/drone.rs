@@ -21,7 +21,7 @@ use super::windows::{self, Corrected, Target};
 use crate::base::causes::with_causes;
 use crate::base::plain::{Shown as _, plain};
 use crate::flight::{Alignment, Flight, FlightOptions, Loss, table};
-use crate::mission::plan::{Kind, Purpose, Segment, Slot};
+use crate::mission::plan::{Purpose, Segment, SegmentKind, Slot};
 
 /// What all logs of a flight share.
 pub(super) struct Shared<'a> {
@@ -164,7 +164,7 @@ fn measure(
     let fit = shared.map_law.and_then(|law| laws.of(law)).ok_or(Cause::NoFit)?;
     let looked = track::measuring(seen.targets);
     let hover = *looked.first().ok_or(Cause::NoHover)?;
-    if looked.iter().any(|target| target.kind == Kind::Horizontal) {
+    if looked.iter().any(|target| target.kind == SegmentKind::Horizontal) {
         let aware = shared.aware.as_ref().ok_or(Cause::TrackWithoutErrors)?;
         let along = track::look(seen.flight, &looked, &shared.options.windows);
         let measured = aware.measure(seen.flight, &along, slot, name)?;

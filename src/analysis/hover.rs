@@ -218,7 +218,7 @@ impl Hover {
 mod tests {
     use super::*;
     use crate::flight::{Clock, Effort, Series};
-    use crate::mission::plan::Kind;
+    use crate::mission::plan::SegmentKind;
 
     fn flown(pulse: impl Fn(f64) -> f64) -> Flight {
         let time_s: Vec<f64> = (0..2000).map(|index| f64::from(index) / 10.0).collect();
@@ -240,7 +240,8 @@ mod tests {
 
     fn look(flight: &Flight, end_s: f64) -> Hover {
         let label = String::new();
-        let target = Target { kind: Kind::Hover, label, start_s: 0.0, end_s, commanded_mps: 0.0 };
+        let target =
+            Target { kind: SegmentKind::Hover, label, start_s: 0.0, end_s, commanded_mps: 0.0 };
         Hover::of(flight, &target, &WindowOptions::default())
     }
 

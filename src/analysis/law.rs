@@ -30,7 +30,7 @@ const FEWEST_WINDOWS: usize = 4;
 
 /// One window as a point of a law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct LawPoint {
     /// Vertical velocity over ground, up positive, m/s.
     pub velocity_mps: f64,
     /// Tilt-corrected pulse width, us.
@@ -128,10 +128,10 @@ impl Law {
 }
 
 /// Fits the straight line `u = A' V + u0`.
-pub fn linear(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
+pub fn linear(points: &[LawPoint], scale: ErrorScale) -> Result<Fit, FitError> {
     check(points, 2)?;
     let (fit, sigmas) = with_effective_variance(points, |sigmas| {
-        let regressor = |point: &Point| point.velocity_mps;
+        let regressor = |point: &LawPoint| point.velocity_mps;
         let (slope, u0_us) = weighted_line(points, sigmas, regressor).ok_or(FitError::Singular)?;
         let solution = minimize(
             |p| {
@@ -152,7 +152,7 @@ pub fn linear(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
 /// The answer is the deepest minimum inside |W| < 8 m/s; other minima within a chi² of 4 of it are
 /// listed. A chi² that falls below the answer's at the edge of the range (or no minimum inside) is
 /// what a line looks like to this law, and is a warning.
-pub fn signed_quadratic(points: &[Point], scale: ErrorScale) -> Result<Fit, FitError> {
+pub fn signed_quadratic(points: &[LawPoint], scale: ErrorScale) -> Result<Fit, FitError> {
     check(points, 3)?;
     let ((found, _), sigmas) = with_effective_variance(points, |sigmas| {
         let found = all_minima(points, sigmas)?;
@@ -176,7 +176,7 @@ pub fn signed_quadratic(points: &[Point], scale: ErrorScale) -> Result<Fit, FitE
 
 /// Fits only W, with A (us/(m/s)²) and u0 (us) held from a reference calibration.
 pub fn signed_quadratic_held(
-    points: &[Point],
+    points: &[LawPoint],
     a: f64,
     u0_us: f64,
     scale: ErrorScale,
@@ -213,7 +213,7 @@ pub fn signed_quadratic_held(
     Ok(fit)
 }
 
-fn check(points: &[Point], parameters: usize) -> Result<(), FitError> {
+fn check(points: &[LawPoint], parameters: usize) -> Result<(), FitError> {
     if points.len() < parameters {
         return Err(FitError::TooFewPoints { points: points.len(), parameters });
     }
@@ -230,7 +230,7 @@ fn check(points: &[Point], parameters: usize) -> Result<(), FitError> {
 
 /// Repeats a fit with sigmas that include the velocities' errors at the slope found before.
 fn with_effective_variance<T>(
-    points: &[Point],
+    points: &[LawPoint],
     fit: impl Fn(&[f64]) -> Result<(T, Law), FitError>,
 ) -> Result<((T, Law), Vec<f64>), FitError> {
     let mut sigmas: Vec<f64> = points.iter().map(|point| point.sigma_us).collect();
@@ -247,8 +247,8 @@ fn with_effective_variance<T>(
     Ok((result, sigmas))
 }
 
-fn residuals(points: &[Point], sigmas: &[f64], law: Law) -> Vec<f64> {
-    let residual = |(point, sigma): (&Point, &f64)| {
+fn residuals(points: &[LawPoint], sigmas: &[f64], law: Law) -> Vec<f64> {
+    let residual = |(point, sigma): (&LawPoint, &f64)| {
         (point.pulse_us - law.pulse_us(point.velocity_mps)) / sigma
     };
     points.iter().zip(sigmas).map(residual).collect()
@@ -260,9 +260,9 @@ fn sum_of_squares(residuals: &[f64]) -> f64 {
 
 /// Weighted straight line `u = slope x + constant` in closed form, centred for precision.
 fn weighted_line(
-    points: &[Point],
+    points: &[LawPoint],
     sigmas: &[f64],
-    x: impl Fn(&Point) -> f64,
+    x: impl Fn(&LawPoint) -> f64,
 ) -> Option<(f64, f64)> {
     let weighed = points.iter().zip(sigmas);
     let line = Line::weighted(
@@ -299,9 +299,9 @@ fn law_of(solution: &Solution) -> Law {
 }
 
 /// Profiles chi² over W and polishes every local minimum with a positive A.
-fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
+fn all_minima(points: &[LawPoint], sigmas: &[f64]) -> Result<Minima, FitError> {
     let at = |w_mps: f64| {
-        let regressor = |point: &Point| signed_square(point.velocity_mps - w_mps);
+        let regressor = |point: &LawPoint| signed_square(point.velocity_mps - w_mps);
         let (a, u0_us) = weighted_line(points, sigmas, regressor)?;
         let law = Law::SignedQuadratic { a, u0_us, w_mps };
         Some((sum_of_squares(&residuals(points, sigmas, law)), [a, u0_us, w_mps]))
@@ -348,7 +348,7 @@ fn all_minima(points: &[Point], sigmas: &[f64]) -> Result<Minima, FitError> {
 }
 
 /// The point of the profile itself, with the covariance of all three parameters there.
-fn held_at(points: &[Point], sigmas: &[f64], start: [f64; 3]) -> Result<Solution, FitError> {
+fn held_at(points: &[LawPoint], sigmas: &[f64], start: [f64; 3]) -> Result<Solution, FitError> {
     let [_, _, w_mps] = start;
     let two = minimize(
         |p| residuals(points, sigmas, Law::SignedQuadratic { a: p[0], u0_us: p[1], w_mps }),
@@ -361,7 +361,7 @@ fn held_at(points: &[Point], sigmas: &[f64], start: [f64; 3]) -> Result<Solution
 
 /// Packs a solution of the free parameters into the result type.
 fn describe(
-    points: &[Point],
+    points: &[LawPoint],
     sigmas: &[f64],
     law: Law,
     solution: &Solution,

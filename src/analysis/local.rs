@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use super::air_prior::{Record, Weighed, grid, quantile, weigh};
 use super::corrections::DOUBTS;
 use super::shape::{PARAMETERS, Shape};
-use super::split::{LEAST_NOISE_US, Parts, Point, Split, rough_sensitivity};
+use super::split::{LEAST_NOISE_US, Parts, Split, WindowPoint, rough_sensitivity};
 
 /// Time scales of local air that are tried, s: gusts to minutes. A grid.
 const TAUS_S: [f64; 4] = [10.0, 40.0, 120.0, 360.0];
@@ -33,7 +33,7 @@ pub(super) struct Local {
 /// The windows of a fleet with their averages over drones taken out.
 pub(super) struct Deviations<'a> {
     pub(super) shape: Shape,
-    pub(super) points: &'a [Point],
+    pub(super) points: &'a [WindowPoint],
     pub(super) split: &'a Split,
     /// Pulses at the mean speed of their cells, us.
     pub(super) pulses: &'a [f64],
@@ -111,7 +111,7 @@ impl Deviations<'_> {
         let p = shape.parameters();
         let priors: &[usize] = if p > 2 { &[2, 3] } else { &[] };
         let (n, rows) = (own.len(), own.len() + priors.len());
-        let padded = |value: &dyn Fn(&Point) -> f64| -> Vec<f64> {
+        let padded = |value: &dyn Fn(&WindowPoint) -> f64| -> Vec<f64> {
             let windows = own.iter().map(|index| value(&points[*index]));
             windows.chain(priors.iter().map(|_| 0.0)).collect()
         };

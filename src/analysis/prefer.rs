@@ -146,15 +146,15 @@ fn w_mps(fit: &Fit) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::law::{ErrorScale, Point, linear, signed_quadratic};
+    use crate::analysis::law::{ErrorScale, LawPoint, linear, signed_quadratic};
 
     fn laws(pulse_us: fn(f64) -> f64) -> Laws {
-        let points: Vec<Point> = (-7..=7)
+        let points: Vec<LawPoint> = (-7..=7)
             .filter(|rung| *rung != 0)
             .map(|rung| {
                 let velocity_mps = 0.5 * f64::from(rung);
                 let odd = if rung % 2 == 0 { 1.0 } else { -1.0 };
-                Point {
+                LawPoint {
                     velocity_mps,
                     pulse_us: pulse_us(velocity_mps) + odd,
                     sigma_us: 1.0,

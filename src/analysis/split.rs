@@ -20,7 +20,7 @@ pub(super) struct Cell {
     pub(super) members: Vec<usize>,
 }
 
-fn cells(points: &[Point]) -> (Vec<Cell>, Vec<usize>) {
+fn cells(points: &[WindowPoint]) -> (Vec<Cell>, Vec<usize>) {
     let mut found: BTreeMap<&(String, usize), Vec<usize>> = BTreeMap::new();
     let mut cells: Vec<Cell> = Vec::new();
     let mut cell_of = Vec::new();
@@ -58,14 +58,14 @@ pub(super) struct Parts {
 }
 
 impl Split {
-    pub(super) fn new(shape: Shape, points: &[Point], drones: usize) -> Self {
+    pub(super) fn new(shape: Shape, points: &[WindowPoint], drones: usize) -> Self {
         let (cells, cell_of) = cells(points);
         let own = points.iter().map(|point| shape.own(point.velocity_mps)).collect();
         Self { drones, cells, cell_of, own }
     }
 
     /// Alternating least squares; deviations of the drones have the mean zero.
-    pub(super) fn of(&self, points: &[Point], values: &[f64]) -> Parts {
+    pub(super) fn of(&self, points: &[WindowPoint], values: &[f64]) -> Parts {
         let mut parts =
             Parts { cells: vec![0.0; self.cells.len()], drones: vec![[0.0; 2]; self.drones] };
         for _ in 0..ROUNDS {
@@ -112,7 +112,7 @@ impl Split {
 
 /// One usable window of one drone, referred.
 #[derive(Clone, Debug)]
-pub(super) struct Point {
+pub(super) struct WindowPoint {
     /// Index of the drone.
     pub(super) drone: usize,
     /// What was commanded, and its count among equals: the same for all drones of the fleet.
@@ -126,12 +126,12 @@ pub(super) struct Point {
 }
 
 /// Slope of an unweighted line through the points, us per unit of the shape's second term.
-pub(super) fn rough_slope(split: &Split, points: &[Point]) -> f64 {
+pub(super) fn rough_slope(split: &Split, points: &[WindowPoint]) -> f64 {
     let line = Line::through(points.iter().zip(&split.own).map(|(point, x)| (*x, point.pulse_us)));
     line.filter(|line| line.xx > 1e-9).map_or(0.0, |line| line.slope())
 }
 
-pub(super) fn noise_us(points: &[Point], members: &[usize]) -> f64 {
+pub(super) fn noise_us(points: &[WindowPoint], members: &[usize]) -> f64 {
     let squares: f64 =
         members.iter().map(|i| points[*i].noise_us.max(LEAST_NOISE_US).powi(2)).sum();
     squares.sqrt() / members.len() as f64

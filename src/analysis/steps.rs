@@ -3,7 +3,7 @@
 use super::windows::Target;
 use crate::flight::table::Steps;
 use crate::flight::{Flight, Series};
-use crate::mission::plan::Kind;
+use crate::mission::plan::SegmentKind;
 use crate::numeric::mean;
 
 /// Running mean before steps are told apart, s: rotor and position control jitter faster.
@@ -56,10 +56,11 @@ fn target(run: &[(f64, f64)], steps: &Steps) -> Option<Target> {
     let settled = run.iter().filter(|(time_s, _)| *time_s >= start_s);
     let mean = mean(settled.map(|(_, value)| value)).unwrap_or_default();
     let (kind, label, commanded_mps) = if mean.abs() < HOVER_MPS {
-        (Kind::Hover, "hover".to_owned(), 0.0)
+        (SegmentKind::Hover, "hover".to_owned(), 0.0)
     } else {
         let rounded = (mean * 10.0).round() / 10.0;
-        let (kind, word) = if mean > 0.0 { (Kind::LegUp, "up") } else { (Kind::LegDown, "down") };
+        let (kind, word) =
+            if mean > 0.0 { (SegmentKind::LegUp, "up") } else { (SegmentKind::LegDown, "down") };
         (kind, format!("{word} {:.1} m/s", rounded.abs()), rounded)
     };
     Some(Target { kind, label, start_s, end_s, commanded_mps })

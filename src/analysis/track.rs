@@ -20,7 +20,7 @@ use super::windows::{Target, WindowOptions};
 use crate::base::estimate::Estimate;
 use crate::base::frame::ShowFrame;
 use crate::flight::{Flight, Series};
-use crate::mission::plan::{Kind, Segment};
+use crate::mission::plan::{Segment, SegmentKind};
 
 /// A horizontal velocity that differs by more between the halves of a running window is not constant,
 /// m/s: it would need a mean acceleration of 0.1 m/s², which leans a drone by 0.6 degrees.
@@ -37,7 +37,7 @@ const SHORTEST_LEG_M: f64 = 10.0;
 /// hover that is long enough for a value.
 pub(super) fn measuring(targets: &[Target]) -> Vec<&Target> {
     let long = |target: &&Target| target.end_s - target.start_s >= RUNNING_S;
-    let moves = |target: &Target| target.kind == Kind::Horizontal;
+    let moves = |target: &Target| target.kind == SegmentKind::Horizontal;
     if !targets.iter().any(|target| moves(target) && long(&target)) {
         return updraft::hover(targets).into_iter().collect();
     }
@@ -52,7 +52,7 @@ pub(super) fn look(flight: &Flight, looked: &[&Target], options: &WindowOptions)
     let mut biases = Vec::new();
     for target in looked {
         let mut part = Hover::of(flight, target, options);
-        if target.kind == Kind::Horizontal {
+        if target.kind == SegmentKind::Horizontal {
             drop_unsteady(flight, &mut part);
         }
         biases.push(part.velocity_bias_mps);
@@ -147,7 +147,9 @@ pub(super) fn contradiction(flight: &Flight, segments: &[Segment]) -> Option<Cau
     };
     let legs: Vec<(&Segment, f64)> = segments
         .iter()
-        .filter(|segment| segment.kind == Kind::Horizontal && planned(segment) >= SHORTEST_LEG_M)
+        .filter(|segment| {
+            segment.kind == SegmentKind::Horizontal && planned(segment) >= SHORTEST_LEG_M
+        })
         .filter_map(|segment| Some((segment, way(segment)?)))
         .collect();
     let wrong: Vec<&(&Segment, f64)> = legs
@@ -170,19 +172,19 @@ mod tests {
     use super::*;
     use crate::base::frame::Geodetic;
 
-    fn target(kind: Kind, start_s: f64, end_s: f64) -> Target {
+    fn target(kind: SegmentKind, start_s: f64, end_s: f64) -> Target {
         Target { kind, label: String::new(), start_s, end_s, commanded_mps: 0.0 }
     }
 
     #[test]
     fn a_scan_is_its_legs_and_its_long_hovers() {
-        let (leg, hover) = (Kind::Horizontal, Kind::Hover);
+        let (leg, hover) = (SegmentKind::Horizontal, SegmentKind::Hover);
         let targets = [
             target(hover, 0.0, 30.0),
             target(leg, 40.0, 70.0),
             target(hover, 72.0, 76.0),
             target(leg, 80.0, 85.0),
-            target(Kind::LegUp, 90.0, 120.0),
+            target(SegmentKind::LegUp, 90.0, 120.0),
         ];
         let starts = |found: Vec<&Target>| found.iter().map(|one| one.start_s).collect::<Vec<_>>();
         assert_eq!(starts(measuring(&targets)), [0.0, 40.0]);
@@ -216,7 +218,7 @@ mod tests {
     #[test]
     fn a_change_of_speed_costs_the_seconds_around_it() {
         let flight = flown();
-        let leg = target(Kind::Horizontal, 5.0, 70.0);
+        let leg = target(SegmentKind::Horizontal, 5.0, 70.0);
         let found = look(&flight, &[&leg], &WindowOptions::default());
         let lost: Vec<i64> = (found.first_s..)
             .zip(&found.seconds)
@@ -224,7 +226,7 @@ mod tests {
             .collect();
         assert_eq!((lost.first(), lost.last()), (Some(&16), Some(&24)), "{lost:?}");
         assert!(found.quality.iter().any(|one| one.reason.starts_with("its horizontal speed")));
-        let steady = target(Kind::Horizontal, 25.0, 70.0);
+        let steady = target(SegmentKind::Horizontal, 25.0, 70.0);
         let found = look(&flight, &[&steady], &WindowOptions::default());
         assert_eq!(found.seconds.iter().flatten().count(), 36);
     }
@@ -244,7 +246,7 @@ mod tests {
     #[test]
     fn legs_that_were_not_flown_are_another_plan() {
         let leg = |start_ms: u64, speed: f64| Segment {
-            kind: Kind::Horizontal,
+            kind: SegmentKind::Horizontal,
             label: format!("{speed} m/s towards 0°"),
             start_ms,
             end_ms: start_ms + 20_000,

@@ -204,8 +204,8 @@ impl DroneSeries {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::law::{ErrorScale, Point, linear, signed_quadratic};
-    use crate::mission::plan::Kind;
+    use crate::analysis::law::{ErrorScale, LawPoint, linear, signed_quadratic};
+    use crate::mission::plan::SegmentKind;
 
     const RATE: f64 = 10.0;
     const LEVEL: Lean<'static> = Lean { leaning: None, calibration: &[] };
@@ -215,11 +215,11 @@ mod tests {
     }
 
     fn fit(law: Law) -> Fit {
-        let points: Vec<Point> = (-7..=7)
+        let points: Vec<LawPoint> = (-7..=7)
             .filter(|rung| *rung != 0)
             .map(|rung| {
                 let velocity_mps = 0.5 * f64::from(rung);
-                Point {
+                LawPoint {
                     velocity_mps,
                     pulse_us: law.pulse_us(velocity_mps),
                     sigma_us: 0.3,
@@ -246,7 +246,7 @@ mod tests {
 
     fn hover() -> Target {
         let label = String::new();
-        Target { kind: Kind::Hover, label, start_s: 0.0, end_s: 300.0, commanded_mps: 0.0 }
+        Target { kind: SegmentKind::Hover, label, start_s: 0.0, end_s: 300.0, commanded_mps: 0.0 }
     }
 
     #[test]

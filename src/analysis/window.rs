@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 
 use super::budget::Supply;
 use super::stats::SampleStats;
-use crate::mission::plan::Kind;
+use crate::mission::plan::SegmentKind;
 
 /// Statistics of one window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WindowStats {
     /// Kind of the segment.
-    pub kind: Kind,
+    pub kind: SegmentKind,
     /// Label: `up 0.5 m/s`.
     pub label: String,
     /// Show time of the window, s.

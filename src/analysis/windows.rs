@@ -9,7 +9,7 @@ use super::cause::Cause;
 use super::stats::{SampleStats, sample_stats};
 use super::window::{Rejection, WindowStats};
 use crate::flight::{Flight, Indicator, Series};
-use crate::mission::plan::{Kind, Segment};
+use crate::mission::plan::{Segment, SegmentKind};
 use crate::numeric::{self, extent, upper_median};
 
 /// Correction of rotor effort for tilt.
@@ -83,7 +83,7 @@ impl WindowOptions {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// Kind of the segment.
-    pub kind: Kind,
+    pub kind: SegmentKind,
     /// Name of the window for people.
     pub label: String,
     /// Start of the window, show time, s.
@@ -138,7 +138,7 @@ const QUANTUM_US: f64 = 1.0;
 /// Windows of a plan's segments: legs, hovers, and those horizontal legs that carry a window.
 pub fn planned(segments: &[Segment]) -> Vec<Target> {
     let analysed = |segment: &&Segment| {
-        segment.kind.is_leg() || segment.kind.is_hover() || segment.kind == Kind::Horizontal
+        segment.kind.is_leg() || segment.kind.is_hover() || segment.kind == SegmentKind::Horizontal
     };
     let target = |segment: &Segment| {
         let window = segment.window?;
@@ -184,7 +184,7 @@ pub fn inferred(flight: &Flight) -> Vec<Target> {
                 .unwrap_or_default();
             let moves = speed > HOVER_MPS;
             return Some(Target {
-                kind: if moves { Kind::Horizontal } else { Kind::Hover },
+                kind: if moves { SegmentKind::Horizontal } else { SegmentKind::Hover },
                 label: if moves { format!("level {speed:.1} m/s") } else { "hover".to_owned() },
                 start_s: (run.start_s + START_CUT_S).max(run.steady_s),
                 end_s: run.end_s - END_CUT_S,
@@ -194,8 +194,11 @@ pub fn inferred(flight: &Flight) -> Vec<Target> {
         if run.duration_s() < TRANSFER_SHARE * longest_leg {
             return None;
         }
-        let (kind, word) =
-            if velocity > 0.0 { (Kind::LegUp, "up") } else { (Kind::LegDown, "down") };
+        let (kind, word) = if velocity > 0.0 {
+            (SegmentKind::LegUp, "up")
+        } else {
+            (SegmentKind::LegDown, "down")
+        };
         Some(Target {
             kind,
             label: format!("{word} {} m/s", velocity.abs()),

@@ -24,7 +24,7 @@ use super::budget::CalibrationAir;
 use super::corrections::{BATTERY, DOUBTS, DRIFT};
 use super::local::{Deviations, Own, local_air};
 use super::shape::{PARAMETERS, Shape};
-use super::split::{Parts, Point, Split, noise_us, rough_sensitivity, rough_slope};
+use super::split::{Parts, Split, WindowPoint, noise_us, rough_sensitivity, rough_slope};
 
 /// Time scales of the air that are tried, s: from windows to beyond the flight (docs/errors.md). A grid.
 const TAUS_S: [f64; 7] = [8.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0];
@@ -68,7 +68,7 @@ pub(super) struct Zero {
 /// The windows of a fleet with one shape of law, and what they say about the air.
 pub(super) struct Fleet<'a> {
     shape: Shape,
-    points: &'a [Point],
+    points: &'a [WindowPoint],
     split: Split,
     /// Pulses at the mean speed of their cells, us.
     pulses: Vec<f64>,
@@ -81,9 +81,9 @@ pub(super) struct Fleet<'a> {
 
 impl<'a> Fleet<'a> {
     /// Weighs the scales of the air. `sigmas` are the standard errors of the doubts
-    /// ([`Point::doubts_us`]). `None` if the windows do not determine a law.
+    /// ([`WindowPoint::doubts_us`]). `None` if the windows do not determine a law.
     pub(super) fn new(
-        points: &'a [Point],
+        points: &'a [WindowPoint],
         drones: usize,
         shape: Shape,
         sigmas: &[f64; DOUBTS],
@@ -94,7 +94,7 @@ impl<'a> Fleet<'a> {
         let split = Split::new(shape, points, drones);
         let rough = rough_slope(&split, points);
         // Members of a cell differ in speed by centimetres per second.
-        let aligned = |(index, point): (usize, &Point)| {
+        let aligned = |(index, point): (usize, &WindowPoint)| {
             let cell = &split.cells[split.cell_of[index]];
             point.pulse_us - rough * (split.own[index] - shape.own(cell.velocity_mps))
         };
@@ -208,7 +208,7 @@ impl<'a> Fleet<'a> {
 /// The averages over drones with the priors of the bends.
 fn fleet_record(
     shape: Shape,
-    points: &[Point],
+    points: &[WindowPoint],
     split: &Split,
     means: &[f64],
     (doubts, sigmas): (&[Parts], &[f64; DOUBTS]),

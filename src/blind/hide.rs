@@ -44,7 +44,7 @@ impl Hidden {
 
 /// An effect that can be hidden, and the range from which its size is drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Kind {
+pub struct HiddenKind {
     /// Name of the effect for `--effects`.
     pub name: &'static str,
     /// Name of the effect in the library, or of the foreign one.
@@ -53,9 +53,9 @@ pub struct Kind {
     pub foreign: bool,
     /// Parameter that states the size of the effect.
     pub size: &'static str,
-    /// Smallest and largest magnitude that is drawn, in [`Kind::unit`].
+    /// Smallest and largest magnitude that is drawn, in [`HiddenKind::unit`].
     pub range: (f64, f64),
-    /// Unit of [`Kind::range`], for people.
+    /// Unit of [`HiddenKind::range`], for people.
     pub unit: &'static str,
     /// Rule by which the value of the parameter follows from the magnitude.
     pub magnitude: Magnitude,
@@ -107,7 +107,7 @@ pub enum Also {
 ///
 /// # Errors
 /// An unknown name.
-pub fn kind_of(name: &str) -> Result<&'static Kind, BlindError> {
+pub fn kind_of(name: &str) -> Result<&'static HiddenKind, BlindError> {
     KINDS.iter().find(|kind| kind.name == name).ok_or_else(|| BlindError::Unknown {
         name: name.to_owned(),
         known: KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", "),
@@ -133,7 +133,7 @@ pub(super) fn log_between(rng: &mut Pcg64, (low, high): (f64, f64)) -> f64 {
 const MOST_SHARE: f64 = 0.8;
 /// Smallest share of the inflow that is drawn.
 const LEAST_SHARE: f64 = 0.005;
-impl Kind {
+impl HiddenKind {
     /// Draws the size of the effect and its other parameters.
     ///
     /// # Errors

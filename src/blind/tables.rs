@@ -5,7 +5,7 @@
 //! the benchmark hide one more. It goes to the end, as the random streams are keyed by the place in the
 //! list.
 
-use super::hide::{Also, Kind, Magnitude};
+use super::hide::{Also, HiddenKind, Magnitude};
 use super::scenario::{Base, INFLOW_SPREAD};
 
 const ANY: &[Base] = &[Base::Airsim, Base::Inflow, Base::Pixel];
@@ -19,8 +19,8 @@ const fn library(
     size: &'static str,
     range: (f64, f64),
     unit: &'static str,
-) -> Kind {
-    Kind {
+) -> HiddenKind {
+    HiddenKind {
         name,
         effect: name,
         foreign: false,
@@ -39,43 +39,43 @@ const fn foreign(
     size: &'static str,
     range: (f64, f64),
     unit: &'static str,
-) -> Kind {
-    Kind { foreign: true, ..library(name, size, range, unit) }
+) -> HiddenKind {
+    HiddenKind { foreign: true, ..library(name, size, range, unit) }
 }
 
 /// Effects that can be hidden, with ranges from the literature and from the field.
-pub const KINDS: &[Kind] = &[
-    Kind {
+pub const KINDS: &[HiddenKind] = &[
+    HiddenKind {
         magnitude: Magnitude::HoverSlope,
         also: &[("spread", Also::Between(INFLOW_SPREAD.0, INFLOW_SPREAD.1))],
         bases: WITHOUT_INFLOW,
         ..library("rotor-inflow", "inflow_share", (8.0, 30.0), "us/(m/s) at hover")
     },
-    Kind {
+    HiddenKind {
         magnitude: Magnitude::KnownDrag,
         ..library("parasitic-drag", "vertical_m2", (0.3, 1.0), "of the known drag")
     },
     library("battery", "exponent", (0.5, 1.0), "share of the sag that acts"),
-    Kind {
+    HiddenKind {
         magnitude: Magnitude::GainIn(5.0),
         ..library("translational-lift", "inflow_share", (0.01, 0.1), "of the thrust at 5 m/s")
     },
-    Kind {
+    HiddenKind {
         magnitude: Magnitude::LossAt(-3.5),
         ..library("vortex-ring", "inflow_share", (0.03, 0.12), "of the thrust at -3.5 m/s")
     },
     library("thrust-curve", "expo", (0.3, 0.7), "expo"),
-    Kind {
+    HiddenKind {
         // Warm magnets usually win over warm windings.
         magnitude: Magnitude::Negative(0.7),
         also: &[("time_s", Also::LogBetween(60.0, 200.0))],
         ..library("motor-thermal", "drift_us", (6.0, 20.0), "us, of either sign")
     },
-    Kind {
+    HiddenKind {
         magnitude: Magnitude::RotorRadii,
         ..library("ground-effect", "radius_m", (1.0, 2.0), "of the rotor's radius")
     },
-    Kind {
+    HiddenKind {
         also: &[("array_m", Also::ArrayWidth)],
         bases: WITH_INFLOW,
         ..library("neighbour-downwash", "strength", (1.0, 4.0), "of the momentum disc's sink")
@@ -83,35 +83,35 @@ pub const KINDS: &[Kind] = &[
     library("blade-flapping", "drag_per_weight", (0.0175, 0.035), "s/m"),
     library("mass-spread", "sd", (0.03, 0.06), "relative"),
     library("thrust-spread", "sd", (0.03, 0.06), "relative"),
-    Kind {
+    HiddenKind {
         name: "velocity-bias",
         magnitude: Magnitude::EitherSign,
         also: &[("lag_s", Also::Is(0.0)), ("sd_mps", Also::Is(0.0))],
         ..library("velocity-error", "bias_mps", (0.06, 0.3), "m/s, of either sign")
     },
     // From about 0.44 s on AirSim's quad swings up and down to its motors' limits: nobody flies a show so.
-    Kind {
+    HiddenKind {
         name: "velocity-lag",
         also: &[("bias_mps", Also::Is(0.0)), ("sd_mps", Also::Is(0.0))],
         ..library("velocity-error", "lag_s", (0.12, 0.4), "s")
     },
-    Kind {
+    HiddenKind {
         magnitude: Magnitude::EitherSign,
         also: &[("at_s", Also::FlightShare(0.3, 0.7))],
         ..foreign("step", "jump_us", (8.0, 30.0), "us, of either sign")
     },
-    Kind {
+    HiddenKind {
         also: &[
             ("wavelength_m", Also::LogBetween(25.0, 60.0)),
             ("phase_rad", Also::Between(0.0, std::f64::consts::TAU)),
         ],
         ..foreign("height-wave", "amplitude_us", (6.0, 20.0), "us")
     },
-    Kind {
+    HiddenKind {
         also: &[("time_s", Also::FlightTime)],
         ..foreign("climb-time", "slope_us", (5.0, 15.0), "us/(m/s) at the end")
     },
-    Kind {
+    HiddenKind {
         magnitude: Magnitude::EitherSign,
         also: &[("knee_mps", Also::Is(1.0))],
         ..foreign("heading", "amplitude_us", (8.0, 25.0), "us, of either sign")

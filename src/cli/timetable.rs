@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::words::{count, shorten};
-use crate::mission::plan::{Group, Kind, Plan, Segment};
+use crate::mission::plan::{Group, Plan, Segment, SegmentKind};
 
 /// Most rows of a timetable before the middle is left out, ramps apart.
 const MAX_ROWS: usize = 60;
@@ -106,7 +106,7 @@ fn describe_group(text: &mut String, plan: &Plan, group: &Group, room: Room) {
         label = room.label,
     );
     let shown = &group.segments;
-    let ramps = shown.iter().any(|segment| segment.kind == Kind::Ramp);
+    let ramps = shown.iter().any(|segment| segment.kind == SegmentKind::Ramp);
     let most = if ramps { 2 * MAX_ROWS } else { MAX_ROWS };
     for (index, segment) in shown.iter().enumerate() {
         if shown.len() > most && (most / 2..shown.len() - most / 2).contains(&index) {
@@ -130,8 +130,8 @@ fn describe_segment(text: &mut String, segment: &Segment, room: Room) {
         format!("{:.2}", (vx * vx + vy * vy + vz * vz).sqrt())
     };
     let speed = match segment.kind {
-        Kind::Ramp if speed.is_empty() => "to 0".to_owned(),
-        Kind::Ramp => format!("to {speed}"),
+        SegmentKind::Ramp if speed.is_empty() => "to 0".to_owned(),
+        SegmentKind::Ramp => format!("to {speed}"),
         _ => speed,
     };
     let height = if segment.from_m[2] == segment.to_m[2] {

@@ -3,7 +3,7 @@
 //! Measured and simulated pulses are compared in these (docs/physics.md, 3.1): long enough for
 //! noise to average, short enough that the air's own time scale shows.
 
-use crate::mission::plan::{Kind, Segment};
+use crate::mission::plan::{Segment, SegmentKind};
 
 /// Nothing is compared for this long after a change of the command, s. The overshoot of the autopilot's
 /// integral term lasts 2 to 3 s after a step of 3.5 m/s (docs/physics.md, 5.1); the rest is margin, chosen.
@@ -22,7 +22,7 @@ const SHORTEST_S: f64 = 2.5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bin {
     /// Kind of segment that is flown in the bin.
-    pub kind: Kind,
+    pub kind: SegmentKind,
     /// Start, show time, s.
     pub start_s: f64,
     /// End, show time, s; excluded.
@@ -58,8 +58,10 @@ impl Bin {
 /// The bins of what a group flies.
 pub(super) fn of_segments(segments: &[Segment]) -> Vec<Bin> {
     let steady = |segment: &&Segment| {
-        let flown =
-            !matches!(segment.kind, Kind::Wait | Kind::Takeoff | Kind::Ramp | Kind::Landing);
+        let flown = !matches!(
+            segment.kind,
+            SegmentKind::Wait | SegmentKind::Takeoff | SegmentKind::Ramp | SegmentKind::Landing
+        );
         flown && segment.from_velocity_mps.is_none_or(|from| from == segment.velocity_mps)
     };
     let mut bins = Vec::new();
@@ -74,7 +76,7 @@ pub(super) fn of_segments(segments: &[Segment]) -> Vec<Bin> {
 
 /// Cuts a steady stretch into bins.
 pub(super) fn cut(
-    kind: Kind,
+    kind: SegmentKind,
     start_s: f64,
     end_s: f64,
     velocity_mps: [f64; 3],

@@ -6,7 +6,7 @@ use super::data::{Data, Group};
 use super::noise::GroupPattern;
 use super::response::Response;
 use crate::effects::{Model, Signals};
-use crate::mission::plan::Kind;
+use crate::mission::plan::SegmentKind;
 use crate::vehicle::Vehicle;
 use crate::vehicle::library::builtin;
 
@@ -25,9 +25,9 @@ pub(super) fn ladder() -> Vec<Bin> {
     let bin = |index: usize| {
         let climb_mps = RUNGS_MPS[index / 2];
         let kind = match climb_mps {
-            0.0 => Kind::Hover,
-            climb if climb > 0.0 => Kind::LegUp,
-            _ => Kind::LegDown,
+            0.0 => SegmentKind::Hover,
+            climb if climb > 0.0 => SegmentKind::LegUp,
+            _ => SegmentKind::LegDown,
         };
         let start_s = 10.0 * (index / 2) as f64 + BIN_S * (index % 2) as f64;
         let velocity_mps = [0.0, 0.0, climb_mps];

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::plan::{Group, Kind, Plan, Purpose, Segment};
+use super::plan::{Group, Plan, Purpose, Segment, SegmentKind};
 use crate::check::{Collector, Finding, Rule, Severity};
 
 /// Speeds that a law needs at least: one gives one equation for two unknowns.
@@ -18,7 +18,7 @@ impl Rule for Plan {
     fn check(&self, collector: &mut Collector) {
         for group in &self.groups {
             windows(self, group, collector);
-            if !counts(self.purpose, Kind::Hover) {
+            if !counts(self.purpose, SegmentKind::Hover) {
                 eaten_hovers(group, collector);
             }
         }
@@ -29,10 +29,12 @@ impl Rule for Plan {
 }
 
 /// Whether a segment is flown to be looked at.
-fn counts(purpose: Purpose, kind: Kind) -> bool {
+fn counts(purpose: Purpose, kind: SegmentKind) -> bool {
     match purpose {
-        Purpose::Calibration => kind.is_leg() || kind == Kind::Horizontal,
-        Purpose::Measurement => kind == Kind::Hover || kind.is_leg() || kind == Kind::Horizontal,
+        Purpose::Calibration => kind.is_leg() || kind == SegmentKind::Horizontal,
+        Purpose::Measurement => {
+            kind == SegmentKind::Hover || kind.is_leg() || kind == SegmentKind::Horizontal
+        }
     }
 }
 
@@ -63,15 +65,16 @@ fn windows(plan: &Plan, group: &Group, collector: &mut Collector) {
 
 /// One warning for all hovers of a group that have no window because of the ramp they begin with.
 fn eaten_hovers(group: &Group, collector: &mut Collector) {
-    let of_transfer = |kind| matches!(kind, Kind::Takeoff | Kind::Climb | Kind::Descend);
+    let of_transfer =
+        |kind| matches!(kind, SegmentKind::Takeoff | SegmentKind::Climb | SegmentKind::Descend);
     let mut eaten = Vec::new();
     let mut before: [Option<&Segment>; 2] = [None, None];
     for segment in &group.segments {
         // The ramp at the end of a transfer is the transfer's own time.
         if let [Some(flown), Some(ramp)] = before
-            && segment.kind == Kind::Hover
+            && segment.kind == SegmentKind::Hover
             && segment.window.is_none()
-            && ramp.kind == Kind::Ramp
+            && ramp.kind == SegmentKind::Ramp
             && !of_transfer(flown.kind)
         {
             eaten.push((ramp, segment));
@@ -79,7 +82,7 @@ fn eaten_hovers(group: &Group, collector: &mut Collector) {
         before = [before[1], Some(segment)];
     }
     let Some((ramp, first)) = eaten.first() else { return };
-    let hovers = group.segments.iter().filter(|segment| segment.kind == Kind::Hover).count();
+    let hovers = group.segments.iter().filter(|segment| segment.kind == SegmentKind::Hover).count();
     let lasts_s = |segment: &Segment| (segment.end_ms - segment.start_ms) as f64 / 1000.0;
     let message = format!(
         "{} of {hovers} hovers (group {}) are too short for an analysis window after the ramps they begin with, first \"{}\": {:.1} s are left after a ramp of {:.1} s",

@@ -12,9 +12,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::mission::plan::{Fence, Group, Kind, PLAN_SCHEMA, Plan, Purpose, Segment, Site, Slot};
+use crate::mission::plan::{
+    Fence, Group, PLAN_SCHEMA, Plan, Purpose, Segment, SegmentKind, Site, Slot,
+};
 use crate::mission::window::WindowRule;
-use crate::show::{Path, Show, Trajectory};
+use crate::show::{SegmentPath, Show, Trajectory};
 use crate::vehicle::{Limits, Vehicle};
 
 /// Velocities closer than this are the same, m/s: what rounding to a file's units can change.
@@ -146,7 +148,7 @@ fn group(index: usize, trajectory: &Trajectory, curved: &mut bool) -> Group {
         })
         .collect();
     let offset_ms = match segments.first() {
-        Some(first) if first.kind == Kind::Wait => first.end_ms,
+        Some(first) if first.kind == SegmentKind::Wait => first.end_ms,
         _ => 0,
     };
     Group { name: format!("group-{}", index + 1), offset_ms, segments }
@@ -160,7 +162,7 @@ fn stretches(trajectory: &Trajectory, curved: &mut bool) -> Vec<Stretch> {
         }
         let (from_m, to_m) =
             (piece.from_m - trajectory.start_m, piece.end_m() - trajectory.start_m);
-        let straight = matches!(piece.path, Path::Hold | Path::Line(_));
+        let straight = matches!(piece.path, SegmentPath::Hold | SegmentPath::Line(_));
         let (first, last) = (piece.state(0.0), piece.state(1.0));
         let mean_mps = (to_m - from_m) / piece.duration_s();
         if straight {
@@ -196,7 +198,7 @@ fn is_vertical(stretch: &Stretch) -> bool {
     stretch.velocity_mps.xy().norm() < SAME_VELOCITY_MPS
 }
 
-fn kinds(stretches: &[Stretch]) -> Vec<Kind> {
+fn kinds(stretches: &[Stretch]) -> Vec<SegmentKind> {
     let flown = stretches.iter().position(|stretch| !is_hover(stretch)).unwrap_or(stretches.len());
     let last = stretches.len().saturating_sub(1);
     // The neighbour in time that is not a ramp.
@@ -208,16 +210,16 @@ fn kinds(stretches: &[Stretch]) -> Vec<Kind> {
     for (index, stretch) in stretches.iter().enumerate() {
         let up = stretch.velocity_mps.z > 0.0;
         let kind = if stretch.from_velocity_mps.is_some() {
-            Kind::Ramp
+            SegmentKind::Ramp
         } else if is_hover(stretch) {
-            if index < flown { Kind::Wait } else { Kind::Hover }
+            if index < flown { SegmentKind::Wait } else { SegmentKind::Hover }
         } else if !is_vertical(stretch) {
-            Kind::Horizontal
+            SegmentKind::Horizontal
         } else if !taken_off && up {
             taken_off = true;
-            Kind::Takeoff
+            SegmentKind::Takeoff
         } else if index == last && !up {
-            Kind::Landing
+            SegmentKind::Landing
         } else {
             let before = steady(Box::new((0..index).rev()));
             let after = steady(Box::new(index + 1..stretches.len()));
@@ -225,10 +227,10 @@ fn kinds(stretches: &[Stretch]) -> Vec<Kind> {
                 .into_iter()
                 .all(|neighbour| neighbour.is_some_and(|at| is_hover(&stretches[at])));
             match (between_hovers && stretch.end_ms - stretch.start_ms >= MIN_LEG_MS, up) {
-                (true, true) => Kind::LegUp,
-                (true, false) => Kind::LegDown,
-                (false, true) => Kind::Climb,
-                (false, false) => Kind::Descend,
+                (true, true) => SegmentKind::LegUp,
+                (true, false) => SegmentKind::LegDown,
+                (false, true) => SegmentKind::Climb,
+                (false, false) => SegmentKind::Descend,
             }
         };
         kinds.push(kind);
@@ -236,20 +238,20 @@ fn kinds(stretches: &[Stretch]) -> Vec<Kind> {
     kinds
 }
 
-fn label(kind: Kind, stretch: &Stretch) -> String {
+fn label(kind: SegmentKind, stretch: &Stretch) -> String {
     let speed = (stretch.velocity_mps.norm() * 100.0).round() / 100.0;
     let height = (stretch.to_m.z * 10.0).round() / 10.0;
     match kind {
-        Kind::Wait => "wait".to_owned(),
-        Kind::Takeoff => format!("take off to {height} m"),
-        Kind::Climb => format!("climb to {height} m"),
-        Kind::Descend => format!("descend to {height} m"),
-        Kind::LegUp => format!("up {speed} m/s"),
-        Kind::LegDown => format!("down {speed} m/s"),
-        Kind::Hover => format!("hover at {height} m"),
-        Kind::Horizontal => format!("{speed} m/s sideways"),
-        Kind::Ramp => "ramp".to_owned(),
-        Kind::Landing => format!("descend to {height} m and land"),
+        SegmentKind::Wait => "wait".to_owned(),
+        SegmentKind::Takeoff => format!("take off to {height} m"),
+        SegmentKind::Climb => format!("climb to {height} m"),
+        SegmentKind::Descend => format!("descend to {height} m"),
+        SegmentKind::LegUp => format!("up {speed} m/s"),
+        SegmentKind::LegDown => format!("down {speed} m/s"),
+        SegmentKind::Hover => format!("hover at {height} m"),
+        SegmentKind::Horizontal => format!("{speed} m/s sideways"),
+        SegmentKind::Ramp => "ramp".to_owned(),
+        SegmentKind::Landing => format!("descend to {height} m and land"),
     }
 }
 
@@ -327,7 +329,7 @@ fn fence(show: &Show, limits: &Limits) -> Fence {
 
 #[cfg(test)]
 mod tests {
-    use crate::mission::plan::{Kind, Plan, Segment};
+    use crate::mission::plan::{Plan, Segment, SegmentKind};
     use crate::mission::resolve::{Override, resolve};
 
     fn round_trip(template: &str, overrides: &[&str]) -> (Plan, Plan) {
@@ -338,7 +340,7 @@ mod tests {
         (flight.plan, recovered)
     }
 
-    fn timetable(segments: &[Segment]) -> Vec<(Kind, u64, u64, [i64; 3])> {
+    fn timetable(segments: &[Segment]) -> Vec<(SegmentKind, u64, u64, [i64; 3])> {
         let cm_per_s = |value: f64| (value * 100.0).round() as i64;
         let row = |s: &Segment| (s.kind, s.start_ms, s.end_ms, s.velocity_mps.map(cm_per_s));
         segments.iter().map(row).collect()
@@ -376,7 +378,7 @@ mod tests {
     fn a_hover_comes_back() {
         let (plan, recovered) = round_trip("hover", &[]);
         let longest = |plan: &Plan| {
-            let hovers = plan.groups[0].segments.iter().filter(|s| s.kind == Kind::Hover);
+            let hovers = plan.groups[0].segments.iter().filter(|s| s.kind == SegmentKind::Hover);
             hovers.map(|s| (s.end_ms - s.start_ms, s.start_ms)).max()
         };
         assert_eq!(longest(&recovered), longest(&plan));

@@ -135,7 +135,7 @@ pub struct Group {
 #[serde(deny_unknown_fields)]
 pub struct Segment {
     /// What the segment is.
-    pub kind: Kind,
+    pub kind: SegmentKind,
     /// Label for people: `up 0.5 m/s`.
     pub label: String,
     /// Start, show time, ms.
@@ -161,7 +161,8 @@ pub struct Segment {
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+#[schemars(rename = "Kind")]
+pub enum SegmentKind {
     /// Standing on the ground before take-off (a group's time offset).
     Wait,
     /// First vertical climb from the ground.
@@ -184,7 +185,7 @@ pub enum Kind {
     Landing,
 }
 
-impl Kind {
+impl SegmentKind {
     /// Whether the commanded velocity is zero (the paper's 0-windows).
     pub fn is_hover(self) -> bool {
         self == Self::Hover

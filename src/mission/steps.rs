@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use toml::Spanned;
 
 use super::error::TemplateError;
-use super::plan::{Kind, Segment};
+use super::plan::{Segment, SegmentKind};
 use super::source::Source;
 use super::template::{Direction, StepKind, StepTemplate, WindowTemplate, span_of};
 use super::window::WindowRule;
@@ -103,14 +103,19 @@ impl<'a> Timeline<'a> {
         let staggered =
             template.steps.iter().any(|step| *step.get_ref().kind.get_ref() == StepKind::Stagger);
         if offset.own_ms > 0 && !staggered {
-            timeline.constant(Kind::Wait, "wait", Vector3::zeros(), offset.own_ms, None)?;
+            timeline.constant(SegmentKind::Wait, "wait", Vector3::zeros(), offset.own_ms, None)?;
         }
         let takeoff = &template.takeoff;
         let altitude_m =
             source.in_range(&takeoff.altitude_m, "take-off altitude", "m", 2.5..=MAX_ALTITUDE_M)?;
         let speed =
             source.in_range(&takeoff.speed_mps, "take-off speed", "m/s", 0.1..=MAX_SPEED_MPS)?;
-        timeline.vertical_to(Kind::Takeoff, altitude_m, speed, span_of(&takeoff.altitude_m))?;
+        timeline.vertical_to(
+            SegmentKind::Takeoff,
+            altitude_m,
+            speed,
+            span_of(&takeoff.altitude_m),
+        )?;
         timeline.steps(&template.steps, None, 0)?;
         timeline.land()?;
         Ok(timeline.segments)
@@ -146,7 +151,11 @@ impl<'a> Timeline<'a> {
                 let to_m = self.required(step.to_m.as_ref(), "to_m", step)?;
                 let to_m = self.source.number(to_m, "height", "m", 0.0..=MAX_ALTITUDE_M)?;
                 let speed = self.speed(step, speed_mps)?;
-                let kind = if to_m >= self.position_m.z { Kind::Climb } else { Kind::Descend };
+                let kind = if to_m >= self.position_m.z {
+                    SegmentKind::Climb
+                } else {
+                    SegmentKind::Descend
+                };
                 self.vertical_to(kind, to_m, speed, span)
             }
             StepKind::Leg => {
@@ -155,8 +164,8 @@ impl<'a> Timeline<'a> {
                 let direction =
                     *self.required(step.direction.as_ref(), "direction", step)?.get_ref();
                 let (kind, word, sign) = match direction {
-                    Direction::Up => (Kind::LegUp, "up", 1.0),
-                    Direction::Down => (Kind::LegDown, "down", -1.0),
+                    Direction::Up => (SegmentKind::LegUp, "up", 1.0),
+                    Direction::Down => (SegmentKind::LegDown, "down", -1.0),
                 };
                 let velocity = Vector3::new(0.0, 0.0, sign * speed);
                 self.timed(kind, &format!("{word} {speed} m/s"), velocity, duration_ms, span)
@@ -164,7 +173,7 @@ impl<'a> Timeline<'a> {
             StepKind::Hover => {
                 let duration_ms = self.duration(step)?;
                 let label = format!("hover at {} m", self.rest_height_m());
-                self.timed(Kind::Hover, &label, Vector3::zeros(), duration_ms, span)
+                self.timed(SegmentKind::Hover, &label, Vector3::zeros(), duration_ms, span)
             }
             StepKind::Horizontal => {
                 let duration_ms = self.duration(step)?;
@@ -175,7 +184,7 @@ impl<'a> Timeline<'a> {
                 let (sin, cos) = heading_deg.to_radians().sin_cos();
                 let velocity = Vector3::new(cos * speed, -sin * speed, 0.0);
                 let label = format!("{speed} m/s towards {heading_deg}°");
-                self.timed(Kind::Horizontal, &label, velocity, duration_ms, span)
+                self.timed(SegmentKind::Horizontal, &label, velocity, duration_ms, span)
             }
             StepKind::Repeat => self.repeat(step, depth),
             StepKind::Stagger => self.wait_in_air(self.offset.own_ms),
@@ -190,7 +199,7 @@ impl<'a> Timeline<'a> {
             return Ok(());
         }
         let label = format!("wait at {} m", self.rest_height_m());
-        self.timed(Kind::Hover, &label, Vector3::zeros(), duration_ms, None)
+        self.timed(SegmentKind::Hover, &label, Vector3::zeros(), duration_ms, None)
     }
 
     fn repeat(&mut self, step: &StepTemplate, depth: usize) -> Result<(), TemplateError> {
@@ -306,7 +315,14 @@ impl<'a> Timeline<'a> {
         if duration_ms > 0 {
             let displacement = (self.velocity_mps + velocity_mps) * (to_s(duration_ms) / 2.0);
             let from = self.velocity_mps;
-            self.push(Kind::Ramp, "ramp", displacement, velocity_mps, Some(from), duration_ms)?;
+            self.push(
+                SegmentKind::Ramp,
+                "ramp",
+                displacement,
+                velocity_mps,
+                Some(from),
+                duration_ms,
+            )?;
         }
         self.velocity_mps = velocity_mps;
         Ok(())
@@ -315,7 +331,7 @@ impl<'a> Timeline<'a> {
     /// A segment of given duration; its ramp, if any, comes first and is part of the duration.
     fn timed(
         &mut self,
-        kind: Kind,
+        kind: SegmentKind,
         label: &str,
         velocity_mps: Vector3<f64>,
         duration_ms: u64,
@@ -341,7 +357,7 @@ impl<'a> Timeline<'a> {
 
     fn constant(
         &mut self,
-        kind: Kind,
+        kind: SegmentKind,
         label: &str,
         velocity_mps: Vector3<f64>,
         duration_ms: u64,
@@ -362,7 +378,7 @@ impl<'a> Timeline<'a> {
     /// A vertical transfer that ends at rest exactly at a height.
     fn vertical_to(
         &mut self,
-        kind: Kind,
+        kind: SegmentKind,
         to_m: f64,
         speed_mps: f64,
         span: Option<Range<usize>>,
@@ -372,16 +388,16 @@ impl<'a> Timeline<'a> {
             return self.ramp(Vector3::zeros());
         }
         let label = match kind {
-            Kind::Takeoff => format!("take off to {to_m} m"),
-            Kind::Landing => format!("descend to {to_m} m and land"),
-            Kind::Descend => format!("descend to {to_m} m"),
+            SegmentKind::Takeoff => format!("take off to {to_m} m"),
+            SegmentKind::Landing => format!("descend to {to_m} m and land"),
+            SegmentKind::Descend => format!("descend to {to_m} m"),
             _ => format!("climb to {to_m} m"),
         };
         let nominal = Vector3::new(0.0, 0.0, distance_m.signum() * speed_mps);
         let before = self.velocity_mps;
         let start_ramp_s = to_s(self.ramp_ms(nominal));
         // A landing is handed over to the autopilot in motion; everything else stops at its height.
-        let stop_ramp_s = if self.ramp_mps2 > 0.0 && kind != Kind::Landing {
+        let stop_ramp_s = if self.ramp_mps2 > 0.0 && kind != SegmentKind::Landing {
             to_s((speed_mps / self.ramp_mps2 * 1000.0).ceil() as u64)
         } else {
             0.0
@@ -403,13 +419,20 @@ impl<'a> Timeline<'a> {
         if start_ramp_s > 0.0 {
             let displacement = (before + velocity) * (start_ramp_s / 2.0);
             let ramp_ms = to_ms(start_ramp_s);
-            self.push(Kind::Ramp, "ramp", displacement, velocity, Some(before), ramp_ms)?;
+            self.push(SegmentKind::Ramp, "ramp", displacement, velocity, Some(before), ramp_ms)?;
         }
         self.constant(kind, &label, velocity, cruise_ms, span)?;
         if stop_ramp_s > 0.0 {
             let displacement = velocity * (stop_ramp_s / 2.0);
             let ramp_ms = to_ms(stop_ramp_s);
-            self.push(Kind::Ramp, "ramp", displacement, Vector3::zeros(), Some(velocity), ramp_ms)?;
+            self.push(
+                SegmentKind::Ramp,
+                "ramp",
+                displacement,
+                Vector3::zeros(),
+                Some(velocity),
+                ramp_ms,
+            )?;
         }
         self.velocity_mps = Vector3::zeros();
         self.position_m.z = to_m;
@@ -444,12 +467,12 @@ impl<'a> Timeline<'a> {
                 )
                 .with_help("add a climb, or lower `end_altitude_m` in [landing]"));
         }
-        self.vertical_to(Kind::Landing, end_m, speed, span)
+        self.vertical_to(SegmentKind::Landing, end_m, speed, span)
     }
 
     fn push(
         &mut self,
-        kind: Kind,
+        kind: SegmentKind,
         label: &str,
         displacement_m: Vector3<f64>,
         velocity_mps: Vector3<f64>,

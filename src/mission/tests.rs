@@ -1,6 +1,6 @@
 //! The grammar: what templates mean, and what they are told when they are wrong.
 
-use super::plan::{Kind, Plan};
+use super::plan::{Plan, SegmentKind};
 use super::resolve::{MissionError, Override, resolve, resolve_text};
 
 fn set(text: &str) -> Override {
@@ -29,7 +29,7 @@ fn the_papers_ladder_has_15_hovers_and_14_legs_in_430_s() {
     let plan = plan_of("calibration", &[]);
     assert_eq!(plan.slots.len(), 49);
     let segments = &plan.groups[0].segments;
-    let hovers: Vec<_> = segments.iter().filter(|s| s.kind == Kind::Hover).collect();
+    let hovers: Vec<_> = segments.iter().filter(|s| s.kind == SegmentKind::Hover).collect();
     let legs: Vec<_> = segments.iter().filter(|s| s.kind.is_leg()).collect();
     assert_eq!((hovers.len(), legs.len()), (15, 14));
     assert_eq!(hovers[14].end_ms - hovers[0].start_ms, 430_000);
@@ -96,7 +96,7 @@ fn counterphase_halves_move_in_opposite_directions() {
     }
     assert!(opposite >= 13, "only {opposite} of 16 legs are in counter-phase");
     let horizontal = |segments: &[super::plan::Segment]| {
-        let legs = segments.iter().filter(|s| s.kind == Kind::Horizontal);
+        let legs = segments.iter().filter(|s| s.kind == SegmentKind::Horizontal);
         legs.map(|s| (s.start_ms, s.velocity_mps)).collect::<Vec<_>>()
     };
     assert_eq!(horizontal(&even.segments), horizontal(&odd.segments), "flown together");
@@ -108,7 +108,7 @@ fn offsets_without_a_stagger_step_are_waited_on_the_ground() {
     let groups = r#"groups = [{ name = "a", select = "rows-even" }, { name = "b", select = "rows-odd", offset_s = 30 }]"#;
     let plan = with("[site]", &format!("{groups}\n[site]")).unwrap();
     let first = &plan.groups[1].segments[0];
-    assert_eq!((first.kind, first.end_ms, first.to_m), (Kind::Wait, 30_000, [0.0; 3]));
+    assert_eq!((first.kind, first.end_ms, first.to_m), (SegmentKind::Wait, 30_000, [0.0; 3]));
 }
 
 #[test]
@@ -147,8 +147,8 @@ fn a_campaign_passes_overrides_to_the_flights_that_have_them() {
         let of_kind = plan.groups[0].segments.iter().filter(|s| s.kind == kind);
         of_kind.map(|s| s.end_ms - s.start_ms).max().unwrap()
     };
-    assert_eq!(longest(&calibration.plan, Kind::LegUp), 15_000);
-    assert_eq!(longest(&hover.plan, Kind::Hover), 60_000);
+    assert_eq!(longest(&calibration.plan, SegmentKind::LegUp), 15_000);
+    assert_eq!(longest(&hover.plan, SegmentKind::Hover), 60_000);
     let error = resolve("campaign", &[set("leg=15")]).unwrap_err().to_string();
     assert!(error.starts_with("cannot set leg: none of the campaign's flights has such a key; did you mean leg_s? there are the parameters "), "{error}");
 }

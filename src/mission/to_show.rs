@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::plan::{self, Kind, Plan, Slot};
+use super::plan::{self, Plan, SegmentKind, Slot};
 use crate::show::lights::{self, LightStep, Rgb};
-use crate::show::{Cue, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation};
+use crate::show::{Cue, FenceZone, Segment, SegmentPath, Show, ShowDrone, Trajectory, Validation};
 
 impl Plan {
     /// Trajectory of a slot, in the show frame.
@@ -25,7 +25,7 @@ impl Plan {
     }
 }
 
-fn path(segment: &plan::Segment, home: Vector3<f64>) -> Path {
+fn path(segment: &plan::Segment, home: Vector3<f64>) -> SegmentPath {
     let from = home + Vector3::from(segment.from_m);
     let to = home + Vector3::from(segment.to_m);
     match segment.from_velocity_mps {
@@ -34,22 +34,26 @@ fn path(segment: &plan::Segment, home: Vector3<f64>) -> Path {
             // duration along it; raising the degree gives the cubic's two.
             let duration_s = (segment.end_ms - segment.start_ms) as f64 / 1000.0;
             let middle = from + Vector3::from(start_velocity) * (duration_s / 2.0);
-            Path::Cubic([(from + middle * 2.0) / 3.0, (middle * 2.0 + to) / 3.0, to])
+            SegmentPath::Cubic([(from + middle * 2.0) / 3.0, (middle * 2.0 + to) / 3.0, to])
         }
-        None if segment.from_m == segment.to_m => Path::Hold,
-        None => Path::Line(to),
+        None if segment.from_m == segment.to_m => SegmentPath::Hold,
+        None => SegmentPath::Line(to),
     }
 }
 
 /// Colour that tells people on the ground what a drone is doing.
-fn color(kind: Kind) -> Rgb {
+fn color(kind: SegmentKind) -> Rgb {
     match kind {
-        Kind::Wait => [0, 0, 0],
-        Kind::LegUp => [255, 96, 0],
-        Kind::LegDown => [0, 96, 255],
-        Kind::Hover => [0, 160, 0],
-        Kind::Horizontal => [200, 0, 200],
-        Kind::Takeoff | Kind::Climb | Kind::Descend | Kind::Ramp | Kind::Landing => [96, 96, 96],
+        SegmentKind::Wait => [0, 0, 0],
+        SegmentKind::LegUp => [255, 96, 0],
+        SegmentKind::LegDown => [0, 96, 255],
+        SegmentKind::Hover => [0, 160, 0],
+        SegmentKind::Horizontal => [200, 0, 200],
+        SegmentKind::Takeoff
+        | SegmentKind::Climb
+        | SegmentKind::Descend
+        | SegmentKind::Ramp
+        | SegmentKind::Landing => [96, 96, 96],
     }
 }
 
@@ -59,7 +63,7 @@ fn lights(segments: &[plan::Segment]) -> Vec<u8> {
     let mut ramp_ms = 0;
     for segment in segments {
         let duration_ms = (segment.end_ms - segment.start_ms) as u32;
-        if segment.kind == Kind::Ramp {
+        if segment.kind == SegmentKind::Ramp {
             ramp_ms += duration_ms;
             continue;
         }
@@ -99,21 +103,21 @@ impl Plan {
         let at_s = |ms: u64| ms as f64 / 1000.0;
         let cues = first
             .iter()
-            .filter(|segment| segment.kind != Kind::Ramp)
+            .filter(|segment| segment.kind != SegmentKind::Ramp)
             .map(|segment| Cue { time_s: at_s(segment.start_ms), name: segment.label.clone() })
             .collect();
         let takeoff_end = plan
             .groups
             .iter()
             .flat_map(|group| &group.segments)
-            .filter(|segment| segment.kind == Kind::Takeoff)
+            .filter(|segment| segment.kind == SegmentKind::Takeoff)
             .map(|segment| segment.end_ms)
             .max();
         let landing_start = plan
             .groups
             .iter()
             .flat_map(|group| &group.segments)
-            .filter(|segment| segment.kind == Kind::Landing)
+            .filter(|segment| segment.kind == SegmentKind::Landing)
             .map(|segment| segment.start_ms)
             .min();
         let limits = &plan.limits;

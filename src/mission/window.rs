@@ -1,6 +1,6 @@
 //! The window rule: the part of each segment that the analysis looks at.
 
-use super::plan::{Kind, Window};
+use super::plan::{SegmentKind, Window};
 
 /// The window rule: the last `length_ms` of a leg without its last `trim_ms`, never before
 /// `settle_ms` into a segment; hovers are used whole between settling and trim.
@@ -29,13 +29,13 @@ impl Default for WindowRule {
 impl WindowRule {
     /// Window of a segment; `None` for kinds that are not analysed, and where it would be shorter
     /// than 2 s.
-    pub fn of(self, kind: Kind, start_ms: u64, end_ms: u64) -> Option<Window> {
+    pub fn of(self, kind: SegmentKind, start_ms: u64, end_ms: u64) -> Option<Window> {
         let earliest = start_ms + self.settle_ms;
         let start_ms = match kind {
-            Kind::LegUp | Kind::LegDown | Kind::Horizontal => {
+            SegmentKind::LegUp | SegmentKind::LegDown | SegmentKind::Horizontal => {
                 end_ms.saturating_sub(self.length_ms).max(earliest)
             }
-            Kind::Hover => earliest,
+            SegmentKind::Hover => earliest,
             _ => return None,
         };
         let end_ms = end_ms.saturating_sub(self.trim_ms);

@@ -14,9 +14,10 @@ use super::text::{NONE, clean, count, fixed, shortened, signed, usable};
 const MOST_FLAGS: usize = 400;
 
 /// A kind of error: its name, what it is, and where it stands in the drone's and the common budget.
-type Kind = (&'static str, &'static str, fn(&ErrorBudget) -> f64, Option<fn(&CommonError) -> f64>);
+type BudgetRow =
+    (&'static str, &'static str, fn(&ErrorBudget) -> f64, Option<fn(&CommonError) -> f64>);
 
-const KINDS: [Kind; 7] = [
+const KINDS: [BudgetRow; 7] = [
     ("hover", "noise of pulse and velocity in the hover", |e| e.window_mps, None),
     (
         "law",

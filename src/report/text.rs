@@ -7,7 +7,7 @@ use crate::base::estimate::Estimate;
 use crate::base::layout;
 use crate::base::plain::plain;
 use crate::flight::Indicator;
-use crate::mission::plan::{Kind, Purpose};
+use crate::mission::plan::{Purpose, SegmentKind};
 
 /// Shown instead of a number that does not exist.
 pub(super) const NONE: &str = "–";
@@ -177,18 +177,18 @@ pub(super) fn purpose(purpose: Purpose) -> &'static str {
 }
 
 /// Kind of a window, in words.
-pub(super) fn kind(kind: Kind) -> &'static str {
+pub(super) fn kind(kind: SegmentKind) -> &'static str {
     match kind {
-        Kind::Wait => "wait",
-        Kind::Takeoff => "take-off",
-        Kind::Climb => "climb",
-        Kind::Descend => "descend",
-        Kind::LegUp => "up",
-        Kind::LegDown => "down",
-        Kind::Hover => "hover",
-        Kind::Horizontal => "horizontal",
-        Kind::Ramp => "ramp",
-        Kind::Landing => "landing",
+        SegmentKind::Wait => "wait",
+        SegmentKind::Takeoff => "take-off",
+        SegmentKind::Climb => "climb",
+        SegmentKind::Descend => "descend",
+        SegmentKind::LegUp => "up",
+        SegmentKind::LegDown => "down",
+        SegmentKind::Hover => "hover",
+        SegmentKind::Horizontal => "horizontal",
+        SegmentKind::Ramp => "ramp",
+        SegmentKind::Landing => "landing",
     }
 }
 

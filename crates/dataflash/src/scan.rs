@@ -125,7 +125,7 @@ pub(super) struct Scan {
 
 /// What the walk needs of a type at every message.
 #[derive(Clone, Copy, Default)]
-struct Kind {
+struct TypeInfo {
     /// Length of the message, bytes; 0 if the type is unknown.
     length: u8,
     flags: u8,
@@ -137,7 +137,7 @@ const FORMAT: u8 = 4;
 const UNITS: u8 = 8;
 
 struct Walk {
-    kinds: [Kind; 256],
+    kinds: [TypeInfo; 256],
     /// Latest `TimeUS`; `None` before the first.
     latest_us: Option<u64>,
     scan: Scan,
@@ -186,7 +186,7 @@ impl Walk {
             jumps: Vec::new(),
             starts: 0,
         };
-        let mut walk = Self { kinds: [Kind::default(); 256], latest_us: None, scan };
+        let mut walk = Self { kinds: [TypeInfo::default(); 256], latest_us: None, scan };
         walk.define(FMT_ID, Format::of_fmt(), Window::whole(&[]), visitor);
         walk
     }
@@ -233,7 +233,7 @@ impl Walk {
     /// Whether to believe in a message that no other follows: not if another one starts inside of
     /// it (its tail was lost), nor if its time is out of reach (chance made its header).
     #[cold]
-    fn is_credible(&self, kind: Kind, message: &[u8], after: &[u8]) -> bool {
+    fn is_credible(&self, kind: TypeInfo, message: &[u8], after: &[u8]) -> bool {
         let jumps = kind.flags & TIMED != 0 && self.jump(time_us(message)).is_some();
         !jumps && !self.hides_message(message, after)
     }
@@ -283,7 +283,7 @@ impl Walk {
     #[inline]
     fn accept<V: Visitor>(
         &mut self,
-        kind: Kind,
+        kind: TypeInfo,
         id: u8,
         message: &[u8],
         window: Window<'_>,
@@ -310,7 +310,7 @@ impl Walk {
     #[cold]
     fn learn<V: Visitor>(
         &mut self,
-        kind: Kind,
+        kind: TypeInfo,
         id: u8,
         message: &[u8],
         window: Window<'_>,
@@ -344,7 +344,7 @@ impl Walk {
         } else if format.is_timed() {
             flags |= TIMED;
         }
-        self.kinds[usize::from(id)] = Kind { length: format.length, flags };
+        self.kinds[usize::from(id)] = TypeInfo { length: format.length, flags };
         if slot.replace(format).is_some() {
             self.scan.units.types.remove(&id);
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::trajectory::{Path, Segment};
+use super::trajectory::{Segment, SegmentPath};
 
 /// Control points of one axis of a curve of at most 7th degree, ends included.
 #[derive(Clone, Copy, Debug)]
@@ -105,12 +105,12 @@ fn split(points: &[Vector3<f64>], u: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64
 }
 
 /// Path through control points (without the start point), if their number is one that exists.
-pub(crate) fn path_through(points: &[Vector3<f64>]) -> Option<Path> {
+pub(crate) fn path_through(points: &[Vector3<f64>]) -> Option<SegmentPath> {
     Some(match points {
-        [] => Path::Hold,
-        [to] => Path::Line(*to),
-        [a, b, c] => Path::Cubic([*a, *b, *c]),
-        _ => Path::Septic(Box::new(points.try_into().ok()?)),
+        [] => SegmentPath::Hold,
+        [to] => SegmentPath::Line(*to),
+        [a, b, c] => SegmentPath::Cubic([*a, *b, *c]),
+        _ => SegmentPath::Septic(Box::new(points.try_into().ok()?)),
     })
 }
 
@@ -135,7 +135,7 @@ pub(crate) fn cut(from_m: Vector3<f64>, segment: &Segment, longest_ms: u32) -> V
             rest = right;
             left
         };
-        let path = path_through(part.get(1..).unwrap_or_default()).unwrap_or(Path::Hold);
+        let path = path_through(part.get(1..).unwrap_or_default()).unwrap_or(SegmentPath::Hold);
         parts.push(Segment { duration_ms: end_ms - start_ms, path });
     }
     parts

@@ -17,7 +17,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 use super::archive::Archive;
 use super::lights::{self, LightStep, Rgb};
 use super::skyc::{Limits, MAX_COORDINATE_M, MAX_DRONES, MAX_TIME_S, SkycError};
-use super::trajectory::{Cursor as Playhead, Path, Piece, Segment, Trajectory};
+use super::trajectory::{Cursor as Playhead, Piece, Segment, SegmentPath, Trajectory};
 use super::{Show, ShowDrone};
 
 const HEADER: &str = "Time [msec],x [m],y [m],z [m],Red,Green,Blue";
@@ -148,7 +148,7 @@ fn curve_times(
     options: &CsvOptions,
     times: &mut Vec<u64>,
 ) {
-    if matches!(piece.path, Path::Hold | Path::Line(_)) {
+    if matches!(piece.path, SegmentPath::Hold | SegmentPath::Line(_)) {
         return;
     }
     let degree = (points.len() - 1) as f64;
@@ -304,10 +304,16 @@ fn drone(
     let mut trajectory = Trajectory::starting_at(first.place_m);
     for pair in rows.windows(2) {
         let [from, to] = pair else { continue };
-        let path = if from.place_m == to.place_m { Path::Hold } else { Path::Line(to.place_m) };
+        let path = if from.place_m == to.place_m {
+            SegmentPath::Hold
+        } else {
+            SegmentPath::Line(to.place_m)
+        };
         let duration_ms = (to.time_ms - from.time_ms) as u32;
         match trajectory.segments.last_mut() {
-            Some(Segment { duration_ms: total, path: Path::Hold }) if path == Path::Hold => {
+            Some(Segment { duration_ms: total, path: SegmentPath::Hold })
+                if path == SegmentPath::Hold =>
+            {
                 *total += duration_ms;
             }
             _ => trajectory.segments.push(Segment { duration_ms, path }),

@@ -77,10 +77,10 @@ pub struct Derived {
 /// ```
 /// use nalgebra::Vector3;
 /// use skybrush_show::derive::{DeriveParams, Firmware, derive};
-/// use skybrush_show::{Path, Segment, Trajectory};
+/// use skybrush_show::{SegmentPath, Segment, Trajectory};
 ///
 /// // A climb at 1 m/s: 2.5 m are reached at 2.5 s, and take 2.5 / 5.5 s.
-/// let climb = Segment { duration_ms: 10_000, path: Path::Line(Vector3::new(0.0, 0.0, 10.0)) };
+/// let climb = Segment { duration_ms: 10_000, path: SegmentPath::Line(Vector3::new(0.0, 0.0, 10.0)) };
 /// let trajectory = Trajectory { start_m: Vector3::zeros(), segments: vec![climb] };
 /// let derived = derive(&trajectory, Firmware::V44, &DeriveParams::default());
 /// assert!((derived.takeoff_s.unwrap() - 2.045).abs() < 1e-3);
@@ -261,13 +261,13 @@ pub fn on_board_altitude_m(z_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Path, Segment};
+    use crate::{Segment, SegmentPath};
     use proptest::prelude::*;
 
     fn vertical(start_z: f64, legs: &[(u32, f64)]) -> Trajectory {
         let leg = |(duration_ms, z): &(u32, f64)| Segment {
             duration_ms: *duration_ms,
-            path: Path::Line(Vector3::new(0.0, 0.0, *z)),
+            path: SegmentPath::Line(Vector3::new(0.0, 0.0, *z)),
         };
         Trajectory {
             start_m: Vector3::new(0.0, 0.0, start_z),

@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 pub use archive::verify as verify_archive;
 
 use crate::frame::ShowFrame;
-pub use trajectory::{Path, Segment, Trajectory};
+pub use trajectory::{Segment, SegmentPath, Trajectory};
 
 /// Largest number of drones in a show that the Skybrush loader accepts.
 pub const MAX_DRONES: usize = 5_000;

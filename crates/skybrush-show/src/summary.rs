@@ -8,7 +8,7 @@ use super::derive::{DeriveParams, Derived, Firmware, derive};
 use super::lights::{self, Explanation};
 use super::quantise::{self, DroneQuantisation};
 use super::skyb::{BlockInfo, Event, SkybContents, SkybError, SkybOptions};
-use super::trajectory::{Path, Trajectory};
+use super::trajectory::{SegmentPath, Trajectory};
 use super::{FenceZone, Show, ShowDrone};
 
 /// Lines of a light program that a summary shows.
@@ -165,10 +165,10 @@ fn drone_summary(
     for segment in &trajectory.segments {
         let [holds, lines, cubics, septics] = &mut pieces;
         *match segment.path {
-            Path::Hold => holds,
-            Path::Line(_) => lines,
-            Path::Cubic(_) => cubics,
-            Path::Septic(_) => septics,
+            SegmentPath::Hold => holds,
+            SegmentPath::Line(_) => lines,
+            SegmentPath::Cubic(_) => cubics,
+            SegmentPath::Septic(_) => septics,
         } += 1;
     }
     DroneSummary {

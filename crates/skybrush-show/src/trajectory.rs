@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 /// Shape of one piece of a trajectory, in show-frame metres. The start point is the end of the
 /// piece before it. The curve parameter is `t / duration`, so a line is flown at constant speed.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Path {
+pub enum SegmentPath {
     /// Stands still at the start point of the piece.
     Hold,
     /// A straight line to this point at constant speed.
@@ -22,7 +22,7 @@ pub struct Segment {
     /// Duration of the piece, ms; never 0 in a valid trajectory.
     pub duration_ms: u32,
     /// Shape of the piece.
-    pub path: Path,
+    pub path: SegmentPath,
 }
 
 /// Flight of one drone from show time 0, in the show frame (x forward, y left, z up), metres.
@@ -47,7 +47,7 @@ pub struct Piece<'a> {
     /// Start point of the piece, show frame, m.
     pub from_m: Vector3<f64>,
     /// Shape of the piece.
-    pub path: &'a Path,
+    pub path: &'a SegmentPath,
 }
 
 /// Position, velocity and acceleration at one instant, show frame.
@@ -61,7 +61,7 @@ pub struct State {
     pub acceleration_mps2: Vector3<f64>,
 }
 
-impl Path {
+impl SegmentPath {
     /// End point, given the start point.
     pub fn end_m(&self, from_m: Vector3<f64>) -> Vector3<f64> {
         match self {
@@ -265,9 +265,11 @@ mod tests {
 
     /// The two-drone example of the Skybrush formats note, drone 1.
     fn example() -> Trajectory {
-        let line =
-            |duration_ms, x, z| Segment { duration_ms, path: Path::Line(Vector3::new(x, 0.0, z)) };
-        let hold = |duration_ms| Segment { duration_ms, path: Path::Hold };
+        let line = |duration_ms, x, z| Segment {
+            duration_ms,
+            path: SegmentPath::Line(Vector3::new(x, 0.0, z)),
+        };
+        let hold = |duration_ms| Segment { duration_ms, path: SegmentPath::Hold };
         Trajectory {
             start_m: Vector3::zeros(),
             segments: vec![
@@ -315,7 +317,7 @@ mod tests {
         ];
         let trajectory = Trajectory {
             start_m: Vector3::zeros(),
-            segments: vec![Segment { duration_ms: 4_000, path: Path::Cubic(points) }],
+            segments: vec![Segment { duration_ms: 4_000, path: SegmentPath::Cubic(points) }],
         };
         let h = 1e-4;
         for time_s in [0.5, 1.7, 3.2] {

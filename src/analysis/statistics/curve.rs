@@ -15,7 +15,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// A point of a correlation function: distance, value, weight.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(super) struct CurvePoint {
     pub(super) distance: f64,
     pub(super) value: f64,
     pub(super) weight: f64,
@@ -23,7 +23,7 @@ pub(super) struct Point {
 
 /// `exp(-r / lambda)`: lambda with its error; `None` when no length fits best (too few points, or a
 /// correlation that does not fall off).
-pub(super) fn exponential(points: &[Point]) -> Option<Estimate> {
+pub(super) fn exponential(points: &[CurvePoint]) -> Option<Estimate> {
     let loss = |ln_length: f64| {
         let rate = (-ln_length).exp();
         points
@@ -46,7 +46,7 @@ pub(super) fn exponential(points: &[Point]) -> Option<Estimate> {
 }
 
 /// `c0 exp(-r / lambda)`: c0 and lambda with their errors.
-pub(super) fn exponential_with_nugget(points: &[Point]) -> Option<(Estimate, Estimate)> {
+pub(super) fn exponential_with_nugget(points: &[CurvePoint]) -> Option<(Estimate, Estimate)> {
     if points.len() < 3 {
         return None;
     }
@@ -85,7 +85,7 @@ pub(super) fn exponential_with_nugget(points: &[Point]) -> Option<(Estimate, Est
 }
 
 /// The best logarithm of a length: the best of a grid, refined; `None` at its ends.
-fn search(points: &[Point], loss: &impl Fn(f64) -> f64) -> Option<f64> {
+fn search(points: &[CurvePoint], loss: &impl Fn(f64) -> f64) -> Option<f64> {
     let distances = || points.iter().map(|point| point.distance);
     let low = (least(distances()).unwrap_or(f64::INFINITY) * SHORTEST).ln();
     let high = (distances().fold(0.0, f64::max) * LONGEST).ln();
@@ -140,10 +140,10 @@ pub(super) fn line(x: &[f64], y: &[f64]) -> Option<(Estimate, Estimate)> {
 mod tests {
     use super::*;
 
-    fn points(value: impl Fn(f64) -> f64) -> Vec<Point> {
+    fn points(value: impl Fn(f64) -> f64) -> Vec<CurvePoint> {
         let distance = |step: i32| 7.0 * f64::from(step);
         (1..=8)
-            .map(|step| Point {
+            .map(|step| CurvePoint {
                 distance: distance(step),
                 value: value(distance(step)),
                 weight: 1.0,
@@ -166,10 +166,13 @@ mod tests {
     #[test]
     fn the_error_is_that_of_a_curve_fit() {
         // The same numbers from scipy's curve_fit, computed once: f = exp(-x / 145) with +-0.02.
-        let wiggled: Vec<Point> = points(|r| (-r / 145.0).exp())
+        let wiggled: Vec<CurvePoint> = points(|r| (-r / 145.0).exp())
             .into_iter()
             .enumerate()
-            .map(|(i, p)| Point { value: p.value + if i % 2 == 0 { 0.02 } else { -0.02 }, ..p })
+            .map(|(i, p)| CurvePoint {
+                value: p.value + if i % 2 == 0 { 0.02 } else { -0.02 },
+                ..p
+            })
             .collect();
         let found = exponential(&wiggled).unwrap();
         assert!((found.value - 143.0).abs() < 3.0, "{found}");

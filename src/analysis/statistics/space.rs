@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::curve::{Point, exponential};
+use super::curve::{CurvePoint, exponential};
 use super::field::Field;
 use super::result::{DistanceClass, Interval};
 use crate::base::estimate::Estimate;
@@ -132,12 +132,16 @@ pub(super) fn length(
 }
 
 /// Medians as points of a curve.
-pub(super) fn points(classes: &[Class], medians: &[f64], weights: Option<&[f64]>) -> Vec<Point> {
+pub(super) fn points(
+    classes: &[Class],
+    medians: &[f64],
+    weights: Option<&[f64]>,
+) -> Vec<CurvePoint> {
     classes
         .iter()
         .zip(medians)
         .enumerate()
-        .map(|(index, (class, value))| Point {
+        .map(|(index, (class, value))| CurvePoint {
             distance: class.distance_m,
             value: *value,
             weight: weights.and_then(|weights| weights.get(index).copied()).unwrap_or(1.0),

@@ -19,7 +19,7 @@ const HEIGHT: f64 = 250.0;
 const APART_S: f64 = 1.5;
 
 /// One value on its way.
-struct Point {
+struct WayPoint {
     way_m: f64,
     value_mps: f64,
     interval_mps: Option<[f64; 2]>,
@@ -27,7 +27,7 @@ struct Point {
 }
 
 /// The values of a drone over the way that it flew; a point that cannot be drawn breaks the line.
-fn points(map: &UpdraftMap, drone: &DroneUpdraft) -> Vec<Point> {
+fn points(map: &UpdraftMap, drone: &DroneUpdraft) -> Vec<WayPoint> {
     let mut points = Vec::new();
     let mut way_m = 0.0;
     let mut last: Option<[f64; 3]> = None;
@@ -41,10 +41,15 @@ fn points(map: &UpdraftMap, drone: &DroneUpdraft) -> Vec<Point> {
         let Some(value_mps) = drone.updraft_mps.get(index).copied().flatten() else { continue };
         if time_s - last_s > APART_S && !points.is_empty() {
             let gap = f64::NAN;
-            points.push(Point { way_m: gap, value_mps: gap, interval_mps: None, truth_mps: None });
+            points.push(WayPoint {
+                way_m: gap,
+                value_mps: gap,
+                interval_mps: None,
+                truth_mps: None,
+            });
         }
         last_s = *time_s;
-        points.push(Point {
+        points.push(WayPoint {
             way_m,
             value_mps,
             interval_mps: drone.interval_mps.get(index).copied().flatten(),
@@ -60,7 +65,7 @@ pub(in crate::report) fn figure(
     key: &str,
     map: &UpdraftMap,
 ) -> Option<Figure> {
-    let tracks: Vec<(&DroneUpdraft, Vec<Point>)> = map
+    let tracks: Vec<(&DroneUpdraft, Vec<WayPoint>)> = map
         .drones
         .iter()
         .filter(|drone| !drone.track_m.is_empty())
@@ -69,7 +74,7 @@ pub(in crate::report) fn figure(
         .collect();
     // Spread over the fleet: the first and the last of it among them.
     let shown = tracks.len().min(MOST_DRONES);
-    let chosen: Vec<&(&DroneUpdraft, Vec<Point>)> = (0..shown)
+    let chosen: Vec<&(&DroneUpdraft, Vec<WayPoint>)> = (0..shown)
         .filter_map(|index| tracks.get(index * (tracks.len() - 1) / (shown - 1).max(1)))
         .collect();
     if chosen.is_empty() {

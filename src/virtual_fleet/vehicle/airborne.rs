@@ -10,7 +10,7 @@ use crate::link::frame::{MavMessage, dialect};
 use crate::protocol::show::Stage;
 use crate::sim::autopilot::director::{self, Abort};
 use crate::sim::autopilot::params::ARM_BEFORE_TAKEOFF_S;
-use crate::sim::{BatteryReading, Flight, FlightSetup, Hooks, RecordedFlight};
+use crate::sim::{BatteryReading, FlightSetup, Hooks, OngoingFlight, RecordedFlight};
 use crate::virtual_fleet::world::LoadedShow;
 
 /// An arming that comes by so little too late is on time: the grid of ticks is coarser.
@@ -52,7 +52,7 @@ impl<'w> Airborne<'w> {
     }
 
     /// The flight, for orders.
-    pub(super) fn flight(&mut self) -> &mut Flight<'w> {
+    pub(super) fn flight(&mut self) -> &mut OngoingFlight<'w> {
         &mut self.flight.flight
     }
 

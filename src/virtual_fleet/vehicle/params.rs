@@ -13,18 +13,18 @@ const AT_ONCE: usize = 20;
 
 /// Kind of number that a parameter is said to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum NumberKind {
     Int8,
     Int16,
     Int32,
     Real,
 }
 
-use Kind::{Int8, Int16, Int32, Real};
+use NumberKind::{Int8, Int16, Int32, Real};
 
 /// Name, kind, value after the swarm launcher's settings.
 #[rustfmt::skip]
-const COMMON: &[(&str, Kind, f32)] = &[
+const COMMON: &[(&str, NumberKind, f32)] = &[
     ("ANGLE_MAX", Int16, 3000.0), ("ARMING_CHECK", Int32, 1.0), ("AUTO_OPTIONS", Int32, 0.0),
     ("ATC_ANGLE_BOOST", Int8, 1.0), ("ATC_INPUT_TC", Real, 0.15),
     ("BATT_CAPACITY", Int32, 3300.0), ("BATT_CRT_MAH", Real, 0.0), ("BATT_CRT_VOLT", Real, 0.0),
@@ -56,7 +56,7 @@ const COMMON: &[(&str, Kind, f32)] = &[
 
 /// Only firmware with a show mode has these.
 #[rustfmt::skip]
-const SHOW: &[(&str, Kind, f32)] = &[
+const SHOW: &[(&str, NumberKind, f32)] = &[
     ("SHOW_CTRL_MODE", Int8, 1.0), ("SHOW_CTRL_RATE", Int8, 10.0), ("SHOW_GROUP", Int8, 0.0),
     ("SHOW_HFENCE_DIST", Real, 25.0), ("SHOW_HFENCE_EN", Int8, 0.0), ("SHOW_HFENCE_TO", Real, 5.0),
     ("SHOW_LED0_CHAN", Int8, 0.0), ("SHOW_LED0_COUNT", Int8, 16.0), ("SHOW_LED0_GAMMA", Real, 1.0),
@@ -72,7 +72,7 @@ const SHOW: &[(&str, Kind, f32)] = &[
 #[derive(Clone, Debug)]
 pub struct Params {
     /// In the order of their names, as indices count.
-    values: BTreeMap<&'static str, (Kind, f32)>,
+    values: BTreeMap<&'static str, (NumberKind, f32)>,
     /// Indices that are still to be sent.
     asked: VecDeque<u16>,
 }

@@ -53,7 +53,7 @@ pub(super) fn found_flight(
     } else {
         // What was simulated no drone and no card has.
         let is_real = at.origin == LogOrigin::Real;
-        let at = of_start::Flight {
+        let at = of_start::FlightLogs {
             logs: &at.folder,
             campaign: is_real.then_some((campaign, plan.name.as_str())),
         };

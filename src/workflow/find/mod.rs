@@ -158,7 +158,7 @@ pub fn find(path: &Path, plan: Option<&Plan>, work: &mut Work) -> Result<(), Wor
     let mut logs: Vec<LogInput> =
         logs.into_iter().map(|path| LogInput { path, ..LogInput::default() }).collect();
     let (start, notes) = if path.is_dir() {
-        of_start::refuse(&of_start::Flight { logs: path, campaign: None }, &mut logs)?
+        of_start::refuse(&of_start::FlightLogs { logs: path, campaign: None }, &mut logs)?
     } else {
         (None, Vec::new())
     };

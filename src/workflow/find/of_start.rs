@@ -28,7 +28,7 @@ fn written_start(logs: &Path) -> Result<Option<(GpsTime, &'static str)>, Workflo
 }
 
 /// Where the logs of a flight are, and what brings the right ones.
-pub(super) struct Flight<'a> {
+pub(super) struct FlightLogs<'a> {
     /// The folder of logs.
     pub(super) logs: &'a Path,
     /// The campaign and the flight's name in it; `None`: a folder of logs alone, or simulated ones.
@@ -38,7 +38,7 @@ pub(super) struct Flight<'a> {
 /// Marks the logs that are of another start than the one that is written down. Returns that start, and
 /// what is doubtful of the others.
 pub(super) fn refuse(
-    flight: &Flight<'_>,
+    flight: &FlightLogs<'_>,
     logs: &mut [LogInput],
 ) -> Result<(Option<GpsTime>, Vec<String>), WorkflowError> {
     let written = match flight.campaign {
@@ -72,7 +72,7 @@ pub(super) fn refuse(
     Ok((Some(start), notes))
 }
 
-fn where_the_right_one_is(flight: &Flight<'_>, start: GpsTime, path: &Path) -> String {
+fn where_the_right_one_is(flight: &FlightLogs<'_>, start: GpsTime, path: &Path) -> String {
     if let Some(kept) = kept(flight.logs, start, path) {
         return format!("this flight's log is {}: put it in its place", kept.shown());
     }

@@ -13,7 +13,7 @@ use updraft::analysis::law::LawOf;
 use updraft::analysis::result::{Analysis, FlightAnalysis, TableRow, Yield};
 use updraft::analysis::table::PaperTable;
 use updraft::analysis::{AnalysisOptions, FlightInput, LogInput, Warning, analyze, analyze_flight};
-use updraft::mission::plan::{Kind, Plan, Purpose};
+use updraft::mission::plan::{Plan, Purpose, SegmentKind};
 use updraft::report::terminal_summary;
 
 /// Show time that holds all of the synthetic ladder, its first six legs, its first four, s.
@@ -124,7 +124,7 @@ fn a_map_takes_the_flocks_law_for_a_partial_ladder() {
         })
         .collect();
     let ladder = plan(Purpose::Calibration, ladder_up_segments(), 3);
-    let table = Timetable::default().add(Kind::Hover, "hover", 0.0, 264.0);
+    let table = Timetable::default().add(SegmentKind::Hover, "hover", 0.0, 264.0);
     let scan = plan(Purpose::Measurement, table.segments, 3);
     let inputs =
         [input("calibration", Some(&ladder), &calibration), input("hover", Some(&scan), &hover)];

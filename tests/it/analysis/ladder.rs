@@ -21,7 +21,7 @@ use updraft::analysis::{
     AnalysisError, AnalysisOptions, FlightInput, LawKind, LogInput, OffsetRule, Warning, analyze,
     analyze_flight,
 };
-use updraft::mission::plan::{Kind, Plan, Purpose};
+use updraft::mission::plan::{Plan, Purpose, SegmentKind};
 
 fn input<'a>(name: &'a str, plan: Option<&'a Plan>, logs: &'a [LogInput]) -> FlightInput<'a> {
     FlightInput { name, plan, logs, ..FlightInput::default() }
@@ -306,7 +306,7 @@ fn synthetic_campaign(folder: &Path) -> [Vec<LogInput>; 2] {
 }
 
 fn synthetic_plans() -> [Plan; 2] {
-    let hover = Timetable::default().add(Kind::Hover, "hover", 0.0, 264.0).segments;
+    let hover = Timetable::default().add(SegmentKind::Hover, "hover", 0.0, 264.0).segments;
     [plan(Purpose::Calibration, ladder_up_segments(), 3), plan(Purpose::Measurement, hover, 3)]
 }
 
@@ -600,7 +600,7 @@ fn measured(pulse: fn(f64) -> f64, up: fn(f64) -> f64, planned_s: f64) -> Analys
     fs::write(&path, log.write()).unwrap();
     hover.truncate(2);
     let [ladder, _] = synthetic_plans();
-    let table = Timetable::default().add(Kind::Hover, "hover", 0.0, planned_s);
+    let table = Timetable::default().add(SegmentKind::Hover, "hover", 0.0, planned_s);
     let scan = plan(Purpose::Measurement, table.segments, 2);
     let inputs =
         [input("calibration", Some(&ladder), &calibration), input("hover", Some(&scan), &hover)];

@@ -7,7 +7,7 @@
 use rand::Rng;
 use rand_distr::{Distribution, Normal};
 use updraft::analysis::law::{
-    ErrorScale, Law, LawKind, Point, linear, signed_quadratic, signed_quadratic_held,
+    ErrorScale, Law, LawKind, LawPoint, linear, signed_quadratic, signed_quadratic_held,
 };
 use updraft::base::rng::{Purpose, stream};
 
@@ -16,10 +16,10 @@ fn rungs() -> impl Iterator<Item = f64> {
     (1..=7).flat_map(|rung| [0.5 * f64::from(rung), -0.5 * f64::from(rung)])
 }
 
-fn points(law: Law, noise_us: f64, random: &mut impl Rng) -> Vec<Point> {
+fn points(law: Law, noise_us: f64, random: &mut impl Rng) -> Vec<LawPoint> {
     let noise = Normal::new(0.0, noise_us).unwrap();
     rungs()
-        .map(|velocity_mps| Point {
+        .map(|velocity_mps| LawPoint {
             velocity_mps,
             pulse_us: law.pulse_us(velocity_mps) + noise.sample(random),
             sigma_us: noise_us.max(0.1),
@@ -173,7 +173,7 @@ fn density_along_the_ladder_explains_table_i() {
     // density. Climbs are measured higher than descents, in thinner air: that widens A and fakes a
     // downdraft. Table I has A 8.207 ± 0.020, u0 1598.656 ± 0.039, W -0.0589 ± 0.0031.
     let home_amsl_m = 190.0;
-    let points: Vec<Point> = rungs()
+    let points: Vec<LawPoint> = rungs()
         .map(|velocity_mps| {
             // Mean height in the window from 10 s to 19 s of a 20 s leg, from 20 m or from its top.
             let speed = velocity_mps.abs();
@@ -181,7 +181,7 @@ fn density_along_the_ladder_explains_table_i() {
             let thrust = 586.6 / density_ratio(home_amsl_m + 20.0 + above);
             let drag = 8.0552 * velocity_mps * speed;
             let pulse_us = 1000.0 + thrust + drag;
-            Point { velocity_mps, pulse_us, sigma_us: 0.3, velocity_sigma_mps: 0.0 }
+            LawPoint { velocity_mps, pulse_us, sigma_us: 0.3, velocity_sigma_mps: 0.0 }
         })
         .collect();
     let fit = signed_quadratic(&points, ErrorScale::Scaled).unwrap();

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use updraft::log::catalog::{ATT, GUIP, PARM, RCOU, SHOW, XKF1};
 use updraft::log::{LogWriter, Value};
 use updraft::mission::plan::{
-    Fence, Group, Kind, PLAN_SCHEMA, Plan, Purpose, Segment, Site, Slot, Window,
+    Fence, Group, PLAN_SCHEMA, Plan, Purpose, Segment, SegmentKind, Site, Slot, Window,
 };
 use updraft::vehicle::Limits;
 
@@ -28,14 +28,20 @@ pub(crate) struct Timetable {
 }
 
 impl Timetable {
-    pub(crate) fn add(mut self, kind: Kind, label: &str, up_mps: f64, duration_s: f64) -> Self {
+    pub(crate) fn add(
+        mut self,
+        kind: SegmentKind,
+        label: &str,
+        up_mps: f64,
+        duration_s: f64,
+    ) -> Self {
         let start_ms = self.time_ms;
         let end_ms = start_ms + (duration_s * 1000.0).round() as u64;
         let window = match kind {
-            Kind::LegUp | Kind::LegDown => {
+            SegmentKind::LegUp | SegmentKind::LegDown => {
                 Some(Window { start_ms: end_ms - 10_000, end_ms: end_ms - 1000 })
             }
-            Kind::Hover => Some(Window { start_ms: start_ms + 3000, end_ms: end_ms - 1000 }),
+            SegmentKind::Hover => Some(Window { start_ms: start_ms + 3000, end_ms: end_ms - 1000 }),
             _ => None,
         };
         let from_m = [0.0, 0.0, self.height_m];
@@ -58,8 +64,8 @@ impl Timetable {
 
 /// The ladder that the fixtures flew; `sign` -1 flies it upside down (a wrong plan).
 pub(crate) fn ladder(sign: f64) -> Vec<Segment> {
-    let mut table = Timetable::default().add(Kind::Takeoff, "climb", 2.0, 10.0).add(
-        Kind::Hover,
+    let mut table = Timetable::default().add(SegmentKind::Takeoff, "climb", 2.0, 10.0).add(
+        SegmentKind::Hover,
         "hover",
         0.0,
         10.0,
@@ -67,12 +73,12 @@ pub(crate) fn ladder(sign: f64) -> Vec<Segment> {
     for rung in 1..=7 {
         let speed = 0.5 * f64::from(rung);
         table = table
-            .add(Kind::LegUp, &format!("up {speed} m/s"), sign * speed, 20.0)
-            .add(Kind::Hover, "hover", 0.0, 10.0)
-            .add(Kind::LegDown, &format!("down {speed} m/s"), -sign * speed, 20.0)
-            .add(Kind::Hover, "hover", 0.0, 10.0);
+            .add(SegmentKind::LegUp, &format!("up {speed} m/s"), sign * speed, 20.0)
+            .add(SegmentKind::Hover, "hover", 0.0, 10.0)
+            .add(SegmentKind::LegDown, &format!("down {speed} m/s"), -sign * speed, 20.0)
+            .add(SegmentKind::Hover, "hover", 0.0, 10.0);
     }
-    table.add(Kind::Landing, "descend", -17.5 / 8.5, 8.5).segments
+    table.add(SegmentKind::Landing, "descend", -17.5 / 8.5, 8.5).segments
 }
 
 /// A plan in which `slots` drones fly the same segments, 7 m apart.
@@ -147,11 +153,11 @@ pub(crate) fn ladder_up(time: f64) -> f64 {
 
 /// The segments of [`ladder_up`].
 pub(crate) fn ladder_up_segments() -> Vec<Segment> {
-    let mut table = Timetable::default().add(Kind::Hover, "hover", 0.0, 20.0);
+    let mut table = Timetable::default().add(SegmentKind::Hover, "hover", 0.0, 20.0);
     for rung in LEGS {
-        let kind = if rung > 0.0 { Kind::LegUp } else { Kind::LegDown };
+        let kind = if rung > 0.0 { SegmentKind::LegUp } else { SegmentKind::LegDown };
         table = table.add(kind, &format!("leg {rung}"), rung, 20.0).add(
-            Kind::Hover,
+            SegmentKind::Hover,
             "hover",
             0.0,
             10.0,

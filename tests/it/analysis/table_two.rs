@@ -9,7 +9,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use updraft::analysis::calibrate::{FitOptions, Location, Weights, calibrate};
 use updraft::analysis::result::{Fit, SampleStats, WindowStats};
 use updraft::base::rng::{Purpose, stream};
-use updraft::mission::plan::Kind;
+use updraft::mission::plan::SegmentKind;
 
 const SCATTER_US: f64 = 15.0;
 const DRONES: u64 = 42 * 25;
@@ -24,7 +24,7 @@ fn window(velocity_mps: f64, pulse_us: f64) -> WindowStats {
         n: 90,
     };
     WindowStats {
-        kind: if velocity_mps > 0.0 { Kind::LegUp } else { Kind::LegDown },
+        kind: if velocity_mps > 0.0 { SegmentKind::LegUp } else { SegmentKind::LegDown },
         label: String::new(),
         start_s: 0.0,
         end_s: 9.0,

@@ -5,7 +5,7 @@ use updraft::analysis::windows::{
     Target, Tilt, WindowOptions, contradiction, correct_tilt, inferred, measure,
 };
 use updraft::flight::{Effort, Flight, Series};
-use updraft::mission::plan::Kind;
+use updraft::mission::plan::SegmentKind;
 
 fn series(duration_s: f64, value: impl Fn(f64) -> f64) -> Series {
     let time_s: Vec<f64> = (0..(duration_s * 10.0) as i32).map(|i| f64::from(i) / 10.0).collect();
@@ -29,7 +29,7 @@ fn flight(command: impl Fn(f64) -> f64 + Copy) -> Flight {
 }
 
 fn leg(start_s: f64, end_s: f64, commanded_mps: f64) -> Target {
-    Target { kind: Kind::LegUp, label: "up".to_owned(), start_s, end_s, commanded_mps }
+    Target { kind: SegmentKind::LegUp, label: "up".to_owned(), start_s, end_s, commanded_mps }
 }
 
 fn rejections(flight: &Flight, target: &Target) -> Vec<Rejection> {
@@ -86,18 +86,18 @@ fn windows_are_found_in_the_commands_of_the_log() {
     };
     let mut flown = flight(command);
     flown.desired_horizontal_mps = Some(series(100.0, |time| if time < 70.0 { 0.0 } else { 3.0 }));
-    let found: Vec<(Kind, f64, f64, f64)> = inferred(&flown)
+    let found: Vec<(SegmentKind, f64, f64, f64)> = inferred(&flown)
         .into_iter()
         .map(|target| (target.kind, target.start_s, target.end_s, target.commanded_mps))
         .collect();
     assert_eq!(
         found,
         [
-            (Kind::Hover, 13.0, 19.0, 0.0),
-            (Kind::LegUp, 30.0, 39.0, 1.5),
-            (Kind::Hover, 43.0, 49.0, 0.0),
-            (Kind::LegDown, 60.0, 69.0, -1.5),
-            (Kind::Horizontal, 73.0, 98.9, 0.0),
+            (SegmentKind::Hover, 13.0, 19.0, 0.0),
+            (SegmentKind::LegUp, 30.0, 39.0, 1.5),
+            (SegmentKind::Hover, 43.0, 49.0, 0.0),
+            (SegmentKind::LegDown, 60.0, 69.0, -1.5),
+            (SegmentKind::Horizontal, 73.0, 98.9, 0.0),
         ]
     );
 }

@@ -151,8 +151,9 @@ fn a_run_that_hides_something_hides_each_effect_in_its_turn() {
             Scenario::draw(seed, &cell).unwrap().hidden[0].kind.clone()
         })
         .collect();
-    let takes =
-        |kind: &&updraft::blind::hide::Kind| !kind.foreign && kind.bases.contains(&Base::Airsim);
+    let takes = |kind: &&updraft::blind::hide::HiddenKind| {
+        !kind.foreign && kind.bases.contains(&Base::Airsim)
+    };
     assert_eq!(chosen.len(), KINDS.iter().filter(takes).count());
 }
 

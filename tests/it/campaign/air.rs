@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use updraft::analysis::result::{Analysis, UpdraftMap};
 use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::campaign::{FlightFolder, read_json};
-use updraft::show::{Path as Shape, Segment, Trajectory};
+use updraft::show::{Segment, SegmentPath as Shape, Trajectory};
 use updraft::sim::air::truth::{HEADER, read, to_csv, write};
 use updraft::sim::air::{Atmosphere, Sum, Uniform};
 

@@ -72,7 +72,7 @@ fn assert_tame_json(ended: &Ended) {
 /// Two drones in one place, far too fast: a show with errors to be hidden.
 fn show() -> Show {
     let mut trajectory = Trajectory::starting_at(Vector3::zeros());
-    let to = updraft::show::Path::Line(Vector3::new(0.0, 0.0, 200.0));
+    let to = updraft::show::SegmentPath::Line(Vector3::new(0.0, 0.0, 200.0));
     trajectory.segments.push(Segment { duration_ms: 2_000, path: to });
     let drone = |number: u32| ShowDrone {
         name: format!("{HOSTILE}{number}"),

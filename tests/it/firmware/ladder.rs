@@ -7,7 +7,7 @@ use crate::firmware::support::{
     distances, fixture, flown, greatest, ladder, read, sitl, stage_s, steps, windows,
 };
 use nalgebra::Vector3;
-use updraft::analysis::law::{ErrorScale, Law, Point, signed_quadratic};
+use updraft::analysis::law::{ErrorScale, Law, LawPoint, signed_quadratic};
 use updraft::analysis::result::WindowStats;
 use updraft::flight::Flight;
 use updraft::log::Log;
@@ -169,7 +169,7 @@ fn square_law_ladder_is_the_firmwares() {
     let points: Vec<_> = ours
         .iter()
         .filter(|window| window.commanded_mps != 0.0)
-        .map(|window| Point {
+        .map(|window| LawPoint {
             velocity_mps: window.velocity_mps.median,
             pulse_us: window.effort_phi.median,
             sigma_us: 0.1,

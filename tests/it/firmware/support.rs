@@ -12,8 +12,8 @@ use updraft::base::frame::{Geodetic, ShowFrame};
 use updraft::base::time::GpsTime;
 use updraft::flight::{Flight, FlightOptions};
 use updraft::log::{Log, Select};
-use updraft::mission::plan::Kind;
-use updraft::show::{Path, Segment, Trajectory};
+use updraft::mission::plan::SegmentKind;
+use updraft::show::{Segment, SegmentPath, Trajectory};
 use updraft::sim::{FlightSetup, Hooks, Uniform, fly};
 use updraft::vehicle::Vehicle;
 use updraft::vehicle::library::builtin;
@@ -33,7 +33,7 @@ pub(crate) fn sitl() -> Vehicle {
 pub(crate) fn show(points: &[(u32, f64, f64, f64)]) -> Trajectory {
     let segments = points.iter().map(|&(duration_ms, x, y, z)| Segment {
         duration_ms,
-        path: Path::Line(Vector3::new(x, y, z)),
+        path: SegmentPath::Line(Vector3::new(x, y, z)),
     });
     Trajectory { start_m: Vector3::zeros(), segments: segments.collect() }
 }
@@ -72,8 +72,11 @@ pub(crate) fn steps() -> Vec<(f64, f64)> {
 /// The windows of the ladder's legs and hovers.
 pub(crate) fn windows(flight: &Flight) -> Vec<WindowStats> {
     let target = |(start_s, commanded_mps): (f64, f64)| {
-        let (kind, after_s, until_s) =
-            if commanded_mps == 0.0 { (Kind::Hover, 3.0, 9.0) } else { (Kind::LegUp, 10.0, 19.0) };
+        let (kind, after_s, until_s) = if commanded_mps == 0.0 {
+            (SegmentKind::Hover, 3.0, 9.0)
+        } else {
+            (SegmentKind::LegUp, 10.0, 19.0)
+        };
         Target {
             kind,
             label: format!("{commanded_mps:+.1} m/s from {start_s} s"),

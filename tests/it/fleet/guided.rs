@@ -14,7 +14,7 @@ use updraft::fleet::vehicle_clock::VehicleClock;
 use updraft::link::clock::{Micros, S};
 use updraft::link::conversation::{Conversation as _, Step};
 use updraft::link::id::DroneId;
-use updraft::show::{Path, Segment, Trajectory};
+use updraft::show::{Segment, SegmentPath, Trajectory};
 
 const DRONE: DroneId = DroneId { network: 0, system: 1 };
 
@@ -23,7 +23,10 @@ const DRONE: DroneId = DroneId { network: 0, system: 1 };
 fn fly(silent: Range<Micros>, hears: bool) -> (usize, GuidedError) {
     let origin = Geodetic { lat_deg: 47.0, lon_deg: 19.0, amsl_m: 100.0 };
     let frame = ShowFrame { origin, orientation_deg: 0.0 };
-    let to = |z, duration_ms| Segment { duration_ms, path: Path::Line(Vector3::new(0.0, 0.0, z)) };
+    let to = |z, duration_ms| Segment {
+        duration_ms,
+        path: SegmentPath::Line(Vector3::new(0.0, 0.0, z)),
+    };
     let segments = vec![to(20.0, 20_000), to(20.0, 120_000), to(3.0, 20_000)];
     let trajectory = Trajectory { start_m: Vector3::zeros(), segments };
     let mut vehicle = Obliging::new(DRONE, false, frame.to_geodetic(Vector3::zeros()));

@@ -10,7 +10,7 @@ use updraft::analysis::result::{Analysis, FlightAnalysis};
 use updraft::analysis::statistics::{FieldScales, Simulator};
 use updraft::analysis::{AnalysisOptions, FlightInput, LogInput, analyze};
 use updraft::base::rng::{Purpose as Stream, stream};
-use updraft::mission::plan::{Kind, Plan, Purpose};
+use updraft::mission::plan::{Plan, Purpose, SegmentKind};
 use updraft::report::terminal_summary;
 
 const SLOPE: f64 = 25.0;
@@ -40,7 +40,7 @@ fn log(path: &Path, drone: u8, length_s: f64, up: fn(f64) -> f64, air_mps: Vec<f
 fn flown(drones: u8) -> Analysis {
     let folder = tempfile::tempdir().unwrap();
     let mut ladder = plan(Purpose::Calibration, ladder_up_segments(), u16::from(drones));
-    let table = Timetable::default().add(Kind::Hover, "hover", 0.0, HOVER_S as f64);
+    let table = Timetable::default().add(SegmentKind::Hover, "hover", 0.0, HOVER_S as f64);
     let mut hover = plan(Purpose::Measurement, table.segments, u16::from(drones));
     for plan in [&mut ladder, &mut hover] {
         for (index, slot) in plan.slots.iter_mut().enumerate() {

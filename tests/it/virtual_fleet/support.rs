@@ -11,7 +11,7 @@ use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
 use updraft::protocol::show::{FROM_DRONE, SHOW_FILE, StartConfig, Status, TO_DRONE};
 use updraft::show::skyb::{self, SkybOptions};
-use updraft::show::{Path, Segment, ShowDrone, Trajectory};
+use updraft::show::{Segment, SegmentPath, ShowDrone, Trajectory};
 use updraft::sim::{FlightSetup, Hooks, RecordedFlight, Uniform};
 use updraft::vehicle::Vehicle;
 use updraft::vehicle::library::builtin;
@@ -75,10 +75,10 @@ pub(crate) fn log_of(setup: &FlightSetup<'_>, booted: GpsTime) -> Vec<u8> {
 
 /// Climbs at 1 m/s, waits 3 s, and comes down to 2.5 m in 5 s.
 pub(crate) fn show_of([x, y]: [f64; 2], height_m: f64) -> ShowDrone {
-    let at = |z| Path::Line(Vector3::new(x, y, z));
+    let at = |z| SegmentPath::Line(Vector3::new(x, y, z));
     let segments = vec![
         Segment { duration_ms: (height_m * 1000.0) as u32, path: at(height_m) },
-        Segment { duration_ms: 3_000, path: Path::Hold },
+        Segment { duration_ms: 3_000, path: SegmentPath::Hold },
         Segment { duration_ms: 5_000, path: at(height_m.min(2.5)) },
     ];
     let trajectory = Trajectory { start_m: Vector3::new(x, y, 0.0), segments };
@@ -89,7 +89,7 @@ pub(crate) fn show_of([x, y]: [f64; 2], height_m: f64) -> ShowDrone {
 pub(crate) fn sideways() -> ShowDrone {
     let segments = [(10_000, 0.0), (20_000, 20.0)].map(|(duration_ms, x)| Segment {
         duration_ms,
-        path: Path::Line(Vector3::new(x, 0.0, 10.0)),
+        path: SegmentPath::Line(Vector3::new(x, 0.0, 10.0)),
     });
     let trajectory = Trajectory { start_m: Vector3::zeros(), segments: segments.to_vec() };
     ShowDrone { trajectory, ..ShowDrone::default() }
@@ -97,7 +97,8 @@ pub(crate) fn sideways() -> ShowDrone {
 
 /// Up and down between 20 and 60 m at 2 m/s for eight minutes.
 pub(crate) fn ladder([x, y]: [f64; 2]) -> ShowDrone {
-    let to = |z, duration_ms| Segment { duration_ms, path: Path::Line(Vector3::new(x, y, z)) };
+    let to =
+        |z, duration_ms| Segment { duration_ms, path: SegmentPath::Line(Vector3::new(x, y, z)) };
     let mut segments = vec![to(20.0, 10_000)];
     for _ in 0..8 {
         segments.extend([to(60.0, 20_000), to(60.0, 10_000), to(20.0, 20_000), to(20.0, 10_000)]);

@@ -10,7 +10,7 @@ use super::air::Atmosphere;
 use super::autopilot::director::takeoff_time_s;
 use super::autopilot::params as p;
 use super::error::SimError;
-use super::flying::Flight;
+use super::flying::OngoingFlight;
 use super::recorder::{LogRecorder, NoLog, Recorder};
 use crate::effects::Extra;
 use crate::vehicle::Vehicle;
@@ -127,7 +127,7 @@ pub fn fly_beyond<W: Write>(
         .ok_or(SimError::NoTakeoff { drone: setup.drone, height_m: p::SHOW_TAKEOFF_ALT })?;
     let mut recorder =
         LogRecorder::new(out, setup, armed_at_us(takeoff_s), false, None).map_err(log_error)?;
-    let mut flight = Flight::beyond(setup, beyond)?;
+    let mut flight = OngoingFlight::beyond(setup, beyond)?;
     flight.step_until(f64::INFINITY, &mut recorder)?;
     let mut summary = flight.finish()?;
     summary.log_rows = recorder.finish().map_err(log_error)?;
@@ -189,7 +189,7 @@ pub fn fly_with<R: Recorder>(
     setup: &FlightSetup<'_>,
     recorder: &mut R,
 ) -> Result<FlightSummary, SimError> {
-    let mut flight = Flight::new(setup)?;
+    let mut flight = OngoingFlight::new(setup)?;
     flight.step_until(f64::INFINITY, recorder)?;
     flight.finish()
 }

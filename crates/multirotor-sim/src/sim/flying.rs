@@ -31,7 +31,7 @@ const TAIL_S: f64 = 2.0;
 const LANDING_PATIENCE_S: f64 = 120.0;
 
 /// One drone's flight, from arming until a moment after disarming, as far as it has been flown.
-pub struct Flight<'a> {
+pub struct OngoingFlight<'a> {
     setup: FlightSetup<'a>,
     plant_steps: u16,
     impact_mps2: f64,
@@ -51,7 +51,7 @@ pub struct Flight<'a> {
     is_over: bool,
 }
 
-impl<'a> Flight<'a> {
+impl<'a> OngoingFlight<'a> {
     /// Prepares a drone that arms when the firmware does so by itself, before its take-off time.
     ///
     /// # Errors

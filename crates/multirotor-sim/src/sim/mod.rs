@@ -24,5 +24,5 @@ pub use flight::{
     Beyond, FlightSetup, FlightSummary, Hooks, fly, fly_beyond, fly_beyond_to_file, fly_to_file,
     fly_with, fly_without_log,
 };
-pub use flying::Flight;
+pub use flying::OngoingFlight;
 pub use recorded::RecordedFlight;

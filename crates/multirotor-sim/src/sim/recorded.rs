@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::error::SimError;
 use super::flight::{FlightSetup, FlightSummary};
-use super::flying::Flight;
+use super::flying::OngoingFlight;
 use super::recorder::LogRecorder;
 use dataflash::time::GpsTime;
 
@@ -13,7 +13,7 @@ use dataflash::time::GpsTime;
 /// [`super::fly`] writes, if nothing disturbs the flight.
 pub struct RecordedFlight<'a> {
     /// Flight that is recorded.
-    pub flight: Flight<'a>,
+    pub flight: OngoingFlight<'a>,
     recorder: Option<LogRecorder<'a, Tap>>,
     tap: Tap,
     drone: u16,
@@ -46,21 +46,21 @@ impl<'a> RecordedFlight<'a> {
         armed_s: Option<f64>,
         booted: Option<GpsTime>,
     ) -> Result<Self, SimError> {
-        Self::of(setup, Flight::armed(setup, armed_s)?, booted)
+        Self::of(setup, OngoingFlight::armed(setup, armed_s)?, booted)
     }
 
-    /// Prepares a drone that arms at show time 0 in GUIDED, see [`Flight::guided`]; `booted` as in
+    /// Prepares a drone that arms at show time 0 in GUIDED, see [`OngoingFlight::guided`]; `booted` as in
     /// [`Self::armed`].
     ///
     /// # Errors
     /// See [`SimError`].
     pub fn guided(setup: &FlightSetup<'a>, booted: Option<GpsTime>) -> Result<Self, SimError> {
-        Self::of(setup, Flight::guided(setup)?, booted)
+        Self::of(setup, OngoingFlight::guided(setup)?, booted)
     }
 
     fn of(
         setup: &FlightSetup<'a>,
-        flight: Flight<'a>,
+        flight: OngoingFlight<'a>,
         booted: Option<GpsTime>,
     ) -> Result<Self, SimError> {
         let tap = Tap::default();

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use super::curve::Curve;
 use crate::trajectory::Piece;
-use crate::{Path, ShowDrone};
+use crate::{SegmentPath, ShowDrone};
 
 /// Part of a drone's time that lies in one piece (or after the last one) and is either wholly in the
 /// air or wholly on the ground.
@@ -155,8 +155,8 @@ impl<'a> Track<'a> {
             return Some([self.end_m; 2]);
         };
         match piece.path {
-            Path::Hold => Some([piece.from_m; 2]),
-            Path::Line(to_m) => {
+            SegmentPath::Hold => Some([piece.from_m; 2]),
+            SegmentPath::Line(to_m) => {
                 let way = to_m - piece.from_m;
                 let (start_ms, whole_ms) =
                     (piece.start_ms as f64, (piece.end_ms - piece.start_ms) as f64);
@@ -166,7 +166,7 @@ impl<'a> Track<'a> {
                     }),
                 )
             }
-            Path::Cubic(_) | Path::Septic(_) => None,
+            SegmentPath::Cubic(_) | SegmentPath::Septic(_) => None,
         }
     }
 
@@ -210,7 +210,7 @@ pub(super) fn overlap(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::{Path, Segment, Trajectory};
+    use crate::trajectory::{Segment, SegmentPath, Trajectory};
 
     #[test]
     fn spans_change_where_the_drone_leaves_the_ground() {
@@ -218,9 +218,15 @@ mod tests {
             trajectory: Trajectory {
                 start_m: Vector3::zeros(),
                 segments: vec![
-                    Segment { duration_ms: 2_000, path: Path::Hold },
-                    Segment { duration_ms: 10_000, path: Path::Line(Vector3::new(0.0, 0.0, 10.0)) },
-                    Segment { duration_ms: 10_000, path: Path::Line(Vector3::new(0.0, 0.0, 0.1)) },
+                    Segment { duration_ms: 2_000, path: SegmentPath::Hold },
+                    Segment {
+                        duration_ms: 10_000,
+                        path: SegmentPath::Line(Vector3::new(0.0, 0.0, 10.0)),
+                    },
+                    Segment {
+                        duration_ms: 10_000,
+                        path: SegmentPath::Line(Vector3::new(0.0, 0.0, 0.1)),
+                    },
                 ],
             },
             ..ShowDrone::default()

@@ -5,7 +5,7 @@ use super::report::{Collector, Finding, Severity};
 use super::track::name_of;
 use super::{CheckInput, MAX_DRONES};
 use crate::ShowDrone;
-use crate::trajectory::Path;
+use crate::trajectory::SegmentPath;
 use untrusted_io::number::plain;
 
 const CHECK: &str = "validity";
@@ -104,10 +104,10 @@ fn check_drone(index: usize, drone: &ShowDrone, collector: &mut Collector) -> bo
     let mut standing_s = None;
     for piece in drone.trajectory.pieces() {
         let good = match piece.path {
-            Path::Hold => true,
-            Path::Line(to) => sound(to),
-            Path::Cubic(points) => points.iter().all(sound),
-            Path::Septic(points) => points.iter().all(sound),
+            SegmentPath::Hold => true,
+            SegmentPath::Line(to) => sound(to),
+            SegmentPath::Cubic(points) => points.iter().all(sound),
+            SegmentPath::Septic(points) => points.iter().all(sound),
         };
         let start_s = piece.start_ms as f64 / 1000.0;
         if !good {

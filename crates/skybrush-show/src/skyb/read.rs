@@ -7,7 +7,7 @@ use super::units::{to_m, value_count};
 use super::{BlockKind, MAGIC, MAX_FILE, SkybError, TRAJECTORY_HEADER, yaw};
 use crate::bezier::{Scalar, path_through};
 use crate::crc::ApCrc32;
-use crate::{Extras, Path, Segment, ShowDrone, Trajectory};
+use crate::{Extras, Segment, SegmentPath, ShowDrone, Trajectory};
 use untrusted_io::plain::plain;
 
 /// Contents of a `.skyb` file.
@@ -242,9 +242,9 @@ fn trajectory(body: &[u8], offset: usize) -> Result<Flown, SkybError> {
 }
 
 /// One piece; `units` goes from its start to its end.
-fn piece(codes: [u8; 3], values: &[u8], units: &mut [i16; 3], scale_mm: u8) -> Path {
+fn piece(codes: [u8; 3], values: &[u8], units: &mut [i16; 3], scale_mm: u8) -> SegmentPath {
     let degree = match codes.iter().max() {
-        Some(0) | None => return Path::Hold,
+        Some(0) | None => return SegmentPath::Hold,
         Some(1) => 1,
         Some(2) => 3,
         Some(_) => 7,
@@ -270,7 +270,7 @@ fn piece(codes: [u8; 3], values: &[u8], units: &mut [i16; 3], scale_mm: u8) -> P
             point[axis] = *value;
         }
     }
-    path_through(&points[..degree]).unwrap_or(Path::Hold)
+    path_through(&points[..degree]).unwrap_or(SegmentPath::Hold)
 }
 
 fn events(body: &[u8], offset: usize) -> Result<Vec<Event>, SkybError> {

@@ -79,9 +79,9 @@ pub struct SkybCost {
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use skybrush_show::{Path, Segment, ShowDrone, Trajectory, skyb};
+/// use skybrush_show::{SegmentPath, Segment, ShowDrone, Trajectory, skyb};
 ///
-/// let climb = Segment { duration_ms: 10_000, path: Path::Line(Vector3::new(0.0, 0.0, 10.0)) };
+/// let climb = Segment { duration_ms: 10_000, path: SegmentPath::Line(Vector3::new(0.0, 0.0, 10.0)) };
 /// let trajectory = Trajectory { start_m: Vector3::zeros(), segments: vec![climb] };
 /// let drone = ShowDrone { trajectory, ..ShowDrone::default() };
 /// let file = skyb::write(&drone, &skyb::SkybOptions::default())?;

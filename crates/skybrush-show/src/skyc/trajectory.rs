@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::{MAX_COORDINATE_M, MAX_TIME_S};
 use crate::bezier::path_through;
 use crate::number::{push_m, push_ms};
-use crate::{Path, Segment, Trajectory};
+use crate::{Segment, SegmentPath, Trajectory};
 
 /// What is wrong, and where in the object.
 #[derive(Debug, PartialEq)]
@@ -73,7 +73,7 @@ pub(super) fn from_json(trajectory: &Value) -> Result<Trajectory, Problem> {
     }
     let mut segments = Vec::with_capacity(later.len() + 1);
     if let Ok(duration_ms @ 1..) = u32::try_from(takeoff_ms) {
-        segments.push(Segment { duration_ms, path: Path::Hold });
+        segments.push(Segment { duration_ms, path: SegmentPath::Hold });
     }
     let (mut before_ms, mut from_m) = (0_i64, start_m);
     for (index, value) in later.iter().enumerate() {
@@ -154,26 +154,30 @@ pub(super) fn vector(value: &Value) -> Result<Vector3<f64>, String> {
     Ok(vector)
 }
 
-fn path(from_m: Vector3<f64>, to_m: Vector3<f64>, controls: &[Value]) -> Result<Path, String> {
+fn path(
+    from_m: Vector3<f64>,
+    to_m: Vector3<f64>,
+    controls: &[Value],
+) -> Result<SegmentPath, String> {
     let control = |index: usize| {
         let value = controls.get(index).unwrap_or(&Value::Null);
         vector(value).map_err(|problem| format!("control point {}: {problem}", index + 1))
     };
     Ok(match controls.len() {
-        0 if from_m == to_m => Path::Hold,
-        0 => Path::Line(to_m),
+        0 if from_m == to_m => SegmentPath::Hold,
+        0 => SegmentPath::Line(to_m),
         1 => {
             // A quadratic curve as a cubic one, exactly.
             let middle = control(0)?;
-            Path::Cubic([(from_m + middle * 2.0) / 3.0, (middle * 2.0 + to_m) / 3.0, to_m])
+            SegmentPath::Cubic([(from_m + middle * 2.0) / 3.0, (middle * 2.0 + to_m) / 3.0, to_m])
         }
-        2 => Path::Cubic([control(0)?, control(1)?, to_m]),
+        2 => SegmentPath::Cubic([control(0)?, control(1)?, to_m]),
         6 => {
             let mut points = [to_m; 7];
             for (index, point) in points.iter_mut().take(6).enumerate() {
                 *point = control(index)?;
             }
-            path_through(&points).unwrap_or(Path::Hold)
+            path_through(&points).unwrap_or(SegmentPath::Hold)
         }
         count => {
             return Err(format!(
@@ -220,15 +224,15 @@ pub(super) fn to_json(trajectory: &Trajectory) -> Result<String, String> {
         text.push(',');
         push_point(&mut text, piece.end_m()).map_err(fail)?;
         match piece.path {
-            Path::Hold | Path::Line(_) => text.push_str(",[]]"),
-            Path::Cubic([first, second, _]) => {
+            SegmentPath::Hold | SegmentPath::Line(_) => text.push_str(",[]]"),
+            SegmentPath::Cubic([first, second, _]) => {
                 text.push_str(",[");
                 push_point(&mut text, *first).map_err(fail)?;
                 text.push(',');
                 push_point(&mut text, *second).map_err(fail)?;
                 text.push_str("]]");
             }
-            Path::Septic(_) => {
+            SegmentPath::Septic(_) => {
                 return Err(fail(
                     "it is a curve of 7th degree, which Live and Viewer cannot show; use cubic pieces"
                         .to_owned(),

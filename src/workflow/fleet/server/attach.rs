@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::identity::Begun;
 use super::start::Started;
 use super::watch::{attached, watch};
-use super::{Flight, bring_home, connect};
+use super::{ServedFlight, bring_home, connect};
 use crate::base::plain::Shown as _;
 use crate::campaign::FlightFolder;
 use crate::campaign::start::{Flying, StartRecord};
@@ -60,7 +60,7 @@ pub(crate) fn take_over(
     let drones: BTreeMap<u16, String> =
         record.drones.iter().map(|drone| (drone.slot, drone.drone.clone())).collect();
     let mut client = connect(host, address)?;
-    let flight = Flight { address, folder, plan, drones: &drones };
+    let flight = ServedFlight { address, folder, plan, drones: &drones };
     let recorded_s = record.start.to_unix_ms().div_euclid(1000);
     let authorized = client.authorized()?;
     if let Some(other) = authorized.filter(|it| !is_of(*it, recorded_s)) {

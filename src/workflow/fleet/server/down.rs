@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::Flight;
+use super::ServedFlight;
 use crate::fleet::abort::Action;
 use crate::fleet::messages;
 use crate::skybrush_server::watch::is_on_ground;
@@ -94,7 +94,7 @@ impl Foreman for Again<'_> {
 pub(super) fn interrupted(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     choice: Choice,
 ) -> WorkflowError {
     host.next_ends();

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::Flight;
+use super::ServedFlight;
 use crate::base::layout;
 use crate::fleet::preflight::{Limits, charge_needed};
 use crate::link::clock::{Micros, S};
@@ -151,7 +151,7 @@ impl fmt::Display for Table {
 pub(super) fn gate(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     step: Step,
     patience: Micros,
 ) -> Result<Table, WorkflowError> {
@@ -188,7 +188,7 @@ pub(super) fn gate(
 }
 
 fn look(
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     status: &BTreeMap<String, Value>,
     first: &BTreeMap<String, Value>,
     step: Step,

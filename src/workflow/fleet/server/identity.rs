@@ -1,7 +1,7 @@
 //! Identity of a flight through a server: recorded when its start is authorized, withdrawn when no
 //! drone took off.
 
-use super::Flight;
+use super::ServedFlight;
 use crate::base::time::GpsTime;
 use crate::campaign::FlightFolder;
 use crate::campaign::start::{Flying, StartRecord, StartedDrone};
@@ -18,7 +18,7 @@ impl Begun {
     /// server, which scales and splits trajectories otherwise than we do: their checksums are not known.
     pub(super) fn write(
         host: &dyn Host,
-        flight: &Flight<'_>,
+        flight: &ServedFlight<'_>,
         unix_s: i64,
     ) -> Result<Self, WorkflowError> {
         let start = GpsTime::from_unix_ms(unix_s * 1000).ok_or_else(|| {

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::Flight;
+use super::ServedFlight;
 use super::gate::{Row, Table, gate};
 use super::upload::Shows;
 use crate::link::clock::{Micros, S};
@@ -24,7 +24,7 @@ pub(super) fn patience(wait_s: f64) -> Micros {
 /// Nothing is sent while a start is authorized: drones may be about to take off.
 pub(super) fn not_authorized_yet(
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
 ) -> Result<(), WorkflowError> {
     if client.authorized()?.is_some() {
         return Err(WorkflowError::Unsafe(format!(
@@ -42,7 +42,7 @@ pub(super) fn not_authorized_yet(
 pub(super) fn load(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     shows: &Shows<'_>,
     wait_s: f64,
 ) -> Result<Result<(), BTreeMap<String, String>>, WorkflowError> {
@@ -77,7 +77,7 @@ fn refusals(host: &dyn Host, table: &Table) -> BTreeMap<String, String> {
 fn enter_show_mode(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
 ) -> Result<(), WorkflowError> {
     let ids: Vec<String> = flight.drones.values().cloned().collect();
     let status = client.status(&ids)?;

@@ -48,7 +48,7 @@ pub(crate) use self::steps::{Status, StatusRow, Uploaded, preflight, status, upl
 const BEYOND_M: f64 = 10.0;
 
 /// A flight through a server.
-struct Flight<'a> {
+struct ServedFlight<'a> {
     /// The server.
     address: &'a str,
     folder: &'a FlightFolder,
@@ -57,7 +57,7 @@ struct Flight<'a> {
     drones: &'a BTreeMap<u16, String>,
 }
 
-impl Flight<'_> {
+impl ServedFlight<'_> {
     /// What a person types to end it.
     fn abort(&self) -> String {
         let Self { address, folder, .. } = self;
@@ -85,7 +85,7 @@ pub(crate) fn fly(
     let shows = Shows::of(plan)?;
     let mut client = connect(host, address)?;
     let drones = assign(host, &mut client, plan, wait_s)?;
-    let flight = Flight { address, folder, plan, drones: &drones };
+    let flight = ServedFlight { address, folder, plan, drones: &drones };
     let not_started = |mut reasons: BTreeMap<String, String>| {
         let drones = drones.iter().map(|(slot, drone)| {
             (*slot, drone.clone(), reasons.remove(drone).into_iter().collect())
@@ -136,10 +136,10 @@ pub(crate) fn fly(
 fn bring_home(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     flown: Ending,
 ) -> Result<(Vec<LogOutput>, Ending), WorkflowError> {
-    let Flight { address, folder, plan, drones } = flight;
+    let ServedFlight { address, folder, plan, drones } = flight;
     let wanted: Vec<(u16, String)> = drones.iter().map(|(slot, id)| (*slot, id.clone())).collect();
     let brought = bring(host, client, address, folder, plan, &wanted, &Wish::default())?;
     sum_up(host, &brought);

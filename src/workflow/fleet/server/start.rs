@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Flight;
+use super::ServedFlight;
 use super::gate::{MOMENT, gate};
 use super::identity::Begun;
 use crate::link::clock::{Micros, S};
@@ -33,7 +33,7 @@ pub(super) struct Started {
 pub(super) fn start(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     lead: &Lead,
 ) -> Result<Started, WorkflowError> {
     let now_us = host.clock().unix_us();
@@ -69,7 +69,7 @@ fn left_s(host: &dyn Host, unix_s: i64) -> f64 {
 fn steps(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     lead: &Lead,
     mut start: StartConfig,
     begun: &mut Option<Begun>,
@@ -122,7 +122,7 @@ fn steps(
 pub(super) fn take_back(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
 ) -> Result<(), WorkflowError> {
     if client.set_start(&StartConfig::none()).is_ok() {
         return Ok(());

@@ -8,7 +8,7 @@ use super::gate::{Table, cells, gate};
 use super::load::{load, patience};
 use super::standing::{assign, standing};
 use super::upload::Shows;
-use super::{Flight, connect};
+use super::{ServedFlight, connect};
 use crate::campaign::FlightFolder;
 use crate::mission::Plan;
 use crate::skybrush_server::Client;
@@ -81,11 +81,11 @@ fn on_slots<T>(
     folder: &FlightFolder,
     plan: &Plan,
     wait_s: f64,
-    step: impl FnOnce(&mut Client, &Flight<'_>) -> Result<T, WorkflowError>,
+    step: impl FnOnce(&mut Client, &ServedFlight<'_>) -> Result<T, WorkflowError>,
 ) -> Result<(BTreeMap<u16, String>, T), WorkflowError> {
     let mut client = connect(host, address)?;
     let drones = assign(host, &mut client, plan, wait_s)?;
-    let done = step(&mut client, &Flight { address, folder, plan, drones: &drones })?;
+    let done = step(&mut client, &ServedFlight { address, folder, plan, drones: &drones })?;
     Ok((drones, done))
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{BEYOND_M, Flight};
+use super::{BEYOND_M, ServedFlight};
 use crate::fleet::fence::fence_of;
 use crate::mission::Plan;
 use crate::show::Show;
@@ -71,7 +71,7 @@ impl<'a> Shows<'a> {
         &self,
         host: &dyn Host,
         client: &mut Client,
-        flight: &Flight<'_>,
+        flight: &ServedFlight<'_>,
     ) -> Result<BTreeMap<String, String>, WorkflowError> {
         let jobs = self.jobs(|slot| flight.drones.get(&slot).cloned())?;
         let mut uploads = Uploads { host, ended: BTreeMap::new() };

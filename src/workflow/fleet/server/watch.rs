@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::Flight;
+use super::ServedFlight;
 use super::down::{LEFT, interrupted};
 use super::start::{Started, take_back};
 use crate::fleet::journal::{Entry, Journal};
@@ -44,7 +44,7 @@ struct Note {
 /// Writes into the journal that a flight was taken over.
 pub(super) fn attached(
     host: &dyn Host,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     start_unix_s: i64,
 ) -> Result<(), WorkflowError> {
     let note = Note { step: "attached", text: format!("start at {start_unix_s} (Unix)") };
@@ -95,7 +95,7 @@ impl Watched {
     }
 
     /// Says how it ended, with names; and the exit code of it.
-    pub(super) fn tell(&self, host: &dyn Host, flight: &Flight<'_>) -> Ending {
+    pub(super) fn tell(&self, host: &dyn Host, flight: &ServedFlight<'_>) -> Ending {
         if self.taken_back {
             host.insist("The start was cancelled elsewhere: no drone takes off");
             return Ending::NoGo;
@@ -137,7 +137,7 @@ impl Watched {
 pub(super) fn watch(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     started: Started,
     on_interrupt: Choice,
 ) -> Result<Watched, WorkflowError> {
@@ -177,7 +177,7 @@ pub(super) fn watch(
 fn look_on(
     host: &dyn Host,
     client: &mut Client,
-    flight: &Flight<'_>,
+    flight: &ServedFlight<'_>,
     start_unix_s: i64,
     attached: bool,
     on_interrupt: Choice,

@@ -20,7 +20,7 @@ use updraft::analysis::{Cause, LawKind, Warning};
 use updraft::base::estimate::Estimate;
 use updraft::base::rng::{self, Purpose as Stream};
 use updraft::flight::{Alignment, Clock, Indicator};
-use updraft::mission::plan::{Kind, Purpose};
+use updraft::mission::plan::{Purpose, SegmentKind};
 use updraft::report::{InputFile, Provenance};
 
 #[allow(unused_imports, reason = "each test binary uses a part")]
@@ -198,9 +198,9 @@ fn calibrated_drone(slot: u16, truth: f64) -> DroneAnalysis {
         let measured = law(v, w) + bias + 0.6 * noise.normal();
         windows.push(WindowStats {
             kind: match v {
-                v if v > 0.0 => Kind::LegUp,
-                v if v < 0.0 => Kind::LegDown,
-                _ => Kind::Hover,
+                v if v > 0.0 => SegmentKind::LegUp,
+                v if v < 0.0 => SegmentKind::LegDown,
+                _ => SegmentKind::Hover,
             },
             label: if v == 0.0 {
                 "hover".to_owned()

@@ -386,11 +386,11 @@ impl<'a> Director<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skybrush_show::{Path, Segment};
+    use skybrush_show::{Segment, SegmentPath};
 
     fn climb(speed_mps: f64, to_m: f64) -> Trajectory {
         let duration_ms = (to_m / speed_mps * 1000.0) as u32;
-        let path = Path::Line(Vector3::new(0.0, 0.0, to_m));
+        let path = SegmentPath::Line(Vector3::new(0.0, 0.0, to_m));
         Trajectory { start_m: Vector3::zeros(), segments: vec![Segment { duration_ms, path }] }
     }
 

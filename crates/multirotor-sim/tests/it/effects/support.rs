@@ -12,7 +12,7 @@ use multirotor_sim::vehicle::Vehicle;
 use multirotor_sim::vehicle::library::builtin;
 use nalgebra::Vector3;
 use skybrush_show::frame::{Geodetic, ShowFrame};
-use skybrush_show::{Path, Segment, Trajectory};
+use skybrush_show::{Segment, SegmentPath, Trajectory};
 
 /// A built-in vehicle without its effects, and then with these choices.
 pub(crate) fn vehicle(name: &str, choices: &[&str]) -> Vehicle {
@@ -123,7 +123,7 @@ pub(crate) fn fly_windows(vehicle: &Vehicle, flight: &Flight) -> Vec<Steady> {
         .iter()
         .map(|(duration_s, height_m)| Segment {
             duration_ms: duration_s * 1000,
-            path: Path::Line(flight.home_m + Vector3::new(0.0, 0.0, *height_m)),
+            path: SegmentPath::Line(flight.home_m + Vector3::new(0.0, 0.0, *height_m)),
         })
         .collect();
     let trajectory = Trajectory { start_m: flight.home_m, segments };

@@ -9,7 +9,7 @@ use multirotor_sim::sim::{FlightSetup, FlightSummary, Hooks, Uniform, fly_with};
 use multirotor_sim::vehicle::library::builtin;
 use nalgebra::Vector3;
 use skybrush_show::frame::{Geodetic, ShowFrame};
-use skybrush_show::{Path, Segment, Trajectory};
+use skybrush_show::{Segment, SegmentPath, Trajectory};
 
 const SPEEDS_MPS: [f64; 7] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5];
 const BASE_M: f64 = 20.0;
@@ -19,21 +19,21 @@ fn ladder(speeds_mps: &[f64]) -> (Trajectory, Vec<(f64, f64)>) {
     let mut segments = Vec::new();
     let mut now_ms = 0;
     let mut legs = Vec::new();
-    let mut add = |segments: &mut Vec<Segment>, duration_ms: u32, path: Path| {
+    let mut add = |segments: &mut Vec<Segment>, duration_ms: u32, path: SegmentPath| {
         segments.push(Segment { duration_ms, path });
         now_ms += duration_ms;
         f64::from(now_ms) / 1000.0
     };
-    let to = |height_m: f64| Path::Line(Vector3::new(0.0, 0.0, height_m));
+    let to = |height_m: f64| SegmentPath::Line(Vector3::new(0.0, 0.0, height_m));
     add(&mut segments, 10_000, to(BASE_M));
-    let mut end_s = add(&mut segments, 10_000, Path::Hold);
+    let mut end_s = add(&mut segments, 10_000, SegmentPath::Hold);
     for &speed in speeds_mps {
         legs.push((end_s, speed));
         add(&mut segments, 20_000, to(BASE_M + 20.0 * speed));
-        end_s = add(&mut segments, 10_000, Path::Hold);
+        end_s = add(&mut segments, 10_000, SegmentPath::Hold);
         legs.push((end_s, -speed));
         add(&mut segments, 20_000, to(BASE_M));
-        end_s = add(&mut segments, 10_000, Path::Hold);
+        end_s = add(&mut segments, 10_000, SegmentPath::Hold);
     }
     add(&mut segments, 8_750, to(2.5));
     (Trajectory { start_m: Vector3::zeros(), segments }, legs)

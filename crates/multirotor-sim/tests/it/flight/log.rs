@@ -11,7 +11,7 @@ use multirotor_sim::vehicle::Vehicle;
 use multirotor_sim::vehicle::library::builtin;
 use nalgebra::Vector3;
 use skybrush_show::frame::{Geodetic, ShowFrame};
-use skybrush_show::{Path, Segment, Trajectory};
+use skybrush_show::{Segment, SegmentPath, Trajectory};
 
 fn vehicle() -> Vehicle {
     builtin("airsim-generic-quad").expect("a built-in vehicle")
@@ -19,17 +19,17 @@ fn vehicle() -> Vehicle {
 
 /// Up to 10 m, a 20 m leg along show x, up 1 m/s, down again, 2.5 m at the end.
 fn short_show(home_m: Vector3<f64>) -> Trajectory {
-    let at = |x: f64, z: f64| Path::Line(home_m + Vector3::new(x, 0.0, z));
+    let at = |x: f64, z: f64| SegmentPath::Line(home_m + Vector3::new(x, 0.0, z));
     let piece = |duration_ms, path| Segment { duration_ms, path };
     Trajectory {
         start_m: home_m,
         segments: vec![
             piece(5_000, at(0.0, 10.0)),
-            piece(5_000, Path::Hold),
+            piece(5_000, SegmentPath::Hold),
             piece(10_000, at(20.0, 10.0)),
-            piece(5_000, Path::Hold),
+            piece(5_000, SegmentPath::Hold),
             piece(10_000, at(20.0, 20.0)),
-            piece(5_000, Path::Hold),
+            piece(5_000, SegmentPath::Hold),
             piece(7_000, at(20.0, 2.5)),
         ],
     }
@@ -279,15 +279,15 @@ fn a_horizontal_step_makes_the_firmwares_transient() {
     // Measured on the firmware: 0 to 1 m/s at most 0.37-0.43 m, 0 to 3.5 m/s 2.15-2.26 m.
     let (vehicle, air) = (vehicle(), Uniform::default());
     for (speed, low_m, high_m) in [(1.0, 0.3, 0.6), (3.5, 1.6, 2.8)] {
-        let at = |x: f64, z: f64| Path::Line(Vector3::new(x, 0.0, z));
+        let at = |x: f64, z: f64| SegmentPath::Line(Vector3::new(x, 0.0, z));
         let piece = |duration_ms, path| Segment { duration_ms, path };
         let trajectory = Trajectory {
             start_m: Vector3::zeros(),
             segments: vec![
                 piece(10_000, at(0.0, 10.0)),
-                piece(5_000, Path::Hold),
+                piece(5_000, SegmentPath::Hold),
                 piece(10_000, at(10.0 * speed, 10.0)),
-                piece(5_000, Path::Hold),
+                piece(5_000, SegmentPath::Hold),
                 piece(7_500, at(10.0 * speed, 2.5)),
             ],
         };
@@ -310,7 +310,7 @@ proptest::proptest! {
         drone in 0_u16..=u16::MAX,
     ) {
         let home = Vector3::new(1.0, -2.0, ground);
-        let at = |x: f64, z: f64| Path::Line(home + Vector3::new(x, 0.0, z));
+        let at = |x: f64, z: f64| SegmentPath::Line(home + Vector3::new(x, 0.0, z));
         let piece = |metres: f64, path| {
             Segment { duration_ms: (metres / speed * 1000.0) as u32 + 1, path }
         };
@@ -318,9 +318,9 @@ proptest::proptest! {
             start_m: home,
             segments: vec![
                 piece(height, at(0.0, height)),
-                Segment { duration_ms: 8_000, path: Path::Hold },
+                Segment { duration_ms: 8_000, path: SegmentPath::Hold },
                 piece(side.abs(), at(side, height)),
-                Segment { duration_ms: 3_000, path: Path::Hold },
+                Segment { duration_ms: 3_000, path: SegmentPath::Hold },
                 piece(height - 2.5, at(side, 2.5)),
             ],
         };

@@ -19,7 +19,7 @@ use multirotor_sim::sim::{Atmosphere, Uniform};
 use multirotor_sim::vehicle::library::builtin;
 use nalgebra::{Matrix3, Vector3};
 use skybrush_show::frame::ShowFrame;
-use skybrush_show::{Path, Segment, Trajectory};
+use skybrush_show::{Segment, SegmentPath, Trajectory};
 
 const RATE_HZ: u16 = 400;
 const HOME_AMSL_M: f64 = 190.0;
@@ -29,9 +29,9 @@ const END_S: f64 = 90.0;
 fn trajectory() -> Trajectory {
     let line = |duration_ms, height_m| Segment {
         duration_ms,
-        path: Path::Line(Vector3::new(0.0, 0.0, height_m)),
+        path: SegmentPath::Line(Vector3::new(0.0, 0.0, height_m)),
     };
-    let hold = |duration_ms| Segment { duration_ms, path: Path::Hold };
+    let hold = |duration_ms| Segment { duration_ms, path: SegmentPath::Hold };
     let segments = vec![
         line(10_000, 20.0),
         hold(30_000),

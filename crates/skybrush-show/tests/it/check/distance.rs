@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use skybrush_show::ShowDrone;
 use skybrush_show::check::Limits;
 use skybrush_show::check::{CheckInput, CheckReport, Options, check};
-use skybrush_show::trajectory::{Cursor, Path, Segment, Trajectory};
+use skybrush_show::trajectory::{Cursor, Segment, SegmentPath, Trajectory};
 
 /// A drone that is in the air from the beginning, above a ground far below.
 fn flying(number: usize, start: [f64; 3], segments: Vec<Segment>) -> ShowDrone {
@@ -173,17 +173,17 @@ fn counter_phase_groups_pass_each_other() {
     assert!((approach(&report) - 7.0).abs() < 1e-6, "{report}");
 }
 
-fn path() -> impl Strategy<Value = Path> {
+fn path() -> impl Strategy<Value = SegmentPath> {
     let point = || (-20.0..20.0_f64, -20.0..20.0_f64, 5.0..30.0_f64);
     let points = |count| {
         proptest::collection::vec(point(), count)
             .prop_map(|points| points.into_iter().map(|(x, y, z)| v(x, y, z)).collect::<Vec<_>>())
     };
     prop_oneof![
-        1 => Just(Path::Hold),
-        3 => points(1).prop_map(|p| Path::Line(p[0])),
-        3 => points(3).prop_map(|p| Path::Cubic([p[0], p[1], p[2]])),
-        2 => points(7).prop_map(|p| Path::Septic(Box::new(p.try_into().unwrap()))),
+        1 => Just(SegmentPath::Hold),
+        3 => points(1).prop_map(|p| SegmentPath::Line(p[0])),
+        3 => points(3).prop_map(|p| SegmentPath::Cubic([p[0], p[1], p[2]])),
+        2 => points(7).prop_map(|p| SegmentPath::Septic(Box::new(p.try_into().unwrap()))),
     ]
 }
 

@@ -3,7 +3,7 @@
 use crate::check::support::*;
 use skybrush_show::check::Fence;
 use skybrush_show::check::{CheckInput, CheckReport, Severity, check};
-use skybrush_show::trajectory::{Path, Segment};
+use skybrush_show::trajectory::{Segment, SegmentPath};
 
 fn one(middle: Vec<Segment>, to: (f64, f64)) -> CheckReport {
     run(vec![flight(1, (0.0, 0.0), middle, to)])
@@ -452,8 +452,10 @@ fn starts_that_are_almost_together() {
 fn numbers_that_make_no_sense() {
     assert_eq!(only(&run(vec![]), "validity").message, "the show has no drones");
     let mut broken = calm(2, 7.0, 0.0);
-    broken.trajectory.segments[1] =
-        Segment { duration_ms: 500, path: Path::Septic(Box::new([v(f64::NAN, 0.0, 0.0); 7])) };
+    broken.trajectory.segments[1] = Segment {
+        duration_ms: 500,
+        path: SegmentPath::Septic(Box::new([v(f64::NAN, 0.0, 0.0); 7])),
+    };
     let finding = only(&run(vec![calm(1, 0.0, 0.0), broken]), "validity");
     assert_eq!((finding.drones, finding.time_s), (vec!["Drone 2".to_owned()], Some(20.0)));
 

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use skybrush_show::check::Fence;
 use skybrush_show::check::Limits;
 use skybrush_show::check::{CheckInput, CheckReport, Finding, check};
-use skybrush_show::trajectory::{Path, Segment, Trajectory};
+use skybrush_show::trajectory::{Segment, SegmentPath, Trajectory};
 use skybrush_show::{Show, ShowDrone};
 
 pub fn limits() -> Limits {
@@ -35,15 +35,15 @@ pub fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
 }
 
 pub fn line(duration_ms: u32, x: f64, y: f64, z: f64) -> Segment {
-    Segment { duration_ms, path: Path::Line(v(x, y, z)) }
+    Segment { duration_ms, path: SegmentPath::Line(v(x, y, z)) }
 }
 
 pub fn hold(duration_ms: u32) -> Segment {
-    Segment { duration_ms, path: Path::Hold }
+    Segment { duration_ms, path: SegmentPath::Hold }
 }
 
 pub fn cubic(duration_ms: u32, points: [[f64; 3]; 3]) -> Segment {
-    Segment { duration_ms, path: Path::Cubic(points.map(Vector3::from)) }
+    Segment { duration_ms, path: SegmentPath::Cubic(points.map(Vector3::from)) }
 }
 
 /// A drone that stands at (x, y, 0) and flies these segments.

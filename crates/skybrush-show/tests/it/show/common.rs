@@ -5,7 +5,7 @@ use std::io::{Cursor, Write as _};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use skybrush_show::crc::ap_crc32;
-use skybrush_show::{Path, Segment, ShowDrone, Trajectory};
+use skybrush_show::{Segment, SegmentPath, ShowDrone, Trajectory};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -19,11 +19,11 @@ pub(crate) fn fix_crc(bytes: &mut [u8]) {
 }
 
 pub(crate) fn hold(duration_ms: u32) -> Segment {
-    Segment { duration_ms, path: Path::Hold }
+    Segment { duration_ms, path: SegmentPath::Hold }
 }
 
 pub(crate) fn line(duration_ms: u32, x: f64, y: f64, z: f64) -> Segment {
-    Segment { duration_ms, path: Path::Line(Vector3::new(x, y, z)) }
+    Segment { duration_ms, path: SegmentPath::Line(Vector3::new(x, y, z)) }
 }
 
 pub(crate) fn septic(duration_ms: u32) -> Segment {
@@ -31,7 +31,7 @@ pub(crate) fn septic(duration_ms: u32) -> Segment {
         let v = f64::from(i);
         Vector3::new(v, 2.0 * v, 10.0 - v)
     });
-    Segment { duration_ms, path: Path::Septic(Box::new(points)) }
+    Segment { duration_ms, path: SegmentPath::Septic(Box::new(points)) }
 }
 
 /// Drone 1 of the worked example of the formats note.
@@ -65,10 +65,10 @@ pub(crate) fn trajectory(with_septic: bool) -> impl Strategy<Value = Trajectory>
         let segment = (kinds, 1_u32..200_000, prop::collection::vec(point(reach_m), 7)).prop_map(
             |(kind, duration_ms, points)| {
                 let path = match kind {
-                    0 => Path::Hold,
-                    1 => Path::Line(points[0]),
-                    2 => Path::Cubic([points[0], points[1], points[2]]),
-                    _ => Path::Septic(Box::new(points.try_into().unwrap())),
+                    0 => SegmentPath::Hold,
+                    1 => SegmentPath::Line(points[0]),
+                    2 => SegmentPath::Cubic([points[0], points[1], points[2]]),
+                    _ => SegmentPath::Septic(Box::new(points.try_into().unwrap())),
                 };
                 Segment { duration_ms, path }
             },

@@ -4,7 +4,7 @@ use super::common::{fix_crc, hold, line, septic, trajectory, worked_example};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use skybrush_show::skyb::{self, BlockKind, Scale, SkybOptions};
-use skybrush_show::{Path, Segment, ShowDrone, Trajectory, YawControl};
+use skybrush_show::{Segment, SegmentPath, ShowDrone, Trajectory, YawControl};
 
 /// The 65 bytes that the official server writes for the worked example.
 #[rustfmt::skip]
@@ -119,7 +119,7 @@ fn brings_axes_of_different_degree_to_one_path() {
     assert!(contents.has_trajectory_yaw);
     assert_eq!(contents.scale_mm, 10);
     let trajectory = contents.drone.trajectory;
-    assert!(matches!(trajectory.segments[0].path, Path::Septic(_)));
+    assert!(matches!(trajectory.segments[0].path, SegmentPath::Septic(_)));
     let middle = trajectory.state_at(1.0).position_m;
     // x: (0 + 3*0 + 3*3 + 3) / 8; y: half of 7 m; z: symmetric about 3.5 m.
     assert!((middle - Vector3::new(1.5, 3.5, 3.5)).norm() < 1e-12, "{middle}");
@@ -162,7 +162,7 @@ fn an_axis_that_is_straight_in_a_curve_takes_two_bytes() {
     // y moves evenly, x curves, z stands: 3 + 6 + 2 bytes.
     let points =
         [Vector3::new(0.0, 1.0, 5.0), Vector3::new(3.0, 2.0, 5.0), Vector3::new(3.0, 3.0, 5.0)];
-    let segments = vec![Segment { duration_ms: 4000, path: Path::Cubic(points) }];
+    let segments = vec![Segment { duration_ms: 4000, path: SegmentPath::Cubic(points) }];
     let drone = flying(Vector3::new(0.0, 0.0, 5.0), segments);
     let file = write(&drone);
     assert_eq!(file.trajectory_bytes, 9 + 11);

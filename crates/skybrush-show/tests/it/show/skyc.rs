@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use skybrush_show::frame::{Geodetic, ShowFrame};
 use skybrush_show::skyc::{self, Limits};
 use skybrush_show::{
-    Cue, Extras, FenceZone, Path, Segment, Show, ShowDrone, Trajectory, Validation, YawControl,
+    Cue, Extras, FenceZone, Segment, SegmentPath, Show, ShowDrone, Trajectory, Validation,
+    YawControl,
 };
 
 fn full_show() -> Show {
@@ -26,7 +27,7 @@ fn full_show() -> Show {
     });
     second.trajectory.segments.push(Segment {
         duration_ms: 1001,
-        path: Path::Cubic([
+        path: SegmentPath::Cubic([
             Vector3::new(1.0, 2.0, 3.0),
             Vector3::new(0.1, -0.2, 1.0 / 3.0),
             Vector3::new(4.0, 5.0, 6.0),
@@ -169,7 +170,7 @@ fn a_full_show_comes_back() {
     let bytes = skyc::write(&show).unwrap();
     let mut read = skyc::read(&bytes).unwrap();
     // Thirds of a metre are written to 0.1 µm.
-    let Some(Segment { path: Path::Cubic(points), .. }) =
+    let Some(Segment { path: SegmentPath::Cubic(points), .. }) =
         read.drones[1].trajectory.segments.last_mut()
     else {
         panic!("the cubic piece is lost")
@@ -279,7 +280,7 @@ fn reads_what_other_writers_make() {
         hold(2500),
         Segment {
             duration_ms: 1001,
-            path: Path::Cubic([
+            path: SegmentPath::Cubic([
                 Vector3::new(0.0, 2.0, 2.0),
                 Vector3::new(0.0, 2.0, 5.0),
                 Vector3::new(0.0, 0.0, 9.0),
@@ -289,7 +290,7 @@ fn reads_what_other_writers_make() {
     ];
     assert_eq!(drone.trajectory.segments[..3], expected);
     assert!(
-        matches!(&drone.trajectory.segments[3].path, Path::Septic(points) if points[5].x == 6.0)
+        matches!(&drone.trajectory.segments[3].path, SegmentPath::Septic(points) if points[5].x == 6.0)
     );
 }
 

@@ -1,6 +1,6 @@
 //! Kinds of air that can be asked for by name: their keys, units, bounds and defaults.
 
-/// A key of a [`Kind`], with its unit, bounds and default.
+/// A key of a [`AirKind`], with its unit, bounds and default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
     /// Name of the key, as in `sd=0.5`.
@@ -28,7 +28,7 @@ pub enum Preset {
 
 /// A kind of air and its keys.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Kind {
+pub struct AirKind {
     /// Name of the kind, as in `field:sd=0.5`.
     pub name: &'static str,
     /// Description of the kind of air, for people.
@@ -61,9 +61,9 @@ const W_STAR: Key = key("w_star", "m/s", Value(2.0), (0.0, 10.0), "convective ve
 const ZI: Key = key("zi", "m", Value(1_400.0), (100.0, 6_000.0), "height of the inversion");
 
 /// Kinds of air, in the order of the help text.
-pub const KINDS: &[Kind] = &[
-    Kind { name: "still", help: "no motion", keys: &[] },
-    Kind {
+pub const KINDS: &[AirKind] = &[
+    AirKind { name: "still", help: "no motion", keys: &[] },
+    AirKind {
         name: "uniform",
         help: "the same everywhere and always",
         keys: &[
@@ -72,12 +72,12 @@ pub const KINDS: &[Kind] = &[
             key("up", "m/s", Value(0.0), (-20.0, 20.0), "velocity upwards"),
         ],
     },
-    Kind {
+    AirKind {
         name: "wind",
         help: "the same horizontal wind everywhere and always",
         keys: &[key("speed", "m/s", Required, SPEED, "wind speed"), FROM],
     },
-    Kind {
+    AirKind {
         name: "profile",
         help: "wind that grows with height: logarithmic, or a power law if alpha is given",
         keys: &[
@@ -88,12 +88,12 @@ pub const KINDS: &[Kind] = &[
             key("alpha", "", Derived("the log law"), (0.0, 0.6), "exponent of the power law"),
         ],
     },
-    Kind {
+    AirKind {
         name: "drone-constant",
         help: "a separate constant updraft for each drone",
         keys: &[key("sd", "m/s", Required, (0.0, 10.0), "standard deviation between drones")],
     },
-    Kind {
+    AirKind {
         name: "thermals",
         help: "thermals after Allen (2006), drifting with the wind",
         keys: &[
@@ -106,7 +106,7 @@ pub const KINDS: &[Kind] = &[
             FROM,
         ],
     },
-    Kind {
+    AirKind {
         name: "lenschow",
         help: "convective turbulence that grows with height (Lenschow 1980), as a random field",
         keys: &[
@@ -126,7 +126,7 @@ pub const KINDS: &[Kind] = &[
             MODES,
         ],
     },
-    Kind {
+    AirKind {
         name: "field",
         help: "random vertical velocity with exponential correlations",
         keys: &[
@@ -140,8 +140,8 @@ pub const KINDS: &[Kind] = &[
             MODES,
         ],
     },
-    Kind { name: "dryden", help: "gusts with the Dryden spectrum", keys: GUST_KEYS },
-    Kind { name: "von-karman", help: "gusts with the von Karman spectrum", keys: GUST_KEYS },
+    AirKind { name: "dryden", help: "gusts with the Dryden spectrum", keys: GUST_KEYS },
+    AirKind { name: "von-karman", help: "gusts with the von Karman spectrum", keys: GUST_KEYS },
 ];
 
 const GUST_KEYS: &[Key] = &[
@@ -159,11 +159,11 @@ const GUST_KEYS: &[Key] = &[
 ];
 
 /// Kind of air by its name; `None` if there is none.
-pub fn kind(name: &str) -> Option<&'static Kind> {
+pub fn kind(name: &str) -> Option<&'static AirKind> {
     KINDS.iter().find(|kind| kind.name == name)
 }
 
-impl Kind {
+impl AirKind {
     /// Key of this kind by its name; `None` if it has none.
     pub fn key(&self, name: &str) -> Option<&'static Key> {
         self.keys.iter().find(|key| key.name == name)

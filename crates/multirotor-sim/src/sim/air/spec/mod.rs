@@ -13,7 +13,7 @@ use thiserror::Error;
 
 pub use build::{Air, build};
 pub use file::{AIR_SCHEMA, builtin_names, from_toml, load};
-pub use kinds::{KINDS, Key, Kind, Preset, help_text, kind};
+pub use kinds::{AirKind, KINDS, Key, Preset, help_text, kind};
 
 use untrusted_io::file::FileError;
 use untrusted_io::plain::plain;
@@ -23,7 +23,7 @@ use untrusted_io::plain::plain;
 /// Its text ([`fmt::Display`]) is what [`FromStr`] reads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AirSpec {
-    kind: &'static Kind,
+    kind: &'static AirKind,
     /// In the kind's order of keys; `None`: not given.
     values: Vec<Option<f64>>,
 }
@@ -134,7 +134,7 @@ impl AirSpec {
     }
 
     /// Kind of air that is specified.
-    pub fn kind(&self) -> &'static Kind {
+    pub fn kind(&self) -> &'static AirKind {
         self.kind
     }
 
