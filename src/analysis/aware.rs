@@ -548,3 +548,19 @@ impl Values<'_> {
         Some([low, high])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn independent_errors_add_as_squares_and_the_common_one_has_its_own_width() {
+        let mut doubts_us = [0.0; DOUBTS];
+        doubts_us[0] = 2.0;
+        doubts_us[DOUBTS - 1] = 3.0;
+        let error =
+            PulseError { basis: [0.0; PARAMETERS], common_us2: 5.0, own_us2: 7.0, doubts_us };
+        let expected = (4.0 * 5.0 + NORMAL * NORMAL * (7.0 + 4.0 + 9.0 + 16.0)).sqrt();
+        assert!((error.half_us(2.0, 4.0) - expected).abs() < 1e-12);
+    }
+}

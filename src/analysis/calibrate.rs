@@ -308,3 +308,31 @@ pub fn flock<'a>(
     let points: Vec<LawPoint> = groups.values().map(average).collect();
     fit_points(&points, options, CalibrationError::NoLadder { rejected: 0, hovers: 0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(scatter_us: f64) -> Vec<LawPoint> {
+        let sign = [1.0, -1.0, -1.0, 1.0, 1.0, -1.0];
+        let point = |index: usize| {
+            let velocity_mps = index as f64 - 2.5;
+            let pulse_us = 1540.0 + 25.0 * velocity_mps + scatter_us * sign[index];
+            LawPoint { velocity_mps, pulse_us, sigma_us: 1.0, velocity_sigma_mps: 0.0 }
+        };
+        (0..6).map(point).collect()
+    }
+
+    #[test]
+    fn the_added_error_explains_the_scatter_and_no_more() {
+        // With equal errors chi² goes as one over their square.
+        let points = points(7.0);
+        let scattered = law::linear(&points, ErrorScale::Unscaled).unwrap().chi2_reduced.unwrap();
+        let expected = (scattered - 1.0).sqrt();
+        let added = added_sigma_us(&points).unwrap();
+        assert!((added - expected).abs() < 1e-3, "{added} {expected}");
+        // One that is below its own error needs none.
+        assert_eq!(added_sigma_us(&self::points(0.5)), Some(0.0));
+        assert_eq!(added_sigma_us(&points[..2]), None, "two points lie on a line");
+    }
+}

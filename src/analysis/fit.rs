@@ -250,6 +250,13 @@ mod tests {
     }
 
     #[test]
+    fn chi_squared_is_the_sum_of_squared_residuals() {
+        let fit = minimize(|p| vec![p[0] - 1.0, p[0] - 4.0, p[0] - 4.0], &[0.0]).unwrap();
+        // At the mean, 3: 4 + 1 + 1.
+        assert!((fit.chi2 - 6.0).abs() < 1e-9 && fit.dof == 2, "{fit:?}");
+    }
+
+    #[test]
     fn a_parameter_that_vanishes_is_still_determined() {
         // Ends within 1e-14 of 0, where a purely relative step would see no change at all.
         let fit = minimize(|p| vec![p[0] + p[1] - 1.0, p[0] - p[1] - 1.0, p[1]], &[3.0, 0.0]);

@@ -429,3 +429,24 @@ fn describe(
         warnings,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_is_the_derivative_of_the_pulse() {
+        let laws = [
+            Law::SignedQuadratic { a: 3.0, u0_us: 1500.0, w_mps: 0.4 },
+            Law::Linear { slope: 25.0, u0_us: 1540.0 },
+        ];
+        for law in laws {
+            for velocity in [-3.0, -0.5, 0.9, 2.0] {
+                let step = 1e-6;
+                let rise = law.pulse_us(velocity + step) - law.pulse_us(velocity - step);
+                let slope = law.slope(velocity);
+                assert!((slope - rise / (2.0 * step)).abs() < 1e-4, "{law:?} at {velocity}");
+            }
+        }
+    }
+}

@@ -47,3 +47,21 @@ impl Shape {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_is_the_derivative_of_the_pulse() {
+        let law = [1540.0, 25.0, 0.7, -0.3];
+        for shape in [Shape::Line, Shape::SignedQuadratic] {
+            for air in [-2.0, -0.4, 0.3, 3.0] {
+                let step = 1e-6;
+                let rise = shape.pulse_us(&law, air + step) - shape.pulse_us(&law, air - step);
+                let slope = shape.slope(&law, air);
+                assert!((slope - rise / (2.0 * step)).abs() < 1e-3, "{shape:?} at {air}: {slope}");
+            }
+        }
+    }
+}

@@ -267,10 +267,14 @@ fn steady_runs(desired: &Series) -> Vec<Run> {
 fn flies(flight: &Flight, run: &Run) -> bool {
     let middle = f64::midpoint(run.start_s, run.end_s);
     let armed = flight.armed_s.iter().any(|(start, end)| (*start..=*end).contains(&middle));
-    let effort = flight.effort.values.between(run.start_s, run.end_s);
-    // Standing, the motors idle well below the lowest output in flight.
-    let spins = flight.effort.indicator != Indicator::Pulse
-        || mean(effort) > flight.pulse_limits_us.0 - QUANTUM_US;
+    // Standing, the motors idle well below the lowest output in flight. That is seen in the pulses,
+    // whatever the flight's effort is read by.
+    let pulses = match flight.effort.indicator {
+        Indicator::Pulse => &flight.effort.values,
+        Indicator::RotorSpeed | Indicator::Power => &flight.pulse_max_us,
+    };
+    let spins =
+        mean(pulses.between(run.start_s, run.end_s)) > flight.pulse_limits_us.0 - QUANTUM_US;
     (armed || flight.armed_s.is_empty()) && spins
 }
 
@@ -459,4 +463,31 @@ fn time_offset_s(flight: &Flight, targets: &[Target]) -> Option<f64> {
     let (least, most) = extent(&offsets)?;
     let median = upper_median(offsets)?;
     (most - least <= OFFSET_SPREAD_S && median.abs() >= OFFSET_MIN_S).then_some(median)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_leaning_drone_needs_less_pulse_upright() {
+        let tilt = 8.0_f64.to_radians();
+        let cos = tilt.cos();
+        let paper = Tilt::Paper.correct(1546.0, tilt, Indicator::Pulse, 1.0);
+        assert!((paper - 1546.0 * cos).abs() < 1e-9);
+        // The thrust is that of the pulse beyond 1000 us.
+        let thrust = Tilt::Thrust.correct(1546.0, tilt, Indicator::Pulse, 0.5);
+        assert!((thrust - (1000.0 + 546.0 * cos.sqrt())).abs() < 1e-9, "{thrust}");
+        assert_eq!(Tilt::Thrust.correct(1546.0, 0.0, Indicator::Pulse, 0.5), 1546.0);
+    }
+
+    #[test]
+    fn beside_the_log_its_last_and_first_values_hold_for_a_gap() {
+        let series = Series { time_s: vec![10.0, 10.5, 11.0], value: vec![1.0, 2.0, 5.0] };
+        assert_eq!(nearby(&series, 10.25), Some(1.5));
+        assert_eq!(nearby(&series, 11.0 + 0.5 * GAP_S), Some(5.0));
+        assert_eq!(nearby(&series, 10.0 - 0.5 * GAP_S), Some(1.0));
+        assert_eq!(nearby(&series, 11.0 + 1.5 * GAP_S), None);
+        assert_eq!(nearby(&series, 10.0 - 1.5 * GAP_S), None);
+    }
 }

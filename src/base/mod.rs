@@ -11,5 +11,5 @@ pub mod sentence;
 
 pub use dataflash::time;
 pub use multirotor_sim::{air, rng};
-pub use skybrush_show::{crc, frame};
-pub use untrusted_io::{file, number, parse, plain, private};
+pub use skybrush_show::frame;
+pub use untrusted_io::{crc, file, number, parse, plain, private};

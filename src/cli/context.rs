@@ -57,8 +57,11 @@ impl Default for RunClock {
 impl RunClock {
     #[cfg(debug_assertions)]
     fn of(global: &Global) -> Self {
-        let trial = global.trial_clock.clone();
-        trial.map_or_else(Self::default, |clock| Self(Arc::new(clock)))
+        let shared = global.shared_clock.clone();
+        shared.map_or_else(Self::default, |clock| {
+            clock.join();
+            Self(Arc::new(clock))
+        })
     }
 
     #[cfg(not(debug_assertions))]

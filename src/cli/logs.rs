@@ -231,7 +231,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
             )?;
             let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
             let rows = pull_through(context, &address, &folder, &plan, slots, &wish, wait_s)?;
-            let lost = rows.iter().filter(|row| row.state == "missing").map(|row| row.slot);
+            let lost = rows.iter().filter(|row| row.is_missing()).map(|row| row.slot);
             let lost: Vec<u16> = lost.collect();
             return end_pull(context, args, &plan, rows, &lost);
         }
@@ -242,7 +242,7 @@ fn pull(context: &Context, args: &PullArgs) -> Result<Exit, CommandError> {
     let (slots, wait_s) = (args.slots.as_ref(), args.connect.wait);
     let brought = logs::pull(context, &mut crew, slots, wait_s, &wish)?;
     let lost: Vec<u16> =
-        brought.iter().filter(|one| one.state == "missing").map(|one| one.slot).collect();
+        brought.iter().filter(|one| one.is_missing()).map(|one| one.slot).collect();
     end_pull(context, args, &plan, brought, &lost)
 }
 

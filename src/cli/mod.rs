@@ -3,8 +3,6 @@
 mod analyze;
 mod blind;
 mod check;
-#[cfg(debug_assertions)]
-mod clock;
 mod context;
 mod effects;
 mod effects_plot;
@@ -38,6 +36,8 @@ use context::{Context, complain};
 use exit::{CommandError, Exit, exit_of};
 
 use crate::base::plain::{for_terminal, plain};
+#[cfg(debug_assertions)]
+use crate::workflow::clock::SharedClock;
 
 /// Measure the vertical motion of the air with a swarm of show drones.
 ///
@@ -101,10 +101,10 @@ pub struct Global {
         hide_env_values = true
     )]
     no_progress: bool,
-    /// For tests: what goes through Skybrush Server goes by this clock
+    /// For tests: the clock that all programs of a test share
     #[cfg(debug_assertions)]
-    #[arg(long, global = true, hide = true, value_parser = clock::TrialClock::parse)]
-    trial_clock: Option<clock::TrialClock>,
+    #[arg(long, global = true, hide = true, value_name = "UNIX_S:FILE")]
+    shared_clock: Option<SharedClock>,
 }
 
 /// When to use colours.

@@ -47,7 +47,7 @@ pub enum Format {
     Plan,
     /// campaign.json
     Campaign,
-    /// logs/flight.json
+    /// simulated/flight.json
     Flight,
     /// analysis.json
     Analysis,

@@ -226,38 +226,12 @@ mod tests {
     use super::super::candidates::Variant;
     use super::super::data::Data;
     use super::super::search::round;
-    use super::super::trial;
+    use super::super::trial::{self, ranked};
     use super::*;
 
     fn found(data: &Data) -> (Found, Comparison) {
         let comparison = trial::comparison(data);
-        let vehicle = comparison.vehicle.clone();
-        let found = Found {
-            vehicle,
-            comparison: comparison.clone(),
-            extras: Vec::new(),
-            felt: Vec::new(),
-            parameters: Vec::new(),
-            values: Vec::new(),
-            hyper: Hyper::default(),
-            gusts_mps: 0.0,
-            steps: Vec::new(),
-            rest: super::super::verdict::Rest::default(),
-        };
-        (found, comparison)
-    }
-
-    fn ranked(candidate: usize, gain: f64) -> Ranked {
-        Ranked {
-            candidate,
-            variant: 0,
-            gain,
-            beta: 1.0,
-            size_us: 3.0,
-            range_us: 3.0,
-            hyper: Hyper::default(),
-            fitted: true,
-        }
+        (Found::nothing(comparison.clone()), comparison)
     }
 
     #[test]

@@ -198,7 +198,7 @@ mod tests {
     use super::super::candidates::{Candidate, Size, Variant};
     use super::super::gls::{Pulses, Split};
     use super::super::noise::{GroupPattern, Hyper};
-    use super::super::trial::{patterns, pulses};
+    use super::super::trial::{patterns, pulses, ranked};
     use super::*;
 
     const MATERIAL_US: f64 = 2.5;
@@ -258,19 +258,6 @@ mod tests {
             }
         }
         Case { groups, pulses, library, generics }
-    }
-
-    fn ranked(candidate: usize, gain: f64) -> Ranked {
-        Ranked {
-            candidate,
-            variant: 0,
-            gain,
-            beta: 1.0,
-            size_us: 3.0,
-            range_us: 3.0,
-            hyper: Hyper::default(),
-            fitted: true,
-        }
     }
 
     fn free(generic: usize, gain: f64) -> RankedGeneric {

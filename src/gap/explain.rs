@@ -79,6 +79,24 @@ pub struct Found {
     pub rest: Rest,
 }
 
+impl Found {
+    /// What is known before the search: the vehicle as it is.
+    pub(super) fn nothing(comparison: Comparison) -> Self {
+        Self {
+            vehicle: comparison.vehicle.clone(),
+            comparison,
+            extras: Vec::new(),
+            felt: Vec::new(),
+            parameters: Vec::new(),
+            values: Vec::new(),
+            hyper: Hyper::default(),
+            gusts_mps: 0.0,
+            steps: Vec::new(),
+            rest: Rest::default(),
+        }
+    }
+}
+
 /// Runs the loop on the drones that are to be fitted.
 ///
 /// # Errors
@@ -91,18 +109,7 @@ pub fn search(
     options: &Options,
 ) -> Result<Found, GapError> {
     let comparison = Comparison::new(data, vehicle, simulated, plan)?;
-    let found = Found {
-        vehicle: comparison.vehicle.clone(),
-        comparison: comparison.clone(),
-        extras: Vec::new(),
-        felt: Vec::new(),
-        parameters: Vec::new(),
-        values: Vec::new(),
-        hyper: Hyper::default(),
-        gusts_mps: 0.0,
-        steps: Vec::new(),
-        rest: Rest::default(),
-    };
+    let found = Found::nothing(comparison.clone());
     let refused = Vec::new();
     let mut search =
         Search { data, vehicle, simulated, plan, options, comparison, found, refused, last: None };

@@ -3,8 +3,9 @@
 use super::bins::{Bin, BinValues};
 use super::compare::{Comparison, Simulated};
 use super::data::{Data, Group};
-use super::noise::GroupPattern;
+use super::noise::{GroupPattern, Hyper};
 use super::response::Response;
+use super::search::Ranked;
 use crate::effects::{Model, Signals};
 use crate::mission::plan::SegmentKind;
 use crate::vehicle::Vehicle;
@@ -95,4 +96,18 @@ pub(super) fn pulses(patterns: &[GroupPattern]) -> Vec<Vec<Vec<f64>>> {
     let drones =
         |group: usize| (0..patterns[group].drones).map(|drone| bins(group, drone)).collect();
     (0..patterns.len()).map(drones).collect()
+}
+
+/// A candidate with what it gains, nats.
+pub(super) fn ranked(candidate: usize, gain: f64) -> Ranked {
+    Ranked {
+        candidate,
+        variant: 0,
+        gain,
+        beta: 1.0,
+        size_us: 3.0,
+        range_us: 3.0,
+        hyper: Hyper::default(),
+        fitted: true,
+    }
 }

@@ -28,6 +28,10 @@ pub struct Needs {
     pub battery_percent: f64,
 }
 
+/// Obstacle to the start of a drone whose arming checks fail; the server keeps their reasons apart
+/// ([`Client::arming_checks`](super::Client::arming_checks)).
+pub const FAILS_ARMING_CHECKS: &str = "fails its arming checks";
+
 /// The server's words of a drone that waits for its authorization ...
 const NOT_AUTHORIZED: &str = "Not authorized to start";
 /// ... of one that waits for a start time, ...
@@ -68,7 +72,7 @@ pub fn obstacles(state: &State, step: Step, now_unix_s: f64, needs: &Needs) -> V
         found.push(format!("has: {} (code {code})", code_name(*code)));
     }
     if has(3) {
-        found.push("fails its arming checks".to_owned());
+        found.push(FAILS_ARMING_CHECKS.to_owned());
     }
     match state.fix {
         None => found.push("does not report its GPS".to_owned()),

@@ -11,6 +11,7 @@ pub mod gate;
 pub mod lines;
 mod logs;
 pub mod message;
+pub mod refusal;
 mod show;
 pub mod state;
 mod upload;

@@ -288,19 +288,29 @@ fn run<'w>(
         let until = arrives.unwrap_or(Micros::MAX).max(begun + TRANSFER_ROUND).min(begun + round);
         let left = until.saturating_sub(clock.now());
         // The last sleep of a round looks for requests: an exchange of short packets is quick.
-        wait(&posts, broadcasts, clock, left);
+        wait(&posts, broadcasts, running, clock, left);
     }
     posts.into_iter().map(|post| post.vehicle).collect()
 }
 
 /// Sleeps, but not for longer than nothing comes.
-fn wait(posts: &[Post<'_>], broadcasts: Option<&Broadcasts>, clock: &dyn Clock, left: Micros) {
+fn wait(
+    posts: &[Post<'_>],
+    broadcasts: Option<&Broadcasts>,
+    running: &Running,
+    clock: &dyn Clock,
+    left: Micros,
+) {
     let until = clock.now() + left;
-    while clock.now() < until {
-        std::thread::sleep(Duration::from_micros(MS.min(left)));
-        if posts.iter().any(Post::has_mail) || broadcasts.is_some_and(Broadcasts::has_mail) {
-            return;
-        }
+    let mut is_over = false;
+    while !is_over && clock.now() < until {
+        clock.wait(Duration::from_micros(left), &mut |longest| {
+            std::thread::sleep(longest.min(Duration::from_micros(MS)));
+            is_over = running.end.load(Ordering::Relaxed)
+                || posts.iter().any(Post::has_mail)
+                || broadcasts.is_some_and(Broadcasts::has_mail);
+            is_over
+        });
     }
 }
 

@@ -1,11 +1,12 @@
 //! Clocks and durations. The program that runs a workflow provides the clock ([`Host::clock`]):
-//! [`SystemClock`], if it needs no other.
+//! [`SystemClock`], if it needs no other, or [`SharedClock`] in tests.
 
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
 use super::host::Host;
+pub use super::shared_clock::SharedClock;
 pub use crate::link::clock::{Clock, MS, Micros, S, SystemClock};
 
 /// Stopwatch for a step, by the host's clock; printed as [`Spent`].
@@ -89,6 +90,10 @@ impl Clock for SinceNow {
 
     fn pause(&self, time: Duration) {
         self.clock.pause(time);
+    }
+
+    fn wait(&self, time: Duration, look: &mut dyn FnMut(Duration) -> bool) {
+        self.clock.wait(time, look);
     }
 
     fn waited(&self, time: Duration) {

@@ -48,6 +48,7 @@ pub mod physics;
 pub mod plan;
 mod provenance;
 pub mod run;
+mod shared_clock;
 pub mod shows;
 pub mod simulate;
 pub mod slots;

@@ -1,4 +1,4 @@
-//! Says what is in a log and what of it is damaged: `cargo run --example damage -- LOG.BIN`.
+//! Says what is in a log and what of it is damaged: `cargo run -p dataflash --example damage -- LOG.BIN`.
 
 use std::error::Error;
 use std::io::{Write as _, stdout};

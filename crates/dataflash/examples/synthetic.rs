@@ -1,4 +1,4 @@
-//! Writes a log with a minute of attitude: `cargo run --example synthetic -- OUT.BIN`.
+//! Writes a log with a minute of attitude: `cargo run -p dataflash --example synthetic -- OUT.BIN`.
 
 use std::error::Error;
 use std::fs::File;

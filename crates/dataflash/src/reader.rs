@@ -154,6 +154,25 @@ impl Log {
     /// Reads the wanted columns in one pass; one table per entry of `wanted`, in its order.
     ///
     /// Damage is never an error: what is readable is read, the rest is in the [`ScanStats`].
+    ///
+    /// ```
+    /// use dataflash::{Log, LogWriter, Select, Value, catalog};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let mut writer = LogWriter::new(Vec::new(), &[&catalog::MSG])?;
+    /// for (time_us, text) in [(1_000, "armed"), (2_000, "landed")] {
+    ///     writer.row(&catalog::MSG, &[Value::Int(time_us), Value::Text(text)])?;
+    /// }
+    /// let mut bytes = writer.finish()?;
+    /// // The drone lost power while it wrote the last row.
+    /// bytes.truncate(bytes.len() - 3);
+    ///
+    /// let (tables, damage) = Log::from_bytes(bytes).select(&[Select { message: "MSG", fields: &["Message"] }]);
+    /// assert_eq!(tables[0].text("Message").unwrap(), ["armed"]);
+    /// assert!(damage.truncated_bytes > 0 && damage.bad_bytes == 0);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn select(&self, wanted: &[Select<'_>]) -> (Vec<Table>, ScanStats) {
         let (notes, scan) = self.walk(|| Notes::new(wanted));
         (notes.tables(&scan.units), scan.stats)

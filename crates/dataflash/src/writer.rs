@@ -30,6 +30,19 @@ pub enum Value<'a> {
 /// Writes a DataFlash log.
 ///
 /// Rows are buffered: a log is whole only after [`LogWriter::finish`].
+///
+/// A row has a value for each field of its message, and values of the wrong kind are refused:
+///
+/// ```
+/// use dataflash::{LogWriter, Value, catalog};
+///
+/// # fn main() -> std::io::Result<()> {
+/// let mut writer = LogWriter::new(Vec::new(), &[&catalog::MSG])?;
+/// assert!(writer.row(&catalog::MSG, &[Value::Int(1_000)]).is_err());
+/// writer.row(&catalog::MSG, &[Value::Int(1_000), Value::Text("armed")])?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct LogWriter<W: Write> {
     out: W,

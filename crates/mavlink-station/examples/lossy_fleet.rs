@@ -1,5 +1,5 @@
 //! Downloads the logs of nine vehicles over a radio that loses a fifth of all frames, in simulated
-//! time: `cargo run --example lossy_fleet`. No vehicle is needed, and nothing waits.
+//! time: `cargo run -p mavlink-station --example lossy_fleet`. No vehicle is needed, and nothing waits.
 
 use std::collections::BTreeMap;
 use std::error::Error;

@@ -1,5 +1,5 @@
 //! Reads parameters of every vehicle that is heard at an address:
-//! `cargo run --example params -- udpin:0.0.0.0:14550 SYSID_THISMAV BATT_CAPACITY`.
+//! `cargo run -p mavlink-station --example params -- udpin:0.0.0.0:14550 SYSID_THISMAV BATT_CAPACITY`.
 
 use std::error::Error;
 use std::io::{Write as _, stdout};

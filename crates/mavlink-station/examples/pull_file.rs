@@ -1,5 +1,5 @@
 //! Downloads a file of a vehicle by MAVFTP:
-//! `cargo run --example pull_file -- udpin:0.0.0.0:14550 1 @SYS/threads.txt threads.txt`.
+//! `cargo run -p mavlink-station --example pull_file -- udpin:0.0.0.0:14550 1 @SYS/threads.txt threads.txt`.
 
 use std::collections::BTreeMap;
 use std::error::Error;

@@ -339,4 +339,48 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_drone_that_is_heard_but_does_not_obey_is_told_five_times_a_second_for_two_minutes() {
+        let mut abort = Abort::new(DroneId { network: 0, system: 1 }, Action::Land, None);
+        let mut now = 0;
+        let end = loop {
+            match round(&mut abort, now) {
+                // It returns, which is not what it was told.
+                Ok(_) => abort.on_message(now, &beat()),
+                Err(end) => break end,
+            }
+            now += EVERY;
+        };
+        assert_eq!((now, end), (120 * S, Aborted::Unconfirmed { told: 600 }));
+    }
+
+    #[test]
+    fn a_drone_that_was_never_heard_is_given_up_when_the_caller_says_so() {
+        let drone = DroneId { network: 0, system: 1 };
+        let mut abort = Abort::new(drone, Action::Land, None).heard_within(10 * S);
+        for now in (0..10 * S).step_by(EVERY as usize) {
+            assert_eq!(round(&mut abort, now).unwrap().len(), 2);
+        }
+        assert_eq!(round(&mut abort, 10 * S), Err(Aborted::Unheard));
+    }
+
+    #[test]
+    fn a_return_that_is_refused_three_times_becomes_a_landing() {
+        let mut abort = Abort::new(DroneId { network: 0, system: 1 }, Action::Return, None);
+        let refused = MavMessage::COMMAND_ACK(dialect::COMMAND_ACK_DATA {
+            command: MavCmd::MAV_CMD_DO_SET_MODE,
+            result: MavResult::MAV_RESULT_FAILED,
+            ..Default::default()
+        });
+        let mode = |sent: &[MavMessage]| match &sent[0] {
+            MavMessage::COMMAND_LONG(long) => long.param2 as u32,
+            other => panic!("{other:?}"),
+        };
+        for second in 0..3 {
+            assert_eq!(mode(&round(&mut abort, second * S).unwrap()), RTL, "{second}");
+            abort.on_message(second * S, &refused);
+        }
+        assert_eq!(mode(&round(&mut abort, 3 * S).unwrap()), LAND);
+    }
 }

@@ -51,3 +51,36 @@ impl Budget {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::clock::{MS, S};
+
+    #[test]
+    fn a_link_carries_its_rate_and_half_a_second_of_idling() {
+        let link = Budget::new(1_000.0);
+        // An hour of idling is worth 500 bytes: the next 600 are on credit, for 100 ms.
+        assert_eq!(link.take(3_600 * S, 400), Ok(()));
+        assert_eq!(link.take(3_600 * S, 200), Ok(()));
+        assert_eq!(link.take(3_600 * S, 1), Err(3_600 * S + 100 * MS + 1));
+        assert_eq!(link.take(3_600 * S + 50 * MS, 1), Err(3_600 * S + 100 * MS + 1));
+        assert_eq!(link.take(3_600 * S + 101 * MS, 1), Ok(()));
+    }
+
+    #[test]
+    fn over_a_minute_no_more_than_the_rate_is_taken() {
+        let link = Budget::new(5_760.0);
+        let (mut now, mut taken) = (0, 0);
+        while now < 60 * S {
+            match link.take(now, 239) {
+                Ok(()) => taken += 239,
+                Err(again) => {
+                    assert!(again > now, "time goes on");
+                    now = again;
+                }
+            }
+        }
+        assert!((60 * 5_760 - 239..=60 * 5_760 + 239).contains(&taken), "{taken}");
+    }
+}

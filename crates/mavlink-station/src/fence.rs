@@ -299,3 +299,108 @@ impl Conversation for PutFence {
         Progress { done: self.read.len() as u64, total }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DRONE: DroneId = DroneId { network: 0, system: 1 };
+
+    fn fence() -> Fence {
+        Fence { corners_1e7: vec![(1, 2), (3, 4), (5, 6)], top_m: 40.0 }
+    }
+
+    fn ack(result: MavMissionResult) -> MavMessage {
+        MavMessage::MISSION_ACK(dialect::MISSION_ACK_DATA {
+            mavtype: result,
+            mission_type: MavMissionType::MAV_MISSION_TYPE_FENCE,
+            ..Default::default()
+        })
+    }
+
+    fn counts(count: u16) -> MavMessage {
+        MavMessage::MISSION_COUNT(dialect::MISSION_COUNT_DATA {
+            count,
+            mission_type: MavMissionType::MAV_MISSION_TYPE_FENCE,
+            ..Default::default()
+        })
+    }
+
+    /// The next message, or how it ends.
+    fn next(put: &mut PutFence, now: Micros) -> Result<MavMessage, Result<(), FenceError>> {
+        match put.poll(now) {
+            Step::Send(message) => Ok(*message),
+            Step::Done(done) => Err(done),
+            Step::Wait(until) => panic!("it waits until {until}"),
+        }
+    }
+
+    #[test]
+    fn another_fence_on_the_drone_is_overwritten_twice_and_then_reported() {
+        let mut put = PutFence::new(DRONE, fence());
+        for round in 1..=ROUNDS {
+            let now = u64::from(round) * 100 * S;
+            let announced = next(&mut put, now).unwrap();
+            assert!(matches!(&announced, MavMessage::MISSION_COUNT(count) if count.count == 3));
+            put.on_message(now, &ack(MavMissionResult::MAV_MISSION_ACCEPTED));
+            let asked = next(&mut put, now).unwrap();
+            assert!(matches!(asked, MavMessage::MISSION_REQUEST_LIST(_)), "{asked:?}");
+            put.on_message(now, &counts(4));
+        }
+        let failed = next(&mut put, 1_000 * S).unwrap_err().unwrap_err();
+        assert_eq!(
+            failed,
+            FenceError::Different { difference: "it has 4 corners, not 3".to_owned() }
+        );
+    }
+
+    #[test]
+    fn a_corner_that_is_read_back_elsewhere_is_noticed() {
+        let mut put = PutFence::new(DRONE, fence());
+        next(&mut put, 0).unwrap();
+        put.on_message(0, &ack(MavMissionResult::MAV_MISSION_ACCEPTED));
+        next(&mut put, 0).unwrap();
+        put.on_message(0, &counts(3));
+        for (seq, x) in [(0, 1), (1, 33)] {
+            let asked = next(&mut put, 0).unwrap();
+            assert!(
+                matches!(&asked, MavMessage::MISSION_REQUEST_INT(request) if request.seq == seq),
+                "{asked:?}"
+            );
+            put.on_message(
+                0,
+                &MavMessage::MISSION_ITEM_INT(dialect::MISSION_ITEM_INT_DATA {
+                    seq,
+                    x,
+                    y: x + 1,
+                    command: MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+                    mission_type: MavMissionType::MAV_MISSION_TYPE_FENCE,
+                    ..Default::default()
+                }),
+            );
+        }
+        let again = next(&mut put, 0).unwrap();
+        assert!(matches!(again, MavMessage::MISSION_COUNT(_)), "it is sent again: {again:?}");
+    }
+
+    #[test]
+    fn a_refusal_is_told_in_the_vehicles_words_and_silence_is_not() {
+        for (result, told) in [
+            (MavMissionResult::MAV_MISSION_NO_SPACE, "no space"),
+            (MavMissionResult::MAV_MISSION_INVALID, "invalid"),
+        ] {
+            let mut put = PutFence::new(DRONE, fence());
+            next(&mut put, 0).unwrap();
+            put.on_message(0, &ack(result));
+            let failed = next(&mut put, 0).unwrap_err();
+            assert_eq!(failed, Err(FenceError::Refused { reason: told.to_owned() }));
+        }
+        let mut put = PutFence::new(DRONE, fence());
+        let tries = u64::from(Patience::default().tries);
+        for try_ in 0..tries {
+            next(&mut put, try_ * UPLOAD_SILENCE).unwrap();
+        }
+        let failed = next(&mut put, tries * UPLOAD_SILENCE).unwrap_err();
+        assert_eq!(failed, Err(FenceError::Silent { doing: "sent" }));
+    }
+}

@@ -87,3 +87,47 @@ impl Conversation for Greet {
         Step::Wait(now)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DRONE: DroneId = DroneId { network: 0, system: 1 };
+
+    /// Number of messages sent until it waits, and until when.
+    fn round(greet: &mut Greet, now: Micros) -> Result<(usize, Micros), Greeted> {
+        let mut sent = 0;
+        loop {
+            match greet.poll(now) {
+                Step::Send(_) => sent += 1,
+                Step::Wait(until) if until > now => return Ok((sent, until)),
+                Step::Wait(_) => {}
+                Step::Done(done) => return Err(done),
+            }
+        }
+    }
+
+    #[test]
+    fn a_vehicle_is_asked_every_second_and_not_for_what_it_has_told() {
+        let mut greet = Greet::new(DRONE);
+        let clock = MavMessage::SYSTEM_TIME(dialect::SYSTEM_TIME_DATA::default());
+        greet.on_message(0, &clock);
+        assert_eq!(round(&mut greet, 0), Ok((2, S)), "the clock may be told at another rate");
+        assert_eq!(round(&mut greet, S / 2), Ok((0, S)));
+        assert_eq!(round(&mut greet, S), Ok((2, 2 * S)), "the version is still unknown");
+        let version = MavMessage::AUTOPILOT_VERSION(dialect::AUTOPILOT_VERSION_DATA::default());
+        greet.on_message(S, &version);
+        assert_eq!(round(&mut greet, S), Err(Greeted { clock: true, version: true }));
+    }
+
+    #[test]
+    fn a_vehicle_that_does_not_answer_is_left_alone_after_ten_seconds() {
+        let mut greet = Greet::new(DRONE);
+        for second in 0..u64::from(TRIES) {
+            assert_eq!(round(&mut greet, second * S), Ok((2, (second + 1) * S)));
+        }
+        let end = u64::from(TRIES) * S;
+        assert!(round(&mut greet, end - 1).is_ok(), "the last answer may still come");
+        assert_eq!(round(&mut greet, end), Err(Greeted::default()));
+    }
+}

@@ -4,7 +4,6 @@ pub mod abort;
 pub mod budget;
 pub mod clear;
 pub mod command;
-pub mod crc;
 pub mod fence;
 pub mod ftp;
 pub mod greet;

@@ -3,10 +3,10 @@
 use super::ftp::put::Put;
 use super::ftp::sum::Sum;
 use super::ftp::{Caller, FtpError};
-use crate::crc::ap_crc32;
 use crate::link::clock::{Micros, S};
 use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::frame::MavMessage;
+use untrusted_io::crc::ap_crc32;
 
 /// Given up after so long without an answer.
 const PATIENCE: Micros = 30 * S;

@@ -1,4 +1,4 @@
-//! Climbs to 100 m in the middle of a thermal and comes down again: `cargo run --example thermal --
+//! Climbs to 100 m in the middle of a thermal and comes down again: `cargo run -p multirotor-sim --example thermal --
 //! OUT.BIN`.
 
 use std::error::Error;

@@ -5,3 +5,6 @@ pub mod effects;
 pub mod rng;
 pub mod sim;
 pub mod vehicle;
+
+/// Their types are part of the interface.
+pub use {dataflash, nalgebra, skybrush_show};

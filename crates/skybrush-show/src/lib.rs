@@ -3,7 +3,6 @@
 mod archive;
 mod bezier;
 pub mod check;
-pub mod crc;
 pub mod csv;
 pub mod derive;
 pub mod frame;

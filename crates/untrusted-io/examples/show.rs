@@ -1,4 +1,4 @@
-//! Prints a text file of a stranger without letting it drive the terminal: `cargo run --example show --
+//! Prints a text file of a stranger without letting it drive the terminal: `cargo run -p untrusted-io --example show --
 //! FILE`.
 
 use std::error::Error;

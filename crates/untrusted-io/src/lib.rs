@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod crc;
 pub mod file;
 pub mod number;
 #[cfg(feature = "parse")]

@@ -161,7 +161,7 @@ fn with_crew(
 
 /// Opens the links and runs a step that flies: `fleet abort` of other terminals is carried out
 /// meanwhile. The step listens for drones itself.
-fn with_desk(
+fn with_orders(
     context: &Context,
     args: &StepArgs,
     body: impl FnOnce(&mut Crew<'_>) -> Result<Exit, CommandError>,
@@ -286,7 +286,7 @@ fn start(context: &Context, args: &StartArgs) -> Result<Exit, CommandError> {
         return dry::start(context, &args.upload.step, args.lead.lead);
     }
     let _lock = lock(context, &args.upload.step.campaign)?;
-    with_desk(context, &args.upload.step, |crew| {
+    with_orders(context, &args.upload.step, |crew| {
         match steps::start(context, crew, args.upload.wish(), &args.lead.lead())? {
             Started::NoGo(table) => tables::preflight(context, &table),
             Started::Flown(ending) => Ok(ending.into()),

@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::connect::Target;
 use super::start::InterruptArgs;
-use super::{StepArgs, dry, server, with_desk};
+use super::{StepArgs, dry, server, with_orders};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::workflow::fleet::server::take_over;
@@ -52,7 +52,7 @@ pub(super) fn run(context: &Context, args: &WatchArgs) -> Result<Exit, CommandEr
         let ending = take_over(context, &address, &folder, &plan, wait_s, on_interrupt, with_logs)?;
         return Ok(ending.into());
     }
-    with_desk(context, &args.step, |crew| {
+    with_orders(context, &args.step, |crew| {
         let on_interrupt = args.interrupt.on_interrupt.into();
         let ending = follow(context, crew, args.step.connect.wait, on_interrupt, !args.no_logs)?;
         Ok(ending.into())

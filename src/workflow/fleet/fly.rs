@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::bring::{Wish, bring};
+use super::bring::{Brought, Wish, bring};
 use super::crew::Crew;
 use super::output::{FlightOutput, LogOutput};
 use super::preflight::PreflightOutput;
@@ -90,7 +90,7 @@ pub(crate) fn fly(
     }
     let brought =
         bring(host, &mut crew.net, crew.folder, crew.plan, &crew.table, &Wish::default())?;
-    let lost = brought.iter().any(|one| one.state == "missing");
+    let lost = brought.iter().any(Brought::is_missing);
     output.logs = brought.iter().map(LogOutput::from).collect();
     Ok((output, if lost { Ending::Losses } else { flown }))
 }

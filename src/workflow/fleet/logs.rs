@@ -1,6 +1,6 @@
 //! Logs on drones, listed and brought home over their own links.
 
-use super::bring::{Brought, Wish, bring};
+use super::bring::{Brought, LogState, Wish, bring};
 use super::crew::Crew;
 use super::output::{ListRow, ListedLog};
 use super::who;
@@ -86,7 +86,7 @@ pub(crate) fn pull(
     let nobody = nobody.into_iter().map(|(slot, why)| Brought {
         slot,
         drone: None,
-        state: "missing",
+        state: LogState::Missing,
         bytes: 0,
         reason: Some(why),
         unchecked: None,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::bring::Brought;
+use super::bring::{Brought, LogState};
 use super::crew::{Crew, Ended};
 use super::preflight::PreflightOutput;
 use crate::link::id::DroneId;
@@ -95,7 +95,8 @@ pub(crate) struct LogOutput {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) drone: Option<String>,
     /// `pulled`, `there` (it had come before) or `missing`.
-    pub(crate) state: &'static str,
+    #[schemars(with = "String")]
+    pub(crate) state: LogState,
     /// Bytes that came.
     pub(crate) bytes: u64,
     /// Why it is missing.
@@ -116,9 +117,14 @@ impl From<&Brought> for LogOutput {
 }
 
 impl LogOutput {
+    /// Whether there is no whole log.
+    pub(crate) fn is_missing(&self) -> bool {
+        self.state == LogState::Missing
+    }
+
     /// Of a log that had come before.
     pub(crate) fn there(slot: u16) -> Self {
-        Self { slot, drone: None, state: "there", bytes: 0, reason: None }
+        Self { slot, drone: None, state: LogState::There, bytes: 0, reason: None }
     }
 }
 

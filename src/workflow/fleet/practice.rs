@@ -16,6 +16,8 @@ use crate::workflow::error::WorkflowError;
 use crate::workflow::host::Host;
 use crate::workflow::words;
 
+/// How often it is looked up whether to stop.
+const LOOK: Duration = Duration::from_millis(100);
 /// Largest log that virtual drones have on their cards, bytes.
 const MOST_LOG: u64 = 1 << 28;
 
@@ -86,7 +88,7 @@ pub(crate) fn serve(
     hangar.serve(stations, broadcasts.as_ref(), &clock, |running| {
         let mut told = false;
         while !host.is_stopped() {
-            std::thread::sleep(Duration::from_millis(100));
+            host.clock().pause(LOOK);
             if running.refused() > 0 && !told {
                 told = true;
                 host.warn(

@@ -47,11 +47,8 @@ pub(crate) fn follow(
     }
     let wish = Wish::default();
     let brought = bring(host, &mut crew.net, crew.folder, crew.plan, &crew.table, &wish)?;
-    let lost: Vec<String> = brought
-        .iter()
-        .filter(|one| one.state == "missing")
-        .map(|one| one.slot.to_string())
-        .collect();
+    let lost: Vec<String> =
+        brought.iter().filter(|one| one.is_missing()).map(|one| one.slot.to_string()).collect();
     match over {
         Some(over) if lost.is_empty() => host.say(&format!("{over}; its logs are downloaded")),
         Some(over) => {

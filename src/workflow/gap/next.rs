@@ -308,7 +308,7 @@ fn notes(
     if !passed_over.is_empty() {
         let names: Vec<&str> = passed_over.iter().map(String::as_str).collect();
         notes.push(format!(
-            "not asked: {}, which at the usual size moves the pulse of such a flight by less than 2.5 us",
+            "not asked: {}: at the usual size too little for such a flight, less than 2.5 us of pulse",
             words::list(&names)
         ));
     }

@@ -14,6 +14,7 @@ use crate::campaign::{FLIGHT_SCHEMA, FlightFolder, FlightRecord, LogRecord, to_j
 use crate::log::{Log, Select};
 use crate::mission::Plan;
 use crate::mission::plan::Slot;
+use crate::sim::recorder::FIRMWARE_MARK;
 use crate::vehicle::Vehicle;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::made_by;
@@ -160,7 +161,7 @@ fn is_of_others(path: &Path) -> bool {
     let (tables, _) = log.select(&[Select { message: "MSG", fields: &["Message"] }]);
     let texts: Vec<&String> =
         tables.iter().filter_map(|table| table.text("Message")).flatten().collect();
-    !texts.is_empty() && !texts.iter().any(|text| text.contains("(updraft)"))
+    !texts.is_empty() && !texts.iter().any(|text| text.contains(FIRMWARE_MARK))
 }
 
 pub(super) fn write_record(

@@ -4,7 +4,7 @@ use updraft::analysis::result::Rejection;
 use updraft::analysis::windows::{
     Target, Tilt, WindowOptions, contradiction, correct_tilt, inferred, measure,
 };
-use updraft::flight::{Effort, Flight, Series};
+use updraft::flight::{Effort, Flight, Indicator, Series};
 use updraft::mission::plan::SegmentKind;
 
 fn series(duration_s: f64, value: impl Fn(f64) -> f64) -> Series {
@@ -107,6 +107,13 @@ fn a_vehicle_that_stands_has_no_windows() {
     let mut standing = flight(|_| 0.0);
     standing.effort.values = series(100.0, |_| 1100.0);
     assert!(inferred(&standing).is_empty());
+    // Also where power is the effort: it flies by its pulses, and stands by them.
+    let power = |pulse_us: f64| Flight {
+        effort: Effort { indicator: Indicator::Power, values: series(100.0, |_| 90.0) },
+        pulse_max_us: series(100.0, |_| pulse_us),
+        ..flight(|_| 0.0)
+    };
+    assert_eq!((inferred(&power(1560.0)).len(), inferred(&power(1110.0)).len()), (1, 0));
     let mut disarmed = flight(|_| 0.0);
     disarmed.armed_s = vec![(0.0, 1.0)];
     assert!(inferred(&disarmed).is_empty());

@@ -5,8 +5,7 @@
 
 use std::fs;
 use std::process::{Command, Stdio};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use updraft::fleet::messages::param_set;
 use updraft::link::address::links;
@@ -14,7 +13,6 @@ use updraft::link::clock::{Micros, S};
 use updraft::link::net::Net as _;
 use updraft::link::station::{Setup, Station};
 
-use crate::cli::drones::Wall;
 use crate::cli::fleet::free_port;
 use crate::cli::guided::{Flight, flown, modes, stage};
 use crate::cli::support::Bench;
@@ -42,16 +40,16 @@ fn in_the_air<'a>(bench: &'a Bench, link: &str, more: &[&str]) -> Flight<'a> {
 }
 
 /// Sets parameters as another station would, that knows nothing of gates.
-#[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
-fn put(station: &str, params: &[(&str, f32)]) {
-    let clock = Arc::new(Wall(Instant::now()));
+fn put(bench: &Bench, station: &str, params: &[(&str, f32)]) {
+    let clock = bench.clock();
     let links = links(&format!("udpin:{station}")).unwrap();
     let mut net = Station::open(Setup { links, key: None, clock }).unwrap();
     let listen = |net: &mut Station, until: Micros| {
         while net.now() < until && net.recv(until).unwrap().is_some() {}
     };
+    let begun = net.now();
     while net.heard().len() < 2 {
-        assert!(net.now() < 20 * S, "nobody is heard");
+        assert!(net.now() < begun + 20 * S, "nobody is heard");
         let until = net.now() + S / 10;
         listen(&mut net, until);
     }
@@ -70,7 +68,7 @@ fn journal(bench: &Bench) -> String {
 
 #[test]
 fn nothing_is_set_on_drones_that_perform_whatever_is_asked() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     let plan = ["plan", "calibration", "--grid", "1x2", "-o", "campaign"];
     bench.expect(0, &[&plan[..], LONG].concat());
     let mut drones = bench.drones();
@@ -84,7 +82,7 @@ fn nothing_is_set_on_drones_that_perform_whatever_is_asked() {
             let mut flight = in_the_air(&bench, &link, &["--no-logs"]);
             flight.signal("-KILL");
             flight.end();
-            put(&station, &[("LOG_FILE_DSRMROT", 0.0), ("BATT_FS_CRT_ACT", 3.0)]);
+            put(&bench, &station, &[("LOG_FILE_DSRMROT", 0.0), ("BATT_FS_CRT_ACT", 3.0)]);
             let changes = fs::read(at("fleet-changes.json")).unwrap();
             let mut said = String::new();
             let mut refused = |code: i32, words: &[&'static str], more: &[&'static str]| {
@@ -129,7 +127,7 @@ fn nothing_is_set_on_drones_that_perform_whatever_is_asked() {
 
 #[test]
 fn no_fence_is_weakened_while_a_drone_of_the_table_is_not_heard() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let mut drones = bench.drones();
     let station = free_port();
@@ -195,7 +193,7 @@ fn what_a_signal_does_in_flight_is_chosen_by_an_option() {
         let mut flight = if stock {
             let mut flight = Flight::of(&bench, &[&flown(&link)[..], &chosen].concat());
             flight.hear("drone 2: armed");
-            std::thread::sleep(Duration::from_secs(4));
+            bench.pause(4);
             flight
         } else {
             in_the_air(&bench, &link, &chosen)
@@ -204,7 +202,7 @@ fn what_a_signal_does_in_flight_is_chosen_by_an_option() {
         assert_eq!(flight.end(), Some(130), "{}", flight.said());
         assert!(flight.said().contains(said), "{}", flight.said());
         if stock {
-            std::thread::sleep(Duration::from_secs(2));
+            bench.pause(2);
         }
         assert_eq!(modes(&bench, &link), wanted, "{choice}, stock: {stock}");
     }

@@ -2,14 +2,14 @@
 //! on the drones.
 
 use std::net::SocketAddr;
-use std::time::{Instant, SystemTime};
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 use updraft::base::time::GpsTime;
 use updraft::campaign::{self, FlightFolder};
 use updraft::fleet::fence::fence_of;
 use updraft::fleet::upload::ShowLoad;
-use updraft::link::clock::{Clock, Micros};
+use updraft::link::clock::Clock;
 use updraft::link::signing::Key;
 use updraft::mission::Plan;
 use updraft::sim::Uniform;
@@ -22,19 +22,6 @@ use updraft::virtual_fleet::world::World;
 
 use crate::cli::support::Bench;
 
-pub(crate) struct Wall(pub(crate) Instant);
-
-impl Clock for Wall {
-    fn now(&self) -> Micros {
-        self.0.elapsed().as_micros() as u64
-    }
-
-    #[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
-    fn unix_us(&self) -> u64 {
-        SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_micros() as u64
-    }
-}
-
 /// Drones of a campaign's flight.
 pub(crate) struct Drones {
     pub(crate) folder: FlightFolder,
@@ -44,8 +31,9 @@ pub(crate) struct Drones {
     pub(crate) faults: Faults,
     /// Parameters that are not as the firmware has them at first.
     pub(crate) params: Vec<(&'static str, f32)>,
-    /// Their seconds per second of the clock on the wall.
+    /// Their seconds per second of the clock.
     pub(crate) speed: f64,
+    clock: Arc<dyn Clock>,
 }
 
 impl Bench {
@@ -60,7 +48,7 @@ impl Bench {
         };
         let setups = plan.slots.iter().map(setup).collect();
         let (key, faults, params, speed) = (None, Faults::default(), Vec::new(), 1.0);
-        Drones { folder, plan, setups, key, faults, params, speed }
+        Drones { folder, plan, setups, key, faults, params, speed, clock: self.clock() }
     }
 }
 
@@ -73,7 +61,6 @@ impl Drones {
     }
 
     /// Runs `body` while the drones look for a station at `station`; then looks at them.
-    #[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
     pub(crate) fn fly<T>(
         &self,
         station: SocketAddr,
@@ -81,7 +68,7 @@ impl Drones {
         look: impl FnOnce(&[VirtualVehicle<'_>]),
     ) -> T {
         let (vehicle, air) = (builtin("airsim-generic-quad").unwrap(), Uniform(Vector3::zeros()));
-        let clock = Wall(Instant::now());
+        let clock = &self.clock;
         let on = GpsTime::from_unix_ms((clock.unix_us() / 1000) as i64).unwrap();
         let world = World::new(&vehicle, &air, self.plan.site.frame(), 7, on);
         let vehicles = self
@@ -101,7 +88,7 @@ impl Drones {
             faults: self.faults,
             seed: 4,
         };
-        let (given, vehicles) = serve(vehicles, &options, &clock, |_| body()).unwrap();
+        let (given, vehicles) = serve(vehicles, &options, &**clock, |_| body()).unwrap();
         look(&vehicles);
         given
     }

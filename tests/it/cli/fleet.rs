@@ -5,7 +5,6 @@
 use std::fs;
 use std::net::UdpSocket;
 use std::process::{Child, Stdio};
-use std::time::Duration;
 
 use crate::cli::support::{Bench, Ended, SHORT};
 
@@ -30,26 +29,25 @@ impl Bench {
         self.expect(0, &[&plan[..], SHORT].concat());
     }
 
+    /// Virtual drones of the folder `drones`.
     pub(crate) fn fleet(&self, station: &str, more: &[&str]) -> Fleet {
         let args = ["fleet", "virtual", "drones", "--station", station];
         // Other tests have fleets at the same time.
         let args = [&args[..], &["--broadcast-port", "0"]].concat();
         let mut command = self.command(&[&args[..], more].concat());
-        Fleet(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
+        Fleet(self.start(command.stdout(Stdio::null()).stderr(Stdio::null())))
     }
 
     /// Pulls until a drone's unfinished log has grown, and is killed then.
     fn killed_pull(&self, args: &[&str]) -> u64 {
         let before = self.bytes_at_home();
         let mut pull = self.command(args);
-        let mut pull = pull.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        let mut waited_ms = 0;
-        while self.bytes_at_home() < before + 100_000 {
-            assert!(waited_ms < 60_000, "nothing came");
+        let mut pull = self.start(pull.stdout(Stdio::null()).stderr(Stdio::null()));
+        let came = self.wait_for(|| {
             assert!(pull.try_wait().unwrap().is_none(), "it ended before it was killed");
-            std::thread::sleep(Duration::from_millis(20));
-            waited_ms += 20;
-        }
+            (self.bytes_at_home() >= before + 100_000).then_some(())
+        });
+        assert!(came.is_some(), "nothing came");
         pull.kill().unwrap();
         assert_eq!(pull.wait().unwrap().code(), None, "killed, not ended");
         self.bytes_at_home()
@@ -63,7 +61,7 @@ impl Bench {
 
 /// Every log but that of drone 3 comes home over a bad link, whatever befalls.
 fn every_log_comes_home(grid: &str, count: u16, rate: &str, after: &str) {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned(grid, "drones");
     bench.planned(grid, "home");
     bench.expect(0, &["simulate", "drones"]);

@@ -32,7 +32,7 @@ fn assert_not_started(vehicle: &VirtualVehicle<'_>) {
 
 #[test]
 fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("2x2", "campaign");
     let mut drones = bench.drones();
     // Drone 2 stands beside drone 1; drone 4 is off its place, but near enough.
@@ -63,7 +63,7 @@ fn drones_on_wrong_and_doubled_slots_are_shown_and_nothing_is_sent() {
 
 #[test]
 fn a_fleet_that_is_not_loaded_is_no_go() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let drones = bench.drones();
     let station = free_port();
@@ -91,7 +91,7 @@ fn a_fleet_that_is_not_loaded_is_no_go() {
 
 #[test]
 fn nobody_starts_a_fleet_without_a_person_or_yes() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let drones = bench.drones();
     let station = free_port();
@@ -121,7 +121,7 @@ fn for_its_owner(key: &std::path::Path) {
 
 #[test]
 fn a_key_that_others_can_read_is_warned_of_and_used() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let key = bench.path("our.key");
     fs::write(&key, "a passphrase of the crew").unwrap();
@@ -145,7 +145,7 @@ fn a_key_that_others_can_read_is_warned_of_and_used() {
 
 #[test]
 fn a_station_with_a_key_refuses_what_is_not_signed_and_says_so() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     fs::write(bench.path("our.key"), "a passphrase of the crew").unwrap();
     for_its_owner(&bench.path("our.key"));
@@ -179,7 +179,7 @@ fn a_station_with_a_key_refuses_what_is_not_signed_and_says_so() {
 
 #[test]
 fn a_station_without_the_drones_key_is_told_to_give_it() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let mut drones = bench.drones();
     drones.key = Some(Key::from_bytes([7; 32]));
@@ -199,7 +199,7 @@ fn a_station_without_the_drones_key_is_told_to_give_it() {
 
 #[test]
 fn two_drones_with_one_system_id_are_reported() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let mut drones = bench.drones();
     drones.setups[1].system = 1;
@@ -231,7 +231,7 @@ fn two_drones_with_one_system_id_are_reported() {
 
 #[test]
 fn the_fence_stays_on_unless_somebody_says_otherwise() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let mut drones = bench.drones();
     let station = free_port();

@@ -9,7 +9,7 @@ use crate::fleet::loaded::{assert_loaded, bad};
 
 #[test]
 fn a_killed_upload_is_run_again_and_every_drone_is_loaded_whole() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("2x3", "campaign");
     let mut drones = bench.drones();
     drones.faults = bad();
@@ -26,16 +26,11 @@ fn a_killed_upload_is_run_again_and_every_drone_is_loaded_whole() {
             // In the midst of the first upload, and of the second.
             for after_s in [3, 8] {
                 let mut killed = bench.command(&upload);
-                let mut killed =
-                    killed.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+                let mut killed = bench.start(killed.stdout(Stdio::null()).stderr(Stdio::null()));
                 // The old values are on the disk before anything is set.
-                let mut waited_ms = 0;
-                while !changes.exists() {
-                    assert!(waited_ms < 60_000, "it does not get to the upload");
-                    std::thread::sleep(Duration::from_millis(50));
-                    waited_ms += 50;
-                }
-                std::thread::sleep(Duration::from_secs(after_s));
+                let there = bench.wait_for(|| changes.exists().then_some(()));
+                assert!(there.is_some(), "it does not get to the upload");
+                bench.clock().pause(Duration::from_secs(after_s));
                 assert!(killed.try_wait().unwrap().is_none(), "it ended before it was killed");
                 killed.kill().unwrap();
                 assert_eq!(killed.wait().unwrap().code(), None, "killed, not ended");

@@ -3,7 +3,6 @@
 #![cfg(unix)]
 
 use std::fs;
-use std::time::Duration;
 
 use crate::cli::fleet::free_port;
 use crate::cli::guided::{Flight, stage};
@@ -26,7 +25,7 @@ fn json(bench: &Bench, path: &str) -> serde_json::Value {
 fn abort(bench: &Bench, link: &str) {
     let mut flight = Flight::of(bench, &fly(link));
     flight.hear("drone 2: armed");
-    std::thread::sleep(Duration::from_secs(4));
+    bench.pause(4);
     bench.expect(0, &["fleet", "abort", "campaign", "--connect", link, "--wait", "10"]);
     assert_eq!(flight.end(), Some(3), "{}", flight.said());
 }
@@ -126,7 +125,7 @@ fn a_start_that_a_signal_or_another_station_took_back_is_no_flight_either() {
 
 #[test]
 fn the_logs_of_one_flight_never_stand_for_those_of_another_that_nobody_flew() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     for folder in ["campaign", "drones"] {
         let hover = ["--grid", "1x2", "--duration", "10", "-o", folder];
         bench.expect(0, &[&["plan", "campaign"][..], SHORT, &hover].concat());
@@ -193,7 +192,7 @@ fn logs_of_an_aborted_flight_that_stay_on_the_drones_are_told() {
     let (bench, _fleet, link) = stage(&["--speed", "10"]);
     let mut flight = Flight::of(&bench, &fly(&link));
     flight.hear("drone 2: armed");
-    std::thread::sleep(Duration::from_secs(4));
+    bench.pause(4);
     flight.signal("-TERM");
     assert_eq!(flight.end(), Some(130), "{}", flight.said());
     let told = "No log of flight 1 (";

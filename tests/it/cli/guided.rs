@@ -5,7 +5,6 @@
 
 use std::fs;
 use std::process::{Child, Command};
-use std::time::{Duration, Instant};
 
 use crate::cli::fleet::{Fleet, free_port};
 use crate::cli::support::{Bench, Ended};
@@ -32,7 +31,7 @@ impl<'a> Flight<'a> {
         let mut command = bench.command(args);
         let err = fs::File::create(bench.path("err.txt")).unwrap();
         let out = fs::File::create(bench.path("out.txt")).unwrap();
-        let child = command.stdout(out).stderr(err).spawn().unwrap();
+        let child = bench.start(command.stdout(out).stderr(err));
         Self { bench, child }
     }
 
@@ -46,14 +45,24 @@ impl<'a> Flight<'a> {
     }
 
     /// Waits until it has said this.
-    #[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
     pub(crate) fn hear(&mut self, text: &str) {
-        let begun = Instant::now();
-        while !self.said().contains(text) {
-            assert!(begun.elapsed() < Duration::from_mins(2), "no {text:?}:\n{}", self.said());
-            assert!(self.child.try_wait().unwrap().is_none(), "it ended:\n{}", self.said());
-            std::thread::sleep(Duration::from_millis(50));
-        }
+        let bench = self.bench;
+        let heard = bench.wait_for(|| {
+            let said = self.said();
+            let ended = self.child.try_wait().unwrap();
+            assert!(
+                ended.is_none() || said.contains(text),
+                "it ended:
+{said}"
+            );
+            said.contains(text).then_some(())
+        });
+        assert!(
+            heard.is_some(),
+            "no {text:?}:
+{}",
+            self.said()
+        );
     }
 
     pub(crate) fn signal(&self, name: &str) {
@@ -61,14 +70,18 @@ impl<'a> Flight<'a> {
         assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
     }
 
-    #[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
     pub(crate) fn end(&mut self) -> Option<i32> {
-        let begun = Instant::now();
-        while self.child.try_wait().unwrap().is_none() {
-            assert!(begun.elapsed() < Duration::from_mins(1), "it goes on:\n{}", self.said());
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        self.child.wait().unwrap().code()
+        let bench = self.bench;
+        let ended = bench.wait_for(|| self.child.try_wait().unwrap());
+        ended
+            .unwrap_or_else(|| {
+                panic!(
+                    "it goes on:
+{}",
+                    self.said()
+                )
+            })
+            .code()
     }
 }
 
@@ -78,7 +91,10 @@ pub(crate) fn flown(link: &str) -> Vec<&str> {
 }
 
 pub(crate) fn stage(more: &[&str]) -> (Bench, Fleet, String) {
-    let bench = Bench::new();
+    stage_on(Bench::with_shared_clock(), more)
+}
+
+pub(crate) fn stage_on(bench: Bench, more: &[&str]) -> (Bench, Fleet, String) {
     bench.planned("1x2", "campaign");
     bench.planned("1x2", "drones");
     let station = free_port();
@@ -123,7 +139,7 @@ fn ctrl_c_sends_guided_drones_home() {
     let (bench, _fleet, link) = stage(&["--stock", "--speed", "5"]);
     let mut flight = Flight::begin(&bench, &link);
     flight.hear("drone 1: armed");
-    std::thread::sleep(Duration::from_secs(4));
+    bench.pause(4);
     flight.signal("-INT");
     assert_eq!(flight.end(), Some(130), "{}", flight.said());
     let said = flight.said();
@@ -156,10 +172,10 @@ fn drones_return_when_their_station_dies() {
     let (bench, _fleet, link) = stage(&["--stock", "--speed", "5"]);
     let mut flight = Flight::begin(&bench, &link);
     flight.hear("drone 1: armed");
-    std::thread::sleep(Duration::from_secs(4));
+    bench.pause(4);
     flight.signal("-KILL");
     assert_eq!(flight.end(), None);
-    std::thread::sleep(Duration::from_secs(2));
+    bench.pause(2);
     assert_eq!(modes(&bench, &link), ["RTL", "RTL"]);
 }
 

@@ -1,11 +1,11 @@
 //! `logs pull` from fleets that are not all there, or not clear.
 
 use std::fs;
-use std::process::Stdio;
 use std::time::Duration;
 
 use crate::cli::fleet::free_port;
-use crate::cli::support::{Bench, Ended};
+use crate::cli::guided::Flight;
+use crate::cli::support::Bench;
 
 impl Bench {
     /// A flown flight, and a campaign of the same plan without logs.
@@ -23,7 +23,7 @@ impl Bench {
 
 #[test]
 fn one_drone_that_is_off_keeps_nobody_elses_log_away() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.flown();
     let station = free_port();
     let link = format!("udpin:{station}");
@@ -56,7 +56,7 @@ fn one_drone_that_is_off_keeps_nobody_elses_log_away() {
 
 #[test]
 fn a_drone_that_is_switched_on_late_is_joined() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.flown();
     let drones: Vec<_> = (1..=4)
         .map(|slot| serde_json::json!({ "slot": slot, "drone": { "network": 0, "system": slot } }))
@@ -67,26 +67,22 @@ fn a_drone_that_is_switched_on_late_is_joined() {
     let link = format!("udpin:{station}");
     let _fleet = bench.fleet(&station, &["--flown", "--gone", "3"]);
     let pull = ["logs", "pull", "home", "--connect", &link, "--wait", "60"];
-    let pull = bench.command(&pull).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut pull = Flight::of(&bench, &pull);
     // The others do not wait for it.
-    let mut waited_ms = 0;
-    while ![1, 2, 4].iter().all(|slot| bench.is_home(*slot)) {
-        assert!(waited_ms < 30_000, "the logs of those that are on do not come");
-        std::thread::sleep(Duration::from_millis(50));
-        waited_ms += 50;
-    }
-    std::thread::sleep(Duration::from_secs(3));
+    let came = || [1, 2, 4].iter().all(|slot| bench.is_home(*slot)).then_some(());
+    assert!(bench.wait_for(came).is_some(), "the logs of those that are on do not come");
+    bench.clock().pause(Duration::from_secs(3));
     let _late = bench.fleet(&station, &["--flown", "--gone", "1,2,4"]);
-    let ended = Ended::of(&pull.wait_with_output().unwrap());
-    assert_eq!(ended.code, Some(0), "{ended}");
-    assert!(ended.err.contains("waiting for drone 3 (slot 3)"), "{ended}");
-    assert!(!ended.err.contains("waiting for drone 1"), "{ended}");
+    assert_eq!(pull.end(), Some(0), "{}", pull.said());
+    let said = pull.said();
+    assert!(said.contains("waiting for drone 3 (slot 3)"), "{said}");
+    assert!(!said.contains("waiting for drone 1"), "{said}");
     assert!(bench.is_home(3));
 }
 
 #[test]
 fn two_drones_on_one_slot_are_refused_by_name_and_the_others_are_not() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("2x2", "campaign");
     let mut drones = bench.drones();
     drones.setups[1].stands_m = drones.setups[0].stands_m;

@@ -3,10 +3,9 @@
 #![cfg(unix)]
 
 use std::fs;
-use std::time::Duration;
 
 use crate::cli::fleet::free_port;
-use crate::cli::guided::{Flight, flown, modes, stage};
+use crate::cli::guided::{Flight, flown, modes, stage, stage_on};
 use crate::cli::support::Bench;
 use crate::cli::terminal::on_a_terminal;
 
@@ -29,7 +28,7 @@ fn an_abort_reaches_the_station_that_watches_a_show() {
     let (bench, _fleet, link) = stage(&["--speed", "5"]);
     let mut flight = Flight::of(&bench, &shown(&link));
     flight.hear("drone 2: armed");
-    std::thread::sleep(Duration::from_secs(4));
+    bench.pause(4);
     let status = bench.expect(1, &ends("status", &link));
     assert!(status.err.contains("held by the command that flies this campaign"), "{status}");
     let ended = bench.expect(0, &ends("abort", &link));
@@ -53,7 +52,7 @@ fn a_landing_of_one_guided_drone_leaves_the_other_flying() {
     let (bench, _fleet, link) = stage(&["--stock", "--speed", "5"]);
     let mut flight = Flight::of(&bench, &flown(&link));
     flight.hear("drone 2: armed");
-    std::thread::sleep(Duration::from_secs(4));
+    bench.pause(4);
     let order = [&ends("land", &link)[..], &["--drones", "2"]].concat();
     let ended = bench.expect(0, &order);
     assert_eq!(ended.out, "drone 2: lands\n", "{ended}");
@@ -87,19 +86,13 @@ fn an_abort_before_the_start_takes_the_start_back_for_everyone() {
     }
 }
 
-/// Waits until a file has this, for two minutes at most.
+/// Waits until a file has this.
 fn wait_for(bench: &Bench, file: &str, text: &str) -> bool {
     let has = || {
         let bytes = fs::read(bench.path(file)).unwrap_or_default();
-        String::from_utf8_lossy(&bytes).contains(text)
+        String::from_utf8_lossy(&bytes).contains(text).then_some(())
     };
-    (0..2400).any(|_| {
-        let there = has();
-        if !there {
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        there
-    })
+    bench.wait_for(has).is_some()
 }
 
 #[test]
@@ -140,7 +133,7 @@ fn an_abort_before_anything_is_loaded_ends_the_flight() {
 
 #[test]
 fn an_order_reaches_the_flight_that_is_in_the_air_whichever_is_named() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     for folder in ["both", "drones"] {
         let plan = ["plan", "campaign", "--grid", "1x2", "--duration", "60", "--speeds", "1"];
         bench.expect(0, &[&plan[..], &["-o", folder]].concat());
@@ -187,7 +180,7 @@ fn a_drone_that_does_not_confirm_is_left_to_its_remote_control_in_time() {
 
 #[test]
 fn a_drone_of_the_flight_that_is_not_heard_is_named() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let mut drones = bench.drones();
     let station = free_port();
@@ -233,7 +226,8 @@ fn a_start_that_was_left_on_drones_stands_in_nobodys_way() {
 
 #[test]
 fn a_station_that_hangs_is_named_and_its_order_is_withdrawn() {
-    let (bench, _fleet, link) = stage(&["--speed", "5"]);
+    // A shared clock would wait for it.
+    let (bench, _fleet, link) = stage_on(Bench::new(), &["--speed", "5"]);
     let mut flight = Flight::of(&bench, &shown(&link));
     flight.hear("Authorized.");
     flight.signal("-STOP");
@@ -241,7 +235,7 @@ fn a_station_that_hangs_is_named_and_its_order_is_withdrawn() {
     assert!(ended.err.contains("no station answered within 3 s"), "{ended}");
     assert!(ended.err.contains("press Ctrl-C"), "{ended}");
     flight.signal("-CONT");
-    std::thread::sleep(Duration::from_secs(2));
+    bench.pause(2);
     assert!(!flight.said().contains("Ordered"), "{}", flight.said());
 }
 
@@ -280,7 +274,7 @@ fn json_is_one_object_however_a_flight_ends() {
 
 #[test]
 fn arguments_are_refused_before_anything_is_sent() {
-    let bench = Bench::new();
+    let bench = Bench::with_shared_clock();
     bench.planned("1x2", "campaign");
     let ended = bench.expect(2, &["fly", "campaign", "--lead", "8"]);
     assert!(ended.err.contains("a lead between 20 and 43200 s"), "{ended}");

@@ -1,16 +1,44 @@
 //! Runs the program in a folder of its own.
 
+use std::fs::File;
+use std::io::{Read as _, Seek as _};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
+use std::sync::Arc;
+use std::time::Duration;
 
 use tempfile::TempDir;
+use updraft::workflow::clock::{Clock, Micros, S, SharedClock, SystemClock};
 
 /// A ladder of two rungs of 6 s, on a grid of two: a second to fly, even in a debug build.
 pub(crate) const SHORT: &[&str] =
     &["--speeds", "1,2", "--leg", "6", "--hover", "4", "--baseline", "10"];
 
+/// Unix time at which the time of a test begins, if it does not take the clock on the wall.
+const BEGINS_UNIX_S: u64 = 1_795_300_000;
+const HOUR: Micros = 3600 * S;
+/// A test looks this often for what it waits for.
+const LOOK: Duration = Duration::from_millis(50);
+
 /// A folder to work in, and the program.
-pub(crate) struct Bench(TempDir);
+pub(crate) struct Bench {
+    folder: TempDir,
+    time: Option<Time>,
+}
+
+/// The clock that a test and its programs share, and the folder of its files.
+struct Time {
+    clock: SharedClock,
+    _folder: TempDir,
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        if let Some(time) = &self.time {
+            time.clock.leave();
+        }
+    }
+}
 
 /// What the program said and how it ended.
 #[derive(Debug)]
@@ -22,11 +50,66 @@ pub(crate) struct Ended {
 
 impl Bench {
     pub(crate) fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
+        Self { folder: tempfile::tempdir().unwrap(), time: None }
+    }
+
+    /// The same with a clock that the test and all its programs share: it goes on only while all of
+    /// them wait. The release build of the program has the clock on the wall only.
+    pub(crate) fn with_shared_clock() -> Self {
+        let mut bench = Self::new();
+        if cfg!(debug_assertions) {
+            let folder = tempfile::tempdir().unwrap();
+            let clock = SharedClock::open(BEGINS_UNIX_S, &folder.path().join("time")).unwrap();
+            clock.join();
+            bench.time = Some(Time { clock, _folder: folder });
+        }
+        bench
+    }
+
+    pub(crate) fn has_shared_clock(&self) -> bool {
+        self.time.is_some()
+    }
+
+    /// The clock of the test's programs.
+    pub(crate) fn clock(&self) -> Arc<dyn Clock> {
+        match &self.time {
+            Some(time) => Arc::new(time.clock.clone()),
+            None => Arc::new(SystemClock::start()),
+        }
+    }
+
+    /// Waits until `found` finds something; for longer than any test takes, `None`.
+    pub(crate) fn wait_for<T>(&self, mut found: impl FnMut() -> Option<T>) -> Option<T> {
+        let longest = if self.has_shared_clock() { HOUR } else { HOUR / 30 };
+        let clock = self.clock();
+        let begun = clock.now();
+        loop {
+            let it = found();
+            if it.is_some() || clock.now() - begun > longest {
+                return it;
+            }
+            clock.pause(LOOK);
+        }
+    }
+
+    /// Waits, s.
+    pub(crate) fn pause(&self, time_s: u64) {
+        self.clock().pause(Duration::from_secs(time_s));
+    }
+
+    /// Starts the program; it takes part in the shared time when this returns, or has ended.
+    pub(crate) fn start(&self, command: &mut Command) -> Child {
+        let mut child = command.spawn().unwrap();
+        if let Some(time) = &self.time {
+            while !time.clock.has_joined(child.id()) && child.try_wait().unwrap().is_none() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        child
     }
 
     pub(crate) fn path(&self, below: &str) -> PathBuf {
-        self.0.path().join(below)
+        self.folder.path().join(below)
     }
 
     /// The program, in the folder, without the caller's environment.
@@ -34,15 +117,33 @@ impl Bench {
         let mut command = Command::new(env!("CARGO_BIN_EXE_updraft"));
         command
             .args(args)
-            .current_dir(self.0.path())
+            .current_dir(self.folder.path())
             .env_remove("NO_COLOR")
             .env_remove("UPDRAFT_NO_PROGRESS")
             .env("COLUMNS", "120");
+        // Drones and station in one program have a time of their own.
+        if let Some(time) = self.time.as_ref().filter(|_| !args.contains(&"sim")) {
+            command.arg("--shared-clock").arg(time.clock.argument());
+        }
         command
     }
 
     pub(crate) fn run(&self, args: &[&str]) -> Ended {
-        Ended::of(&self.command(args).output().unwrap())
+        let mut command = self.command(args);
+        if !self.has_shared_clock() || args.contains(&"sim") {
+            return Ended::of(&command.output().unwrap());
+        }
+        let (mut out, mut err) = (tempfile::tempfile().unwrap(), tempfile::tempfile().unwrap());
+        command.stdout(out.try_clone().unwrap()).stderr(err.try_clone().unwrap());
+        let mut child = self.start(&mut command);
+        let status = self.wait_for(|| child.try_wait().unwrap()).expect("it goes on");
+        let read = |file: &mut File| {
+            let mut bytes = Vec::new();
+            file.rewind().unwrap();
+            file.read_to_end(&mut bytes).unwrap();
+            bytes
+        };
+        Ended::of(&Output { status, stdout: read(&mut out), stderr: read(&mut err) })
     }
 
     /// The same, which must end with this code.

@@ -2,19 +2,19 @@
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 use crate::cli::support::Bench;
 
 /// Runs the program on a terminal and types each answer when it has said what comes before it: its exit
 /// code, and all that the terminal showed. `None`: there is no `script` here.
-#[expect(clippy::disallowed_methods, reason = "the program under test has the real clock")]
 pub(crate) fn on_a_terminal(
     bench: &Bench,
     args: &[&str],
     talk: &[(&str, &str)],
 ) -> Option<(i32, String)> {
-    let words: Vec<String> = args.iter().map(|word| format!("'{word}'")).collect();
+    let program = bench.command(args);
+    let words: Vec<String> =
+        program.get_args().map(|word| format!("'{}'", word.to_str().unwrap())).collect();
     let program = env!("CARGO_BIN_EXE_updraft");
     let line =
         format!("trap : INT; '{program}' {}; echo $?, ended with that code", words.join(" "));
@@ -30,18 +30,14 @@ pub(crate) fn on_a_terminal(
         let text = String::from_utf8_lossy(&bytes).into_owned();
         text.split_once('\n').map(|(_, shown)| shown.to_owned()).unwrap_or_default()
     };
-    let begun = Instant::now();
     let wait = |text: &str| {
-        loop {
+        let seen = bench.wait_for(|| {
             let shown = shown();
-            if shown.contains(text) {
-                return;
-            }
-            let is_there =
-                !shown.contains("ended with ") && begun.elapsed() < Duration::from_mins(2);
-            assert!(is_there, "no {text:?}:\n{shown}");
-            std::thread::sleep(Duration::from_millis(50));
-        }
+            let has = shown.contains(text);
+            assert!(has || !shown.contains("ended with "), "no {text:?}:\n{shown}");
+            has.then_some(())
+        });
+        assert!(seen.is_some(), "no {text:?}:\n{}", shown());
     };
     for (said, typed) in talk {
         wait(said);

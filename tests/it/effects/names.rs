@@ -1,11 +1,10 @@
 //! One effect, one file: no code outside of an effect's own file decides by its name.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot read the sources fails")]
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::house::sources;
 use updraft::effects::LIBRARY;
 
 /// Where effects have their names: their own files, and the tables of what the benchmark hides.
@@ -17,17 +16,6 @@ const TESTS: [&str; 1] = ["src/gap/null_flights.rs"];
 const HELP: [&str; 2] = ["src/cli/effects.rs", "src/cli/blind.rs"];
 /// Files in which a word that is also an effect's name means something else.
 const OTHER: [(&str, &str); 1] = [("src/report/errors.rs", "battery")];
-
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|ending| ending == "rs") {
-            found.push(path);
-        }
-    }
-}
 
 /// The string literals of a source text, without its comments and what follows `#[cfg(test)]`.
 fn literals(text: &str) -> Vec<String> {

@@ -5,10 +5,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::fleet::transfers::{content, drone};
+use crate::fleet::transfers::{content, drone, wanted};
 use updraft::fleet::logs::manifest::{Method, Verified};
 use updraft::fleet::logs::one::{OneDone, OneOptions};
-use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
+use updraft::fleet::logs::pull::{Outcome, PullOptions, pull};
 use updraft::link::clock::{MS, Micros, S};
 use updraft::link::conversation::{NoObserver, Observer, Progress};
 use updraft::link::frame::MavMessage;
@@ -78,16 +78,6 @@ fn limited(bytes_per_s: f64, loss: f64) -> Faults {
 
 /// Of a frame of 90 data bytes (10 header, 7 + 90 payload, 2 checksum).
 const DATA: f64 = 90.0 / 109.0;
-
-fn wanted(count: u8) -> Vec<Wanted> {
-    let one = |system: u8| Wanted {
-        drone: drone(system),
-        slot: system.into(),
-        file: format!("{system:02}.BIN"),
-        flight: None,
-    };
-    (1..=count).map(one).collect()
-}
 
 fn pull_all(
     net: &mut LossyNet<Asked>,

@@ -7,10 +7,10 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use crate::fleet::transfers::{content, drone};
+use crate::fleet::transfers::{content, drone, wanted};
 use updraft::fleet::logs::manifest::{Method, Shelf, Verified};
 use updraft::fleet::logs::one::{OneDone, OneOptions, Which};
-use updraft::fleet::logs::pull::{Outcome, PullOptions, Wanted, pull};
+use updraft::fleet::logs::pull::{Outcome, PullOptions, pull};
 use updraft::fleet::logs::verify::verify;
 use updraft::link::clock::{MS, Micros, S};
 use updraft::link::conversation::{NoObserver, Observer};
@@ -67,16 +67,6 @@ fn fleet(count: u8, faults: Faults, length: impl Fn(u8) -> usize) -> LossyNet<Ev
     let vehicles: BTreeMap<_, _> =
         (1..=count).map(|system| (drone(system), vehicle(system, length(system)))).collect();
     LossyNet::new(vehicles, faults, 11)
-}
-
-fn wanted(count: u8) -> Vec<Wanted> {
-    let one = |system: u8| Wanted {
-        drone: drone(system),
-        slot: system.into(),
-        file: format!("{system:02}.BIN"),
-        flight: None,
-    };
-    (1..=count).map(one).collect()
 }
 
 fn options(start_number: u32) -> PullOptions {

@@ -7,21 +7,20 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use updraft::fleet::dry_run::Obliging;
-use updraft::fleet::fence::fence_of;
 use updraft::fleet::slots::FleetTable;
-use updraft::fleet::upload::ShowLoad;
 use updraft::link::clock::{MS, Micros, S};
 use updraft::link::conversation::{Conversation, run_all};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavMissionResult, MavResult};
 use updraft::link::id::DroneId;
 use updraft::mission::Plan;
-use updraft::mission::resolve::{Override, resolve};
 use updraft::protocol::ftp::{Op, Packet};
 use updraft::protocol::show::{FROM_DRONE, Stage, Status};
-use updraft::show::skyb;
 use updraft::virtual_fleet::endpoint::Endpoint;
 use updraft::virtual_fleet::lossy::{Faults, LossyNet};
+
+use crate::fleet::loaded::hover;
+pub(crate) use crate::fleet::loaded::load;
 
 pub(crate) type Net = LossyNet<Scripted>;
 
@@ -31,21 +30,7 @@ pub(crate) fn drone(system: u8) -> DroneId {
 
 /// A hover of 2 x 3 drones.
 pub(crate) fn plan() -> Plan {
-    let overrides = [
-        Override::new("grid.rows", 2),
-        Override::new("duration_s", 30.0),
-        Override::new("height_m", 30.0),
-        Override::new("site.orientation_deg", 40.0),
-        Override::new("grid.columns", 3),
-    ];
-    resolve("hover", &overrides).unwrap().flights.remove(0).plan
-}
-
-pub(crate) fn load(plan: &Plan, slot: u16) -> ShowLoad {
-    let show = plan.to_show();
-    let drone = &show.drones[usize::from(slot) - 1];
-    let skyb = skyb::write(drone, &skyb::SkybOptions::default()).unwrap().bytes;
-    ShowLoad { skyb, site: plan.site, fence: fence_of(plan, &show).unwrap() }
+    hover(2, 3)
 }
 
 pub(crate) fn table(plan: &Plan) -> FleetTable {

@@ -1,20 +1,18 @@
-//! Drones with contents of files that can be told apart.
+//! What tests of log transfers share.
 
-use updraft::link::id::DroneId;
+#[path = "../../../crates/mavlink-station/tests/it/content.rs"]
+mod contents;
 
-pub(crate) fn drone(system: u8) -> DroneId {
-    DroneId { network: 0, system }
-}
+pub(crate) use contents::{content, drone};
+use updraft::fleet::logs::pull::Wanted;
 
-/// Bytes that repeat nowhere, another sequence for each seed.
-pub(crate) fn content(seed: u64, length: usize) -> Vec<u8> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    (0..length)
-        .map(|_| {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 24) as u8
-        })
-        .collect()
+/// The log of each drone from 1 to `count`, for the slot of its number.
+pub(crate) fn wanted(count: u8) -> Vec<Wanted> {
+    let one = |system: u8| Wanted {
+        drone: drone(system),
+        slot: system.into(),
+        file: format!("{system:02}.BIN"),
+        flight: None,
+    };
+    (1..=count).map(one).collect()
 }

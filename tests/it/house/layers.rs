@@ -10,6 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use super::sources;
 use proc_macro2::{TokenStream, TokenTree};
 use quote::ToTokens as _;
 use syn::{Attribute, ImplItem, Item, UseTree};
@@ -51,17 +52,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
 
 /// The room of arguments, terminal and exit codes: it may use all others.
 const FRONT: &str = "cli";
-
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            found.push(path);
-        }
-    }
-}
 
 /// A file's code without what is compiled for tests alone.
 struct Code {

@@ -1,20 +1,11 @@
 //! What the code cites of `docs/physics.md` is there.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use super::sources;
 
 const CITATION: &str = "docs/physics.md, ";
-
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let path = entry.path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            found.push(path);
-        }
-    }
-}
 
 /// The number at the start of a text: `3.2` of `3.2) and more`.
 fn number(text: &str) -> &str {

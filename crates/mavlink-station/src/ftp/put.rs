@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use super::exchange::ExchangeStep;
 use super::{Caller, Exchange, FtpError, answer};
-use crate::crc::ap_crc32;
 use crate::link::clock::{Micros, S};
 use crate::link::conversation::{Conversation, Progress, Step};
 use crate::link::frame::MavMessage;
 use crate::protocol::ftp::{MOST_DATA, NakReason, Op, Packet};
+use untrusted_io::crc::ap_crc32;
 
 /// Pieces on their way at once; a vehicle keeps five requests.
 const WINDOW: usize = 4;

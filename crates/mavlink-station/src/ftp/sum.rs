@@ -10,7 +10,7 @@ use crate::protocol::ftp::{Op, Packet};
 /// A slow card of an autopilot, bytes per second.
 const SLOWEST: u64 = 200_000;
 
-/// Conversation that asks for the checksum of a whole file ([`crate::crc::ap_crc32`]).
+/// Conversation that asks for the checksum of a whole file ([`untrusted_io::crc::ap_crc32`]).
 #[derive(Debug)]
 pub struct Sum {
     caller: Caller,

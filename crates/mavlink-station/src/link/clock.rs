@@ -23,6 +23,12 @@ pub trait Clock: Send + Sync {
         std::thread::sleep(time);
     }
 
+    /// Waits for input, for a duration of the clock at most. `look` waits for it, for as long as it is
+    /// told on the wall, and says whether it came; it may return sooner. A clock that goes by itself calls it once.
+    fn wait(&self, time: Duration, look: &mut dyn FnMut(Duration) -> bool) {
+        look(time);
+    }
+
     /// Reports that the caller has waited for this duration elsewhere; only a clock that does not
     /// go by itself takes note.
     fn waited(&self, _time: Duration) {}

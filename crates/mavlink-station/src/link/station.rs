@@ -266,7 +266,12 @@ impl Net for Station {
             }
             let now = self.clock.now();
             let wait = until.min(self.next_heartbeat).saturating_sub(now);
-            match self.input.recv_timeout(Duration::from_micros(wait)) {
+            let mut came = Err(RecvTimeoutError::Timeout);
+            self.clock.wait(Duration::from_micros(wait), &mut |longest| {
+                came = self.input.recv_timeout(longest);
+                !matches!(came, Err(RecvTimeoutError::Timeout))
+            });
+            match came {
                 Ok(piece) => self.take(piece)?,
                 Err(RecvTimeoutError::Timeout) if self.clock.now() >= until => return Ok(None),
                 Err(RecvTimeoutError::Timeout) => {}

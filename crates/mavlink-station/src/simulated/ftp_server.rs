@@ -9,10 +9,10 @@ use std::collections::VecDeque;
 
 use super::storage::{Storage, StorageError};
 use super::transfers::Meter;
-use crate::crc::ApCrc32;
 use crate::link::clock::{Micros, S};
 use crate::link::frame::{MavMessage, Sender, dialect};
 use crate::protocol::ftp::{MOST_DATA, Op, Packet};
+use untrusted_io::crc::ApCrc32;
 
 /// Number of packets in one burst.
 pub const BURST: u32 = 500;

@@ -6,26 +6,11 @@ use mavlink_station::simulated::endpoint::Endpoint;
 use mavlink_station::simulated::files::FileVehicle;
 use mavlink_station::simulated::lossy::{Faults, LossyNet};
 use mavlink_station::simulated::storage::MemoryStorage;
-use mavlink_station::{Conversation, DroneId, NoObserver, run_all};
+use mavlink_station::{Conversation, NoObserver, run_all};
+
+pub(crate) use crate::content::{content, drone};
 
 pub(crate) type Net = LossyNet<FileVehicle<MemoryStorage>>;
-
-pub(crate) fn drone(system: u8) -> DroneId {
-    DroneId { network: 0, system }
-}
-
-/// Bytes that repeat nowhere, another sequence for each seed.
-pub(crate) fn content(seed: u64, length: usize) -> Vec<u8> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    (0..length)
-        .map(|_| {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 24) as u8
-        })
-        .collect()
-}
 
 /// `count` vehicles with one log of `length` bytes each, sending `packets_per_s` at most.
 pub(crate) fn fleet(

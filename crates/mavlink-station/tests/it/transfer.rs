@@ -3,7 +3,6 @@
 #![expect(clippy::unwrap_used, reason = "a simulated link stays open")]
 
 use crate::support::{content, drone, fleet, one};
-use mavlink_station::crc::ap_crc32;
 use mavlink_station::ftp::get::{Get, GetOptions};
 use mavlink_station::ftp::list::List;
 use mavlink_station::ftp::put::Put;
@@ -13,6 +12,7 @@ use mavlink_station::simulated::lossy::Faults;
 use mavlink_station::simulated::storage::Storage as _;
 use mavlink_station::sink::Memory;
 use mavlink_station::{MS, Net as _, NoObserver, S, run_all};
+use untrusted_io::crc::ap_crc32;
 
 const LOG: &str = "/APM/LOGS/00000001.BIN";
 

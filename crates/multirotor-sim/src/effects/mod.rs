@@ -69,6 +69,12 @@ pub const LIBRARY: &[&dyn Effect] = &[
 ];
 
 /// Effect of a name; `None` if the library has none.
+///
+/// ```
+/// let inflow = multirotor_sim::effects::find("rotor-inflow").unwrap().definition();
+/// assert!(inflow.formula.contains("w"), "{}", inflow.formula);
+/// assert!(multirotor_sim::effects::find("phlogiston").is_none());
+/// ```
 pub fn find(name: &str) -> Option<&'static dyn Effect> {
     LIBRARY.iter().copied().find(|effect| effect.definition().name == name)
 }

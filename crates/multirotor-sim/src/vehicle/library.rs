@@ -29,6 +29,16 @@ pub fn builtin_toml(name: &str) -> Option<&'static str> {
 
 /// Built-in vehicle by its name.
 ///
+/// ```
+/// use multirotor_sim::vehicle::library::{builtin, names};
+///
+/// assert!(names().any(|name| name == "pixel"));
+/// assert!(builtin("pixel")?.airframe.mass_kg > 0.1);
+/// // The error lists the names that exist.
+/// assert!(builtin("zeppelin").unwrap_err().to_string().contains("pixel"));
+/// # Ok::<(), multirotor_sim::vehicle::VehicleError>(())
+/// ```
+///
 /// # Errors
 /// [`VehicleError::Unknown`] lists the names that exist.
 pub fn builtin(name: &str) -> Result<Vehicle, VehicleError> {

@@ -6,8 +6,8 @@ use serde::Serialize;
 use super::units::{to_m, value_count};
 use super::{BlockKind, MAGIC, MAX_FILE, SkybError, TRAJECTORY_HEADER, yaw};
 use crate::bezier::{Scalar, path_through};
-use crate::crc::ApCrc32;
 use crate::{Extras, Segment, SegmentPath, ShowDrone, Trajectory};
+use untrusted_io::crc::ApCrc32;
 use untrusted_io::plain::plain;
 
 /// Contents of a `.skyb` file.

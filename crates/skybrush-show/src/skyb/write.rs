@@ -7,8 +7,8 @@ use super::{
     BlockKind, MAGIC, MAX_BODY, MAX_SCALE_MM, Quantisation, SkybError, TRAJECTORY_HEADER, yaw,
 };
 use crate::bezier::{self, Scalar};
-use crate::crc::ap_crc32;
 use crate::{Segment, ShowDrone, Trajectory};
+use untrusted_io::crc::ap_crc32;
 
 /// Rule for choosing the size of the unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -64,6 +64,18 @@ impl Default for Wish {
     }
 }
 
+/// Where a drone's log is in the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum LogState {
+    /// It came.
+    Pulled,
+    /// It had come before.
+    There,
+    /// It did not come, or not whole.
+    Missing,
+}
+
 /// What became of a drone's log.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Brought {
@@ -71,8 +83,7 @@ pub(crate) struct Brought {
     /// None: nobody is known to stand there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) drone: Option<DroneId>,
-    /// `pulled`, `there` or `missing`.
-    pub(crate) state: &'static str,
+    pub(crate) state: LogState,
     pub(crate) bytes: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) reason: Option<String>,
@@ -82,11 +93,16 @@ pub(crate) struct Brought {
 }
 
 impl Brought {
+    /// Whether there is no whole log.
+    pub(crate) fn is_missing(&self) -> bool {
+        self.state == LogState::Missing
+    }
+
     /// In a sentence why there is no log; `None`: there is one.
     pub(crate) fn loss(&self) -> Option<String> {
         let reason = self.reason.as_deref().unwrap_or("unknown");
         let slot = self.slot;
-        (self.state == "missing").then(|| match (self.drone, self.bytes) {
+        self.is_missing().then(|| match (self.drone, self.bytes) {
             (None, _) => format!("no log of slot {slot}: {reason}"),
             (Some(drone), 0) => format!("no log of drone {drone} (slot {slot}): {reason}"),
             // Its beginning came, or older logs.
@@ -210,13 +226,15 @@ impl Brought {
                 });
                 let there = done.pulled.is_empty() && !done.there.is_empty();
                 let state = match (&reason, there) {
-                    (Some(_), _) => "missing",
-                    (None, true) => "there",
-                    (None, false) => "pulled",
+                    (Some(_), _) => LogState::Missing,
+                    (None, true) => LogState::There,
+                    (None, false) => LogState::Pulled,
                 };
                 (state, bytes, reason, done.unchecked.clone())
             }
-            Some(Outcome::Stopped) | None => ("missing", 0, Some("interrupted".to_owned()), None),
+            Some(Outcome::Stopped) | None => {
+                (LogState::Missing, 0, Some("interrupted".to_owned()), None)
+            }
         };
         Self { slot, drone: Some(drone), state, bytes, reason, unchecked }
     }

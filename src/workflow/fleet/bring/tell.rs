@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::Brought;
+use super::{Brought, LogState};
 use crate::base::plain::Shown as _;
 use crate::base::time::GpsTime;
 use crate::campaign::origin::logs_in;
@@ -29,7 +29,7 @@ pub(super) fn all(
     say_newer(host, outcomes);
     let unchecked = brought
         .iter()
-        .filter(|one| one.state == "there")
+        .filter(|one| one.state == LogState::There)
         .filter_map(|one| Some((one.drone?, one.slot, one.unchecked.as_ref()?)));
     for (drone, slot, why) in unchecked {
         host.warn(&format!(
@@ -45,13 +45,13 @@ pub(super) fn all(
 /// How many logs are home, in a line.
 pub(super) fn sum(host: &dyn Host, brought: &[Brought], watch: &Stopwatch) {
     let bytes: u64 = brought.iter().map(|one| one.bytes).sum();
-    let state = |state: &str| brought.iter().filter(|one| one.state == state).count();
+    let state = |state: LogState| brought.iter().filter(|one| one.state == state).count();
     host.say(&format!(
         "Downloaded {} of {} logs, {:.1} MB in {watch}{}",
-        state("pulled") + state("there"),
+        state(LogState::Pulled) + state(LogState::There),
         brought.len(),
         bytes as f64 / 1e6,
-        match state("there") {
+        match state(LogState::There) {
             0 => String::new(),
             there => format!(" ({there} already here)"),
         }

@@ -52,7 +52,7 @@ impl Net for Stubborn<'_> {
                 self.note(&error);
                 // A closed link fails at once, every time.
                 let left = until.saturating_sub(self.net.now()).min(PAUSE);
-                std::thread::sleep(Duration::from_micros(left));
+                self.host.clock().pause(Duration::from_micros(left));
                 Ok(None)
             }
         }

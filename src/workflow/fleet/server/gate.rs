@@ -15,7 +15,7 @@ use crate::fleet::preflight::{Limits, charge_needed};
 use crate::link::clock::{Micros, S};
 use crate::mission::Plan;
 use crate::skybrush_server::Client;
-use crate::skybrush_server::gate::{Needs, Step, obstacles};
+use crate::skybrush_server::gate::{FAILS_ARMING_CHECKS, Needs, Step, obstacles};
 use crate::skybrush_server::state::State;
 use crate::workflow::error::WorkflowError;
 use crate::workflow::host::Host;
@@ -218,7 +218,7 @@ fn with_reasons_of_checks(
     host: &dyn Host,
     mut table: Table,
 ) -> Result<Table, WorkflowError> {
-    let fails = |why: &String| why == "fails its arming checks";
+    let fails = |why: &String| why == FAILS_ARMING_CHECKS;
     let open = table.rows.iter().filter(|row| row.no_go.iter().any(fails));
     let ids: Vec<String> = open.map(|row| row.drone.clone()).collect();
     if ids.is_empty() {

@@ -8,7 +8,7 @@ use crate::campaign::FlightFolder;
 use crate::mission::Plan;
 use crate::skybrush_server::{Client, LogEntry};
 use crate::workflow::error::WorkflowError;
-use crate::workflow::fleet::bring::Wish;
+use crate::workflow::fleet::bring::{LogState, Wish};
 use crate::workflow::fleet::output::LogOutput;
 use crate::workflow::fleet::output::{ListRow, ListedLog};
 use crate::workflow::host::Host;
@@ -96,7 +96,7 @@ pub(crate) fn pull(
     let nobody = |slot| LogOutput {
         slot,
         drone: None,
-        state: "missing",
+        state: LogState::Missing,
         bytes: 0,
         reason: Some("no drone of the server is known to stand there".to_owned()),
     };

@@ -143,7 +143,7 @@ fn bring_home(
     let wanted: Vec<(u16, String)> = drones.iter().map(|(slot, id)| (*slot, id.clone())).collect();
     let brought = bring(host, client, address, folder, plan, &wanted, &Wish::default())?;
     sum_up(host, &brought);
-    if brought.iter().all(|row| row.state != "missing") {
+    if !brought.iter().any(LogOutput::is_missing) {
         return Ok((brought, flown));
     }
     let campaign = folder.0.shown();

@@ -22,6 +22,7 @@ use super::autopilot::Autopilot;
 use super::plant::Plant;
 use super::sensors::Estimate;
 pub use log::{LogRecorder, STEPS_10_HZ};
+pub use start::FIRMWARE_MARK;
 
 /// State of a flight at one control step, before the body moves.
 #[derive(Clone, Copy)]

@@ -12,6 +12,8 @@ use super::view::View;
 /// What the log calls the firmware. It begins as the firmware's own logs do, because readers take
 /// the vehicle type from it, and says that this was a simulation.
 const VERSION: &str = "ArduCopter V4.4.4 (updraft)";
+/// Mark of simulated logs in the name of the firmware, which stands in the text messages at their beginning.
+pub const FIRMWARE_MARK: &str = "(updraft)";
 const FRAME: &str = "Frame: QUAD/X";
 /// ModeNum of the show mode, and the reason that the fork gives for entering it by itself.
 const SHOW_MODE: (i64, i64) = (127, 32);

@@ -4,8 +4,8 @@ use std::io::{Cursor, Write as _};
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use skybrush_show::crc::ap_crc32;
 use skybrush_show::{Segment, SegmentPath, ShowDrone, Trajectory};
+use untrusted_io::crc::ap_crc32;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 

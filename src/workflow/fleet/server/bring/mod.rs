@@ -24,7 +24,7 @@ use crate::mission::Plan;
 use crate::skybrush_server::{Client, Foreman, Job, Outcome, list_logs};
 use crate::workflow::clock::Spent;
 use crate::workflow::error::{WorkflowError, with_reasons};
-use crate::workflow::fleet::bring::Wish;
+use crate::workflow::fleet::bring::{LogState, Wish};
 use crate::workflow::fleet::output::LogOutput;
 use crate::workflow::host::Host;
 use crate::workflow::made_by;
@@ -86,9 +86,9 @@ pub(super) fn bring(
                 || broke.clone().unwrap_or_else(|| "the server did not report on it".to_owned());
             let reason = one.failure.clone().or_else(|| (!one.over).then(open));
             let state = match &reason {
-                Some(_) => "missing",
-                None if one.pulled == 0 => "there",
-                None => "pulled",
+                Some(_) => LogState::Missing,
+                None if one.pulled == 0 => LogState::There,
+                None => LogState::Pulled,
             };
             Some(LogOutput {
                 slot: *slot,

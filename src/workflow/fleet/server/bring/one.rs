@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::Puller;
 use crate::fleet::logs::manifest::{AtHome, LogFlight};
+use crate::skybrush_server::refusal::Refusal;
 use crate::skybrush_server::{
     Job, LogEntry, Outcome, fetch_log, list_logs, log_bytes, log_entries,
 };
@@ -201,19 +202,16 @@ pub(super) fn number(log: &LogEntry) -> u32 {
 
 /// Whether it is of no use to ask once more.
 fn is_final(reason: &str) -> bool {
-    let reason = reason.to_lowercase();
-    reason.contains("no such uav") || reason.contains("another log download")
+    matches!(Refusal::of(reason), Refusal::NoSuchDrone | Refusal::OtherDownload)
 }
 
 /// The server's words, with what to do where that is known.
 fn advised(reason: &str) -> String {
-    if reason.contains("Another log download") {
-        return format!(
+    match Refusal::of(reason) {
+        Refusal::OtherDownload => format!(
             "{reason} (by Skybrush Live, or a program that was killed): try again when it is over"
-        );
+        ),
+        Refusal::TimedOut => format!("{reason}: is it switched on and disarmed?"),
+        Refusal::NoSuchDrone | Refusal::Other => reason.to_owned(),
     }
-    if reason.contains("timed out") {
-        return format!("{reason}: is it switched on and disarmed?");
-    }
-    reason.to_owned()
 }

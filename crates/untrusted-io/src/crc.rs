@@ -1,14 +1,15 @@
-//! The CRC-32 that ArduPilot (MAVFTP) and Skybrush (`.skyb`) use.
+//! Checksums by which files of vehicles and shows are told: the CRC-32 of ArduPilot (MAVFTP) and Skybrush
+//! (`.skyb`), and that of ZIP files.
 
 use std::path::Path;
 
-use untrusted_io::file::{FileError, read_pieces};
+use crate::file::{FileError, read_pieces};
 
 /// CRC-32 with the reflected polynomial `0xEDB88320`, initial value 0 and no final XOR.
 ///
 /// ```
-/// assert_eq!(skybrush_show::crc::ap_crc32(b"123456789"), 0x2DFD_2D88);
-/// assert_eq!(skybrush_show::crc::ap_crc32(b"hello-world"), 0xDA53_B3B7);
+/// assert_eq!(untrusted_io::crc::ap_crc32(b"123456789"), 0x2DFD_2D88);
+/// assert_eq!(untrusted_io::crc::ap_crc32(b"hello-world"), 0xDA53_B3B7);
 /// ```
 pub fn ap_crc32(data: &[u8]) -> u32 {
     let mut crc = ApCrc32::default();
