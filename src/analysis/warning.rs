@@ -301,9 +301,9 @@ fn tilt_form(
     };
     write!(
         f,
-        "tilt: pulses are corrected to {ours}. With {other} u0 would change by {change:+.1} {unit}, which is \
-         more than its error of {error:.1} {unit} and reads as {:+.2} m/s of updraft where a hover \
-         leans alike",
+        "tilt: pulses are corrected to {ours}. With {other} u0 would change by {change:+.1} {unit}, \
+         which is more than its error of {error:.1} {unit} and reads as {:+.2} m/s of updraft where a \
+         hover leans alike",
         -change / slope
     )
 }

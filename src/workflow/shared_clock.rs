@@ -123,8 +123,8 @@ impl SharedClock {
         Ok(Seat { clock: self.path.clone(), path, file })
     }
 
-    /// All seats: the instant for which each waits, ms, 0 for none, and whether it is taken.
-    fn seats(&self) -> impl Iterator<Item = (u64, bool)> {
+    /// The instants for which those who take part wait, ms; 0 of one that does not wait.
+    fn waits(&self) -> impl Iterator<Item = u64> {
         let folder = self.path.parent().unwrap_or(Path::new(".")).to_owned();
         let mut begins = self.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         begins.push('.');
@@ -133,7 +133,7 @@ impl SharedClock {
             entry.file_name().to_string_lossy().starts_with(&begins).then_some(())?;
             let file = File::open(entry.path()).ok()?;
             let is_taken = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
-            Some((file.metadata().ok()?.len(), is_taken))
+            is_taken.then_some(file.metadata().ok()?.len())
         })
     }
 
@@ -163,10 +163,7 @@ impl SharedClock {
 
     /// Lets time go on if everyone waits.
     fn go_on(&self) {
-        self.set_forward(|now| {
-            let waits = self.seats().filter(|(_, is_taken)| *is_taken).map(|(until, _)| until);
-            waits.min().unwrap_or(now)
-        });
+        self.set_forward(|now| self.waits().min().unwrap_or(now));
     }
 
     fn set_wait(until_ms: u64) {

@@ -1,4 +1,5 @@
-//! Prints columns of a log as CSV: `cargo run -p dataflash --example columns -- LOG.BIN ATT TimeUS,Roll,Pitch`.
+//! Prints columns of a log as CSV:
+//! `cargo run -p dataflash --example columns -- LOG.BIN ATT TimeUS,Roll,Pitch`.
 
 use std::error::Error;
 use std::io::{BufWriter, Write as _, stdout};

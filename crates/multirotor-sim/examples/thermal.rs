@@ -1,5 +1,5 @@
-//! Climbs to 100 m in the middle of a thermal and comes down again: `cargo run -p multirotor-sim --example thermal --
-//! OUT.BIN`.
+//! Climbs to 100 m in the middle of a thermal and comes down again:
+//! `cargo run -p multirotor-sim --example thermal -- OUT.BIN`.
 
 use std::error::Error;
 use std::fs::File;

@@ -1,4 +1,5 @@
-//! Writes a show of one drone that hovers for a minute: `cargo run -p skybrush-show --example hover -- OUT.skyb`.
+//! Writes a show of one drone that hovers for a minute:
+//! `cargo run -p skybrush-show --example hover -- OUT.skyb`.
 
 use std::error::Error;
 

@@ -1,4 +1,5 @@
-//! What is in a show, and whether it breaks generous limits: `cargo run -p skybrush-show --example inspect -- SHOW.skyc`.
+//! What is in a show, and whether it breaks generous limits:
+//! `cargo run -p skybrush-show --example inspect -- SHOW.skyc`.
 
 use std::error::Error;
 use std::io::{Write as _, stdout};

@@ -1,5 +1,5 @@
-//! Prints a text file of a stranger without letting it drive the terminal: `cargo run -p untrusted-io --example show --
-//! FILE`.
+//! Prints a text file of a stranger without letting it drive the terminal:
+//! `cargo run -p untrusted-io --example show -- FILE`.
 
 use std::error::Error;
 use std::io::{Write as _, stdout};

@@ -43,7 +43,7 @@ impl Bench {
         let before = self.bytes_at_home();
         let mut pull = self.command(args);
         let mut pull = self.start(pull.stdout(Stdio::null()).stderr(Stdio::null()));
-        let came = self.wait_for(|| {
+        let came = self.wait_for(60, || {
             assert!(pull.try_wait().unwrap().is_none(), "it ended before it was killed");
             (self.bytes_at_home() >= before + 100_000).then_some(())
         });

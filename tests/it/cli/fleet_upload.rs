@@ -28,7 +28,7 @@ fn a_killed_upload_is_run_again_and_every_drone_is_loaded_whole() {
                 let mut killed = bench.command(&upload);
                 let mut killed = bench.start(killed.stdout(Stdio::null()).stderr(Stdio::null()));
                 // The old values are on the disk before anything is set.
-                let there = bench.wait_for(|| changes.exists().then_some(()));
+                let there = bench.wait_for(60, || changes.exists().then_some(()));
                 assert!(there.is_some(), "it does not get to the upload");
                 bench.clock().pause(Duration::from_secs(after_s));
                 assert!(killed.try_wait().unwrap().is_none(), "it ended before it was killed");

@@ -47,22 +47,13 @@ impl<'a> Flight<'a> {
     /// Waits until it has said this.
     pub(crate) fn hear(&mut self, text: &str) {
         let bench = self.bench;
-        let heard = bench.wait_for(|| {
+        let heard = bench.wait_for(120, || {
             let said = self.said();
             let ended = self.child.try_wait().unwrap();
-            assert!(
-                ended.is_none() || said.contains(text),
-                "it ended:
-{said}"
-            );
+            assert!(ended.is_none() || said.contains(text), "it ended:\n{said}");
             said.contains(text).then_some(())
         });
-        assert!(
-            heard.is_some(),
-            "no {text:?}:
-{}",
-            self.said()
-        );
+        assert!(heard.is_some(), "no {text:?}:\n{}", self.said());
     }
 
     pub(crate) fn signal(&self, name: &str) {
@@ -72,16 +63,8 @@ impl<'a> Flight<'a> {
 
     pub(crate) fn end(&mut self) -> Option<i32> {
         let bench = self.bench;
-        let ended = bench.wait_for(|| self.child.try_wait().unwrap());
-        ended
-            .unwrap_or_else(|| {
-                panic!(
-                    "it goes on:
-{}",
-                    self.said()
-                )
-            })
-            .code()
+        let ended = bench.wait_for(60, || self.child.try_wait().unwrap());
+        ended.unwrap_or_else(|| panic!("it goes on:\n{}", self.said())).code()
     }
 }
 

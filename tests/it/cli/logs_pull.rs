@@ -70,7 +70,7 @@ fn a_drone_that_is_switched_on_late_is_joined() {
     let mut pull = Flight::of(&bench, &pull);
     // The others do not wait for it.
     let came = || [1, 2, 4].iter().all(|slot| bench.is_home(*slot)).then_some(());
-    assert!(bench.wait_for(came).is_some(), "the logs of those that are on do not come");
+    assert!(bench.wait_for(30, came).is_some(), "the logs of those that are on do not come");
     bench.clock().pause(Duration::from_secs(3));
     let _late = bench.fleet(&station, &["--flown", "--gone", "1,2,4"]);
     assert_eq!(pull.end(), Some(0), "{}", pull.said());

@@ -92,7 +92,7 @@ fn wait_for(bench: &Bench, file: &str, text: &str) -> bool {
         let bytes = fs::read(bench.path(file)).unwrap_or_default();
         String::from_utf8_lossy(&bytes).contains(text).then_some(())
     };
-    bench.wait_for(has).is_some()
+    bench.wait_for(120, has).is_some()
 }
 
 #[test]
@@ -102,13 +102,10 @@ fn an_abort_at_the_question_is_confirmed_in_both_terminals() {
         let fly = ["fly", "campaign", "--connect", &link, "--set-params", "--no-logs"];
         let fly = [&fly[..], &["--lead", "120", "--wait", "20"], guided].concat();
         let question = "Authorize the start?";
-        let (shown, ended) = std::thread::scope(|scope| {
-            let order = || {
-                wait_for(&bench, "typescript", question).then(|| bench.run(&ends("abort", &link)))
-            };
-            let order = scope.spawn(order);
-            (on_a_terminal(&bench, &fly, &[(question, "")]), order.join().unwrap())
-        });
+        let order =
+            || wait_for(&bench, "typescript", question).then(|| bench.run(&ends("abort", &link)));
+        let (shown, ended) =
+            bench.together(|| on_a_terminal(&bench, &fly, &[(question, "")]), order);
         let (Some((code, shown)), Some(ended)) = (shown, ended) else { return };
         let down = "on the ground, its start is taken back";
         assert_eq!(ended.out, format!("drone 1: {down}\ndrone 2: {down}\n"), "{ended}");

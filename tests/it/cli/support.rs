@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tempfile::TempDir;
-use updraft::workflow::clock::{Clock, Micros, S, SharedClock, SystemClock};
+use updraft::workflow::clock::{Clock, S, SharedClock, SystemClock};
 
 /// A ladder of two rungs of 6 s, on a grid of two: a second to fly, even in a debug build.
 pub(crate) const SHORT: &[&str] =
@@ -16,9 +16,12 @@ pub(crate) const SHORT: &[&str] =
 
 /// Unix time at which the time of a test begins, if it does not take the clock on the wall.
 const BEGINS_UNIX_S: u64 = 1_795_300_000;
-const HOUR: Micros = 3600 * S;
+/// No command of a test goes on for longer, s of the shared clock.
+const LONGEST_COMMAND_S: u64 = 3600;
 /// A test looks this often for what it waits for.
 const LOOK: Duration = Duration::from_millis(50);
+/// After so long on the wall, a test fails that waits for what nobody does.
+const STANDSTILL: Duration = Duration::from_mins(15);
 
 /// A folder to work in, and the program.
 pub(crate) struct Bench {
@@ -66,8 +69,11 @@ impl Bench {
         bench
     }
 
-    pub(crate) fn has_shared_clock(&self) -> bool {
-        self.time.is_some()
+    /// The clock that a command with these arguments shares: drones and station in one program have a
+    /// time of their own.
+    fn clock_of(&self, args: &[&str]) -> Option<&SharedClock> {
+        let time = self.time.as_ref()?;
+        (!args.contains(&"sim")).then_some(&time.clock)
     }
 
     /// The clock of the test's programs.
@@ -78,18 +84,45 @@ impl Bench {
         }
     }
 
-    /// Waits until `found` finds something; for longer than any test takes, `None`.
-    pub(crate) fn wait_for<T>(&self, mut found: impl FnMut() -> Option<T>) -> Option<T> {
-        let longest = if self.has_shared_clock() { HOUR } else { HOUR / 30 };
+    /// Waits until `found` finds something, for `longest_s` at most.
+    pub(crate) fn wait_for<T>(
+        &self,
+        longest_s: u64,
+        mut found: impl FnMut() -> Option<T>,
+    ) -> Option<T> {
         let clock = self.clock();
         let begun = clock.now();
+        let on_the_wall = SystemClock::start();
         loop {
             let it = found();
-            if it.is_some() || clock.now() - begun > longest {
+            if it.is_some() || clock.now() - begun > longest_s * S {
                 return it;
             }
-            clock.pause(LOOK);
+            clock.wait(LOOK, &mut |time| {
+                std::thread::sleep(time);
+                let waited = Duration::from_micros(on_the_wall.now());
+                assert!(
+                    waited < STANDSTILL,
+                    "somebody neither waits nor leaves: time stands still"
+                );
+                false
+            });
         }
+    }
+
+    /// Does both at the same time, in threads of their own.
+    pub(crate) fn together<A: Send, B: Send>(
+        &self,
+        one: impl FnOnce() -> A + Send,
+        other: impl FnOnce() -> B + Send,
+    ) -> (A, B) {
+        std::thread::scope(|scope| {
+            let (one, other) = (scope.spawn(one), scope.spawn(other));
+            // Whoever just joined a thread would not wait on the clock, and time would stand still.
+            let end = || (one.is_finished() && other.is_finished()).then_some(());
+            self.wait_for(LONGEST_COMMAND_S, end).expect("both end");
+            (one.join().unwrap(), other.join().unwrap())
+        })
     }
 
     /// Waits, s.
@@ -121,22 +154,22 @@ impl Bench {
             .env_remove("NO_COLOR")
             .env_remove("UPDRAFT_NO_PROGRESS")
             .env("COLUMNS", "120");
-        // Drones and station in one program have a time of their own.
-        if let Some(time) = self.time.as_ref().filter(|_| !args.contains(&"sim")) {
-            command.arg("--shared-clock").arg(time.clock.argument());
+        if let Some(clock) = self.clock_of(args) {
+            command.arg("--shared-clock").arg(clock.argument());
         }
         command
     }
 
     pub(crate) fn run(&self, args: &[&str]) -> Ended {
         let mut command = self.command(args);
-        if !self.has_shared_clock() || args.contains(&"sim") {
+        if self.clock_of(args).is_none() {
             return Ended::of(&command.output().unwrap());
         }
         let (mut out, mut err) = (tempfile::tempfile().unwrap(), tempfile::tempfile().unwrap());
         command.stdout(out.try_clone().unwrap()).stderr(err.try_clone().unwrap());
         let mut child = self.start(&mut command);
-        let status = self.wait_for(|| child.try_wait().unwrap()).expect("it goes on");
+        let ended = self.wait_for(LONGEST_COMMAND_S, || child.try_wait().unwrap());
+        let status = ended.expect("it goes on");
         let read = |file: &mut File| {
             let mut bytes = Vec::new();
             file.rewind().unwrap();

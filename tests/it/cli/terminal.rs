@@ -31,7 +31,7 @@ pub(crate) fn on_a_terminal(
         text.split_once('\n').map(|(_, shown)| shown.to_owned()).unwrap_or_default()
     };
     let wait = |text: &str| {
-        let seen = bench.wait_for(|| {
+        let seen = bench.wait_for(120, || {
             let shown = shown();
             let has = shown.contains(text);
             assert!(has || !shown.contains("ended with "), "no {text:?}:\n{shown}");

@@ -2,10 +2,9 @@
 
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::Arc;
-use std::time::{Instant, SystemTime};
 
 use nalgebra::Vector3;
-use updraft::link::clock::{Clock, MS, Micros, S};
+use updraft::link::clock::{Clock, MS, S, SystemClock};
 use updraft::link::frame::MavMessage;
 use updraft::link::frame::dialect::{self, MavCmd, MavResult};
 use updraft::link::id::DroneId;
@@ -23,26 +22,6 @@ use updraft::virtual_fleet::vehicle::{BootTimes, VehicleSetup, VirtualVehicle};
 use updraft::virtual_fleet::world::World;
 
 use super::support::{Field, file, gps_at, ladder, log_of, read, show_of, tow_at};
-
-pub(crate) struct Wall(Instant);
-
-#[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
-impl Wall {
-    pub(crate) fn start() -> Self {
-        Self(Instant::now())
-    }
-}
-
-impl Clock for Wall {
-    fn now(&self) -> Micros {
-        self.0.elapsed().as_micros() as u64
-    }
-
-    #[expect(clippy::disallowed_methods, reason = "real sockets need a real clock")]
-    fn unix_us(&self) -> u64 {
-        SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_micros() as u64
-    }
-}
 
 fn slot_m(system: u8) -> [f64; 2] {
     let index = u32::from(system - 1);
@@ -123,7 +102,7 @@ fn lead(station: &mut Station, running: &Running, field: &Field, count: u8) -> i
 fn fly_fleet(count: u8, show: impl Fn([f64; 2]) -> ShowDrone, pace: Pace, faults: Faults) {
     let field = Field::new();
     let world = field.world();
-    let clock = Arc::new(Wall::start());
+    let clock = Arc::new(SystemClock::start());
     let at = free_port();
     let links = vec![format!("udpin:{at}").parse().unwrap()];
     let wall: Arc<dyn Clock> = clock.clone();
@@ -170,7 +149,7 @@ fn a_fleet_flies_at_a_chosen_speed_over_a_bad_link() {
 fn what_is_broadcast_at_one_port_is_heard_by_all() {
     let field = Field::new();
     let world = field.world();
-    let clock = Arc::new(Wall::start());
+    let clock = Arc::new(SystemClock::start());
     let ports = [free_port(), free_port()];
     let links = ports.iter().enumerate();
     let links = links.map(|(network, at)| format!("{network}@udpin:{at}").parse().unwrap());
@@ -238,7 +217,7 @@ fn forty_nine_fly_a_ladder() {
 
 #[test]
 fn a_speed_of_nothing_is_refused() {
-    let clock = Wall::start();
+    let clock = SystemClock::start();
     for speed in [0.0, -1.0, f64::NAN, 1e9] {
         let options = ServerOptions {
             stations: vec![free_port()],

@@ -4,7 +4,7 @@ use std::net::UdpSocket;
 use std::sync::Arc;
 use std::time::Duration;
 
-use updraft::link::clock::{Clock, MS, S};
+use updraft::link::clock::{Clock, MS, S, SystemClock};
 use updraft::link::frame::{FrameReader, MavMessage, Sender, dialect, encode};
 use updraft::link::id::DroneId;
 use updraft::link::net::Net as _;
@@ -13,7 +13,7 @@ use updraft::link::station::{STATION, Setup, Station};
 use updraft::virtual_fleet::lossy::Faults;
 use updraft::virtual_fleet::server::{Pace, Running, ServerError, ServerOptions, serve};
 
-use super::server::{Wall, drone, free_port};
+use super::server::{drone, free_port};
 use super::support::{Field, show_of};
 
 fn key(byte: u8) -> Key {
@@ -35,7 +35,7 @@ fn wish(system: u8) -> MavMessage {
 
 /// Whether the drone is heard within a second, and answers; and what it refused.
 fn talk(of_station: Option<Key>, of_drone: Option<Key>) -> (bool, bool, u64) {
-    let (field, clock, at) = (Field::new(), Arc::new(Wall::start()), free_port());
+    let (field, clock, at) = (Field::new(), Arc::new(SystemClock::start()), free_port());
     let world = field.world();
     let links = vec![format!("udpin:{at}").parse().unwrap()];
     let wall: Arc<dyn Clock> = clock.clone();
@@ -76,7 +76,7 @@ fn another_key_or_none_is_not() {
 
 #[test]
 fn a_frame_that_is_sent_again_is_refused() {
-    let (field, clock) = (Field::new(), Wall::start());
+    let (field, clock) = (Field::new(), SystemClock::start());
     let world = field.world();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
@@ -142,7 +142,7 @@ fn what_was_heard_in_one_network_or_by_an_earlier_station_is_refused() {
     let path = folder.path().join("swarm.key");
     std::fs::write(&path, [7; 32]).unwrap();
     let from_file = || Some(Key::from_file(&path).unwrap());
-    let clock = Arc::new(Wall::start());
+    let clock = Arc::new(SystemClock::start());
     let mut signer = Signer::new(from_file().unwrap(), 0, signing_time(clock.unix_us()));
     let recorded: Vec<Vec<u8>> = (0..5).map(|_| beat(9, &mut signer)).collect();
     let open = || {
@@ -163,7 +163,7 @@ fn what_was_heard_in_one_network_or_by_an_earlier_station_is_refused() {
 
 #[test]
 fn the_same_id_in_two_networks_is_two_drones() {
-    let (field, clock) = (Field::new(), Arc::new(Wall::start()));
+    let (field, clock) = (Field::new(), Arc::new(SystemClock::start()));
     let world = field.world();
     let ports = vec![free_port(), free_port()];
     let links = (0..2).map(|n: usize| format!("{n}@udpin:{}", ports[n]).parse().unwrap()).collect();

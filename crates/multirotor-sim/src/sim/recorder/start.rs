@@ -148,10 +148,15 @@ fn parameters(setup: &FlightSetup<'_>) -> Vec<(&'static str, f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::system_id;
+    use super::*;
 
     #[test]
     fn system_ids_stay_in_mavlinks_range() {
         assert_eq!([1, 49, 255, 256, 0].map(system_id), [1, 49, 255, 1, 1]);
+    }
+
+    #[test]
+    fn the_version_has_the_mark_by_which_logs_of_this_simulator_are_known() {
+        assert!(VERSION.ends_with(FIRMWARE_MARK));
     }
 }
