@@ -65,92 +65,7 @@ pub fn search(
     questions: &[Question],
     aim: Aim,
 ) -> Result<Option<Choice>, GapError> {
-    let flown = Flight::new(known, present.clone())?;
-    let was = predict(known, &flown, (false, false), questions)?;
-    let wanted: Vec<f64> = questions
-        .iter()
-        .zip(&was)
-        .map(|(question, was)| match question.kind() {
-            Kind::TooSmall => aim.z,
-            Kind::Class | Kind::Unknown => aim.z.max(BETTER * least(was)),
-        })
-        .collect();
-    let mut desk = Desk { known, present, vehicle, questions, flights: BTreeMap::new(), count: 0 };
-    let mut at = desk.look(largest(present))?;
-    if at.elements.charge {
-        // Full batteries fall fastest: where time is no rival, that shows the sag better.
-        let full = desk.look(Elements { charge: false, ..at.elements })?;
-        if full.shortfall(&wanted) < at.shortfall(&wanted) {
-            at = full;
-        }
-    }
-    if at.shortfall(&wanted) > 0.0
-        && questions.iter().any(|question| question.kind() == Kind::Class)
-    {
-        let loaded = desk.look(Elements { payload: true, ..at.elements })?;
-        let adds = |((with, without), wanted): ((&f64, &f64), &f64)| {
-            without < wanted && *with > PAYLOAD_ADDS * without.max(1e-9)
-        };
-        if loaded.z.iter().zip(&at.z).zip(&wanted).any(adds) {
-            at = loaded;
-        }
-    }
-    while at.seconds > aim.longest_s {
-        let mut best: Option<Looked> = None;
-        for simpler in at.elements.simpler() {
-            let other = desk.look(simpler)?;
-            if other.seconds >= at.seconds {
-                continue;
-            }
-            // What is lost for a second saved.
-            let price = |one: &Looked| {
-                (one.shortfall(&wanted) - at.shortfall(&wanted)) / (at.seconds - one.seconds)
-            };
-            if best.as_ref().is_none_or(|best| price(&other) < price(best)) {
-                best = Some(other);
-            }
-        }
-        match best {
-            Some(best) => at = best,
-            None => return Ok(None),
-        }
-    }
-    let goals: Vec<f64> =
-        at.z.iter().zip(&wanted).map(|(z, wanted)| (KEEP * z).min(*wanted)).collect();
-    let mut needed: Vec<Left> = Vec::new();
-    loop {
-        let mut options = Vec::new();
-        for simpler in at.elements.simpler() {
-            let left = left_out(at.elements, simpler);
-            if !needed.contains(&left) {
-                options.push((desk.seconds(simpler)?, left, simpler));
-            }
-        }
-        options.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut next = None;
-        for (_, left, simpler) in options {
-            let other = desk.look(simpler)?;
-            if other.seconds <= at.seconds && other.z.iter().zip(&goals).all(|(z, goal)| z >= goal)
-            {
-                next = Some(other);
-                break;
-            }
-            needed.push(left);
-        }
-        match next {
-            Some(next) => at = next,
-            None => break,
-        }
-    }
-    let plan = desk.flight(at.elements)?.plan().clone();
-    Ok(Some(Choice {
-        elements: at.elements,
-        plan,
-        predicted: at.predicted,
-        was,
-        wanted,
-        looked_at: desk.count,
-    }))
+    FlightSearch::new(known, present, vehicle, questions)?.choose(aim)
 }
 
 /// All that this fleet can fly.
@@ -196,17 +111,130 @@ impl Looked {
     }
 }
 
-struct Desk<'a> {
+/// A search for the next flight that keeps what it has simulated.
+pub struct FlightSearch<'a> {
     known: &'a Known,
     present: &'a Plan,
     vehicle: &'a str,
     questions: &'a [Question],
+    /// Separations of the flight that was flown.
+    was: Predicted,
     /// Flights by what can be seen of them.
     flights: BTreeMap<Elements, Flight>,
     count: usize,
 }
 
-impl Desk<'_> {
+impl<'a> FlightSearch<'a> {
+    /// Predicts what the flight that was flown separates.
+    ///
+    /// # Errors
+    /// The model cannot fly, or effects are not valid.
+    pub fn new(
+        known: &'a Known,
+        present: &'a Plan,
+        vehicle: &'a str,
+        questions: &'a [Question],
+    ) -> Result<Self, GapError> {
+        let flown = Flight::new(known, present.clone())?;
+        let was = predict(known, &flown, (false, false), questions)?;
+        let flights = BTreeMap::new();
+        Ok(Self { known, present, vehicle, questions, was, flights, count: 0 })
+    }
+
+    /// The shortest flight that reaches the aim, as [`search`] looks for it. What was simulated for one aim
+    /// is not simulated again for another.
+    ///
+    /// # Errors
+    /// The model cannot fly, or effects are not valid.
+    pub fn choose(&mut self, aim: Aim) -> Result<Option<Choice>, GapError> {
+        self.count = 0;
+        let wanted: Vec<f64> = self
+            .questions
+            .iter()
+            .zip(&self.was)
+            .map(|(question, was)| match question.kind() {
+                Kind::TooSmall => aim.z,
+                Kind::Class | Kind::Unknown => aim.z.max(BETTER * least(was)),
+            })
+            .collect();
+        let mut at = self.look(largest(self.present))?;
+        if at.elements.charge {
+            // Full batteries fall fastest: where time is no rival, that shows the sag better.
+            let full = self.look(Elements { charge: false, ..at.elements })?;
+            if full.shortfall(&wanted) < at.shortfall(&wanted) {
+                at = full;
+            }
+        }
+        if at.shortfall(&wanted) > 0.0
+            && self.questions.iter().any(|question| question.kind() == Kind::Class)
+        {
+            let loaded = self.look(Elements { payload: true, ..at.elements })?;
+            let adds = |((with, without), wanted): ((&f64, &f64), &f64)| {
+                without < wanted && *with > PAYLOAD_ADDS * without.max(1e-9)
+            };
+            if loaded.z.iter().zip(&at.z).zip(&wanted).any(adds) {
+                at = loaded;
+            }
+        }
+        while at.seconds > aim.longest_s {
+            let mut best: Option<Looked> = None;
+            for simpler in at.elements.simpler() {
+                let other = self.look(simpler)?;
+                if other.seconds >= at.seconds {
+                    continue;
+                }
+                // What is lost for a second saved.
+                let price = |one: &Looked| {
+                    (one.shortfall(&wanted) - at.shortfall(&wanted)) / (at.seconds - one.seconds)
+                };
+                if best.as_ref().is_none_or(|best| price(&other) < price(best)) {
+                    best = Some(other);
+                }
+            }
+            match best {
+                Some(best) => at = best,
+                None => return Ok(None),
+            }
+        }
+        let goals: Vec<f64> =
+            at.z.iter().zip(&wanted).map(|(z, wanted)| (KEEP * z).min(*wanted)).collect();
+        let mut needed: Vec<Left> = Vec::new();
+        loop {
+            let mut options = Vec::new();
+            for simpler in at.elements.simpler() {
+                let left = left_out(at.elements, simpler);
+                if !needed.contains(&left) {
+                    options.push((self.seconds(simpler)?, left, simpler));
+                }
+            }
+            options.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut next = None;
+            for (_, left, simpler) in options {
+                let other = self.look(simpler)?;
+                if other.seconds <= at.seconds
+                    && other.z.iter().zip(&goals).all(|(z, goal)| z >= goal)
+                {
+                    next = Some(other);
+                    break;
+                }
+                needed.push(left);
+            }
+            match next {
+                Some(next) => at = next,
+                None => break,
+            }
+        }
+        let plan = self.flight(at.elements)?.plan().clone();
+        Ok(Some(Choice {
+            elements: at.elements,
+            plan,
+            predicted: at.predicted,
+            was: self.was.clone(),
+            wanted,
+            looked_at: self.count,
+        }))
+    }
+
     fn plan(&self, elements: Elements) -> Result<Plan, GapError> {
         let text = elements.template(self.present, self.vehicle, &[], &[]);
         let mission = resolve_text("next.toml", &text, &[]).map_err(Box::new)?;

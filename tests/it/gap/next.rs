@@ -5,7 +5,7 @@
 use crate::gap::verdicts::{INFLOW, climb_class, fitted, verdict};
 use updraft::check::{CheckInput, check};
 use updraft::gap::next::predict::{least, matters, predict, size_z};
-use updraft::gap::next::search::{Aim, search};
+use updraft::gap::next::search::{Aim, FlightSearch};
 use updraft::gap::next::{Elements, Flight, Known, Legs, Order, Question, Sought, ask};
 use updraft::gap::verdict::{Detectable, Finding, Noise};
 use updraft::mission::Plan;
@@ -183,7 +183,8 @@ fn a_class_gets_a_flight_that_separates_it_better() {
     let was = predict(&known, &flown, (false, false), &questions).unwrap();
     assert_eq!(was[0].len(), 2, "from drag and from the thrust curve: {was:?}");
     let aim = Aim { z: 5.0, longest_s: 960.0 };
-    let choice = search(&known, &present, VEHICLE, &questions, aim).unwrap().unwrap();
+    let mut search = FlightSearch::new(&known, &present, VEHICLE, &questions).unwrap();
+    let choice = search.choose(aim).unwrap().unwrap();
     let (before, after) = (least(&was[0]), least(&choice.predicted[0]));
     assert!(after >= aim.z && after > before, "{before} -> {after}: {:?}", choice.elements);
     // Everything together tells far more than the paper's ladder: the rest was left out for time.
@@ -193,15 +194,15 @@ fn a_class_gets_a_flight_that_separates_it_better() {
     assert!(choice.plan.duration_ms <= 960_000);
     // What is asked for less is answered sooner.
     let modest = Aim { z: 0.5 * after.min(5.0), longest_s: 960.0 };
-    let sooner = search(&known, &present, VEHICLE, &questions, modest).unwrap().unwrap();
+    let sooner = search.choose(modest).unwrap().unwrap();
     assert!(sooner.plan.duration_ms <= choice.plan.duration_ms);
     assert!(least(&sooner.predicted[0]) >= 0.95 * modest.z);
     // A limit is kept; one that nothing keeps is said.
     let short = Aim { z: 5.0, longest_s: 300.0 };
-    let shorter = search(&known, &present, VEHICLE, &questions, short).unwrap().unwrap();
+    let shorter = search.choose(short).unwrap().unwrap();
     assert!(shorter.plan.duration_ms <= 300_000);
     let none = Aim { z: 5.0, longest_s: 60.0 };
-    assert!(search(&known, &present, VEHICLE, &questions, none).unwrap().is_none());
+    assert!(search.choose(none).unwrap().is_none());
 }
 
 /// A class may have members that are no effects: what something unknown would depend on, and a motion of
