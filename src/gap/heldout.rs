@@ -62,7 +62,8 @@ impl Case<'_> {
     }
 
     fn against(&self, data: &Data, vehicle: &Vehicle) -> Result<Comparison, GapError> {
-        let comparison = Comparison::new(data, vehicle, self.simulated, self.plan)?;
+        let comparison = Comparison::new(data, vehicle, self.simulated, self.plan)?
+            .in_updraft(self.found.updraft_mps);
         Ok(same_bins(&comparison, &self.found.comparison))
     }
 

@@ -78,6 +78,8 @@ pub struct Settled {
     pub time_s: f64,
     /// State of the battery.
     pub supply: Supply,
+    /// Drones next to this one in the array, 0 to 8; `None`: as its home has it.
+    pub neighbours: Option<f64>,
 }
 
 /// State of a battery from which its voltage under load follows.

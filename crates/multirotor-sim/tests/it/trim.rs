@@ -87,6 +87,7 @@ impl Recorder for Compared {
             heading_rad: motion.rotation[(1, 0)].atan2(motion.rotation[(0, 0)]),
             time_s: (moment.time_us - turning_us) as f64 * 1e-6,
             supply: Supply::Used(battery.map_or(0.0, |battery| battery.used_ah)),
+            neighbours: None,
         };
         let trimmed = self.trim.at(&condition).expect("what is flown is possible");
         let pulses = moment.pilot.motors.pulses_us.map(f64::from);

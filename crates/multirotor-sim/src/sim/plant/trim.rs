@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::rotor::ROTORS;
 use super::{GRAVITY, Plant};
-use crate::effects::{Active, Definition, EffectError, Hook, Settled, Supply};
+use crate::effects::{Active, Air, Definition, EffectError, Hook, Now, Settled, Supply};
 use crate::sim::air::Surroundings;
 use crate::vehicle::Vehicle;
 
@@ -25,7 +25,7 @@ const MOST_LEAN: f64 = 0.9;
 /// Current and voltage of a battery find each other in a few steps: a step changes one by some percent of the other.
 const SUPPLY_STEPS: usize = 12;
 /// Places at which the mean over gusts is taken, in standard deviations from -4 to 4.
-const GUST_PLACES: i32 = 40;
+const GUST_PLACES: i32 = 16;
 
 /// One steady moment of flight; the default is a hover in still air at sea level, 100 m above ground, with a
 /// full battery and cold motors.
@@ -47,6 +47,8 @@ pub struct Condition {
     pub time_s: f64,
     /// State of the battery.
     pub supply: Supply,
+    /// Drones next to this one in the array, 0 to 8; `None`: as its home has it.
+    pub neighbours: Option<f64>,
 }
 
 impl Default for Condition {
@@ -60,8 +62,22 @@ impl Default for Condition {
             heading_rad: 0.0,
             time_s: 0.0,
             supply: Supply::Used(0.0),
+            neighbours: None,
         }
     }
+}
+
+/// The forces of a steady state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    /// Share of full thrust that the rotors give.
+    output: f64,
+    /// Horizontal part of the thrust's direction, show frame: the sine of the lean, and where to.
+    pub lean: Vector2<f64>,
+    /// Command that reaches the rotors, 0 to 1.
+    command: f64,
+    /// Electrical power of all rotors, W.
+    pub power_w: f64,
 }
 
 /// What a vehicle does in steady flight.
@@ -113,7 +129,8 @@ impl Trim {
         let dt_s = 0.0025;
         let (effects, airframe) = Active::start_deviating(vehicle, deviation, home_m, dt_s)?;
         let mut plant = Plant::with_effects(&airframe, effects, home_m, dt_s);
-        plant.effects.settle(&Settled { time_s: 0.0, supply: Supply::Used(0.0) });
+        let fresh = Settled { time_s: 0.0, supply: Supply::Used(0.0), neighbours: None };
+        plant.effects.settle(&fresh);
         let gust_sd_mps = plant.effects.gust_sd_mps();
         let mut trim = Self { plant, hover_output: 0.5, gust_sd_mps };
         // From a third of full thrust, as most multirotors hover, to where this one does.
@@ -124,26 +141,45 @@ impl Trim {
     /// The steady state under a condition; `None` where the vehicle has none: it cannot hold this speed, or has
     /// not the power.
     pub fn at(&mut self, condition: &Condition) -> Option<Trimmed> {
-        self.plant.effects.settle(&Settled { time_s: condition.time_s, supply: condition.supply });
+        let balance = self.balance(condition)?;
+        let pulse_us = self.pulse_us(&balance, condition)?;
+        Some(Trimmed {
+            pulse_us,
+            lean: balance.lean,
+            rotor_radps: self.plant.rotors.speed_radps(balance.output),
+            power_w: balance.power_w,
+            current_a: self.plant.battery().map(|battery| battery.amps),
+        })
+    }
+
+    /// The balance of forces under a condition, whatever the supply; `None` where there is none.
+    pub fn balance(&mut self, condition: &Condition) -> Option<Balance> {
+        self.settle(condition);
         let found = self.balanced(condition, Vector3::new(self.hover_output, 0.0, 0.0));
         let left_mps2 = self.left_over(condition, &found).norm();
         if left_mps2.is_nan() || left_mps2 > BESIDE_A_JUMP_MPS2 {
             return None;
         }
-        let density_ratio = self.met_density(condition);
+        let density_ratio = self.met(condition).0.density_ratio;
         let (output, torque) = (found.x, self.plant.torque);
-        let power_w = self.plant.rotors.power_w(density_ratio, torque);
-        let wanted = match self.plant.sitl {
+        let command = match self.plant.sitl {
             Some(_) => output,
             None => self.plant.rotors.command_for(output, density_ratio * torque),
         };
-        Some(Trimmed {
-            pulse_us: 1000.0 + 1000.0 * self.given_for(wanted, condition, power_w)?,
-            lean: found.yz(),
-            rotor_radps: self.plant.rotors.speed_radps(output),
-            power_w,
-            current_a: self.plant.battery().map(|battery| battery.amps),
-        })
+        let power_w = self.plant.rotors.power_w(density_ratio, torque);
+        Some(Balance { output, lean: found.yz(), command, power_w })
+    }
+
+    /// Pulse width of all rotors for a balance, us: what time, supply and controllers make of it. `None`: no
+    /// pulse does it.
+    pub fn pulse_us(&mut self, balance: &Balance, condition: &Condition) -> Option<f64> {
+        self.settle(condition);
+        Some(1000.0 + 1000.0 * self.given_for(balance, condition)?)
+    }
+
+    fn settle(&mut self, condition: &Condition) {
+        let Condition { time_s, supply, neighbours, .. } = *condition;
+        self.plant.effects.settle(&Settled { time_s, supply, neighbours });
     }
 
     /// Newton's method from a first guess; the best that it saw.
@@ -213,26 +249,24 @@ impl Trim {
         acceleration - condition.acceleration_mps2
     }
 
-    /// Density as the effects make it.
-    fn met_density(&mut self, condition: &Condition) -> f64 {
+    /// What effects see under a condition, and the air as they make it.
+    fn met(&mut self, condition: &Condition) -> (Now, Air) {
         let around = Surroundings {
             air_velocity_mps: condition.air_mps,
             density_ratio: condition.density_ratio,
         };
-        self.plant.meet(&around, &condition.velocity_mps).1.density_ratio
+        self.plant.meet(&around, &condition.velocity_mps)
     }
 
-    /// The command that the autopilot must give so that the rotors get `wanted`, both 0 to 1.
-    fn given_for(&mut self, wanted: f64, condition: &Condition, power_w: f64) -> Option<f64> {
+    /// The command that the autopilot must give for a balance, 0 to 1.
+    fn given_for(&mut self, balance: &Balance, condition: &Condition) -> Option<f64> {
+        let wanted = balance.command;
         if !self.plant.effects.acts(Hook::Command) {
             return Some(wanted);
         }
-        let around = Surroundings {
-            air_velocity_mps: condition.air_mps,
-            density_ratio: condition.density_ratio,
-        };
-        let (mut now, _) = self.plant.meet(&around, &condition.velocity_mps);
-        (now.dt_s, now.power_w) = (0.0, power_w);
+        self.plant.rotors.settle(balance.output);
+        let (mut now, _) = self.met(condition);
+        (now.dt_s, now.power_w) = (0.0, balance.power_w);
         for _ in 0..SUPPLY_STEPS {
             self.plant.effects.follow(&now);
         }
