@@ -1,4 +1,4 @@
-//! What a flight needs of its drones.
+//! The preflight table: the charge that a flight needs, and parameters that could not be set.
 
 use super::params::SetError;
 use super::preflight::{COLUMNS, Cell, Known, Limits, charge_needed, preflight};

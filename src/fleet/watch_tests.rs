@@ -1,4 +1,4 @@
-//! What a monitor tells of drones that fly, fall silent, restart or go astray.
+//! Events of drones that fly, fall silent, restart or go astray, as a monitor tells them.
 
 use std::collections::BTreeMap;
 
