@@ -28,19 +28,31 @@ fn of_several_boots_the_last_is_read_unless_another_is_wanted() {
     }
 }
 
+/// Batteries in turn, with their voltage, voltage at rest, current and resistance.
+fn batteries(values: &[[f64; 4]]) -> Messages {
+    let mut log = LogWriter::new(Vec::new(), &[&BAT]).unwrap();
+    for row in 0..50 {
+        for (instance, [volt, resting, amperes, ohm]) in (0..).zip(values) {
+            let mut row = vec![Value::Int(100_000 * row), Value::Int(instance)];
+            row.extend([*volt, *resting, *amperes, 0.0, 0.0, 0.0, *ohm].map(Value::Float));
+            row.push(Value::Int(80));
+            log.row(&BAT, &row).unwrap();
+        }
+    }
+    Messages::read(&Log::from_bytes(log.finish().unwrap()))
+}
+
 #[test]
 fn a_board_without_a_current_sensor_gives_no_power() {
-    let power = |amperes: f64| {
-        let mut log = LogWriter::new(Vec::new(), &[&BAT]).unwrap();
-        for row in 0..50 {
-            let mut values = vec![Value::Int(100_000 * row), Value::Int(0)];
-            values.extend([12.0, 12.5, amperes, 0.0, 0.0, 0.0, 0.0].map(Value::Float));
-            values.push(Value::Int(80));
-            log.row(&BAT, &values).unwrap();
-        }
-        let messages = Messages::read(&Log::from_bytes(log.finish().unwrap()));
-        messages.power().map(|power| power.value)
-    };
+    let power = |amperes| batteries(&[[12.0, 12.5, amperes, 0.0]]).power().map(|power| power.value);
     assert_eq!(power(0.0), None);
     assert_eq!(power(10.0), Some(vec![120.0; 50]));
+}
+
+#[test]
+fn the_voltage_at_rest_is_that_of_the_first_battery() {
+    let (volts, ohm) = batteries(&[[12.0, 12.5, 10.0, 0.0625], [5.0, 5.5, 1.0, 0.5]]).resting();
+    assert_eq!((volts.unwrap().value, ohm), (vec![12.5; 50], Some(0.0625)));
+    let (volts, ohm) = batteries(&[[12.0, 0.0, 10.0, 0.0]]).resting();
+    assert_eq!((volts, ohm), (None, None), "an autopilot that does not estimate it logs 0");
 }
