@@ -87,3 +87,56 @@ pub(super) fn missing(
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::super::calibrate::{FitOptions, calibrate};
+    use super::super::map_statistics::HoverSeen;
+    use super::super::result::Trace;
+    use super::*;
+    use crate::flight::{Clock, Loss};
+
+    fn one(losses: Vec<Loss>) -> One {
+        let drone = DroneAnalysis {
+            slot: Some(1),
+            name: String::new(),
+            source: String::new(),
+            home_m: None,
+            clock: Clock::default(),
+            windows: Vec::new(),
+            laws: None,
+            offset: None,
+            partial_ladder: None,
+            trace: Trace::default(),
+            warnings: Vec::new(),
+        };
+        One {
+            drone,
+            losses,
+            skipped_bytes: 12,
+            calibration: Err(calibrate(&[], &FitOptions::default()).unwrap_err()),
+            updraft: None,
+            hover: HoverSeen::default(),
+            truth: None,
+        }
+    }
+
+    #[test]
+    fn a_log_is_used_in_part_if_something_of_it_is_lost() {
+        let partly_used = |losses: Vec<Loss>| {
+            let log = LogInput { path: PathBuf::from("1.BIN"), ..LogInput::default() };
+            let outcome = [(&log, &SlotMatch::Slot(1), Ok(one(losses)))];
+            let account = Account::of(&FlightInput::default(), outcome.into_iter());
+            assert_eq!((account.ones.len(), account.unused.len()), (1, 0));
+            account.partly_used
+        };
+        assert_eq!(partly_used(Vec::new()), []);
+        let lost = partly_used(vec![Loss::CutOff { height_m: 20.0 }]);
+        let [PartlyUsedLog { source, slot: Some(1), skipped_bytes: 12, .. }] = &lost[..] else {
+            panic!("{lost:?}")
+        };
+        assert_eq!(source, "1.BIN");
+    }
+}

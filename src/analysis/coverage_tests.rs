@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 
 use super::aware::Aware;
 use super::battery::Sag;
-use super::budget::{CommonError, Supply};
+use super::budget::{CommonError, Quality, QualityFlag, Supply};
 use super::calibrate::FitOptions;
 use super::corrections::Corrections;
 use super::density::Density;
@@ -356,14 +356,23 @@ fn many_campaigns() {
 /// What drone 0 measures in a hover at a lean, by a calibration in still air: its values, the noise of a second
 /// in us, the law's true slope, and what it shares with the others.
 fn at_a_lean(lean_rad: f64, corrections: Corrections<'_>) -> (Measured, f64, f64, CommonError) {
+    in_air(0.0, lean_rad, corrections)
+}
+
+/// The same in air that rises.
+fn in_air(
+    air_mps: f64,
+    lean_rad: f64,
+    corrections: Corrections<'_>,
+) -> (Measured, f64, f64, CommonError) {
     let mut rng = stream(5, 0, Stream::Sensors);
     let world = World::new(&mut rng, LawKind::Linear);
     let calibration = calibration(&mut rng, &world, STILL);
     let corrections = Corrections { density: Some(World::density()), ..corrections };
     let sag = Some(Sag::default());
     let aware = Aware::new(&calibration, corrections, sag, Some(LawKind::Linear)).unwrap();
-    let still = vec![0.0; (HOVER_S / STEP_S) as usize];
-    let (mut flight, _) = hover(&mut rng, &world, STILL, 0, &still);
+    let air = vec![air_mps; (HOVER_S / STEP_S) as usize];
+    let (mut flight, _) = hover(&mut rng, &world, STILL, 0, &air);
     flight.roll_rad.value.fill(lean_rad);
     let label = String::new();
     let target = Target {
@@ -417,4 +426,20 @@ fn every_origin_of_an_error_is_in_the_total() {
     let sum: f64 = parts.iter().map(|part| part * part).sum();
     assert!((common.se_mps - sum.sqrt()).abs() < 1e-9, "{common:?}");
     assert!(common.half_width_mps >= 1.95 * common.se_mps, "{common:?}");
+}
+
+#[test]
+fn air_is_told_to_be_faster_than_the_ladder_where_it_is() {
+    let reasons = |air_mps: f64| -> Vec<String> {
+        let (measured, ..) = in_air(air_mps, 0.0, Corrections::default());
+        let beyond = |flag: &&QualityFlag| flag.flag == Quality::BeyondLadder;
+        measured.quality.iter().filter(beyond).map(|flag| flag.reason.clone()).collect()
+    };
+    for air_mps in [-3.0, 0.0, 3.0] {
+        assert_eq!(reasons(air_mps), [] as [&str; 0], "the ladder reaches to 3.5 m/s");
+    }
+    for air_mps in [-5.0, 5.0] {
+        let told = "231 s of faster air than the ladder's -3.5 to +3.5 m/s";
+        assert_eq!(reasons(air_mps), [told], "{air_mps} m/s");
+    }
 }

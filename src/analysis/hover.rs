@@ -314,4 +314,12 @@ mod tests {
         let noise = look(&flown(odd), 199.0).noise_us(26.0);
         assert!((2.5..3.0).contains(&noise), "steps of 4 us: {noise}");
     }
+
+    #[test]
+    fn a_hover_is_as_long_as_from_its_start_to_its_end() {
+        let from_to = |start_s, end_s| Hover { start_s, end_s, ..Hover::default() };
+        let short = from_to(100.0, 108.0).nothing().to_string();
+        assert!(short.starts_with("the hover is too short: its window has 8 s"), "{short}");
+        assert_eq!(from_to(100.0, 140.0).nothing(), Cause::OutsideLaw { track: false });
+    }
 }

@@ -449,4 +449,14 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn every_valley_of_a_profile_is_a_start_and_its_ends_are_none() {
+        let starts = |chi2: fn(f64) -> f64| {
+            minima_of(&grid().map(chi2).collect::<Vec<_>>()).collect::<Vec<_>>()
+        };
+        let [low, high] = starts(|w| (w * w - 9.0).powi(2))[..] else { panic!("two valleys") };
+        assert!((low + 3.0).abs() < W_STEP_MPS && (high - 3.0).abs() < W_STEP_MPS, "{low} {high}");
+        assert_eq!(starts(|w| -w), [] as [f64; 0], "a slope has its lowest point at its end");
+    }
 }

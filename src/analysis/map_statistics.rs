@@ -132,3 +132,28 @@ fn slope_us_per_mps(laws: &Laws) -> Option<f64> {
         .or_else(|| laws.signed_quadratic.as_ref().and_then(first))?;
     (slope.is_finite() && slope > 0.0).then_some(slope)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mission::plan::SegmentKind;
+
+    fn mean_heading_deg(headings: &[f64]) -> Option<f64> {
+        let time_s = (0..headings.len()).map(|second| second as f64).collect();
+        let yaw_deg = Series { time_s, value: headings.to_vec() };
+        let (kind, label) = (SegmentKind::Hover, String::new());
+        let hover = Target { kind, label, start_s: 0.0, end_s: 10.0, commanded_mps: 0.0 };
+        heading_deg(&Flight { yaw_deg, ..Flight::default() }, &hover)
+    }
+
+    #[test]
+    fn headings_on_both_sides_of_north_have_a_mean_between_them() {
+        for (headings, expected) in
+            [([350.0, 20.0], 5.0), ([340.0, 10.0], 355.0), ([80.0, 120.0], 100.0)]
+        {
+            let mean = mean_heading_deg(&headings).unwrap();
+            assert!((mean - expected).abs() < 1e-9, "{headings:?}: {mean}");
+        }
+        assert_eq!(mean_heading_deg(&[]), None);
+    }
+}

@@ -6,6 +6,8 @@
 mod account;
 mod air_prior;
 mod analyze;
+#[cfg(test)]
+mod analyze_tests;
 mod aware;
 pub mod battery;
 pub mod budget;

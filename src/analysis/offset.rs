@@ -262,4 +262,30 @@ mod tests {
         assert_eq!(surface.at(f64::NAN, 20.0), None);
         assert!(!surface.at(1e12, -1e9).unwrap().inside);
     }
+
+    fn hover(pulse_us: f64, rejected: &[super::super::result::Rejection]) -> WindowStats {
+        let stats =
+            |mean: f64| serde_json::json!({"median": mean, "mean": mean, "sd": 0.0, "n": 1});
+        let mut window: WindowStats = serde_json::from_value(serde_json::json!({
+            "kind": "hover", "label": "", "start_s": 10.0, "end_s": 16.0, "commanded_mps": 0.0,
+            "height_m": 20.0, "velocity_mps": stats(0.0), "pulse_us": stats(0.0),
+            "pulse_phi_us": stats(0.0), "tilt_deg": stats(0.0), "offset_us": null, "rejected": []
+        }))
+        .unwrap();
+        window.effort_phi.mean = pulse_us;
+        window.rejected = rejected.to_vec();
+        window
+    }
+
+    #[test]
+    fn two_hovers_that_were_flown_properly_make_a_map_and_one_is_its_own_mean() {
+        let gap = hover(1700.0, &[super::super::result::Rejection::Gap]);
+        let of = |windows: &[WindowStats]| OffsetMap::of(windows, Location::Mean);
+        let map = of(&[hover(1540.0, &[]), gap.clone(), hover(1550.0, &[])]).unwrap();
+        assert_eq!(map.baseline_us.value, 1545.0);
+        let offsets: Vec<f64> = map.points.iter().map(|point| point.offset_us).collect();
+        assert_eq!(offsets, [-5.0, 5.0]);
+        assert_eq!(of(&[hover(1540.0, &[]), gap]), None);
+        assert_eq!(of(&[hover(1540.0, &[]), hover(f64::NAN, &[])]), None, "a pulse is not known");
+    }
 }

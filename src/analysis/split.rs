@@ -143,3 +143,20 @@ pub(super) fn rough_sensitivity(shape: Shape, rough: f64, air_mps: f64) -> f64 {
         Shape::SignedQuadratic => 2.0 * rough * air_mps.abs(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn air_moves_a_pulse_by_the_slope_of_its_law() {
+        for shape in [Shape::Line, Shape::SignedQuadratic] {
+            for air_mps in [-3.0, -0.5, 0.4, 2.0] {
+                let moved = |by_mps| shape.pulse_us(&[1540.0, 25.0, 0.0, 0.0], air_mps + by_mps);
+                let per_mps = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+                let sensitivity = rough_sensitivity(shape, 25.0, air_mps);
+                assert!((sensitivity - per_mps).abs() < 1e-3, "{shape:?} at {air_mps}");
+            }
+        }
+    }
+}

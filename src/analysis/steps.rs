@@ -91,4 +91,14 @@ mod tests {
         assert!(up.start_s > 11.5 && up.end_s < 18.0, "{up:?}");
         assert_eq!(steady(&Flight::default(), &steps), []);
     }
+
+    #[test]
+    fn the_shortest_window_is_still_used() {
+        let run: Vec<(f64, f64)> = (0..=20).map(|half| (0.5 * f64::from(half), 0.0)).collect();
+        let of =
+            |shortest_s| target(&run, &Steps { settle_s: 3.0, shortest_s, ..Steps::default() });
+        let window = of(6.5).unwrap();
+        assert_eq!((window.start_s, window.end_s), (3.0, 9.5));
+        assert!(of(6.6).is_none());
+    }
 }

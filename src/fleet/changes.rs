@@ -146,3 +146,19 @@ impl Changes {
         self.drones.iter().filter(unfenced).map(|entry| entry.drone).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_read_as_they_were_written_and_there_are_none_without_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(Changes::read(folder.path()).unwrap(), Changes::default());
+        let mut changes = Changes::default();
+        let change = Change { name: "FENCE_ENABLE".to_owned(), was: 0.0, now: 1.0 };
+        changes.add(DroneId { network: 0, system: 1 }, &[change]);
+        changes.write(folder.path()).unwrap();
+        assert_eq!(Changes::read(folder.path()).unwrap(), changes);
+    }
+}

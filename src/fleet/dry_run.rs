@@ -384,3 +384,31 @@ pub fn dry_run<C: Conversation>(
     }
     (lines, None)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::messages::{GuidedTarget, position_target};
+    use super::*;
+
+    #[test]
+    fn the_vehicle_says_that_it_is_where_it_was_sent() {
+        let drone = DroneId { network: 0, system: 1 };
+        let home = Geodetic { lat_deg: 47.0, lon_deg: 19.0, amsl_m: 100.0 };
+        let mut vehicle = Obliging::new(drone, false, home);
+        let target = GuidedTarget {
+            lat_1e7: 470_012_345,
+            lon_1e7: -190_054_321,
+            above_home_m: 12.5,
+            neu_mps: [0.0; 3],
+            yaw_rad: 0.0,
+        };
+        let mut said = Vec::new();
+        vehicle.on_message(0, &position_target(drone, 0, &target), &mut said);
+        vehicle.poll(0, &mut said);
+        let at = said.iter().find_map(|message| match message {
+            MavMessage::GLOBAL_POSITION_INT(at) => Some((at.lat, at.lon, at.alt, at.relative_alt)),
+            _ => None,
+        });
+        assert_eq!(at, Some((470_012_345, -190_054_321, 112_500, 12_500)));
+    }
+}

@@ -11,17 +11,25 @@ pub mod dry_run;
 pub mod fence;
 pub mod gate;
 pub mod guided;
+#[cfg(test)]
+mod guided_tests;
 pub mod journal;
 pub mod logs;
 mod off_course;
 pub mod order_handler;
 pub mod orders;
 pub mod preflight;
+#[cfg(test)]
+mod preflight_tests;
 pub mod required;
 pub mod slots;
 pub mod start;
+#[cfg(test)]
+mod start_tests;
 pub mod upload;
 pub mod watch;
+#[cfg(test)]
+mod watch_tests;
 
 pub use mavlink_station::{
     abort, budget, clear, command, ftp, greet, intervals, load, log_protocol, messages, params,

@@ -258,4 +258,16 @@ mod tests {
         assert!(course.look(place, at(2.5), FAR_M).unwrap().0 < 0.2);
         assert_eq!(course.look(place, at(2.5), FAR_M), None, "the same again");
     }
+
+    #[test]
+    fn a_step_allows_its_lag_in_full_at_first_and_then_less_and_less() {
+        let mut course = course();
+        course.steps = vec![(100.0, 3.0)];
+        let allowed_m = |show_s: f64, doubt_s: f64| course.transient_m(Moment { show_s, doubt_s });
+        for (show_s, expected_m) in [(99.5, 0.0), (100.5, 2.4), (102.75, 1.2), (105.0, 0.0)] {
+            assert!((allowed_m(show_s, 0.0) - expected_m).abs() < 1e-9, "at {show_s} s");
+        }
+        assert!((allowed_m(99.5, 1.0) - 2.4).abs() < 1e-9, "it may have begun");
+        assert!((allowed_m(105.0, 2.5) - 1.44).abs() < 1e-9, "it may not have ended");
+    }
 }

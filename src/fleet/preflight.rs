@@ -438,18 +438,3 @@ impl std::fmt::Display for Preflight {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mission::resolve::resolve;
-
-    #[test]
-    fn a_flight_needs_its_share_of_the_endurance_and_the_reserve() {
-        let mut plan = resolve("calibration", &[]).unwrap().flights.remove(0).plan;
-        plan.duration_ms = 300_000;
-        plan.limits.endurance_s = 1_000.0;
-        plan.limits.endurance_reserve = 0.25;
-        assert!((charge_needed(&plan) - 55.0).abs() < 1e-9);
-    }
-}

@@ -244,3 +244,124 @@ fn takeoff_s(evidence: &Evidence<'_>) -> f64 {
     let still = heights.get(..up).and_then(|before| before.iter().rposition(low));
     still.and_then(|index| times.get(index).copied()).unwrap_or(start)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::catalog::GPS;
+    use crate::log::{Log, LogWriter, Value};
+    use crate::mission::plan::{SegmentKind, Window};
+
+    /// GPS rows five a second over board time, s, with the time that they tell, ms since the GPS epoch.
+    fn gps_rows(gps_ms: impl Fn(f64) -> i64) -> Messages {
+        let mut log = LogWriter::new(Vec::new(), &[&GPS]).unwrap();
+        for row in 0..2000 {
+            let time = GpsTime::from_total_ms(gps_ms(0.2 * f64::from(row))).unwrap();
+            let (tow_ms, week) = (i64::from(time.tow_ms), i64::from(time.week));
+            let ints = [i64::from(200_000 * row), 0, 3, tow_ms, week, 20, 0, 0, 0];
+            let mut values: Vec<Value<'_>> = ints.into_iter().map(Value::Int).collect();
+            values.extend([Value::Float(0.0); 5]);
+            values.push(Value::Int(1));
+            log.row(&GPS, &values).unwrap();
+        }
+        Messages::read(&Log::from_bytes(log.finish().unwrap()))
+    }
+
+    fn found(
+        messages: &Messages,
+        velocity_up: &Series,
+        height: &Series,
+        options: FlightOptions<'_>,
+    ) -> (Clock, usize) {
+        let flight = (100.0, 300.0);
+        let evidence = Evidence { messages, flight, desired_up: None, velocity_up, height };
+        let mut warnings = Vec::new();
+        (align(&evidence, options, &mut warnings), warnings.len())
+    }
+
+    #[test]
+    fn gps_time_of_the_flight_places_a_start_on_the_board() {
+        let on_ms = 1_450_000_000_000;
+        let start = GpsTime::from_total_ms(on_ms + 110_000);
+        // The board wanders by a tenth of a second to each side; before the flight it had no time yet.
+        let messages = gps_rows(|time_s| {
+            let off_ms = if time_s < 90.0 { -7_000_000.0 } else { (time_s / 20.0).sin() * 100.0 };
+            on_ms + (1000.0 * time_s + off_ms).round() as i64
+        });
+        let options = FlightOptions { start, ..FlightOptions::default() };
+        let (clock, warnings) = found(&messages, &Series::default(), &Series::default(), options);
+        assert_eq!((clock.method, clock.start, warnings), (Alignment::GpsTime, start, 0));
+        assert!((clock.offset_s - 110.0).abs() < 0.1, "{clock:?}");
+        assert!((0.05..0.11).contains(&clock.residual_s), "{clock:?}");
+    }
+
+    /// Legs of 20 s at these speeds, m/s, from 20 m on, each with a window.
+    fn legs(speeds_mps: &[f64]) -> Vec<Segment> {
+        let mut height_m = 20.0;
+        let leg = |(start_ms, up_mps): (u64, &f64)| {
+            let from_m = [0.0, 0.0, height_m];
+            height_m += 20.0 * up_mps;
+            Segment {
+                kind: SegmentKind::Climb,
+                label: String::new(),
+                start_ms,
+                end_ms: start_ms + 20_000,
+                from_m,
+                to_m: [0.0, 0.0, height_m],
+                velocity_mps: [0.0, 0.0, *up_mps],
+                from_velocity_mps: None,
+                window: Some(Window { start_ms: start_ms + 10_000, end_ms: start_ms + 19_000 }),
+            }
+        };
+        (0..).step_by(20_000).zip(speeds_mps).map(leg).collect()
+    }
+
+    /// A channel over the flight at 10 Hz.
+    fn channel(value: impl Fn(f64) -> f64) -> Series {
+        let time_s: Vec<f64> = (1000..3000).map(|tick| f64::from(tick) / 10.0).collect();
+        let value = time_s.iter().map(|time| value(*time)).collect();
+        Series { time_s, value }
+    }
+
+    /// The clock by a plan whose first seconds alone were flown, from 130 s on by the board's clock.
+    fn flown_until(end_s: f64) -> (Clock, usize) {
+        let segments = legs(&[1.0, 0.0, -1.0]);
+        let velocity_up = channel(|time_s| {
+            let show_s = time_s - 130.0;
+            if show_s < end_s { planned_up_mps(&segments, show_s) } else { 0.0 }
+        });
+        let options = FlightOptions { segments: Some(&segments), ..FlightOptions::default() };
+        found(&Messages::default(), &velocity_up, &Series::default(), options)
+    }
+
+    #[test]
+    fn a_plan_is_matched_if_more_than_half_of_it_was_flown() {
+        for end_s in [60.0, 45.0] {
+            let (clock, warnings) = flown_until(end_s);
+            assert_eq!((clock.method, warnings), (Alignment::Plan, 0), "flown until {end_s} s");
+            assert!((clock.offset_s - 130.0).abs() < 0.2, "{clock:?}");
+        }
+        for end_s in [15.0, 0.0] {
+            let (clock, warnings) = flown_until(end_s);
+            assert_eq!((clock.method, warnings), (Alignment::Takeoff, 1), "flown until {end_s} s");
+        }
+    }
+
+    #[test]
+    fn heights_sharpen_what_velocities_tell_late() {
+        let segments = legs(&[1.0, -1.0, 2.0, -2.0, 0.5, -0.5]);
+        let velocity_up = channel(|time_s| planned_up_mps(&segments, time_s - 130.4));
+        let height = channel(|time_s| {
+            let show_s = time_s - 130.0;
+            let leg = segments.iter().rev().find(|leg| leg.start_ms as f64 <= 1000.0 * show_s);
+            leg.map_or(20.0, |leg| {
+                leg.from_m[2] + leg.velocity_mps[2] * (show_s - leg.start_ms as f64 / 1000.0)
+            })
+        });
+        let options = FlightOptions { segments: Some(&segments), ..FlightOptions::default() };
+        let (clock, _) = found(&Messages::default(), &velocity_up, &height, options);
+        assert_eq!(clock.method, Alignment::Plan);
+        assert!((clock.offset_s - 130.0).abs() < 0.02, "{clock:?}");
+        assert!(clock.residual_s < 0.05, "{clock:?}");
+    }
+}

@@ -165,3 +165,36 @@ fn difference_mps(flight: &Flight, segments: &[Segment]) -> f64 {
         .sum();
     sum / f64::from(SAMPLES)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::Series;
+    use crate::mission::plan::SegmentKind;
+
+    #[test]
+    fn the_difference_from_a_plan_is_a_mean_over_its_time() {
+        let segment = |start_ms, end_ms, up_mps| Segment {
+            kind: SegmentKind::Climb,
+            label: String::new(),
+            start_ms,
+            end_ms,
+            from_m: [0.0; 3],
+            to_m: [0.0; 3],
+            velocity_mps: [0.0, 0.0, up_mps],
+            from_velocity_mps: None,
+            window: None,
+        };
+        let plan = [segment(0, 20_000, 1.0), segment(20_000, 40_000, 0.2)];
+        let difference = |up_mps: fn(f64) -> f64| {
+            let time_s: Vec<f64> = (0..=400).map(|tick| f64::from(tick) / 10.0).collect();
+            let value = time_s.iter().map(|time| up_mps(*time)).collect();
+            let velocity_up_mps = Series { time_s, value };
+            difference_mps(&Flight { velocity_up_mps, ..Flight::default() }, &plan)
+        };
+        assert!(difference(|time| if time < 20.0 { 1.0 } else { 0.2 }) < 0.01, "as planned");
+        // 0.5 m/s at most for the first half, and 0.2 m/s for the second.
+        let standing = difference(|_| 0.0);
+        assert!((standing - 0.35).abs() < 1e-9, "{standing}");
+    }
+}

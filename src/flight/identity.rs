@@ -460,3 +460,15 @@ fn place(rows: &super::clean::Rows, row: usize) -> Option<Geodetic> {
         && (place.lat_deg, place.lon_deg) != (0.0, 0.0);
     is_place.then_some(place)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_so_many_seconds_later_than_another() {
+        let [one, other] =
+            [1_400_000_002_000, 1_400_000_005_500].map(|ms| GpsTime::from_total_ms(ms).unwrap());
+        assert_eq!((later_s(other, one), later_s(one, other), later_s(one, one)), (3.5, -3.5, 0.0));
+    }
+}

@@ -380,4 +380,10 @@ mod tests {
         assert_eq!(words(2.0 * GAP_S), "a gap");
         assert!(words(9.2e12).contains("clock jumps"), "{}", words(9.2e12));
     }
+
+    #[test]
+    fn the_first_and_the_last_of_several_are_called_so() {
+        let named = [(0, 1), (0, 3), (1, 3), (2, 3)].map(|(index, count)| ordinal(index, count));
+        assert_eq!(named, ["first", "first", "number 2", "last (number 3)"]);
+    }
 }

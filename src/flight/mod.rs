@@ -16,6 +16,8 @@
 
 mod align;
 mod channels;
+#[cfg(test)]
+mod channels_tests;
 mod choose;
 mod clean;
 mod fit;

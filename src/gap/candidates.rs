@@ -318,3 +318,24 @@ pub(super) fn of_the_air(
         air("updraft-profile", column(&|signals| (signals.height_m.max(0.0) / 100.0).cbrt())),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::*;
+
+    #[test]
+    fn air_that_begins_to_rise_takes_away_the_pulse_that_a_drone_answers_with() {
+        let data = trial::data(2, |_, _| 0.0);
+        let comparison = trial::comparison(&data);
+        let patterns = comparison.patterns(&trial::vehicle(), 0.2).unwrap();
+        let hyper = Hyper::default();
+        let motions = of_the_air(&comparison.scene, &patterns, &hyper);
+        let drift = &motions.iter().find(|one| one.name == "updraft-drift").unwrap().variants[0];
+        let responses = patterns[0].responses(&hyper);
+        let (first, last) = (0, responses.len() - 1);
+        let share = |bin: usize| drift.column.at(0, 0, bin) / responses[bin];
+        assert!((share(last) + 1.0).abs() < 1e-9, "1 m/s at the end: {}", share(last));
+        assert!((-0.1..0.0).contains(&share(first)), "and hardly any before: {}", share(first));
+    }
+}

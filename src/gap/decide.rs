@@ -267,12 +267,12 @@ mod tests {
     }
 
     impl Case {
-        /// What is decided, as a word and the members of the class.
-        fn decided(
+        fn decision(
             &self,
             library: &[Ranked],
             generics: &[RankedGeneric],
-        ) -> (&'static str, Vec<usize>) {
+            options: &Options,
+        ) -> Decision {
             let split = Split::of(&self.pulses);
             let problem = Problem::new(&self.groups, &split);
             let (mut library, mut generics) = (library.to_vec(), generics.to_vec());
@@ -283,7 +283,16 @@ mod tests {
             let drones = [3, 2];
             let sought =
                 Sought { library: &self.library, generics: &self.generics, drones: &drones };
-            let decision = decide(&problem, &round, sought, MATERIAL_US, &BY_FLOORS, 0);
+            decide(&problem, &round, sought, MATERIAL_US, options, 0)
+        }
+
+        /// What is decided, as a word and the members of the class.
+        fn decided(
+            &self,
+            library: &[Ranked],
+            generics: &[RankedGeneric],
+        ) -> (&'static str, Vec<usize>) {
+            let decision = self.decision(library, generics, &BY_FLOORS);
             let limits = Thresholds { library: 8.0, generic: 14.0 };
             assert_eq!(decision.thresholds, limits, "the floors");
             match decision.what {
@@ -374,5 +383,15 @@ mod tests {
     #[test]
     fn the_margin_of_a_class_is_six_nats_or_a_tenth() {
         assert_eq!([0.0, 10.0, 60.0, 200.0].map(margin_nats), [6.0, 6.0, 6.0, 20.0]);
+    }
+
+    #[test]
+    fn what_chance_reaches_is_asked_unless_a_gain_is_far_above_it() {
+        let case = case();
+        let strict = Options { alpha: 1e-12, replicates: 20, ..BY_FLOORS };
+        let thresholds = |gain| case.decision(&[ranked(0, gain)], &[], &strict).thresholds;
+        let found = thresholds(SURE_NATS - 0.1);
+        assert!(found.library > 8.0, "once in so many flights chance gains more: {found:?}");
+        assert_eq!(thresholds(SURE_NATS), Thresholds { library: 8.0, generic: 14.0 });
     }
 }

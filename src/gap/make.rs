@@ -358,4 +358,25 @@ mod tests {
         assert!(gap(&clean) < 1.0, "{}", gap(&clean));
         assert!(gap(&poisoned) > 5.0, "{}", gap(&poisoned));
     }
+
+    #[test]
+    fn the_models_pulse_of_a_rung_is_the_measured_less_what_is_left() {
+        let data = trial::data(4, |_, _| 0.0);
+        let regime = |x: f64| Regime {
+            by: Dependence::Climb,
+            label: String::new(),
+            x,
+            before_us: (5.0, 1.0),
+            after_us: -2.0,
+            before_mps: 0.0,
+            bins: 8,
+        };
+        let rungs = ladder(&data, &[-2.0, 2.0, 3.0, 7.0].map(regime));
+        assert_eq!(rungs.len(), 3, "nobody flew 7 m/s");
+        assert!(rungs.windows(2).all(|pair| pair[0].measured_us < pair[1].measured_us));
+        for rung in rungs {
+            assert!((rung.before_us - (rung.measured_us - 5.0)).abs() < 1e-9, "{rung:?}");
+            assert!((rung.after_us - (rung.measured_us + 2.0)).abs() < 1e-9, "{rung:?}");
+        }
+    }
 }

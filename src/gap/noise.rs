@@ -369,16 +369,19 @@ impl Whitener {
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_shared_updraft_is_its_mean_over_what_the_noise_holds_for_likely() {
-        let group = |drones: usize, first: f64| GroupPattern {
+    fn group(drones: usize, first: f64) -> GroupPattern {
+        GroupPattern {
             drones,
             time_s: (0..6).map(|bin| first + 20.0 * f64::from(bin)).collect(),
             height_m: (0..6).map(|bin| 10.0 + 15.0 * f64::from(bin)).collect(),
             response: vec![Response::straight(20.0); 6],
             slope_us: vec![0.0; 6],
             ..GroupPattern::default()
-        };
+        }
+    }
+
+    #[test]
+    fn the_shared_updraft_is_its_mean_over_what_the_noise_holds_for_likely() {
         let groups = [group(5, 0.0), group(7, 8.0)];
         let hyper = Hyper::default();
         let rest: Vec<Vec<f64>> = (0..2)
@@ -404,6 +407,25 @@ mod tests {
             let found = found[*group][*bin];
             assert!((found - wanted).abs() < 1e-9 * wanted.abs().max(1.0), "{found} {wanted}");
             assert!(found.abs() < 0.3, "{found}: three pulses of 20 us/(m/s) are 0.15 m/s");
+        }
+    }
+
+    #[test]
+    fn simulated_drones_differ_about_the_noise_that_they_share() {
+        let groups = [group(5, 0.0), group(7, 8.0)];
+        let whitener = Whitener::new(&groups, &Hyper::default());
+        let draw = |index: usize| (1.7 * index as f64).sin();
+        let mut drawn = 0;
+        let pulses = whitener.simulate(|| {
+            drawn += 1;
+            draw(drawn)
+        });
+        let first: Vec<f64> = (1..=whitener.order.len()).map(draw).collect();
+        for ((group, bin), shared) in whitener.order.iter().zip(whitener.means.colour(&first)) {
+            let values: Vec<f64> = pulses[*group].iter().map(|drone| drone[*bin]).collect();
+            let mean = numeric::mean(&values).unwrap();
+            assert!((mean - shared).abs() < 1e-9, "{mean} instead of {shared} us");
+            assert!(values.iter().any(|value| (value - mean).abs() > 0.1), "{values:?}");
         }
     }
 }

@@ -156,3 +156,29 @@ fn axes(after: &Comparison) -> Vec<Axis<'_>> {
     }
     axes
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::super::trial;
+    use super::*;
+
+    #[test]
+    fn a_continuous_regime_has_classes_of_one_width_around_their_values() {
+        let comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+        let axes = axes(&comparison);
+        let time = axes.iter().find(|axis| axis.by == Dependence::Time).unwrap();
+        let times: Vec<f64> =
+            comparison.scene.signals[0].iter().map(|signals| signals.time_s).collect();
+        let (first_s, last_s) = extent(times.iter().copied()).unwrap();
+        let half_s = (last_s - first_s) / CLASSES as f64 / 2.0;
+        let mut labels = BTreeSet::new();
+        for (bin, time_s) in times.iter().enumerate() {
+            let (label, middle_s) = (time.of)(0, 0, bin).unwrap();
+            assert!((time_s - middle_s).abs() < half_s + 1e-9, "{time_s} s: {label}");
+            labels.insert(label);
+        }
+        assert_eq!(labels.len(), CLASSES, "{labels:?}");
+    }
+}

@@ -164,3 +164,49 @@ fn track(flight: &Flight, change_s: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     }
     Some((rates, velocities))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mission::plan::SegmentKind;
+
+    /// Up and down for ten seconds each, by a drone whose velocity lags behind its height by so much, s.
+    fn lag_found_s(lag_s: f64) -> Option<f64> {
+        let up_mps = |leg: u64| if leg.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let segment = |leg: u64| Segment {
+            kind: SegmentKind::LegUp,
+            label: String::new(),
+            start_ms: 10_000 * leg,
+            end_ms: 10_000 * (leg + 1),
+            from_m: [0.0; 3],
+            to_m: [0.0; 3],
+            velocity_mps: [0.0, 0.0, up_mps(leg)],
+            from_velocity_mps: None,
+            window: None,
+        };
+        let segments: Vec<Segment> = (0..8).map(segment).collect();
+        let mut flight = Flight::default();
+        let (mut height_m, mut rate_mps, mut velocity_mps) = (50.0, 0.0, 0.0);
+        for tick in 0..8000_u64 {
+            let time_s = tick as f64 / 100.0;
+            rate_mps += 0.01 / 0.4 * (up_mps(tick / 1000) - rate_mps);
+            height_m += 0.01 * rate_mps;
+            velocity_mps += 0.01 / (0.01 + lag_s) * (rate_mps - velocity_mps);
+            for (series, value) in
+                [(&mut flight.height_m, height_m), (&mut flight.velocity_up_mps, velocity_mps)]
+            {
+                series.time_s.push(time_s);
+                series.value.push(value);
+            }
+        }
+        lag(&flight, &segments)
+    }
+
+    #[test]
+    fn the_lag_of_a_velocity_behind_its_height_is_found() {
+        for lag_s in [0.1, 0.3, 0.6] {
+            let found_s = lag_found_s(lag_s).unwrap();
+            assert!((found_s - lag_s).abs() < 0.03, "{found_s} instead of {lag_s} s");
+        }
+    }
+}

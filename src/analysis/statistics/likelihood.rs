@@ -492,4 +492,22 @@ mod tests {
         assert!(values.iter().all(|value| value.is_finite()), "no number stands for a gap");
         assert_eq!(values[(3, 0)], field.rows[4][blocks.seconds[0]]);
     }
+
+    #[test]
+    fn between_three_lengths_the_top_of_their_parabola_is_taken() {
+        let field = field();
+        let blocks = Blocks::of(&field).unwrap();
+        let likelihood = Likelihood::new(&field, &blocks, Unknown { slope: false, common: false });
+        // What is largest 0.3 steps above the middle; all else goes evenly with the step.
+        let best = |step: f64| Best {
+            at: [2.0 + 0.1 * step, -1.0],
+            log_likelihood: 7.0 - 2.0 * (step - 0.3).powi(2),
+            variance: (0.5 + 0.2 * step).exp(),
+        };
+        let found = likelihood.between(4, Some(best(-1.0)), best(0.0), Some(best(1.0)));
+        assert!((found.tau_s.ln() - 2.03).abs() < 1e-9, "{}", found.tau_s);
+        let ln_length = likelihood.grid[4].ln_length + 0.3 * STEP;
+        assert!((found.lambda_m.ln() - ln_length).abs() < 1e-9, "{}", found.lambda_m);
+        assert!((found.sd_mps.ln() - 0.28).abs() < 1e-9, "{}", found.sd_mps);
+    }
 }

@@ -171,3 +171,22 @@ pub(super) fn described(classes: &[Class], correlations: &DMatrix<f64>) -> Vec<D
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_along_a_row_are_classed_by_their_distance() {
+        let places = [100.0, 107.0].into_iter().flat_map(|y| [50.0, 57.0, 64.0].map(|x| [x, y]));
+        let field = Field { places: places.collect(), rows: Vec::new(), seconds: 0, running: 1 };
+        let seconds = DMatrix::from_element(6, 6, 1000.0);
+        let found = |which| -> Vec<(f64, usize)> {
+            let classes = classes(&field, &seconds, which);
+            classes.iter().map(|class| (class.distance_m, class.pairs.len())).collect()
+        };
+        assert_eq!(found(Pairs::AlongX), [(7.0, 4), (14.0, 2)]);
+        assert_eq!(found(Pairs::AlongY), [(7.0, 3)]);
+        assert_eq!(classes(&field, &DMatrix::zeros(6, 6), Pairs::AlongX).len(), 0);
+    }
+}

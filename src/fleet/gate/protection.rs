@@ -52,3 +52,20 @@ impl Protection {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::frame::dialect;
+    use crate::mission::resolve::resolve;
+
+    #[test]
+    fn a_fence_of_less_than_three_corners_is_none() {
+        let plan = resolve("calibration", &[]).unwrap().flights.remove(0).plan;
+        let weakened = [0, 2, 3, 4].map(|count| {
+            let fence = dialect::MISSION_COUNT_DATA { count, ..Default::default() };
+            Protection::of(&plan).is_weakened(&MavMessage::MISSION_COUNT(fence))
+        });
+        assert_eq!(weakened, [true, true, false, false]);
+    }
+}

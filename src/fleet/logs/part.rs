@@ -523,4 +523,15 @@ mod tests {
         sample.put(0, 7, b"x8X").unwrap();
         assert!(sample.differs && sample.have.gap(0, 10).is_none());
     }
+
+    #[test]
+    fn the_sums_of_a_file_are_those_of_its_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("01.BIN");
+        let bytes: Vec<u8> = (0..600_000_u32).map(|place| (place % 251) as u8).collect();
+        for length in [0, 1, bytes.len()] {
+            fs::write(&path, &bytes[..length]).unwrap();
+            assert_eq!(sums(&path).unwrap(), sums_of(&bytes[..length]));
+        }
+    }
 }

@@ -110,6 +110,7 @@ mod tests {
 
     use super::super::{MOST_RESTARTS, MOST_ROUNDS, OneOptions, Target};
     use super::*;
+    use crate::fleet::ftp::get::{Got, Tally};
     use crate::fleet::logs::manifest::Shelf;
     use crate::fleet::logs::part::sums_of;
     use crate::link::id::DroneId;
@@ -223,5 +224,16 @@ mod tests {
         let stage = one.relist(part);
         assert!(matches!(stage, Stage::Over), "{stage:?}");
         assert!(one.done.failure.unwrap().reason.contains("heartbeats"));
+    }
+
+    #[test]
+    fn a_log_that_was_opened_again_has_taken_so_many_attempts_more() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut one, sink) = complete(folder.path());
+        one.attempts = 1;
+        let tally = Tally { opened: 4, new_bytes: BYTES, ..Tally::default() };
+        let stage = one.on_got(Got { sink, result: Ok(BYTES), tally });
+        assert!(matches!(stage, Stage::Settle(_)), "{stage:?}");
+        assert_eq!((one.attempts, one.held), (4, BYTES));
     }
 }
