@@ -350,43 +350,50 @@ fn settle_updraft(
     free: &[Column],
     start: Solution,
 ) -> Result<Solution, GapError> {
-    let hyper = start.hyper;
-    let now_mps = comparison.scene.updraft_mps;
-    let starts = if found.steps.is_empty() { UPDRAFTS_MPS.to_vec() } else { vec![now_mps] };
-    let mut best: Option<InUpdraft> = None;
-    for start_mps in starts {
-        let there = InUpdraft::fitted(comparison, found, free, hyper, start_mps)?;
-        best = better(best, there);
+    let mut solution = start;
+    let mut starts = vec![comparison.scene.updraft_mps];
+    if found.steps.is_empty() {
+        starts.extend(UPDRAFTS_MPS);
     }
-    for _ in 0..UPDRAFT_ROUNDS {
-        let Some(there) = &best else { break };
-        let at_mps = there.comparison.scene.updraft_mps;
-        let step_mps = (there.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
-        if step_mps.abs() < UPDRAFT_SETTLED_MPS {
-            break;
+    for _ in 0..PATTERN_ROUNDS {
+        // How drones answer gusts stays as it is meanwhile: their scatter must not choose an updraft.
+        let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
+        let fit = |hyper: Hyper, updraft_mps: f64| {
+            InUpdraft::fitted(comparison, &patterns, found, free, hyper, updraft_mps)
+        };
+        let mut best: Option<InUpdraft> = None;
+        for start_mps in starts {
+            best = better(best, fit(solution.hyper, start_mps)?);
         }
-        let (hyper, likely) = (there.solution.hyper, there.likely);
-        for share in [1.0, 0.5] {
-            let next_mps = at_mps + share * step_mps;
-            let next = InUpdraft::fitted(comparison, found, free, hyper, next_mps)?;
-            best = better(best, next);
-            if best.as_ref().is_some_and(|best| best.likely > likely) {
+        for _ in 0..UPDRAFT_ROUNDS {
+            let Some(there) = &best else { break };
+            let (at_mps, hyper, likely) = (there.updraft_mps, there.solution.hyper, there.likely);
+            let step_mps = (there.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
+            if step_mps.abs() < UPDRAFT_SETTLED_MPS {
+                break;
+            }
+            for share in [1.0, 0.5] {
+                best = better(best, fit(hyper, at_mps + share * step_mps)?);
+                if best.as_ref().is_some_and(|best| best.likely > likely) {
+                    break;
+                }
+            }
+            if best.as_ref().is_none_or(|best| best.likely <= likely) {
                 break;
             }
         }
-        if best.as_ref().is_some_and(|best| best.likely <= likely) {
-            break;
-        }
+        let Some(best) = best else { break };
+        solution = best.solution;
+        found.updraft_mps = best.updraft_mps;
+        *comparison = comparison.clone().in_updraft(best.updraft_mps);
+        starts = vec![best.updraft_mps];
     }
-    let Some(best) = best else { return Ok(start) };
-    found.updraft_mps = best.comparison.scene.updraft_mps;
-    *comparison = best.comparison;
-    Ok(best.solution)
+    Ok(solution)
 }
 
 /// A flight taken in an updraft, and what explains most of it there.
 struct InUpdraft {
-    comparison: Comparison,
+    updraft_mps: f64,
     solution: Solution,
     likely: f64,
     /// Updraft that explains most, as far as the slopes at this one tell, m/s.
@@ -397,6 +404,7 @@ impl InUpdraft {
     /// `None`: the vehicle cannot fly so.
     fn fitted(
         comparison: &Comparison,
+        patterns: &[GroupPattern],
         found: &Found,
         free: &[Column],
         hyper: Hyper,
@@ -404,9 +412,6 @@ impl InUpdraft {
     ) -> Result<Option<Self>, GapError> {
         let comparison = comparison.clone().in_updraft(updraft_mps);
         let Ok(residual) = comparison.residual(&found.vehicle, found.gusts_mps) else {
-            return Ok(None);
-        };
-        let Ok(patterns) = comparison.patterns(&found.vehicle, found.gusts_mps) else {
             return Ok(None);
         };
         let doubts = refine::doubts(&comparison, &found.vehicle, &found.parameters)?;
@@ -422,14 +427,11 @@ impl InUpdraft {
             }
         }
         let split = Split::of(&from_still);
-        let problem = Problem::new(&patterns, &split).doubting(&doubts).with(free);
+        let problem = Problem::new(patterns, &split).doubting(&doubts).with(free);
         let solution = problem.fit(hyper, Likelihood::Profile);
         let likely = solution.log_posterior();
         let most_mps = UPDRAFT_DOUBT_MPS * problem.first_doubt(&solution).unwrap_or_default();
-        if std::env::var_os("UPD_DEBUG").is_some() {
-            eprintln!("W {updraft_mps} likely {likely} most {most_mps}");
-        }
-        Ok(likely.is_finite().then_some(Self { comparison, solution, likely, most_mps }))
+        Ok(likely.is_finite().then_some(Self { updraft_mps, solution, likely, most_mps }))
     }
 }
 
@@ -443,7 +445,9 @@ fn better(one: Option<InUpdraft>, other: Option<InUpdraft>) -> Option<InUpdraft>
 
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
-const UPDRAFTS_MPS: [f64; 5] = [0.0, -1.0, 1.0, -2.0, 2.0];
+const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
+/// Rounds with drones' answers to gusts as they are in the updraft of the round before. Numerical.
+const PATTERN_ROUNDS: usize = 2;
 /// Rounds in which the updraft settles, at most. Numerical.
 const UPDRAFT_ROUNDS: usize = 6;
 /// Longest step of the updraft in one round, m/s: a slope is no more than a hint. Chosen.
