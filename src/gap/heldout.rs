@@ -401,6 +401,7 @@ mod tests {
             values: vec![(0.1, 0.01)],
             hyper: Hyper::default(),
             gusts_mps: 0.2,
+            updraft_mps: 0.0,
             steps: Vec::new(),
             rest: Rest::default(),
         }
