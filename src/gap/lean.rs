@@ -1,13 +1,15 @@
 //! Wind from the leans of the fleet.
 
-use nalgebra::{DMatrix, DVector, Matrix2};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector3};
 
 use super::bins::BinValues;
 use super::data::Data;
 use super::lean_fit::{Point, fit, hovering_wind};
+use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
-use crate::numeric::Moments;
+use crate::numeric::{Line, Moments};
 use crate::sim::plant::drag::Drag;
+use crate::sim::plant::trim::{Condition, Trim};
 use crate::vehicle::Vehicle;
 
 /// Standard gravity, m/s².
@@ -17,6 +19,8 @@ const GRAVITY: f64 = 9.80665;
 const LEAST_SLOPE: f64 = 0.004;
 /// Rounds of the air speed by a lean. Doubled from 12 when bodies in one piece joined the laws; chosen.
 const ROUNDS: usize = 24;
+/// A law is made to fit the trim at every whole speed up to this, m/s: show drones do not fly in more wind.
+const LAW_SPEEDS_MPS: u32 = 10;
 /// Fastest wind that is believed, m/s: no small multirotor holds its place in more.
 const FASTEST_MPS: f64 = 25.0;
 
@@ -36,6 +40,11 @@ pub struct LeanLaw {
 impl LeanLaw {
     /// Lean law of a vehicle's model at an air density, kg/m³.
     pub fn of(vehicle: &Vehicle, density: f64) -> Self {
+        if vehicle.airframe.sitl.is_some()
+            && let Some(law) = Self::by_trim(vehicle, density)
+        {
+            return law;
+        }
         let of = |role: Role| role.value(vehicle).unwrap_or(0.0);
         let factor = Drag::new(&vehicle.airframe).factor_m2();
         let box_m2 = (factor.x * factor.y).sqrt();
@@ -45,6 +54,21 @@ impl LeanLaw {
             square: density * (box_m2 + body_m2) / (vehicle.airframe.mass_kg * GRAVITY),
             body_share: body_m2 / (box_m2 + body_m2).max(1e-9),
         }
+    }
+
+    /// The law that is nearest to the leans of steady level flight; `None` where there is none.
+    fn by_trim(vehicle: &Vehicle, density: f64) -> Option<Self> {
+        let mut trim = Trim::of(vehicle).ok()?;
+        let density_ratio = density / SEA_LEVEL_DENSITY;
+        let mut slopes = Vec::new();
+        for speed in 1..=LAW_SPEEDS_MPS {
+            let speed_mps = f64::from(speed);
+            let velocity_mps = Vector3::new(speed_mps, 0.0, 0.0);
+            let level = Condition { velocity_mps, density_ratio, ..Condition::default() };
+            slopes.push((speed_mps, trim.balance(&level)?.lean.x.asin() / speed_mps));
+        }
+        let line = Line::through(slopes)?;
+        Some(Self { linear: line.intercept(), square: line.slope(), body_share: 0.0 })
     }
 
     fn box_square(self) -> f64 {

@@ -60,6 +60,35 @@ pub trait InFlight: Copies + fmt::Debug + Send + Sync {
     fn battery(&self) -> Option<Reading> {
         None
     }
+
+    /// Puts its memory where a steady flight has it, and leaves chance out: from then on the effect answers
+    /// as it does in the mean ([`crate::sim::plant::trim`]). What has neither memory nor chance needs none.
+    fn settle(&mut self, _at: &Settled) {}
+
+    /// Standard deviation of vertical gusts that a settled effect leaves to whoever takes their mean, m/s.
+    fn gust_sd_mps(&self) -> f64 {
+        0.0
+    }
+}
+
+/// State of slow processes in steady flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settled {
+    /// Time since the motors started, s.
+    pub time_s: f64,
+    /// State of the battery.
+    pub supply: Supply,
+    /// Drones next to this one in the array, 0 to 8; `None`: as its home has it.
+    pub neighbours: Option<f64>,
+}
+
+/// State of a battery from which its voltage under load follows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Supply {
+    /// Charge drawn since take-off, Ah.
+    Used(f64),
+    /// Voltage at rest, V, whatever the battery's own discharge curve says.
+    Resting(f64),
 }
 
 /// Copying of an effect in flight; every [`InFlight`] that is `Clone` has it.
@@ -203,19 +232,42 @@ impl Active {
         home_m: Vector3<f64>,
         dt_s: f64,
     ) -> Result<(Self, Airframe), EffectError> {
+        let own = |definition: &Definition| {
+            (deviation(definition, seed, drone), chance(definition, seed, drone))
+        };
+        Self::start_as(vehicle, extra, own, home_m, dt_s)
+    }
+
+    /// As [`Active::start`], for a drone whose deviations from the fleet are given, in standard deviations
+    /// of each effect; chance is that of no drone.
+    ///
+    /// # Errors
+    /// As [`Active::start`].
+    pub fn start_deviating(
+        vehicle: &Vehicle,
+        deviation: impl Fn(&Definition) -> f64,
+        home_m: Vector3<f64>,
+        dt_s: f64,
+    ) -> Result<(Self, Airframe), EffectError> {
+        let own = |definition: &Definition| (deviation(definition), chance(definition, 0, 0));
+        Self::start_as(vehicle, &[], own, home_m, dt_s)
+    }
+
+    fn start_as(
+        vehicle: &Vehicle,
+        extra: &[Extra],
+        own: impl Fn(&Definition) -> (f64, Pcg64),
+        home_m: Vector3<f64>,
+        dt_s: f64,
+    ) -> Result<(Self, Airframe), EffectError> {
         let reference = Reference::of(vehicle);
         let mut airframe = vehicle.airframe;
         let mut active = Self::default();
         for (effect, values) in resolved(vehicle)?.into_iter().chain(extra.iter().copied()) {
             let definition = effect.definition();
-            let start = Start {
-                values: &values,
-                deviation: deviation(definition, seed, drone),
-                rng: chance(definition, seed, drone),
-                reference: &reference,
-                home_m,
-                dt_s,
-            };
+            let (deviation, rng) = own(definition);
+            let start =
+                Start { values: &values, deviation, rng, reference: &reference, home_m, dt_s };
             let Some(acting) = effect.start(&start, &mut airframe) else { continue };
             let hooks = definition.hooks.iter().fold(0, |mask, hook| mask | *hook as u8);
             active.hooks |= hooks;
@@ -270,6 +322,18 @@ impl Active {
         for part in with(&mut self.parts, Hook::Sense) {
             part.acting.sense(dt_s, climb_mps);
         }
+    }
+
+    /// Puts the memory of all effects where a steady flight has it; see [`InFlight::settle`].
+    pub fn settle(&mut self, at: &Settled) {
+        for part in &mut self.parts {
+            part.acting.settle(at);
+        }
+    }
+
+    /// Standard deviation of the vertical gusts that settled effects leave out, m/s.
+    pub fn gust_sd_mps(&self) -> f64 {
+        self.parts.iter().map(|part| part.acting.gust_sd_mps().powi(2)).sum::<f64>().sqrt()
     }
 
     /// The battery, if one acts.

@@ -3,7 +3,7 @@
 use super::cell::cell_v;
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::role::Role;
-use super::{Effect, InFlight, Now, Reading, Reference, Signals, Start};
+use super::{Effect, InFlight, Now, Reading, Reference, Settled, Signals, Start, Supply};
 use crate::vehicle::{Airframe, RotorLaw, Vehicle};
 
 const CELLS: usize = 0;
@@ -30,6 +30,8 @@ pub(super) struct Battery;
 struct Pack {
     values: Values,
     used_ah: f64,
+    /// Open-circuit voltage that is given, not that of the charge.
+    given_v: Option<f64>,
     /// Under load.
     volts: f64,
     amps: f64,
@@ -200,6 +202,7 @@ impl Effect for Battery {
         Some(Box::new(Pack {
             values: *start.values,
             used_ah: 0.0,
+            given_v: None,
             volts: resting_v,
             amps: 0.0,
             resting_v,
@@ -213,7 +216,7 @@ impl InFlight for Pack {
         let values = &self.values;
         self.amps = (now.power_w + values[AVIONICS]) / self.volts;
         self.used_ah += self.amps * now.dt_s / 3600.0;
-        self.resting_v = resting_v(values, self.used_ah);
+        self.resting_v = self.given_v.unwrap_or_else(|| resting_v(values, self.used_ah));
         let least = LEAST * self.resting_v;
         self.volts = (self.resting_v - values[RESISTANCE] * self.amps).max(least);
         let ratio = self.volts / values[REFERENCE];
@@ -222,6 +225,15 @@ impl InFlight for Pack {
 
     fn command(&self, command: f64) -> f64 {
         command * self.factor
+    }
+
+    fn settle(&mut self, at: &Settled) {
+        match at.supply {
+            Supply::Used(charge_ah) => (self.used_ah, self.given_v) = (charge_ah, None),
+            Supply::Resting(volts) => self.given_v = Some(volts),
+        }
+        self.resting_v = self.given_v.unwrap_or_else(|| resting_v(&self.values, self.used_ah));
+        self.volts = self.resting_v;
     }
 
     fn battery(&self) -> Option<Reading> {

@@ -36,7 +36,7 @@ mod turbulence;
 mod velocity_error;
 mod vortex_ring;
 
-pub use active::{Active, Air, Change, Extra, InFlight, Now, Reading, Start};
+pub use active::{Active, Air, Change, Extra, InFlight, Now, Reading, Settled, Start, Supply};
 pub use definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 pub use error::EffectError;
 pub use model::Model;

@@ -2,7 +2,7 @@
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::role::Role;
-use super::{Effect, InFlight, Now, Reference, Signals, Start};
+use super::{Effect, InFlight, Now, Reference, Settled, Signals, Start};
 use crate::vehicle::Airframe;
 
 const DRIFT: usize = 0;
@@ -83,6 +83,10 @@ impl InFlight for Motors {
         if now.turning {
             self.warmth += (1.0 - self.warmth) * now.dt_s / self.time_s;
         }
+    }
+
+    fn settle(&mut self, at: &Settled) {
+        self.warmth = -(-at.time_s.max(0.0) / self.time_s).exp_m1();
     }
 
     fn command(&self, command: f64) -> f64 {

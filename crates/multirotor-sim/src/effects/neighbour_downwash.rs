@@ -2,7 +2,7 @@
 
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::reference::DENSITY;
-use super::{Air, Effect, InFlight, Now, Reference, Signals, Start, momentum};
+use super::{Air, Effect, InFlight, Now, Reference, Settled, Signals, Start, momentum};
 use crate::vehicle::Airframe;
 
 const SPACING: usize = 0;
@@ -106,6 +106,12 @@ impl InFlight for Seat {
         let wind_mps = now.relative_mps.xy().norm();
         let sink = sink_mps(self.weight_n, now.density_ratio, &self.values, wind_mps);
         air.velocity_mps.z -= sink * self.share;
+    }
+
+    fn settle(&mut self, at: &Settled) {
+        if let Some(count) = at.neighbours {
+            self.share = count / 8.0;
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Valu
 use super::model::base_drag_m2;
 use super::reference::DENSITY;
 use super::role::Role;
-use super::{Air, Effect, InFlight, Now, Reference, Signals, Start};
+use super::{Air, Effect, InFlight, Now, Reference, Settled, Signals, Start};
 use crate::vehicle::{Airframe, Vehicle};
 
 const SIGMA: usize = 0;
@@ -49,6 +49,7 @@ struct Gusts {
     decay: f64,
     /// Standard deviation of what a step adds, m/s.
     kick_mps: f64,
+    sigma_mps: f64,
     rng: Pcg64,
 }
 
@@ -110,7 +111,8 @@ impl Effect for Turbulence {
     fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
         let decay = (-start.dt_s / start.values[TIME]).exp();
         let kick_mps = start.values[SIGMA] * (1.0 - decay * decay).sqrt();
-        Some(Box::new(Gusts { gust_mps: 0.0, decay, kick_mps, rng: start.rng.clone() }))
+        let (sigma_mps, rng) = (start.values[SIGMA], start.rng.clone());
+        Some(Box::new(Gusts { gust_mps: 0.0, decay, kick_mps, sigma_mps, rng }))
     }
 }
 
@@ -119,6 +121,14 @@ impl InFlight for Gusts {
         let draw: f64 = StandardNormal.sample(&mut self.rng);
         self.gust_mps = self.gust_mps * self.decay + self.kick_mps * draw;
         air.velocity_mps.z += self.gust_mps;
+    }
+
+    fn settle(&mut self, _at: &Settled) {
+        (self.gust_mps, self.kick_mps) = (0.0, 0.0);
+    }
+
+    fn gust_sd_mps(&self) -> f64 {
+        self.sigma_mps
     }
 }
 

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use super::definition::{Class, Definition, Hook, Parameter, Signal, Sought, Values};
 use super::disc::{Disc, LEAST_SHARE, MOST_SHARE, flow_us, share_of};
 use super::role::Role;
-use super::{Change, Effect, InFlight, Now, Reference, Signals, Start, momentum};
+use super::{Change, Effect, InFlight, Now, Reference, Settled, Signals, Start, momentum};
 use crate::vehicle::Airframe;
 
 const SHARE: usize = 0;
@@ -159,6 +159,10 @@ impl InFlight for Rotor {
         let jitter = 1.0 + self.jitter * depth * self.noise;
         change.thrust *= jitter * thrust / without.thrust.max(0.05);
         change.torque += self.disc.merit * (thrust * flow - without.thrust * without.flow);
+    }
+
+    fn settle(&mut self, _at: &Settled) {
+        self.jitter = 0.0;
     }
 }
 

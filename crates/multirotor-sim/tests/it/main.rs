@@ -4,3 +4,4 @@ mod air;
 mod effects;
 mod flight;
 mod json;
+mod trim;

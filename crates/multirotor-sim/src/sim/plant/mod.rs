@@ -6,6 +6,7 @@
 pub mod drag;
 pub mod rotor;
 pub mod sitl;
+pub mod trim;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -183,15 +184,10 @@ impl Plant {
         let middle_mps = now.velocity_mps + now.acceleration_mps2 * half_s;
         let middle_radps = now.rate_radps + now.angular_acceleration * half_s;
 
-        let mut loads = Loads { force_n: change.force_n, torque_nm: Vector3::zeros() };
         let relative = now.rotation.tr_mul(&(middle_mps - air.velocity_mps));
-        if let Some(sitl) = &mut self.sitl {
-            sitl.add_loads(command, &relative, &middle_radps, air.density_ratio, &mut loads);
-        } else {
-            self.rotors.add_loads(air.density_ratio, change, &mut loads);
-            self.drag.add_loads(&relative, air.density_ratio, &mut loads);
-        }
+        let loads = self.loads(command, &relative, &middle_radps, air, change);
 
+        let now = &self.motion;
         let mut acceleration = now.rotation * (loads.force_n * self.per_mass);
         acceleration.z -= GRAVITY;
         let spin = now.rate_radps.cross(&now.rate_radps.component_mul(&self.inertia));
@@ -210,6 +206,26 @@ impl Plant {
         self.rest_on_ground();
     }
 
+    /// Loads of rotors, drag and effects, body axes, at a velocity relative to the air and turn rates.
+    #[inline]
+    fn loads(
+        &mut self,
+        command: &[f64; ROTORS],
+        relative_mps: &Vector3<f64>,
+        rate_radps: &Vector3<f64>,
+        air: &Air,
+        change: &Change,
+    ) -> Loads {
+        let mut loads = Loads { force_n: change.force_n, torque_nm: Vector3::zeros() };
+        if let Some(sitl) = &mut self.sitl {
+            sitl.add_loads(command, relative_mps, rate_radps, air.density_ratio, &mut loads);
+        } else {
+            self.rotors.add_loads(air.density_ratio, change, &mut loads);
+            self.drag.add_loads(relative_mps, air.density_ratio, &mut loads);
+        }
+        loads
+    }
+
     /// The air, the loads' changes and the commands as the effects make them.
     fn affected(
         &mut self,
@@ -217,6 +233,19 @@ impl Plant {
         around: &Surroundings,
         velocity_mps: &Vector3<f64>,
     ) -> (Air, Change, [f64; ROTORS]) {
+        let (mut now, air) = self.meet(around, velocity_mps);
+        let mut command = *command;
+        if self.effects.acts(Hook::Command) {
+            now.power_w = self.rotors.power_w(air.density_ratio, self.torque);
+            self.effects.follow(&now);
+            command = command.map(|command| self.effects.command(command));
+        }
+        let change = self.change(&now);
+        (air, change, command)
+    }
+
+    /// What effects see at a velocity, and the air as they make it.
+    fn meet(&mut self, around: &Surroundings, velocity_mps: &Vector3<f64>) -> (Now, Air) {
         let motion = &self.motion;
         let mut air =
             Air { velocity_mps: around.air_velocity_mps, density_ratio: around.density_ratio };
@@ -238,18 +267,17 @@ impl Plant {
             now.density_ratio = air.density_ratio;
             now.thrust_n = self.rotors.thrust_n(air.density_ratio);
         }
-        let mut command = *command;
-        if self.effects.acts(Hook::Command) {
-            now.power_w = self.rotors.power_w(air.density_ratio, self.torque);
-            self.effects.follow(&now);
-            command = command.map(|command| self.effects.command(command));
-        }
+        (now, air)
+    }
+
+    /// What the effects change of the loads.
+    fn change(&mut self, now: &Now) -> Change {
         let mut change = Change::default();
         if self.effects.acts(Hook::Loads) {
-            change = self.effects.loads(&now);
+            change = self.effects.loads(now);
         }
         self.torque = change.torque;
-        (air, change, command)
+        change
     }
 
     /// The ground carries what would sink into it, and holds it level: drones stand on their legs.
@@ -361,7 +389,7 @@ mod tests {
     fn acceleration(air_up_mps: f64, pulse_us: f64, ratio: f64) -> f64 {
         let mut plant = plant(100.0);
         let command = [(pulse_us - 1000.0) / 1000.0; 4];
-        plant.rotors.settle(&command);
+        plant.rotors.settle(command[0]);
         let around = Surroundings {
             air_velocity_mps: Vector3::new(0.0, 0.0, -air_up_mps),
             density_ratio: ratio,

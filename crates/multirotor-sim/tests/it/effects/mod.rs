@@ -3,4 +3,4 @@
 mod figures;
 mod flight;
 mod speed_limit;
-mod support;
+pub(crate) mod support;

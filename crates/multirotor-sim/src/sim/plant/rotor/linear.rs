@@ -94,7 +94,7 @@ impl Linear {
             .iter()
             .map(|output| {
                 let torque_nm = output * self.max_torque_nm * density_ratio * torque;
-                rotor_w(&RotorLaw::Linear, output.max(0.0).sqrt() * self.max_radps, torque_nm)
+                rotor_w(&RotorLaw::Linear, self.speed_radps(*output), torque_nm)
             })
             .sum()
     }
@@ -108,8 +108,12 @@ impl Linear {
         }
     }
 
+    /// Rotor speed at this share of full thrust, rad/s.
+    pub fn speed_radps(&self, output: f64) -> f64 {
+        output.max(0.0).sqrt() * self.max_radps
+    }
+
     /// Puts the rotors into the steady state of a command.
-    #[cfg(test)]
     pub fn settle(&mut self, command: &[f64; ROTORS]) {
         self.filtered = *command;
         self.output = *command;

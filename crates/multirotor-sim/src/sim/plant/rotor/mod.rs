@@ -95,11 +95,28 @@ impl Rotors {
         }
     }
 
-    /// Puts AirSim's rotors into the steady state of a command.
-    #[cfg(test)]
-    pub fn settle(&mut self, command: &[f64; ROTORS]) {
-        if let Self::Linear(rotors) = self {
-            rotors.settle(command);
+    /// Turns all rotors steadily with this share of full thrust.
+    pub fn settle(&mut self, output: f64) {
+        match self {
+            Self::Linear(rotors) => rotors.settle(&[output; ROTORS]),
+            Self::Motor(rotors) => rotors.settle(output),
+        }
+    }
+
+    /// Command (0 to 1) that keeps this share of full thrust in still air when the torque is `torque`
+    /// times that in still air at sea level.
+    pub fn command_for(&self, output: f64, torque: f64) -> f64 {
+        match self {
+            Self::Linear(_) => output,
+            Self::Motor(rotors) => rotors.command_for(output, torque),
+        }
+    }
+
+    /// Rotor speed at this share of full thrust, rad/s.
+    pub fn speed_radps(&self, output: f64) -> f64 {
+        match self {
+            Self::Linear(rotors) => rotors.speed_radps(output),
+            Self::Motor(rotors) => rotors.speed_radps(output),
         }
     }
 }

@@ -108,6 +108,26 @@ impl Motor {
         }
     }
 
+    /// Rotor speed at this share of full thrust, rad/s.
+    pub fn speed_radps(&self, output: f64) -> f64 {
+        (output.max(0.0) * self.max_square).sqrt()
+    }
+
+    /// Turns all rotors steadily with this share of full thrust.
+    pub fn settle(&mut self, output: f64) {
+        self.speed_radps = [self.speed_radps(output); ROTORS];
+    }
+
+    /// Command (0 to 1) that keeps this share of full thrust against a torque, as [`Motor::advance`] has it.
+    pub fn command_for(&self, output: f64, torque: f64) -> f64 {
+        let speed = self.speed_radps(output);
+        let torque_nm = self.torque_factor * torque.max(LEAST_TORQUE) * speed * speed;
+        let resistance_ohm = self.law.resistance_ohm;
+        let volts = self.constant * speed
+            + resistance_ohm * (torque_nm / self.constant + self.law.no_load_a);
+        volts / self.law.supply_v
+    }
+
     fn squares(&self) -> [f64; ROTORS] {
         self.speed_radps.map(|speed| speed * speed)
     }

@@ -1,0 +1,300 @@
+//! Trim: steady flight without flying it.
+//!
+//! [`Trim`] finds the state in which the plant's own loads balance: thrust, lean, and with them the pulse, the
+//! rotors' speed and the current. It calls the very functions that [`Plant::step`] integrates, effects included, so
+//! what a vehicle answers to climb, wind, density, height, charge and time is written down in one place.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use super::rotor::ROTORS;
+use super::{GRAVITY, Plant};
+use crate::effects::{Active, Air, Definition, EffectError, Hook, Now, Settled, Supply};
+use crate::sim::air::Surroundings;
+use crate::vehicle::Vehicle;
+
+/// Balance is found when the acceleration that is left is below this, m/s².
+const BALANCED_MPS2: f64 = 1e-9;
+/// AirSim's drag jumps at the end of its dead band: beside a jump this much may be left, m/s².
+const BESIDE_A_JUMP_MPS2: f64 = 5e-3;
+/// Newton's method takes four steps from a hover; beside a jump it takes more.
+const STEPS: usize = 24;
+/// Step of the numerical derivatives, share of full thrust and of one.
+const STEP: f64 = 1e-6;
+/// The lean's horizontal part is kept below this: beyond 64 degrees no autopilot flies.
+const MOST_LEAN: f64 = 0.9;
+/// Current and voltage of a battery find each other in a few steps: a step changes one by some percent of the other.
+const SUPPLY_STEPS: usize = 12;
+/// Places at which the mean over gusts is taken, in standard deviations from -4 to 4.
+const GUST_PLACES: i32 = 16;
+
+/// One steady moment of flight; the default is a hover in still air at sea level, 100 m above ground, with a
+/// full battery and cold motors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Condition {
+    /// Velocity over ground, show frame, m/s.
+    pub velocity_mps: Vector3<f64>,
+    /// Velocity of the air, show frame, m/s.
+    pub air_mps: Vector3<f64>,
+    /// Acceleration, show frame, m/s².
+    pub acceleration_mps2: Vector3<f64>,
+    /// Air density as a share of sea level's.
+    pub density_ratio: f64,
+    /// Position, show frame, m; height counts from the ground at home.
+    pub position_m: Vector3<f64>,
+    /// Heading of the vehicle's nose about the show's z, rad; 0 is along the show's x.
+    pub heading_rad: f64,
+    /// Time since the motors started, s.
+    pub time_s: f64,
+    /// State of the battery.
+    pub supply: Supply,
+    /// Drones next to this one in the array, 0 to 8; `None`: as its home has it.
+    pub neighbours: Option<f64>,
+}
+
+impl Default for Condition {
+    fn default() -> Self {
+        Self {
+            velocity_mps: Vector3::zeros(),
+            air_mps: Vector3::zeros(),
+            acceleration_mps2: Vector3::zeros(),
+            density_ratio: 1.0,
+            position_m: Vector3::new(0.0, 0.0, 100.0),
+            heading_rad: 0.0,
+            time_s: 0.0,
+            supply: Supply::Used(0.0),
+            neighbours: None,
+        }
+    }
+}
+
+/// The forces of a steady state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    /// Share of full thrust that the rotors give.
+    output: f64,
+    /// Horizontal part of the thrust's direction, show frame: the sine of the lean, and where to.
+    pub lean: Vector2<f64>,
+    /// Command that reaches the rotors, 0 to 1.
+    command: f64,
+    /// Electrical power of all rotors, W.
+    pub power_w: f64,
+}
+
+/// What a vehicle does in steady flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trimmed {
+    /// Pulse width of all rotors, us; it may lie beyond what the autopilot gives.
+    pub pulse_us: f64,
+    /// Horizontal part of the thrust's direction, show frame: the sine of the lean, and where to.
+    pub lean: Vector2<f64>,
+    /// Rotor speed, rad/s.
+    pub rotor_radps: f64,
+    /// Electrical power of all rotors, W.
+    pub power_w: f64,
+    /// Current out of the battery, A, if the vehicle has one.
+    pub current_a: Option<f64>,
+}
+
+/// Steady states of one drone.
+#[derive(Clone, Debug)]
+pub struct Trim {
+    plant: Plant,
+    hover_output: f64,
+    gust_sd_mps: f64,
+}
+
+/// What the forces are found for: share of full thrust, and the lean.
+type Unknown = Vector3<f64>;
+
+impl Trim {
+    /// Steady states of the fleet's mean drone.
+    ///
+    /// # Errors
+    /// An unknown effect or parameter, or a value out of bounds.
+    pub fn of(vehicle: &Vehicle) -> Result<Self, EffectError> {
+        Self::deviating(vehicle, Vector3::zeros(), |_| 0.0)
+    }
+
+    /// Steady states of a drone that stands at `home_m` (show frame) and deviates from the fleet by so many
+    /// standard deviations of each effect.
+    ///
+    /// # Errors
+    /// As [`Trim::of`].
+    pub fn deviating(
+        vehicle: &Vehicle,
+        home_m: Vector3<f64>,
+        deviation: impl Fn(&Definition) -> f64,
+    ) -> Result<Self, EffectError> {
+        // Steady states have no step; effects that state their memory per step want one.
+        let dt_s = 0.0025;
+        let (effects, airframe) = Active::start_deviating(vehicle, deviation, home_m, dt_s)?;
+        let mut plant = Plant::with_effects(&airframe, effects, home_m, dt_s);
+        let fresh = Settled { time_s: 0.0, supply: Supply::Used(0.0), neighbours: None };
+        plant.effects.settle(&fresh);
+        let gust_sd_mps = plant.effects.gust_sd_mps();
+        let mut trim = Self { plant, hover_output: 0.5, gust_sd_mps };
+        // From a third of full thrust, as most multirotors hover, to where this one does.
+        trim.hover_output = trim.balanced(&Condition::default(), Vector3::new(0.35, 0.0, 0.0)).x;
+        Ok(trim)
+    }
+
+    /// The steady state under a condition; `None` where the vehicle has none: it cannot hold this speed, or has
+    /// not the power.
+    pub fn at(&mut self, condition: &Condition) -> Option<Trimmed> {
+        let balance = self.balance(condition)?;
+        let pulse_us = self.pulse_us(&balance, condition)?;
+        Some(Trimmed {
+            pulse_us,
+            lean: balance.lean,
+            rotor_radps: self.plant.rotors.speed_radps(balance.output),
+            power_w: balance.power_w,
+            current_a: self.plant.battery().map(|battery| battery.amps),
+        })
+    }
+
+    /// The balance of forces under a condition, whatever the supply; `None` where there is none.
+    pub fn balance(&mut self, condition: &Condition) -> Option<Balance> {
+        self.settle(condition);
+        let found = self.balanced(condition, Vector3::new(self.hover_output, 0.0, 0.0));
+        let left_mps2 = self.left_over(condition, &found).norm();
+        if left_mps2.is_nan() || left_mps2 > BESIDE_A_JUMP_MPS2 {
+            return None;
+        }
+        let density_ratio = self.met(condition).0.density_ratio;
+        let (output, torque) = (found.x, self.plant.torque);
+        let command = match self.plant.sitl {
+            Some(_) => output,
+            None => self.plant.rotors.command_for(output, density_ratio * torque),
+        };
+        let power_w = self.plant.rotors.power_w(density_ratio, torque);
+        Some(Balance { output, lean: found.yz(), command, power_w })
+    }
+
+    /// Pulse width of all rotors for a balance, us: what time, supply and controllers make of it. `None`: no
+    /// pulse does it.
+    pub fn pulse_us(&mut self, balance: &Balance, condition: &Condition) -> Option<f64> {
+        self.settle(condition);
+        Some(1000.0 + 1000.0 * self.given_for(balance, condition)?)
+    }
+
+    fn settle(&mut self, condition: &Condition) {
+        let Condition { time_s, supply, neighbours, .. } = *condition;
+        self.plant.effects.settle(&Settled { time_s, supply, neighbours });
+    }
+
+    /// Newton's method from a first guess; the best that it saw.
+    fn balanced(&mut self, condition: &Condition, guess: Unknown) -> Unknown {
+        let mut at = guess;
+        let mut left = self.left_over(condition, &at);
+        let (mut best, mut least) = (at, left.norm());
+        for _ in 0..STEPS {
+            let columns = [0, 1, 2].map(|index| {
+                let mut beside = at;
+                beside[index] += STEP;
+                (self.left_over(condition, &beside) - left) / STEP
+            });
+            let Some(step) = Matrix3::from_columns(&columns).lu().solve(&left) else { break };
+            at -= step;
+            at.x = at.x.clamp(0.0, 4.0);
+            let lean = at.yz().norm();
+            if lean > MOST_LEAN {
+                at.y *= MOST_LEAN / lean;
+                at.z *= MOST_LEAN / lean;
+            }
+            left = self.left_over(condition, &at);
+            let norm = left.norm();
+            if norm < least {
+                (best, least) = (at, norm);
+            }
+            if norm.is_nan() || norm < BALANCED_MPS2 {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Acceleration beyond the condition's, m/s²: its mean over the gusts that effects bring.
+    fn left_over(&mut self, condition: &Condition, at: &Unknown) -> Vector3<f64> {
+        if self.gust_sd_mps == 0.0 {
+            return self.left_over_in(condition, at, 0.0);
+        }
+        let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
+        for place in -GUST_PLACES..=GUST_PLACES {
+            let deviation = f64::from(place) * 4.0 / f64::from(GUST_PLACES);
+            let weight = (-deviation * deviation / 2.0).exp();
+            sum += self.left_over_in(condition, at, deviation * self.gust_sd_mps) * weight;
+            weights += weight;
+        }
+        sum / weights
+    }
+
+    fn left_over_in(&mut self, condition: &Condition, at: &Unknown, gust_mps: f64) -> Vector3<f64> {
+        let plant = &mut self.plant;
+        let rotation = leaning(at.yz(), condition.heading_rad);
+        plant.motion.rotation = rotation;
+        plant.motion.position_m = condition.position_m;
+        plant.motion.velocity_mps = condition.velocity_mps;
+        plant.motion.acceleration_mps2 = condition.acceleration_mps2;
+        plant.rotors.settle(at.x);
+        let around = Surroundings {
+            air_velocity_mps: condition.air_mps + Vector3::new(0.0, 0.0, gust_mps),
+            density_ratio: condition.density_ratio,
+        };
+        let (now, air) = plant.meet(&around, &condition.velocity_mps);
+        let change = plant.change(&now);
+        let relative = rotation.tr_mul(&(condition.velocity_mps - air.velocity_mps));
+        let loads = plant.loads(&[at.x; ROTORS], &relative, &Vector3::zeros(), &air, &change);
+        let mut acceleration = rotation * (loads.force_n * plant.per_mass);
+        acceleration.z -= GRAVITY;
+        acceleration - condition.acceleration_mps2
+    }
+
+    /// What effects see under a condition, and the air as they make it.
+    fn met(&mut self, condition: &Condition) -> (Now, Air) {
+        let around = Surroundings {
+            air_velocity_mps: condition.air_mps,
+            density_ratio: condition.density_ratio,
+        };
+        self.plant.meet(&around, &condition.velocity_mps)
+    }
+
+    /// The command that the autopilot must give for a balance, 0 to 1.
+    fn given_for(&mut self, balance: &Balance, condition: &Condition) -> Option<f64> {
+        let wanted = balance.command;
+        if !self.plant.effects.acts(Hook::Command) {
+            return Some(wanted);
+        }
+        self.plant.rotors.settle(balance.output);
+        let (mut now, _) = self.met(condition);
+        (now.dt_s, now.power_w) = (0.0, balance.power_w);
+        for _ in 0..SUPPLY_STEPS {
+            self.plant.effects.follow(&now);
+        }
+        let effects = &self.plant.effects;
+        // The way from command to rotor rises with the command: Newton's method on its inverse.
+        let mut given = wanted;
+        for _ in 0..STEPS {
+            let error = effects.command(given) - wanted;
+            let slope =
+                (effects.command(given + STEP) - effects.command(given - STEP)) / (2.0 * STEP);
+            if slope.is_nan() || slope <= 0.0 {
+                return None;
+            }
+            given -= error / slope;
+            if error.abs() < 1e-13 {
+                break;
+            }
+        }
+        given.is_finite().then_some(given)
+    }
+}
+
+/// Rotation from body to show frame of a vehicle whose thrust points along `lean` horizontally, with its nose
+/// on a heading.
+fn leaning(lean: Vector2<f64>, heading_rad: f64) -> Matrix3<f64> {
+    let up = Vector3::new(lean.x, lean.y, (1.0 - lean.norm_squared()).max(0.0).sqrt());
+    let (sin, cos) = heading_rad.sin_cos();
+    // The nose stays above its heading, and at right angles to the thrust.
+    let nose = Vector3::new(cos, sin, -(up.x * cos + up.y * sin) / up.z).normalize();
+    Matrix3::from_columns(&[nose, up.cross(&nose), up])
+}
