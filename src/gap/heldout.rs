@@ -62,8 +62,7 @@ impl Case<'_> {
     }
 
     fn against(&self, data: &Data, vehicle: &Vehicle) -> Result<Comparison, GapError> {
-        let comparison = Comparison::new(data, vehicle, self.simulated, self.plan)?
-            .in_updraft(self.found.updraft_mps);
+        let comparison = Comparison::new(data, vehicle, self.simulated, self.plan)?;
         Ok(same_bins(&comparison, &self.found.comparison))
     }
 
@@ -401,7 +400,6 @@ mod tests {
             values: vec![(0.1, 0.01)],
             hyper: Hyper::default(),
             gusts_mps: 0.2,
-            updraft_mps: 0.0,
             steps: Vec::new(),
             rest: Rest::default(),
         }

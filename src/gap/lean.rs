@@ -295,3 +295,23 @@ fn smoothed(group: &super::data::Group, values: &[f64]) -> Vec<f64> {
 
 /// Fewest bins of horizontal flight that measure a lean law: two numbers from two headings.
 const FEWEST_MOVING: usize = 4;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicle::library::builtin;
+
+    #[test]
+    fn the_wind_of_the_firmwares_own_vehicle_is_read_from_its_leans() {
+        let vehicle = builtin("arducopter-sitl").unwrap();
+        let law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY);
+        let mut trim = Trim::of(&vehicle).unwrap();
+        for speed_mps in [1.0, 3.0, 5.0, 8.0] {
+            let velocity_mps = Vector3::new(speed_mps, 0.0, 0.0);
+            let level = Condition { velocity_mps, ..Condition::default() };
+            let lean_rad = trim.balance(&level).unwrap().lean.x.asin();
+            let [read_mps, _] = law.air([lean_rad, 0.0], 0.0);
+            assert!((read_mps - speed_mps).abs() < 0.02 * speed_mps, "{speed_mps}: {read_mps}");
+        }
+    }
+}

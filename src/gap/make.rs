@@ -113,9 +113,8 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         seed: options.seed,
     };
     let shrink = case.gap(&train, &held)?;
-    let whole = Comparison::new(&data, &found.vehicle, &simulated, input.plan)?
-        .feeling(&found.felt)
-        .in_updraft(found.updraft_mps);
+    let whole =
+        Comparison::new(&data, &found.vehicle, &simulated, input.plan)?.feeling(&found.felt);
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
         // The sizes that go into the model are those of all drones.
         found.refit(&whole)?;

@@ -38,7 +38,6 @@ mod response;
 mod scene;
 mod search;
 mod sensor;
-mod steady;
 mod table;
 #[cfg(test)]
 mod trial;

@@ -80,7 +80,7 @@ pub struct Balance {
     pub power_w: f64,
 }
 
-/// What a vehicle does in steady flight.
+/// Steady state of a vehicle: its pulse, lean, rotor speed and current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trimmed {
     /// Pulse width of all rotors, us; it may lie beyond what the autopilot gives.
@@ -96,6 +96,21 @@ pub struct Trimmed {
 }
 
 /// Steady states of one drone.
+///
+/// ```
+/// use multirotor_sim::nalgebra::Vector3;
+/// use multirotor_sim::sim::plant::trim::{Condition, Trim};
+/// use multirotor_sim::vehicle::library::builtin;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut trim = Trim::of(&builtin("pixel")?)?;
+/// let hover = trim.at(&Condition::default()).ok_or("it cannot hover")?;
+/// let climb = Condition { velocity_mps: Vector3::new(0.0, 0.0, 2.0), ..Condition::default() };
+/// let climb = trim.at(&climb).ok_or("it cannot climb")?;
+/// assert!(climb.pulse_us > hover.pulse_us + 30.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Trim {
     plant: Plant,
