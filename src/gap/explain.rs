@@ -172,7 +172,7 @@ impl Look {
 impl Search<'_> {
     /// Looks once and takes up what passes; whether the search goes on.
     fn takes_step(&mut self, step: usize) -> Result<bool, GapError> {
-        let look = self.look()?;
+        let look = self.look_in_likelier_updraft()?;
         let (problem, sought) = (look.problem(), look.sought());
         let round = round(&problem, look.hyper, sought, true);
         let problem = problem.among(&round.groups);
@@ -218,8 +218,31 @@ impl Search<'_> {
         Ok(true)
     }
 
-    /// What is left, and everything that may explain it.
-    fn look(&mut self) -> Result<Look, GapError> {
+    /// What is left in the updraft that explains most, or in still air with the effect that explains most: what
+    /// a model lacks can look like an updraft, and the other way round.
+    fn look_in_likelier_updraft(&mut self) -> Result<Look, GapError> {
+        let begins = self.found.steps.is_empty();
+        let look = self.look(true)?;
+        if !begins || self.found.updraft_mps.abs() < STILL_MPS {
+            return Ok(look);
+        }
+        let explains = |look: &Look| {
+            let round = round(&look.problem(), look.hyper, look.sought(), true);
+            round.base.log_posterior() + (round.best() - NAMED_NATS).max(0.0)
+        };
+        let there = (self.comparison.clone(), self.found.clone());
+        self.comparison = self.comparison.clone().in_updraft(0.0);
+        self.found.updraft_mps = 0.0;
+        let still = self.look(false)?;
+        if explains(&still) > explains(&look) {
+            return Ok(still);
+        }
+        (self.comparison, self.found) = there;
+        Ok(look)
+    }
+
+    /// What is left, and everything that may explain it; in the updraft that explains most if it `settles` there.
+    fn look(&mut self, settles: bool) -> Result<Look, GapError> {
         let Self { comparison, found, refused, .. } = self;
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
@@ -231,7 +254,7 @@ impl Search<'_> {
             .doubting(&doubts)
             .with(&free)
             .fit(found.hyper, Likelihood::Profile);
-        let quick = settle_updraft(comparison, found, &free, quick)?;
+        let quick = if settles { settle_updraft(comparison, found, &free, quick)? } else { quick };
         let doubts = refine::doubts(comparison, &found.vehicle, &found.parameters)?;
         found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
@@ -443,6 +466,10 @@ fn better(one: Option<InUpdraft>, other: Option<InUpdraft>) -> Option<InUpdraft>
     }
 }
 
+/// An updraft that is none, m/s: what a flight of a quarter of an hour tells of it at best. Chosen.
+const STILL_MPS: f64 = 0.05;
+/// Gain that an effect must have before it may be named, nats (docs/physics.md, 3.3).
+const NAMED_NATS: f64 = 8.0;
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
