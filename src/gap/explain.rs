@@ -13,7 +13,7 @@ use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper, WHITE};
 use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refine, slopes};
 use super::response::{self, Response, gusts_mps};
-use super::search::{Ranked, RankedGeneric, Round, Sought, Thresholds, round};
+use super::search::{FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::effects::{Role, Signals};
 use crate::mission::plan::Plan;
@@ -228,7 +228,7 @@ impl Search<'_> {
         }
         let explains = |look: &Look| {
             let round = round(&look.problem(), look.hyper, look.sought(), true);
-            round.base.log_posterior() + (round.best() - NAMED_NATS).max(0.0)
+            round.base.log_posterior() + (round.best() - FLOOR_NATS).max(0.0)
         };
         let there = (self.comparison.clone(), self.found.clone());
         self.comparison = self.comparison.clone().in_updraft(0.0);
@@ -468,8 +468,6 @@ fn better(one: Option<InUpdraft>, other: Option<InUpdraft>) -> Option<InUpdraft>
 
 /// An updraft that is none, m/s: what a flight of a quarter of an hour tells of it at best. Chosen.
 const STILL_MPS: f64 = 0.05;
-/// Gain that an effect must have before it may be named, nats (docs/physics.md, 3.3).
-const NAMED_NATS: f64 = 8.0;
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
