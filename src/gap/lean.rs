@@ -40,6 +40,7 @@ pub struct LeanLaw {
 impl LeanLaw {
     /// Lean law of a vehicle's model at an air density, kg/m³.
     pub fn of(vehicle: &Vehicle, density: f64) -> Self {
+        // The law has the very form of the other frames' drag, and no part for what this one's does with thrust.
         if vehicle.airframe.sitl.is_some()
             && let Some(law) = Self::by_trim(vehicle, density)
         {

@@ -211,12 +211,18 @@ impl Effect for Battery {
     }
 }
 
+impl Pack {
+    fn at_rest_v(&self) -> f64 {
+        self.given_v.unwrap_or_else(|| resting_v(&self.values, self.used_ah))
+    }
+}
+
 impl InFlight for Pack {
     fn follow(&mut self, now: &Now) {
         let values = &self.values;
         self.amps = (now.power_w + values[AVIONICS]) / self.volts;
         self.used_ah += self.amps * now.dt_s / 3600.0;
-        self.resting_v = self.given_v.unwrap_or_else(|| resting_v(values, self.used_ah));
+        self.resting_v = self.at_rest_v();
         let least = LEAST * self.resting_v;
         self.volts = (self.resting_v - values[RESISTANCE] * self.amps).max(least);
         let ratio = self.volts / values[REFERENCE];
@@ -232,7 +238,7 @@ impl InFlight for Pack {
             Supply::Used(charge_ah) => (self.used_ah, self.given_v) = (charge_ah, None),
             Supply::Resting(volts) => self.given_v = Some(volts),
         }
-        self.resting_v = self.given_v.unwrap_or_else(|| resting_v(&self.values, self.used_ah));
+        self.resting_v = self.at_rest_v();
         self.volts = self.resting_v;
     }
 

@@ -34,6 +34,8 @@ struct Seat {
     values: Values,
     /// Its neighbours over the eight of a drone in the middle.
     share: f64,
+    /// The same as its place before take-off has it.
+    share_at_home: f64,
     weight_n: f64,
 }
 
@@ -93,9 +95,11 @@ impl Effect for NeighbourDownwash {
     }
 
     fn start(&self, start: &Start<'_>, _airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
+        let share_at_home = neighbours(start.home_m.x, start.home_m.y, start.values) / 8.0;
         Some(Box::new(Seat {
             values: *start.values,
-            share: neighbours(start.home_m.x, start.home_m.y, start.values) / 8.0,
+            share: share_at_home,
+            share_at_home,
             weight_n: start.reference.weight_n(),
         }))
     }
@@ -109,9 +113,7 @@ impl InFlight for Seat {
     }
 
     fn settle(&mut self, at: &Settled) {
-        if let Some(count) = at.neighbours {
-            self.share = count / 8.0;
-        }
+        self.share = at.neighbours.map_or(self.share_at_home, |count| count / 8.0);
     }
 }
 

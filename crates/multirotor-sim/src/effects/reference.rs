@@ -89,7 +89,7 @@ impl Reference {
 }
 
 /// Voltage at a motor that turns at a speed against a torque, V.
-fn motor_volts(motor: &MotorLaw, speed_radps: f64, torque_nm: f64) -> f64 {
+pub(crate) fn motor_volts(motor: &MotorLaw, speed_radps: f64, torque_nm: f64) -> f64 {
     let constant = motor.constant();
     constant * speed_radps + motor.resistance_ohm * (torque_nm / constant + motor.no_load_a)
 }

@@ -12,14 +12,13 @@ use multirotor_sim::sim::plant::trim::{Condition, Trim};
 use multirotor_sim::sim::recorder::{Moment, Recorder};
 use multirotor_sim::sim::{FlightSetup, Hooks, Uniform, fly_with};
 use multirotor_sim::vehicle::Vehicle;
-use multirotor_sim::vehicle::library::builtin;
+use multirotor_sim::vehicle::library::{builtin, names};
 use nalgebra::Vector3;
 use skybrush_show::frame::{Geodetic, ShowFrame};
 use skybrush_show::{Segment, SegmentPath, Trajectory};
 
 use crate::effects::support::vehicle;
 
-const VEHICLES: [&str; 4] = ["airsim-generic-quad", "pixel", "phantom4", "arducopter-sitl"];
 /// How far the trim may be off, us and degrees: what the users of the trim count on.
 const PULSE_US: f64 = 0.05;
 const LEAN_DEG: f64 = 0.01;
@@ -28,7 +27,7 @@ const SETTLING_S: f64 = 9.0;
 const SEED: u64 = 3;
 const DRONE: u16 = 5;
 
-/// Vertical legs at these speeds, each twice as long as it takes to become steady.
+/// Vertical legs at these speeds of 16 s each, of which the steady part is looked at.
 fn legs(speeds_mps: &[f64]) -> (Trajectory, Vec<(f64, f64)>) {
     let (mut segments, mut windows) = (Vec::new(), Vec::new());
     let (mut time_s, mut height_m) = (0.0, 0.0);
@@ -166,14 +165,14 @@ fn without_jitter(vehicle: &Vehicle) -> Vehicle {
     calm
 }
 
-/// Effects whose mean a flight of seconds does not show: their gusts and jitter are chance.
+/// Whether an effect's mean does not show in a flight of seconds: its gusts are chance.
 fn is_chance(effect: &str) -> bool {
-    ["turbulence"].contains(&effect)
+    effect == "turbulence"
 }
 
 #[test]
 fn each_vehicle_is_flown_as_it_is_trimmed() {
-    for name in VEHICLES {
+    for name in names() {
         for (wind, up) in [(0.0, 0.0), (5.0, 1.0), (8.0, -1.0)] {
             let case = format!("{name}, wind {wind}, updraft {up}");
             let air_mps = Vector3::new(wind * 0.8, -wind * 0.6, up);
@@ -199,7 +198,7 @@ fn each_effect_is_flown_as_it_is_trimmed() {
 #[ignore = "takes minutes: cargo test --release -p multirotor-sim --test it -- --ignored trim"]
 fn everything_is_flown_as_it_is_trimmed() {
     let mut failed = Vec::new();
-    for name in VEHICLES {
+    for name in names() {
         for effect in LIBRARY.iter().map(|effect| effect.definition().name).chain([""]) {
             if is_chance(effect) {
                 continue;

@@ -10,6 +10,7 @@ use super::rotor::ROTORS;
 use super::{GRAVITY, Plant};
 use crate::effects::{Active, Air, Definition, EffectError, Hook, Now, Settled, Supply};
 use crate::sim::air::Surroundings;
+use crate::sim::flight::STEP_S;
 use crate::vehicle::Vehicle;
 
 /// Balance is found when the acceleration that is left is below this, m/s².
@@ -22,6 +23,8 @@ const STEPS: usize = 24;
 const STEP: f64 = 1e-6;
 /// The lean's horizontal part is kept below this: beyond 64 degrees no autopilot flies.
 const MOST_LEAN: f64 = 0.9;
+/// Share of full thrust beyond which no balance is looked for: more than any effect takes away.
+const MOST_OUTPUT: f64 = 4.0;
 /// Current and voltage of a battery find each other in a few steps: a step changes one by some percent of the other.
 const SUPPLY_STEPS: usize = 12;
 /// Places at which the mean over gusts is taken, in standard deviations from -4 to 4.
@@ -64,6 +67,18 @@ impl Default for Condition {
             supply: Supply::Used(0.0),
             neighbours: None,
         }
+    }
+}
+
+impl Condition {
+    fn is_finite(&self) -> bool {
+        let vectors = self.velocity_mps + self.air_mps + self.acceleration_mps2 + self.position_m;
+        (vectors.sum() + self.density_ratio + self.heading_rad + self.time_s).is_finite()
+    }
+
+    fn around(&self, gust_mps: f64) -> Surroundings {
+        let air_velocity_mps = self.air_mps + Vector3::new(0.0, 0.0, gust_mps);
+        Surroundings { air_velocity_mps, density_ratio: self.density_ratio }
     }
 }
 
@@ -141,20 +156,19 @@ impl Trim {
         deviation: impl Fn(&Definition) -> f64,
     ) -> Result<Self, EffectError> {
         // Steady states have no step; effects that state their memory per step want one.
-        let dt_s = 0.0025;
-        let (effects, airframe) = Active::start_deviating(vehicle, deviation, home_m, dt_s)?;
-        let mut plant = Plant::with_effects(&airframe, effects, home_m, dt_s);
-        let fresh = Settled { time_s: 0.0, supply: Supply::Used(0.0), neighbours: None };
-        plant.effects.settle(&fresh);
+        let (effects, airframe) = Active::start_deviating(vehicle, deviation, home_m, STEP_S)?;
+        let plant = Plant::with_effects(&airframe, effects, home_m, STEP_S);
         let gust_sd_mps = plant.effects.gust_sd_mps();
-        let mut trim = Self { plant, hover_output: 0.5, gust_sd_mps };
         // From a third of full thrust, as most multirotors hover, to where this one does.
-        trim.hover_output = trim.balanced(&Condition::default(), Vector3::new(0.35, 0.0, 0.0)).x;
+        let mut trim = Self { plant, hover_output: 0.35, gust_sd_mps };
+        let hover = Condition::default();
+        trim.settle(&hover);
+        trim.hover_output = trim.balanced(&hover).x;
         Ok(trim)
     }
 
-    /// The steady state under a condition; `None` where the vehicle has none: it cannot hold this speed, or has
-    /// not the power.
+    /// The steady state under a condition; `None` where the forces do not balance at up to four times the rotors'
+    /// full thrust, or no pulse makes the rotors do it.
     pub fn at(&mut self, condition: &Condition) -> Option<Trimmed> {
         let balance = self.balance(condition)?;
         let pulse_us = self.pulse_us(&balance, condition)?;
@@ -169,12 +183,18 @@ impl Trim {
 
     /// The balance of forces under a condition, whatever the supply; `None` where there is none.
     pub fn balance(&mut self, condition: &Condition) -> Option<Balance> {
+        // Checked here, as the drag's dead band would take NaN for no wind.
+        if !condition.is_finite() {
+            return None;
+        }
         self.settle(condition);
-        let found = self.balanced(condition, Vector3::new(self.hover_output, 0.0, 0.0));
+        let found = self.balanced(condition);
         let left_mps2 = self.left_over(condition, &found).norm();
         if left_mps2.is_nan() || left_mps2 > BESIDE_A_JUMP_MPS2 {
             return None;
         }
+        // The torque is that between the gusts.
+        self.left_over_in(condition, &found, 0.0);
         let density_ratio = self.met(condition).0.density_ratio;
         let (output, torque) = (found.x, self.plant.torque);
         let command = match self.plant.sitl {
@@ -197,9 +217,9 @@ impl Trim {
         self.plant.effects.settle(&Settled { time_s, supply, neighbours });
     }
 
-    /// Newton's method from a first guess; the best that it saw.
-    fn balanced(&mut self, condition: &Condition, guess: Unknown) -> Unknown {
-        let mut at = guess;
+    /// Newton's method from a hover; the best that it saw.
+    fn balanced(&mut self, condition: &Condition) -> Unknown {
+        let mut at = Vector3::new(self.hover_output, 0.0, 0.0);
         let mut left = self.left_over(condition, &at);
         let (mut best, mut least) = (at, left.norm());
         for _ in 0..STEPS {
@@ -210,7 +230,7 @@ impl Trim {
             });
             let Some(step) = Matrix3::from_columns(&columns).lu().solve(&left) else { break };
             at -= step;
-            at.x = at.x.clamp(0.0, 4.0);
+            at.x = at.x.clamp(0.0, MOST_OUTPUT);
             let lean = at.yz().norm();
             if lean > MOST_LEAN {
                 at.y *= MOST_LEAN / lean;
@@ -251,10 +271,7 @@ impl Trim {
         plant.motion.velocity_mps = condition.velocity_mps;
         plant.motion.acceleration_mps2 = condition.acceleration_mps2;
         plant.rotors.settle(at.x);
-        let around = Surroundings {
-            air_velocity_mps: condition.air_mps + Vector3::new(0.0, 0.0, gust_mps),
-            density_ratio: condition.density_ratio,
-        };
+        let around = condition.around(gust_mps);
         let (now, air) = plant.meet(&around, &condition.velocity_mps);
         let change = plant.change(&now);
         let relative = rotation.tr_mul(&(condition.velocity_mps - air.velocity_mps));
@@ -266,11 +283,7 @@ impl Trim {
 
     /// What effects see under a condition, and the air as they make it.
     fn met(&mut self, condition: &Condition) -> (Now, Air) {
-        let around = Surroundings {
-            air_velocity_mps: condition.air_mps,
-            density_ratio: condition.density_ratio,
-        };
-        self.plant.meet(&around, &condition.velocity_mps)
+        self.plant.meet(&condition.around(0.0), &condition.velocity_mps)
     }
 
     /// The command that the autopilot must give for a balance, 0 to 1.
@@ -312,4 +325,75 @@ fn leaning(lean: Vector2<f64>, heading_rad: f64) -> Matrix3<f64> {
     // The nose stays above its heading, and at right angles to the thrust.
     let nose = Vector3::new(cos, sin, -(up.x * cos + up.y * sin) / up.z).normalize();
     Matrix3::from_columns(&[nose, up.cross(&nose), up])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::select::{choose, values_of};
+    use crate::effects::{Reference, Signals, find};
+    use crate::vehicle::library::builtin;
+
+    fn trim(name: &str, effect: &str) -> Trim {
+        let mut vehicle = builtin(name).unwrap();
+        choose(&mut vehicle, effect).unwrap();
+        Trim::of(&vehicle).unwrap()
+    }
+
+    fn climbing(climb_mps: f64) -> Condition {
+        Condition { velocity_mps: Vector3::new(0.0, 0.0, climb_mps), ..Condition::default() }
+    }
+
+    #[test]
+    fn a_charge_and_its_voltage_at_rest_ask_for_the_same_pulse() {
+        let mut trim = trim("pixel", "battery");
+        let used = Condition { supply: Supply::Used(1.5), ..Condition::default() };
+        let pulse_us = trim.at(&used).unwrap().pulse_us;
+        let resting_v = trim.plant.battery().unwrap().resting_v;
+        let rested = Condition { supply: Supply::Resting(resting_v), ..used };
+        assert!((trim.at(&rested).unwrap().pulse_us - pulse_us).abs() < 1e-9);
+        let full_us = trim.at(&Condition::default()).unwrap().pulse_us;
+        assert!(pulse_us > full_us + 5.0, "{pulse_us} after {full_us}");
+    }
+
+    #[test]
+    fn gusts_bend_the_mean_as_their_closed_form_says_and_leave_the_power() {
+        let vehicle = builtin("airsim-generic-quad").unwrap();
+        let mut calm = Trim::of(&vehicle).unwrap();
+        let mut gusty = trim("airsim-generic-quad", "turbulence");
+        let effect = find("turbulence").unwrap();
+        let values = values_of(effect, &vehicle).unwrap();
+        for climb_mps in [-3.0, -0.4, 0.0, 0.4, 3.0] {
+            let at = climbing(climb_mps);
+            let bent_us = gusty.at(&at).unwrap().pulse_us - calm.at(&at).unwrap().pulse_us;
+            let signals = Signals { climb_mps, ..Signals::default() };
+            let closed_us = effect.pulse_us(&Reference::of(&vehicle), &values, &signals);
+            assert!((bent_us - closed_us).abs() < 0.1, "{climb_mps}: {bent_us}, {closed_us}");
+        }
+        let at = Condition::default();
+        let calm_w = trim("pixel", "turbulence=off").at(&at).unwrap().power_w;
+        let gusty_w = trim("pixel", "turbulence").at(&at).unwrap().power_w;
+        assert!((gusty_w / calm_w - 1.0).abs() < 0.02, "{gusty_w} W in gusts, {calm_w} W without");
+    }
+
+    #[test]
+    fn a_place_in_the_array_is_given_or_that_of_its_home() {
+        let mut trim = trim("airsim-generic-quad", "neighbour-downwash");
+        let mut climb_us = |neighbours| {
+            let at = Condition { neighbours, ..climbing(2.0) };
+            trim.at(&at).unwrap().pulse_us
+        };
+        let (home_us, alone_us, home_again_us) =
+            (climb_us(None), climb_us(Some(0.0)), climb_us(None));
+        assert!(home_us > alone_us + 1.0, "{home_us} at home, {alone_us} alone");
+        assert_eq!(home_us, home_again_us);
+    }
+
+    #[test]
+    fn what_no_thrust_balances_has_no_steady_state() {
+        let mut trim = trim("airsim-generic-quad", "battery=off");
+        assert!(trim.at(&climbing(4.0)).is_some());
+        assert_eq!(trim.at(&climbing(60.0)), None);
+        assert_eq!(trim.at(&climbing(f64::NAN)), None);
+    }
 }

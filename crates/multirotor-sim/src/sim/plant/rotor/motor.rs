@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use super::{LAYOUT, ROTORS, lag_gain};
 use crate::effects::Change;
-use crate::effects::reference::rotor_w;
+use crate::effects::reference::{motor_volts, rotor_w};
 use crate::sim::plant::Loads;
 use crate::vehicle::{Airframe, MotorLaw, RotorLaw};
 
@@ -122,10 +122,7 @@ impl Motor {
     pub fn command_for(&self, output: f64, torque: f64) -> f64 {
         let speed = self.speed_radps(output);
         let torque_nm = self.torque_factor * torque.max(LEAST_TORQUE) * speed * speed;
-        let resistance_ohm = self.law.resistance_ohm;
-        let volts = self.constant * speed
-            + resistance_ohm * (torque_nm / self.constant + self.law.no_load_a);
-        volts / self.law.supply_v
+        motor_volts(&self.law, speed, torque_nm) / self.law.supply_v
     }
 
     fn squares(&self) -> [f64; ROTORS] {
