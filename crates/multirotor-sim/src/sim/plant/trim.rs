@@ -372,7 +372,7 @@ mod tests {
         }
         let at = Condition::default();
         let calm_w = trim("pixel", "turbulence=off").at(&at).unwrap().power_w;
-        let gusty_w = trim("pixel", "turbulence").at(&at).unwrap().power_w;
+        let gusty_w = trim("pixel", "turbulence.sigma_mps=1.0").at(&at).unwrap().power_w;
         assert!((gusty_w / calm_w - 1.0).abs() < 0.02, "{gusty_w} W in gusts, {calm_w} W without");
     }
 
