@@ -12,7 +12,7 @@ use super::refly::{mean_drone, refly};
 use super::response::{self, Response};
 use super::scene::Scene;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
-use crate::effects::{EffectError, Model, Reference, Signals};
+use crate::effects::{EffectError, Reference};
 use crate::mission::plan::Plan;
 use crate::numeric::mean;
 use crate::vehicle::Vehicle;
@@ -145,6 +145,13 @@ impl Comparison {
             })
             .collect();
         Ok(Self { data, side, scene, wind: blown, closure_us, felt: Vec::new(), amsl_m, vehicle })
+    }
+
+    /// This comparison in a flight that is in an updraft all over, m/s.
+    #[must_use]
+    pub(super) fn in_updraft(mut self, updraft_mps: f64) -> Self {
+        self.scene = self.scene.in_updraft(updraft_mps);
+        self
     }
 
     /// This comparison with an additional response to vertical air speed, by group and bin, that no effect
@@ -289,6 +296,20 @@ impl Comparison {
         Ok(doubts)
     }
 
+    /// Change of the pulse by one standard deviation of the updraft that the whole flight may be in: nobody
+    /// knows it before, and where the response is curved it changes how the pulse goes with climb.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub(super) fn updraft_doubt(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
+        let at =
+            |by_mps: f64| self.scene.in_updraft(self.scene.updraft_mps + by_mps).pulses(vehicle);
+        let (more, less) = (at(UPDRAFT_STEP_MPS)?, at(-UPDRAFT_STEP_MPS)?);
+        let per_doubt = UPDRAFT_DOUBT_MPS / (2.0 * UPDRAFT_STEP_MPS);
+        let change = more.less(&less);
+        Ok(change.each(|group, drone, bin| per_doubt * change.at(group, drone, bin)))
+    }
+
     /// What more wind along an axis of the show does to the vehicle's closed form, us.
     fn by_wind(
         &self,
@@ -298,11 +319,13 @@ impl Comparison {
         by_mps: f64,
     ) -> Result<Column, EffectError> {
         let mut scene = self.scene.clone();
-        for (signals, air) in scene.signals.iter_mut().zip(&self.wind.air_mps) {
-            for (signals, air) in signals.iter_mut().zip(air) {
+        let groups = scene.signals.iter_mut().zip(&mut scene.relative_mps);
+        for ((signals, relative), air) in groups.zip(&self.wind.air_mps) {
+            for ((signals, relative), air) in signals.iter_mut().zip(relative).zip(air) {
                 let mut air = *air;
                 air[axis] -= by_mps;
                 signals.horizontal_mps = air[0].hypot(air[1]);
+                *relative = air;
             }
         }
         Ok(scene.pulses(vehicle)?.less(closed))
@@ -343,6 +366,11 @@ fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
 const LEAST_DOUBT_US: f64 = 1e-3;
 /// Change of the wind for the derivative by it, m/s: the strength of horizontal gusts. Chosen.
 const SIDE_STEP_MPS: f64 = 0.25;
+/// Standard deviation of the updraft that a whole flight may be in, m/s: thermals that a fleet can fly a
+/// calibration in.
+pub(super) const UPDRAFT_DOUBT_MPS: f64 = 3.0;
+/// Half of the step of the derivative by the updraft, m/s. Numerical.
+const UPDRAFT_STEP_MPS: f64 = 0.1;
 /// Fewest bins of a comparison. Chosen; the noise alone has 11 parameters.
 const FEWEST_BINS: usize = 12;
 
@@ -407,6 +435,9 @@ const NODES: [(f64, f64); 7] = [
     (3.750_439_717_725_742, 0.000_548_268_855_972_217),
 ];
 
+/// Place of the node without a gust.
+const MIDDLE: usize = NODES.len() / 2;
+
 /// Mean of the pulse in gusts less the pulse in their mean: known physics, computed and never named
 /// (docs/physics.md, 2.5).
 fn rectified(
@@ -414,18 +445,15 @@ fn rectified(
     vehicle: &Vehicle,
     gusts_mps: f64,
 ) -> Result<Vec<Vec<f64>>, EffectError> {
-    let model = Model::of(vehicle)?;
-    let of = |signals: &Signals| {
-        if gusts_mps <= 0.0 {
-            return 0.0;
-        }
-        let at = |node: f64| {
-            let climb_mps = signals.climb_mps - node * gusts_mps;
-            model.pulse_us(&Signals { climb_mps, ..*signals })
-        };
-        NODES.iter().map(|(node, weight)| weight * at(*node)).sum::<f64>() - at(0.0)
+    if gusts_mps <= 0.0 {
+        return Ok(scene.signals.iter().map(|group| vec![0.0; group.len()]).collect());
+    }
+    let pulses_us = scene.shifted(vehicle, NODES.map(|(node, _)| -node * gusts_mps))?;
+    let bent = |pulses_us: &[f64; NODES.len()]| {
+        let nodes = NODES.iter().zip(pulses_us);
+        nodes.map(|((_, weight), pulse_us)| weight * pulse_us).sum::<f64>() - pulses_us[MIDDLE]
     };
-    Ok(scene.signals.iter().map(|group| group.iter().map(of).collect()).collect())
+    Ok(pulses_us.iter().map(|group| group.iter().map(bent).collect()).collect())
 }
 
 #[cfg(test)]

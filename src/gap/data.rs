@@ -4,7 +4,7 @@
 use super::bins::{Bin, BinValues, cut, of_segments};
 use super::left_out::LeftOut;
 use super::measure::measured;
-use super::scene::IDLE_US;
+use super::steady::IDLE_US;
 use crate::analysis::steps::steady;
 use crate::analysis::windows::inferred;
 use crate::flight::Flight;

@@ -3,17 +3,17 @@
 use super::candidates::{
     Candidate, Size, Variant, drag_by_lean, library, of_the_air, read_otherwise,
 };
-use super::compare::{Comparison, Simulated};
+use super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::contest::{Contest, before, entered};
 use super::data::Data;
 use super::decide::{What, decide};
 use super::error::GapError;
 use super::generic::{Generic, all, drawn};
-use super::gls::{Column, Likelihood, Problem, Split};
+use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper, WHITE};
-use super::refine::{Parameter, doubts, fitted, half_interval, parameters_of, refine, slopes};
+use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refine, slopes};
 use super::response::{self, Response, gusts_mps};
-use super::search::{Ranked, RankedGeneric, Round, Sought, Thresholds, round};
+use super::search::{FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::effects::{Role, Signals};
 use crate::mission::plan::Plan;
@@ -73,6 +73,8 @@ pub struct Found {
     pub hyper: Hyper,
     /// Strength of gusts that the rectification was computed with, m/s.
     pub gusts_mps: f64,
+    /// Updraft that the whole flight is in, m/s.
+    pub updraft_mps: f64,
     /// Findings, in the order in which they were made.
     pub steps: Vec<Step>,
     /// The end of the search.
@@ -91,6 +93,7 @@ impl Found {
             values: Vec::new(),
             hyper: Hyper::default(),
             gusts_mps: 0.0,
+            updraft_mps: 0.0,
             steps: Vec::new(),
             rest: Rest::default(),
         }
@@ -169,7 +172,7 @@ impl Look {
 impl Search<'_> {
     /// Looks once and takes up what passes; whether the search goes on.
     fn takes_step(&mut self, step: usize) -> Result<bool, GapError> {
-        let look = self.look()?;
+        let look = self.look_in_likelier_updraft()?;
         let (problem, sought) = (look.problem(), look.sought());
         let round = round(&problem, look.hyper, sought, true);
         let problem = problem.among(&round.groups);
@@ -215,19 +218,44 @@ impl Search<'_> {
         Ok(true)
     }
 
-    /// What is left, and everything that may explain it.
-    fn look(&mut self) -> Result<Look, GapError> {
+    /// What is left in the updraft that explains most, or in still air with the effect that explains most: what
+    /// a model lacks can look like an updraft, and the other way round.
+    fn look_in_likelier_updraft(&mut self) -> Result<Look, GapError> {
+        let begins = self.found.steps.is_empty();
+        let look = self.look(true)?;
+        if !begins || self.found.updraft_mps.abs() < STILL_MPS {
+            return Ok(look);
+        }
+        let explains = |look: &Look| {
+            let round = round(&look.problem(), look.hyper, look.sought(), true);
+            round.base.log_posterior() + (round.best() - FLOOR_NATS).max(0.0)
+        };
+        let there = (self.comparison.clone(), self.found.clone());
+        self.comparison = self.comparison.clone().in_updraft(0.0);
+        self.found.updraft_mps = 0.0;
+        let still = self.look(false)?;
+        if explains(&still) > explains(&look) {
+            return Ok(still);
+        }
+        (self.comparison, self.found) = there;
+        Ok(look)
+    }
+
+    /// What is left, and everything that may explain it; in the updraft that explains most if it `settles` there.
+    fn look(&mut self, settles: bool) -> Result<Look, GapError> {
         let Self { comparison, found, refused, .. } = self;
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         // Gusts that the residual shows bend the model's curve: known physics first.
         let mut free = found.extras.clone();
         free.extend(slopes(comparison, &found.vehicle, &found.parameters)?);
-        let doubts = doubts(comparison, &found.vehicle, &found.parameters)?;
+        let doubts = refine::doubts(comparison, &found.vehicle, &found.parameters)?;
         let quick = Problem::new(&patterns, &residual)
             .doubting(&doubts)
             .with(&free)
             .fit(found.hyper, Likelihood::Profile);
+        let quick = if settles { settle_updraft(comparison, found, &free, quick)? } else { quick };
+        let doubts = refine::doubts(comparison, &found.vehicle, &found.parameters)?;
         found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
@@ -332,9 +360,125 @@ impl Search<'_> {
 
     fn against_model(&self) -> Result<Comparison, GapError> {
         let Self { data, simulated, plan, found, .. } = self;
-        Ok(Comparison::new(data, &found.vehicle, simulated, *plan)?.feeling(&found.felt))
+        let comparison = Comparison::new(data, &found.vehicle, simulated, *plan)?;
+        Ok(comparison.feeling(&found.felt).in_updraft(found.updraft_mps))
     }
 }
+
+/// Moves a comparison into the updraft that the whole flight most probably is in: where the response is curved,
+/// that changes how the pulse goes with climb. With what explains most there.
+fn settle_updraft(
+    comparison: &mut Comparison,
+    found: &mut Found,
+    free: &[Column],
+    start: Solution,
+) -> Result<Solution, GapError> {
+    let mut solution = start;
+    let mut starts = vec![comparison.scene.updraft_mps];
+    if found.steps.is_empty() {
+        starts.extend(UPDRAFTS_MPS);
+    }
+    for _ in 0..PATTERN_ROUNDS {
+        // How drones answer gusts stays as it is meanwhile: their scatter must not choose an updraft.
+        let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
+        let fit = |hyper: Hyper, updraft_mps: f64| {
+            InUpdraft::fitted(comparison, &patterns, found, free, hyper, updraft_mps)
+        };
+        let mut best: Option<InUpdraft> = None;
+        for start_mps in starts {
+            best = better(best, fit(solution.hyper, start_mps)?);
+        }
+        for _ in 0..UPDRAFT_ROUNDS {
+            let Some(there) = &best else { break };
+            let (at_mps, hyper, likely) = (there.updraft_mps, there.solution.hyper, there.likely);
+            let step_mps = (there.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
+            if step_mps.abs() < UPDRAFT_SETTLED_MPS {
+                break;
+            }
+            for share in [1.0, 0.5] {
+                best = better(best, fit(hyper, at_mps + share * step_mps)?);
+                if best.as_ref().is_some_and(|best| best.likely > likely) {
+                    break;
+                }
+            }
+            if best.as_ref().is_none_or(|best| best.likely <= likely) {
+                break;
+            }
+        }
+        let Some(best) = best else { break };
+        solution = best.solution;
+        found.updraft_mps = best.updraft_mps;
+        *comparison = comparison.clone().in_updraft(best.updraft_mps);
+        starts = vec![best.updraft_mps];
+    }
+    Ok(solution)
+}
+
+/// A flight taken in an updraft, and what explains most of it there.
+struct InUpdraft {
+    updraft_mps: f64,
+    solution: Solution,
+    likely: f64,
+    /// Updraft that explains most, as far as the slopes at this one tell, m/s.
+    most_mps: f64,
+}
+
+impl InUpdraft {
+    /// `None`: the vehicle cannot fly so.
+    fn fitted(
+        comparison: &Comparison,
+        patterns: &[GroupPattern],
+        found: &Found,
+        free: &[Column],
+        hyper: Hyper,
+        updraft_mps: f64,
+    ) -> Result<Option<Self>, GapError> {
+        let comparison = comparison.clone().in_updraft(updraft_mps);
+        let Ok(residual) = comparison.residual(&found.vehicle, found.gusts_mps) else {
+            return Ok(None);
+        };
+        let doubts = refine::doubts(&comparison, &found.vehicle, &found.parameters)?;
+        let Some(doubt) = doubts.first() else { return Ok(None) };
+        // The doubt counts from still air, and the residual from the updraft that it is taken in.
+        let share = updraft_mps / UPDRAFT_DOUBT_MPS;
+        let mut from_still = residual;
+        for (group, drones) in from_still.iter_mut().enumerate() {
+            for (drone, bins) in drones.iter_mut().enumerate() {
+                for (bin, value) in bins.iter_mut().enumerate() {
+                    *value += share * doubt.at(group, drone, bin);
+                }
+            }
+        }
+        let split = Split::of(&from_still);
+        let problem = Problem::new(patterns, &split).doubting(&doubts).with(free);
+        let solution = problem.fit(hyper, Likelihood::Profile);
+        let likely = solution.log_posterior();
+        let most_mps = UPDRAFT_DOUBT_MPS * problem.first_doubt(&solution).unwrap_or_default();
+        Ok(likely.is_finite().then_some(Self { updraft_mps, solution, likely, most_mps }))
+    }
+}
+
+/// Whichever explains more.
+fn better(one: Option<InUpdraft>, other: Option<InUpdraft>) -> Option<InUpdraft> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(if other.likely > one.likely { other } else { one }),
+        (one, other) => one.or(other),
+    }
+}
+
+/// An updraft that is none, m/s: what a flight of a quarter of an hour tells of it at best. Chosen.
+const STILL_MPS: f64 = 0.05;
+/// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
+/// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
+const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
+/// Rounds with drones' answers to gusts as they are in the updraft of the round before. Numerical.
+const PATTERN_ROUNDS: usize = 2;
+/// Rounds in which the updraft settles, at most. Numerical.
+const UPDRAFT_ROUNDS: usize = 6;
+/// Longest step of the updraft in one round, m/s: a slope is no more than a hint. Chosen.
+const UPDRAFT_STEP_MPS: f64 = 1.0;
+/// A step of the updraft that is none, m/s: far below what a flight tells of it.
+const UPDRAFT_SETTLED_MPS: f64 = 0.01;
 
 /// The end of the search, if this round is the last.
 fn rest(round: &Round, sought: Sought<'_>, thresholds: &Thresholds) -> Rest {

@@ -242,6 +242,12 @@ impl<'a> Problem<'a> {
         more
     }
 
+    /// The first of the doubts by a solution, in its standard deviations.
+    pub(super) fn first_doubt(&self, solution: &Solution) -> Option<f64> {
+        let place = self.columns.iter().position(|column| column.is_doubt)?;
+        solution.beta.get(place).copied()
+    }
+
     /// What a solution leaves of the groups' means, by group and bin, us.
     pub(super) fn rest(&self, solution: &Solution) -> Vec<Vec<f64>> {
         let mut rest = self.pulses.means.clone();

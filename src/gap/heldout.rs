@@ -62,7 +62,8 @@ impl Case<'_> {
     }
 
     fn against(&self, data: &Data, vehicle: &Vehicle) -> Result<Comparison, GapError> {
-        let comparison = Comparison::new(data, vehicle, self.simulated, self.plan)?;
+        let comparison = Comparison::new(data, vehicle, self.simulated, self.plan)?
+            .in_updraft(self.found.updraft_mps);
         Ok(same_bins(&comparison, &self.found.comparison))
     }
 
@@ -400,6 +401,7 @@ mod tests {
             values: vec![(0.1, 0.01)],
             hyper: Hyper::default(),
             gusts_mps: 0.2,
+            updraft_mps: 0.0,
             steps: Vec::new(),
             rest: Rest::default(),
         }

@@ -113,8 +113,9 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         seed: options.seed,
     };
     let shrink = case.gap(&train, &held)?;
-    let whole =
-        Comparison::new(&data, &found.vehicle, &simulated, input.plan)?.feeling(&found.felt);
+    let whole = Comparison::new(&data, &found.vehicle, &simulated, input.plan)?
+        .feeling(&found.felt)
+        .in_updraft(found.updraft_mps);
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
         // The sizes that go into the model are those of all drones.
         found.refit(&whole)?;

@@ -38,6 +38,7 @@ mod response;
 mod scene;
 mod search;
 mod sensor;
+mod steady;
 mod table;
 #[cfg(test)]
 mod trial;

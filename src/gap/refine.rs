@@ -119,8 +119,8 @@ pub(super) fn refine(
     last.ok_or(GapError::NothingCommon)
 }
 
-/// What is not known exactly, as regressors of one standard deviation each: the wind, and the forms of
-/// effects of which only the size is fitted.
+/// What is not known exactly, as regressors of one standard deviation each: the updraft that the whole flight is
+/// in (always the first), the wind, and the forms of effects of which only the size is fitted.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
@@ -129,7 +129,8 @@ pub(super) fn doubts(
     vehicle: &Vehicle,
     parameters: &[Parameter],
 ) -> Result<Vec<Column>, GapError> {
-    let mut doubts = comparison.wind_doubts(vehicle)?;
+    let mut doubts = vec![comparison.updraft_doubt(vehicle)?];
+    doubts.extend(comparison.wind_doubts(vehicle)?);
     for fitted in parameters.iter().filter(|fitted| fitted.before.is_none()) {
         let Some((form, sd)) = form_of(fitted) else { continue };
         let is_fitted = |one: &Parameter| (one.effect, one.name) == (form.effect, form.name);

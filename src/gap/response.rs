@@ -19,7 +19,7 @@ pub struct Response([f64; COUNT]);
 
 impl Response {
     /// Of a pulse as a function of the shift of the vertical speed, m/s.
-    pub(super) fn of(pulse_us: impl Fn(f64) -> f64) -> Self {
+    pub(super) fn of(mut pulse_us: impl FnMut(f64) -> f64) -> Self {
         let at: [f64; COUNT + 2] =
             std::array::from_fn(|index| pulse_us((index as f64 - STEPS as f64 - 1.0) * STEP_MPS));
         Self(std::array::from_fn(|index| (at[index + 2] - at[index]) / (2.0 * STEP_MPS)))

@@ -1,15 +1,15 @@
 //! Signals that closed forms take in each bin, and the pulses of a model for them.
 
 use super::bins::BinValues;
-use super::compare::thrust_exponent;
 use super::data::Data;
 use super::gls::Column;
 use super::lean::Wind;
 use super::response::Response;
+use super::steady::{Moment, Steady};
 use crate::base::air::density_ratio;
 use crate::effects::cell::charge_of_cell;
 use crate::effects::select::looks_at;
-use crate::effects::{EffectError, Model, Reference, Role, Signal, Signals};
+use crate::effects::{EffectError, Reference, Role, Signal, Signals};
 use crate::numeric::mean;
 use crate::vehicle::Vehicle;
 
@@ -18,9 +18,6 @@ const FULL_CELL_V: f64 = 4.25;
 
 /// Bins that show what charge a battery started with: the first minute or so. Chosen.
 const EARLY_BINS: usize = 12;
-/// Pulse without thrust, us: the convention of all controllers (docs/physics.md, 1.1).
-pub(super) const IDLE_US: f64 = 1000.0;
-
 /// Steady signals of a comparison: what was flown and what the logs say of wind and battery. None of
 /// them follows the pulse: terminal voltage, current and measured acceleration do and are never used
 /// (endogenous regressors; docs/physics.md, 3.1).
@@ -28,6 +25,10 @@ pub(super) const IDLE_US: f64 = 1000.0;
 pub struct Scene {
     /// Signals by group and bin.
     pub signals: Vec<Vec<Signals>>,
+    /// Horizontal velocity relative to the air by group and bin, show frame, m/s.
+    pub relative_mps: Vec<Vec<[f64; 2]>>,
+    /// Updraft that the whole flight is in, m/s; the signals' climb is relative to it.
+    pub updraft_mps: f64,
     /// Charge left by the voltage at rest, by group, drone and bin, 0 to 1; `None` if it was not
     /// logged.
     pub charge: Option<Vec<Vec<Vec<f64>>>>,
@@ -103,7 +104,18 @@ impl Scene {
         let resting_v = mean(&volts).filter(|_| logged).unwrap_or_default();
         let neighbours = data.groups.iter().map(|group| group.neighbours.clone()).collect();
         let resistance_ohm = data.resistance_ohm;
-        Self { signals, charge, cells, resting_v, resistance_ohm, neighbours }
+        let relative_mps = wind.air_mps.clone();
+        let updraft_mps = 0.0;
+        Self {
+            signals,
+            relative_mps,
+            updraft_mps,
+            charge,
+            cells,
+            resting_v,
+            resistance_ohm,
+            neighbours,
+        }
     }
 
     /// Only some bins, chosen by the places of group and bin.
@@ -113,6 +125,13 @@ impl Scene {
         for (group, signals) in scene.signals.iter_mut().enumerate() {
             let mut bin = 0;
             signals.retain(|_| {
+                bin += 1;
+                keep(group, bin - 1)
+            });
+        }
+        for (group, air) in scene.relative_mps.iter_mut().enumerate() {
+            let mut bin = 0;
+            air.retain(|_| {
                 bin += 1;
                 keep(group, bin - 1)
             });
@@ -137,7 +156,9 @@ impl Scene {
             for (bin, signals) in scene.signals[index].iter_mut().enumerate() {
                 let values = side[index][bin];
                 let velocity = group.bins[bin].velocity_mps;
-                signals.horizontal_mps = (velocity[0] - wind[0]).hypot(velocity[1] - wind[1]);
+                let relative = [velocity[0] - wind[0], velocity[1] - wind[1]];
+                signals.horizontal_mps = relative[0].hypot(relative[1]);
+                scene.relative_mps[index][bin] = relative;
                 signals.tilt_rad = values.lean_rad[0].hypot(values.lean_rad[1]);
             }
         }
@@ -145,61 +166,103 @@ impl Scene {
         scene
     }
 
-    /// Pulses that a vehicle's model asks for, brought to level, us.
+    /// The same flight in another updraft, m/s.
+    #[must_use]
+    pub fn in_updraft(&self, updraft_mps: f64) -> Self {
+        let mut scene = self.clone();
+        for signals in scene.signals.iter_mut().flatten() {
+            signals.climb_mps -= updraft_mps - self.updraft_mps;
+        }
+        scene.updraft_mps = updraft_mps;
+        scene
+    }
+
+    /// The moments of a group's bins.
+    fn moments(&self, group: usize) -> impl Iterator<Item = Moment> {
+        let air = self.relative_mps[group].iter();
+        let both = self.signals[group].iter().zip(air);
+        both.map(|(signals, relative)| Moment { signals: *signals, relative_mps: *relative })
+    }
+
+    /// Pulses that a vehicle's steady flight asks for, brought to level, us.
     ///
     /// # Errors
-    /// Effects of the vehicle that are not valid.
+    /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
-        let model = Model::of(vehicle)?;
-        let exponent = thrust_exponent(vehicle);
+        let mut steady = Steady::of(vehicle)?;
         let battery = Battery::of(vehicle);
         let hover_ah_per_s = battery.as_ref().map_or(0.0, |battery| battery.hover_ah_per_s);
-        let at = |signals: &Signals, charge: Option<f64>, neighbours: f64| {
-            let charge_used_ah = match (&battery, charge) {
-                (Some(battery), Some(charge)) => (battery.initial - charge) * battery.capacity_ah,
-                _ => hover_ah_per_s * signals.time_s.max(0.0),
-            };
-            let pulse_us = model.pulse_us(&Signals { charge_used_ah, neighbours, ..*signals });
-            // As both sides of the comparison are: brought to level by their own lean.
-            IDLE_US + (pulse_us - IDLE_US) * signals.tilt_rad.cos().powf(exponent)
+        let used_ah = |signals: &Signals, charge: Option<f64>| match (&battery, charge) {
+            (Some(battery), Some(charge)) => (battery.initial - charge) * battery.capacity_ah,
+            _ => hover_ah_per_s * signals.time_s.max(0.0),
         };
-        let own =
-            (battery.is_some() && self.charge.is_some()) || looks_at(vehicle, Signal::Neighbours);
+        let near = looks_at(vehicle, Signal::Neighbours);
+        let own = (battery.is_some() && self.charge.is_some()) || near;
+        let groups = 0..self.signals.len();
         if !own {
-            let of = |signals: &Vec<Signals>| signals.iter().map(|s| at(s, None, 0.0)).collect();
-            return Ok(Column::Shared(self.signals.iter().map(of).collect()));
+            let mut shared = Vec::new();
+            for group in groups {
+                let pulse = |at: Moment| steady.pulse_us(&at, used_ah(&at.signals, None), 0.0);
+                shared.push(self.moments(group).map(pulse).collect::<Result<_, _>>()?);
+            }
+            return Ok(Column::Shared(shared));
         }
-        let drone = |group: usize, drone: usize| -> Vec<f64> {
-            self.signals[group]
-                .iter()
-                .enumerate()
-                .map(|(bin, signals)| {
+        let mut of_drones = Vec::new();
+        for group in groups {
+            let mut drones = vec![Vec::new(); self.neighbours[group].len()];
+            for (bin, at) in self.moments(group).enumerate() {
+                // Batteries differ, and the balance of forces does not know them.
+                let mut balance = None;
+                for (drone, pulses) in drones.iter_mut().enumerate() {
+                    let neighbours = self.neighbours[group][drone];
+                    let balance = match balance {
+                        Some(balance) if !near => balance,
+                        _ => *balance.insert(steady.balance(&at, neighbours)?),
+                    };
                     let charge = self.charge.as_ref().map(|charge| charge[group][drone][bin]);
-                    at(signals, charge, self.neighbours[group][drone])
-                })
-                .collect()
-        };
-        let group = |index: usize| {
-            (0..self.neighbours[index].len()).map(|which| drone(index, which)).collect()
-        };
-        Ok(Column::Own((0..self.signals.len()).map(group).collect()))
+                    let used_ah = used_ah(&at.signals, charge);
+                    pulses.push(steady.of_balance(&balance, &at, used_ah, neighbours)?);
+                }
+            }
+            of_drones.push(drones);
+        }
+        Ok(Column::Own(of_drones))
     }
 
     /// Response to vertical air speed of a model by group and bin: by the whole model, so that effects that
     /// build on the rest of it are in it.
     ///
     /// # Errors
-    /// Effects of the vehicle that are not valid.
+    /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn response(&self, vehicle: &Vehicle) -> Result<Vec<Vec<Response>>, EffectError> {
         let mut calm = vehicle.clone();
         // What shakes has a scatter of its own, which hides how it answers gusts.
         calm.effects.retain(|name, _| !shakes(name));
-        let model = Model::of(&calm)?;
-        let of = |signals: &Signals| {
-            let at = |climb_mps| model.pulse_us(&Signals { climb_mps, ..*signals });
-            Response::of(|shift_mps| at(signals.climb_mps + shift_mps))
+        let mut steady = Steady::of(&calm)?;
+        let groups = 0..self.signals.len();
+        groups.map(|group| self.moments(group).map(|at| steady.response(&at)).collect()).collect()
+    }
+
+    /// Pulses by group and bin at vertical speeds that differ from the flown one by so much, of the mean drone, us.
+    ///
+    /// # Errors
+    /// As [`Scene::pulses`].
+    pub(super) fn shifted<const COUNT: usize>(
+        &self,
+        vehicle: &Vehicle,
+        shifts_mps: [f64; COUNT],
+    ) -> Result<Vec<Vec<[f64; COUNT]>>, EffectError> {
+        let mut steady = Steady::of(vehicle)?;
+        let mut of = |at: Moment| -> Result<[f64; COUNT], EffectError> {
+            let mut pulses_us = [0.0; COUNT];
+            for (pulse_us, shift_mps) in pulses_us.iter_mut().zip(shifts_mps) {
+                let shifted = at.climbing(at.signals.climb_mps + shift_mps);
+                *pulse_us = steady.pulse_us(&shifted, at.signals.charge_used_ah, 0.0)?;
+            }
+            Ok(pulses_us)
         };
-        Ok(self.signals.iter().map(|group| group.iter().map(of).collect()).collect())
+        let groups = 0..self.signals.len();
+        groups.map(|group| self.moments(group).map(&mut of).collect()).collect()
     }
 }
 

@@ -57,6 +57,16 @@ pub enum EffectError {
         /// Condition on the value, or consequence of it, as text.
         why: String,
     },
+    /// A steady flight that the vehicle with its effects cannot fly.
+    #[error(
+        "the vehicle cannot fly steadily at {climb_mps:+.1} m/s of climb and {horizontal_mps:.1} m/s of wind"
+    )]
+    NotFlown {
+        /// Climb relative to the air, m/s.
+        climb_mps: f64,
+        /// Horizontal speed relative to the air, m/s.
+        horizontal_mps: f64,
+    },
     /// Not `NAME`, `NAME=on`, `NAME=off` or `NAME.PARAMETER=NUMBER`.
     #[error("\"{0}\" is not NAME, NAME=on, NAME=off or NAME.PARAMETER=NUMBER")]
     Syntax(String),

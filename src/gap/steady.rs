@@ -1,0 +1,125 @@
+//! A vehicle in the steady moments of a flight, by the simulator's own trim.
+
+use nalgebra::Vector3;
+
+use super::response::Response;
+use crate::effects::{EffectError, Signals, Supply};
+use crate::sim::plant::trim::{Balance, Condition, Trim};
+use crate::vehicle::Vehicle;
+
+/// Pulse without thrust, us: the convention of all controllers (docs/physics.md, 1.1).
+pub(super) const IDLE_US: f64 = 1000.0;
+
+/// One steady moment: what closed forms look at, and which way the air goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moment {
+    /// Signals at the moment; the lean that the logs show is not looked at.
+    pub signals: Signals,
+    /// Horizontal velocity relative to the air, show frame, m/s.
+    pub relative_mps: [f64; 2],
+}
+
+impl Moment {
+    /// The same moment at another vertical speed relative to the air, m/s.
+    pub(super) fn climbing(self, climb_mps: f64) -> Self {
+        Self { signals: Signals { climb_mps, ..self.signals }, ..self }
+    }
+
+    fn condition(&self, charge_used_ah: f64, neighbours: f64) -> Condition {
+        let Signals { climb_mps, height_m, time_s, density_ratio, acceleration_mps2, .. } =
+            self.signals;
+        let [x, y] = self.relative_mps;
+        Condition {
+            velocity_mps: Vector3::new(x, y, climb_mps),
+            acceleration_mps2: Vector3::new(0.0, 0.0, acceleration_mps2),
+            density_ratio,
+            position_m: Vector3::new(0.0, 0.0, height_m),
+            time_s,
+            supply: Supply::Used(charge_used_ah),
+            neighbours: Some(neighbours),
+            ..Condition::default()
+        }
+    }
+
+    fn refused(&self) -> EffectError {
+        EffectError::NotFlown {
+            climb_mps: self.signals.climb_mps,
+            horizontal_mps: self.relative_mps[0].hypot(self.relative_mps[1]),
+        }
+    }
+}
+
+/// Steady pulses of a vehicle's mean drone.
+pub(super) struct Steady {
+    trim: Trim,
+    /// Power of thrust that `u - 1000` goes with at hover.
+    exponent: f64,
+}
+
+impl Steady {
+    /// Steady pulses of a vehicle with its effects.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub(super) fn of(vehicle: &Vehicle) -> Result<Self, EffectError> {
+        let exponent = super::compare::thrust_exponent(vehicle);
+        Ok(Self { trim: Trim::of(vehicle)?, exponent })
+    }
+
+    /// The pulse at a moment, brought to level as measured pulses are, us.
+    ///
+    /// # Errors
+    /// The vehicle cannot fly so.
+    pub(super) fn pulse_us(
+        &mut self,
+        at: &Moment,
+        charge_used_ah: f64,
+        neighbours: f64,
+    ) -> Result<f64, EffectError> {
+        let balance = self.balance(at, neighbours)?;
+        self.of_balance(&balance, at, charge_used_ah, neighbours)
+    }
+
+    /// The balance of forces at a moment, which no battery changes.
+    ///
+    /// # Errors
+    /// The vehicle cannot fly so.
+    pub(super) fn balance(&mut self, at: &Moment, neighbours: f64) -> Result<Balance, EffectError> {
+        self.trim.balance(&at.condition(0.0, neighbours)).ok_or_else(|| at.refused())
+    }
+
+    /// The pulse of a balance, brought to level, us.
+    ///
+    /// # Errors
+    /// No pulse does it.
+    pub(super) fn of_balance(
+        &mut self,
+        balance: &Balance,
+        at: &Moment,
+        charge_used_ah: f64,
+        neighbours: f64,
+    ) -> Result<f64, EffectError> {
+        let condition = at.condition(charge_used_ah, neighbours);
+        let pulse_us =
+            self.trim.pulse_us(balance, &condition).ok_or_else(|| at.refused())? - IDLE_US;
+        let cos = (1.0 - balance.lean.norm_squared()).max(0.0).sqrt();
+        Ok(IDLE_US + pulse_us * cos.powf(self.exponent))
+    }
+
+    /// Response to vertical air speed at a moment.
+    ///
+    /// # Errors
+    /// The vehicle cannot fly at a speed so near.
+    pub(super) fn response(&mut self, at: &Moment) -> Result<Response, EffectError> {
+        let mut refused = None;
+        let response = Response::of(|shift_mps| {
+            let shifted = at.climbing(at.signals.climb_mps + shift_mps);
+            let charge_ah = at.signals.charge_used_ah;
+            self.pulse_us(&shifted, charge_ah, 0.0).unwrap_or_else(|error| {
+                refused = Some(error);
+                f64::NAN
+            })
+        });
+        refused.map_or(Ok(response), Err)
+    }
+}
