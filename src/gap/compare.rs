@@ -12,9 +12,9 @@ use super::refly::{mean_drone, refly};
 use super::response::{self, Response};
 use super::scene::Scene;
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
-use crate::effects::{EffectError, Reference};
+use crate::effects::{EffectError, Reference, Role, find, select};
 use crate::mission::plan::Plan;
-use crate::numeric::mean;
+use crate::numeric::{Moments, mean};
 use crate::vehicle::Vehicle;
 
 /// The simulated side of a comparison.
@@ -50,9 +50,13 @@ pub struct Comparison {
     closure_us: Vec<Vec<f64>>,
     /// What no effect of the vehicle adds to the response to vertical air speed; empty: nothing.
     felt: Vec<Vec<Response>>,
+    /// Air that the simulated side was flown in, show frame, z up, m/s.
+    flown_mps: [f64; 3],
     amsl_m: f64,
     /// Mean drone of the fleet, by the model.
     pub vehicle: Vehicle,
+    /// What makes drones differ by the model: effect, parameter, and its size.
+    spreads: Vec<(String, String, f64)>,
 }
 
 /// Power of thrust that `u - 1000` goes with at hover.
@@ -67,8 +71,8 @@ fn amsl_m(plan: Option<&Plan>) -> f64 {
 }
 
 /// How a vehicle leans in the air at a height.
-fn lean_law(vehicle: &Vehicle, amsl_m: f64) -> LeanLaw {
-    LeanLaw::of(vehicle, SEA_LEVEL_DENSITY * density_ratio(amsl_m))
+fn lean_law(vehicle: &Vehicle, amsl_m: f64, updraft_mps: f64) -> LeanLaw {
+    LeanLaw::of(vehicle, SEA_LEVEL_DENSITY * density_ratio(amsl_m), updraft_mps)
 }
 
 impl Comparison {
@@ -82,24 +86,43 @@ impl Comparison {
         simulated: &Simulated<'_>,
         plan: Option<&Plan>,
     ) -> Result<Self, GapError> {
+        Self::of(data, vehicle, simulated, plan, 0.0)
+    }
+
+    /// Flies (or takes) the simulated side of a vehicle for a flight that is in an updraft all over, m/s.
+    ///
+    /// # Errors
+    /// As [`Comparison::new`].
+    pub(super) fn of(
+        data: &Data,
+        vehicle: &Vehicle,
+        simulated: &Simulated<'_>,
+        plan: Option<&Plan>,
+        updraft_mps: f64,
+    ) -> Result<Self, GapError> {
+        let spreads = spreads(vehicle);
         let vehicle = mean_drone(vehicle);
         let amsl_m = amsl_m(plan);
-        let law = lean_law(&vehicle, amsl_m);
-        let first = wind(data, law, None).mean_mps;
-        let fly = |wind_mps: [f64; 2]| -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
+        let law = lean_law(&vehicle, amsl_m, updraft_mps);
+        // Logs of another simulation, and closed forms, are in still air.
+        let flown_updraft_mps =
+            if matches!(simulated, Simulated::Refly(_)) { updraft_mps } else { 0.0 };
+        let air = |wind: &Wind| [wind.mean_mps[0], wind.mean_mps[1], flown_updraft_mps];
+        let first = air(&wind(data, law, None));
+        let fly = |air_mps: [f64; 3]| -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
             match simulated {
                 Simulated::Given { values, flew } => {
                     let flew = mean_drone(flew);
                     match plan.filter(|_| flew != vehicle) {
                         Some(plan) => {
-                            let without = fly_groups(data, &flew, plan, wind_mps)?;
-                            let with = fly_groups(data, &vehicle, plan, wind_mps)?;
+                            let without = fly_groups(data, &flew, plan, air_mps)?;
+                            let with = fly_groups(data, &vehicle, plan, air_mps)?;
                             Ok(changed(values, &without, &with))
                         }
                         None => Ok(values.clone()),
                     }
                 }
-                Simulated::Refly(plan) => fly_groups(data, &vehicle, plan, wind_mps),
+                Simulated::Refly(plan) => fly_groups(data, &vehicle, plan, air_mps),
                 Simulated::Closed => Ok(data.as_flown()),
             }
         };
@@ -110,7 +133,7 @@ impl Comparison {
             // What the legs say of the wind is better than what hovers say by the model's law alone.
             let whole = data.keep(|group, bin| values[group][bin].is_some());
             let side = flat(&values);
-            flown_mps = wind(&whole, law, Some((&side, first))).mean_mps;
+            flown_mps = air(&wind(&whole, law, Some((&side, first))));
             values = fly(flown_mps)?;
         }
         let has = |group: usize, bin: usize| values[group][bin].is_some();
@@ -121,7 +144,9 @@ impl Comparison {
         }
         let blown = wind(&data, law, Some((&side, flown_mps)));
         let scene = Scene::measured(&data, &side, &blown, amsl_m);
-        let simulated_scene = scene.simulated(&data, &side, flown_mps);
+        let simulated_scene =
+            scene.in_updraft(flown_updraft_mps).simulated(&data, &side, flown_mps);
+        let scene = scene.in_updraft(updraft_mps);
         let closed = match simulated {
             Simulated::Given { flew, .. } if plan.is_none() => {
                 simulated_scene.pulses(&mean_drone(flew))?
@@ -144,10 +169,11 @@ impl Comparison {
                 bins.iter().enumerate().map(apart).collect()
             })
             .collect();
-        Ok(Self { data, side, scene, wind: blown, closure_us, felt: Vec::new(), amsl_m, vehicle })
+        let (wind, felt) = (blown, Vec::new());
+        Ok(Self { data, side, scene, wind, closure_us, felt, flown_mps, amsl_m, vehicle, spreads })
     }
 
-    /// This comparison in a flight that is in an updraft all over, m/s.
+    /// This comparison in a flight that is in an updraft all over, m/s, with the wind as it was read.
     #[must_use]
     pub(super) fn in_updraft(mut self, updraft_mps: f64) -> Self {
         self.scene = self.scene.in_updraft(updraft_mps);
@@ -190,6 +216,16 @@ impl Comparison {
                 of.measured.iter().enumerate().map(drone).collect()
             })
             .collect())
+    }
+
+    /// Root mean square of what the model leaves about each drone's mean, us.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub(super) fn raw_gap_us(&self) -> Result<f64, EffectError> {
+        let residual = self.residual(&self.vehicle, 0.0)?;
+        let variances = residual.iter().flatten().filter_map(|bins| Moments::of(bins));
+        Ok(mean(variances.map(|moments| moments.population_variance())).unwrap_or_default().sqrt())
     }
 
     /// Patterns of the groups that the noise model takes, for a vehicle.
@@ -258,8 +294,10 @@ impl Comparison {
             wind,
             closure_us: pick(&self.closure_us, &keep),
             felt: pick(&self.felt, &keep),
+            flown_mps: self.flown_mps,
             amsl_m: self.amsl_m,
             vehicle: self.vehicle.clone(),
+            spreads: self.spreads.clone(),
         }
     }
 
@@ -275,8 +313,9 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub fn pulses_by_lean(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
-        let wind = wind(&self.data, lean_law(vehicle, self.amsl_m), None);
-        Scene::measured(&self.data, &self.side, &wind, self.amsl_m).pulses(vehicle)
+        let wind = wind(&self.data, lean_law(vehicle, self.amsl_m, self.scene.updraft_mps), None);
+        let scene = Scene::measured(&self.data, &self.side, &wind, self.amsl_m);
+        scene.in_updraft(self.scene.updraft_mps).pulses(vehicle)
     }
 
     /// Change of the pulse by one standard error of the wind, along either axis of the show.
@@ -293,6 +332,33 @@ impl Comparison {
                 doubts.push(doubt);
             }
         }
+        Ok(doubts)
+    }
+
+    /// Change of the pulse by one standard deviation of the mean of each group's drones, for each effect that makes
+    /// drones differ by the model, and group: few drones are not the fleet.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub(super) fn spread_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
+        let mut doubts = Vec::new();
+        for (effect, parameter, size) in &self.spreads {
+            let mut spread = vehicle.clone();
+            select::set(&mut spread, effect, parameter, *size);
+            let by = |effect: &str| self.scene.deviating(&spread, effect);
+            let (without, with) = (by("")?, by(effect)?);
+            for group in 0..with.len() {
+                let zero = Column::Shared(with.clone());
+                let doubt =
+                    zero.each(
+                        |of, _, bin| {
+                            if of == group { with[of][bin] - without[of][bin] } else { 0.0 }
+                        },
+                    );
+                doubts.push(doubt);
+            }
+        }
+        doubts.retain(|doubt| doubt.range() > LEAST_DOUBT_US);
         Ok(doubts)
     }
 
@@ -318,17 +384,11 @@ impl Comparison {
         axis: usize,
         by_mps: f64,
     ) -> Result<Column, EffectError> {
-        let mut scene = self.scene.clone();
-        let groups = scene.signals.iter_mut().zip(&mut scene.relative_mps);
-        for ((signals, relative), air) in groups.zip(&self.wind.air_mps) {
-            for ((signals, relative), air) in signals.iter_mut().zip(relative).zip(air) {
-                let mut air = *air;
-                air[axis] -= by_mps;
-                signals.horizontal_mps = air[0].hypot(air[1]);
-                *relative = air;
-            }
+        let mut wind = self.wind.clone();
+        for air in wind.air_mps.iter_mut().flatten() {
+            air[axis] -= by_mps;
         }
-        Ok(scene.pulses(vehicle)?.less(closed))
+        Ok(self.scene.clone().blown(&wind).pulses(vehicle)?.less(closed))
     }
 
     /// Distance of the mean leans of both sides in hover and in vertical flight, rad.
@@ -357,6 +417,22 @@ impl Comparison {
     }
 }
 
+/// What makes a vehicle's drones differ: effect, parameter, and its size.
+fn spreads(vehicle: &Vehicle) -> Vec<(String, String, f64)> {
+    let mut found = Vec::new();
+    for (name, table) in vehicle.effects.iter().filter(|(_, table)| table.on) {
+        let parameters = find(name).into_iter().flat_map(|effect| effect.definition().parameters);
+        for spread in parameters.filter(|one| one.role.is_some_and(Role::is_spread)) {
+            let size = table.parameters.get(spread.name).copied();
+            let size = size.unwrap_or_else(|| (spread.default)(vehicle));
+            if size > 0.0 {
+                found.push((name.clone(), spread.name.to_owned(), size));
+            }
+        }
+    }
+    found
+}
+
 /// The bins that are there.
 fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
     values.iter().map(|group| group.iter().flatten().copied().collect()).collect()
@@ -378,7 +454,7 @@ fn fly_groups(
     data: &Data,
     vehicle: &Vehicle,
     plan: &Plan,
-    wind_mps: [f64; 2],
+    air_mps: [f64; 3],
 ) -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
     use rayon::prelude::*;
     data.groups
@@ -395,7 +471,7 @@ fn fly_groups(
             let slot =
                 nearest.and_then(|(slot, _)| plan.slot(*slot)).ok_or(GapError::NothingCommon)?;
             let exponent = thrust_exponent(vehicle);
-            Ok(refly(vehicle, plan, slot, &group.bins, wind_mps, exponent)?)
+            Ok(refly(vehicle, plan, slot, &group.bins, air_mps, exponent)?)
         })
         .collect()
 }

@@ -20,7 +20,7 @@ pub(super) const CLASS_NATS: f64 = 6.0;
 const CLASS_SHARE: f64 = 0.1;
 /// Rivals within this many margins, as regressors, are compared in full. Chosen; fixed margins of 8 and 12
 /// nats came before it. Costs time only, unless the full comparison turns round more than a margin.
-const CONTEST_MARGINS: f64 = 2.0;
+pub(super) const CONTEST_MARGINS: f64 = 2.0;
 /// Rivals must leave a similar trace: correlation with everything else partialled out. The confounded pairs
 /// of docs/physics.md, 3.5 correlate above 0.7; the value below that is chosen.
 pub(super) const ALIKE: f64 = 0.6;
@@ -115,7 +115,9 @@ pub(super) fn decide(
         // So must another reading of the wind.
         let is_plain = candidate.size.is_some() && !candidate.by_lean;
         let is_effect = is_plain || ranked.gain > FREE_FLOOR_NATS;
-        candidate.name != "updraft-drift" && is_effect && ranked.fitted && matters
+        // Scatter between drones has many causes: it may support a name, never make one.
+        let in_means = ranked.plain > FLOOR_NATS;
+        candidate.name != "updraft-drift" && is_effect && in_means && ranked.fitted && matters
     };
     let best = round.library.iter().find(is_named);
     let best_gain = best.map_or(0.0, |best| best.gain);

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::effects::Signal;
+
 /// Quantity along which a residual is held apart, or on which a free shape depends.
 ///
 /// Files have the names of [`Dependence::name`].
@@ -56,6 +58,22 @@ impl Dependence {
     /// Dependence of a name in files; `None` for another word.
     pub fn of(name: &str) -> Option<Self> {
         ALL.into_iter().find(|one| one.name() == name)
+    }
+
+    /// Whether an effect that depends on a signal may depend on this.
+    pub(super) fn is_of(self, signal: Signal) -> bool {
+        match self {
+            Self::Climb => signal == Signal::Climb,
+            Self::ClimbTime => matches!(signal, Signal::Climb | Signal::Time),
+            Self::Height => matches!(signal, Signal::Height | Signal::Density),
+            Self::Time | Self::Step => matches!(signal, Signal::Time | Signal::ChargeUsed),
+            Self::Wind | Self::Lean | Self::Heading => {
+                matches!(signal, Signal::Horizontal | Signal::Tilt)
+            }
+            Self::Voltage => signal == Signal::ChargeUsed,
+            Self::Place => signal == Signal::Neighbours,
+            Self::Drone => signal == Signal::Drone,
+        }
     }
 
     /// Whether drones are held apart, not moments of a flight.

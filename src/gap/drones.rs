@@ -46,7 +46,12 @@ pub(super) fn drones(
         }
     }
     each.sort_by_key(|drone| drone.slot);
-    let spread = spread(&each, reliability, found, original);
+    let responses: Vec<f64> =
+        patterns.iter().flat_map(|pattern| pattern.responses(&found.hyper)).collect();
+    // Who responds more than the others needs another pulse where the air rises, too.
+    let by_updraft_us =
+        found.hyper.get(SLOPES) * found.updraft_mps.abs() * mean(&responses).unwrap_or_default();
+    let spread = spread(&each, reliability, by_updraft_us, found, original);
     let correlation = (each.len() >= FEWEST).then(|| correlation(&each));
     let words = words(&each, correlation, found);
     Ok((Drones { each, correlation, words }, spread))
@@ -102,6 +107,7 @@ const FEWEST_FOR_SPREAD: usize = 12;
 fn spread(
     each: &[DroneOffset],
     reliability: f64,
+    by_updraft_us: f64,
     found: &Found,
     original: &Vehicle,
 ) -> Option<Step> {
@@ -121,7 +127,7 @@ fn spread(
     let (by_mass, by_thrust) = (Role::MassSpread.place()?, Role::ThrustSpread.place()?);
     let known = |role: Role| role.value(original).unwrap_or(0.0);
     let (mass, thrust) = (known(Role::MassSpread), known(Role::ThrustSpread));
-    let expected = mass.hypot(thrust).max(USUAL);
+    let expected = mass.hypot(thrust).max(USUAL).hypot(by_updraft_us / sensitivity);
     if low <= expected {
         return None;
     }

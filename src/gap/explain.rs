@@ -6,7 +6,7 @@ use super::candidates::{
 use super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::contest::{Contest, before, entered};
 use super::data::Data;
-use super::decide::{What, decide};
+use super::decide::{CONTEST_MARGINS, What, decide, margin_nats};
 use super::error::GapError;
 use super::generic::{Generic, all, drawn};
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
@@ -15,7 +15,7 @@ use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refin
 use super::response::{self, Response, gusts_mps};
 use super::search::{FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, round};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
-use crate::effects::{Role, Signals};
+use crate::effects::{Role, Signal, Signals, find};
 use crate::mission::plan::Plan;
 use crate::numeric::mean;
 use crate::vehicle::Vehicle;
@@ -144,6 +144,15 @@ struct Search<'a> {
     last: Option<(Found, f64)>,
 }
 
+/// The updraft in which is looked.
+#[derive(Clone, Copy)]
+enum In<'a> {
+    /// The one that explains most.
+    Settled,
+    /// The present one; in noise of these patterns, if there are any.
+    Present(Option<&'a [GroupPattern]>),
+}
+
 /// What is looked at in one round, and for what.
 struct Look {
     patterns: Vec<GroupPattern>,
@@ -172,24 +181,39 @@ impl Look {
 impl Search<'_> {
     /// Looks once and takes up what passes; whether the search goes on.
     fn takes_step(&mut self, step: usize) -> Result<bool, GapError> {
+        let t0 = std::time::Instant::now(); //TRACE
         let look = self.look_in_likelier_updraft()?;
+        eprintln!("TRACE look {:.2}", t0.elapsed().as_secs_f64()); //TRACE
         let (problem, sought) = (look.problem(), look.sought());
         let round = round(&problem, look.hyper, sought, true);
+        eprintln!("TRACE round {:.2}", t0.elapsed().as_secs_f64()); //TRACE
         let problem = problem.among(&round.groups);
         let likely = round.base.log_posterior();
         if let Some((before, was)) = self.last.take()
             && likely < was - WORSE_NATS
         {
             // Fitted together with the rest it explains less than was explained without.
+            let free = self.found.steps.pop();
             self.found = before;
+            widen(&mut self.found.steps, free.as_ref());
             return Ok(false);
         }
         self.found.hyper = round.base.hyper;
         let material_us = material_us(&look.patterns, &round.base.hyper);
         let mut decision = decide(&problem, &round, sought, material_us, self.options, step);
+        eprintln!(
+            "TRACE decide {:.2} best {} {:.1} plain {:.1} free {:.1} W {:.2}",
+            t0.elapsed().as_secs_f64(),
+            round.library.first().map_or("", |b| sought.library[b.candidate].name),
+            round.best(),
+            round.library.first().map_or(0.0, |b| b.plain),
+            round.best_generic(),
+            self.found.updraft_mps
+        ); //TRACE
         let (found, comparison) = (&self.found, &self.comparison);
         decision.what =
             Contest { found, comparison, sought, round: &round }.settle(&problem, decision.what)?;
+        eprintln!("TRACE contest {:.2}", t0.elapsed().as_secs_f64()); //TRACE
         self.found.rest = rest(&round, sought, &decision.thresholds);
         if step == self.options.most_steps || matches!(decision.what, What::Nothing) {
             self.found.comparison = self.comparison.clone();
@@ -222,7 +246,7 @@ impl Search<'_> {
     /// a model lacks can look like an updraft, and the other way round.
     fn look_in_likelier_updraft(&mut self) -> Result<Look, GapError> {
         let begins = self.found.steps.is_empty();
-        let look = self.look(true)?;
+        let look = self.look(In::Settled)?;
         if !begins || self.found.updraft_mps.abs() < STILL_MPS {
             return Ok(look);
         }
@@ -231,33 +255,41 @@ impl Search<'_> {
             round.base.log_posterior() + (round.best() - FLOOR_NATS).max(0.0)
         };
         let there = (self.comparison.clone(), self.found.clone());
-        self.comparison = self.comparison.clone().in_updraft(0.0);
         self.found.updraft_mps = 0.0;
-        let still = self.look(false)?;
+        self.comparison = self.against_model()?;
+        // In the same noise: how drones scatter must not choose an updraft.
+        let still = self.look(In::Present(Some(&look.patterns)))?;
+        eprintln!("TRACE still {:.1} there {:.1}", explains(&still), explains(&look)); //TRACE
         if explains(&still) > explains(&look) {
-            return Ok(still);
+            return self.look(In::Present(None));
         }
         (self.comparison, self.found) = there;
         Ok(look)
     }
 
-    /// What is left, and everything that may explain it; in the updraft that explains most if it `settles` there.
-    fn look(&mut self, settles: bool) -> Result<Look, GapError> {
-        let Self { comparison, found, refused, .. } = self;
+    /// What is left, and everything that may explain it.
+    fn look(&mut self, updraft: In<'_>) -> Result<Look, GapError> {
+        let Self { comparison, found, .. } = self;
         let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         // Gusts that the residual shows bend the model's curve: known physics first.
         let mut free = found.extras.clone();
         free.extend(slopes(comparison, &found.vehicle, &found.parameters)?);
         let doubts = refine::doubts(comparison, &found.vehicle, &found.parameters)?;
-        let quick = Problem::new(&patterns, &residual)
+        let mut quick = Problem::new(&patterns, &residual)
             .doubting(&doubts)
             .with(&free)
             .fit(found.hyper, Likelihood::Profile);
-        let quick = if settles { settle_updraft(comparison, found, &free, quick)? } else { quick };
+        if matches!(updraft, In::Settled) {
+            quick = self.settle_updraft(&free, quick)?;
+        }
+        let Self { comparison, found, refused, .. } = self;
         let doubts = refine::doubts(comparison, &found.vehicle, &found.parameters)?;
         found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
-        let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
+        let patterns = match updraft {
+            In::Present(Some(patterns)) => patterns.to_vec(),
+            _ => comparison.patterns(&found.vehicle, found.gusts_mps)?,
+        };
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         let mut candidates = library(&found.vehicle, &comparison.scene)?;
         candidates.extend(read_otherwise(comparison, &found.vehicle)?);
@@ -267,6 +299,43 @@ impl Search<'_> {
         let drones = comparison.data.counts();
         let hyper = quick.hyper;
         Ok(Look { patterns, residual, free, doubts, hyper, candidates, generics, drones })
+    }
+
+    /// Goes into the updraft that the whole flight most probably is in: where the response is curved, that
+    /// changes how the pulse goes with climb. With what explains most there.
+    fn settle_updraft(&mut self, free: &[Column], start: Solution) -> Result<Solution, GapError> {
+        let mut solution = start;
+        let mut starts = vec![self.found.updraft_mps];
+        if self.found.steps.is_empty() {
+            starts.extend(UPDRAFTS_MPS);
+        }
+        for _ in 0..FLOWN_ROUNDS {
+            let Self { comparison, found, .. } = self;
+            // How drones answer gusts stays as it is meanwhile: their scatter must not choose an updraft.
+            let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
+            let fit = |hyper: Hyper, updraft_mps: f64| {
+                InUpdraft::fitted(comparison, &patterns, found, free, hyper, updraft_mps)
+            };
+            let Some(best) = likeliest(fit, &starts, solution.hyper)? else { break };
+            solution = best.solution;
+            let moved_mps = best.updraft_mps - found.updraft_mps;
+            found.updraft_mps = best.updraft_mps;
+            starts = vec![best.updraft_mps];
+            if moved_mps.abs() < UPDRAFT_SETTLED_MPS {
+                break;
+            }
+            let flown = self.against_model()?;
+            let bins = |of: &Comparison| -> Vec<usize> {
+                of.data.groups.iter().map(|group| group.bins.len()).collect()
+            };
+            // Where the model cannot follow the command in that updraft, regressors would lose their bins.
+            self.comparison = if free.is_empty() || bins(&flown) == bins(&self.comparison) {
+                flown
+            } else {
+                self.comparison.clone().in_updraft(best.updraft_mps)
+            };
+        }
+        Ok(solution)
     }
 
     /// Takes an effect into the model, or a motion of the air into the regressors. `names` are those of
@@ -360,58 +429,40 @@ impl Search<'_> {
 
     fn against_model(&self) -> Result<Comparison, GapError> {
         let Self { data, simulated, plan, found, .. } = self;
-        let comparison = Comparison::new(data, &found.vehicle, simulated, *plan)?;
-        Ok(comparison.feeling(&found.felt).in_updraft(found.updraft_mps))
+        let Found { vehicle, felt, updraft_mps, .. } = found;
+        Ok(Comparison::of(data, vehicle, simulated, *plan, *updraft_mps)?.feeling(felt))
     }
 }
 
-/// Moves a comparison into the updraft that the whole flight most probably is in: where the response is curved,
-/// that changes how the pulse goes with climb. With what explains most there.
-fn settle_updraft(
-    comparison: &mut Comparison,
-    found: &mut Found,
-    free: &[Column],
-    start: Solution,
-) -> Result<Solution, GapError> {
-    let mut solution = start;
-    let mut starts = vec![comparison.scene.updraft_mps];
-    if found.steps.is_empty() {
-        starts.extend(UPDRAFTS_MPS);
+/// The updraft that explains most, by Gauss and Newton from the best of some starts; `None`: the vehicle can fly
+/// in none of them.
+fn likeliest(
+    fit: impl Fn(Hyper, f64) -> Result<Option<InUpdraft>, GapError>,
+    starts_mps: &[f64],
+    hyper: Hyper,
+) -> Result<Option<InUpdraft>, GapError> {
+    let mut best: Option<InUpdraft> = None;
+    for start_mps in starts_mps {
+        best = better(best, fit(hyper, *start_mps)?);
     }
-    for _ in 0..PATTERN_ROUNDS {
-        // How drones answer gusts stays as it is meanwhile: their scatter must not choose an updraft.
-        let patterns = comparison.patterns(&found.vehicle, found.gusts_mps)?;
-        let fit = |hyper: Hyper, updraft_mps: f64| {
-            InUpdraft::fitted(comparison, &patterns, found, free, hyper, updraft_mps)
-        };
-        let mut best: Option<InUpdraft> = None;
-        for start_mps in starts {
-            best = better(best, fit(solution.hyper, start_mps)?);
+    for _ in 0..UPDRAFT_ROUNDS {
+        let Some(there) = &best else { break };
+        let (at_mps, hyper, likely) = (there.updraft_mps, there.solution.hyper, there.likely);
+        let step_mps = (there.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
+        if step_mps.abs() < UPDRAFT_SETTLED_MPS {
+            break;
         }
-        for _ in 0..UPDRAFT_ROUNDS {
-            let Some(there) = &best else { break };
-            let (at_mps, hyper, likely) = (there.updraft_mps, there.solution.hyper, there.likely);
-            let step_mps = (there.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
-            if step_mps.abs() < UPDRAFT_SETTLED_MPS {
-                break;
-            }
-            for share in [1.0, 0.5] {
-                best = better(best, fit(hyper, at_mps + share * step_mps)?);
-                if best.as_ref().is_some_and(|best| best.likely > likely) {
-                    break;
-                }
-            }
-            if best.as_ref().is_none_or(|best| best.likely <= likely) {
+        for share in [1.0, 0.5] {
+            best = better(best, fit(hyper, at_mps + share * step_mps)?);
+            if best.as_ref().is_some_and(|best| best.likely > likely) {
                 break;
             }
         }
-        let Some(best) = best else { break };
-        solution = best.solution;
-        found.updraft_mps = best.updraft_mps;
-        *comparison = comparison.clone().in_updraft(best.updraft_mps);
-        starts = vec![best.updraft_mps];
+        if best.as_ref().is_none_or(|best| best.likely <= likely) {
+            break;
+        }
     }
-    Ok(solution)
+    Ok(best)
 }
 
 /// A flight taken in an updraft, and what explains most of it there.
@@ -453,6 +504,11 @@ impl InUpdraft {
         let problem = Problem::new(patterns, &split).doubting(&doubts).with(free);
         let solution = problem.fit(hyper, Likelihood::Profile);
         let likely = solution.log_posterior();
+        eprintln!(
+            "TRACE   W {updraft_mps:.3} likely {likely:.1} to {:.2} hyper {:?}",
+            UPDRAFT_DOUBT_MPS * problem.first_doubt(&solution).unwrap_or_default(),
+            solution.hyper.0.map(|v| (v.exp() * 1000.0).round() / 1000.0)
+        ); //TRACE
         let most_mps = UPDRAFT_DOUBT_MPS * problem.first_doubt(&solution).unwrap_or_default();
         Ok(likely.is_finite().then_some(Self { updraft_mps, solution, likely, most_mps }))
     }
@@ -471,14 +527,44 @@ const STILL_MPS: f64 = 0.05;
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
-/// Rounds with drones' answers to gusts as they are in the updraft of the round before. Numerical.
-const PATTERN_ROUNDS: usize = 2;
+/// Rounds in which the model is flown, and drones' answers to gusts are taken, in the updraft of the round before.
+/// Numerical.
+const FLOWN_ROUNDS: usize = 2;
 /// Rounds in which the updraft settles, at most. Numerical.
 const UPDRAFT_ROUNDS: usize = 6;
 /// Longest step of the updraft in one round, m/s: a slope is no more than a hint. Chosen.
 const UPDRAFT_STEP_MPS: f64 = 1.0;
 /// A step of the updraft that is none, m/s: far below what a flight tells of it.
 const UPDRAFT_SETTLED_MPS: f64 = 0.01;
+
+/// Makes classes of the names that a free shape, which could not be taken in, is left beside: an effect is named
+/// alone only if it leaves nothing of its kind.
+fn widen(steps: &mut [Step], free: Option<&Step>) {
+    let Some(Step { finding: Finding::Unknown { depends_on, .. }, .. }) = free else { return };
+    for step in steps {
+        let Finding::Name { effect, parameters, was_there: false } = &step.finding else {
+            continue;
+        };
+        if !signals_of(effect).iter().any(|signal| depends_on.is_of(*signal)) {
+            continue;
+        }
+        let near = step.gain_nats - CONTEST_MARGINS * margin_nats(step.gain_nats);
+        let rivals = step.rivals.iter().filter(|rival| {
+            let looks = || signals_of(&rival.name).iter().any(|signal| depends_on.is_of(*signal));
+            !rival.generic && rival.name != *effect && rival.gain_nats > near && looks()
+        });
+        let mut effects = vec![effect.clone()];
+        effects.extend(rivals.map(|rival| rival.name.clone()));
+        if effects.len() > 1 {
+            step.finding = Finding::Class { effects, parameters: parameters.clone() };
+        }
+    }
+}
+
+/// Signals that an effect depends on.
+fn signals_of(effect: &str) -> &'static [Signal] {
+    find(effect).map_or(&[], |effect| effect.definition().signals)
+}
 
 /// The end of the search, if this round is the last.
 fn rest(round: &Round, sought: Sought<'_>, thresholds: &Thresholds) -> Rest {

@@ -67,7 +67,7 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     found.extend(waves(&height));
     found.push(climb_times_time(&climb, &time));
     found.extend(steps(&time));
-    found.extend(scene.charge.as_ref().and_then(by_charge));
+    found.extend(scene.charge().as_ref().and_then(by_charge));
     found.extend(directions(scene, headings));
     found
 }

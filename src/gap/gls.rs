@@ -447,7 +447,8 @@ impl Solution {
 #[cfg(test)]
 mod tests {
     use super::super::noise::{
-        GRADIENT, GUST_TIME, GUSTS, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SLOPES, WHITE,
+        GRADIENT, GUST_TIME, GUSTS, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME, SLOPES,
+        WHITE,
     };
     use super::super::trial::{patterns, pulses};
     use super::*;
@@ -493,6 +494,7 @@ mod tests {
                     let quickly = (-apart_s / hyper.get(GUST_TIME)).exp();
                     sum += answers * (square(OWN) * slowly + square(GUSTS) * quickly);
                     sum += square(OFFSETS) + square(SLOPES) * a.slope_us[k] * b.slope_us[l];
+                    sum += square(PULSE_NOISE) * (-apart_s / 5.0).exp();
                 }
                 if one == other {
                     sum += square(WHITE);

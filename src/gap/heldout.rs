@@ -62,8 +62,8 @@ impl Case<'_> {
     }
 
     fn against(&self, data: &Data, vehicle: &Vehicle) -> Result<Comparison, GapError> {
-        let comparison = Comparison::new(data, vehicle, self.simulated, self.plan)?
-            .in_updraft(self.found.updraft_mps);
+        let updraft_mps = self.found.updraft_mps;
+        let comparison = Comparison::of(data, vehicle, self.simulated, self.plan, updraft_mps)?;
         Ok(same_bins(&comparison, &self.found.comparison))
     }
 

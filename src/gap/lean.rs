@@ -35,14 +35,16 @@ pub struct LeanLaw {
     /// Share of the drag that is a body's in one piece (s), which goes with the whole air speed. The rest is
     /// a box's, each face of which feels only the air along its own axis.
     pub body_share: f64,
+    /// Updraft that the law holds in, m/s: climbs are relative to it.
+    pub updraft_mps: f64,
 }
 
 impl LeanLaw {
-    /// Lean law of a vehicle's model at an air density, kg/m³.
-    pub fn of(vehicle: &Vehicle, density: f64) -> Self {
+    /// Lean law of a vehicle's model at an air density, kg/m³, in an updraft, m/s.
+    pub fn of(vehicle: &Vehicle, density: f64, updraft_mps: f64) -> Self {
         // The law has the very form of the other frames' drag, and no part for what this one's does with thrust.
         if vehicle.airframe.sitl.is_some()
-            && let Some(law) = Self::by_trim(vehicle, density)
+            && let Some(law) = Self::by_trim(vehicle, density, updraft_mps)
         {
             return law;
         }
@@ -54,22 +56,24 @@ impl LeanLaw {
             linear: of(Role::RotorDrag),
             square: density * (box_m2 + body_m2) / (vehicle.airframe.mass_kg * GRAVITY),
             body_share: body_m2 / (box_m2 + body_m2).max(1e-9),
+            updraft_mps,
         }
     }
 
     /// The law that is nearest to the leans of steady level flight; `None` where there is none.
-    fn by_trim(vehicle: &Vehicle, density: f64) -> Option<Self> {
+    fn by_trim(vehicle: &Vehicle, density: f64, updraft_mps: f64) -> Option<Self> {
         let mut trim = Trim::of(vehicle).ok()?;
         let density_ratio = density / SEA_LEVEL_DENSITY;
         let mut slopes = Vec::new();
         for speed in 1..=LAW_SPEEDS_MPS {
             let speed_mps = f64::from(speed);
-            let velocity_mps = Vector3::new(speed_mps, 0.0, 0.0);
+            let velocity_mps = Vector3::new(speed_mps, 0.0, -updraft_mps);
             let level = Condition { velocity_mps, density_ratio, ..Condition::default() };
             slopes.push((speed_mps, trim.balance(&level)?.lean.x.asin() / speed_mps));
         }
         let line = Line::through(slopes)?;
-        Some(Self { linear: line.intercept(), square: line.slope(), body_share: 0.0 })
+        let (linear, square) = (line.intercept(), line.slope());
+        Some(Self { linear, square, body_share: 0.0, updraft_mps })
     }
 
     fn box_square(self) -> f64 {
@@ -82,7 +86,7 @@ impl LeanLaw {
 
     /// The lean in horizontal air, show frame.
     pub(super) fn lean(self, air_mps: [f64; 2], climb_mps: f64) -> [f64; 2] {
-        let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(climb_mps);
+        let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(climb_mps - self.updraft_mps);
         let linear = self.linear + self.body_square() * whole_mps;
         air_mps.map(|part| (linear + self.box_square() * part.abs()) * part)
     }
@@ -94,7 +98,8 @@ impl LeanLaw {
 
     /// Change of each axis' lean with each axis' air, rad/(m/s).
     pub(super) fn slopes(self, air_mps: [f64; 2], climb_mps: f64) -> Matrix2<f64> {
-        let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(climb_mps).max(1e-6);
+        let axial_mps = climb_mps - self.updraft_mps;
+        let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(axial_mps).max(1e-6);
         let body = self.body_square();
         Matrix2::from_fn(|row, column| {
             let turned = body * air_mps[row] * air_mps[column] / whole_mps;
@@ -108,7 +113,8 @@ impl LeanLaw {
         let mut speed_mps: f64 = 1.0;
         let mut air_mps = [0.0; 2];
         for _ in 0..ROUNDS {
-            let linear = self.linear + self.body_square() * speed_mps.hypot(climb_mps);
+            let whole_mps = speed_mps.hypot(climb_mps - self.updraft_mps);
+            let linear = self.linear + self.body_square() * whole_mps;
             let square = self.box_square();
             air_mps = lean_rad.map(|lean: f64| {
                 let size = if square > 1e-12 {
@@ -158,12 +164,12 @@ pub struct Measured {
 
 /// Finds the wind. Horizontal legs at known speeds measure the lean law as well.
 ///
-/// `flown` is the simulated side with the wind that it was flown in: legs are short, and what a lean
+/// `flown` is the simulated side with the air that it was flown in: legs are short, and what a lean
 /// still lacks of its steady value there lacks in the simulator, too.
 pub(super) fn wind(
     data: &Data,
     law: LeanLaw,
-    flown: Option<(&[Vec<BinValues>], [f64; 2])>,
+    flown: Option<(&[Vec<BinValues>], [f64; 3])>,
 ) -> Wind {
     let leans: Vec<Vec<[f64; 2]>> = data
         .groups
@@ -172,11 +178,12 @@ pub(super) fn wind(
         .map(|(index, group)| {
             let lean = |bin: usize| {
                 let mean = |axis: usize| group.mean(bin, |values| values.lean_rad[axis]);
-                let unsettled = flown.and_then(|(side, wind_mps)| {
+                let unsettled = flown.and_then(|(side, [x_mps, y_mps, updraft_mps])| {
+                    let there = LeanLaw { updraft_mps, ..law };
                     let values = side.get(index)?.get(bin)?;
                     let velocity = group.bins[bin].velocity_mps;
-                    let air = [velocity[0] - wind_mps[0], velocity[1] - wind_mps[1]];
-                    let steady = law.lean(air, velocity[2]);
+                    let air = [velocity[0] - x_mps, velocity[1] - y_mps];
+                    let steady = there.lean(air, velocity[2]);
                     Some([values.lean_rad[0] - steady[0], values.lean_rad[1] - steady[1]])
                 });
                 let [x, y] = unsettled.unwrap_or_default();
@@ -305,7 +312,7 @@ mod tests {
     #[test]
     fn the_wind_of_the_firmwares_own_vehicle_is_read_from_its_leans() {
         let vehicle = builtin("arducopter-sitl").unwrap();
-        let law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY);
+        let law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY, 0.0);
         let mut trim = Trim::of(&vehicle).unwrap();
         for speed_mps in [1.0, 3.0, 5.0, 8.0] {
             let velocity_mps = Vector3::new(speed_mps, 0.0, 0.0);

@@ -18,7 +18,7 @@ const NAMED_Z: f64 = 5.0;
 
 /// Wind and lean of a comparison with the model that was planned with.
 pub(super) fn found(before: &Comparison) -> WindFound {
-    let model = LeanLaw::of(&before.vehicle, SEA_LEVEL_DENSITY);
+    let model = LeanLaw::of(&before.vehicle, SEA_LEVEL_DENSITY, 0.0);
     WindFound {
         mean_mps: before.wind.mean_mps,
         lean_per_mps: before.wind.measured.map(|measured| Interval {

@@ -11,8 +11,8 @@ use super::explain::{Found, Options, search};
 use super::heldout::Case;
 use super::left_out::LeftOut;
 use super::noise::{
-    GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SIDE_GUSTS,
-    SLOPES, WHITE,
+    GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME,
+    SIDE_GUSTS, SLOPES, WHITE,
 };
 use super::regimes::regimes;
 use super::sensor::sensor;
@@ -93,18 +93,28 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         (None, None) => return Err(GapError::NoSimulatedSide),
     };
     let (train, held) = data.split();
-    let channel = match input.plan {
+    let mut channel = match input.plan {
         Some(plan) => sensor(input.flown, |slot| plan.slot(slot).map(|slot| plan.segments(slot))),
         None => SensorChannel::default(),
     };
     // A sensor that is off is repaired first: the pulse is then compared at the right speeds. So is a
     // lean that is off: the pulse is then compared in the right wind, at the right tilt.
+    let t0 = std::time::Instant::now(); //TRACE
     let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
     let wind = super::lean_channel::found(&before);
     let leans = super::lean_channel::step(&before, &wind, options.alpha);
     let mut repaired = repaired(input.vehicle, &channel);
+    if channel.named {
+        // What is late may be the log alone: then the model must not be made late.
+        let late = Comparison::new(&data, &repaired, &simulated, input.plan)?;
+        if late.raw_gap_us()? > before.raw_gap_us()? {
+            channel.in_log = true;
+            repaired = input.vehicle.clone();
+        }
+    }
     add_others(&mut repaired, leans.as_slice());
     let mut found = search(&train, &repaired, &simulated, input.plan, options)?;
+    eprintln!("TRACE make let case = Case  {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let case = Case {
         original: input.vehicle,
         simulated: &simulated,
@@ -112,15 +122,19 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         found: &found,
         seed: options.seed,
     };
+    eprintln!("TRACE make let shrink = case {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let shrink = case.gap(&train, &held)?;
-    let whole = Comparison::new(&data, &found.vehicle, &simulated, input.plan)?
-        .feeling(&found.felt)
-        .in_updraft(found.updraft_mps);
+    eprintln!("TRACE make let whole = Comp {:.2}", t0.elapsed().as_secs_f64()); //TRACE
+    let (plan, updraft_mps) = (input.plan, found.updraft_mps);
+    let whole =
+        Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps)?.feeling(&found.felt);
+    let before = Comparison::of(&data, input.vehicle, &simulated, plan, updraft_mps)?;
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
         // The sizes that go into the model are those of all drones.
         found.refit(&whole)?;
         super::explain::settle(&mut found);
     }
+    eprintln!("TRACE make let held_slots: Vec {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let held_slots: Vec<u16> = held.groups.iter().flat_map(|group| group.slots.clone()).collect();
     let mut left_out = input.left_out.clone();
     left_out.extend(data.left_out.iter().cloned());
@@ -132,6 +146,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         held_out: held_slots.clone(),
         left_out,
     };
+    eprintln!("TRACE make let (differences {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let (differences, spread) = if found.extras.is_empty() {
         drones(&whole, &found, input.vehicle, |slot| held_slots.contains(&slot))?
     } else {
@@ -140,6 +155,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let mut steps = found.steps.clone();
     steps.extend(spread);
     steps.extend(leans);
+    eprintln!("TRACE make let mut verdict = Verdict {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let mut verdict = Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -150,7 +166,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         steps,
         rest: found.rest.clone(),
         detectable: detectable(&found)?,
-        noise: noise(&found.hyper),
+        noise: noise(&found.hyper, found.updraft_mps),
         wind,
         drones: differences,
         gap: shrink,
@@ -159,17 +175,18 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         ladder: Vec::new(),
         cautions: warnings(&data, &found, input),
     };
+    eprintln!("TRACE make verdict.ladder = {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     verdict.ladder = ladder(&whole.data, &verdict.regimes);
     verdict.summary = summary(&verdict);
     let mut model = model(input.vehicle, &found);
     add_others(&mut model, &verdict.steps);
-    if verdict.sensor.named {
+    if verdict.sensor.named && !verdict.sensor.in_log {
         model = self::repaired(&model, &verdict.sensor);
     }
     Ok(Explained { verdict, model, found })
 }
 
-fn noise(hyper: &Hyper) -> Noise {
+fn noise(hyper: &Hyper, updraft_mps: f64) -> Noise {
     Noise {
         shared_air_mps: hyper.get(SHARED),
         shared_air_s: hyper.get(SHARED_TIME),
@@ -182,6 +199,8 @@ fn noise(hyper: &Hyper) -> Noise {
         least_response: hyper.get(LEAST),
         gradient_mps: hyper.get(GRADIENT),
         side_gusts_mps: hyper.get(SIDE_GUSTS),
+        pulse_noise_us: hyper.get(PULSE_NOISE),
+        updraft_mps,
     }
 }
 

@@ -40,7 +40,9 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
         return None;
     }
     let climb_mps = mean(flight.velocity_up_mps.between(start_s, end_s))?;
-    if (climb_mps - bin.climb_mps()).abs() > FOLLOW_MPS {
+    let follows = |climb_mps: f64| (climb_mps - bin.climb_mps()).abs() <= FOLLOW_MPS;
+    // A velocity that is off is no reason to drop a drone whose height did what it should.
+    if !follows(climb_mps) && !rise_mps(flight, bin).is_some_and(follows) {
         return None;
     }
     let lean_rad = lean(flight, start_s, end_s, turn)?;
@@ -63,6 +65,12 @@ fn one(flight: &Flight, bin: &Bin, turn: (f64, f64), thrust_exponent: f64) -> Op
         resting_v: resting_v.unwrap_or(f64::NAN),
     };
     (values.pulse_us.is_finite() && values.height_m.is_finite()).then_some(values)
+}
+
+/// Rate of the height over a bin, m/s.
+fn rise_mps(flight: &Flight, bin: &Bin) -> Option<f64> {
+    let height = |time_s: f64| flight.height_m.at(time_s, GAP_S);
+    Some((height(bin.end_s)? - height(bin.start_s)?) / bin.length_s())
 }
 
 fn is_saturated(flight: &Flight, start_s: f64, end_s: f64) -> bool {

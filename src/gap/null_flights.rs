@@ -39,7 +39,8 @@ fn comparison(plan: &Plan, vehicle: &Vehicle) -> Comparison {
     let bins = of_segments(&plan.groups[0].segments);
     let exponent = thrust_exponent(vehicle);
     let values: Vec<Option<BinValues>> =
-        refly(vehicle, plan, &plan.slots[0], &bins, WIND_MPS, exponent).unwrap();
+        refly(vehicle, plan, &plan.slots[0], &bins, [WIND_MPS[0], WIND_MPS[1], 0.0], exponent)
+            .unwrap();
     let slots = plan.slots.iter().collect();
     let part = PlannedPart { name: "all".to_owned(), slots, bins: &bins, values: &values };
     let data = Data::planned(plan, &[part], |_, _| f64::NAN);

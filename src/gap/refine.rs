@@ -131,6 +131,7 @@ pub(super) fn doubts(
 ) -> Result<Vec<Column>, GapError> {
     let mut doubts = vec![comparison.updraft_doubt(vehicle)?];
     doubts.extend(comparison.wind_doubts(vehicle)?);
+    doubts.extend(comparison.spread_doubts(vehicle)?);
     for fitted in parameters.iter().filter(|fitted| fitted.before.is_none()) {
         let Some((form, sd)) = form_of(fitted) else { continue };
         let is_fitted = |one: &Parameter| (one.effect, one.name) == (form.effect, form.name);

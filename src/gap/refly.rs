@@ -2,8 +2,6 @@
 
 use std::io;
 
-use nalgebra::Vector3;
-
 use super::bins::{Bin, BinValues};
 use crate::base::time::GpsTime;
 use crate::effects::{Role, find};
@@ -28,7 +26,19 @@ pub(super) fn mean_drone(vehicle: &Vehicle) -> Vehicle {
     mean
 }
 
-/// Flies one slot of a plan in a uniform wind (show frame, m/s) and gives its bins.
+/// A vehicle without what shakes its thrust: one flight of a model shows its mean.
+fn without_jitter(vehicle: &Vehicle) -> Vehicle {
+    let mut calm = vehicle.clone();
+    for (name, table) in &mut calm.effects {
+        let parameters = find(name).into_iter().flat_map(|effect| effect.definition().parameters);
+        for jitter in parameters.filter(|one| one.role == Some(Role::Scatter)) {
+            table.parameters.insert(jitter.name.to_owned(), 0.0);
+        }
+    }
+    calm
+}
+
+/// Flies one slot of a plan in uniform air (show frame, z up, m/s) and gives its bins.
 ///
 /// # Errors
 /// The flight failed: a vehicle that cannot fly, or effects that are not valid.
@@ -37,11 +47,12 @@ pub(super) fn refly(
     plan: &Plan,
     slot: &Slot,
     bins: &[Bin],
-    wind_mps: [f64; 2],
+    air_mps: [f64; 3],
     thrust_exponent: f64,
 ) -> Result<Vec<Option<BinValues>>, SimError> {
     let trajectory = plan.trajectory(slot);
-    let air = Uniform(Vector3::new(wind_mps[0], wind_mps[1], 0.0));
+    let vehicle = &without_jitter(vehicle);
+    let air = Uniform(air_mps.into());
     let setup = FlightSetup {
         vehicle,
         trajectory: &trajectory,

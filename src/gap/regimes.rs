@@ -143,7 +143,7 @@ fn axes(after: &Comparison) -> Vec<Axis<'_>> {
             }),
         },
     ];
-    if let Some(charge) = &after.scene.charge {
+    if let Some(charge) = after.scene.charge() {
         axes.push(Axis {
             by: Dependence::Voltage,
             of: Box::new(move |group, drone, bin| {

@@ -1,23 +1,23 @@
 //! Signals that closed forms take in each bin, and the pulses of a model for them.
 
-use super::bins::BinValues;
+use nalgebra::{DMatrix, DVector};
+
+use super::bins::{Bin, BinValues};
 use super::data::Data;
-use super::gls::Column;
+use super::gls::{Column, Pulses};
 use super::lean::Wind;
 use super::response::Response;
 use super::steady::{Moment, Steady};
 use crate::base::air::density_ratio;
 use crate::effects::cell::charge_of_cell;
 use crate::effects::select::looks_at;
-use crate::effects::{EffectError, Reference, Role, Signal, Signals};
-use crate::numeric::mean;
+use crate::effects::{Definition, EffectError, Reference, Role, Signal, Signals, Supply};
+use crate::numeric::{extent, mean};
 use crate::vehicle::Vehicle;
 
 /// Open-circuit voltage above which there must be another cell, V: a full lithium polymer cell has 4.20 V.
 const FULL_CELL_V: f64 = 4.25;
 
-/// Bins that show what charge a battery started with: the first minute or so. Chosen.
-const EARLY_BINS: usize = 12;
 /// Steady signals of a comparison: what was flown and what the logs say of wind and battery. None of
 /// them follows the pulse: terminal voltage, current and measured acceleration do and are never used
 /// (endogenous regressors; docs/physics.md, 3.1).
@@ -29,9 +29,9 @@ pub struct Scene {
     pub relative_mps: Vec<Vec<[f64; 2]>>,
     /// Updraft that the whole flight is in, m/s; the signals' climb is relative to it.
     pub updraft_mps: f64,
-    /// Charge left by the voltage at rest, by group, drone and bin, 0 to 1; `None` if it was not
-    /// logged.
-    pub charge: Option<Vec<Vec<Vec<f64>>>>,
+    /// Each battery's voltage at rest, by group, drone and bin, V; `None` if it was not logged. One series for a
+    /// group's mean drone.
+    pub volts: Option<Pulses>,
     /// Number of cells in series, by the voltage at rest.
     pub cells: f64,
     /// Mean voltage at rest, V; 0 if it was not logged.
@@ -66,42 +66,18 @@ impl Scene {
                 (0..group.bins.len()).map(signal).collect()
             })
             .collect();
-        let volts: Vec<f64> = data
-            .groups
-            .iter()
-            .flat_map(|group| &group.measured)
-            .flatten()
-            .map(|v| v.resting_v)
-            .collect();
-        let logged =
-            !volts.is_empty() && volts.iter().all(|volts| volts.is_finite() && *volts > 1.0);
-        let most = volts.iter().copied().fold(0.0, f64::max);
+        let logged = |values: &BinValues| values.resting_v.is_finite() && values.resting_v > 1.0;
+        let each = || data.groups.iter().flat_map(|group| &group.measured).flatten();
+        let logged = each().next().is_some() && each().all(logged);
+        let of_group = |group: &super::data::Group| -> Vec<Vec<f64>> {
+            let drones = group.measured.iter();
+            drones.map(|drone| settled_volts(&group.bins, drone)).collect()
+        };
+        let volts: Option<Pulses> = logged.then(|| data.groups.iter().map(of_group).collect());
+        let most = each().map(|values| values.resting_v).fold(0.0, f64::max);
         let cells = if logged { (most / FULL_CELL_V).ceil().max(1.0) } else { 1.0 };
-        let charge = logged.then(|| {
-            let of = |values: &BinValues| charge_of_cell(values.resting_v / cells);
-            let drones = |group: &super::data::Group| -> Vec<Vec<f64>> {
-                group.measured.iter().map(|drone| drone.iter().map(of).collect()).collect()
-            };
-            // Who needs more pulse drains the battery faster: a drone's own decline follows its pulse.
-            // What it started with, and how its group declined, do not.
-            let exogenous = |drones: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
-                let bins = drones.first().map_or(0, Vec::len);
-                let declined = |bin: usize| mean(drones.iter().map(|d| d[bin] - d[0]));
-                let decline: Vec<f64> =
-                    (0..bins).map(|bin| declined(bin).unwrap_or_default()).collect();
-                // By some bins: the scatter of one voltage is worth some percent of charge.
-                let first = |drone: &Vec<f64>| {
-                    let early = drone.iter().zip(&decline).take(EARLY_BINS);
-                    let (sum, count) =
-                        early.fold((0.0, 0.0), |(s, c), (now, less)| (s + now - less, c + 1.0));
-                    if count > 0.0 { sum / count } else { 0.0 }
-                };
-                let from = |first: f64| decline.iter().map(|less| first + less).collect();
-                drones.iter().map(|drone| from(first(drone))).collect()
-            };
-            data.groups.iter().map(drones).map(exogenous).collect()
-        });
-        let resting_v = mean(&volts).filter(|_| logged).unwrap_or_default();
+        let resting_v =
+            mean(each().map(|values| values.resting_v)).filter(|_| logged).unwrap_or_default();
         let neighbours = data.groups.iter().map(|group| group.neighbours.clone()).collect();
         let resistance_ohm = data.resistance_ohm;
         let relative_mps = wind.air_mps.clone();
@@ -110,7 +86,7 @@ impl Scene {
             signals,
             relative_mps,
             updraft_mps,
-            charge,
+            volts,
             cells,
             resting_v,
             resistance_ohm,
@@ -136,10 +112,10 @@ impl Scene {
                 keep(group, bin - 1)
             });
         }
-        for (group, drones) in scene.charge.iter_mut().flatten().enumerate() {
-            for charge in drones {
+        for (group, drones) in scene.volts.iter_mut().flatten().enumerate() {
+            for volts in drones {
                 let mut bin = 0;
-                charge.retain(|_| {
+                volts.retain(|_| {
                     bin += 1;
                     keep(group, bin - 1)
                 });
@@ -148,15 +124,20 @@ impl Scene {
         scene
     }
 
-    /// The simulator's own flight: its leans in the mean wind.
+    /// The simulator's own flight: its leans in the air (show frame, m/s) that it was flown in.
     #[must_use]
-    pub fn simulated(&self, data: &Data, side: &[Vec<BinValues>], wind: [f64; 2]) -> Self {
-        let mut scene = Self { charge: None, ..self.clone() };
+    pub fn simulated(&self, data: &Data, side: &[Vec<BinValues>], air: [f64; 3]) -> Self {
+        let logged = side.iter().flatten().all(|values| values.resting_v.is_finite());
+        let of_group = |(group, side): (&super::data::Group, &Vec<BinValues>)| {
+            vec![settled_volts(&group.bins, side)]
+        };
+        let volts = logged.then(|| data.groups.iter().zip(side).map(of_group).collect());
+        let mut scene = Self { volts, ..self.clone() };
         for (index, group) in data.groups.iter().enumerate() {
             for (bin, signals) in scene.signals[index].iter_mut().enumerate() {
                 let values = side[index][bin];
                 let velocity = group.bins[bin].velocity_mps;
-                let relative = [velocity[0] - wind[0], velocity[1] - wind[1]];
+                let relative = [velocity[0] - air[0], velocity[1] - air[1]];
                 signals.horizontal_mps = relative[0].hypot(relative[1]);
                 scene.relative_mps[index][bin] = relative;
                 signals.tilt_rad = values.lean_rad[0].hypot(values.lean_rad[1]);
@@ -177,6 +158,28 @@ impl Scene {
         scene
     }
 
+    /// Charge left by the voltage at rest, by group, drone and bin, 0 to 1; `None` if it was not logged.
+    pub(super) fn charge(&self) -> Option<Pulses> {
+        let of = |volts: &f64| charge_of_cell(volts / self.cells);
+        let drones = |group: &Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+            group.iter().map(|volts| volts.iter().map(of).collect()).collect()
+        };
+        self.volts.as_ref().map(|groups| groups.iter().map(drones).collect())
+    }
+
+    /// This flight in another wind.
+    #[must_use]
+    pub(super) fn blown(mut self, wind: &Wind) -> Self {
+        let groups = self.signals.iter_mut().zip(&mut self.relative_mps);
+        for ((signals, relative), air) in groups.zip(&wind.air_mps) {
+            for ((signals, relative), air) in signals.iter_mut().zip(relative).zip(air) {
+                signals.horizontal_mps = air[0].hypot(air[1]);
+                *relative = *air;
+            }
+        }
+        self
+    }
+
     /// The moments of a group's bins.
     fn moments(&self, group: usize) -> impl Iterator<Item = Moment> {
         let air = self.relative_mps[group].iter();
@@ -190,19 +193,19 @@ impl Scene {
     /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
         let mut steady = Steady::of(vehicle)?;
-        let battery = Battery::of(vehicle);
-        let hover_ah_per_s = battery.as_ref().map_or(0.0, |battery| battery.hover_ah_per_s);
-        let used_ah = |signals: &Signals, charge: Option<f64>| match (&battery, charge) {
-            (Some(battery), Some(charge)) => (battery.initial - charge) * battery.capacity_ah,
-            _ => hover_ah_per_s * signals.time_s.max(0.0),
+        let battery = hover_ah_per_s(vehicle);
+        let hover_ah_per_s = battery.unwrap_or_default();
+        let supply = |signals: &Signals, volts: Option<f64>| match volts {
+            Some(volts) if battery.is_some() => Supply::Resting(volts),
+            _ => Supply::Used(hover_ah_per_s * signals.time_s.max(0.0)),
         };
         let near = looks_at(vehicle, Signal::Neighbours);
-        let own = (battery.is_some() && self.charge.is_some()) || near;
+        let volts = self.volts.as_ref().filter(|_| battery.is_some());
         let groups = 0..self.signals.len();
-        if !own {
+        if volts.is_none() && !near {
             let mut shared = Vec::new();
             for group in groups {
-                let pulse = |at: Moment| steady.pulse_us(&at, used_ah(&at.signals, None), 0.0);
+                let pulse = |at: Moment| steady.pulse_us(&at, supply(&at.signals, None), 0.0);
                 shared.push(self.moments(group).map(pulse).collect::<Result<_, _>>()?);
             }
             return Ok(Column::Shared(shared));
@@ -219,14 +222,39 @@ impl Scene {
                         Some(balance) if !near => balance,
                         _ => *balance.insert(steady.balance(&at, neighbours)?),
                     };
-                    let charge = self.charge.as_ref().map(|charge| charge[group][drone][bin]);
-                    let used_ah = used_ah(&at.signals, charge);
-                    pulses.push(steady.of_balance(&balance, &at, used_ah, neighbours)?);
+                    let volts = volts.map(|volts| {
+                        let drones = &volts[group];
+                        drones[drone.min(drones.len().saturating_sub(1))][bin]
+                    });
+                    let supply = supply(&at.signals, volts);
+                    pulses.push(steady.of_balance(&balance, &at, supply, neighbours)?);
                 }
             }
             of_drones.push(drones);
         }
         Ok(Column::Own(of_drones))
+    }
+
+    /// Pulses by group and bin of the mean of as many drones as each group has, when that mean is by one standard
+    /// deviation above the fleet's in what an effect of the vehicle lets drones differ, us.
+    ///
+    /// # Errors
+    /// As [`Scene::pulses`].
+    pub(super) fn deviating(
+        &self,
+        vehicle: &Vehicle,
+        effect: &str,
+    ) -> Result<Vec<Vec<f64>>, EffectError> {
+        let mut of_groups = Vec::new();
+        for group in 0..self.signals.len() {
+            let drones = self.neighbours[group].len().max(1) as f64;
+            let own = |of: &Definition| if of.name == effect { drones.sqrt().recip() } else { 0.0 };
+            let mut steady = Steady::deviating(vehicle, own)?;
+            let supply = |at: &Moment| Supply::Used(at.signals.charge_used_ah);
+            let pulse = |at: Moment| steady.pulse_us(&at, supply(&at), 0.0);
+            of_groups.push(self.moments(group).map(pulse).collect::<Result<_, _>>()?);
+        }
+        Ok(of_groups)
     }
 
     /// Response to vertical air speed of a model by group and bin: by the whole model, so that effects that
@@ -257,7 +285,8 @@ impl Scene {
             let mut pulses_us = [0.0; COUNT];
             for (pulse_us, shift_mps) in pulses_us.iter_mut().zip(shifts_mps) {
                 let shifted = at.climbing(at.signals.climb_mps + shift_mps);
-                *pulse_us = steady.pulse_us(&shifted, at.signals.charge_used_ah, 0.0)?;
+                *pulse_us =
+                    steady.pulse_us(&shifted, Supply::Used(at.signals.charge_used_ah), 0.0)?;
             }
             Ok(pulses_us)
         };
@@ -271,21 +300,31 @@ fn shakes(effect: &str) -> bool {
     Role::Scatter.is_of(effect)
 }
 
-struct Battery {
-    initial: f64,
-    capacity_ah: f64,
-    hover_ah_per_s: f64,
+/// Charge that a hover takes out of a vehicle's battery, Ah/s; `None`: it has no battery.
+fn hover_ah_per_s(vehicle: &Vehicle) -> Option<f64> {
+    Role::BatteryCharge.value(vehicle)?;
+    let of = |role: Role| role.value(vehicle).unwrap_or_default();
+    let power_w = Reference::of(vehicle).hover_w() + of(Role::BatteryAvionics);
+    Some(power_w / of(Role::BatteryReference).max(0.1) / 3600.0)
 }
 
-impl Battery {
-    fn of(vehicle: &Vehicle) -> Option<Self> {
-        let initial = Role::BatteryCharge.value(vehicle)?;
-        let of = |role: Role| role.value(vehicle).unwrap_or_default();
-        let power_w = Reference::of(vehicle).hover_w() + of(Role::BatteryAvionics);
-        Some(Self {
-            initial,
-            capacity_ah: of(Role::BatteryCapacity),
-            hover_ah_per_s: power_w / of(Role::BatteryReference).max(0.1) / 3600.0,
-        })
-    }
+/// A battery's voltage at rest in each bin without the scatter of the bins, V: by a cubic of time. What a logger
+/// makes of voltage and current follows the pulse from bin to bin, and must not explain it.
+fn settled_volts(bins: &[Bin], values: &[BinValues]) -> Vec<f64> {
+    let times: Vec<f64> = bins.iter().map(Bin::middle_s).collect();
+    let volts = DVector::from_iterator(values.len(), values.iter().map(|one| one.resting_v));
+    let Some((first, last)) = extent(&times) else { return Vec::new() };
+    let scaled = |time: &f64| (2.0 * time - first - last) / (last - first).max(1.0);
+    let powers = DMatrix::from_fn(times.len(), VOLTS_POWERS.min(times.len()), |bin, power| {
+        scaled(&times[bin]).powi(power as i32)
+    });
+    let fitted = powers.clone().svd(true, true).solve(&volts, 1e-12).ok();
+    fitted.map_or_else(
+        || volts.iter().copied().collect(),
+        |of| (powers * of).iter().copied().collect(),
+    )
 }
+
+/// Powers of time in a battery's voltage: the curve of a cell over a flight is a cubic within hundredths of a
+/// volt. Chosen.
+const VOLTS_POWERS: usize = 4;

@@ -29,6 +29,8 @@ pub(super) struct Ranked {
     pub variant: usize,
     /// Gain, nats: with the noise fitted anew where [`Ranked::fitted`].
     pub gain: f64,
+    /// Gain as a regressor alone, without what it does to the scatter between drones, nats.
+    pub plain: f64,
     /// Coefficient on the form.
     pub beta: f64,
     /// Standard deviation over bins of what it does to the pulse, us.
@@ -151,6 +153,7 @@ fn scan(base: &Solution, sought: Sought<'_>) -> Vec<Ranked> {
                         candidate: index,
                         variant: place,
                         gain: gain.nats,
+                        plain: gain.nats,
                         beta: gain.beta,
                         size_us: gain.beta.abs() * variant.column.spread(sought.drones),
                         range_us: gain.beta.abs() * variant.column.range(),
@@ -177,6 +180,7 @@ fn refit(
     let variant = &candidate.variants[ranked.variant];
     let problem = problem.with([&variant.column]);
     let mut with = problem.fit(base.hyper, Likelihood::Profile);
+    let plain = ranked.plain.max(with.log_posterior() - before);
     // Who feels a climb feels the air as well: the scatter must fit what the effect makes of gusts.
     let feeling = |beta: &[f64]| {
         let beta = beta.last().copied().unwrap_or(0.0);
@@ -191,10 +195,11 @@ fn refit(
     let gain = with.log_posterior() - before;
     if !admissible(candidate, variant, beta) || gain < ranked.gain {
         // The noise at its start is a fit as well.
-        return Ranked { fitted: true, ..ranked.clone() };
+        return Ranked { plain, fitted: true, ..ranked.clone() };
     }
     Ranked {
         gain,
+        plain,
         beta,
         size_us: beta.abs() * variant.column.spread(sought.drones),
         range_us: beta.abs() * variant.column.range(),

@@ -55,7 +55,7 @@ pub(super) fn sensor<'a>(
     let centre = bias_mps.map_or(0.0, |bias| bias.value);
     let biased_drones =
         biases.iter().filter(|(_, bias)| (bias - centre).abs() > TOLD_BIAS_MPS).copied().collect();
-    SensorChannel { bias_mps, lag_s, biased_drones, named }
+    SensorChannel { bias_mps, lag_s, biased_drones, named, in_log: false }
 }
 
 /// Mean with the interval that the drones' scatter and a doubt they share give.

@@ -3,12 +3,15 @@
 use nalgebra::Vector3;
 
 use super::response::Response;
-use crate::effects::{EffectError, Signals, Supply};
+use crate::effects::{Definition, EffectError, Signals, Supply};
 use crate::sim::plant::trim::{Balance, Condition, Trim};
 use crate::vehicle::Vehicle;
 
 /// Pulse without thrust, us: the convention of all controllers (docs/physics.md, 1.1).
 pub(super) const IDLE_US: f64 = 1000.0;
+
+/// Halvings on the way to the fastest climb that a vehicle can fly. Numerical: to a thousandth.
+const HALVINGS: usize = 10;
 
 /// One steady moment: what closed forms look at, and which way the air goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +28,7 @@ impl Moment {
         Self { signals: Signals { climb_mps, ..self.signals }, ..self }
     }
 
-    fn condition(&self, charge_used_ah: f64, neighbours: f64) -> Condition {
+    fn condition(&self, supply: Supply, neighbours: f64) -> Condition {
         let Signals { climb_mps, height_m, time_s, density_ratio, acceleration_mps2, .. } =
             self.signals;
         let [x, y] = self.relative_mps;
@@ -35,7 +38,7 @@ impl Moment {
             density_ratio,
             position_m: Vector3::new(0.0, 0.0, height_m),
             time_s,
-            supply: Supply::Used(charge_used_ah),
+            supply,
             neighbours: Some(neighbours),
             ..Condition::default()
         }
@@ -66,6 +69,18 @@ impl Steady {
         Ok(Self { trim: Trim::of(vehicle)?, exponent })
     }
 
+    /// Steady pulses of a drone that deviates from the fleet by so many standard deviations of each effect.
+    ///
+    /// # Errors
+    /// As [`Steady::of`].
+    pub(super) fn deviating(
+        vehicle: &Vehicle,
+        own: impl Fn(&Definition) -> f64,
+    ) -> Result<Self, EffectError> {
+        let exponent = super::compare::thrust_exponent(vehicle);
+        Ok(Self { trim: Trim::deviating(vehicle, Vector3::zeros(), own)?, exponent })
+    }
+
     /// The pulse at a moment, brought to level as measured pulses are, us.
     ///
     /// # Errors
@@ -73,19 +88,35 @@ impl Steady {
     pub(super) fn pulse_us(
         &mut self,
         at: &Moment,
-        charge_used_ah: f64,
+        supply: Supply,
         neighbours: f64,
     ) -> Result<f64, EffectError> {
         let balance = self.balance(at, neighbours)?;
-        self.of_balance(&balance, at, charge_used_ah, neighbours)
+        self.of_balance(&balance, at, supply, neighbours)
     }
 
-    /// The balance of forces at a moment, which no battery changes.
+    /// The balance of forces at a moment, which no battery changes; where there is none, that of the fastest
+    /// climb or descent in the same air that has one: rotors that are at their limits stay there.
     ///
     /// # Errors
-    /// The vehicle cannot fly so.
+    /// The vehicle cannot even hover in that air.
     pub(super) fn balance(&mut self, at: &Moment, neighbours: f64) -> Result<Balance, EffectError> {
-        self.trim.balance(&at.condition(0.0, neighbours)).ok_or_else(|| at.refused())
+        let mut of =
+            |moment: &Moment| self.trim.balance(&moment.condition(Supply::Used(0.0), neighbours));
+        if let Some(balance) = of(at) {
+            return Ok(balance);
+        }
+        let wanted_mps = at.signals.climb_mps;
+        let mut found = of(&at.climbing(0.0)).ok_or_else(|| at.refused())?;
+        let (mut flown, mut refused) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let share = f64::midpoint(flown, refused);
+            match of(&at.climbing(share * wanted_mps)) {
+                Some(balance) => (found, flown) = (balance, share),
+                None => refused = share,
+            }
+        }
+        Ok(found)
     }
 
     /// The pulse of a balance, brought to level, us.
@@ -96,10 +127,10 @@ impl Steady {
         &mut self,
         balance: &Balance,
         at: &Moment,
-        charge_used_ah: f64,
+        supply: Supply,
         neighbours: f64,
     ) -> Result<f64, EffectError> {
-        let condition = at.condition(charge_used_ah, neighbours);
+        let condition = at.condition(supply, neighbours);
         let pulse_us =
             self.trim.pulse_us(balance, &condition).ok_or_else(|| at.refused())? - IDLE_US;
         let cos = (1.0 - balance.lean.norm_squared()).max(0.0).sqrt();
@@ -114,8 +145,8 @@ impl Steady {
         let mut refused = None;
         let response = Response::of(|shift_mps| {
             let shifted = at.climbing(at.signals.climb_mps + shift_mps);
-            let charge_ah = at.signals.charge_used_ah;
-            self.pulse_us(&shifted, charge_ah, 0.0).unwrap_or_else(|error| {
+            let supply = Supply::Used(at.signals.charge_used_ah);
+            self.pulse_us(&shifted, supply, 0.0).unwrap_or_else(|error| {
                 refused = Some(error);
                 f64::NAN
             })

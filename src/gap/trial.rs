@@ -104,6 +104,7 @@ pub(super) fn ranked(candidate: usize, gain: f64) -> Ranked {
         candidate,
         variant: 0,
         gain,
+        plain: gain,
         beta: 1.0,
         size_us: 3.0,
         range_us: 3.0,

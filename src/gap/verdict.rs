@@ -89,6 +89,9 @@ pub struct SensorChannel {
     pub biased_drones: Vec<(u16, f64)>,
     /// Whether bias or lag is large enough to be named.
     pub named: bool,
+    /// Whether only the log is off: the drones flew as they were told to.
+    #[serde(default)]
+    pub in_log: bool,
 }
 
 /// A value with its 95 % interval.
@@ -263,6 +266,12 @@ pub struct Noise {
     /// Horizontal gusts beyond those that the leans show, m/s along either axis.
     #[serde(default)]
     pub side_gusts_mps: f64,
+    /// Noise of each drone's pulse that is remembered for some seconds, us.
+    #[serde(default)]
+    pub pulse_noise_us: f64,
+    /// Uniform updraft in which the flight is explained best, m/s.
+    #[serde(default)]
+    pub updraft_mps: f64,
 }
 
 /// The wind and how the vehicle leans in it.

@@ -156,7 +156,7 @@ pub(super) fn warnings(data: &Data, found: &Found, input: &Input<'_>) -> Vec<War
     if data.groups.len() == 1 && input.plan.is_some() && input.simulated.is_none() {
         warnings.push(Warning::OneGroup);
     }
-    if found.comparison.scene.charge.is_none() {
+    if found.comparison.scene.volts.is_none() {
         warnings.push(Warning::NoRestingVoltage);
     }
     warnings

@@ -300,6 +300,16 @@ pub(super) fn noise_rows(verdict: &Verdict) -> Vec<Value> {
             with_unit(noise.side_gusts_mps, "m/s"),
             "standard deviation along either axis",
         ),
+        (
+            "noise of each drone's pulse that some seconds remember",
+            with_unit(noise.pulse_noise_us, "us"),
+            "standard deviation",
+        ),
+        (
+            "uniform updraft of the whole flight",
+            with_unit(noise.updraft_mps, "m/s"),
+            "where the flight is explained best",
+        ),
     ];
     rows.into_iter().map(|(what, value, note)| context! { what, value, note }).collect()
 }

@@ -6,8 +6,8 @@ use crate::gap::GapError;
 use crate::gap::bins::{Bin, BinValues, of_segments};
 use crate::gap::compare::thrust_exponent;
 use crate::gap::noise::{
-    GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, SHARED, SHARED_TIME, SIDE_GUSTS,
-    SLOPES, WHITE,
+    GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME,
+    SIDE_GUSTS, SLOPES, WHITE,
 };
 use crate::gap::refine::{Parameter, size_of};
 use crate::gap::refly::{mean_drone, refly};
@@ -48,6 +48,7 @@ fn hyper_of(noise: &Noise) -> Hyper {
         (LEAST, noise.least_response),
         (GRADIENT, noise.gradient_mps),
         (SIDE_GUSTS, noise.side_gusts_mps),
+        (PULSE_NOISE, noise.pulse_noise_us),
     ];
     for (place, value) in found {
         hyper.0[place] = value.max(LEAST_NOISE).ln();
@@ -94,7 +95,10 @@ impl Flight {
             let bins = of_segments(&group.segments);
             let mut slots = plan.slots.iter().filter(|slot| usize::from(slot.group) == index);
             let values = match slots.next() {
-                Some(slot) => refly(&vehicle, &plan, slot, &bins, known.wind_mps, exponent)?,
+                Some(slot) => {
+                    let [x_mps, y_mps] = known.wind_mps;
+                    refly(&vehicle, &plan, slot, &bins, [x_mps, y_mps, 0.0], exponent)?
+                }
                 None => Vec::new(),
             };
             groups.push((bins, values));
