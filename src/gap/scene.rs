@@ -1,5 +1,6 @@
 //! Signals that closed forms take in each bin, and the pulses of a model for them.
 
+use super::as_flown::AsFlown;
 use super::bins::BinValues;
 use super::data::Data;
 use super::gls::Column;
@@ -39,6 +40,8 @@ pub struct Scene {
     /// Resistance of the batteries as the logs have it, ohm.
     pub resistance_ohm: Option<f64>,
     neighbours: Vec<Vec<f64>>,
+    /// What the logs of another program's simulation have more than the model that stands for it.
+    as_flown: Option<AsFlown>,
 }
 
 impl Scene {
@@ -115,7 +118,18 @@ impl Scene {
             resting_v,
             resistance_ohm,
             neighbours,
+            as_flown: None,
         }
+    }
+
+    /// The same flight of vehicles that answer climb as another program's logs do.
+    #[must_use]
+    pub(super) fn answering(self, as_flown: Option<&AsFlown>) -> Self {
+        Self { as_flown: as_flown.cloned(), ..self }
+    }
+
+    fn steady(&self, vehicle: &Vehicle) -> Result<Steady, EffectError> {
+        Ok(Steady::of(vehicle)?.answering(self.as_flown.as_ref()))
     }
 
     /// Only some bins, chosen by the places of group and bin.
@@ -189,7 +203,7 @@ impl Scene {
     /// # Errors
     /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
-        let mut steady = Steady::of(vehicle)?;
+        let mut steady = self.steady(vehicle)?;
         let battery = Battery::of(vehicle);
         let hover_ah_per_s = battery.as_ref().map_or(0.0, |battery| battery.hover_ah_per_s);
         let used_ah = |signals: &Signals, charge: Option<f64>| match (&battery, charge) {
@@ -238,7 +252,7 @@ impl Scene {
         let mut calm = vehicle.clone();
         // What shakes has a scatter of its own, which hides how it answers gusts.
         calm.effects.retain(|name, _| !shakes(name));
-        let mut steady = Steady::of(&calm)?;
+        let mut steady = self.steady(&calm)?;
         let groups = 0..self.signals.len();
         groups.map(|group| self.moments(group).map(|at| steady.response(&at)).collect()).collect()
     }
@@ -252,7 +266,7 @@ impl Scene {
         vehicle: &Vehicle,
         shifts_mps: [f64; COUNT],
     ) -> Result<Vec<Vec<[f64; COUNT]>>, EffectError> {
-        let mut steady = Steady::of(vehicle)?;
+        let mut steady = self.steady(vehicle)?;
         let mut of = |at: Moment| -> Result<[f64; COUNT], EffectError> {
             let mut pulses_us = [0.0; COUNT];
             for (pulse_us, shift_mps) in pulses_us.iter_mut().zip(shifts_mps) {

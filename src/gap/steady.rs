@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::as_flown::AsFlown;
 use super::response::Response;
 use crate::effects::{EffectError, Signals, Supply};
 use crate::sim::plant::trim::{Balance, Condition, Trim};
@@ -54,6 +55,8 @@ pub(super) struct Steady {
     trim: Trim,
     /// Power of thrust that `u - 1000` goes with at hover.
     exponent: f64,
+    /// What another program's logs have more than the vehicle.
+    as_flown: Option<AsFlown>,
 }
 
 impl Steady {
@@ -63,7 +66,19 @@ impl Steady {
     /// Effects of the vehicle that are not valid.
     pub(super) fn of(vehicle: &Vehicle) -> Result<Self, EffectError> {
         let exponent = super::compare::thrust_exponent(vehicle);
-        Ok(Self { trim: Trim::of(vehicle)?, exponent })
+        Ok(Self { trim: Trim::of(vehicle)?, exponent, as_flown: None })
+    }
+
+    /// The same of vehicles that answer climb as another program's logs do.
+    pub(super) fn answering(self, as_flown: Option<&AsFlown>) -> Self {
+        Self { as_flown: as_flown.cloned(), ..self }
+    }
+
+    fn condition(&self, at: &Moment, charge_used_ah: f64, neighbours: f64) -> Condition {
+        let mut condition = at.condition(charge_used_ah, neighbours);
+        let more_mps2 = self.as_flown.as_ref().map_or(0.0, |own| own.at(at.signals.climb_mps));
+        condition.acceleration_mps2.z += more_mps2;
+        condition
     }
 
     /// The pulse at a moment, brought to level as measured pulses are, us.
@@ -85,7 +100,8 @@ impl Steady {
     /// # Errors
     /// The vehicle cannot fly so.
     pub(super) fn balance(&mut self, at: &Moment, neighbours: f64) -> Result<Balance, EffectError> {
-        self.trim.balance(&at.condition(0.0, neighbours)).ok_or_else(|| at.refused())
+        let condition = self.condition(at, 0.0, neighbours);
+        self.trim.balance(&condition).ok_or_else(|| at.refused())
     }
 
     /// The pulse of a balance, brought to level, us.
@@ -99,7 +115,7 @@ impl Steady {
         charge_used_ah: f64,
         neighbours: f64,
     ) -> Result<f64, EffectError> {
-        let condition = at.condition(charge_used_ah, neighbours);
+        let condition = self.condition(at, charge_used_ah, neighbours);
         let pulse_us =
             self.trim.pulse_us(balance, &condition).ok_or_else(|| at.refused())? - IDLE_US;
         let cos = (1.0 - balance.lean.norm_squared()).max(0.0).sqrt();
