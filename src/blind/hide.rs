@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::BlindError;
 use super::scenario::{Base, Protocol};
-pub use super::tables::KINDS;
+pub use super::tables::{KINDS, ON_REQUEST};
 use crate::base::rng::{Purpose, stream};
 use crate::effects::select::{set, value_of, values_of};
 use crate::effects::{Reference, Role, Signals, find};
@@ -19,7 +19,7 @@ use crate::vehicle::Vehicle;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hidden {
-    /// What was asked for, as in [`KINDS`].
+    /// What was asked for, as in [`KINDS`] or [`ON_REQUEST`].
     pub kind: String,
     /// Name of the effect in the library, or of the foreign one.
     pub effect: String,
@@ -108,10 +108,26 @@ pub enum Also {
 /// # Errors
 /// An unknown name.
 pub fn kind_of(name: &str) -> Result<&'static HiddenKind, BlindError> {
-    KINDS.iter().find(|kind| kind.name == name).ok_or_else(|| BlindError::Unknown {
+    kinds().find(|kind| kind.name == name).ok_or_else(|| BlindError::Unknown {
         name: name.to_owned(),
-        known: KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", "),
+        known: kinds().map(|kind| kind.name).collect::<Vec<_>>().join(", "),
     })
+}
+
+/// Everything that can be hidden: what each table hides, and what it hides on request.
+pub fn kinds() -> impl Iterator<Item = &'static HiddenKind> {
+    KINDS.iter().chain(ON_REQUEST)
+}
+
+/// Streams of [`ON_REQUEST`] begin here, so that [`KINDS`] can grow.
+const FIRST_ON_REQUEST: u64 = 1_000;
+
+/// Random stream of a kind by its place in its list: what else is hidden does not change it.
+fn stream_of(name: &str) -> u64 {
+    let place =
+        |list: &[HiddenKind]| list.iter().position(|kind| kind.name == name).map(|at| at as u64);
+    let on_request = || place(ON_REQUEST).map(|at| FIRST_ON_REQUEST + at);
+    1 + place(KINDS).or_else(on_request).unwrap_or(0)
 }
 
 /// A number drawn uniformly from 0 to 1.
@@ -150,9 +166,7 @@ impl HiddenKind {
             return Err(BlindError::NotEligible { name, base: base.name() });
         }
         let known = base.known()?;
-        // Each kind has a stream of its own: what else is hidden does not change it.
-        let place = KINDS.iter().position(|kind| kind.name == self.name).unwrap_or(0);
-        let rng = &mut stream(seed, 1 + place as u64, Purpose::Hidden);
+        let rng = &mut stream(seed, stream_of(self.name), Purpose::Hidden);
         let mut magnitude = log_between(rng, self.range);
         let sign = if unit(rng) < 0.5 { -1.0 } else { 1.0 };
         let flight_s = protocol.length_s();
@@ -322,5 +336,29 @@ mod tests {
                 hidden.parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
             assert_eq!((kind.name, &drawn[..]), (name, parameters));
         }
+    }
+
+    #[test]
+    fn what_is_hidden_on_request_is_drawn_from_its_own_stream_within_its_range() {
+        let streams: std::collections::BTreeSet<u64> =
+            kinds().map(|kind| stream_of(kind.name)).collect();
+        assert_eq!(streams.len(), kinds().count());
+        for kind in ON_REQUEST {
+            for (seed, base) in (0..20).flat_map(|seed| kind.bases.iter().map(move |b| (seed, *b)))
+            {
+                let hidden = kind.draw(seed, base, Protocol::Paper, 14.0).unwrap();
+                let magnitude = hidden.value().abs();
+                assert!((kind.range.0..=kind.range.1).contains(&magnitude), "{hidden:?}");
+                let mut vehicle = base.known().unwrap();
+                for (name, value) in &hidden.parameters {
+                    set(&mut vehicle, kind.effect, name, *value);
+                }
+                values_of(find(kind.effect).unwrap(), &vehicle).unwrap();
+            }
+        }
+        let draw = |name: &str| {
+            kind_of(name).unwrap().draw(7, Base::Airsim, Protocol::Paper, 14.0).unwrap().value()
+        };
+        assert!(draw("battery-overcompensated") < 0.0);
     }
 }

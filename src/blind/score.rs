@@ -7,6 +7,7 @@ use super::classes::{equivalent, is_single};
 use super::foreign;
 use super::hide::Hidden;
 use super::scenario::{Cell, Scenario};
+use super::tables::ALIKE;
 use crate::effects::{Effect, Role, find};
 use crate::gap::verdict::{Finding, Fitted, Interval};
 use crate::gap::{Dependence, Verdict};
@@ -157,7 +158,8 @@ pub fn score(truth: &Scenario, verdict: &Verdict, fisher_z: &[Option<f64>]) -> O
 impl Outcome {
     fn note_name(&mut self, truth: &Scenario, effect: &str) {
         self.found.push(effect.to_owned());
-        if library(truth).any(|hidden| hidden.effect == effect) {
+        let is_it = |hidden: &Hidden| !hidden.foreign && hidden.effect == effect;
+        if truth.hidden.iter().any(|hidden| is_it(hidden) || is_alike(hidden, effect)) {
             return;
         }
         self.wrong_names.push(effect.to_owned());
@@ -178,7 +180,13 @@ fn accepts(hidden: &Hidden, depends_on: Dependence) -> bool {
 
 /// As [`accepts`], of a member of a class.
 fn accepts_name(hidden: &Hidden, name: &str) -> bool {
-    Dependence::of(name).is_some_and(|depends_on| accepts(hidden, depends_on))
+    is_alike(hidden, name)
+        || Dependence::of(name).is_some_and(|depends_on| accepts(hidden, depends_on))
+}
+
+/// Whether an effect of the library is to first order what a foreign one does.
+fn is_alike(hidden: &Hidden, effect: &str) -> bool {
+    hidden.foreign && ALIKE.contains(&(hidden.effect.as_str(), effect))
 }
 
 fn compare(hidden: &Hidden, value: f64, verdict: &Verdict, z: Option<f64>) -> HiddenOutcome {

@@ -204,7 +204,7 @@ fn power_bin((from, to): (f64, f64), outcomes: &[&Outcome]) -> PowerBin {
 fn effects(settings: &Settings, outcomes: &[Outcome]) -> Vec<EffectRow> {
     let mut rows = Vec::new();
     for protocol in &settings.protocols {
-        for kind in super::hide::KINDS {
+        for kind in super::hide::kinds() {
             let flights = outcomes.iter().filter(|one| one.cell.protocol == *protocol);
             let of: Vec<_> =
                 flights.flat_map(|one| &one.hidden).filter(|one| one.kind == kind.name).collect();

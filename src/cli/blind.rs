@@ -8,9 +8,10 @@ use super::context::Context;
 use super::exit::{CommandError, Exit};
 use super::words;
 use crate::base::plain::Shown as _;
+use crate::blind::hide::HiddenKind;
 use crate::blind::render::{Style, render};
 use crate::blind::series::{Place, Settings};
-use crate::blind::tables::KINDS;
+use crate::blind::tables::{KINDS, ON_REQUEST};
 use crate::blind::{AirClass, Base, Protocol};
 use crate::workflow::blind;
 
@@ -44,7 +45,9 @@ the two are compared. Finished flights are kept in flights/: running the same co
 an interrupted run. The table is in table.json and table.md. Method and metrics: docs/blind.md.
 
 What can be hidden:
-{}", kinds_text()))]
+{}
+Only where --effects names it:
+{}", kinds_text(KINDS), kinds_text(ON_REQUEST)))]
 pub(super) struct BlindArgs {
     /// Which protocol to fly
     #[arg(long, value_enum, default_value_t = Which::Both)]
@@ -129,12 +132,12 @@ fn hidden_sets(text: &str) -> Result<Sets, String> {
     Ok(Sets(sets))
 }
 
-fn kinds_text() -> String {
+fn kinds_text(kinds: &[HiddenKind]) -> String {
     use std::fmt::Write as _;
-    KINDS.iter().fold(String::new(), |mut text, kind| {
+    kinds.iter().fold(String::new(), |mut text, kind| {
         let library = if kind.foreign { "  (in no library)" } else { "" };
         let (low, high) = kind.range;
-        let _ = writeln!(text, "  {:<20} {low} to {high} {}{library}", kind.name, kind.unit);
+        let _ = writeln!(text, "  {:<24} {low} to {high} {}{library}", kind.name, kind.unit);
         text
     })
 }

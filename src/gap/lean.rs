@@ -48,10 +48,10 @@ impl LeanLaw {
         }
         let of = |role: Role| role.value(vehicle).unwrap_or(0.0);
         let factor = Drag::new(&vehicle.airframe).factor_m2();
-        let box_m2 = (factor.x * factor.y).sqrt();
+        let box_m2 = (factor.x * factor.y).sqrt() * (1.0 + of(Role::FaceDragSide));
         let body_m2 = of(Role::BodyDragSide) / 2.0;
         Self {
-            linear: of(Role::RotorDrag),
+            linear: of(Role::RotorDrag) + of(Role::MomentumDrag) / GRAVITY,
             square: density * (box_m2 + body_m2) / (vehicle.airframe.mass_kg * GRAVITY),
             body_share: body_m2 / (box_m2 + body_m2).max(1e-9),
         }

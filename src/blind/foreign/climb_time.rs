@@ -41,7 +41,8 @@ impl Effect for ClimbTime {
             name: "climb-time",
             title: "Response that changes with time",
             what: "the response to vertical speed grows during the flight",
-            explanation: "A rotor that comes loose answers differently at the end than at the start: no library has it.",
+            explanation: "A rotor that comes loose answers differently at the end than at the start. \
+                The library has the like of it.",
             formula: "du = K V t/T",
             source: "made for the blind benchmark",
             class: Class::AxialLinear,

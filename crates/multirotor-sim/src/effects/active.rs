@@ -56,6 +56,10 @@ pub trait InFlight: Copies + fmt::Debug + Send + Sync {
     /// ([`Hook::Sense`]).
     fn sense(&mut self, _dt_s: f64, _climb_mps: &mut f64) {}
 
+    /// Changes what the log has for the vertical speed, m/s up, `dt_s` after its last look; the autopilot
+    /// flies by what it was before ([`Hook::Log`]).
+    fn log(&mut self, _dt_s: f64, _climb_mps: &mut f64) {}
+
     /// State of the battery, if the effect is one.
     fn battery(&self) -> Option<Reading> {
         None
@@ -148,13 +152,16 @@ pub struct Change {
     pub thrust: f64,
     /// Torque over the torque in still air at the same speed; effects add to it.
     pub torque: f64,
+    /// Factors on the drag that the airframe itself has along forward, left and up; effects multiply
+    /// them.
+    pub drag: Vector3<f64>,
     /// Further force on the body, body axes, N.
     pub force_n: Vector3<f64>,
 }
 
 impl Default for Change {
     fn default() -> Self {
-        Self { thrust: 1.0, torque: 1.0, force_n: Vector3::zeros() }
+        Self { thrust: 1.0, torque: 1.0, drag: Vector3::repeat(1.0), force_n: Vector3::zeros() }
     }
 }
 
@@ -324,6 +331,13 @@ impl Active {
         }
     }
 
+    /// Changes what the log has for the vertical speed, m/s up.
+    pub fn log(&mut self, dt_s: f64, climb_mps: &mut f64) {
+        for part in with(&mut self.parts, Hook::Log) {
+            part.acting.log(dt_s, climb_mps);
+        }
+    }
+
     /// Puts the memory of all effects where a steady flight has it; see [`InFlight::settle`].
     pub fn settle(&mut self, at: &Settled) {
         for part in &mut self.parts {
@@ -378,7 +392,7 @@ mod tests {
     use super::*;
 
     /// Deviation of drone 3 under seed 7 for each effect, and the first number of its stream.
-    const DRAWS: [(&str, f64, u64); 17] = [
+    const DRAWS: [(&str, f64, u64); 21] = [
         ("mass-spread", -0.063_823_343_466_044_15, 325_346_737_122_288_009),
         ("thrust-spread", 2.666_399_345_796_056, 5_479_058_648_760_249_280),
         ("air-density", 0.759_942_189_982_168_9, 14_439_030_494_600_378_327),
@@ -387,12 +401,16 @@ mod tests {
         ("thrust-curve", 0.407_090_556_830_227_55, 14_458_061_969_385_231_259),
         ("motor-thermal", -0.905_745_029_546_533_2, 16_004_134_536_043_060_479),
         ("battery", -0.588_286_263_749_746_1, 8_942_325_488_124_258_209),
+        ("pulse-noise", -0.268_648_624_219_961_55, 7_388_021_891_317_039_778),
         ("rotor-inflow", -0.494_508_823_137_220_17, 3_014_171_728_495_088_284),
         ("vortex-ring", -0.827_028_263_018_044_4, 10_427_928_058_194_456_216),
         ("translational-lift", -0.091_642_293_540_451_49, 10_567_096_808_043_295_592),
         ("ground-effect", -0.544_046_891_695_008_3, 7_166_232_599_593_086_703),
         ("blade-flapping", -1.241_054_591_525_546, 5_335_166_919_643_654_586),
+        ("momentum-drag", 1.351_224_193_992_771_6, 12_702_732_446_352_242_684),
+        ("face-drag", -0.672_551_663_380_650_5, 18_130_604_132_095_981_021),
         ("parasitic-drag", 0.440_599_538_625_699_84, 10_695_362_410_491_381_301),
+        ("response-drift", -0.271_991_150_726_748_57, 7_559_973_124_267_518_155),
         ("added-mass", -0.583_631_245_189_050_4, 14_067_041_122_870_747_768),
         ("velocity-error", 2.781_867_786_157_109_3, 5_020_864_049_965_810_683),
         ("tilt-formula", -0.325_747_776_748_847_8, 16_620_499_787_810_606_892),

@@ -100,7 +100,8 @@ impl Effect for Battery {
                 of 1 % needs 1 % more of the pulse above 1000 us. The slow part (charge) looks like \
                 a growing downdraft; the fast part (current times resistance) steepens every \
                 response. ArduPilot's compensation raises the pulse before it is logged, so it \
-                hides nothing. An empty battery does not switch off here: it stays at the voltage of \
+                hides nothing; one that a motor controller does itself is not logged, and what it \
+                leaves is gamma: 0 if it is right, another number if it is wrong by a factor. An empty battery does not switch off here: it stays at the voltage of \
                 no charge (3.27 V a cell), and the drone flies on with what that gives; the \
                 simulator names such drones. Terminal voltage must not be used as a regressor: the pulse drives \
                 the current and with it the voltage.",
@@ -166,8 +167,9 @@ impl Effect for Battery {
                 Parameter {
                     name: "exponent",
                     unit: "",
-                    what: "how much of a fall of voltage reaches the motor (gamma)",
-                    low: 0.0,
+                    what: "how much of a fall of voltage reaches the motor (gamma): 1 all, 0 none, \
+                        below 0 where a compensation does too much",
+                    low: -1.0,
                     high: 2.0,
                     default: |_| 1.0,
                     role: Some(Role::BatterySag),

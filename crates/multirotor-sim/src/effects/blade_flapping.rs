@@ -28,7 +28,9 @@ impl Effect for BladeFlapping {
                 induced drag differs too. The sum is a force in the rotor plane, linear in the \
                 horizontal air speed: a drone leans by a degree or more per m/s, where AirSim's \
                 hardly leans at all. Leaning, the rotor plane's force carries part of the weight, \
-                and the wind blows through the disc (which rotor inflow turns into a higher pulse).",
+                and the wind blows through the disc (which rotor inflow turns into a higher pulse). \
+                It goes with the rotors' speed, the root of their thrust, times the speed in their \
+                plane; what the same blades answer to air along their axis is rotor inflow.",
             formula: "H = 4 k_d w v = lambda sqrt(T m g) v;  in hover tan(phi) = \
                 lambda v sqrt(cos phi), T = m g cos(phi)",
             source: "Hoffmann et al. 2007; Mahony, Kumar and Corke 2012; RotorPy k_d",

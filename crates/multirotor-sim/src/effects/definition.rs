@@ -165,6 +165,8 @@ pub enum Hook {
     Loads = 8,
     /// On what the autopilot takes for its vertical speed.
     Sense = 16,
+    /// On what the log has for the vertical speed.
+    Log = 32,
 }
 
 impl Hook {
@@ -176,6 +178,7 @@ impl Hook {
             Self::Command => "the way from command to motor",
             Self::Loads => "thrust, torque and forces",
             Self::Sense => "its own idea of its vertical speed",
+            Self::Log => "the vertical speed in its log",
         }
     }
 }

@@ -89,7 +89,8 @@ pub fn number(value: f64) -> String {
 pub fn shown_at(vehicle: &Vehicle, signal: Signal, value: f64) -> Result<Signals, EffectError> {
     let mut signals = Signals::default();
     match signal {
-        Signal::Climb => signals.climb_mps = value,
+        // What changes in time is shown at the end of a usual flight.
+        Signal::Climb => (signals.climb_mps, signals.time_s) = (value, 600.0),
         Signal::Horizontal => signals.horizontal_mps = value,
         Signal::Tilt => signals.tilt_rad = value,
         Signal::Height => signals.height_m = value,

@@ -16,14 +16,18 @@ pub mod definition;
 mod disc;
 pub mod doc;
 mod error;
+mod face_drag;
 mod ground_effect;
 mod mass_spread;
 pub mod model;
 pub mod momentum;
+mod momentum_drag;
 mod motor_thermal;
 mod neighbour_downwash;
 mod parasitic_drag;
+mod pulse_noise;
 pub mod reference;
+mod response_drift;
 pub mod role;
 mod rotor_inflow;
 pub mod select;
@@ -57,12 +61,16 @@ pub const LIBRARY: &[&dyn Effect] = &[
     &thrust_curve::ThrustCurve,
     &motor_thermal::MotorThermal,
     &battery::Battery,
+    &pulse_noise::PulseNoise,
     &rotor_inflow::RotorInflow,
     &vortex_ring::VortexRing,
     &translational_lift::TranslationalLift,
     &ground_effect::GroundEffect,
     &blade_flapping::BladeFlapping,
+    &momentum_drag::MomentumDrag,
+    &face_drag::FaceDrag,
     &parasitic_drag::ParasiticDrag,
+    &response_drift::ResponseDrift,
     &added_mass::AddedMass,
     &velocity_error::VelocityError,
     &tilt_formula::TiltFormula,

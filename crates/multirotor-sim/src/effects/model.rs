@@ -3,7 +3,7 @@
 use super::definition::{Signal, Values};
 use super::select::resolved;
 use super::{Effect, EffectError, Reference, Signals};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Airframe, Vehicle};
 
 /// Half of the step with which sensitivities are taken, m/s.
 const STEP_MPS: f64 = 0.05;
@@ -75,7 +75,11 @@ pub fn depends_on_model(effect: &dyn Effect) -> bool {
 
 /// Drag factor of AirSim's box along up: force / (density · speed²), m².
 pub(super) fn base_drag_m2(vehicle: &Vehicle) -> f64 {
-    let frame = &vehicle.airframe;
+    airframe_drag_m2(&vehicle.airframe)
+}
+
+/// As [`base_drag_m2`], of an airframe.
+pub(super) fn airframe_drag_m2(frame: &Airframe) -> f64 {
     let [x, y, _] = frame.body_m;
     let rotors_m2 = 4.0 * std::f64::consts::PI * frame.rotor_diameter_m.powi(2);
     frame.drag_coefficient / 2.0 * (x * y + rotors_m2)

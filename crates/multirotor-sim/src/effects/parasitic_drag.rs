@@ -28,7 +28,9 @@ impl Effect for ParasiticDrag {
             what: "the body resists the air with the square of its speed",
             explanation: "Plates, arms and battery stand in the stream: an odd, quadratic response \
                 that adds to the linear one of the rotors. AirSim has it already, with four times \
-                the area of the rotor discs; real bodies have much less. In steady windows its \
+                the area of the rotor discs; real bodies have much less, and another effect scales the box's. \
+                With equal areas it is a body in one piece, which resists with |v| v whichever way \
+                the air comes. In steady windows its \
                 size cannot be told from a wrong thrust curve.",
             formula: "D = rho/2 |v| (S_h v_x, S_h v_y, S_v v_z) along the body's axes, S = C_D area;  \
                 du = A V|V|, A = L rho S_v/(2 m g)",

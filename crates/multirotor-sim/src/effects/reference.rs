@@ -3,7 +3,7 @@
 use crate::vehicle::{Airframe, MotorLaw, RotorLaw, Vehicle};
 
 /// Standard gravity, m/s².
-const GRAVITY: f64 = 9.80665;
+pub(super) const GRAVITY: f64 = 9.80665;
 /// Density at sea level, kg/m³.
 pub(super) const DENSITY: f64 = 1.225;
 const ROTORS: f64 = 4.0;
@@ -78,6 +78,16 @@ impl Reference {
     pub fn sensitivity_us(&self) -> f64 {
         let step = 1e-4;
         (self.thrust_us(1.0 + step) - self.thrust_us(1.0 - step)) / (2.0 * step)
+    }
+
+    /// As [`Reference::sensitivity_us`], of what the simulator flies: ArduPilot's own frame has a curve
+    /// of thrust that is not the airframe's, taken here in the hover of its reference test.
+    pub fn own_sensitivity_us(&self) -> f64 {
+        let Some(frame) = &self.airframe.sitl else { return self.sensitivity_us() };
+        let (expo, thrust) = (frame.thrust_expo, frame.hover_throttle);
+        // Slope of (1 - expo) c + expo c² where the curve has the thrust of hover.
+        let slope = ((1.0 - expo).powi(2) + 4.0 * expo * thrust).sqrt();
+        1000.0 * (frame.spin_max - frame.spin_min) * thrust / slope
     }
 
     /// Electrical power in hover, W.

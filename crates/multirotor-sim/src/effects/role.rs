@@ -18,6 +18,10 @@ pub enum Role {
     BodyDragSide,
     /// Force of the rotors against horizontal air over weight, per air speed, s/m.
     RotorDrag,
+    /// Force of the rotors against horizontal air over mass, per air speed, 1/s.
+    MomentumDrag,
+    /// Relative change of the drag of the airframe's own side faces.
+    FaceDragSide,
     /// Share of the geometric thrust that the rotors lose to their own inflow in hover.
     InflowShare,
     /// Share of the inflow of which horizontal air gives a part back.
@@ -36,6 +40,8 @@ pub enum Role {
     SensorBias,
     /// Lag of the autopilot's vertical speed, s.
     SensorLag,
+    /// 1: only the log has the error of the vertical speed; 0: the autopilot flies by it, too.
+    SensorLogOnly,
     /// Time constant of warming up after take-off, s.
     WarmUpTime,
     /// Cells of the battery in series.
@@ -127,10 +133,12 @@ impl Role {
 mod tests {
     use super::*;
 
-    const ONCE: [Role; 19] = [
+    const ONCE: [Role; 22] = [
         Role::BodyDragTop,
         Role::BodyDragSide,
         Role::RotorDrag,
+        Role::MomentumDrag,
+        Role::FaceDragSide,
         Role::InflowShare,
         Role::WindLift,
         Role::MassSpread,
@@ -138,6 +146,7 @@ mod tests {
         Role::InflowSpread,
         Role::SensorBias,
         Role::SensorLag,
+        Role::SensorLogOnly,
         Role::WarmUpTime,
         Role::BatteryCells,
         Role::BatteryCapacity,

@@ -194,6 +194,7 @@ impl<'a> OngoingFlight<'a> {
         estimate.acceleration_mps2.z += self.impact_mps2;
         self.plant.sense(STEP_S, &mut estimate.velocity_mps.z);
         let pulses = self.pilot.update(time_s, &estimate);
+        self.plant.log(STEP_S, &mut estimate.velocity_mps.z);
         self.tally.note(&self.pilot, &self.plant, time_s, self.setup.home_m.z);
         let moment = Moment {
             step,

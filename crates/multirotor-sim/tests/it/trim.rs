@@ -7,7 +7,8 @@ use std::io;
 
 use dataflash::time::GpsTime;
 use multirotor_sim::effects::active::deviation;
-use multirotor_sim::effects::{LIBRARY, Role, Supply, find};
+use multirotor_sim::effects::select::values_of;
+use multirotor_sim::effects::{LIBRARY, Reference, Role, Signals, Supply, find};
 use multirotor_sim::sim::plant::trim::{Condition, Trim};
 use multirotor_sim::sim::recorder::{Moment, Recorder};
 use multirotor_sim::sim::{FlightSetup, Hooks, Uniform, fly_with};
@@ -59,6 +60,7 @@ struct Off {
     climb_mps: f64,
 }
 
+/// What is flown, and the trim that it is held against.
 struct Compared {
     trim: Trim,
     windows: Vec<(f64, f64)>,
@@ -101,10 +103,11 @@ impl Recorder for Compared {
     }
 }
 
-/// Flies legs in an air and gives for each: climb over ground, m/s, and the mean difference of pulse, us, and
+/// Flies a vehicle's legs in an air and gives for each, against the trim of the same or another vehicle: climb over ground, m/s, and the mean difference of pulse, us, and
 /// lean, degrees, between trim and flight.
 fn differences(
     vehicle: &Vehicle,
+    trimmed: &Vehicle,
     air_mps: Vector3<f64>,
     speeds_mps: &[f64],
 ) -> Vec<(f64, f64, f64)> {
@@ -126,7 +129,7 @@ fn differences(
         hooks: Hooks::default(),
     };
     let own = |definition: &_| deviation(definition, SEED, DRONE);
-    let trim = Trim::deviating(vehicle, home_m, own).expect("effects");
+    let trim = Trim::deviating(&without_jitter(trimmed), home_m, own).expect("effects");
     let off = vec![Off::default(); windows.len()];
     let mut compared = Compared { trim, windows, off, turning_us: None };
     fly_with(&setup, &mut compared).expect("a flight");
@@ -140,7 +143,7 @@ fn differences(
 /// The largest differences of all legs, us and degrees.
 fn largest(case: &str, vehicle: &Vehicle, air_mps: Vector3<f64>, speeds: &[f64]) -> (f64, f64) {
     let mut most = (0.0_f64, 0.0_f64);
-    for (climb_mps, pulse_us, lean_deg) in differences(vehicle, air_mps, speeds) {
+    for (climb_mps, pulse_us, lean_deg) in differences(vehicle, vehicle, air_mps, speeds) {
         println!("{case}: {climb_mps:+.2} m/s: {pulse_us:+.4} us, {lean_deg:.5} degrees");
         most = (most.0.max(pulse_us.abs()), most.1.max(lean_deg));
     }
@@ -192,6 +195,115 @@ fn each_effect_is_flown_as_it_is_trimmed() {
         let vehicle = vehicle("airsim-generic-quad", &[effect]);
         assert_flown(effect, &vehicle, air_mps, &[-3.0, 1.0]);
     }
+}
+
+/// Vehicles, effects with sizes that show, and whether the pulse shows them (the lean does otherwise).
+const SIZED: [(&str, &[&str], bool); 10] = [
+    ("airsim-generic-quad", &["face-drag.top=1.5"], true),
+    ("airsim-generic-quad", &["face-drag.top=-0.8", "face-drag.sides=3"], true),
+    ("arducopter-sitl", &["face-drag.top=2", "face-drag.sides=0.5"], true),
+    ("airsim-generic-quad", &["momentum-drag.per_s=0.5"], true),
+    ("pixel", &["momentum-drag.per_s=0.3"], false),
+    ("phantom4", &["momentum-drag.per_s=0.3", "momentum-drag.axial=1"], true),
+    ("airsim-generic-quad", &["response-drift.slope_us=-12"], true),
+    ("arducopter-sitl", &["response-drift.slope_us=12"], true),
+    ("pixel", &["battery.exponent=-0.5"], true),
+    ("airsim-generic-quad", &["battery.exponent=2", "battery.resistance_ohm=0"], true),
+];
+
+#[test]
+fn effects_of_any_size_are_flown_as_they_are_trimmed_and_not_without_them() {
+    let air_mps = Vector3::new(4.0, -3.0, 0.3);
+    for (name, choices, in_pulse) in SIZED {
+        let (with, without) = (vehicle(name, choices), vehicle(name, &[]));
+        let case = format!("{name}, {choices:?}");
+        assert_flown(&case, &with, air_mps, &[-3.0, 1.0]);
+        let missed = differences(&with, &without, air_mps, &[-3.0, 1.0]);
+        let most = |of: fn(&(f64, f64, f64)) -> f64| missed.iter().map(of).fold(0.0, f64::max);
+        let (pulse_us, lean_deg) = (most(|leg| leg.1.abs()), most(|leg| leg.2));
+        println!("{case}: without it {pulse_us:.2} us, {lean_deg:.3} degrees");
+        let seen = if in_pulse { pulse_us > 10.0 * PULSE_US } else { lean_deg > 10.0 * LEAN_DEG };
+        assert!(seen, "{case}: the trim without it is off by {pulse_us} us, {lean_deg} degrees");
+    }
+}
+
+/// Change of the pulse by an effect, us: by the trim, and by its closed form at the trim's lean.
+fn twice(name: &str, choices: &[&str], effect: &str, condition: &Condition) -> (f64, f64) {
+    let (with, without) = (vehicle(name, choices), vehicle(name, &[]));
+    let [before, after] =
+        [&without, &with].map(|one| Trim::of(one).unwrap().at(condition).expect("a balance"));
+    let effect = find(effect).expect("an effect");
+    let values = values_of(effect, &with).expect("values");
+    let relative = condition.velocity_mps - condition.air_mps;
+    let signals = Signals {
+        climb_mps: relative.z,
+        horizontal_mps: relative.xy().norm(),
+        tilt_rad: after.lean.norm().asin(),
+        time_s: condition.time_s,
+        density_ratio: condition.density_ratio,
+        ..Signals::default()
+    };
+    let at = Reference::of(&with).in_air(condition.density_ratio);
+    (after.pulse_us - before.pulse_us, effect.pulse_us(&at, &values, &signals))
+}
+
+#[test]
+fn closed_forms_say_what_the_trim_finds() {
+    let cases: [(&str, &[&str], &str, f64); 6] = [
+        ("airsim-generic-quad", &["face-drag.top=1.5"], "face-drag", 0.0),
+        ("airsim-generic-quad", &["face-drag.top=-0.8", "face-drag.sides=0"], "face-drag", 4.0),
+        ("pixel", &["momentum-drag.per_s=0.3", "momentum-drag.axial=1"], "momentum-drag", 0.0),
+        ("pixel", &["momentum-drag.per_s=0.4"], "momentum-drag", 6.0),
+        ("pixel", &["response-drift.slope_us=-8"], "response-drift", 0.0),
+        ("phantom4", &["response-drift.slope_us=8"], "response-drift", 0.0),
+    ];
+    for (name, choices, effect, wind_mps) in cases {
+        for climb_mps in [-3.0, 1.0, 3.5] {
+            let condition = Condition {
+                velocity_mps: Vector3::new(0.0, 0.0, climb_mps),
+                air_mps: Vector3::new(wind_mps, 0.0, 0.0),
+                density_ratio: 0.97,
+                time_s: 400.0,
+                ..Condition::default()
+            };
+            let (trim_us, closed_us) = twice(name, choices, effect, &condition);
+            println!("{effect} {name} {climb_mps:+} m/s: trim {trim_us:+.3}, {closed_us:+.3} us");
+            let off_us = (trim_us - closed_us).abs();
+            assert!(
+                off_us < 0.1 + 0.02 * trim_us.abs(),
+                "{effect} {climb_mps}: {trim_us}, {closed_us}"
+            );
+            assert!(trim_us.abs() > 1.0, "{effect} {climb_mps}: nothing to compare");
+        }
+    }
+}
+
+#[test]
+fn a_drift_is_so_many_us_on_every_frame() {
+    for name in names() {
+        let choices = ["response-drift.slope_us=6", "response-drift.time_s=300"];
+        let [with, without] = [vehicle(name, &choices), vehicle(name, &[])];
+        let slope_us = |one: &Vehicle| {
+            let mut trim = Trim::of(one).unwrap();
+            let mut at = |climb_mps| {
+                let velocity_mps = Vector3::new(0.0, 0.0, climb_mps);
+                let at = Condition { velocity_mps, time_s: 600.0, ..Condition::default() };
+                trim.at(&at).expect("a balance").pulse_us
+            };
+            (at(0.5) - at(-0.5)) / 1.0
+        };
+        let drift_us = slope_us(&with) - slope_us(&without);
+        // ArduPilot's frame is taken in the hover of its reference test, in thinner air.
+        assert!((drift_us - 12.0).abs() < 0.6, "{name}: {drift_us} us/(m/s) for 12");
+    }
+}
+
+#[test]
+fn without_drag_of_its_own_an_airframe_has_none_to_change() {
+    let air_mps = Vector3::new(3.0, 0.0, -2.0);
+    let at = Condition { air_mps, ..Condition::default() };
+    let trimmed = |choices: &[&str]| Trim::of(&vehicle("pixel", choices)).unwrap().at(&at);
+    assert_eq!(trimmed(&["face-drag.top=3"]), trimmed(&[]));
 }
 
 #[test]

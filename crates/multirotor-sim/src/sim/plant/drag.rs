@@ -45,13 +45,21 @@ impl Drag {
         self.factor_m2
     }
 
-    /// Adds the drag at a velocity of the body relative to the air, body axes, m/s.
+    /// Adds the drag at a velocity of the body relative to the air, body axes, m/s; `share` has what
+    /// effects make of it along forward, left and up.
     #[inline]
-    pub fn add_loads(&self, relative_mps: &Vector3<f64>, density_ratio: f64, loads: &mut Loads) {
+    pub fn add_loads(
+        &self,
+        relative_mps: &Vector3<f64>,
+        density_ratio: f64,
+        share: &Vector3<f64>,
+        loads: &mut Loads,
+    ) {
         let density = density_ratio * SEA_LEVEL_DENSITY;
-        loads.force_n -= relative_mps.zip_map(&self.factor_m2, |speed, factor| {
+        let drag_n = relative_mps.zip_map(&self.factor_m2, |speed, factor| {
             if speed.abs() > DEAD_BAND_MPS { factor * density * speed * speed.abs() } else { 0.0 }
         });
+        loads.force_n -= drag_n.component_mul(share);
     }
 }
 
@@ -73,9 +81,10 @@ mod tests {
     #[test]
     fn acts_against_the_motion_and_is_dead_in_the_band() {
         let mut loads = Loads::default();
-        drag().add_loads(&Vector3::new(0.1, -0.1, 0.099), 1.0, &mut loads);
+        let as_it_is = Vector3::repeat(1.0);
+        drag().add_loads(&Vector3::new(0.1, -0.1, 0.099), 1.0, &as_it_is, &mut loads);
         assert_eq!(loads.force_n, Vector3::zeros());
-        drag().add_loads(&Vector3::new(0.2, 0.0, -3.0), 1.0, &mut loads);
+        drag().add_loads(&Vector3::new(0.2, 0.0, -3.0), 1.0, &as_it_is, &mut loads);
         assert!((loads.force_n.z - 0.109930 * 1.225 * 9.0).abs() < 1e-4);
         assert!(loads.force_n.x < 0.0 && loads.force_n.y == 0.0);
     }

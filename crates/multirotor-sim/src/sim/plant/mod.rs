@@ -152,6 +152,15 @@ impl Plant {
         }
     }
 
+    /// Changes the vertical speed that the log has (m/s, up positive) as the effects do; `dt_s` is
+    /// the time since the last call.
+    #[inline]
+    pub fn log(&mut self, dt_s: f64, climb_mps: &mut f64) {
+        if self.effects.acts(Hook::Log) {
+            self.effects.log(dt_s, climb_mps);
+        }
+    }
+
     /// Advances by one step with rotor commands from 0 to 1.
     ///
     /// The velocity-Verlet scheme of AirSim's FastPhysicsEngine: drag at the velocity expected in
@@ -218,10 +227,18 @@ impl Plant {
     ) -> Loads {
         let mut loads = Loads { force_n: change.force_n, torque_nm: Vector3::zeros() };
         if let Some(sitl) = &mut self.sitl {
-            sitl.add_loads(command, relative_mps, rate_radps, air.density_ratio, &mut loads);
+            let density_ratio = air.density_ratio;
+            sitl.add_loads(
+                command,
+                relative_mps,
+                rate_radps,
+                density_ratio,
+                &change.drag,
+                &mut loads,
+            );
         } else {
             self.rotors.add_loads(air.density_ratio, change, &mut loads);
-            self.drag.add_loads(relative_mps, air.density_ratio, &mut loads);
+            self.drag.add_loads(relative_mps, air.density_ratio, &change.drag, &mut loads);
         }
         loads
     }

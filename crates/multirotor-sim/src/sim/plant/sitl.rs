@@ -91,7 +91,8 @@ impl Sitl {
     }
 
     /// Adds the loads of commands (share of 1000..2000 us) at a velocity relative to the air and
-    /// turn rates, both in body axes; `density_ratio` is that of the standard atmosphere.
+    /// turn rates, both in body axes; `density_ratio` is that of the standard atmosphere, and
+    /// `drag_share` what effects make of the body's drag along forward, left and up.
     #[inline(never)]
     pub fn add_loads(
         &mut self,
@@ -99,6 +100,7 @@ impl Sitl {
         relative_mps: &Vector3<f64>,
         rate_radps: &Vector3<f64>,
         density_ratio: f64,
+        drag_share: &Vector3<f64>,
         loads: &mut Loads,
     ) {
         if density_ratio != self.asked_ratio {
@@ -124,7 +126,8 @@ impl Sitl {
         loads.force_n.z += thrust;
         loads.force_n -= relative_mps * (self.momentum * self.root_density * root);
         let drag = self.half_drag_m2 * self.density;
-        loads.force_n -= relative_mps.map(|speed| drag * speed * speed.abs());
+        let drag_n = relative_mps.map(|speed| drag * speed * speed.abs());
+        loads.force_n -= drag_n.component_mul(drag_share);
         loads.torque_nm += Vector3::new(roll * lever, pitch * lever, yaw * YAW_SCALE * self.arm_m);
         loads.torque_nm -= rate_radps.component_mul(&self.inertia) * TURN_DAMPING_PER_S;
     }
@@ -160,6 +163,7 @@ mod tests {
                 &velocity,
                 &Vector3::zeros(),
                 density_ratio(HOME_AMSL_M + height_m),
+                &Vector3::repeat(1.0),
                 &mut loads,
             );
             if loads.force_n.z < 3.0 * GRAVITY { low = middle } else { high = middle }

@@ -33,7 +33,7 @@ pub struct Moment<'a> {
     pub time_us: i64,
     /// Autopilot after the step.
     pub pilot: &'a Autopilot<'a>,
-    /// State estimate that the autopilot used in the step.
+    /// State estimate that the autopilot used in the step, its vertical speed as the log has it.
     pub estimate: &'a Estimate,
     /// Body with its true motion.
     pub plant: &'a Plant,

@@ -264,6 +264,74 @@ fn velocity_error_shifts_the_measured_velocity_alone() {
 }
 
 #[test]
+fn a_log_can_be_late_or_off_while_the_autopilot_is_not() {
+    // From rest into a climb of 2 m/s: what lags by d has gone d times 2 m/s less far.
+    let flight = Flight { windows: vec![(52.0, 62.0), (64.0, 73.0)], ..Flight::moving(2.0) };
+    let flown = |more: &[&str]| {
+        let choices = [&["velocity-error.sd_mps=0", "velocity-error.lag_s=0"], more].concat();
+        fly_windows(&vehicle("pixel", &choices), &flight)
+    };
+    let plain = flown(&[]);
+    let late = flown(&["velocity-error.lag_s=0.3", "velocity-error.log_only=1"]);
+    let off = flown(&["velocity-error.bias_mps=-1.5", "velocity-error.log_only=1"]);
+    let (mean, after) = (|one: &Steady| one.measured_mps, 0.3 * 2.0 / 10.0);
+    assert!((mean(&plain[0]) - mean(&late[0]) - after).abs() < 0.005, "{late:?}");
+    assert!((mean(&plain[1]) - mean(&late[1])).abs() < 0.005, "{late:?}");
+    assert!((mean(&plain[1]) - mean(&off[1]) - 1.5).abs() < 1e-9, "{off:?}");
+    for other in [&late, &off] {
+        for (other, plain) in other.iter().zip(&plain) {
+            assert_eq!(other.pulse_us, plain.pulse_us, "what is only logged moves nothing");
+            assert_eq!(other.climb_mps, plain.climb_mps);
+        }
+    }
+    // With the same lag the loop flies another way; with a bias it follows the heights all the same.
+    let flies_late = flown(&["velocity-error.lag_s=0.3"]);
+    assert_ne!(flies_late[0].pulse_us, plain[0].pulse_us);
+    let flies_off = flown(&["velocity-error.bias_mps=0.4"]);
+    assert!((flies_off[1].climb_mps - 2.0).abs() < 0.05, "{flies_off:?}");
+    assert!((mean(&flies_off[1]) - flies_off[1].climb_mps - 0.4).abs() < 0.01, "{flies_off:?}");
+    let refused = multirotor_sim::effects::select::choose(
+        &mut vehicle("pixel", &[]),
+        "velocity-error.log_only=0.5",
+    );
+    assert!(refused.unwrap_err().to_string().contains("0 or 1"));
+}
+
+#[test]
+fn noise_of_the_pulse_remembers_for_as_long_as_it_says() {
+    let flight = Flight {
+        legs: vec![(4, 3.0), (20, 40.0), (320, 40.0), (20, 3.0)],
+        windows: (0..140)
+            .map(|at| (50.0 + 2.0 * f64::from(at), 52.0 + 2.0 * f64::from(at)))
+            .collect(),
+        ..Flight::hover(40.0)
+    };
+    let spread = |time: &str| {
+        let choices = ["pulse-noise.sd_us=8", time];
+        let windows = fly_windows(&vehicle("pixel", &choices), &flight);
+        let n = windows.len() as f64;
+        let mean = windows.iter().map(|one| one.pulse_us).sum::<f64>() / n;
+        let off = |lag: usize| {
+            let pairs = windows.iter().zip(&windows[lag..]);
+            let product = |(a, b): (&Steady, &Steady)| (a.pulse_us - mean) * (b.pulse_us - mean);
+            pairs.map(product).sum::<f64>() / n
+        };
+        (off(0).sqrt(), off(2) / off(0), mean)
+    };
+    let (long_us, kept, mean_us) = spread("pulse-noise.time_s=5");
+    let (short_us, ..) = spread("pulse-noise.time_s=0.1");
+    println!("means of 2 s: {long_us:.2} us, {kept:.2} kept after 4 s; short {short_us:.2} us");
+    // Means of 2 s of what remembers for 5 s have 0.94 of its standard deviation; of 4 s later, exp(-4/5).
+    assert!((5.5..9.5).contains(&long_us), "{long_us}");
+    assert!((0.15..0.75).contains(&kept), "{kept}");
+    assert!(short_us < 0.5 * long_us, "{short_us}");
+    let calm = fly_windows(&vehicle("pixel", &[]), &flight);
+    let calm_us = calm.iter().map(|one| one.pulse_us).sum::<f64>() / calm.len() as f64;
+    // 280 s are some 28 independent values.
+    assert!((mean_us - calm_us).abs() < 3.0 * 8.0 / 28.0_f64.sqrt(), "{mean_us} for {calm_us}");
+}
+
+#[test]
 fn effects_that_are_off_or_do_nothing_change_no_bit() {
     let stock = vehicle("airsim-generic-quad", &[]);
     let flight = Flight { seed: 5, ..Flight::moving(2.5).wind(3.0) };
