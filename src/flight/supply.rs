@@ -8,9 +8,11 @@
 use super::Series;
 use crate::numeric::upper_median;
 
-/// The estimate has settled when its voltage moves by less than this share, which is 2 us on a show drone
-/// (docs/physics.md, 5.4). Chosen.
-const SETTLED: f64 = 0.003;
+/// An estimate that moves by less than this share of itself is no estimate: somebody knows the pack. Chosen.
+const KNOWN: f64 = 0.05;
+/// A difference in the voltage at rest that does not matter, as a share: 2 us on a show drone (docs/physics.md,
+/// 5.4). Chosen.
+const SMALL: f64 = 0.003;
 /// Voltage and current are taken less their means over this time to each side, s: the pack empties in minutes.
 const SMOOTH_S: f64 = 10.0;
 /// Current and voltage of one row are no further apart, s.
@@ -28,8 +30,8 @@ pub(super) struct Logged<'a> {
 }
 
 impl Logged<'_> {
-    /// Voltage at rest and resistance of the pack; `flight` is from when to when it flew. The autopilot's own where
-    /// its estimate of the resistance has settled, or where voltage and current do not tell it better.
+    /// Voltage at rest and resistance of the pack; `flight` is from when to when it flew. The autopilot's own unless
+    /// its estimate of the resistance moves and voltage and current tell it better.
     pub(super) fn at_rest(self, flight: (f64, f64)) -> (Option<Series>, Option<f64>) {
         let better = self.by_one_resistance(flight);
         let Self { resting_v, resistance_ohm, .. } = self;
@@ -44,14 +46,13 @@ impl Logged<'_> {
         let (volts, amps) = (self.voltage_v?, self.current_a?);
         let usual_v = upper_median(volts.between(start_s, end_s).to_vec())?;
         let usual_a = upper_median(amps.between(start_s, end_s).to_vec())?;
-        // Too small to be worth a share of the voltage.
-        let settled_ohm = SETTLED * usual_v / usual_a;
-        let moves_ohm = range(self.resistance_ohm?.between(start_s, end_s))?;
-        if moves_ohm.is_nan() || moves_ohm < settled_ohm {
-            return None;
-        }
+        let small_ohm = SMALL * usual_v / usual_a;
+        let (low_ohm, high_ohm) = between_ends(self.resistance_ohm?.between(start_s, end_s))?;
+        let is_known = high_ohm - low_ohm < KNOWN * high_ohm;
         let (ohm, se_ohm) = slope(volts, amps, (start_s, end_s))?;
-        if se_ohm.is_nan() || se_ohm > settled_ohm {
+        let apart_ohm = (ohm - low_ohm).abs().max((ohm - high_ohm).abs());
+        let is_better = se_ohm < small_ohm && apart_ohm > small_ohm;
+        if is_known || !is_better {
             return None;
         }
         let ohm = ohm.max(0.0);
@@ -65,12 +66,12 @@ impl Logged<'_> {
     }
 }
 
-/// From nearly the least to nearly the largest value.
-fn range(values: &[f64]) -> Option<f64> {
+/// Nearly the least and nearly the largest value.
+fn between_ends(values: &[f64]) -> Option<(f64, f64)> {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);
     let end = (ENDS * values.len() as f64) as usize;
-    Some(values.get(values.len().checked_sub(end + 1)?)? - values.get(end)?)
+    Some((*values.get(end)?, *values.get(values.len().checked_sub(end + 1)?)?))
 }
 
 /// Resistance by which the voltage falls when the current rises, with its standard error, ohm.
@@ -153,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn an_estimate_that_has_settled_is_the_autopilots() {
+    fn a_resistance_that_is_known_is_the_autopilots() {
         // It may know more than the log: 0.03 ohm where voltage and current say 0.02.
         let (resting_v, ohm) = told(0.02, |_| 0.03);
         assert_eq!(ohm, 0.03);

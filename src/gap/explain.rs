@@ -146,6 +146,7 @@ struct Search<'a> {
 }
 
 /// What is looked at in one round, and for what.
+#[derive(Clone)]
 struct Look {
     patterns: Vec<GroupPattern>,
     residual: Split,
@@ -199,9 +200,10 @@ impl Search<'_> {
         let rivals = rivals(&round, sought);
         if let What::Free(free) = &decision.what
             && self.comparison.is_foreign()
-            && let Some(pair) = pairs::instead_of(&problem, &round, sought, free)
+            && let Some((look, pair, base)) =
+                self.pair_in_likelier_updraft(look.clone(), &round, free, &problem)?
         {
-            self.take_pair(&look, &pair, &round, (decision.thresholds.library, rivals))?;
+            self.take_pair(&look, &pair, &base, (decision.thresholds.library, rivals))?;
             self.fly_again()?;
             return Ok(true);
         }
@@ -248,6 +250,43 @@ impl Search<'_> {
         }
         (self.comparison, self.found) = there;
         Ok(look)
+    }
+
+    /// Two effects that explain as much as a free shape; in still air unless an updraft that one look found makes them
+    /// explain clearly more. That updraft stood for what both explain.
+    fn pair_in_likelier_updraft(
+        &mut self,
+        look: Look,
+        found: &Round,
+        free: &RankedGeneric,
+        problem: &Problem<'_>,
+    ) -> Result<Option<(Look, Pair, Solution)>, GapError> {
+        let there = pairs::instead_of(problem, found, look.sought(), free);
+        if !self.found.steps.is_empty() || self.found.updraft_mps == 0.0 {
+            return Ok(there.map(|pair| (look, pair, found.base.clone())));
+        }
+        let before = (self.comparison.clone(), self.found.clone());
+        self.comparison = self.comparison.clone().in_updraft(0.0);
+        self.found.updraft_mps = 0.0;
+        let still = self.look(false)?;
+        let problem = still.problem();
+        let round = round(&problem, still.hyper, still.sought(), true);
+        let best = round.generics.first();
+        let here = best.and_then(|free| {
+            pairs::instead_of(&problem.among(&round.groups), &round, still.sought(), free)
+        });
+        let likely = |base: &Solution, pair: &Pair| base.log_posterior() + pair.gain;
+        let is_better = match (&here, &there) {
+            (Some(here), Some(there)) => {
+                likely(&round.base, here) > likely(&found.base, there) - FLOOR_NATS
+            }
+            (here, _) => here.is_some(),
+        };
+        if is_better {
+            return Ok(here.map(|pair| (still, pair, round.base.clone())));
+        }
+        (self.comparison, self.found) = before;
+        Ok(there.map(|pair| (look, pair, found.base.clone())))
     }
 
     /// What is left, and everything that may explain it; in the updraft that explains most if it `settles` there.
@@ -331,7 +370,7 @@ impl Search<'_> {
         &mut self,
         look: &Look,
         pair: &Pair,
-        round: &Round,
+        base: &Solution,
         (threshold_nats, rivals): (f64, Vec<Rival>),
     ) -> Result<(), GapError> {
         let Self { comparison, found, .. } = self;
@@ -346,7 +385,7 @@ impl Search<'_> {
             let candidate = &look.candidates[member.candidate];
             if !found.parameters.iter().any(|known| known.effect == candidate.name) {
                 let before = before(candidate);
-                let more = parameters_of(comparison, &next, candidate.name, before, &round.base)?;
+                let more = parameters_of(comparison, &next, candidate.name, before, base)?;
                 found.parameters.extend(more);
             }
             let variant = &candidate.variants[member.variant];

@@ -20,6 +20,8 @@ const MOST_FITTED: usize = 8;
 pub(super) struct Pair {
     pub(super) members: [Ranked; 2],
     pub(super) names: [Vec<&'static str>; 2],
+    /// What both explain, nats.
+    pub(super) gain: f64,
 }
 
 /// One pair in its best forms.
@@ -115,7 +117,7 @@ pub(super) fn instead_of(
     };
     let members = [member(0), member(1)];
     let both = members.iter().all(|member| member.gain > FLOOR_NATS);
-    both.then_some(Pair { members, names })
+    both.then_some(Pair { members, names, gain: best.gain })
 }
 
 fn column(library: &[Candidate], (candidate, variant): (usize, usize)) -> &super::gls::Column {
@@ -142,4 +144,74 @@ fn tried(
         admissible(&library[candidate], &library[candidate].variants[variant], beta)
     };
     (gain.is_finite() && forms.into_iter().zip(tried.beta()).all(can)).then_some(tried)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates::{Size, Variant};
+    use super::super::gls::{Column, Split};
+    use super::super::noise::{GroupPattern, Hyper};
+    use super::super::trial::{patterns, pulses};
+    use super::*;
+
+    type Form = fn(f64) -> f64;
+    const WAVE: Form = |time| 20.0 * (0.07 * time).sin();
+    const LINE: Form = |time| 0.4 * time;
+    const SQUARE: Form = |time| 0.008 * (time - 60.0) * (time - 60.0);
+
+    fn column(groups: &[GroupPattern], form: Form) -> Column {
+        let bins = |group: &GroupPattern| group.time_s.iter().map(|time| form(*time)).collect();
+        Column::Shared(groups.iter().map(bins).collect())
+    }
+
+    /// What stands for what in pulses that have the first two forms.
+    fn found(library: &[(&'static str, Form)], free_gain: f64) -> Option<[Vec<&'static str>; 2]> {
+        let groups = patterns();
+        let candidate = |(name, form): &(&'static str, Form)| {
+            let column = column(&groups, *form);
+            let size = Size { name: "size", unit: "", low: 0.0, high: 9.0, now: 0.0, usual: 1.0 };
+            let variant = Variant { vehicle: None, size: 1.0, column, felt: Vec::new() };
+            let size = Some(size);
+            Candidate { name, was_there: false, by_lean: false, size, variants: vec![variant] }
+        };
+        let library: Vec<Candidate> = library.iter().map(candidate).collect();
+        let (wave, line) = (column(&groups, WAVE), column(&groups, LINE));
+        let mut pulses = pulses(&groups);
+        for (group, drones) in pulses.iter_mut().enumerate() {
+            for (bin, value) in drones.iter_mut().flat_map(|bins| bins.iter_mut().enumerate()) {
+                *value += 2.0 * wave.at(group, 0, bin) + 3.0 * line.at(group, 0, bin);
+            }
+        }
+        let split = Split::of(&pulses);
+        let problem = Problem::new(&groups, &split);
+        let hyper = Hyper::default();
+        let base = problem.fit(hyper, Likelihood::Profile);
+        let round = Round { groups: groups.clone(), base, library: vec![], generics: vec![] };
+        let sought = Sought { library: &library, generics: &[], drones: &[3, 2] };
+        let (beta, size_us, range_us) = (Vec::new(), 9.0, 9.0);
+        let free = RankedGeneric {
+            generic: 0,
+            gain: free_gain,
+            plain: free_gain,
+            beta,
+            size_us,
+            range_us,
+            hyper,
+        };
+        instead_of(&problem, &round, sought, &free).map(|pair| pair.names)
+    }
+
+    #[test]
+    fn two_effects_that_explain_together_what_a_free_shape_does_are_named() {
+        let library = [("wave", WAVE), ("line", LINE), ("square", SQUARE)];
+        assert_eq!(found(&library, 1.0), Some([vec!["wave"], vec!["line"]]));
+        assert_eq!(found(&library, 1000.0), None, "a free shape is better");
+        assert_eq!(found(&library[1..], 1.0), None, "and these two do not explain it");
+    }
+
+    #[test]
+    fn what_leaves_the_same_trace_as_one_of_them_stands_for_it() {
+        let library = [("wave", WAVE), ("line", LINE), ("its like", LINE)];
+        assert_eq!(found(&library, 1.0), Some([vec!["wave"], vec!["line", "its like"]]));
+    }
 }

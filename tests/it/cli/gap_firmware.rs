@@ -68,6 +68,30 @@ fn steps(verdict: &Value) -> Vec<Value> {
     verdict["steps"].as_array().unwrap().iter().map(|step| step["finding"].clone()).collect()
 }
 
+/// Names of the effects that are in a finding.
+fn names(finding: &Value) -> Vec<String> {
+    let class = finding["effects"].as_array().cloned().unwrap_or_default();
+    let all = class.iter().chain(finding.get("effect"));
+    all.filter_map(|name| name.as_str().map(str::to_owned)).collect()
+}
+
+#[test]
+fn two_plants_of_the_firmware_differ_in_momentum_drag_by_name() {
+    let verdict = between(STILL, SQUARE_LAW, &[]);
+    let found: Vec<Vec<String>> = steps(&verdict).iter().map(names).collect();
+    let is_found = |name: &str| found.iter().any(|names| names.iter().any(|one| one == name));
+    assert!(is_found("momentum-drag"), "{}", verdict["summary"]);
+    assert!(steps(&verdict).iter().all(|step| step["kind"] != "unknown"), "{}", verdict["summary"]);
+    let drag = verdict["steps"].as_array().unwrap().iter().find_map(|step| {
+        let own = step["finding"]["parameters"].as_array()?.iter();
+        own.clone().find(|one| one["name"] == "per_s").cloned()
+    });
+    // The plant's: 0.2 sqrt(rho A m g)/m.
+    let interval = &drag.unwrap()["value"];
+    let of = |key: &str| interval[key].as_f64().unwrap();
+    assert!(of("low") < 0.235 && 0.235 < of("high"), "{interval}");
+}
+
 #[test]
 fn an_updraft_all_over_is_nothing_that_the_simulated_logs_lack() {
     let verdict = between(UPDRAFT, STILL, &[]);
@@ -95,6 +119,9 @@ fn a_hover_in_still_air_is_mapped_as_still() {
     fs::write(bench.path("hover.toml"), HOVER_TEMPLATE).unwrap();
     flown(&bench, "hover", &["hover.toml", "--orientation", "30"], HOVER);
     let ended = bench.expect(0, &["analyze", "calibration", "hover", "--json"]);
-    let analysis = ended.json("updraft.analyze/1");
-    println!("{analysis:#}");
+    let analysis = ended.json("updraft.analyze/1")["analysis"].clone();
+    let mean = &analysis["flights"][1]["map"]["drones"][0]["mean"];
+    let of = |key: &str| mean[key].as_f64().unwrap();
+    // Its pack has no resistance, and what the autopilot takes for it moves: -0.5 m/s by BAT.VoltR.
+    assert!(of("value").abs() < 0.05 && of("se") < 0.05, "{mean}");
 }
