@@ -193,7 +193,7 @@ pub fn analyze_flight(
         density: input.density,
         leaning: input.leaning,
         lean_table: input.lean_table,
-        has_battery: input.sag.is_some(),
+        warm_up_us: input.sag.map(|sag| sag.warm_up_us),
         unknown_share: 0.0,
     };
     let aware = reference

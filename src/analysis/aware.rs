@@ -112,7 +112,8 @@ impl<'a> Aware<'a> {
         let battery = sag.and_then(|sag| battery::correction(windows(), sag));
         let unknown_share =
             battery.map_or(0.0, |battery| battery::unknown_share(windows(), battery));
-        let corrections = Corrections { has_battery: sag.is_some(), unknown_share, ..corrections };
+        let warm_up_us = sag.map(|sag| sag.warm_up_us);
+        let corrections = Corrections { warm_up_us, unknown_share, ..corrections };
         let slopes: Vec<f64> = reference
             .drones
             .iter()
@@ -269,7 +270,7 @@ impl<'a> Aware<'a> {
         }
         let without = |one: &&(Referred, Raw)| pack.is_none() || one.1.resting_v.is_none();
         let uncorrected = referred.iter().flatten().filter(without).count();
-        if self.corrections.has_battery && uncorrected > 0 {
+        if self.corrections.warm_up_us.is_some() && uncorrected > 0 {
             flag(
                 Quality::NoVoltage,
                 match (self.battery, uncorrected < known.len()) {

@@ -32,6 +32,11 @@ pub(super) const LOW_SHARE: f64 = 0.88;
 /// per cent, 5.5 us on a show drone (docs/physics.md, 5.4). Chosen.
 const LEAST_UNKNOWN: f64 = 0.01;
 
+/// What warming does to the pulse: standard error, us. Magnets lose a little flux (-10 to -20 us), windings
+/// gain resistance (+4 us); how much of it a flight still sees depends on how warm the motors take off.
+/// Chosen between.
+const WARM_UP_US: f64 = 3.0;
+
 /// Effect of a fall of voltage on the pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sag {
@@ -39,20 +44,24 @@ pub struct Sag {
     pub exponent: f64,
     /// Standard error of the exponent, common to the fleet.
     pub exponent_se: f64,
+    /// What motors that warm up do to the pulse: standard error, us.
+    pub warm_up_us: f64,
 }
 
 impl Sag {
     /// No correction: all that the voltage may have done is error.
-    pub const UNCORRECTED: Self = Self { exponent: 0.0, exponent_se: 1.0 };
+    pub const UNCORRECTED: Self = Self { exponent: 0.0, exponent_se: 1.0, warm_up_us: WARM_UP_US };
     /// Correction for logs of an unknown vehicle, which may be simulated with a battery that acts
     /// on nothing.
-    pub const UNKNOWN: Self = Self { exponent: 0.5, exponent_se: 0.5 };
+    pub const UNKNOWN: Self = Self { exponent: 0.5, exponent_se: 0.5, warm_up_us: WARM_UP_US };
+    /// Correction for ArduPilot's own simulator, whose motors stay as they are.
+    pub const SIMULATOR: Self = Self { exponent: 1.0, exponent_se: 0.05, warm_up_us: 0.0 };
 }
 
 impl Default for Sag {
     /// A controller that passes on a share of the voltage.
     fn default() -> Self {
-        Self { exponent: 1.0, exponent_se: 0.05 }
+        Self { exponent: 1.0, exponent_se: 0.05, warm_up_us: WARM_UP_US }
     }
 }
 

@@ -26,10 +26,6 @@ pub(super) const DENSITY: usize = 3;
 const NO_THRUST_US: f64 = 1000.0;
 /// Time constant of warming motors and controllers, s: 60 to 200 s (docs/physics.md, 5.4).
 const WARM_UP_S: f64 = 100.0;
-/// What warming does to the pulse: standard error, us. Magnets lose a little flux (-10 to -20 us), windings
-/// gain resistance (+4 us); how much of it a flight still sees depends on how warm the motors take off.
-/// Chosen between.
-const WARM_UP_US: f64 = 3.0;
 /// Drift where a battery acts on the pulse and its voltage is not known: standard error, us per
 /// minute of flight. A small drone's pack falls by half a percent a minute, one percent is 5.5 us.
 const UNKNOWN_VOLTAGE_US: f64 = 3.0;
@@ -61,8 +57,8 @@ pub(super) struct Corrections<'a> {
     pub(super) density: Option<Density>,
     pub(super) leaning: Option<Leaning>,
     pub(super) lean_table: Option<&'a LeanTable>,
-    /// Whether a battery acts on the pulse.
-    pub(super) has_battery: bool,
+    /// What motors that warm up do to the pulse, where a battery acts on it: standard error, us.
+    pub(super) warm_up_us: Option<f64>,
     /// Share of `u - 1000` that a pack whose voltage is not known may have changed, where the law is
     /// referred to a voltage: standard error ([`super::battery::unknown_share`]).
     pub(super) unknown_share: f64,
@@ -117,7 +113,7 @@ impl Corrections<'_> {
             sigmas[BATTERY] = pack.correction.exponent_se;
         }
         // Both kinds of drift are scaled to us in `refer`.
-        sigmas[DRIFT] = if self.has_battery { 1.0 } else { 0.0 };
+        sigmas[DRIFT] = if self.warm_up_us.is_some() { 1.0 } else { 0.0 };
         let known = self.leaning.is_some() || self.lean_table.is_some();
         sigmas[WIND] = if known { WIND_SHARE } else { UNKNOWN_WIND_SHARE };
         sigmas[DENSITY] = match self.density {
@@ -163,7 +159,7 @@ impl Corrections<'_> {
         };
         doubts_us[DENSITY] = (pulse_us - NO_THRUST_US) * log_density;
         let flown_s = raw.time_s.max(0.0);
-        let warm = WARM_UP_US * (1.0 - (-flown_s / WARM_UP_S).exp());
+        let warm = self.warm_up_us.unwrap_or_default() * (1.0 - (-flown_s / WARM_UP_S).exp());
         if let Some((pack, resting_v)) = pack.zip(raw.resting_v) {
             let (referred, per_exponent) = pack.refer(pulse_us, resting_v);
             pulse_us = referred;
@@ -242,7 +238,7 @@ mod tests {
     #[test]
     fn drift_is_doubted_where_a_battery_acts_and_more_without_its_voltage() {
         let late = Raw { time_s: 600.0, ..flown() };
-        let corrections = Corrections { has_battery: true, ..Corrections::default() };
+        let corrections = Corrections { warm_up_us: Some(3.0), ..Corrections::default() };
         assert_eq!(corrections.sigmas(None)[DRIFT], 1.0);
         assert_eq!(Corrections::default().sigmas(None)[DRIFT], 0.0);
         let doubt_us = corrections.refer(&late, None, SLOPE).doubts_us[DRIFT];

@@ -422,14 +422,14 @@ impl Messages {
 
     /// Battery voltage at rest as the autopilot estimates it, V, and the resistance of the pack
     /// that it found, ohm.
-    pub(super) fn resting(&self) -> (Option<Series>, Option<f64>) {
+    pub(super) fn resting(&self) -> (Option<Series>, Option<Series>) {
         let Some(mut rows) = self.rows("BAT").cloned() else { return (None, None) };
         if let Some(instances) = rows.column("Instance").map(<[f64]>::to_vec) {
             rows.retain(|row| instances.get(row) == Some(&0.0));
         }
         let positive = |value: f64| if value > 0.0 { value } else { f64::NAN };
-        let resistance = rows.series("Res", positive).and_then(|series| upper_median(series.value));
-        (rows.series("VoltR", positive), resistance.filter(|ohm| *ohm < HIGHEST_OHM))
+        let possible = |ohm: f64| if ohm < HIGHEST_OHM { positive(ohm) } else { f64::NAN };
+        (rows.series("VoltR", positive), rows.series("Res", possible))
     }
 
     /// GPS rows with a 3-D fix: (board time s, milliseconds since the GPS epoch).

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::align::{Evidence, align};
 use super::channels::{Ekf, Messages};
+use super::supply::Logged;
 use super::{Effort, Flight, FlightError, FlightOptions, Indicator, Loss, Series, Warning, pick};
 use crate::log::Log;
 use crate::numeric::{most, upper_median};
@@ -90,6 +91,13 @@ pub(super) fn load(
     let show = |time: f64| time - clock.offset_s;
     let (voltage_v, current_a) = messages.battery();
     let (resting_v, resistance_ohm) = messages.resting();
+    let (resting_v, resistance_ohm) = Logged {
+        voltage_v: voltage_v.as_ref(),
+        current_a: current_a.as_ref(),
+        resting_v,
+        resistance_ohm: resistance_ohm.as_ref(),
+    }
+    .at_rest(flight);
     let place = messages.places().into_iter().find(|(time, ..)| *time >= flight.0 - MARGIN_S);
     let Channels { pulse, pulse_max, pulse_min, ekf, roll, pitch, yaw, effort } = channels;
     let mut height_m = cut(ekf.height);

@@ -26,6 +26,7 @@ mod indicator;
 mod load;
 mod pick;
 mod series;
+mod supply;
 pub mod table;
 mod warning;
 
@@ -94,10 +95,10 @@ pub struct Flight {
     /// True vertical velocity of the air, m/s, up positive, where something beside the drone measured
     /// it.
     pub truth_up_mps: Option<Series>,
-    /// Battery voltage without load as the autopilot estimates it (`BAT.VoltR`), V. Unlike the
-    /// voltage at the terminals it does not follow the pulse.
+    /// Battery voltage without load, V: as the autopilot estimates it (`BAT.VoltR`), or by voltage and current
+    /// where its estimate has not settled. Unlike the voltage at the terminals it does not follow the pulse.
     pub resting_v: Option<Series>,
-    /// Resistance of the battery as the autopilot found it (`BAT.Res`, median), ohm.
+    /// Resistance of the battery, ohm: as the autopilot found it (`BAT.Res`, median), or by voltage and current.
     pub resistance_ohm: Option<f64>,
     /// Show stage (0..9), at its changes: (show time s, stage).
     pub stages: Vec<(f64, u8)>,

@@ -132,6 +132,58 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
     Ok(found)
 }
 
+/// Momentum drag along the rotors' axis, as ArduPilot's own simulator has it: effect, size, and the share that acts
+/// along the axis. Of other vehicles it is a stand-in for inflow, and not looked for.
+pub(super) const AXIAL_DRAG: [&str; 3] = ["momentum-drag", "per_s", "axial"];
+
+/// Sizes of momentum drag that are tried, as shares of what the vehicle has by default.
+const AXIAL_SIZES: [f64; 2] = [0.5, 1.0];
+
+/// Momentum drag on all axes, for vehicles of ArduPilot's own simulator.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub(super) fn axial_drag(
+    vehicle: &Vehicle,
+    scene: &Scene,
+) -> Result<Option<Candidate>, EffectError> {
+    let [name, size, axial] = AXIAL_DRAG;
+    let Some(effect) = find(name).filter(|_| vehicle.airframe.sitl.is_some()) else {
+        return Ok(None);
+    };
+    let definition = effect.definition();
+    let Some(parameter) = definition.parameter(size) else { return Ok(None) };
+    if vehicle.effects.get(name).is_some_and(|table| table.on) {
+        return Ok(None);
+    }
+    let (base, response) = (scene.pulses(vehicle)?, scene.response(vehicle)?);
+    let usual = (parameter.default)(vehicle);
+    let mut variants = Vec::new();
+    for share in AXIAL_SIZES {
+        let mut other = vehicle.clone();
+        select::set(&mut other, name, size, share * usual);
+        select::set(&mut other, name, axial, 1.0);
+        let Ok(pulses) = scene.pulses(&other) else { continue };
+        let mut felt = scene.response(&other)?;
+        response::add(&mut felt, -1.0, &response);
+        if is_hardly_felt(&felt, &response) {
+            felt.clear();
+        }
+        let column = pulses.less(&base);
+        variants.push(Variant { vehicle: Some(other), size: share * usual, column, felt });
+    }
+    let size = Size {
+        name: parameter.name,
+        unit: parameter.unit,
+        low: parameter.low,
+        high: parameter.high,
+        now: 0.0,
+        usual,
+    };
+    let size = Some(size);
+    Ok(Some(Candidate { name: definition.name, was_there: false, by_lean: false, size, variants }))
+}
+
 /// Share of the response that a form must change before the scatter between drones is asked about it.
 /// Chosen, not measured: a smaller change is lost in the estimate of the gusts.
 const FELT: f64 = 0.1;

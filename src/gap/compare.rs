@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::as_flown::AsFlown;
 use super::bins::{Bin, BinValues};
 use super::data::Data;
 use super::error::GapError;
@@ -30,6 +31,8 @@ pub enum Simulated<'a> {
         /// added is what it does to the model in the embedded simulator, or, without a plan, by the closed
         /// forms.
         flew: &'a Vehicle,
+        /// Whether another program flew it: its plant need not be the model's.
+        is_foreign: bool,
     },
     /// The model's closed forms at the climb that was flown, as there is no plan to simulate.
     Closed,
@@ -57,6 +60,9 @@ pub struct Comparison {
     pub vehicle: Vehicle,
     /// What makes drones differ by the model: effect, parameter, and its size.
     spreads: Vec<(String, String, f64)>,
+    /// Wind that another program simulated, where the measured drones flew in another, m/s.
+    other_wind_mps: Option<[f64; 2]>,
+    is_foreign: bool,
 }
 
 /// Power of thrust that `u - 1000` goes with at hover.
@@ -107,13 +113,24 @@ impl Comparison {
         // Logs of another simulation, and closed forms, are in still air.
         let flown_updraft_mps =
             if matches!(simulated, Simulated::Refly(_)) { updraft_mps } else { 0.0 };
-        let air = |wind: &Wind| [wind.mean_mps[0], wind.mean_mps[1], flown_updraft_mps];
-        let first = air(&wind(data, law, None));
+        let air = |[x_mps, y_mps]: [f64; 2]| [x_mps, y_mps, flown_updraft_mps];
+        let first = air(match simulated {
+            Simulated::Given { values, flew, is_foreign: true } => {
+                own_wind(data, values, flew, amsl_m)
+            }
+            _ => wind(data, law, None).mean_mps,
+        });
+        let as_flown = match simulated {
+            Simulated::Given { values, flew, is_foreign: true } => {
+                as_flown(data, values, &mean_drone(flew), (law, first, amsl_m))?
+            }
+            _ => None,
+        };
         let fly = |air_mps: [f64; 3]| -> Result<Vec<Vec<Option<BinValues>>>, GapError> {
             match simulated {
-                Simulated::Given { values, flew } => {
+                Simulated::Given { values, flew, .. } => {
                     let flew = mean_drone(flew);
-                    match plan.filter(|_| flew != vehicle) {
+                    match plan.filter(|_| flew != vehicle && as_flown.is_none()) {
                         Some(plan) => {
                             let without = fly_groups(data, &flew, plan, air_mps)?;
                             let with = fly_groups(data, &vehicle, plan, air_mps)?;
@@ -133,7 +150,7 @@ impl Comparison {
             // What the legs say of the wind is better than what hovers say by the model's law alone.
             let whole = data.keep(|group, bin| values[group][bin].is_some());
             let side = flat(&values);
-            flown_mps = air(&wind(&whole, law, Some((&side, first))));
+            flown_mps = air(wind(&whole, law, Some((&side, first))).mean_mps);
             values = fly(flown_mps)?;
         }
         let has = |group: usize, bin: usize| values[group][bin].is_some();
@@ -143,12 +160,12 @@ impl Comparison {
             return Err(GapError::NothingCommon);
         }
         let blown = wind(&data, law, Some((&side, flown_mps)));
-        let scene = Scene::measured(&data, &side, &blown, amsl_m);
+        let scene = Scene::measured(&data, &side, &blown, amsl_m).answering(as_flown.as_ref());
         let simulated_scene =
             scene.in_updraft(flown_updraft_mps).simulated(&data, &side, flown_mps);
         let scene = scene.in_updraft(updraft_mps);
         let closed = match simulated {
-            Simulated::Given { flew, .. } if plan.is_none() => {
+            Simulated::Given { flew, .. } if plan.is_none() || as_flown.is_some() => {
                 simulated_scene.pulses(&mean_drone(flew))?
             }
             _ => simulated_scene.pulses(&vehicle)?,
@@ -169,8 +186,25 @@ impl Comparison {
                 bins.iter().enumerate().map(apart).collect()
             })
             .collect();
-        let (wind, felt) = (blown, Vec::new());
-        Ok(Self { data, side, scene, wind, closure_us, felt, flown_mps, amsl_m, vehicle, spreads })
+        let is_foreign = matches!(simulated, Simulated::Given { is_foreign: true, .. });
+        let mut comparison = Self {
+            data,
+            side,
+            scene,
+            wind: blown,
+            closure_us,
+            felt: Vec::new(),
+            flown_mps,
+            amsl_m,
+            vehicle,
+            spreads,
+            other_wind_mps: None,
+            is_foreign,
+        };
+        if is_foreign && comparison.apart_rad() > OTHER_WIND_DEG.to_radians() {
+            comparison.other_wind_mps = Some([flown_mps[0], flown_mps[1]]);
+        }
+        Ok(comparison)
     }
 
     /// This comparison in a flight that is in an updraft all over, m/s, with the wind as it was read.
@@ -298,6 +332,8 @@ impl Comparison {
             amsl_m: self.amsl_m,
             vehicle: self.vehicle.clone(),
             spreads: self.spreads.clone(),
+            other_wind_mps: self.other_wind_mps,
+            is_foreign: self.is_foreign,
         }
     }
 
@@ -332,6 +368,7 @@ impl Comparison {
                 doubts.push(doubt);
             }
         }
+        doubts.extend(self.doubt_of_other_wind(vehicle, &closed)?);
         Ok(doubts)
     }
 
@@ -360,6 +397,36 @@ impl Comparison {
         }
         doubts.retain(|doubt| doubt.range() > LEAST_DOUBT_US);
         Ok(doubts)
+    }
+
+    /// Whether the simulated side is another program's.
+    pub(super) fn is_foreign(&self) -> bool {
+        self.is_foreign
+    }
+
+    /// Whether the two sides flew in different wind.
+    pub(super) fn is_in_other_wind(&self) -> bool {
+        self.other_wind_mps.is_some()
+    }
+
+    /// All that the difference in wind between the two sides does to the pulse, by the model: nobody knows how well
+    /// the model knows it, and nothing is named that it explains.
+    fn doubt_of_other_wind(
+        &self,
+        vehicle: &Vehicle,
+        closed: &Column,
+    ) -> Result<Option<Column>, EffectError> {
+        let Some(wind_mps) = self.other_wind_mps else { return Ok(None) };
+        let mut scene = self.scene.clone();
+        let groups = scene.signals.iter_mut().zip(&mut scene.relative_mps);
+        for ((signals, relative), group) in groups.zip(&self.data.groups) {
+            for ((signals, relative), bin) in signals.iter_mut().zip(relative).zip(&group.bins) {
+                *relative = [0, 1].map(|axis: usize| bin.velocity_mps[axis] - wind_mps[axis]);
+                signals.horizontal_mps = relative[0].hypot(relative[1]);
+            }
+        }
+        let doubt = closed.less(&scene.pulses(vehicle)?);
+        Ok((doubt.spread(&self.data.counts()) > LEAST_DOUBT_US).then_some(doubt))
     }
 
     /// Change of the pulse by one standard deviation of the updraft that the whole flight may be in: nobody
@@ -438,6 +505,42 @@ fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
     values.iter().map(|group| group.iter().flatten().copied().collect()).collect()
 }
 
+/// The simulated side as data of one drone in each group.
+fn as_data(data: &Data, values: &[Vec<Option<BinValues>>]) -> Data {
+    let mut own = data.keep(|group, bin| values[group][bin].is_some());
+    for (group, values) in own.groups.iter_mut().zip(flat(values)) {
+        group.measured = vec![values];
+    }
+    own
+}
+
+/// The wind that another program simulated, by its own leans, m/s.
+fn own_wind(
+    data: &Data,
+    values: &[Vec<Option<BinValues>>],
+    flew: &Vehicle,
+    amsl_m: f64,
+) -> [f64; 2] {
+    wind(&as_data(data, values), lean_law(&mean_drone(flew), amsl_m, 0.0), None).mean_mps
+}
+
+/// How another program's simulation answers climb, where its logs tell it.
+fn as_flown(
+    data: &Data,
+    values: &[Vec<Option<BinValues>>],
+    flew: &Vehicle,
+    (law, air_mps, amsl_m): (LeanLaw, [f64; 3], f64),
+) -> Result<Option<AsFlown>, EffectError> {
+    let data = data.keep(|group, bin| values[group][bin].is_some());
+    let side = flat(values);
+    let blown = wind(&data, law, Some((&side, air_mps)));
+    let scene = Scene::measured(&data, &side, &blown, amsl_m).simulated(&data, &side, air_mps);
+    AsFlown::of(&data, &side, &scene, flew)
+}
+
+/// Sides whose leans are further apart flew in different wind, degrees. Chosen: several times the error of
+/// an attitude, and 0.4 m/s on a drone that leans by 1.2 degrees per m/s.
+const OTHER_WIND_DEG: f64 = 0.5;
 /// Nuisance regressors with a smaller effect are left out, us. Far below the noise; saves time only.
 const LEAST_DOUBT_US: f64 = 1e-3;
 /// Change of the wind for the derivative by it, m/s: the strength of horizontal gusts. Chosen.

@@ -1,7 +1,7 @@
 //! The loop of the search: find, name, add, and again, until nothing passes.
 
 use super::candidates::{
-    Candidate, Size, Variant, drag_by_lean, library, of_the_air, read_otherwise,
+    Candidate, Size, Variant, axial_drag, drag_by_lean, library, of_the_air, read_otherwise,
 };
 use super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::contest::{Contest, before, entered};
@@ -11,6 +11,7 @@ use super::error::GapError;
 use super::generic::{Generic, all, drawn};
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper, WHITE};
+use super::pairs::{self, Pair};
 use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refine, slopes};
 use super::response::{self, Response, gusts_mps};
 use super::search::{FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, round};
@@ -154,6 +155,7 @@ enum In<'a> {
 }
 
 /// What is looked at in one round, and for what.
+#[derive(Clone)]
 struct Look {
     patterns: Vec<GroupPattern>,
     residual: Split,
@@ -220,6 +222,15 @@ impl Search<'_> {
             return Ok(false);
         }
         let rivals = rivals(&round, sought);
+        if let What::Free(free) = &decision.what
+            && self.comparison.is_foreign()
+            && let Some((look, pair, base)) =
+                self.pair_in_likelier_updraft(look.clone(), &round, free, &problem)?
+        {
+            self.take_pair(&look, &pair, &base, (decision.thresholds.library, rivals))?;
+            self.fly_again()?;
+            return Ok(true);
+        }
         match decision.what {
             What::Nothing => {}
             What::Effects { members, or_else } => {
@@ -267,6 +278,43 @@ impl Search<'_> {
         Ok(look)
     }
 
+    /// Two effects that explain as much as a free shape; in still air unless an updraft that one look found makes them
+    /// explain clearly more. That updraft stood for what both explain.
+    fn pair_in_likelier_updraft(
+        &mut self,
+        look: Look,
+        found: &Round,
+        free: &RankedGeneric,
+        problem: &Problem<'_>,
+    ) -> Result<Option<(Look, Pair, Solution)>, GapError> {
+        let there = pairs::instead_of(problem, found, look.sought(), free);
+        if !self.found.steps.is_empty() || self.found.updraft_mps == 0.0 {
+            return Ok(there.map(|pair| (look, pair, found.base.clone())));
+        }
+        let before = (self.comparison.clone(), self.found.clone());
+        self.found.updraft_mps = 0.0;
+        self.comparison = self.against_model()?;
+        let still = self.look(In::Present(None))?;
+        let problem = still.problem();
+        let round = round(&problem, still.hyper, still.sought(), true);
+        let best = round.generics.first();
+        let here = best.and_then(|free| {
+            pairs::instead_of(&problem.among(&round.groups), &round, still.sought(), free)
+        });
+        let likely = |base: &Solution, pair: &Pair| base.log_posterior() + pair.gain;
+        let is_better = match (&here, &there) {
+            (Some(here), Some(there)) => {
+                likely(&round.base, here) > likely(&found.base, there) - FLOOR_NATS
+            }
+            (here, _) => here.is_some(),
+        };
+        if is_better {
+            return Ok(here.map(|pair| (still, pair, round.base.clone())));
+        }
+        (self.comparison, self.found) = before;
+        Ok(there.map(|pair| (look, pair, found.base.clone())))
+    }
+
     /// What is left, and everything that may explain it.
     fn look(&mut self, updraft: In<'_>) -> Result<Look, GapError> {
         let Self { comparison, found, .. } = self;
@@ -292,7 +340,10 @@ impl Search<'_> {
         };
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         let mut candidates = library(&found.vehicle, &comparison.scene)?;
-        candidates.extend(read_otherwise(comparison, &found.vehicle)?);
+        candidates.extend(axial_drag(&found.vehicle, &comparison.scene)?);
+        if !comparison.is_in_other_wind() {
+            candidates.extend(read_otherwise(comparison, &found.vehicle)?);
+        }
         candidates.retain(|candidate| !refused.contains(&candidate.name));
         candidates.extend(of_the_air(&comparison.scene, &patterns, &quick.hyper));
         let generics = all(&comparison.scene, &comparison.headings());
@@ -381,6 +432,49 @@ impl Search<'_> {
             shape: Some(along_its_signal(comparison, variant, best.beta)),
         });
         Ok(())
+    }
+
+    /// Takes two effects into the model that explain together what neither does alone.
+    fn take_pair(
+        &mut self,
+        look: &Look,
+        pair: &Pair,
+        base: &Solution,
+        (threshold_nats, rivals): (f64, Vec<Rival>),
+    ) -> Result<(), GapError> {
+        let Self { comparison, found, .. } = self;
+        let mut next = found.vehicle.clone();
+        for member in &pair.members {
+            let candidate = &look.candidates[member.candidate];
+            let table = entered(candidate, member)
+                .and_then(|vehicle| vehicle.effects.get(candidate.name).cloned());
+            next.effects.extend(table.map(|table| (candidate.name.to_owned(), table)));
+        }
+        for (member, names) in pair.members.iter().zip(&pair.names) {
+            let candidate = &look.candidates[member.candidate];
+            if !found.parameters.iter().any(|known| known.effect == candidate.name) {
+                let before = before(candidate);
+                let more = parameters_of(comparison, &next, candidate.name, before, base)?;
+                found.parameters.extend(more);
+            }
+            let variant = &candidate.variants[member.variant];
+            found.steps.push(Step {
+                finding: finding(
+                    names.iter().map(|name| (*name).to_owned()).collect(),
+                    candidate.was_there,
+                    None,
+                ),
+                gain_nats: member.gain,
+                threshold_nats,
+                alpha: self.options.alpha,
+                size_us: member.size_us,
+                rivals: rivals.clone(),
+                shape: Some(along_its_signal(comparison, variant, member.beta)),
+            });
+            found.hyper = member.hyper;
+        }
+        found.vehicle = next;
+        found.refit(comparison)
     }
 
     /// Takes a free shape into the regressors.
@@ -488,7 +582,9 @@ impl InUpdraft {
         let Ok(residual) = comparison.residual(&found.vehicle, found.gusts_mps) else {
             return Ok(None);
         };
-        let doubts = refine::doubts(&comparison, &found.vehicle, &found.parameters)?;
+        let Ok(doubts) = refine::doubts(&comparison, &found.vehicle, &found.parameters) else {
+            return Ok(None);
+        };
         let Some(doubt) = doubts.first() else { return Ok(None) };
         // The doubt counts from still air, and the residual from the updraft that it is taken in.
         let share = updraft_mps / UPDRAFT_DOUBT_MPS;

@@ -21,6 +21,12 @@ const LEAST_SLOPE: f64 = 0.004;
 const ROUNDS: usize = 24;
 /// A law is made to fit the trim at every whole speed up to this, m/s: show drones do not fly in more wind.
 const LAW_SPEEDS_MPS: u32 = 10;
+/// Air speed at which the load of climbs is read from the trim, m/s: a usual wind.
+const LOAD_SPEED_MPS: f64 = 4.0;
+/// Climb at which it is read, m/s: the fastest rung of a ladder.
+const LOAD_CLIMB_MPS: f64 = 3.5;
+/// No descent takes more of the weight off the rotors, as a share.
+const LEAST_LOAD: f64 = 0.3;
 /// Fastest wind that is believed, m/s: no small multirotor holds its place in more.
 const FASTEST_MPS: f64 = 25.0;
 
@@ -37,6 +43,9 @@ pub struct LeanLaw {
     pub body_share: f64,
     /// Updraft that the law holds in, m/s: climbs are relative to it.
     pub updraft_mps: f64,
+    /// What the rotors carry in a climb, as far as it is known: `1 + p V + q V|V|` of the weight (p, q). Who pulls
+    /// more leans less in the same wind.
+    pub load: [f64; 2],
 }
 
 impl LeanLaw {
@@ -57,6 +66,7 @@ impl LeanLaw {
             square: density * (box_m2 + body_m2) / (vehicle.airframe.mass_kg * GRAVITY),
             body_share: body_m2 / (box_m2 + body_m2).max(1e-9),
             updraft_mps,
+            load: [0.0; 2],
         }
     }
 
@@ -67,13 +77,35 @@ impl LeanLaw {
         let mut slopes = Vec::new();
         for speed in 1..=LAW_SPEEDS_MPS {
             let speed_mps = f64::from(speed);
-            let velocity_mps = Vector3::new(speed_mps, 0.0, -updraft_mps);
+            let velocity_mps = Vector3::new(speed_mps, 0.0, 0.0);
             let level = Condition { velocity_mps, density_ratio, ..Condition::default() };
             slopes.push((speed_mps, trim.balance(&level)?.lean.x.asin() / speed_mps));
         }
         let line = Line::through(slopes)?;
-        let (linear, square) = (line.intercept(), line.slope());
-        Some(Self { linear, square, body_share: 0.0, updraft_mps })
+        let mut less = |climb_mps: f64| {
+            let lean = |trim: &mut Trim, climb_mps: f64| {
+                let velocity_mps = Vector3::new(LOAD_SPEED_MPS, 0.0, climb_mps);
+                let condition = Condition { velocity_mps, density_ratio, ..Condition::default() };
+                Some(trim.balance(&condition)?.lean.x.asin())
+            };
+            Some(lean(&mut trim, 0.0)? / lean(&mut trim, climb_mps)? - 1.0)
+        };
+        let (up, down) = (less(LOAD_CLIMB_MPS)?, less(-LOAD_CLIMB_MPS)?);
+        // What is odd in the climb at its half tells the line from the square.
+        let odd = 0.5 * (up - down);
+        let half = 0.5 * (less(0.5 * LOAD_CLIMB_MPS)? - less(-0.5 * LOAD_CLIMB_MPS)?);
+        let linear = (4.0 * half - odd) / LOAD_CLIMB_MPS;
+        let square = (odd / LOAD_CLIMB_MPS - linear) / LOAD_CLIMB_MPS;
+        let (intercept, slope) = (line.intercept(), line.slope());
+        let load = [linear, square];
+        Some(Self { linear: intercept, square: slope, body_share: 0.0, updraft_mps, load })
+    }
+
+    /// What the rotors carry in a climb over ground, as a share of hover in still air.
+    fn load(self, climb_mps: f64) -> f64 {
+        let [linear, square] = self.load;
+        let climb_mps = climb_mps - self.updraft_mps;
+        (1.0 + linear * climb_mps + square * climb_mps * climb_mps.abs()).max(LEAST_LOAD)
     }
 
     fn box_square(self) -> f64 {
@@ -88,7 +120,8 @@ impl LeanLaw {
     pub(super) fn lean(self, air_mps: [f64; 2], climb_mps: f64) -> [f64; 2] {
         let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(climb_mps - self.updraft_mps);
         let linear = self.linear + self.body_square() * whole_mps;
-        air_mps.map(|part| (linear + self.box_square() * part.abs()) * part)
+        let load = self.load(climb_mps);
+        air_mps.map(|part| (linear + self.box_square() * part.abs()) * part / load)
     }
 
     /// Change of the lean with the air at a horizontal air speed, rad/(m/s).
@@ -101,15 +134,17 @@ impl LeanLaw {
         let axial_mps = climb_mps - self.updraft_mps;
         let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(axial_mps).max(1e-6);
         let body = self.body_square();
+        let load = self.load(climb_mps);
         Matrix2::from_fn(|row, column| {
             let turned = body * air_mps[row] * air_mps[column] / whole_mps;
             let own = self.linear + body * whole_mps + 2.0 * self.box_square() * air_mps[row].abs();
-            turned + if row == column { own } else { 0.0 }
+            (turned + if row == column { own } else { 0.0 }) / load
         })
     }
 
     /// Horizontal air over ground-fixed axes by the lean of the thrust axis, m/s.
     pub(super) fn air(self, lean_rad: [f64; 2], climb_mps: f64) -> [f64; 2] {
+        let lean_rad = lean_rad.map(|lean| lean * self.load(climb_mps));
         let mut speed_mps: f64 = 1.0;
         let mut air_mps = [0.0; 2];
         for _ in 0..ROUNDS {
@@ -321,6 +356,17 @@ mod tests {
             let [read_mps, _] = law.air([lean_rad, 0.0], 0.0);
             let doubt_mps = LEAST_DOUBT_MPS.hypot(LAW_DOUBT * speed_mps);
             assert!((read_mps - speed_mps).abs() < 0.2 * doubt_mps, "{speed_mps}: {read_mps}");
+            // Climbing, its drag weighs on the rotors: it leans by 14 degrees at -3.5 m/s and by 10 at 3.5.
+            for climb_mps in [-3.5, -1.0, 2.0, 3.5] {
+                let velocity_mps = Vector3::new(speed_mps, 0.0, climb_mps);
+                let climbing = Condition { velocity_mps, ..Condition::default() };
+                let lean_rad = trim.balance(&climbing).unwrap().lean.x.asin();
+                let [read_mps, _] = law.air([lean_rad, 0.0], climb_mps);
+                let off_mps = read_mps - speed_mps;
+                assert!(off_mps.abs() < 0.2 * doubt_mps, "{speed_mps}, {climb_mps}: {read_mps}");
+                let back_rad = law.lean([read_mps, 0.0], climb_mps)[0];
+                assert!((back_rad - lean_rad).abs() < 1e-6, "{back_rad} for {lean_rad}");
+            }
         }
     }
 }

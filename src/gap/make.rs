@@ -86,7 +86,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
             if let Some(value_us) = constant_us(values.iter().flatten().flatten(), exponent) {
                 return Err(GapError::ConstantSimulated { value_us });
             }
-            Simulated::Given { values, flew: input.vehicle }
+            Simulated::Given { values, flew: input.vehicle, is_foreign: true }
         }
         (None, Some(plan)) => Simulated::Refly(plan),
         (None, None) if input.table.is_some() => Simulated::Closed,

@@ -1,6 +1,7 @@
 //! Search for missing physics: where simulation and measurement disagree, which effect is missing,
 //! and what cannot be known.
 
+mod as_flown;
 mod backward;
 mod bins;
 mod candidates;
@@ -31,6 +32,7 @@ pub mod next;
 mod noise;
 #[cfg(test)]
 mod null_flights;
+mod pairs;
 mod refine;
 mod refly;
 mod regimes;

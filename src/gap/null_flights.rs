@@ -48,7 +48,7 @@ fn comparison(plan: &Plan, vehicle: &Vehicle) -> Comparison {
     Comparison::new(
         &data,
         vehicle,
-        &Simulated::Given { values: vec![side], flew: vehicle },
+        &Simulated::Given { values: vec![side], flew: vehicle, is_foreign: false },
         Some(plan),
     )
     .unwrap()

@@ -3,7 +3,7 @@
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use super::bins::Bin;
-use super::candidates::set;
+use super::candidates::{AXIAL_DRAG, set};
 use super::compare::Comparison;
 use super::error::GapError;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
@@ -196,8 +196,11 @@ pub(super) fn parameters_of(
 ) -> Result<Vec<Parameter>, GapError> {
     let Some(known) = find(effect) else { return Ok(Vec::new()) };
     let definition = known.definition();
-    let Sought::Shape { size, shape, .. } = &definition.sought else {
-        return Ok(Vec::new());
+    let [axial_drag, per_s, _] = AXIAL_DRAG;
+    let (size, shape) = match &definition.sought {
+        Sought::Shape { size, shape, .. } => (*size, shape),
+        _ if definition.name == axial_drag => (per_s, &None),
+        _ => return Ok(Vec::new()),
     };
     let of = |name: &str| parameter(definition, name);
     let mut found: Vec<Parameter> =

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::as_flown::AsFlown;
 use super::bins::{Bin, BinValues};
 use super::data::Data;
 use super::gls::{Column, Pulses};
@@ -39,6 +40,8 @@ pub struct Scene {
     /// Resistance of the batteries as the logs have it, ohm.
     pub resistance_ohm: Option<f64>,
     neighbours: Vec<Vec<f64>>,
+    /// What the logs of another program's simulation have more than the model that stands for it.
+    as_flown: Option<AsFlown>,
 }
 
 impl Scene {
@@ -91,7 +94,18 @@ impl Scene {
             resting_v,
             resistance_ohm,
             neighbours,
+            as_flown: None,
         }
+    }
+
+    /// The same flight of vehicles that answer climb as another program's logs do.
+    #[must_use]
+    pub(super) fn answering(self, as_flown: Option<&AsFlown>) -> Self {
+        Self { as_flown: as_flown.cloned(), ..self }
+    }
+
+    fn steady(&self, vehicle: &Vehicle) -> Result<Steady, EffectError> {
+        Ok(Steady::of(vehicle)?.answering(self.as_flown.as_ref()))
     }
 
     /// Only some bins, chosen by the places of group and bin.
@@ -192,7 +206,7 @@ impl Scene {
     /// # Errors
     /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
-        let mut steady = Steady::of(vehicle)?;
+        let mut steady = self.steady(vehicle)?;
         let battery = hover_ah_per_s(vehicle);
         let hover_ah_per_s = battery.unwrap_or_default();
         let supply = |signals: &Signals, volts: Option<f64>| match volts {
@@ -249,7 +263,8 @@ impl Scene {
         for group in 0..self.signals.len() {
             let drones = self.neighbours[group].len().max(1) as f64;
             let own = |of: &Definition| if of.name == effect { drones.sqrt().recip() } else { 0.0 };
-            let mut steady = Steady::deviating(vehicle, own)?;
+            let deviating = Steady::deviating(vehicle, own)?;
+            let mut steady = deviating.answering(self.as_flown.as_ref());
             let supply = |at: &Moment| Supply::Used(at.signals.charge_used_ah);
             let pulse = |at: Moment| steady.pulse_us(&at, supply(&at), 0.0);
             of_groups.push(self.moments(group).map(pulse).collect::<Result<_, _>>()?);
@@ -266,7 +281,7 @@ impl Scene {
         let mut calm = vehicle.clone();
         // What shakes has a scatter of its own, which hides how it answers gusts.
         calm.effects.retain(|name, _| !shakes(name));
-        let mut steady = Steady::of(&calm)?;
+        let mut steady = self.steady(&calm)?;
         let groups = 0..self.signals.len();
         groups.map(|group| self.moments(group).map(|at| steady.response(&at)).collect()).collect()
     }
@@ -280,7 +295,7 @@ impl Scene {
         vehicle: &Vehicle,
         shifts_mps: [f64; COUNT],
     ) -> Result<Vec<Vec<[f64; COUNT]>>, EffectError> {
-        let mut steady = Steady::of(vehicle)?;
+        let mut steady = self.steady(vehicle)?;
         let mut of = |at: Moment| -> Result<[f64; COUNT], EffectError> {
             let mut pulses_us = [0.0; COUNT];
             for (pulse_us, shift_mps) in pulses_us.iter_mut().zip(shifts_mps) {

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::as_flown::AsFlown;
 use super::response::Response;
 use crate::effects::{Definition, EffectError, Signals, Supply};
 use crate::sim::plant::trim::{Balance, Condition, Trim};
@@ -57,6 +58,8 @@ pub(super) struct Steady {
     trim: Trim,
     /// Power of thrust that `u - 1000` goes with at hover.
     exponent: f64,
+    /// What another program's logs have more than the vehicle.
+    as_flown: Option<AsFlown>,
 }
 
 impl Steady {
@@ -66,7 +69,19 @@ impl Steady {
     /// Effects of the vehicle that are not valid.
     pub(super) fn of(vehicle: &Vehicle) -> Result<Self, EffectError> {
         let exponent = super::compare::thrust_exponent(vehicle);
-        Ok(Self { trim: Trim::of(vehicle)?, exponent })
+        Ok(Self { trim: Trim::of(vehicle)?, exponent, as_flown: None })
+    }
+
+    /// The same of vehicles that answer climb as another program's logs do.
+    pub(super) fn answering(self, as_flown: Option<&AsFlown>) -> Self {
+        Self { as_flown: as_flown.cloned(), ..self }
+    }
+
+    fn condition(&self, at: &Moment, supply: Supply, neighbours: f64) -> Condition {
+        let mut condition = at.condition(supply, neighbours);
+        let more_mps2 = self.as_flown.as_ref().map_or(0.0, |own| own.at(at.signals.climb_mps));
+        condition.acceleration_mps2.z += more_mps2;
+        condition
     }
 
     /// Steady pulses of a drone that deviates from the fleet by so many standard deviations of each effect.
@@ -78,7 +93,8 @@ impl Steady {
         own: impl Fn(&Definition) -> f64,
     ) -> Result<Self, EffectError> {
         let exponent = super::compare::thrust_exponent(vehicle);
-        Ok(Self { trim: Trim::deviating(vehicle, Vector3::zeros(), own)?, exponent })
+        let trim = Trim::deviating(vehicle, Vector3::zeros(), own)?;
+        Ok(Self { trim, exponent, as_flown: None })
     }
 
     /// The pulse at a moment, brought to level as measured pulses are, us.
@@ -101,17 +117,19 @@ impl Steady {
     /// # Errors
     /// The vehicle cannot even hover in that air.
     pub(super) fn balance(&mut self, at: &Moment, neighbours: f64) -> Result<Balance, EffectError> {
-        let mut of =
-            |moment: &Moment| self.trim.balance(&moment.condition(Supply::Used(0.0), neighbours));
-        if let Some(balance) = of(at) {
+        let supply = Supply::Used(0.0);
+        let first = self.condition(at, supply, neighbours);
+        if let Some(balance) = self.trim.balance(&first) {
             return Ok(balance);
         }
         let wanted_mps = at.signals.climb_mps;
-        let mut found = of(&at.climbing(0.0)).ok_or_else(|| at.refused())?;
+        let hover = self.condition(&at.climbing(0.0), supply, neighbours);
+        let mut found = self.trim.balance(&hover).ok_or_else(|| at.refused())?;
         let (mut flown, mut refused) = (0.0, 1.0);
         for _ in 0..HALVINGS {
             let share = f64::midpoint(flown, refused);
-            match of(&at.climbing(share * wanted_mps)) {
+            let slower = self.condition(&at.climbing(share * wanted_mps), supply, neighbours);
+            match self.trim.balance(&slower) {
                 Some(balance) => (found, flown) = (balance, share),
                 None => refused = share,
             }
@@ -130,7 +148,7 @@ impl Steady {
         supply: Supply,
         neighbours: f64,
     ) -> Result<f64, EffectError> {
-        let condition = at.condition(supply, neighbours);
+        let condition = self.condition(at, supply, neighbours);
         let pulse_us =
             self.trim.pulse_us(balance, &condition).ok_or_else(|| at.refused())? - IDLE_US;
         let cos = (1.0 - balance.lean.norm_squared()).max(0.0).sqrt();

@@ -11,10 +11,6 @@ use crate::effects::select::value_of;
 /// Fewer drones than this are all fitted, and none is held out.
 const FEWEST_TO_HOLD: usize = 8;
 
-/// Sides whose leans are further apart flew in different wind, degrees. Chosen: several times the error of
-/// an attitude, and 0.4 m/s on a drone that leans by 1.2 degrees per m/s.
-const OTHER_WIND_DEG: f64 = 0.5;
-
 /// Warning to the reader of a verdict. In `verdict.json` it stands as its sentence.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -96,8 +92,8 @@ impl fmt::Display for Warning {
             Self::OtherWind { lean_deg } => write!(
                 f,
                 "the drones lean by {lean_deg:.1} degrees more or less than the simulated ones in hover \
-                 and vertical flight: the two sides flew in different wind, and what wind does is mixed \
-                 with what the simulation lacks"
+                 and vertical flight: the two sides flew in different wind, and nothing is named that this \
+                 explains"
             ),
             Self::Tables => f.write_str(
                 "tables have no plan that could be flown again: the model's side is its closed forms at \
@@ -145,8 +141,8 @@ pub(super) fn warnings(data: &Data, found: &Found, input: &Input<'_>) -> Vec<War
         }
     }
     if input.simulated.is_some() {
-        let lean_deg = found.comparison.apart_rad().to_degrees();
-        if lean_deg > OTHER_WIND_DEG {
+        if found.comparison.is_in_other_wind() {
+            let lean_deg = found.comparison.apart_rad().to_degrees();
             warnings.push(Warning::OtherWind { lean_deg });
         }
     }

@@ -71,7 +71,7 @@ impl<'a> Scenery<'a> {
                 first.map_or_else(Vec::new, |values| values.iter().copied().map(Some).collect())
             })
             .collect();
-        let simulated = Simulated::Given { values: side, flew: &known.model };
+        let simulated = Simulated::Given { values: side, flew: &known.model, is_foreign: false };
         let mut comparison = Comparison::new(&data, &known.model, &simulated, Some(plan))?;
         // The wind is known here, and needs no estimate from the leans.
         let air =

@@ -31,5 +31,7 @@ pub(super) fn density(plan: &Plan, vehicle: Option<&Vehicle>) -> Density {
 /// that does nothing; real ones have one that does.
 pub(super) fn sag(is_simulated: bool, vehicle: Option<&Vehicle>) -> Option<Sag> {
     let has_battery = vehicle.is_some_and(|vehicle| looks_at(vehicle, Signal::ChargeUsed));
-    (has_battery || !is_simulated).then(Sag::default)
+    let by_firmware = vehicle.is_some_and(|vehicle| vehicle.airframe.sitl.is_some());
+    let sag = if by_firmware { Sag::SIMULATOR } else { Sag::default() };
+    (has_battery || !is_simulated).then_some(sag)
 }

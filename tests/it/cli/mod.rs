@@ -23,6 +23,7 @@ mod fleet_upload;
 mod flights;
 mod foreign_text;
 mod gap;
+mod gap_firmware;
 mod gap_next;
 mod guided;
 mod help;

@@ -7,6 +7,7 @@ use super::{Change, Effect, InFlight, Now, Reference, Signals, Start, momentum};
 use crate::vehicle::Airframe;
 
 const SHARE: usize = 0;
+const ADVANCE: usize = 1;
 /// Thrust over that in still air below which a rotor has no state worth a correction.
 const LEAST_THRUST: f64 = 0.05;
 
@@ -19,6 +20,13 @@ pub(super) struct TranslationalLift;
 struct Rotor {
     disc: Disc,
     share: f64,
+    advance: f64,
+}
+
+/// What the advancing blades make of the thrust at an edgewise speed over the induced velocity in hover: the
+/// thrust of a blade goes with 1 + 3/2 of the squared advance ratio (Leishman, ch. 2).
+fn advancing(share: f64, advance: f64, edgewise: f64) -> f64 {
+    1.0 + advance * share * edgewise * edgewise
 }
 
 impl Effect for TranslationalLift {
@@ -31,26 +39,38 @@ impl Effect for TranslationalLift {
                 less induced velocity (Glauert). The saved inflow is thrust: hovering in wind needs \
                 a smaller pulse. In constant wind it hides in u0; a gust of 1 m/s at 5 m/s looks \
                 like a sink of almost half as much.",
-            formula: "v_i sqrt(v² + (V + v_i)²) = v_h²;  T = k w² - k2 w (V + v_i)",
+            formula: "v_i sqrt(v² + (V + v_i)²) = v_h²;  T = (k w² - k2 w (V + v_i)) (1 + a s (v/v_h)²)",
             source: "Glauert 1926; Leishman, Principles of Helicopter Aerodynamics, ch. 2",
             class: Class::Horizontal,
             signals: &[Signal::Horizontal, Signal::Climb, Signal::Tilt],
-            parameters: &[Parameter {
-                name: "inflow_share",
-                unit: "",
-                what: "share of the geometric thrust lost to the inflow in hover",
-                low: LEAST_SHARE,
-                high: MOST_SHARE,
-                default: share_of,
-                role: Some(Role::WindLift),
-            }],
+            parameters: &[
+                Parameter {
+                    name: "inflow_share",
+                    unit: "",
+                    what: "share of the geometric thrust lost to the inflow in hover",
+                    low: LEAST_SHARE,
+                    high: MOST_SHARE,
+                    default: share_of,
+                    role: Some(Role::WindLift),
+                },
+                Parameter {
+                    name: "advance",
+                    unit: "",
+                    what: "thrust that the advancing blades add where the edgewise speed is the \
+                        induced velocity in hover, over the share",
+                    low: 0.0,
+                    high: 3.0,
+                    default: |_| 0.0,
+                    role: None,
+                },
+            ],
             hooks: &[Hook::Loads],
             shown: (Signal::Horizontal, 0.0, 8.0),
             sought: Sought::Shape {
                 size: "inflow_share",
                 sizes: |_| &[0.02, 0.5],
                 usual: None,
-                shape: None,
+                shape: Some(("advance", &[0.0, 1.0])),
             },
         }
     }
@@ -60,11 +80,17 @@ impl Effect for TranslationalLift {
         let axial = signals.axial_mps() / induced_mps;
         let edgewise = signals.edgewise_mps() / induced_mps;
         let flow = |edgewise| axial + momentum::induced(axial, edgewise);
+        let more = advancing(values[SHARE], values[ADVANCE], edgewise);
         flow_us(at, values[SHARE], flow(edgewise)) - flow_us(at, values[SHARE], flow(0.0))
+            + at.thrust_us(more.recip())
     }
 
     fn start(&self, start: &Start<'_>, airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
-        Some(Box::new(Rotor { disc: Disc::of(airframe), share: start.values[SHARE] }))
+        Some(Box::new(Rotor {
+            disc: Disc::of(airframe),
+            share: start.values[SHARE],
+            advance: start.values[ADVANCE],
+        }))
     }
 }
 
@@ -74,7 +100,8 @@ impl InFlight for Rotor {
         let without = momentum::at_speed(self.share, axial, 0.0);
         let with = momentum::at_speed(self.share, axial, edgewise);
         if without.thrust > LEAST_THRUST {
-            change.thrust *= with.thrust / without.thrust;
+            change.thrust *=
+                with.thrust / without.thrust * advancing(self.share, self.advance, edgewise);
             change.torque +=
                 self.disc.merit * (with.thrust * with.flow - without.thrust * without.flow);
         }
