@@ -183,12 +183,9 @@ impl Look {
 impl Search<'_> {
     /// Looks once and takes up what passes; whether the search goes on.
     fn takes_step(&mut self, step: usize) -> Result<bool, GapError> {
-        let t0 = std::time::Instant::now(); //TRACE
         let look = self.look_in_likelier_updraft()?;
-        eprintln!("TRACE look {:.2}", t0.elapsed().as_secs_f64()); //TRACE
         let (problem, sought) = (look.problem(), look.sought());
         let round = round(&problem, look.hyper, sought, true);
-        eprintln!("TRACE round {:.2}", t0.elapsed().as_secs_f64()); //TRACE
         let problem = problem.among(&round.groups);
         let likely = round.base.log_posterior();
         if let Some((before, was)) = self.last.take()
@@ -203,19 +200,9 @@ impl Search<'_> {
         self.found.hyper = round.base.hyper;
         let material_us = material_us(&look.patterns, &round.base.hyper);
         let mut decision = decide(&problem, &round, sought, material_us, self.options, step);
-        eprintln!(
-            "TRACE decide {:.2} best {} {:.1} plain {:.1} free {:.1} W {:.2}",
-            t0.elapsed().as_secs_f64(),
-            round.library.first().map_or("", |b| sought.library[b.candidate].name),
-            round.best(),
-            round.library.first().map_or(0.0, |b| b.plain),
-            round.best_generic(),
-            self.found.updraft_mps
-        ); //TRACE
         let (found, comparison) = (&self.found, &self.comparison);
         decision.what =
             Contest { found, comparison, sought, round: &round }.settle(&problem, decision.what)?;
-        eprintln!("TRACE contest {:.2}", t0.elapsed().as_secs_f64()); //TRACE
         self.found.rest = rest(&round, sought, &decision.thresholds);
         if step == self.options.most_steps || matches!(decision.what, What::Nothing) {
             self.found.comparison = self.comparison.clone();
@@ -270,7 +257,6 @@ impl Search<'_> {
         self.comparison = self.against_model()?;
         // In the same noise: how drones scatter must not choose an updraft.
         let still = self.look(In::Present(Some(&look.patterns)))?;
-        eprintln!("TRACE still {:.1} there {:.1}", explains(&still), explains(&look)); //TRACE
         if explains(&still) > explains(&look) {
             return self.look(In::Present(None));
         }
@@ -367,12 +353,12 @@ impl Search<'_> {
             let fit = |hyper: Hyper, updraft_mps: f64| {
                 InUpdraft::fitted(comparison, &patterns, found, free, hyper, updraft_mps)
             };
+            let Some(here) = fit(solution.hyper, found.updraft_mps)? else { break };
             let Some(best) = likeliest(fit, &starts, solution.hyper)? else { break };
-            solution = best.solution;
-            let moved_mps = best.updraft_mps - found.updraft_mps;
-            found.updraft_mps = best.updraft_mps;
+            let before_mps = std::mem::replace(&mut found.updraft_mps, best.updraft_mps);
             starts = vec![best.updraft_mps];
-            if moved_mps.abs() < UPDRAFT_SETTLED_MPS {
+            if (best.updraft_mps - before_mps).abs() < UPDRAFT_SETTLED_MPS {
+                solution = best.solution;
                 break;
             }
             let flown = self.against_model()?;
@@ -380,11 +366,24 @@ impl Search<'_> {
                 of.data.groups.iter().map(|group| group.bins.len()).collect()
             };
             // Where the model cannot follow the command in that updraft, regressors would lose their bins.
-            self.comparison = if free.is_empty() || bins(&flown) == bins(&self.comparison) {
-                flown
+            let (there, patterns) = if bins(&flown) == bins(&self.comparison) {
+                (flown, patterns)
+            } else if free.is_empty() {
+                let patterns = flown.patterns(&self.found.vehicle, self.found.gusts_mps)?;
+                (flown, patterns)
             } else {
-                self.comparison.clone().in_updraft(best.updraft_mps)
+                (self.comparison.clone().in_updraft(best.updraft_mps), patterns)
             };
+            // What its steady states seemed to explain the model must explain when it is flown.
+            let (hyper, updraft_mps) = (best.solution.hyper, best.updraft_mps);
+            let again =
+                InUpdraft::fitted(&there, &patterns, &self.found, free, hyper, updraft_mps)?;
+            if again.is_none_or(|again| again.likely < here.likely - SAME_NATS) {
+                self.found.updraft_mps = before_mps;
+                break;
+            }
+            solution = best.solution;
+            self.comparison = there;
         }
         Ok(solution)
     }
@@ -600,11 +599,6 @@ impl InUpdraft {
         let problem = Problem::new(patterns, &split).doubting(&doubts).with(free);
         let solution = problem.fit(hyper, Likelihood::Profile);
         let likely = solution.log_posterior();
-        eprintln!(
-            "TRACE   W {updraft_mps:.3} likely {likely:.1} to {:.2} hyper {:?}",
-            UPDRAFT_DOUBT_MPS * problem.first_doubt(&solution).unwrap_or_default(),
-            solution.hyper.0.map(|v| (v.exp() * 1000.0).round() / 1000.0)
-        ); //TRACE
         let most_mps = UPDRAFT_DOUBT_MPS * problem.first_doubt(&solution).unwrap_or_default();
         Ok(likely.is_finite().then_some(Self { updraft_mps, solution, likely, most_mps }))
     }
@@ -630,6 +624,9 @@ const FLOWN_ROUNDS: usize = 2;
 const UPDRAFT_ROUNDS: usize = 6;
 /// Longest step of the updraft in one round, m/s: a slope is no more than a hint. Chosen.
 const UPDRAFT_STEP_MPS: f64 = 1.0;
+/// By how much less likely a flight may become where its updraft is flown, nats: what the drones' answers to gusts
+/// make of it there. Chosen, three times [`WORSE_NATS`].
+const SAME_NATS: f64 = 6.0;
 /// A step of the updraft that is none, m/s: far below what a flight tells of it.
 const UPDRAFT_SETTLED_MPS: f64 = 0.01;
 

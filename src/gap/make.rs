@@ -99,7 +99,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     // A sensor that is off is repaired first: the pulse is then compared at the right speeds. So is a
     // lean that is off: the pulse is then compared in the right wind, at the right tilt.
-    let t0 = std::time::Instant::now(); //TRACE
     let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
     let wind = super::lean_channel::found(&before);
     let leans = super::lean_channel::step(&before, &wind, options.alpha);
@@ -114,7 +113,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     }
     add_others(&mut repaired, leans.as_slice());
     let mut found = search(&train, &repaired, &simulated, input.plan, options)?;
-    eprintln!("TRACE make let case = Case  {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let case = Case {
         original: input.vehicle,
         simulated: &simulated,
@@ -122,9 +120,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         found: &found,
         seed: options.seed,
     };
-    eprintln!("TRACE make let shrink = case {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let shrink = case.gap(&train, &held)?;
-    eprintln!("TRACE make let whole = Comp {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let (plan, updraft_mps) = (input.plan, found.updraft_mps);
     let whole =
         Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps)?.feeling(&found.felt);
@@ -134,7 +130,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         found.refit(&whole)?;
         super::explain::settle(&mut found);
     }
-    eprintln!("TRACE make let held_slots: Vec {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let held_slots: Vec<u16> = held.groups.iter().flat_map(|group| group.slots.clone()).collect();
     let mut left_out = input.left_out.clone();
     left_out.extend(data.left_out.iter().cloned());
@@ -146,7 +141,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         held_out: held_slots.clone(),
         left_out,
     };
-    eprintln!("TRACE make let (differences {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let (differences, spread) = if found.extras.is_empty() {
         drones(&whole, &found, input.vehicle, |slot| held_slots.contains(&slot))?
     } else {
@@ -155,7 +149,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let mut steps = found.steps.clone();
     steps.extend(spread);
     steps.extend(leans);
-    eprintln!("TRACE make let mut verdict = Verdict {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     let mut verdict = Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -175,7 +168,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         ladder: Vec::new(),
         cautions: warnings(&data, &found, input),
     };
-    eprintln!("TRACE make verdict.ladder = {:.2}", t0.elapsed().as_secs_f64()); //TRACE
     verdict.ladder = ladder(&whole.data, &verdict.regimes);
     verdict.summary = summary(&verdict);
     let mut model = model(input.vehicle, &found);

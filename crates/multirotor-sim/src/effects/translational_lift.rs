@@ -7,7 +7,10 @@ use super::{Change, Effect, InFlight, Now, Reference, Signals, Start, momentum};
 use crate::vehicle::Airframe;
 
 const SHARE: usize = 0;
-const ADVANCE: usize = 1;
+const SQUARE: usize = 1;
+/// Thrust that a share of one adds by the square where the edgewise speed is the induced velocity in hover: about
+/// what momentum theory adds there.
+const SQUARE_GAIN: f64 = 0.25;
 /// Thrust over that in still air below which a rotor has no state worth a correction.
 const LEAST_THRUST: f64 = 0.05;
 
@@ -20,13 +23,13 @@ pub(super) struct TranslationalLift;
 struct Rotor {
     disc: Disc,
     share: f64,
-    advance: f64,
+    square: f64,
 }
 
 /// What the advancing blades make of the thrust at an edgewise speed over the induced velocity in hover: the
 /// thrust of a blade goes with 1 + 3/2 of the squared advance ratio (Leishman, ch. 2).
-fn advancing(share: f64, advance: f64, edgewise: f64) -> f64 {
-    1.0 + advance * share * edgewise * edgewise
+fn advancing(share: f64, square: f64, edgewise: f64) -> f64 {
+    1.0 + SQUARE_GAIN * square * share * edgewise * edgewise
 }
 
 impl Effect for TranslationalLift {
@@ -39,7 +42,7 @@ impl Effect for TranslationalLift {
                 less induced velocity (Glauert). The saved inflow is thrust: hovering in wind needs \
                 a smaller pulse. In constant wind it hides in u0; a gust of 1 m/s at 5 m/s looks \
                 like a sink of almost half as much.",
-            formula: "v_i sqrt(v² + (V + v_i)²) = v_h²;  T = (k w² - k2 w (V + v_i)) (1 + a s (v/v_h)²)",
+            formula: "v_i sqrt(v² + (V + v_i)²) = v_h²;  T = k w² - k2 w (V + v_i), of which a part goes with v²",
             source: "Glauert 1926; Leishman, Principles of Helicopter Aerodynamics, ch. 2",
             class: Class::Horizontal,
             signals: &[Signal::Horizontal, Signal::Climb, Signal::Tilt],
@@ -54,12 +57,12 @@ impl Effect for TranslationalLift {
                     role: Some(Role::WindLift),
                 },
                 Parameter {
-                    name: "advance",
+                    name: "square",
                     unit: "",
-                    what: "thrust that the advancing blades add where the edgewise speed is the \
-                        induced velocity in hover, over the share",
+                    what: "part of it that goes with the square of the speed, as the thrust of \
+                        advancing blades does",
                     low: 0.0,
-                    high: 3.0,
+                    high: 1.0,
                     default: |_| 0.0,
                     role: None,
                 },
@@ -70,7 +73,7 @@ impl Effect for TranslationalLift {
                 size: "inflow_share",
                 sizes: |_| &[0.02, 0.5],
                 usual: None,
-                shape: Some(("advance", &[0.0, 1.0])),
+                shape: Some(("square", &[0.0, 1.0])),
             },
         }
     }
@@ -80,8 +83,9 @@ impl Effect for TranslationalLift {
         let axial = signals.axial_mps() / induced_mps;
         let edgewise = signals.edgewise_mps() / induced_mps;
         let flow = |edgewise| axial + momentum::induced(axial, edgewise);
-        let more = advancing(values[SHARE], values[ADVANCE], edgewise);
-        flow_us(at, values[SHARE], flow(edgewise)) - flow_us(at, values[SHARE], flow(0.0))
+        let more = advancing(values[SHARE], values[SQUARE], edgewise);
+        let share = values[SHARE] * (1.0 - values[SQUARE]);
+        flow_us(at, share, flow(edgewise)) - flow_us(at, share, flow(0.0))
             + at.thrust_us(more.recip())
     }
 
@@ -89,7 +93,7 @@ impl Effect for TranslationalLift {
         Some(Box::new(Rotor {
             disc: Disc::of(airframe),
             share: start.values[SHARE],
-            advance: start.values[ADVANCE],
+            square: start.values[SQUARE],
         }))
     }
 }
@@ -97,11 +101,12 @@ impl Effect for TranslationalLift {
 impl InFlight for Rotor {
     fn loads(&mut self, now: &Now, change: &mut Change) {
         let Some((axial, edgewise)) = self.disc.speeds(now) else { return };
-        let without = momentum::at_speed(self.share, axial, 0.0);
-        let with = momentum::at_speed(self.share, axial, edgewise);
+        let share = self.share * (1.0 - self.square);
+        let without = momentum::at_speed(share, axial, 0.0);
+        let with = momentum::at_speed(share, axial, edgewise);
         if without.thrust > LEAST_THRUST {
             change.thrust *=
-                with.thrust / without.thrust * advancing(self.share, self.advance, edgewise);
+                with.thrust / without.thrust * advancing(self.share, self.square, edgewise);
             change.torque +=
                 self.disc.merit * (with.thrust * with.flow - without.thrust * without.flow);
         }
