@@ -18,6 +18,7 @@ name = "hover"
 purpose = "measurement"
 title = "Hover"
 vehicle = "arducopter-sitl"
+site = { origin = [-35.363261, 149.16523], ground_amsl_m = 584.0, orientation_deg = 30.0 }
 grid = { rows = 1, columns = 1, spacing_m = 7.0 }
 takeoff = { altitude_m = 5.0, speed_mps = 1.0 }
 landing = { end_altitude_m = 2.5, speed_mps = 1.0 }
@@ -59,7 +60,7 @@ fn flown(bench: &Bench, name: &str, plan: &[&str], log: &str) {
 
 fn calibration(bench: &Bench, log: &str) {
     let ladder = ["calibration", "--grid", "1x1", "--vehicle", "arducopter-sitl"];
-    let heights = ["--baseline", "20", "--ramp", "0"];
+    let heights = ["--baseline", "20", "--ramp", "0", "--set", "takeoff.speed_mps=2"];
     flown(bench, "calibration", &[&ladder[..], &heights].concat(), log);
 }
 
