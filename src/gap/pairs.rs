@@ -10,6 +10,7 @@ use super::candidates::Candidate;
 use super::decide::margin_nats;
 use super::gls::{Likelihood, Problem, Solution};
 use super::search::{FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, admissible};
+use crate::effects::{Signal, find};
 
 /// A free shape must gain this many times as much to be something else, as against a single effect.
 const FREE_BETTER: f64 = 1.25;
@@ -51,7 +52,15 @@ pub(super) fn instead_of(
     free: &RankedGeneric,
 ) -> Option<Pair> {
     let library = sought.library;
-    let is_effect = |place: &usize| library[*place].size.is_some() && !library[*place].by_lean;
+    // On a ladder whose rungs grow, a response that grows with time is a square.
+    let goes_with_time = |candidate: &Candidate| {
+        let effect = find(candidate.name);
+        effect.is_some_and(|effect| effect.definition().signals.contains(&Signal::Time))
+    };
+    let is_effect = |place: &usize| {
+        let candidate = &library[*place];
+        candidate.size.is_some() && !candidate.by_lean && !goes_with_time(candidate)
+    };
     let effects: Vec<usize> = (0..library.len()).filter(is_effect).collect();
     let before = round.base.log_posterior();
     let mut tried: Vec<Tried> = effects
