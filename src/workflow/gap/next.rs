@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use super::proof::{self, Proven};
 use super::search::Searched;
 use super::{MODEL, VERDICT};
 use crate::base::file::{FileError, create_folder, write_whole};
 use crate::base::plain::Shown as _;
 use crate::blind::rehearse::{Rehearsal, answers, rehearse};
-use crate::campaign::{self, FlightFolder, read_json, to_json};
+use crate::campaign::{self, FlightFolder, to_json};
 use crate::effects::{LIBRARY, Signal};
 use crate::gap::Verdict;
 use crate::gap::next::predict::{least, matters};
@@ -161,7 +162,7 @@ impl Before {
                 campaign.shown()
             )));
         }
-        let verdict: Verdict = read_json(&place)?;
+        let Proven { verdict, .. } = proof::read(&compared, &again(wish))?;
         let (folder, plan) = flight_of(campaign, wish.flight.as_deref())?;
         is_of(&verdict, &plan).map_err(|why| {
             WorkflowError::Usage(format!("{} cannot be used: {why}", place.shown()))
@@ -176,8 +177,20 @@ impl Before {
     }
 }
 
+/// The command that compares again.
+fn again(wish: &Wish) -> String {
+    let mut command = format!("updraft gap {}", words::shell(&wish.campaign.shown().to_string()));
+    if let Some(name) = &wish.flight {
+        command += &format!(" --flight {}", words::shell(name));
+    }
+    if let Some(folder) = &wish.gap {
+        command += &format!(" -o {}", words::shell(&folder.shown().to_string()));
+    }
+    command
+}
+
 /// Whether a verdict can be one of this flight; else why not.
-fn is_of(verdict: &Verdict, plan: &Plan) -> Result<(), String> {
+pub(crate) fn is_of(verdict: &Verdict, plan: &Plan) -> Result<(), String> {
     if verdict.schema != VERDICT_SCHEMA {
         return Err(format!("its schema is \"{}\", not {VERDICT_SCHEMA}", verdict.schema));
     }
