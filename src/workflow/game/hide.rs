@@ -60,10 +60,11 @@ pub fn run(host: &dyn Host, wish: &Wish) -> Result<Ready, WorkflowError> {
     ));
     let flown = fly::fly(&truth, &play::flight(folder), Some(host.stop_flag()))?;
     host.say(&format!(
-        "Flown: {} in {} air, {} -> {}",
+        "Flown: {} in {} air, {} of {} -> {}",
         game.protocol.template(),
         game.air.name(),
         words::count(flown.logs, "log"),
+        words::count(usize::from(truth.slots()), "drone"),
         play::flight(folder).shown()
     ));
     let file = GameFile {
@@ -109,9 +110,12 @@ fn make_room(folder: &Path, force: bool) -> Result<(), WorkflowError> {
             folder.shown()
         )));
     }
-    let was_played = || play::verdict(folder).exists();
-    if !is_game && (was_played() || campaign::flights(folder).is_ok_and(|all| !all.is_empty())) {
-        let what = if was_played() { "a flight of `updraft run --hide`" } else { "a campaign" };
+    // A seal without a game is what an interrupted one has left, if nobody has searched its flight.
+    let was_searched = play::verdict(folder).exists();
+    let is_campaign =
+        || !play::is_played(folder) && campaign::flights(folder).is_ok_and(|all| !all.is_empty());
+    if !is_game && (was_searched || is_campaign()) {
+        let what = if was_searched { "a flight of `updraft run --hide`" } else { "a campaign" };
         return Err(WorkflowError::Usage(format!(
             "{} holds {what}; choose another folder with -o",
             folder.shown()

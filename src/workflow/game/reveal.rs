@@ -15,7 +15,7 @@ use crate::workflow::gap::next::is_of;
 use crate::workflow::gap::search::Searched;
 use crate::workflow::gap::{VERDICT, proof};
 use crate::workflow::host::Host;
-use crate::workflow::{made_by, words};
+use crate::workflow::made_by;
 
 /// Largest `game.json` that is read, bytes.
 pub(super) const MAX_GAME_BYTES: u64 = 64 << 20;
@@ -41,7 +41,7 @@ pub fn run(
     let path = record_path(folder);
     let compared = gap.map_or_else(|| gap_folder(folder), Path::to_owned);
     let verdict_path = compared.join(VERDICT);
-    let again = again(folder, gap);
+    let again = proof::again(folder, None, gap);
     if !verdict_path.is_file() {
         return Err(WorkflowError::Nothing(format!(
             "the truth stays sealed: {} has no {VERDICT}; compare first (`{again}`), or say where that was \
@@ -78,15 +78,6 @@ pub fn run(
     })?;
     write_whole(&path, &record.to_json()?)?;
     Ok((record, path))
-}
-
-/// The command that compares again.
-fn again(folder: &Path, gap: Option<&Path>) -> String {
-    let mut command = format!("updraft gap {}", words::shell(&folder.shown().to_string()));
-    if let Some(gap) = gap {
-        command += &format!(" -o {}", words::shell(&gap.shown().to_string()));
-    }
-    command
 }
 
 /// The folder of the verdict as the record has it: its path below the game's folder, else its whole path.

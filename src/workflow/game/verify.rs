@@ -1,6 +1,6 @@
 //! Whether truth, nonce, flight, verdict and record of a game belong together.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -171,7 +171,7 @@ impl Checks<'_> {
             }
             return None;
         }
-        let again = format!("updraft gap {}", words::shell(&self.folder.shown().to_string()));
+        let again = proof::again(self.folder, None, None);
         let found = read_whole(&path, MAX_GAME_BYTES).map(|bytes| sha256(&bytes));
         if let (Ok(found), Some(record)) = (&found, record)
             && *found != record.verdict_sha256
@@ -204,7 +204,7 @@ impl Checks<'_> {
     fn record(
         &mut self,
         record: &BlindRecord,
-        path: &PathBuf,
+        path: &Path,
         truth_sha256: &str,
         verdict: Option<&Verdict>,
     ) {

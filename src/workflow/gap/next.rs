@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::proof::{self, Proven};
+use super::proof::{self, Proven, again};
 use super::search::Searched;
 use super::{MODEL, VERDICT};
 use crate::base::file::{FileError, create_folder, write_whole};
@@ -162,7 +162,8 @@ impl Before {
                 campaign.shown()
             )));
         }
-        let Proven { verdict, .. } = proof::read(&compared, &again(wish))?;
+        let again = again(campaign, wish.flight.as_deref(), wish.gap.as_deref());
+        let Proven { verdict, .. } = proof::read(&compared, &again)?;
         let (folder, plan) = flight_of(campaign, wish.flight.as_deref())?;
         is_of(&verdict, &plan).map_err(|why| {
             WorkflowError::Usage(format!("{} cannot be used: {why}", place.shown()))
@@ -175,18 +176,6 @@ impl Before {
             if is_builtin { plan.vehicle.clone() } else { vehicle.to_string_lossy().into_owned() };
         Ok(Self { place, verdict, plan, model, word })
     }
-}
-
-/// The command that compares again.
-fn again(wish: &Wish) -> String {
-    let mut command = format!("updraft gap {}", words::shell(&wish.campaign.shown().to_string()));
-    if let Some(name) = &wish.flight {
-        command += &format!(" --flight {}", words::shell(name));
-    }
-    if let Some(folder) = &wish.gap {
-        command += &format!(" -o {}", words::shell(&folder.shown().to_string()));
-    }
-    command
 }
 
 /// Whether a verdict can be one of this flight; else why not.

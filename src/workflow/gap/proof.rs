@@ -12,6 +12,7 @@ use crate::base::plain::Shown as _;
 use crate::campaign::CampaignError;
 use crate::gap::Verdict;
 use crate::workflow::error::WorkflowError;
+use crate::workflow::words;
 
 /// Name of the file in the folder of a comparison.
 pub(crate) const PROOF: &str = "SHA256";
@@ -32,6 +33,20 @@ pub(super) fn write(folder: &Path, files: &[(&str, &[u8])]) -> Result<(), FileEr
         let _ = writeln!(text, "{}  {name}", sha256(bytes));
     }
     write_whole(&folder.join(PROOF), text.as_bytes())
+}
+
+/// The command that compares a campaign again, one of its flights if it is named, into a folder if that is
+/// named.
+pub(crate) fn again(campaign: &Path, flight: Option<&str>, folder: Option<&Path>) -> String {
+    let word = |path: &Path| words::shell(&path.shown().to_string());
+    let mut command = vec!["updraft gap".to_owned(), word(campaign)];
+    if let Some(name) = flight {
+        command.extend(["--flight".to_owned(), words::shell(name)]);
+    }
+    if let Some(folder) = folder {
+        command.extend(["-o".to_owned(), word(folder)]);
+    }
+    command.join(" ")
 }
 
 /// Reads the verdict of a comparison that nobody has edited, nor its model. `again` is the command that

@@ -57,9 +57,12 @@ fn serves_every_instance_on_its_own_port_until_the_duration_is_flown() {
     assert!(of(0, "height_m") > 0.1 && of(1, "height_m") == 0.0, "{json}");
 }
 
-/// Flies one instance with the same pulse in every frame of 2.5 ms. Returns the replies and the summary.
+/// Frames per second of [`fly`]: long ones, as each waits for its reply.
+const RATE_HZ: u16 = 100;
+
+/// Flies one instance with the same pulse in every frame. Returns the replies and the summary.
 fn fly(bench: &Bench, more: &[&str], frames: u32, pulse: u16) -> (Vec<String>, serde_json::Value) {
-    let duration = (f64::from(frames) / 400.0).to_string();
+    let duration = (f64::from(frames) / f64::from(RATE_HZ)).to_string();
     let mut child = bench
         .command(&["physics", "--listen", "127.0.0.1:0", "--json", "--status", "0"])
         .args(["--duration", &duration])
@@ -76,7 +79,7 @@ fn fly(bench: &Bench, more: &[&str], frames: u32, pulse: u16) -> (Vec<String>, s
     client.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
     let mut buffer = [0; 2000];
     let replies = (0..frames).map(|count| {
-        client.send(&packet(400, count, [pulse; 4])).unwrap();
+        client.send(&packet(RATE_HZ, count, [pulse; 4])).unwrap();
         let length = client.recv(&mut buffer).unwrap();
         String::from_utf8(buffer[..length].to_vec()).unwrap()
     });
@@ -94,10 +97,15 @@ fn an_effect_acts_on_the_body_that_the_firmware_flies() {
     let bench = Bench::new();
     let home = ["--home", "47.4733,19.0621,190,59"];
     let drag = format!("parasitic-drag.vertical_m2={AREA_M2}");
-    let (bare, _) = fly(&bench, &home, 1200, 1750);
-    let (held, _) = fly(&bench, &[&home[..], &["--effect", &drag]].concat(), 1200, 1750);
+    let (bare, _) = fly(&bench, &home, 250, 1750);
+    let (held, _) = fly(&bench, &[&home[..], &["--effect", &drag]].concat(), 250, 1750);
+    // The specific force is the mean of a frame, as is the mean of the speeds at its ends.
     let motion = |replies: &[String]| -> Vec<(f64, f64)> {
-        replies.iter().map(|text| read(text)).map(|at| (-at.velocity.z, -at.accel.z)).collect()
+        let replies: Vec<_> = replies.iter().map(|text| read(text)).collect();
+        let of = |pair: &[packets::Reply]| {
+            (-f64::midpoint(pair[0].velocity.z, pair[1].velocity.z), -pair[1].accel.z)
+        };
+        replies.windows(2).map(of).collect()
     };
     let (bare, held) = (motion(&bare), motion(&held));
     let density = 1.225 * (1.0 - 0.0065 * 200.0 / 288.15_f64).powf(4.2559);
@@ -105,7 +113,8 @@ fn an_effect_acts_on_the_body_that_the_firmware_flies() {
     for climb_mps in [3.0, 5.0, 7.0] {
         let force_at = |motion: &[(f64, f64)]| {
             let place = motion.iter().position(|(climb, _)| *climb >= climb_mps).unwrap();
-            motion[place].1
+            let [(below, before), (above, after)] = [motion[place - 1], motion[place]];
+            before + (after - before) * (climb_mps - below) / (above - below)
         };
         let found = force_at(&bare) - force_at(&held);
         let wanted = 0.5 * density * AREA_M2 * climb_mps * climb_mps / mass_kg;
@@ -113,8 +122,8 @@ fn an_effect_acts_on_the_body_that_the_firmware_flies() {
     }
     // Switched off again it is as without.
     let (off, _) =
-        fly(&bench, &[&home[..], &["--effect", "parasitic-drag=off"]].concat(), 400, 1750);
-    assert_eq!(motion(&off), bare[..400]);
+        fly(&bench, &[&home[..], &["--effect", "parasitic-drag=off"]].concat(), 50, 1750);
+    assert_eq!(motion(&off), bare[..49]);
 }
 
 #[test]
@@ -122,7 +131,7 @@ fn the_truth_is_what_the_body_met_and_the_same_packets_give_the_same_bytes() {
     let bench = Bench::new();
     bench.expect(0, &["plan", "calibration", "--grid", "1x2", "-o", "campaign"]);
     let args = ["--updraft", "1.5", "--wind", "4", "--effect", "turbulence", "--truth"];
-    let alone = fly(&bench, &args, 1201, 1700);
+    let alone = fly(&bench, &args, 301, 1700);
     let path = bench.path("physics-truth/01.csv");
     assert_eq!(alone.1["instances"][0]["truth"], "physics-truth/01.csv");
     let text = std::fs::read_to_string(&path).unwrap();
@@ -137,13 +146,13 @@ fn the_truth_is_what_the_body_met_and_the_same_packets_give_the_same_bytes() {
         // The frame that ends then has the place at which the next begins.
         let height_m = match second {
             0 => 0.0,
-            _ => -read(&alone.0[second * 400 - 1]).position.z,
+            _ => -read(&alone.0[second * 100 - 1]).position.z,
         };
         assert!((row[3] - height_m).abs() < 0.002, "{second}: {row:?}");
         assert_eq!((row[0], &row[4..]), (second as f64, &[4.0, 0.0, 1.5, 1.5][..]));
     }
     assert_eq!(read_truth(&path).unwrap().updraft_mps, [1.5; 4]);
-    let again = fly(&bench, &args, 1201, 1700);
+    let again = fly(&bench, &args, 301, 1700);
     assert!(again.0 == alone.0 && std::fs::read_to_string(&path).unwrap() == text);
 
     // With a campaign it lies in the flight's folder, apart from the truth of `simulate`.
