@@ -48,7 +48,7 @@ pub struct BlindRecord {
     pub sha256: String,
 }
 
-/// What a record is made of, beside the comparison.
+/// Parts that a record is made of, beside the comparison.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<'a> {
     /// Program and version.
