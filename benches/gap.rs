@@ -44,6 +44,7 @@ const AIR: AirScales = AirScales {
     wind_mps: WIND_MPS,
     wind_gust_mps: 0.33,
     wind_gust_s: 25.0,
+    updraft_mps: 0.0,
 };
 
 struct Fleet {

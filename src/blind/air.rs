@@ -44,6 +44,15 @@ pub struct AirScales {
     pub wind_gust_mps: f64,
     /// Their correlation time, s.
     pub wind_gust_s: f64,
+    /// Steady updraft that all drones meet besides, m/s, up positive.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub updraft_mps: f64,
+}
+
+/// Whether there is nothing to write down.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_none(updraft_mps: &f64) -> bool {
+    *updraft_mps == 0.0
 }
 
 /// Air of one blind flight.
@@ -83,7 +92,7 @@ impl BlindAir {
 impl Atmosphere for BlindAir {
     fn air_velocity(&self, position_m: &Vector3<f64>, time_s: f64) -> Vector3<f64> {
         let [x, y] = self.wind_mps(time_s);
-        Vector3::new(x, y, self.field.updraft_mps(position_m, time_s))
+        Vector3::new(x, y, self.field.updraft_mps(position_m, time_s) + self.scales.updraft_mps)
     }
 
     fn sampler(&self, drone: u16) -> Box<dyn AirSampler + Send + '_> {
@@ -106,7 +115,8 @@ struct Sampler<'a> {
 impl AirSampler for Sampler<'_> {
     fn air_velocity(&mut self, position_m: &Vector3<f64>, time_s: f64) -> Vector3<f64> {
         let [x, y] = self.air.wind_mps(time_s);
-        self.field.air_velocity(position_m, time_s) + Vector3::new(x, y, self.local.at(time_s))
+        let up_mps = self.local.at(time_s) + self.air.scales.updraft_mps;
+        self.field.air_velocity(position_m, time_s) + Vector3::new(x, y, up_mps)
     }
 }
 
@@ -156,6 +166,7 @@ mod tests {
         wind_mps: [3.0, -2.0],
         wind_gust_mps: 0.5,
         wind_gust_s: 25.0,
+        updraft_mps: 0.0,
     };
 
     #[test]
@@ -179,6 +190,18 @@ mod tests {
         assert!((square / count / wanted - 1.0).abs() < 0.2, "{}", square / count);
         assert!((sum / count).abs() < 0.12, "{}", sum / count);
         assert!((across / count / 0.5 - 1.0).abs() < 0.35, "{}", across / count);
+    }
+
+    #[test]
+    fn steady_air_is_its_wind_and_its_updraft_alone() {
+        let still = AirScales { shared_mps: 0.0, local_mps: 0.0, wind_gust_mps: 0.0, ..SCALES };
+        let air = BlindAir::new(&AirScales { updraft_mps: 1.5, ..still }, 3);
+        let place = Vector3::new(4.0, 5.0, 60.0);
+        let wanted = Vector3::new(3.0, -2.0, 1.5);
+        for time_s in [-20.0, 0.0, 77.7] {
+            assert_eq!(air.air_velocity(&place, time_s), wanted);
+            assert_eq!(air.sampler(2).air_velocity(&place, time_s), wanted);
+        }
     }
 
     #[test]

@@ -64,6 +64,23 @@ pub enum BlindError {
         /// Name of the base vehicle from which it cannot be hidden.
         base: &'static str,
     },
+    /// The effect cannot be hidden in this size.
+    #[error(
+        "\"{name}\" cannot be hidden with a size of {size}; it can be {} to {} {unit}",
+        short(*least), short(*most)
+    )]
+    Size {
+        /// Name of the effect that was to be hidden.
+        name: &'static str,
+        /// Size as asked for.
+        size: f64,
+        /// Smallest magnitude that can be hidden.
+        least: f64,
+        /// Largest magnitude that can be hidden.
+        most: f64,
+        /// Unit of these sizes.
+        unit: &'static str,
+    },
     /// The effect was asked for twice, perhaps under two names.
     #[error("\"{name}\" cannot be hidden together with \"{other}\": they are one effect")]
     Twice {
@@ -170,4 +187,9 @@ pub enum BlindError {
     /// The user stopped the run.
     #[error("interrupted; run the same command again to resume")]
     Stopped,
+}
+
+/// A number with three digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }

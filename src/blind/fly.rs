@@ -44,11 +44,10 @@ pub struct Flown {
 /// When the template cannot be resolved.
 pub fn planned(scenario: &Scenario) -> Result<ResolvedFlight, BlindError> {
     let cell = &scenario.cell;
-    let side = i64::from(cell.side);
     let overrides = [
         Override::new("vehicle", cell.base.vehicle_name()),
-        Override::new("grid.rows", side),
-        Override::new("grid.columns", side),
+        Override::new("grid.rows", i64::from(cell.side)),
+        Override::new("grid.columns", i64::from(cell.columns())),
         Override::new("grid.spacing_m", SPACING_M),
     ];
     let mut mission = resolve(cell.protocol.template(), &overrides)?;

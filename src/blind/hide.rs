@@ -13,6 +13,7 @@ pub use super::tables::{KINDS, ON_REQUEST};
 use crate::base::rng::{Purpose, stream};
 use crate::effects::select::{set, value_of, values_of};
 use crate::effects::{Reference, Role, Signals, find};
+use crate::sim::plant::sitl::Sitl;
 use crate::vehicle::Vehicle;
 
 /// One hidden effect, as the true vehicle has it.
@@ -145,6 +146,9 @@ pub(super) fn log_between(rng: &mut Pcg64, (low, high): (f64, f64)) -> f64 {
     (low * (high / low).powf(unit(rng))).clamp(low, high)
 }
 
+/// Sizes that may be asked for go this far below and above the usual range, as factors.
+const SIZES_BELOW: f64 = 10.0;
+const SIZES_ABOVE: f64 = 3.0;
 /// Largest share of the inflow that is drawn: beyond it rotors are windmills.
 const MOST_SHARE: f64 = 0.8;
 /// Smallest share of the inflow that is drawn.
@@ -161,6 +165,22 @@ impl HiddenKind {
         protocol: Protocol,
         width_m: f64,
     ) -> Result<Hidden, BlindError> {
+        self.draw_sized(seed, base, protocol, width_m, None)
+    }
+
+    /// Draws the effect's other parameters, and its size if it is not given, in
+    /// [`HiddenKind::unit`].
+    ///
+    /// # Errors
+    /// When the base does not take it, or not in this size.
+    pub fn draw_sized(
+        &'static self,
+        seed: u64,
+        base: Base,
+        protocol: Protocol,
+        width_m: f64,
+        size: Option<f64>,
+    ) -> Result<Hidden, BlindError> {
         if !self.bases.contains(&base) {
             let name = self.name.to_owned();
             return Err(BlindError::NotEligible { name, base: base.name() });
@@ -168,7 +188,10 @@ impl HiddenKind {
         let known = base.known()?;
         let rng = &mut stream(seed, stream_of(self.name), Purpose::Hidden);
         let mut magnitude = log_between(rng, self.range);
-        let sign = if unit(rng) < 0.5 { -1.0 } else { 1.0 };
+        let mut sign = if unit(rng) < 0.5 { -1.0 } else { 1.0 };
+        if let Some(size) = size {
+            (magnitude, sign) = (self.allowed(size)?, size.signum());
+        }
         let flight_s = protocol.length_s();
         let mut parameters = BTreeMap::new();
         for (name, also) in self.also {
@@ -187,6 +210,7 @@ impl HiddenKind {
         let value = match self.magnitude {
             Magnitude::Value => magnitude,
             Magnitude::EitherSign => sign * magnitude,
+            Magnitude::Negative(_) if size.is_some() => sign * magnitude,
             Magnitude::Negative(chance) => {
                 if unit(rng) < chance {
                     -magnitude
@@ -199,15 +223,17 @@ impl HiddenKind {
                     let at = |climb_mps| Signals { climb_mps, ..Signals::default() };
                     Ok((pulse(share, &at(1.0))? - pulse(share, &at(-1.0))?) / 2.0)
                 };
-                share_for(self.range, &mut magnitude, slope)?
+                self.share_for(size, &mut magnitude, slope)?
             }
             Magnitude::GainIn(horizontal_mps) => {
                 let at = Signals { horizontal_mps, ..Signals::default() };
-                share_for(self.range, &mut magnitude, |share| Ok(-pulse(share, &at)? / per_thrust))?
+                let gain = |share| Ok(-pulse(share, &at)? / per_thrust);
+                self.share_for(size, &mut magnitude, gain)?
             }
             Magnitude::LossAt(climb_mps) => {
                 let at = Signals { climb_mps, ..Signals::default() };
-                share_for(self.range, &mut magnitude, |share| Ok(pulse(share, &at)? / per_thrust))?
+                let loss = |share| Ok(pulse(share, &at)? / per_thrust);
+                self.share_for(size, &mut magnitude, loss)?
             }
             Magnitude::KnownDrag => {
                 let [top_m2, side_m2] = match Role::BodyDragTop.value(&known) {
@@ -215,8 +241,8 @@ impl HiddenKind {
                         let side_m2 = Role::BodyDragSide.value(&known).unwrap_or_default();
                         [top_m2 * (1.0 + magnitude), side_m2 * (1.0 + magnitude)]
                     }
-                    // AirSim's law has its drag in the airframe.
-                    None => airsim_drag_m2(&known).map(|drag_m2| drag_m2 * magnitude),
+                    // Other laws have their drag in the airframe.
+                    None => airframe_drag_m2(&known).map(|drag_m2| drag_m2 * magnitude),
                 };
                 if let Some(side) = Role::BodyDragSide.place() {
                     parameters.insert(side.parameter.name.to_owned(), side_m2);
@@ -245,32 +271,59 @@ impl HiddenKind {
         let Some(found) = find(self.effect) else { return Ok(0.0) };
         Ok(found.pulse_us(&Reference::of(known), &values_of(found, &vehicle)?, at))
     }
+
+    /// Magnitude of a size that somebody asks for, if it is one that makes sense.
+    fn allowed(&self, size: f64) -> Result<f64, BlindError> {
+        let (low, high) = self.range;
+        let (least, most) = (low / SIZES_BELOW, high * SIZES_ABOVE);
+        let has_sign = matches!(self.magnitude, Magnitude::EitherSign | Magnitude::Negative(_));
+        let magnitude = if has_sign { size.abs() } else { size };
+        if (least..=most).contains(&magnitude) {
+            return Ok(magnitude);
+        }
+        Err(self.not_of_size(size, least, most))
+    }
+
+    fn not_of_size(&self, size: f64, least: f64, most: f64) -> BlindError {
+        BlindError::Size { name: self.name, size, least, most, unit: self.unit }
+    }
+
+    /// The share of inflow that has this magnitude. A magnitude that no share of a rotor has is drawn
+    /// again within those that there are, its place in the range kept; one that was `asked` for is
+    /// refused.
+    fn share_for(
+        &self,
+        asked: Option<f64>,
+        magnitude: &mut f64,
+        size: impl Fn(f64) -> Result<f64, BlindError>,
+    ) -> Result<f64, BlindError> {
+        let most = size(MOST_SHARE)?;
+        let (low, high) = self.range;
+        if let Some(asked) = asked {
+            let least = size(LEAST_SHARE)?;
+            if !(least..=most).contains(&asked) {
+                return Err(self.not_of_size(asked, least, most));
+            }
+        } else if most < high {
+            let place = (*magnitude / low).ln() / (high / low).ln();
+            *magnitude = low * (most.max(low) / low).powf(place);
+        }
+        let (mut below, mut above) = (LEAST_SHARE, MOST_SHARE);
+        for _ in 0..60 {
+            let middle = f64::midpoint(below, above);
+            if size(middle)? < *magnitude { below = middle } else { above = middle }
+        }
+        Ok(f64::midpoint(below, above))
+    }
 }
 
-/// The share of inflow that has this magnitude. A magnitude that no share of a rotor has is drawn
-/// again within those that there are: its place in the range is kept.
-fn share_for(
-    (low, high): (f64, f64),
-    magnitude: &mut f64,
-    size: impl Fn(f64) -> Result<f64, BlindError>,
-) -> Result<f64, BlindError> {
-    let most = size(MOST_SHARE)?;
-    if most < high {
-        let place = (*magnitude / low).ln() / (high / low).ln();
-        *magnitude = low * (most.max(low) / low).powf(place);
-    }
-    let (mut below, mut above) = (LEAST_SHARE, MOST_SHARE);
-    for _ in 0..60 {
-        let middle = f64::midpoint(below, above);
-        if size(middle)? < *magnitude { below = middle } else { above = middle }
-    }
-    Ok(f64::midpoint(below, above))
-}
-
-/// AirSim's drag of the body box and the discs as drag coefficient times area: from above, from the
-/// side, m².
-fn airsim_drag_m2(vehicle: &Vehicle) -> [f64; 2] {
+/// Drag of an airframe as drag coefficient times area, from above and from the side, m²: that of AirSim's
+/// body box and discs, or of the frame of ArduPilot's simulator.
+fn airframe_drag_m2(vehicle: &Vehicle) -> [f64; 2] {
     let frame = &vehicle.airframe;
+    if let Some(sitl) = &frame.sitl {
+        return [Sitl::new(sitl, frame.mass_kg).drag_area_m2(); 2];
+    }
     let [length, width, height] = frame.body_m;
     let discs_m2 = 4.0 * std::f64::consts::PI * frame.rotor_diameter_m.powi(2);
     let sides_m2 = 4.0 * std::f64::consts::PI * frame.rotor_diameter_m * frame.rotor_height_m;

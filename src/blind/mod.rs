@@ -6,7 +6,8 @@
 //! physics that no library lists ([`foreign`]). What the search gets is a flight folder like any
 //! other: template, vehicle, plan and `.BIN` logs ([`fly`]). The truth is sealed ([`seal`]): its hash
 //! is published before the flight is flown, and it is opened only when a verdict is on the disk.
-//! [`score`] compares one verdict with the truth, [`table`] many.
+//! [`score`] compares one verdict with the truth, [`table`] many. [`game`] is one such flight for
+//! strangers, with what they choose, and [`record`] what came of it.
 
 pub mod air;
 pub mod classes;
@@ -14,10 +15,12 @@ pub mod error;
 pub mod explain;
 pub mod fly;
 pub mod foreign;
+pub mod game;
 pub mod hide;
 pub mod interval;
 mod metrics;
 pub mod play;
+pub mod record;
 pub mod rehearse;
 pub mod render;
 pub mod scenario;

@@ -128,6 +128,7 @@ pub fn fly_answer(
         wind_mps,
         wind_gust_mps: WIND_GUST.1 * wind_mps[0].hypot(wind_mps[1]),
         wind_gust_s: WIND_GUST.0,
+        updraft_mps: 0.0,
     };
     let setting = Setting {
         plan,

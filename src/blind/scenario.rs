@@ -85,6 +85,8 @@ pub enum AirClass {
     Moderate,
     /// As in the paper's field flights.
     Field,
+    /// It does not change.
+    Still,
 }
 
 impl AirClass {
@@ -94,6 +96,7 @@ impl AirClass {
             Self::Calm => "calm",
             Self::Moderate => "moderate",
             Self::Field => "field",
+            Self::Still => "still",
         }
     }
 
@@ -103,6 +106,7 @@ impl AirClass {
             Self::Calm => 0.12,
             Self::Moderate => 0.36,
             Self::Field => 0.5,
+            Self::Still => 0.0,
         }
     }
 }
@@ -119,6 +123,10 @@ pub enum Base {
     Inflow,
     /// A show drone like `pixel`: motor law, inflow and body drag.
     Pixel,
+    /// A camera drone: `phantom4`, with motor law, inflow and body drag.
+    Phantom4,
+    /// The frame of ArduPilot's own simulator: `arducopter-sitl`.
+    Sitl,
 }
 
 impl Base {
@@ -128,6 +136,8 @@ impl Base {
             Self::Airsim => "airsim",
             Self::Inflow => "inflow",
             Self::Pixel => "pixel",
+            Self::Phantom4 => "phantom4",
+            Self::Sitl => "sitl",
         }
     }
 }
@@ -144,8 +154,11 @@ pub struct Cell {
     pub base: Base,
     /// What is hidden, by the names of [`super::hide::KINDS`]; empty: nothing.
     pub hidden: Vec<String>,
-    /// Drones along each side of the grid.
+    /// Drones along each side of the grid; with `columns`: its rows.
     pub side: u16,
+    /// Columns of the grid; absent: as many as rows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns: Option<u16>,
 }
 
 impl Cell {
@@ -156,7 +169,23 @@ impl Cell {
         let names: Vec<&str> = takes.map(|kind| kind.name).collect();
         let place = unit(&mut stream(seed, CHOICE, Purpose::Hidden)) * names.len() as f64;
         let hidden = names.get(place as usize).map(|name| (*name).to_owned());
-        Self { protocol, air, base, hidden: hidden.into_iter().collect(), side: FULL_SIDE }
+        let hidden = hidden.into_iter().collect();
+        Self { protocol, air, base, hidden, side: FULL_SIDE, columns: None }
+    }
+
+    /// Number of columns of the grid.
+    pub fn columns(&self) -> u16 {
+        self.columns.unwrap_or(self.side)
+    }
+
+    /// Number of slots in the grid.
+    pub fn slots(&self) -> u16 {
+        self.side * self.columns()
+    }
+
+    /// Width of the array along its longer side, m.
+    pub(super) fn width_m(&self) -> f64 {
+        f64::from(self.side.max(self.columns()).saturating_sub(1)) * SPACING_M
     }
 
     /// Short name of the cell: `paper-calm-airsim-none`.
@@ -221,7 +250,7 @@ impl Scenario {
     ///
     /// If an effect is unknown, cannot be hidden from this base, or not together with another.
     pub fn draw(seed: u64, cell: &Cell) -> Result<Self, BlindError> {
-        let width_m = f64::from(cell.side.saturating_sub(1)) * SPACING_M;
+        let width_m = cell.width_m();
         let mut hidden: Vec<Hidden> = Vec::new();
         for name in &cell.hidden {
             let drawn = kind_of(name)?.draw(seed, cell.base, cell.protocol, width_m)?;
@@ -237,7 +266,7 @@ impl Scenario {
 
     /// Number of slots in the formation.
     pub fn slots(&self) -> u16 {
-        self.cell.side * self.cell.side
+        self.cell.slots()
     }
 
     /// True value of the parameter that states the size of a hidden effect, averaged over the
@@ -268,7 +297,7 @@ impl Scenario {
 fn nuisance(seed: u64, cell: &Cell) -> Result<Nuisance, BlindError> {
     // Stream 0 of this purpose: each hidden effect has one behind it.
     let rng = &mut stream(seed, 0, Purpose::Hidden);
-    let slots = cell.side * cell.side;
+    let slots = cell.slots();
     let sd_mps = cell.air.sd_mps();
     let thrust_spread = between(rng, (0.012, 0.02));
     let inflow_spread = between(rng, INFLOW_SPREAD);
@@ -283,9 +312,10 @@ fn nuisance(seed: u64, cell: &Cell) -> Result<Nuisance, BlindError> {
         wind_mps: [wind_mps * cos, wind_mps * sin],
         wind_gust_mps: 0.15 * wind_mps,
         wind_gust_s: 25.0,
+        updraft_mps: 0.0,
     };
     let vehicle = cell.base.known()?;
-    let cells = if vehicle.name == "pixel" { 2.0 } else { 3.0 };
+    let cells = cell.base.battery_cells();
     let endurance_s = between(rng, ENDURANCE_S);
     let battery = BatteryTruth {
         cells,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::error::BlindError;
 use super::scenario::{SCENARIO_SCHEMA, Scenario};
 use crate::base::digest::sha256;
-use crate::base::file::{create_folder, read_whole, write_whole};
+use crate::base::file::{FileError, create_folder, read_whole, write_whole};
 use crate::base::rng::{Purpose, stream};
 use crate::campaign::to_json;
 
@@ -61,7 +61,15 @@ pub fn truth_path(beside: &Path) -> PathBuf {
 /// When the files cannot be written.
 pub fn seal(beside: &Path, truth: &Scenario) -> Result<String, BlindError> {
     let mut rng = stream(truth.seed, NONCE, Purpose::Hidden);
-    let nonce = format!("{:016x}{:016x}", rng.next_u64(), rng.next_u64());
+    seal_with(beside, truth, format!("{:016x}{:016x}", rng.next_u64(), rng.next_u64()))
+}
+
+/// Seals a truth as [`seal`] does, with a nonce that does not follow from the truth's seed: who knows or
+/// guesses the seed cannot check it against the published hash.
+///
+/// # Errors
+/// When the files cannot be written.
+pub fn seal_with(beside: &Path, truth: &Scenario, nonce: String) -> Result<String, BlindError> {
     let sealed = Sealed { nonce, truth: truth.clone() };
     let bytes = to_json(&sealed)
         .map_err(|error| BlindError::Text { what: "the truth", reason: error.to_string() })?;
@@ -85,10 +93,8 @@ pub fn open(beside: &Path, verdict: &Path, told: Option<&str>) -> Result<Opened,
         return Err(BlindError::NoVerdict { sealed, verdict });
     }
     let verdict_sha256 = sha256(&read_whole(verdict, 64 * MAX_BYTES)?);
-    let published = read_whole(&hash_path(beside), MAX_BYTES)?;
-    let published = String::from_utf8_lossy(&published);
-    let published = published.split_whitespace().next().unwrap_or_default();
-    let published = told.unwrap_or(published).to_owned();
+    let published = published(beside)?;
+    let published = told.map_or(published, str::to_owned);
     let path = truth_path(beside);
     let bytes = read_whole(&path, MAX_BYTES)?;
     let found = sha256(&bytes);
@@ -101,4 +107,22 @@ pub fn open(beside: &Path, verdict: &Path, told: Option<&str>) -> Result<Opened,
         return Err(BlindError::Schema { path, found, wanted: SCENARIO_SCHEMA });
     }
     Ok(Opened { truth: sealed.truth, truth_sha256: found, verdict_sha256 })
+}
+
+/// The hash that was published, as it stands in `sealed/SHA256`.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn published(beside: &Path) -> Result<String, FileError> {
+    let text = read_whole(&hash_path(beside), MAX_BYTES)?;
+    let text = String::from_utf8_lossy(&text);
+    Ok(text.split_whitespace().next().unwrap_or_default().to_owned())
+}
+
+/// SHA-256 of the sealed truth as it is now, hexadecimal. Nothing of the truth is told.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn truth_sha256(beside: &Path) -> Result<String, FileError> {
+    Ok(sha256(&read_whole(&truth_path(beside), MAX_BYTES)?))
 }

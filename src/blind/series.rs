@@ -131,6 +131,7 @@ impl Settings {
                             base: *base,
                             hidden: hidden.clone(),
                             side: self.side,
+                            columns: None,
                         });
                     }
                 }

@@ -8,9 +8,11 @@
 use super::hide::{Also, HiddenKind, Magnitude};
 use super::scenario::{Base, INFLOW_SPREAD};
 
-const ANY: &[Base] = &[Base::Airsim, Base::Inflow, Base::Pixel];
+const ANY: &[Base] = &[Base::Airsim, Base::Inflow, Base::Pixel, Base::Phantom4, Base::Sitl];
+/// The frame of ArduPilot's simulator has a thrust of its own, which what acts on rotors does not change.
+const WITH_ROTORS: &[Base] = &[Base::Airsim, Base::Inflow, Base::Pixel, Base::Phantom4];
 /// In AirSim a hovering drone does not feel a sink of some cm/s.
-const WITH_INFLOW: &[Base] = &[Base::Inflow, Base::Pixel];
+const WITH_INFLOW: &[Base] = &[Base::Inflow, Base::Pixel, Base::Phantom4];
 const WITHOUT_INFLOW: &[Base] = &[Base::Airsim];
 /// Bases whose airframe has a drag of its own.
 const WITH_FACES: &[Base] = &[Base::Airsim, Base::Inflow];
@@ -60,10 +62,12 @@ pub const KINDS: &[HiddenKind] = &[
     library("battery", "exponent", (0.5, 1.0), "share of the sag that acts"),
     HiddenKind {
         magnitude: Magnitude::GainIn(5.0),
+        bases: WITH_ROTORS,
         ..library("translational-lift", "inflow_share", (0.01, 0.1), "of the thrust at 5 m/s")
     },
     HiddenKind {
         magnitude: Magnitude::LossAt(-3.5),
+        bases: WITH_ROTORS,
         ..library("vortex-ring", "inflow_share", (0.03, 0.12), "of the thrust at -3.5 m/s")
     },
     library("thrust-curve", "expo", (0.3, 0.7), "expo"),
@@ -75,6 +79,7 @@ pub const KINDS: &[HiddenKind] = &[
     },
     HiddenKind {
         magnitude: Magnitude::RotorRadii,
+        bases: WITH_ROTORS,
         ..library("ground-effect", "radius_m", (1.0, 2.0), "of the rotor's radius")
     },
     HiddenKind {
@@ -82,9 +87,12 @@ pub const KINDS: &[HiddenKind] = &[
         bases: WITH_INFLOW,
         ..library("neighbour-downwash", "strength", (1.0, 4.0), "of the momentum disc's sink")
     },
-    library("blade-flapping", "drag_per_weight", (0.0175, 0.035), "s/m"),
+    HiddenKind {
+        bases: WITH_ROTORS,
+        ..library("blade-flapping", "drag_per_weight", (0.0175, 0.035), "s/m")
+    },
     library("mass-spread", "sd", (0.03, 0.06), "relative"),
-    library("thrust-spread", "sd", (0.03, 0.06), "relative"),
+    HiddenKind { bases: WITH_ROTORS, ..library("thrust-spread", "sd", (0.03, 0.06), "relative") },
     HiddenKind {
         name: "velocity-bias",
         magnitude: Magnitude::EitherSign,

@@ -18,6 +18,27 @@ const KEEPS: [Role; 2] = [Role::InflowShare, Role::BodyDragTop];
 const WARM_S: f64 = 1.0;
 
 impl Base {
+    /// Base that is made from a built-in vehicle as it is; `None`: there is none of this name.
+    pub fn of_vehicle(name: &str) -> Option<Self> {
+        [Self::Airsim, Self::Pixel, Self::Phantom4, Self::Sitl]
+            .into_iter()
+            .find(|base| base.vehicle_name() == name)
+    }
+
+    /// Whether the known vehicle has an inflow, and with it a spread of the inflow.
+    fn has_inflow(self) -> bool {
+        !matches!(self, Self::Airsim | Self::Sitl)
+    }
+
+    /// Number of cells in series of the battery that the logs report.
+    pub(super) fn battery_cells(self) -> f64 {
+        match self {
+            Self::Pixel => 2.0,
+            Self::Airsim | Self::Inflow | Self::Sitl => 3.0,
+            Self::Phantom4 => 4.0,
+        }
+    }
+
     /// Known vehicle, which is handed to the search.
     ///
     /// # Errors
@@ -29,7 +50,7 @@ impl Base {
         if self == Self::Inflow {
             Role::InflowShare.set(&mut vehicle, KNOWN_INFLOW_SHARE);
         }
-        if self != Self::Airsim {
+        if self.has_inflow() {
             Role::InflowSpread.set(&mut vehicle, KNOWN_INFLOW_SPREAD);
         }
         Role::ThrustSpread.set(&mut vehicle, KNOWN_THRUST_SPREAD);
@@ -41,6 +62,8 @@ impl Base {
         match self {
             Self::Airsim | Self::Inflow => "airsim-generic-quad",
             Self::Pixel => "pixel",
+            Self::Phantom4 => "phantom4",
+            Self::Sitl => "arducopter-sitl",
         }
     }
 }
@@ -55,7 +78,7 @@ pub fn true_vehicle(scenario: &Scenario, slot: u16) -> Result<Vehicle, BlindErro
     let mut vehicle = scenario.cell.base.known()?;
     let rest = &scenario.nuisance;
     Role::ThrustSpread.set(&mut vehicle, rest.thrust_spread);
-    if scenario.cell.base != Base::Airsim {
+    if scenario.cell.base.has_inflow() {
         Role::InflowSpread.set(&mut vehicle, rest.inflow_spread);
     }
     let battery = &rest.battery;

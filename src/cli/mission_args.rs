@@ -58,7 +58,7 @@ pub(super) struct MissionArgs {
     pub(super) set: Vec<String>,
 }
 
-fn parse_grid(text: &str) -> Result<(i64, i64), String> {
+pub(super) fn parse_grid(text: &str) -> Result<(i64, i64), String> {
     text.split_once(['x', 'X'])
         .and_then(|(rows, columns)| Some((rows.trim().parse().ok()?, columns.trim().parse().ok()?)))
         .ok_or_else(|| "write it as rows x columns, for example 7x7".to_owned())

@@ -19,10 +19,14 @@ use crate::workflow::physics::{self, Home, Physics, Served};
   updraft physics
   updraft physics --updraft 1.5 --wind 5 --home 47.4733,19.0621,190,59
   updraft physics --campaign my-campaign --flight hover --instances 4
+  updraft physics --effect rotor-inflow --effect battery.initial_charge=0.8 --truth
 
 Then start ArduCopter's simulator with the --home that is printed for each instance:
   arducopter --model JSON:127.0.0.1 -I0 --home=47.4733,19.0621,190,59
-Instance n listens n times ten ports above the first. Ctrl-C stops it. See docs/sitl.md.")]
+Instance n listens n times ten ports above the first. Ctrl-C stops it. With --truth, the air that each
+instance met is written when it ends: physics-truth/01.csv and so on, in the flight's folder or, without
+a campaign, in this one; a row per second since the firmware's last start. See docs/sitl.md.")]
+#[command(mut_arg("truth", |truth| truth.help("Write the air that each instance met to physics-truth/ (see below)")))]
 pub(super) struct PhysicsArgs {
     /// Address and port of the first instance (port 0: any free port for each)
     #[arg(long, value_name = "ADDRESS:PORT", default_value_t = SocketAddr::from(([127, 0, 0, 1], BASE_PORT)))]
@@ -90,6 +94,8 @@ struct InstanceOutput {
     home: [f64; 4],
     #[serde(flatten)]
     status: Status,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    truth: Option<PathBuf>,
 }
 
 pub(super) fn run(context: &Context, args: &PhysicsArgs) -> Result<Exit, CommandError> {
@@ -100,11 +106,16 @@ pub(super) fn run(context: &Context, args: &PhysicsArgs) -> Result<Exit, Command
         flight: args.flight.clone(),
         home: args.home,
         vehicle: args.vehicle.clone(),
+        effects: args.air.effects.clone(),
+        truth: args.air.truth,
         air: args.air.air(args.updraft),
         seed: args.air.seed,
         status_every: Duration::from_secs(args.status),
         duration_s: args.duration,
     };
+    if args.air.full_logs {
+        context.warn("--full-logs does nothing here: the firmware writes its own logs");
+    }
     let (vehicle, served) = physics::run(context, &wish)?;
     let flown = served.iter().any(|served| served.status.frames > 0);
     if context.json {
@@ -113,6 +124,7 @@ pub(super) fn run(context: &Context, args: &PhysicsArgs) -> Result<Exit, Command
             listen: served.listen,
             home: served.home.0,
             status: served.status,
+            truth: served.truth,
         };
         let instances = served.into_iter().enumerate().map(output).collect();
         context.print_json(&PhysicsOutput { schema: "updraft.physics/1", vehicle, instances })?;

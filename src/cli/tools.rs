@@ -7,6 +7,8 @@ use schemars::schema_for;
 use super::context::Context;
 use super::exit::{CommandError, Exit};
 use crate::analysis::result::Analysis;
+use crate::blind::game::GameFile;
+use crate::blind::record::BlindRecord;
 use crate::blind::seal::Sealed;
 use crate::blind::series::FlightResult;
 use crate::blind::table::Table;
@@ -24,6 +26,7 @@ use crate::study::result::StudyResult;
 use crate::vehicle::Vehicle;
 use crate::workflow::fleet::output::FlyOutput;
 use crate::workflow::fleet::preflight::PreflightOutput;
+use crate::workflow::game::verify::Verification;
 
 /// Arguments of `updraft completions`.
 #[derive(Debug, Args)]
@@ -77,6 +80,12 @@ pub enum Format {
     BlindFlight,
     /// sealed/truth.json of a blind flight
     BlindTruth,
+    /// game.json of `updraft blind hide`
+    BlindGame,
+    /// reveal.json of `updraft blind reveal`
+    BlindRecord,
+    /// what `updraft blind verify --json` prints
+    BlindVerify,
     /// gap/next.json
     Next,
     /// hidden.json of `updraft run --hide`
@@ -104,6 +113,9 @@ impl Format {
             Self::Blind => schema_for!(Table),
             Self::BlindFlight => schema_for!(FlightResult),
             Self::BlindTruth => schema_for!(Sealed),
+            Self::BlindGame => schema_for!(GameFile),
+            Self::BlindRecord => schema_for!(BlindRecord),
+            Self::BlindVerify => schema_for!(Verification),
             Self::Next => schema_for!(Next),
             Self::Hidden => schema_for!(HiddenRun),
         };

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::ending::Ending;
 use super::error::WorkflowError;
+use super::game::game_path;
 use super::gap::search::Written;
 use super::host::Host;
 use super::{made_by, words};
@@ -93,6 +94,12 @@ fn tell(host: &dyn Host, folder: &Path, cell: &Cell, truth: &Scenario, act: Act<
 /// A flight of another seed is not mixed with this one's.
 fn make_room(folder: &Path, force: bool) -> Result<(), WorkflowError> {
     let flight = play::flight(folder);
+    if game_path(folder).exists() {
+        return Err(WorkflowError::Usage(format!(
+            "{} holds a game of `updraft blind hide`; choose another folder with -o",
+            folder.shown()
+        )));
+    }
     if play::is_played(folder) {
         // What was interrupted before its verdict is flown again: the same seed gives the same flight.
         if !force && play::verdict(folder).exists() {

@@ -39,6 +39,7 @@ pub mod ending;
 pub mod error;
 pub mod find;
 pub mod fleet;
+pub mod game;
 pub mod gap;
 pub mod hashes;
 pub mod hidden;

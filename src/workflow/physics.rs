@@ -1,7 +1,7 @@
 //! Simulated bodies and air for unmodified ArduCopter simulators.
 
 use std::net::{SocketAddr, UdpSocket};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -12,8 +12,12 @@ use nalgebra::Vector3;
 use super::clock::Stopwatch;
 use super::error::WorkflowError;
 use super::host::Host;
+use crate::base::file::write_whole;
 use crate::base::frame::{Geodetic, ShowFrame};
+use crate::base::plain::Shown as _;
 use crate::campaign;
+use crate::effects::definition::Hook;
+use crate::effects::select::{choose, known, resolved};
 use crate::sim::Atmosphere;
 use crate::sim::air::spec::{self, Air};
 use crate::sim::json::{Instance, InstanceSetup, PORTS_PER_INSTANCE, Refusal, Status, serve};
@@ -23,6 +27,8 @@ use crate::vehicle::{Vehicle, library};
 const ARDUPILOT_HOME: [f64; 4] = [-35.363261, 149.165230, 584.0, 353.0];
 /// Most instances of one program: each is a thread and a socket.
 const MAX_INSTANCES: usize = 500;
+/// Folder of the air that the instances met.
+const TRUTH: &str = "physics-truth";
 /// The stop request and the clock are looked at so often.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -41,6 +47,10 @@ pub struct Physics {
     pub home: Option<Home>,
     /// Vehicle, a built-in name or a file; `None`: the campaign's.
     pub vehicle: Option<String>,
+    /// Choices of effects, over the vehicle's own: `NAME`, `NAME=off`, `NAME.PARAMETER=NUMBER`.
+    pub effects: Vec<String>,
+    /// Whether the air that each instance meets is written down.
+    pub truth: bool,
     /// Motion of the air.
     pub air: Air,
     /// Seed of sensor noise and random air.
@@ -79,13 +89,15 @@ pub struct Served {
     pub home: Home,
     /// Statistics and state at its end.
     pub status: Status,
+    /// Path of the air that it met since its last start, if that was asked for and it flew.
+    pub truth: Option<PathBuf>,
 }
 
 /// Serves all instances until it is stopped, or all have flown long enough. Returns the vehicle's
 /// name and the outcome of each instance.
 ///
 /// # Errors
-/// When the campaign or vehicle cannot be used, or a socket fails.
+/// When the campaign, vehicle or effects cannot be used, a socket fails, or the truth cannot be written.
 pub fn run(host: &dyn Host, wish: &Physics) -> Result<(String, Vec<Served>), WorkflowError> {
     let fleet = fleet(wish)?;
     let air = spec::build(&wish.air, &fleet.frame, wish.seed, "physics");
@@ -99,17 +111,37 @@ pub fn run(host: &dyn Host, wish: &Physics) -> Result<(String, Vec<Served>), Wor
         ));
     }
     fly(host, wish, &mut stations)?;
-    let served = stations.iter().map(|station| Served {
-        listen: station.address,
-        home: station.home,
-        status: *station.instance.status(),
-    });
-    let served = served.collect();
+    let mut served = Vec::new();
+    for (station, slot) in stations.iter().zip(1..) {
+        let truth = station.instance.truth();
+        served.push(Served {
+            listen: station.address,
+            home: station.home,
+            status: *station.instance.status(),
+            truth: truth.map(|text| write_truth(host, &fleet.place, slot, &text)).transpose()?,
+        });
+    }
     Ok((fleet.vehicle.name.clone(), served))
+}
+
+/// Writes the air that an instance met, below the flight's folder or the current one: apart from the truth
+/// of `updraft simulate`, whose seconds are those of the show.
+fn write_truth(
+    host: &dyn Host,
+    place: &Path,
+    slot: u16,
+    text: &str,
+) -> Result<PathBuf, WorkflowError> {
+    let path = place.join(TRUTH).join(format!("{slot:02}.csv"));
+    write_whole(&path, text.as_bytes())?;
+    host.say(&format!("instance {}: the air it met -> {}", slot - 1, path.shown()));
+    Ok(path)
 }
 
 /// Where the instances stand and what they are.
 struct Fleet {
+    /// Folder of the flight; empty: there is none.
+    place: PathBuf,
     vehicle: Vehicle,
     frame: ShowFrame,
     homes_m: Vec<Vector3<f64>>,
@@ -129,7 +161,8 @@ fn fleet(wish: &Physics) -> Result<Fleet, WorkflowError> {
         let Home([lat_deg, lon_deg, amsl_m, orientation_deg]) = wish.home.unwrap_or_default();
         let name = wish.vehicle.as_deref().unwrap_or("airsim-generic-quad");
         return Ok(Fleet {
-            vehicle: library::load(name)?,
+            place: PathBuf::new(),
+            vehicle: affected(library::load(name)?, &wish.effects)?,
             frame: ShowFrame { origin: Geodetic { lat_deg, lon_deg, amsl_m }, orientation_deg },
             homes_m: vec![Vector3::zeros(); counted(wish.instances.unwrap_or(1))?],
         });
@@ -151,10 +184,28 @@ fn fleet(wish: &Physics) -> Result<Fleet, WorkflowError> {
             )));
         }
         let homes_m = plan.slots.iter().take(count).map(|slot| slot.home_m.into()).collect();
-        return Ok(Fleet { vehicle, frame: plan.site.frame(), homes_m });
+        let vehicle = affected(vehicle, &wish.effects)?;
+        return Ok(Fleet { place: folder.0, vehicle, frame: plan.site.frame(), homes_m });
     }
     let name = wish.flight.as_deref().unwrap_or_default();
     Err(WorkflowError::Usage(format!("the campaign has no flight \"{name}\"")))
+}
+
+/// The vehicle with the effects that were chosen.
+fn affected(mut vehicle: Vehicle, choices: &[String]) -> Result<Vehicle, WorkflowError> {
+    for choice in choices {
+        choose(&mut vehicle, choice)?;
+        let name = choice.split(['=', '.']).next().unwrap_or_default().trim();
+        let hooks = known(name)?.definition().hooks;
+        let is_on = vehicle.effects.get(name).is_some_and(|table| table.on);
+        if is_on && !hooks.is_empty() && hooks.iter().all(|hook| *hook == Hook::Sense) {
+            return Err(WorkflowError::Usage(format!(
+                "{name} is an error of the autopilot's sensors, and the firmware simulates its own: set its                  SIM_* parameters instead"
+            )));
+        }
+    }
+    resolved(&vehicle)?;
+    Ok(vehicle)
 }
 
 fn counted(instances: usize) -> Result<usize, WorkflowError> {
@@ -187,20 +238,21 @@ fn stations<'a>(
             ))
         };
         let socket = UdpSocket::bind(address).map_err(failed)?;
+        let instance = Instance::new(InstanceSetup {
+            vehicle: &fleet.vehicle,
+            home_m: *home_m,
+            frame: fleet.frame,
+            atmosphere,
+            seed: wish.seed,
+            drone: (index + 1) as u16,
+        });
         let place = fleet.frame.to_geodetic(*home_m);
         let heading_deg = fleet.frame.orientation_deg;
         stations.push(Station {
             address: socket.local_addr().map_err(failed)?,
             socket,
             home: Home([place.lat_deg, place.lon_deg, place.amsl_m, heading_deg]),
-            instance: Instance::new(InstanceSetup {
-                vehicle: &fleet.vehicle,
-                home_m: *home_m,
-                frame: fleet.frame,
-                atmosphere,
-                seed: wish.seed,
-                drone: (index + 1) as u16,
-            }),
+            instance: if wish.truth { instance.with_truth() } else { instance },
             status: Mutex::default(),
         });
     }

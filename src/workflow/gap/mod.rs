@@ -4,6 +4,7 @@ mod choose;
 mod compare;
 pub(crate) mod logs;
 pub(crate) mod next;
+pub(crate) mod proof;
 pub(crate) mod search;
 
 use std::path::{Path, PathBuf};
@@ -129,7 +130,7 @@ fn output(request: &Request) -> Result<PathBuf, WorkflowError> {
 }
 
 /// File names in the folder of a comparison.
-const VERDICT: &str = "verdict.json";
+pub(crate) const VERDICT: &str = "verdict.json";
 const MODEL: &str = "model.toml";
 
 /// Refuses a named folder with files of somebody else's where this command's would go.
@@ -179,6 +180,7 @@ fn write(
     let made = report::render_gap(&explained.verdict, provenance)?;
     let pages = folder.join("report");
     report::write(&made, &pages)?;
+    proof::write(folder, &[(VERDICT, &json), (MODEL, model.as_bytes())])?;
     // Last: who finds a verdict finds the others as well.
     write_whole(&folder.join(VERDICT), &json)?;
     Ok(pages.join(report::PAGE_FILE))

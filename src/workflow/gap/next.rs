@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use super::proof::{self, Proven, again};
 use super::search::Searched;
 use super::{MODEL, VERDICT};
 use crate::base::file::{FileError, create_folder, write_whole};
 use crate::base::plain::Shown as _;
 use crate::blind::rehearse::{Rehearsal, answers, rehearse};
-use crate::campaign::{self, FlightFolder, read_json, to_json};
+use crate::campaign::{self, FlightFolder, to_json};
 use crate::effects::{LIBRARY, Signal};
 use crate::gap::Verdict;
 use crate::gap::next::predict::{least, matters};
@@ -161,7 +162,8 @@ impl Before {
                 campaign.shown()
             )));
         }
-        let verdict: Verdict = read_json(&place)?;
+        let again = again(campaign, wish.flight.as_deref(), wish.gap.as_deref());
+        let Proven { verdict, .. } = proof::read(&compared, &again)?;
         let (folder, plan) = flight_of(campaign, wish.flight.as_deref())?;
         is_of(&verdict, &plan).map_err(|why| {
             WorkflowError::Usage(format!("{} cannot be used: {why}", place.shown()))
@@ -177,7 +179,7 @@ impl Before {
 }
 
 /// Whether a verdict can be one of this flight; else why not.
-fn is_of(verdict: &Verdict, plan: &Plan) -> Result<(), String> {
+pub(crate) fn is_of(verdict: &Verdict, plan: &Plan) -> Result<(), String> {
     if verdict.schema != VERDICT_SCHEMA {
         return Err(format!("its schema is \"{}\", not {VERDICT_SCHEMA}", verdict.schema));
     }

@@ -16,7 +16,7 @@ use updraft::effects::{Model, Signals};
 
 fn cell(protocol: Protocol, base: Base, hidden: &[&str]) -> Cell {
     let hidden = hidden.iter().map(|name| (*name).to_owned()).collect();
-    Cell { protocol, air: AirClass::Moderate, base, hidden, side: 3 }
+    Cell { protocol, air: AirClass::Moderate, base, hidden, side: 3, columns: None }
 }
 
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {

@@ -19,7 +19,8 @@ use updraft::gap::{Dependence, Verdict};
 
 fn truth(base: Base, hidden: &[&str]) -> Scenario {
     let hidden = hidden.iter().map(|name| (*name).to_owned()).collect();
-    let cell = Cell { protocol: Protocol::Paper, air: AirClass::Field, base, hidden, side: 3 };
+    let (protocol, air) = (Protocol::Paper, AirClass::Field);
+    let cell = Cell { protocol, air, base, hidden, side: 3, columns: None };
     Scenario::draw(7, &cell).unwrap()
 }
 

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot run the program fails")]
 
 use super::support::Bench;
-use crate::gap::verdicts::{INFLOW, climb_class, verdict};
+use crate::gap::verdicts::{INFLOW, climb_class, prove, verdict};
 use updraft::gap::Verdict;
 use updraft::vehicle::library;
 
@@ -18,6 +18,37 @@ fn compared(bench: &Bench, verdict: &Verdict) {
     table.parameters.insert("inflow_share".to_owned(), INFLOW);
     std::fs::write(folder.join("model.toml"), toml::to_string(&model).unwrap()).unwrap();
     std::fs::write(folder.join("verdict.json"), serde_json::to_vec(verdict).unwrap()).unwrap();
+    prove(&folder);
+}
+
+#[test]
+fn an_edited_verdict_or_model_is_refused() {
+    let bench = Bench::new();
+    compared(&bench, &verdict(vec![climb_class()]));
+    let next = ["gap", "next", "campaign", "--no-verify"];
+    for (file, from, to) in [
+        ("verdict.json", "parasitic-drag", "ground-effect"),
+        ("model.toml", "inflow_share = 0.4", "inflow_share = 0.41"),
+    ] {
+        let path = bench.path("campaign/gap").join(file);
+        let written = std::fs::read_to_string(&path).unwrap();
+        assert!(written.contains(from), "{written}");
+        std::fs::write(&path, written.replacen(from, to, 1)).unwrap();
+        let ended = bench.expect(2, &next);
+        let said =
+            format!("campaign/gap/{file} was edited after `updraft gap` wrote it: its SHA-256 is");
+        assert!(ended.err.contains(&said), "{ended}");
+        assert!(ended.err.contains("compare again (`updraft gap campaign`)"), "{ended}");
+        std::fs::write(&path, written).unwrap();
+    }
+    assert!(!bench.path("campaign/gap/next.toml").exists());
+    std::fs::remove_file(bench.path("campaign/gap/SHA256")).unwrap();
+    let ended = bench.expect(2, &next);
+    assert!(ended.err.contains("verdict.json has no SHA256 beside it"), "{ended}");
+    assert!(ended.err.contains("compare again (`updraft gap campaign`)"), "{ended}");
+    std::fs::rename(bench.path("campaign/gap"), bench.path("else where")).unwrap();
+    let ended = bench.expect(2, &[&next[..], &["--gap", "else where"]].concat());
+    assert!(ended.err.contains("(`updraft gap campaign -o 'else where'`)"), "{ended}");
 }
 
 #[test]
@@ -129,6 +160,9 @@ fn an_effect_is_hidden_named_and_revealed() {
     assert_eq!(result["right"], true, "{ended}");
     let verdict = bench.path("out/flight/gap/verdict.json");
     assert!(verdict.is_file());
+    // The verdict that the program writes is one that it takes.
+    let next = bench.run(&["gap", "next", "out/flight", "--no-verify"]);
+    assert!(!next.err.contains("edited") && !next.err.contains("SHA256"), "{next}");
     let again = bench.expect(2, &args);
     assert!(again.err.contains("replace it with --force"), "{again}");
 }

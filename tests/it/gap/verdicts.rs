@@ -1,5 +1,11 @@
 //! A verdict on a flight, as tests need it.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot write its folder fails")]
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use updraft::base::digest::sha256;
 use updraft::gap::Verdict;
 use updraft::gap::verdict::{Finding, Fitted, Interval, Noise, Step, VERDICT_SCHEMA};
 
@@ -60,4 +66,14 @@ pub(crate) fn climb_class() -> Finding {
         effects: effects.map(str::to_owned).to_vec(),
         parameters: vec![fitted("inflow_share", INFLOW)],
     }
+}
+
+/// Writes the hashes of verdict and model beside them, as `updraft gap` does.
+pub(crate) fn prove(folder: &Path) {
+    let mut text = String::new();
+    for name in ["verdict.json", "model.toml"] {
+        let bytes = std::fs::read(folder.join(name)).unwrap();
+        writeln!(text, "{}  {name}", sha256(&bytes)).unwrap();
+    }
+    std::fs::write(folder.join("SHA256"), text).unwrap();
 }

@@ -39,6 +39,9 @@ fn json_schemas_are_current() {
         (Format::Blind, "blind"),
         (Format::BlindFlight, "blind-flight"),
         (Format::BlindTruth, "blind-truth"),
+        (Format::BlindGame, "blind-game"),
+        (Format::BlindRecord, "blind-record"),
+        (Format::BlindVerify, "blind-verify"),
         (Format::Next, "next"),
         (Format::Hidden, "hidden"),
     ] {

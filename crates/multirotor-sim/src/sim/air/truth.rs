@@ -3,7 +3,6 @@
 //! One CSV file per drone, one row per second of show time. `up_10s_mps` is the mean updraft over
 //! the 10 s around the row, which is what the analysis' running mean can see.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::Vector3;
@@ -19,9 +18,9 @@ use untrusted_io::plain::Shown as _;
 /// First line of a truth file. Places in the show frame; motion towards east, north and up.
 pub const HEADER: &str = "time_s,x_m,y_m,z_m,east_mps,north_mps,up_mps,up_10s_mps";
 /// Samples per second that the 10 s means are taken from.
-const RATE: i64 = 10;
+pub(crate) const RATE: i64 = 10;
 /// Half of the running mean, s.
-const HALF_S: i64 = 5;
+pub(crate) const HALF_S: i64 = 5;
 /// Largest file that is read, bytes: a day.
 const MAX_BYTES: u64 = 16 << 20;
 
@@ -84,19 +83,30 @@ pub fn to_csv(
     let steps = (RATE * HALF_S) as usize;
     for (second, centre) in (0..=end_s).zip((steps..).step_by(RATE as usize)) {
         let Some((place, velocity)) = samples.get(centre) else { break };
-        let neu = frame.to_neu(*velocity);
         let (Some(to), Some(from)) = (integral.get(centre + steps), integral.get(centre - steps))
         else {
             break;
         };
         let mean = (to - from) / (2 * HALF_S) as f64;
-        // Adding zero turns -0 into 0.
-        let [x, y, z] = [place.x, place.y, place.z].map(|value| value + 0.0);
-        let [east, north, up] = [neu.y, neu.x, neu.z].map(|value| value + 0.0);
-        let _ =
-            writeln!(text, "{second},{x:.3},{y:.3},{z:.3},{east:.5},{north:.5},{up:.5},{mean:.5}");
+        text.push_str(&row(second, place, *velocity, mean, frame));
     }
     text
+}
+
+/// One row of a truth file: a second, a place and the motion of the air there, both in the show frame, and
+/// its mean updraft.
+pub(crate) fn row(
+    second: i64,
+    place_m: &Vector3<f64>,
+    velocity_mps: Vector3<f64>,
+    mean_mps: f64,
+    frame: &ShowFrame,
+) -> String {
+    let neu = frame.to_neu(velocity_mps);
+    // Adding zero turns -0 into 0.
+    let [x, y, z] = [place_m.x, place_m.y, place_m.z].map(|value| value + 0.0);
+    let [east, north, up] = [neu.y, neu.x, neu.z].map(|value| value + 0.0);
+    format!("{second},{x:.3},{y:.3},{z:.3},{east:.5},{north:.5},{up:.5},{mean_mps:.5}\n")
 }
 
 /// Writes the truth of one drone; see [`to_csv`].

@@ -9,6 +9,7 @@ use thiserror::Error;
 use super::imu::Imu;
 use super::packet::{PacketError, ServoPacket};
 use super::reply::write_reply;
+use super::track::Track;
 use crate::effects::Active;
 use crate::sim::air::{Atmosphere, Surroundings, density_ratio};
 use crate::sim::flight::command;
@@ -65,6 +66,7 @@ pub struct Instance<'a> {
     peer: Option<Peer>,
     reply: String,
     status: Status,
+    track: Option<Track>,
 }
 
 #[derive(Clone, Copy)]
@@ -134,7 +136,25 @@ impl<'a> Instance<'a> {
             peer: None,
             reply: String::new(),
             status: Status::default(),
+            track: None,
         }
+    }
+
+    /// An instance that takes note of the air that its body meets; see [`Instance::truth`].
+    #[must_use]
+    pub fn with_truth(mut self) -> Self {
+        self.track = Some(Track::default());
+        self
+    }
+
+    /// The air that the body has met since its firmware started, as the CSV text of a truth file
+    /// ([`crate::sim::air::truth`]): a row per second since that start, with the place where the body
+    /// truly was. `None` before its first frame, and without [`Instance::with_truth`].
+    ///
+    /// The ten-second mean of the first and last five seconds is of the part that was flown. No more
+    /// than a day is kept.
+    pub fn truth(&self) -> Option<String> {
+        self.track.as_ref()?.to_csv(&self.setup.frame)
     }
 
     /// Answers one datagram with the text to send back.
@@ -193,6 +213,7 @@ impl<'a> Instance<'a> {
             }
             _ => {
                 self.restart(rate_hz);
+                self.track = self.track.take().map(|_| Track::default());
                 self.status.starts += 1;
                 1
             }
@@ -261,6 +282,10 @@ impl<'a> Instance<'a> {
             air_velocity_mps: self.setup.atmosphere.air_velocity(place, self.time_s),
             density_ratio: density_ratio(self.setup.frame.origin.amsl_m + place.z),
         };
+        if let Some(track) = &mut self.track {
+            let velocity_mps = self.around.air_velocity_mps;
+            track.meet(self.time_s, *place, velocity_mps, &self.setup.frame);
+        }
     }
 }
 

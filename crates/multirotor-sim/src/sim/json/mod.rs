@@ -15,6 +15,7 @@ mod instance;
 mod packet;
 mod reply;
 mod serve;
+mod track;
 
 pub use instance::{Instance, InstanceSetup, Refusal, Status};
 pub use packet::{MAX_PACKET_BYTES, PacketError, ServoPacket};

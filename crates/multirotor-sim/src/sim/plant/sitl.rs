@@ -90,6 +90,11 @@ impl Sitl {
         self.inertia
     }
 
+    /// Drag coefficient of the body times its area, the same from every side, m².
+    pub fn drag_area_m2(&self) -> f64 {
+        2.0 * self.half_drag_m2
+    }
+
     /// Adds the loads of commands (share of 1000..2000 us) at a velocity relative to the air and
     /// turn rates, both in body axes; `density_ratio` is that of the standard atmosphere, and
     /// `drag_share` what effects make of the body's drag along forward, left and up.

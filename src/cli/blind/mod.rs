@@ -1,18 +1,23 @@
-//! `updraft blind`: flights that hide physics, what the search makes of them, and then the truth.
+//! `updraft blind`: flights that hide physics, what the search makes of them, and then the truth; in a
+//! series for a table, or one as a game for strangers.
+
+mod hide;
+mod reveal;
+mod verify;
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{Args, Subcommand, ValueEnum};
 
-use super::context::Context;
-use super::exit::{CommandError, Exit};
-use super::words;
 use crate::base::plain::Shown as _;
 use crate::blind::hide::HiddenKind;
 use crate::blind::render::{Style, render};
 use crate::blind::series::{Place, Settings};
 use crate::blind::tables::{KINDS, ON_REQUEST};
 use crate::blind::{AirClass, Base, Protocol};
+use crate::cli::context::Context;
+use crate::cli::exit::{CommandError, Exit};
+use crate::cli::words;
 use crate::workflow::blind;
 
 /// The word for nothing.
@@ -32,11 +37,13 @@ enum Which {
 
 /// Arguments of `updraft blind`.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_long_help = format!("Examples:
   updraft blind --seed 7 --tuning --flights 20 --grid 3
   updraft blind --seed 20270101 --flights 3000 -o blind
   updraft blind --seed 20270102 --protocol paper --effects none --air field --flights 200
   updraft blind --seed 20270103 --effects battery,rotor-inflow+battery --base airsim --keep
+  updraft blind hide -o game                      # a game: then updraft gap game, blind reveal game
 
 Each flight is drawn from the seed, its truth is sealed (the SHA-256 is published before the flight),
 and it is flown with physics that the vehicle's file does not have. The search sees template,
@@ -49,6 +56,8 @@ What can be hidden:
 Only where --effects names it:
 {}", kinds_text(KINDS), kinds_text(ON_REQUEST)))]
 pub(super) struct BlindArgs {
+    #[command(subcommand)]
+    command: Option<BlindCommand>,
     /// Which protocol to fly
     #[arg(long, value_enum, default_value_t = Which::Both)]
     protocol: Which,
@@ -57,8 +66,8 @@ pub(super) struct BlindArgs {
     flights: u32,
     /// Seed for all flights: 1000000 or more for scoring; below that, with --tuning, for trying
     /// things out
-    #[arg(long, value_name = "SEED")]
-    seed: u64,
+    #[arg(long, value_name = "SEED", required = true)]
+    seed: Option<u64>,
     /// What to hide, separated by commas; NAME+NAME hides both together, `none` hides nothing
     /// [default: each by itself, and nothing six times as often]
     #[arg(long, value_name = "NAMES", value_parser = hidden_sets)]
@@ -90,6 +99,16 @@ pub(super) struct BlindArgs {
     /// Flights at the same time [default: one per core]
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
+}
+
+#[derive(Debug, Subcommand)]
+enum BlindCommand {
+    /// Fly a game: something is hidden, or nothing, and its truth is sealed
+    Hide(hide::HideArgs),
+    /// Open a game's seal, now that there is a verdict
+    Reveal(reveal::RevealArgs),
+    /// Check that nobody has altered a game
+    Verify(verify::VerifyArgs),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -169,7 +188,7 @@ impl BlindArgs {
             bases: bases.collect(),
             hidden,
             flights: self.flights as usize,
-            seed: self.seed,
+            seed: self.seed.unwrap_or_default(),
             side: self.grid,
             tuning: self.tuning,
         }
@@ -177,6 +196,12 @@ impl BlindArgs {
 }
 
 pub(super) fn run(context: &Context, args: &BlindArgs) -> Result<Exit, CommandError> {
+    match &args.command {
+        Some(BlindCommand::Hide(args)) => return hide::run(context, args),
+        Some(BlindCommand::Reveal(args)) => return reveal::run(context, args),
+        Some(BlindCommand::Verify(args)) => return verify::run(context, args),
+        None => {}
+    }
     let place = Place { folder: args.output.clone(), keep: args.keep };
     let note = args.note.as_deref();
     let scored = blind::run(context, &args.settings(), &place, args.jobs, note)?;

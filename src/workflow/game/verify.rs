@@ -1,0 +1,231 @@
+//! Whether truth, nonce, flight, verdict and record of a game belong together.
+
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::reveal::{MAX_GAME_BYTES, gap_folder, read_record};
+use super::{files, game_path, read_game, record_path};
+use crate::base::digest::sha256;
+use crate::base::file::read_whole;
+use crate::base::plain::Shown as _;
+use crate::blind::game::GameFile;
+use crate::blind::record::BlindRecord;
+use crate::blind::seal;
+use crate::gap::Verdict;
+use crate::workflow::error::{WorkflowError, with_reasons};
+use crate::workflow::gap::{VERDICT, proof};
+use crate::workflow::{made_by, words};
+
+/// Name and version of the format of what `updraft blind verify --json` prints.
+pub const VERIFY_SCHEMA: &str = "updraft.blind-verify/1";
+
+/// Whether the parts of a game belong together.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Verification {
+    /// Format name and version: `updraft.blind-verify/1`.
+    pub schema: String,
+    /// Program and version.
+    pub made_by: String,
+    /// SHA-256 of the truth that everything is held against.
+    pub truth_sha256: String,
+    /// Whether the seal was opened.
+    pub revealed: bool,
+    /// Whether nothing was altered.
+    pub intact: bool,
+    /// Each part that was looked at.
+    pub checks: Vec<Check>,
+}
+
+/// One part of a game.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Check {
+    /// Its path.
+    pub file: String,
+    /// What is right with it, if nothing is wrong.
+    pub holds: String,
+    /// What is wrong with it; absent: nothing.
+    pub problem: Option<String>,
+}
+
+/// Checks of a game, as they are made.
+struct Checks<'a> {
+    folder: &'a Path,
+    made: Vec<Check>,
+}
+
+impl Checks<'_> {
+    fn add(&mut self, path: &Path, holds: impl Into<String>, problem: Option<String>) {
+        let file = path.shown().to_string();
+        self.made.push(Check { file, holds: holds.into(), problem });
+    }
+}
+
+/// Verifies a game, before its seal is opened or after. `published` is the truth's SHA-256 as somebody has
+/// written it down; `None`: as the record has it, else `game.json`.
+///
+/// # Errors
+/// When there is no game. What was altered is no error, but in [`Verification::checks`].
+pub fn run(folder: &Path, published: Option<&str>) -> Result<Verification, WorkflowError> {
+    let game = read_game(folder)?;
+    let path = record_path(folder);
+    let revealed = path.exists();
+    let record = revealed.then(|| read_record(&path));
+    let (record, unreadable) = match record {
+        Some(Ok(record)) => (Some(record), None),
+        Some(Err(error)) => (None, Some(with_reasons(&error))),
+        None => (None, None),
+    };
+    let recorded = record.as_ref().map(|record| record.truth_sha256.clone());
+    let published = published.map(str::to_lowercase);
+    let truth_sha256 = published.or(recorded).unwrap_or_else(|| game.truth_sha256.clone());
+    let mut checks = Checks { folder, made: Vec::new() };
+    checks.seal(&truth_sha256);
+    checks.game(&game, record.as_ref(), &truth_sha256);
+    checks.flight(&game);
+    let proven = checks.verdict(record.as_ref(), revealed);
+    if let Some(problem) = unreadable {
+        checks.add(&path, "", Some(problem));
+    }
+    if let Some(record) = &record {
+        checks.record(record, &path, &truth_sha256, proven.as_ref());
+    }
+    Ok(Verification {
+        schema: VERIFY_SCHEMA.to_owned(),
+        made_by: made_by(),
+        truth_sha256,
+        revealed,
+        intact: checks.made.iter().all(|check| check.problem.is_none()),
+        checks: checks.made,
+    })
+}
+
+/// What is wrong with a hash, if it is another.
+fn other(found: &str, wanted: &str) -> Option<String> {
+    (found != wanted)
+        .then(|| format!("was altered: its SHA-256 is {found}, published was {wanted}"))
+}
+
+impl Checks<'_> {
+    /// The truth with its nonce, and the published hash beside it.
+    fn seal(&mut self, truth_sha256: &str) {
+        let folder = self.folder;
+        let problem = match seal::truth_sha256(folder) {
+            Ok(found) => other(&found, truth_sha256),
+            Err(error) => Some(with_reasons(&error)),
+        };
+        let holds = "the truth and its nonce have the SHA-256 that was published";
+        self.add(&seal::truth_path(folder), holds, problem);
+        let problem = match seal::published(folder) {
+            Ok(found) if found == truth_sha256 => None,
+            Ok(found) => Some(format!("says {found}, published was {truth_sha256}")),
+            Err(error) => Some(with_reasons(&error)),
+        };
+        self.add(&seal::hash_path(folder), "has that SHA-256", problem);
+    }
+
+    /// What the player was given.
+    fn game(&mut self, game: &GameFile, record: Option<&BlindRecord>, truth_sha256: &str) {
+        let path = game_path(self.folder);
+        let problem = if game.truth_sha256 == truth_sha256 {
+            let found = read_whole(&path, MAX_GAME_BYTES).map(|bytes| sha256(&bytes));
+            match (found, record) {
+                (Ok(found), Some(record)) if found != record.game_sha256 => Some(format!(
+                    "was altered: its SHA-256 is {found}, in the record stands {}",
+                    record.game_sha256
+                )),
+                (Err(error), _) => Some(with_reasons(&error)),
+                _ => None,
+            }
+        } else {
+            let says = &game.truth_sha256;
+            Some(format!("says that the truth's SHA-256 is {says}, published was {truth_sha256}"))
+        };
+        self.add(&path, "names that SHA-256 and those of the flight's files", problem);
+    }
+
+    /// Plan, vehicle and logs.
+    fn flight(&mut self, game: &GameFile) {
+        let differences = files::differences(self.folder, game);
+        if differences.is_empty() {
+            let count = words::count(game.files.len(), "file");
+            let flight = crate::blind::play::flight(self.folder);
+            self.add(&flight, format!("{count} as they were flown"), None);
+        }
+        for difference in differences {
+            self.add(&self.folder.join(&difference.path), "", Some(difference.how));
+        }
+    }
+
+    /// The verdict, if there is one yet.
+    fn verdict(&mut self, record: Option<&BlindRecord>, revealed: bool) -> Option<Verdict> {
+        let compared = match record {
+            Some(record) => self.folder.join(&record.gap),
+            None => gap_folder(self.folder),
+        };
+        let path = compared.join(VERDICT);
+        if !path.exists() {
+            if revealed {
+                self.add(&path, "", Some("is missing".to_owned()));
+            }
+            return None;
+        }
+        let again = proof::again(self.folder, None, None);
+        let found = read_whole(&path, MAX_GAME_BYTES).map(|bytes| sha256(&bytes));
+        if let (Ok(found), Some(record)) = (&found, record)
+            && *found != record.verdict_sha256
+        {
+            let problem = format!(
+                "was altered: its SHA-256 is {found}, in the record stands {}",
+                record.verdict_sha256
+            );
+            self.add(&path, "", Some(problem));
+            return None;
+        }
+        match proof::read(&compared, &again) {
+            Ok(proven) => {
+                let holds = if record.is_some() {
+                    "is the one for which the seal was opened"
+                } else {
+                    "is as `updraft gap` wrote it"
+                };
+                self.add(&path, holds, None);
+                Some(proven.verdict)
+            }
+            Err(error) => {
+                self.add(&path, "", Some(with_reasons(&error)));
+                None
+            }
+        }
+    }
+
+    /// The record against the truth and the verdict, by this program if it has made the record.
+    fn record(
+        &mut self,
+        record: &BlindRecord,
+        path: &Path,
+        truth_sha256: &str,
+        verdict: Option<&Verdict>,
+    ) {
+        let opened = || {
+            let at = self.folder.join(&record.gap).join(VERDICT);
+            seal::open(self.folder, &at, Some(truth_sha256)).ok()
+        };
+        let mut holds = "is as it was written";
+        let problem = if record.truth_sha256 != truth_sha256 {
+            let says = &record.truth_sha256;
+            Some(format!("is of a truth with the SHA-256 {says}, published was {truth_sha256}"))
+        } else if record.made_by != made_by() {
+            holds = "is as it was written (by another version: not scored again)";
+            None
+        } else if let (Some(verdict), Some(opened)) = (verdict, opened()) {
+            holds = "has the score that truth and verdict give";
+            (!record.is_score_of(&opened.truth, verdict))
+                .then(|| "was altered: truth and verdict give another score".to_owned())
+        } else {
+            None
+        };
+        self.add(path, holds, problem);
+    }
+}

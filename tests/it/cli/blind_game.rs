@@ -1,0 +1,226 @@
+//! `updraft blind hide`, `reveal` and `verify`: a game of strangers, and what spoils it.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot run the program fails")]
+
+use std::fs;
+
+use super::support::{Bench, Ended, contents};
+use crate::gap::verdicts::{fitted, prove, verdict};
+use updraft::gap::Verdict;
+use updraft::gap::verdict::Finding;
+
+/// The shortest game, in steady air.
+const SMALL: [&str; 6] = ["blind", "hide", "--protocol", "paper", "--air", "still"];
+/// The fewest drones.
+const FEW: [&str; 2] = ["--grid", "2x2"];
+
+fn hide(bench: &Bench, more: &[&str]) -> Ended {
+    bench.expect(0, &[&SMALL[..], more].concat())
+}
+
+fn naming(effect: &str, parameter: &str, value: f64) -> Verdict {
+    let parameters = vec![fitted(parameter, value)];
+    let mut verdict =
+        verdict(vec![Finding::Name { effect: effect.to_owned(), parameters, was_there: false }]);
+    verdict.summary = format!("{effect} is missing.");
+    verdict
+}
+
+/// As if `updraft gap` had compared.
+fn compare(bench: &Bench, folder: &str, verdict: &Verdict) {
+    let folder = bench.path(folder);
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("verdict.json"), serde_json::to_vec(verdict).unwrap()).unwrap();
+    fs::write(folder.join("model.toml"), "").unwrap();
+    prove(&folder);
+}
+
+fn swap(bench: &Bench, file: &str, from: &str, to: &str) -> Vec<u8> {
+    let path = bench.path(file);
+    let before = fs::read_to_string(&path).unwrap();
+    assert!(before.contains(from), "{before}");
+    fs::write(&path, before.replacen(from, to, 1)).unwrap();
+    before.into_bytes()
+}
+
+/// A game from its making to its verification, and everything in it altered once.
+#[test]
+fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
+    let bench = Bench::new();
+    let hidden = hide(
+        &bench,
+        &[&FEW[..], &["--effect", "battery=0.7", "--seed", "7", "-o", "game"]].concat(),
+    );
+    let game: serde_json::Value =
+        serde_json::from_slice(&fs::read(bench.path("game/game.json")).unwrap()).unwrap();
+    let sha256 = game["truth_sha256"].as_str().unwrap();
+    assert!(hidden.out.contains(sha256) && hidden.out.contains("updraft gap game"), "{hidden}");
+    // Neither what is said nor what the player is given tells what is hidden.
+    let told = format!("{hidden}{game}");
+    assert!(!told.contains("battery"), "{told}");
+    for (path, bytes) in contents(&bench.path("game/flight")) {
+        if path.extension().is_some_and(|extension| extension != "BIN") {
+            let text = String::from_utf8(bytes).unwrap();
+            assert!(!text.contains("0.7") || !text.contains("exponent"), "{}", path.display());
+        }
+    }
+
+    let early = bench.expect(5, &["blind", "reveal", "game"]);
+    assert!(
+        early.err.contains("the truth stays sealed: game/gap has no verdict.json; compare first (`updraft gap game`)"),
+        "{early}"
+    );
+    assert!(!early.err.contains("battery") && !bench.path("game/reveal.json").exists());
+    let before = bench.expect(0, &["blind", "verify", "game", "--sha256", sha256]);
+    assert!(before.out.contains("The seal was not opened yet"), "{before}");
+    assert!(!before.out.contains("battery"), "{before}");
+
+    compare(&bench, "game/gap", &naming("battery", "exponent", 0.72));
+    // What was changed before the seal is opened keeps it closed.
+    let log = bench.path("game/flight/logs/02.BIN");
+    let flown = fs::read(&log).unwrap();
+    fs::write(&log, &flown[..flown.len() / 2]).unwrap();
+    let ended = bench.expect(2, &["blind", "reveal", "game"]);
+    assert!(ended.err.contains("flight/logs/02.BIN was changed after the flight"), "{ended}");
+    fs::write(&log, &flown).unwrap();
+    let written = swap(&bench, "game/gap/verdict.json", "battery", "buttery");
+    let ended = bench.expect(2, &["blind", "reveal", "game"]);
+    assert!(ended.err.contains("game/gap/verdict.json was edited"), "{ended}");
+    assert!(ended.err.contains("compare again (`updraft gap game`)"), "{ended}");
+    fs::write(bench.path("game/gap/verdict.json"), &written).unwrap();
+    assert!(!bench.path("game/reveal.json").exists());
+
+    let ended = bench.expect(0, &["blind", "reveal", "game"]);
+    assert!(ended.out.contains("Hidden:   battery (0.700"), "{ended}");
+    assert!(ended.out.contains("Verdict:  battery is missing."), "{ended}");
+    assert!(ended.out.contains("Right: battery was hidden"), "{ended}");
+    let again = bench.expect(0, &["blind", "reveal", "game", "--json"]);
+    let record = again.json("updraft.blind-record/1");
+    assert_eq!((&record["truth_sha256"], &record["right"]), (&game["truth_sha256"], &true.into()));
+    let verified = bench.expect(0, &["blind", "verify", "game", "--json"]);
+    let verified = verified.json("updraft.blind-verify/1");
+    assert_eq!((&verified["intact"], &verified["revealed"]), (&true.into(), &true.into()));
+
+    for (file, from, to, said) in [
+        ("sealed/truth.json", "battery", "buttery", "truth.json: was altered: its SHA-256 is"),
+        ("sealed/truth.json", "\"nonce\": \"", "\"nonce\": \"0", "truth.json: was altered"),
+        ("sealed/SHA256", &sha256[..8], "01234567", "SHA256: says 01234567"),
+        ("game.json", "still", "calm", "game.json: was altered: its SHA-256 is"),
+        ("game.json", &sha256[..8], "01234567", "game.json: says that the truth's SHA-256 is 0123"),
+        ("gap/verdict.json", "battery", "buttery", "verdict.json: was altered: its SHA-256 is"),
+        ("gap/SHA256", "verdict", "verdikt", "verdict.json was edited after"),
+        ("flight/plan.json", "{", "{ ", "plan.json: was changed after the flight"),
+        (
+            "flight/vehicle.toml",
+            "mass_kg",
+            "mass_kg ",
+            "vehicle.toml: was changed after the flight",
+        ),
+        ("reveal.json", "Right:", "Wrong:", "reveal.json was edited after"),
+        ("reveal.json", "\"right\": true", "\"right\": false", "reveal.json was edited after"),
+    ] {
+        let file = format!("game/{file}");
+        let before = swap(&bench, &file, from, to);
+        let ended = bench.expect(4, &["blind", "verify", "game"]);
+        assert!(ended.err.contains(said), "{file}: {ended}");
+        assert!(ended.out.contains("ALTERED") && ended.out.contains("proves nothing"), "{ended}");
+        fs::write(bench.path(&file), before).unwrap();
+    }
+    fs::remove_file(&log).unwrap();
+    fs::write(bench.path("game/flight/logs/09.BIN"), &flown).unwrap();
+    let ended = bench.expect(4, &["blind", "verify", "game", "-q"]);
+    assert!(ended.err.contains("02.BIN: is missing") && ended.out.is_empty(), "{ended}");
+    assert!(ended.err.contains("09.BIN: was added after the flight"), "{ended}");
+    fs::remove_file(bench.path("game/flight/logs/09.BIN")).unwrap();
+    fs::write(&log, &flown).unwrap();
+    // A forgery that fits in itself does not fit what was published.
+    let other = "ab".repeat(32);
+    let ended = bench.expect(4, &["blind", "verify", "game", "--sha256", &other]);
+    assert!(ended.err.contains(&format!("published was {other}")), "{ended}");
+    bench.expect(0, &["blind", "verify", "game"]);
+
+    // Who knows the truth is not asked again.
+    compare(&bench, "game/gap", &naming("rotor-inflow", "inflow_share", 0.3));
+    let ended = bench.expect(2, &["blind", "reveal", "game"]);
+    assert!(ended.err.contains("the seal was opened for another verdict"), "{ended}");
+    // Another game in its place: the old verdict does not count for it.
+    let ended = bench.expect(2, &[&SMALL[..], &FEW[..], &["-o", "game"]].concat());
+    assert!(ended.err.contains("game holds a game") && ended.err.contains("--force"), "{ended}");
+    let ended = bench.expect(2, &["run", "--hide", "3", "--grid", "3x3", "-o", "game", "--force"]);
+    assert!(ended.err.contains("holds a game of `updraft blind hide`"), "{ended}");
+    hide(&bench, &[&FEW[..], &["--nothing", "--force", "--quiet", "-o", "game"]].concat());
+    assert!(!bench.path("game/gap").exists() && !bench.path("game/reveal.json").exists());
+    compare(&bench, "elsewhere", &naming("battery", "exponent", 0.72));
+    let ended = bench.expect(0, &["blind", "reveal", "game", "--gap", "elsewhere"]);
+    assert!(ended.out.contains("Hidden:   nothing"), "{ended}");
+    assert!(ended.out.contains("Wrong: nothing was hidden, and battery was named."), "{ended}");
+    bench.expect(0, &["blind", "verify", "game"]);
+}
+
+#[test]
+fn the_seed_says_what_is_flown_and_the_nonce_is_another_each_time() {
+    let bench = Bench::new();
+    let flown = ["one", "two"].map(|folder| {
+        hide(&bench, &["--seed", "11", "--grid", "2x3", "--wind", "3", "-o", folder]);
+        let logs = contents(&bench.path(folder).join("flight"));
+        let bytes: Vec<Vec<u8>> = logs.into_iter().map(|(_, bytes)| bytes).collect();
+        (bytes, fs::read_to_string(bench.path(folder).join("sealed/SHA256")).unwrap())
+    });
+    let [(one, sealed_one), (two, sealed_two)] = flown;
+    assert!(one.len() > 3 && one == two);
+    assert_ne!(sealed_one, sealed_two);
+}
+
+#[test]
+fn what_cannot_be_hidden_is_said() {
+    let bench = Bench::new();
+    let says = |code: i32, args: &[&str], words: &str| {
+        let ended = bench.expect(code, &[&["blind", "hide"], args].concat());
+        assert!(ended.err.contains(words), "{args:?}: {ended}");
+        assert!(ended.out.is_empty(), "{ended}");
+    };
+    says(2, &["--effect", "warp"], "nothing is called \"warp\" that could be hidden; there are");
+    says(2, &["--effect", "battery=much"], "\"much\" is not a number; write it as NAME=SIZE");
+    says(2, &["--effect", "battery=9"], "a size of 9; it can be 0.05 to 3 share of the sag");
+    says(2, &["--effect", "battery", "--nothing"], "cannot be used with");
+    says(2, &["--effect", "battery", "--effect", "battery"], "they are one effect");
+    says(
+        2,
+        &["--effect", "rotor-inflow", "--vehicle", "pixel"],
+        "cannot be hidden from the base pixel, which has it",
+    );
+    says(2, &["--vehicle", "zeppelin"], "possible values: airsim-generic-quad, arducopter-sitl");
+    says(2, &["--grid", "1x4"], "a game has 2 to 15 rows and columns; 1x4 is not possible");
+    says(2, &["--wind", "-3"], "a wind speed between 0 and 30 m/s");
+    says(2, &["--air", "storm"], "possible values: still, calm, moderate, field");
+    bench.expect(0, &["plan", "calibration", "--grid", "2x2", "-o", "campaign"]);
+    says(2, &["-o", "campaign", "--force"], "campaign holds a campaign; choose another folder");
+    fs::create_dir_all(bench.path("mine/flight")).unwrap();
+    says(2, &["-o", "mine", "--force"], "was not made by `updraft blind hide`");
+    for command in ["reveal", "verify"] {
+        let ended = bench.expect(5, &["blind", command, "campaign"]);
+        assert!(ended.err.contains("campaign is no game: it has no game.json"), "{ended}");
+    }
+    let ended = bench.expect(2, &["blind", "verify", "campaign", "--sha256", "12"]);
+    assert!(ended.err.contains("64 hexadecimal digits"), "{ended}");
+    // A series without a seed is refused as it was.
+    let ended = bench.expect(2, &["blind"]);
+    assert!(ended.err.contains("--seed <SEED>"), "{ended}");
+}
+
+/// The whole way, with the real search, which finds no truth: it was carried off.
+///
+/// `cargo test --release --test it cli::blind_game -- --ignored`
+#[test]
+#[ignore = "flies and searches: minutes in a debug build"]
+fn the_search_does_not_need_the_seal_and_names_what_is_hidden() {
+    let bench = Bench::new();
+    let args = ["--grid", "4x4", "--air", "calm", "--effect", "rotor-inflow=20", "--seed", "5"];
+    bench.expect(0, &[&["blind", "hide", "-o", "game"], &args[..]].concat());
+    fs::rename(bench.path("game/sealed"), bench.path("sealed")).unwrap();
+    bench.expect(0, &["gap", "game"]);
+    fs::rename(bench.path("sealed"), bench.path("game/sealed")).unwrap();
+    let ended = bench.expect(0, &["blind", "reveal", "game", "--json"]);
+    assert_eq!(ended.json("updraft.blind-record/1")["right"], true, "{ended}");
+    bench.expect(0, &["blind", "verify", "game"]);
+}
