@@ -1,6 +1,6 @@
 //! Hidden effects do what their files say, in trim and in flight.
 
-use foreign_worlds::hidden::KINDS;
+use foreign_worlds::hidden::{Drawn, KINDS, Parameter};
 use foreign_worlds::{Condition, Trim};
 
 use super::support::{BLADES, LAW, flown, hiding};
@@ -48,7 +48,11 @@ fn closed_forms_are_those_of_the_files() {
 fn every_kind_flies_on_both_plants_and_comes_home() {
     for plant in [&LAW, &BLADES] {
         for kind in KINDS {
-            let values: Vec<f64> = kind.parameters.iter().map(|one| one.high).collect();
+            let value = |one: &Parameter| match one.drawn {
+                Drawn::FlightShare => 90.0 * one.high,
+                _ => one.high,
+            };
+            let values: Vec<f64> = kind.parameters.iter().map(value).collect();
             let mut world = hiding(plant, kind.name, &values);
             world.air.wind_mps = [4.0, 2.0];
             let (flown, _) = flown(&world);
