@@ -1,5 +1,6 @@
 //! One blind flight, fully determined by its seed and its cell.
 
+use foreign_worlds::World;
 use rand_distr::Distribution as _;
 use rand_distr::StandardUniform;
 use rand_pcg::Pcg64;
@@ -10,6 +11,7 @@ use super::air::AirScales;
 use super::error::BlindError;
 use super::hide::{Hidden, KINDS, between, kind_of, log_between, unit};
 use super::vehicles::hover_a;
+use super::worlds::{self, Worlds};
 use crate::base::rng::{Purpose, stream};
 use crate::effects::Role;
 
@@ -136,13 +138,17 @@ impl Base {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
+    /// Whose physics it is flown with.
+    #[serde(default, skip_serializing_if = "Worlds::is_home")]
+    pub worlds: Worlds,
     /// The protocol.
     pub protocol: Protocol,
     /// The air.
     pub air: AirClass,
     /// The known vehicle.
     pub base: Base,
-    /// What is hidden, by the names of [`super::hide::KINDS`]; empty: nothing.
+    /// What is hidden, by the names of [`super::hide::KINDS`] or, in foreign worlds, of
+    /// [`super::tables::FOREIGN_KINDS`]; empty: nothing.
     pub hidden: Vec<String>,
     /// Drones along each side of the grid.
     pub side: u16,
@@ -156,13 +162,15 @@ impl Cell {
         let names: Vec<&str> = takes.map(|kind| kind.name).collect();
         let place = unit(&mut stream(seed, CHOICE, Purpose::Hidden)) * names.len() as f64;
         let hidden = names.get(place as usize).map(|name| (*name).to_owned());
-        Self { protocol, air, base, hidden: hidden.into_iter().collect(), side: FULL_SIDE }
+        let hidden = hidden.into_iter().collect();
+        Self { worlds: Worlds::Home, protocol, air, base, hidden, side: FULL_SIDE }
     }
 
     /// Short name of the cell: `paper-calm-airsim-none`.
     pub fn name(&self) -> String {
         let hidden = if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") };
-        format!("{}-{}-{}-{hidden}", self.protocol.name(), self.air.name(), self.base.name())
+        let words = [self.protocol.name(), self.air.name(), self.base.name(), &hidden].join("-");
+        if self.worlds.is_home() { words } else { format!("{}-{words}", self.worlds.name()) }
     }
 }
 
@@ -212,6 +220,9 @@ pub struct Scenario {
     pub hidden: Vec<Hidden>,
     /// What is always there.
     pub nuisance: Nuisance,
+    /// The world, if it is a foreign one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub world: Option<World>,
 }
 
 impl Scenario {
@@ -221,6 +232,9 @@ impl Scenario {
     ///
     /// If an effect is unknown, cannot be hidden from this base, or not together with another.
     pub fn draw(seed: u64, cell: &Cell) -> Result<Self, BlindError> {
+        if !cell.worlds.is_home() {
+            return Self::foreign(seed, cell);
+        }
         let width_m = f64::from(cell.side.saturating_sub(1)) * SPACING_M;
         let mut hidden: Vec<Hidden> = Vec::new();
         for name in &cell.hidden {
@@ -232,7 +246,43 @@ impl Scenario {
             hidden.push(drawn);
         }
         let nuisance = nuisance(seed, cell)?;
-        Ok(Self { schema: SCENARIO_SCHEMA.to_owned(), seed, cell: cell.clone(), hidden, nuisance })
+        Ok(Self {
+            schema: SCENARIO_SCHEMA.to_owned(),
+            seed,
+            cell: cell.clone(),
+            hidden,
+            nuisance,
+            world: None,
+        })
+    }
+
+    /// Draws a flight in a foreign world.
+    fn foreign(seed: u64, cell: &Cell) -> Result<Self, BlindError> {
+        let world = worlds::draw::world(seed, cell)?;
+        let known = worlds::known::vehicle(&world, cell.base)?.vehicle;
+        let hidden = worlds::draw::truths(&world, &known);
+        // The drones that are charged and lost are drawn as at home; the rest stands in the world.
+        let mut nuisance = nuisance(seed, cell)?;
+        nuisance.warm.clear();
+        nuisance.inflow_spread = 0.0;
+        nuisance.thrust_spread = world.thrust_spread;
+        let [shared, own] = [world.air.shared_mps, world.air.own_mps];
+        nuisance.air = AirScales {
+            shared_mps: shared,
+            time_s: world.air.shared_s,
+            local_mps: own,
+            local_s: world.air.own_s,
+            wind_mps: world.air.wind_mps,
+            wind_gust_mps: 0.0,
+            ..nuisance.air
+        };
+        nuisance.battery = BatteryTruth {
+            cells: world.battery.cells,
+            capacity_ah: world.battery.capacity_ah,
+            resistance_ohm: world.battery.resistance_ohm,
+        };
+        let (schema, cell) = (SCENARIO_SCHEMA.to_owned(), cell.clone());
+        Ok(Self { schema, seed, cell, hidden, nuisance, world: Some(world) })
     }
 
     /// Number of slots in the formation.

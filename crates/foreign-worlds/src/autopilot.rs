@@ -22,7 +22,7 @@ const MOST_INTEGRAL_MPS2: f64 = 4.0;
 /// Smallest command in the air, 0 to 1.
 const LEAST_COMMAND: f64 = 0.12;
 
-/// What the loop believes of the drone's motion, and what it is to do.
+/// Motion that the loop believes in, and the one that it is to make.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errand {
     /// Where it should be, show frame, m.
@@ -35,7 +35,7 @@ pub struct Errand {
     pub velocity_mps: Vector,
 }
 
-/// What the loop decides.
+/// Decision of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision {
     /// Command to the motor controllers, 0 to 1.

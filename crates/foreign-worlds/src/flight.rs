@@ -62,7 +62,7 @@ pub struct Site {
 pub struct Drone<'a> {
     /// Number of its slot, from 1: the key of its random streams.
     pub slot: u16,
-    /// Its place on the ground, show frame, m.
+    /// Place on the ground, show frame, m.
     pub home_m: Vector,
     /// Whether another drone flies next to it on the left.
     pub has_left: bool,
@@ -80,7 +80,7 @@ pub struct Drone<'a> {
     pub start: (i64, i64),
 }
 
-/// What became of a drone.
+/// Outcome of a drone's flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flown {
     /// Largest distance from its target in the air, m.

@@ -15,7 +15,7 @@ const STEPS: usize = 60;
 /// Largest horizontal part of the thrust's direction.
 const MOST_LEAN: f64 = 0.8;
 
-/// What surrounds a drone at one moment.
+/// Surroundings of a drone at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     /// Velocity relative to the air, show frame, m/s; z is the climb through the air.

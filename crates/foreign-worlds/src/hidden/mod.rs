@@ -40,7 +40,7 @@ pub struct Moment {
     pub height_m: f64,
     /// Velocity relative to the air, show frame, m/s; z is the climb through the air.
     pub relative_mps: Vector,
-    /// The same in body axes, m/s.
+    /// Velocity relative to the air in body axes, m/s.
     pub body_mps: Vector,
     /// Vertical acceleration, m/s², up positive.
     pub acceleration_mps2: f64,
@@ -138,9 +138,9 @@ pub enum Drawn {
 pub struct Kind {
     /// Name, for options and tables.
     pub name: &'static str,
-    /// What it is, in a few words.
+    /// Description in a few words.
     pub what: &'static str,
-    /// What it depends on: words for the quantities along which it can be recognised, the plainest first.
+    /// Words for the quantities along which it can be recognised, the plainest first.
     pub depends_on: &'static [&'static str],
     /// Parameters; the first says how large it is.
     pub parameters: &'static [Parameter],

@@ -67,7 +67,7 @@ impl Rotor {
         (zeroth, second)
     }
 
-    /// What the rotor does at a speed (rad/s) in a flow along and across its axis (m/s).
+    /// State of the rotor at a speed (rad/s) in a flow along and across its axis (m/s).
     pub fn state(
         &self,
         speed_radps: f64,
@@ -130,7 +130,7 @@ pub struct BladeElement {
     pub motor: Motor,
     /// Drag area of the body from the side: drag coefficient times area, m².
     pub side_m2: f64,
-    /// The same from above, m².
+    /// Drag area of the body from above, m².
     pub top_m2: f64,
 }
 

@@ -35,7 +35,7 @@ pub struct Flow {
     pub density_ratio: f64,
 }
 
-/// What the rotors do to the body.
+/// Forces on the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Loads {
     /// Force of all rotors, body axes, N.
