@@ -223,6 +223,11 @@ pub struct Scenario {
     /// The world, if it is a foreign one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub world: Option<World>,
+    /// Largest difference of the known vehicle's pulses from those of the foreign plant without what is
+    /// hidden, over the flown range of air speeds and without the mean, us. Beyond 1 us something is missing
+    /// where nothing is hidden.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_over_us: Option<f64>,
 }
 
 impl Scenario {
@@ -253,14 +258,16 @@ impl Scenario {
             hidden,
             nuisance,
             world: None,
+            left_over_us: None,
         })
     }
 
     /// Draws a flight in a foreign world.
     fn foreign(seed: u64, cell: &Cell) -> Result<Self, BlindError> {
         let world = worlds::draw::world(seed, cell)?;
-        let known = worlds::known::vehicle(&world, cell.base)?.vehicle;
-        let hidden = worlds::draw::truths(&world, &known);
+        let known = worlds::known::vehicle(&world, cell.base)?;
+        let left_over_us = Some(known.largest_us);
+        let hidden = worlds::draw::truths(&world, &known.vehicle);
         // The drones that are charged and lost are drawn as at home; the rest stands in the world.
         let mut nuisance = nuisance(seed, cell)?;
         nuisance.warm.clear();
@@ -282,7 +289,7 @@ impl Scenario {
             resistance_ohm: world.battery.resistance_ohm,
         };
         let (schema, cell) = (SCENARIO_SCHEMA.to_owned(), cell.clone());
-        Ok(Self { schema, seed, cell, hidden, nuisance, world: Some(world) })
+        Ok(Self { schema, seed, cell, hidden, nuisance, world: Some(world), left_over_us })
     }
 
     /// Number of slots in the formation.
