@@ -5,6 +5,7 @@ use std::path::Path;
 use super::foreign;
 use super::hide::Hidden;
 use super::scenario::Scenario;
+use super::worlds;
 use crate::effects::Reference;
 use crate::gap::{SteadyPulse, There, Verdict};
 use crate::vehicle::Vehicle;
@@ -40,6 +41,9 @@ where
 /// Hidden effects of a truth, in the form that the calculation of their Fisher z takes; `vehicle`
 /// is the true one.
 pub fn there<'a>(truth: &'a Scenario, vehicle: &Vehicle) -> Vec<There<'a>> {
+    if let Some(world) = &truth.world {
+        return worlds::steady::there(world);
+    }
     let foreign = |hidden: &Hidden| -> Option<SteadyPulse<'a>> {
         let found = foreign::find(&hidden.effect)?;
         let of = |name: &str| hidden.parameters.get(name).copied();

@@ -10,6 +10,7 @@ use super::error::BlindError;
 use super::foreign;
 use super::scenario::{SPACING_M, Scenario};
 use super::vehicles::true_vehicle;
+use super::worlds;
 use crate::base::file::{create_folder, sweep_partial, write_whole};
 use crate::base::time::GpsTime;
 use crate::campaign::{FlightFolder, to_json};
@@ -25,7 +26,7 @@ use crate::vehicle::Vehicle;
 /// uses has 2.5 ms.
 pub const PLANT_STEPS: u16 = 2;
 /// When blind flights start: 2026-06-01 12:00 UTC. Fixed, so that the same seed gives the same bytes.
-const START: GpsTime = GpsTime { week: 2421, tow_ms: 129_618_000 };
+pub(super) const START: GpsTime = GpsTime { week: 2421, tow_ms: 129_618_000 };
 
 /// Logs of a blind flight, and the drones that it lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +70,9 @@ pub fn fly(
     folder: &Path,
     stop: Option<&AtomicBool>,
 ) -> Result<Flown, BlindError> {
+    if let Some(world) = &scenario.world {
+        return worlds::fly::fly(scenario, world, folder, stop);
+    }
     let flight = planned(scenario)?;
     let known = scenario.cell.base.known()?;
     let setting = Setting {

@@ -8,6 +8,7 @@ use super::foreign;
 use super::hide::{KINDS, kind_of, unit};
 use super::scenario::{AirClass, Base, Cell, Protocol, Scenario};
 use super::vehicles::true_vehicle;
+use super::worlds::Worlds;
 use crate::base::rng::{Purpose, stream};
 use crate::effects::EffectError;
 use crate::effects::select::resolved;
@@ -68,6 +69,7 @@ impl Game {
             Choice::These(sizes) => sizes.clone(),
         };
         let cell = Cell {
+            worlds: Worlds::Home,
             protocol: self.protocol,
             air: self.air,
             base: self.base,

@@ -13,6 +13,7 @@ pub use super::tables::{KINDS, ON_REQUEST};
 use crate::base::rng::{Purpose, stream};
 use crate::effects::select::{set, value_of, values_of};
 use crate::effects::{Reference, Role, Signals, find};
+use crate::gap::Dependence;
 use crate::sim::plant::sitl::Sitl;
 use crate::vehicle::Vehicle;
 
@@ -34,6 +35,10 @@ pub struct Hidden {
     pub before: Option<f64>,
     /// How large it was drawn, in words.
     pub words: String,
+    /// Dependences by which it may be called unknown; empty in home worlds.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "Vec<String>")]
+    pub depends_on: Vec<Dependence>,
 }
 
 impl Hidden {
@@ -260,6 +265,7 @@ impl HiddenKind {
             size: self.size.to_owned(),
             before: value_of(&known, self.effect, self.size),
             words: format!("{magnitude:.3} {}", self.unit),
+            depends_on: Vec::new(),
         };
         Ok(hidden)
     }

@@ -2,7 +2,7 @@
 
 use super::interval::{clopper_pearson, median};
 use super::scenario::{AirClass, Base, Protocol};
-use super::score::{Called, HiddenOutcome, Outcome};
+use super::score::{Called, HiddenOutcome, Outcome, WORSE};
 use super::table::{Demand, Metric};
 use crate::effects::Role;
 
@@ -27,6 +27,11 @@ pub(super) fn metrics(outcomes: &[&Outcome]) -> Vec<Metric> {
     let hidden: Vec<&HiddenOutcome> = outcomes.iter().flat_map(|one| &one.hidden).collect();
     let mut metrics = false_alarms(&none);
     metrics.extend(names(&some, &hidden));
+    metrics.push(rate(
+        "a wrong single name, of all flights",
+        outcomes.iter().map(|one| !one.wrong_names.is_empty()),
+        [at_most(0.03), at_most(0.005)],
+    ));
     metrics.extend(sizes(&some, &hidden));
     metrics.push(said_invisible(&hidden));
     metrics.extend(the_papers_own(&some));
@@ -125,6 +130,11 @@ fn sizes(some: &[&Outcome], hidden: &[&HiddenOutcome]) -> Vec<Metric> {
         rate(
             "flights made worse",
             some.iter().map(|one| one.made_worse),
+            [at_most(0.03), at_most(0.0)],
+        ),
+        rate(
+            "raw held-out gap made worse",
+            found().filter_map(|one| one.raw_shrink).map(|shrink| shrink < 1.0 - WORSE),
             [at_most(0.03), at_most(0.0)],
         ),
     ]

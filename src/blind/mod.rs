@@ -3,7 +3,8 @@
 //! The hidden side is a path of its own. Its flights are whole closed-loop flights of the simulator
 //! at another step of the plant, with effects in their full form (the search's library has their
 //! closed forms), with random air, gusts, noise, spread between drones and missing logs; some hide
-//! physics that no library lists ([`foreign`]). What the search gets is a flight folder like any
+//! physics that no library lists ([`foreign`]). In foreign worlds ([`worlds`]) the plant, too, is another.
+//! What the search gets is a flight folder like any
 //! other: template, vehicle, plan and `.BIN` logs ([`fly`]). The truth is sealed ([`seal`]): its hash
 //! is published before the flight is flown, and it is opened only when a verdict is on the disk.
 //! [`score`] compares one verdict with the truth, [`table`] many. [`game`] is one such flight for
@@ -31,7 +32,9 @@ pub mod table;
 pub mod tables;
 pub mod told;
 pub mod vehicles;
+pub mod worlds;
 
 pub use error::BlindError;
 pub use explain::Explain;
 pub use scenario::{AirClass, Base, Cell, Protocol, Scenario};
+pub use worlds::Worlds;

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::table::{Demand, Group, Metric, Table};
+use super::worlds::Worlds;
 
 /// Form in which a table is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +33,10 @@ pub fn render(table: &Table, style: Style, note: Option<&str>) -> String {
         let _ = write!(text, ", {note}");
     }
     text.push_str(".\n");
+    if let Some(rows) = beside(table) {
+        title(&mut text, style, 3, "home and foreign worlds");
+        grid(&mut text, style, &rows);
+    }
     for group in &table.groups {
         let heading = format!("{} ({} flights)", group.label, group.flights);
         title(&mut text, style, 3, &heading);
@@ -47,6 +52,27 @@ pub fn render(table: &Table, style: Style, note: Option<&str>) -> String {
         grid(&mut text, style, &effect_rows(table));
     }
     text
+}
+
+/// Metrics of home and foreign worlds side by side, if both were flown.
+fn beside(table: &Table) -> Option<Vec<Vec<String>>> {
+    let of = |worlds: Worlds| table.groups.iter().find(|group| group.label == worlds.name());
+    let (home, foreign) = (of(Worlds::Home)?, of(Worlds::Foreign)?);
+    let told = |metric: &Metric| match (metric.value, metric.interval) {
+        (Some(value), Some(_)) => {
+            format!("{} ({} of {})", percent(value), metric.counts.0, metric.counts.1)
+        }
+        (Some(value), None) => format!("{} (of {})", percent(value), metric.counts.1),
+        (None, _) => String::new(),
+    };
+    let mut rows = vec![row(["metric", "home", "foreign", "acceptance"])];
+    for (left, right) in home.metrics.iter().zip(&foreign.metrics) {
+        if left.value.is_some() || right.value.is_some() {
+            let wanted = demand(right, &right.acceptance);
+            rows.push(vec![left.name.clone(), told(left), told(right), wanted]);
+        }
+    }
+    Some(rows)
 }
 
 fn title(text: &mut String, style: Style, level: usize, words: &str) {

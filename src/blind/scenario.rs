@@ -1,5 +1,6 @@
 //! One blind flight, fully determined by its seed and its cell.
 
+use foreign_worlds::World;
 use rand_distr::Distribution as _;
 use rand_distr::StandardUniform;
 use rand_pcg::Pcg64;
@@ -10,6 +11,7 @@ use super::air::AirScales;
 use super::error::BlindError;
 use super::hide::{Hidden, KINDS, between, kind_of, log_between, unit};
 use super::vehicles::hover_a;
+use super::worlds::{self, Worlds};
 use crate::base::rng::{Purpose, stream};
 use crate::effects::Role;
 
@@ -146,13 +148,17 @@ impl Base {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
+    /// Whose physics it is flown with.
+    #[serde(default, skip_serializing_if = "Worlds::is_home")]
+    pub worlds: Worlds,
     /// The protocol.
     pub protocol: Protocol,
     /// The air.
     pub air: AirClass,
     /// The known vehicle.
     pub base: Base,
-    /// What is hidden, by the names of [`super::hide::KINDS`]; empty: nothing.
+    /// What is hidden, by the names of [`super::hide::KINDS`] or, in foreign worlds, of
+    /// [`super::tables::FOREIGN_KINDS`]; empty: nothing.
     pub hidden: Vec<String>,
     /// Drones along each side of the grid; with `columns`: its rows.
     pub side: u16,
@@ -170,7 +176,8 @@ impl Cell {
         let place = unit(&mut stream(seed, CHOICE, Purpose::Hidden)) * names.len() as f64;
         let hidden = names.get(place as usize).map(|name| (*name).to_owned());
         let hidden = hidden.into_iter().collect();
-        Self { protocol, air, base, hidden, side: FULL_SIDE, columns: None }
+        let (worlds, side) = (Worlds::Home, FULL_SIDE);
+        Self { worlds, protocol, air, base, hidden, side, columns: None }
     }
 
     /// Number of columns of the grid.
@@ -191,7 +198,8 @@ impl Cell {
     /// Short name of the cell: `paper-calm-airsim-none`.
     pub fn name(&self) -> String {
         let hidden = if self.hidden.is_empty() { "none".to_owned() } else { self.hidden.join("+") };
-        format!("{}-{}-{}-{hidden}", self.protocol.name(), self.air.name(), self.base.name())
+        let words = [self.protocol.name(), self.air.name(), self.base.name(), &hidden].join("-");
+        if self.worlds.is_home() { words } else { format!("{}-{words}", self.worlds.name()) }
     }
 }
 
@@ -241,6 +249,14 @@ pub struct Scenario {
     pub hidden: Vec<Hidden>,
     /// What is always there.
     pub nuisance: Nuisance,
+    /// The world, if it is a foreign one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub world: Option<World>,
+    /// Largest difference of the known vehicle's pulses from those of the foreign plant without what is
+    /// hidden, over the flown range of air speeds and without the mean, us. Beyond 1 us something is missing
+    /// where nothing is hidden.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_over_us: Option<f64>,
 }
 
 impl Scenario {
@@ -250,6 +266,9 @@ impl Scenario {
     ///
     /// If an effect is unknown, cannot be hidden from this base, or not together with another.
     pub fn draw(seed: u64, cell: &Cell) -> Result<Self, BlindError> {
+        if !cell.worlds.is_home() {
+            return Self::foreign(seed, cell);
+        }
         let width_m = cell.width_m();
         let mut hidden: Vec<Hidden> = Vec::new();
         for name in &cell.hidden {
@@ -261,7 +280,45 @@ impl Scenario {
             hidden.push(drawn);
         }
         let nuisance = nuisance(seed, cell)?;
-        Ok(Self { schema: SCENARIO_SCHEMA.to_owned(), seed, cell: cell.clone(), hidden, nuisance })
+        Ok(Self {
+            schema: SCENARIO_SCHEMA.to_owned(),
+            seed,
+            cell: cell.clone(),
+            hidden,
+            nuisance,
+            world: None,
+            left_over_us: None,
+        })
+    }
+
+    /// Draws a flight in a foreign world.
+    fn foreign(seed: u64, cell: &Cell) -> Result<Self, BlindError> {
+        let world = worlds::draw::world(seed, cell)?;
+        let known = worlds::known::vehicle(&world, cell.base)?;
+        let left_over_us = Some(known.largest_us);
+        let hidden = worlds::draw::truths(&world, &known.vehicle);
+        // The drones that are charged and lost are drawn as at home; the rest stands in the world.
+        let mut nuisance = nuisance(seed, cell)?;
+        nuisance.warm.clear();
+        nuisance.inflow_spread = 0.0;
+        nuisance.thrust_spread = world.thrust_spread;
+        let [shared, own] = [world.air.shared_mps, world.air.own_mps];
+        nuisance.air = AirScales {
+            shared_mps: shared,
+            time_s: world.air.shared_s,
+            local_mps: own,
+            local_s: world.air.own_s,
+            wind_mps: world.air.wind_mps,
+            wind_gust_mps: 0.0,
+            ..nuisance.air
+        };
+        nuisance.battery = BatteryTruth {
+            cells: world.battery.cells,
+            capacity_ah: world.battery.capacity_ah,
+            resistance_ohm: world.battery.resistance_ohm,
+        };
+        let (schema, cell) = (SCENARIO_SCHEMA.to_owned(), cell.clone());
+        Ok(Self { schema, seed, cell, hidden, nuisance, world: Some(world), left_over_us })
     }
 
     /// Number of slots in the formation.

@@ -14,7 +14,7 @@ use crate::gap::{Dependence, Verdict};
 
 /// A gap that grows by less is the same: a bias of the velocity shifts a straight response as a whole, and
 /// its repair leaves the gap as it was but for rounding.
-const WORSE: f64 = 1.01;
+pub(super) const WORSE: f64 = 1.01;
 
 /// What a verdict makes of one hidden effect.
 #[derive(
@@ -172,8 +172,11 @@ fn library(truth: &Scenario) -> impl Iterator<Item = &Hidden> {
     truth.hidden.iter().filter(|hidden| !hidden.foreign)
 }
 
-/// Whether a hidden effect is off-library and does depend on this.
+/// Whether a hidden effect may be called unknown with this dependence.
 fn accepts(hidden: &Hidden, depends_on: Dependence) -> bool {
+    if hidden.depends_on.contains(&depends_on) {
+        return true;
+    }
     let foreign = foreign::find(&hidden.effect).filter(|_| hidden.foreign);
     foreign.is_some_and(|foreign| foreign.depends_on.contains(&depends_on))
 }
@@ -219,7 +222,10 @@ fn called(hidden: &Hidden, verdict: &Verdict) -> Called {
     }
     for step in &verdict.steps {
         let this = match &step.finding {
-            Finding::Unknown { depends_on, .. } if accepts(hidden, *depends_on) => Called::Named,
+            // In foreign worlds the library's effects have other forms: what is told of them is right.
+            Finding::Unknown { depends_on, .. } if accepts(hidden, *depends_on) => {
+                if hidden.foreign { Called::Named } else { Called::InClass }
+            }
             Finding::Unknown { .. } => Called::Unknown,
             _ if hidden.foreign => {
                 let fits = step.finding.effects().iter().any(|one| accepts_name(hidden, one));

@@ -15,6 +15,7 @@ use super::hide::kind_of;
 use super::scenario::{AirClass, Base, Cell, Protocol, Scenario};
 use super::score::{Outcome, score};
 use super::seal;
+use super::worlds::{self, Worlds};
 use crate::base::file::{FileError, create_folder, write_whole};
 use crate::base::rng::{Purpose, stream};
 use crate::campaign::{read_json, to_json};
@@ -32,6 +33,9 @@ const ORDER: u64 = u64::MAX - 1;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
+    /// Whose physics is flown.
+    #[serde(default = "home_alone", skip_serializing_if = "is_home_alone")]
+    pub worlds: Vec<Worlds>,
     /// Protocols.
     pub protocols: Vec<Protocol>,
     /// Airs.
@@ -48,6 +52,14 @@ pub struct Settings {
     pub side: u16,
     /// Whether this is for tuning.
     pub tuning: bool,
+}
+
+fn home_alone() -> Vec<Worlds> {
+    vec![Worlds::Home]
+}
+
+fn is_home_alone(worlds: &[Worlds]) -> bool {
+    worlds == [Worlds::Home]
 }
 
 /// One finished flight: `flights/NNNNN.json`.
@@ -87,6 +99,22 @@ pub fn flight_seed(table: u64, index: usize) -> Result<u64, BlindError> {
     Ok(table << FLIGHT_BITS | index)
 }
 
+/// Whether a set of effects can be hidden from a base.
+fn worlds_take(worlds: Worlds, base: Base, hidden: &[String]) -> Result<(), BlindError> {
+    let not = |name: &String| BlindError::NotEligible { name: name.clone(), base: base.name() };
+    if !worlds.is_home() {
+        let nothing = "nothing".to_owned();
+        let first = || not(hidden.first().unwrap_or(&nothing));
+        return if worlds::takes(base, hidden) { Ok(()) } else { Err(first()) };
+    }
+    for name in hidden {
+        if !kind_of(name)?.bases.contains(&base) {
+            return Err(not(name));
+        }
+    }
+    Ok(())
+}
+
 impl Settings {
     /// Checks that the seed is in the right range: seeds for tuning and for scoring never meet.
     ///
@@ -110,29 +138,23 @@ impl Settings {
     pub fn cells(&self) -> Result<Vec<Cell>, BlindError> {
         let mut cells = Vec::new();
         let mut refused = None;
-        for hidden in &self.hidden {
-            for base in &self.bases {
-                let mut takes = true;
-                for name in hidden {
-                    if !kind_of(name)?.bases.contains(base) {
-                        takes = false;
-                        let name = name.clone();
-                        refused = Some(BlindError::NotEligible { name, base: base.name() });
+        for worlds in &self.worlds {
+            for hidden in &self.hidden {
+                for base in &self.bases {
+                    if let Err(error) = worlds_take(*worlds, *base, hidden) {
+                        refused = Some(error);
+                        continue;
                     }
-                }
-                if !takes {
-                    continue;
-                }
-                for protocol in &self.protocols {
-                    for air in &self.airs {
-                        cells.push(Cell {
+                    for protocol in &self.protocols {
+                        cells.extend(self.airs.iter().map(|air| Cell {
+                            worlds: *worlds,
                             protocol: *protocol,
                             air: *air,
                             base: *base,
                             hidden: hidden.clone(),
                             side: self.side,
                             columns: None,
-                        });
+                        }));
                     }
                 }
             }

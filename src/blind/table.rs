@@ -5,8 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use super::interval::{clopper_pearson, median, power};
 use super::metrics::{has_z, is_named, metrics};
+use super::scenario::Base;
 use super::score::{Called, Outcome};
 use super::series::Settings;
+use super::tables::{FOREIGN_KINDS, KINDS};
+use super::worlds::Worlds;
 
 /// Name and version of the format of a table.
 pub const TABLE_SCHEMA: &str = "updraft.blind-table/1";
@@ -158,6 +161,19 @@ impl Demand {
 pub fn table(settings: &Settings, outcomes: &[Outcome], lost: usize, made_by: &str) -> Table {
     let all: Vec<&Outcome> = outcomes.iter().collect();
     let mut groups = vec![group("all", &all)];
+    if settings.worlds.iter().any(|worlds| !worlds.is_home()) {
+        for worlds in &settings.worlds {
+            let of: Vec<_> = all.iter().copied().filter(|one| one.cell.worlds == *worlds).collect();
+            groups.push(group(worlds.name(), &of));
+            // No file is a plant of blades: something is missing where nothing is hidden.
+            for (base, name) in [(Base::Airsim, "thrust law"), (Base::Pixel, "blades")] {
+                let of: Vec<_> = of.iter().copied().filter(|one| one.cell.base == base).collect();
+                if !worlds.is_home() {
+                    groups.push(group(&format!("{}, {name}", worlds.name()), &of));
+                }
+            }
+        }
+    }
     for protocol in &settings.protocols {
         let of: Vec<_> = all.iter().copied().filter(|one| one.cell.protocol == *protocol).collect();
         groups.push(group(protocol.name(), &of));
@@ -201,23 +217,37 @@ fn power_bin((from, to): (f64, f64), outcomes: &[&Outcome]) -> PowerBin {
     }
 }
 
+/// All that can be hidden: where, its name, and whether no library lists it.
+fn kinds() -> impl Iterator<Item = (Worlds, &'static str, bool)> {
+    let home = KINDS.iter().map(|kind| (Worlds::Home, kind.name, kind.foreign));
+    let foreign =
+        FOREIGN_KINDS.iter().map(|kind| (Worlds::Foreign, kind.name, kind.like.is_none()));
+    home.chain(foreign)
+}
+
 fn effects(settings: &Settings, outcomes: &[Outcome]) -> Vec<EffectRow> {
     let mut rows = Vec::new();
     for protocol in &settings.protocols {
-        for kind in super::hide::kinds() {
-            let flights = outcomes.iter().filter(|one| one.cell.protocol == *protocol);
+        for (worlds, name, is_foreign) in kinds() {
+            let flights = outcomes
+                .iter()
+                .filter(|one| one.cell.protocol == *protocol && one.cell.worlds == worlds);
             let of: Vec<_> =
-                flights.flat_map(|one| &one.hidden).filter(|one| one.kind == kind.name).collect();
+                flights.flat_map(|one| &one.hidden).filter(|one| one.kind == name).collect();
             let called = |called| of.iter().filter(|one| one.called == called).count();
             // What no library has is right to be unknown.
             let right = called(Called::Named);
-            let (named, recognised) = if kind.foreign { (0, right) } else { (right, 0) };
+            let (named, recognised) = if is_foreign { (0, right) } else { (right, 0) };
             let errors: Vec<f64> =
                 of.iter().filter_map(|one| one.relative_error).map(f64::abs).collect();
             if !of.is_empty() {
                 rows.push(EffectRow {
                     protocol: protocol.name().to_owned(),
-                    kind: kind.name.to_owned(),
+                    kind: if worlds.is_home() {
+                        name.to_owned()
+                    } else {
+                        format!("{name} (foreign)")
+                    },
                     count: of.len(),
                     named,
                     in_class: called(Called::InClass),

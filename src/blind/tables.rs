@@ -171,6 +171,62 @@ pub const ON_REQUEST: &[HiddenKind] = &[
 /// Foreign effects, and what the library has for them to first order: naming that is no mistake.
 pub const ALIKE: &[(&str, &str)] = &[("climb-time", "response-drift")];
 
+/// An effect that can be hidden in foreign worlds.
+#[derive(Clone, Copy, Debug)]
+pub struct ForeignKind {
+    /// Name of the effect for `--effects`, as the crate `foreign-worlds` has it.
+    pub name: &'static str,
+    /// Name of the library's effect that is the right answer; `None`: the library has none.
+    pub like: Option<&'static str>,
+    /// Parameter of the library's effect that states its size, where both have one form.
+    pub size: Option<&'static str>,
+    /// Bases from which it can be hidden: AirSim's stands for the thrust law, the show drone's for
+    /// blades.
+    pub bases: &'static [Base],
+}
+
+const BOTH: &[Base] = &[Base::Airsim, Base::Pixel];
+const LAW: &[Base] = &[Base::Airsim];
+
+const fn like(
+    name: &'static str,
+    like: &'static str,
+    size: Option<&'static str>,
+    bases: &'static [Base],
+) -> ForeignKind {
+    ForeignKind { name, like: Some(like), size, bases }
+}
+
+const fn unlike(name: &'static str) -> ForeignKind {
+    ForeignKind { name, like: None, size: None, bases: BOTH }
+}
+
+/// Effects that can be hidden in foreign worlds.
+pub const FOREIGN_KINDS: &[ForeignKind] = &[
+    // Blades have an inflow of their own.
+    like("inflow", "rotor-inflow", None, LAW),
+    like("base-drag", "face-drag", Some("top"), LAW),
+    like("body-drag", "parasitic-drag", None, BOTH),
+    like("hub-force", "blade-flapping", Some("drag_per_weight"), LAW),
+    like("voltage", "battery", Some("exponent"), BOTH),
+    like("warming", "motor-thermal", Some("drift_us"), BOTH),
+    like("vortex-dip", "vortex-ring", None, BOTH),
+    like("lift", "translational-lift", None, BOTH),
+    like("curve", "thrust-curve", Some("expo"), BOTH),
+    like("log-lag", "velocity-error", Some("lag_s"), BOTH),
+    like("log-bias", "velocity-error", Some("bias_mps"), BOTH),
+    like("loop-lag", "velocity-error", Some("lag_s"), BOTH),
+    like("momentum-drag", "momentum-drag", Some("per_s"), BOTH),
+    unlike("drift"),
+    unlike("icing"),
+    unlike("hysteresis"),
+    unlike("ceiling"),
+    unlike("height-response"),
+    unlike("heading-wake"),
+    unlike("oscillation"),
+    unlike("side-wake"),
+];
+
 /// Classes of effects that the paper's protocol cannot tell apart, fixed in advance; an effect may be in
 /// several. Shared drift of the air belongs to the first, but is never named: the noise model explains it.
 pub const CLASSES: &[&[&str]] = &[
@@ -202,6 +258,19 @@ mod tests {
     use super::*;
     use crate::blind::foreign;
     use crate::effects;
+
+    #[test]
+    fn every_foreign_kind_is_in_the_crate_and_answers_to_the_library() {
+        let names: Vec<_> = FOREIGN_KINDS.iter().map(|kind| kind.name).collect();
+        let known: Vec<_> = foreign_worlds::hidden::KINDS.iter().map(|kind| kind.name).collect();
+        assert_eq!(names, known);
+        for kind in FOREIGN_KINDS {
+            let like = kind.like.map(|name| effects::find(name).unwrap().definition());
+            if let Some(size) = kind.size {
+                assert!(like.unwrap().parameter(size).is_some(), "{}", kind.name);
+            }
+        }
+    }
 
     #[test]
     fn every_name_is_an_effect_and_every_parameter_its() {

@@ -2,6 +2,7 @@
 
 use super::error::BlindError;
 use super::scenario::{Base, BatteryTruth, Scenario};
+use super::worlds;
 use crate::effects::select::set;
 use crate::effects::{Reference, Role};
 use crate::vehicle::{Vehicle, library};
@@ -75,6 +76,10 @@ impl Base {
 ///
 /// If a built-in vehicle is not valid.
 pub fn true_vehicle(scenario: &Scenario, slot: u16) -> Result<Vehicle, BlindError> {
+    if let Some(world) = &scenario.world {
+        // No file is a foreign plant with what is hidden: the known one is the nearest.
+        return Ok(worlds::known::vehicle(world, scenario.cell.base)?.vehicle);
+    }
     let mut vehicle = scenario.cell.base.known()?;
     let rest = &scenario.nuisance;
     Role::ThrustSpread.set(&mut vehicle, rest.thrust_spread);

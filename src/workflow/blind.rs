@@ -11,18 +11,21 @@ use crate::base::file::write_whole;
 use crate::blind::render::{Style, render};
 use crate::blind::series::{self, Place, Settings};
 use crate::blind::table::{Table, table};
-use crate::blind::tables::{FIRST_OF_PAIRS, KINDS, TOGETHER};
-use crate::blind::{Base, BlindError};
+use crate::blind::tables::{FIRST_OF_PAIRS, FOREIGN_KINDS, KINDS, TOGETHER};
+use crate::blind::{Base, BlindError, Worlds};
 use crate::campaign::to_json;
 
 /// Nothing hidden is this many times as frequent as each thing that is hidden, unless `--effects` says
 /// which: false alarms are what is demanded most of.
 const NONE_WEIGHT: usize = 6;
 
-/// Default sets of hidden effects: each effect by itself.
-pub fn one_each() -> Vec<Vec<String>> {
+/// Default sets of hidden effects: each effect of these worlds by itself.
+pub fn one_each(worlds: &[Worlds]) -> Vec<Vec<String>> {
     let nothing = std::iter::repeat_n(Vec::new(), NONE_WEIGHT);
-    nothing.chain(KINDS.iter().map(|kind| vec![kind.name.to_owned()])).collect()
+    let home = KINDS.iter().map(|kind| (Worlds::Home, kind.name));
+    let foreign = FOREIGN_KINDS.iter().map(|kind| (Worlds::Foreign, kind.name));
+    let some = home.chain(foreign).filter(|(one, _)| worlds.contains(one));
+    nothing.chain(some.map(|(_, name)| vec![name.to_owned()])).collect()
 }
 
 /// Sets of two and three effects that are hidden together.

@@ -13,8 +13,8 @@ use crate::base::plain::Shown as _;
 use crate::blind::hide::HiddenKind;
 use crate::blind::render::{Style, render};
 use crate::blind::series::{Place, Settings};
-use crate::blind::tables::{KINDS, ON_REQUEST};
-use crate::blind::{AirClass, Base, Protocol};
+use crate::blind::tables::{FOREIGN_KINDS, KINDS, ON_REQUEST};
+use crate::blind::{AirClass, Base, Protocol, Worlds};
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
 use crate::cli::words;
@@ -54,10 +54,16 @@ an interrupted run. The table is in table.json and table.md. Method and metrics:
 What can be hidden:
 {}
 Only where --effects names it:
-{}", kinds_text(KINDS), kinds_text(ON_REQUEST)))]
+{}
+
+In foreign worlds (--worlds foreign), where the base airsim is a thrust law and pixel one of blades:
+{}", kinds_text(KINDS), kinds_text(ON_REQUEST), foreign_kinds_text()))]
 pub(super) struct BlindArgs {
     #[command(subcommand)]
     command: Option<BlindCommand>,
+    /// Whose physics to fly with, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "home")]
+    worlds: Vec<WorldsWord>,
     /// Which protocol to fly
     #[arg(long, value_enum, default_value_t = Which::Both)]
     protocol: Which,
@@ -112,6 +118,14 @@ enum BlindCommand {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum WorldsWord {
+    /// The simulator's own, with the hidden effects added
+    Home,
+    /// A second plant, written from other equations, with other air, noise and faults
+    Foreign,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum AirWord {
     /// A calm dawn: 0.12 m/s
     Calm,
@@ -144,7 +158,9 @@ fn hidden_sets(text: &str) -> Result<Sets, String> {
             part => part.split('+').map(|name| name.trim().to_owned()).collect(),
         };
         for name in &names {
-            crate::blind::hide::kind_of(name).map_err(|error| error.to_string())?;
+            if crate::blind::worlds::kind_of(name).is_none() {
+                crate::blind::hide::kind_of(name).map_err(|error| error.to_string())?;
+            }
         }
         sets.push(names);
     }
@@ -157,6 +173,16 @@ fn kinds_text(kinds: &[HiddenKind]) -> String {
         let library = if kind.foreign { "  (in no library)" } else { "" };
         let (low, high) = kind.range;
         let _ = writeln!(text, "  {:<24} {low} to {high} {}{library}", kind.name, kind.unit);
+        text
+    })
+}
+
+fn foreign_kinds_text() -> String {
+    use std::fmt::Write as _;
+    FOREIGN_KINDS.iter().fold(String::new(), |mut text, kind| {
+        let library = if kind.like.is_none() { "  (in no library)" } else { "" };
+        let what = foreign_worlds::hidden::find(kind.name).map_or("", |found| found.what);
+        let _ = writeln!(text, "  {:<20} {what}{library}", kind.name);
         text
     })
 }
@@ -178,11 +204,23 @@ impl BlindArgs {
             BaseWord::Inflow => Base::Inflow,
             BaseWord::Pixel => Base::Pixel,
         });
-        let mut hidden = self.effects.as_ref().map_or_else(blind::one_each, |sets| sets.0.clone());
+        let mut worlds: Vec<Worlds> = self
+            .worlds
+            .iter()
+            .map(|worlds| match worlds {
+                WorldsWord::Home => Worlds::Home,
+                WorldsWord::Foreign => Worlds::Foreign,
+            })
+            .collect();
+        worlds.sort_unstable();
+        worlds.dedup();
+        let each = || blind::one_each(&worlds);
+        let mut hidden = self.effects.as_ref().map_or_else(each, |sets| sets.0.clone());
         if self.pairs {
             hidden.extend(blind::several());
         }
         Settings {
+            worlds,
             protocols,
             airs: airs.collect(),
             bases: bases.collect(),

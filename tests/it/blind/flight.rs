@@ -10,13 +10,14 @@ use updraft::blind::fly::{fly, planned};
 use updraft::blind::hide::{KINDS, kind_of};
 use updraft::blind::series::flight_seed;
 use updraft::blind::vehicles::true_vehicle;
-use updraft::blind::{AirClass, Base, Cell, Protocol, Scenario};
+use updraft::blind::{AirClass, Base, Cell, Protocol, Scenario, Worlds};
 use updraft::effects::select::resolved;
 use updraft::effects::{Model, Signals};
 
 fn cell(protocol: Protocol, base: Base, hidden: &[&str]) -> Cell {
     let hidden = hidden.iter().map(|name| (*name).to_owned()).collect();
-    Cell { protocol, air: AirClass::Moderate, base, hidden, side: 3, columns: None }
+    let (worlds, air) = (Worlds::Home, AirClass::Moderate);
+    Cell { worlds, protocol, air, base, hidden, side: 3, columns: None }
 }
 
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {

@@ -4,3 +4,4 @@ mod flight;
 mod foreign;
 mod play;
 mod score;
+mod worlds;

@@ -11,7 +11,7 @@ use updraft::blind::score::{Called, Outcome, score};
 use updraft::blind::seal;
 use updraft::blind::series::{FIRST_SCORING_SEED, Place, Settings, run};
 use updraft::blind::table::table;
-use updraft::blind::{AirClass, Base, BlindError, Cell, Explain, Protocol, Scenario};
+use updraft::blind::{AirClass, Base, BlindError, Cell, Explain, Protocol, Scenario, Worlds};
 use updraft::gap::verdict::{
     Detectable, Finding, Fitted, Interval, SensorChannel, Shrink, Step, VERDICT_SCHEMA,
 };
@@ -19,8 +19,8 @@ use updraft::gap::{Dependence, Verdict};
 
 fn truth(base: Base, hidden: &[&str]) -> Scenario {
     let hidden = hidden.iter().map(|name| (*name).to_owned()).collect();
-    let (protocol, air) = (Protocol::Paper, AirClass::Field);
-    let cell = Cell { protocol, air, base, hidden, side: 3, columns: None };
+    let (worlds, protocol, air) = (Worlds::Home, Protocol::Paper, AirClass::Field);
+    let cell = Cell { worlds, protocol, air, base, hidden, side: 3, columns: None };
     Scenario::draw(7, &cell).unwrap()
 }
 
@@ -235,6 +235,7 @@ fn the_seal_opens_after_the_verdict_and_shows_tampering() {
 
 fn settings(seed: u64, tuning: bool) -> Settings {
     Settings {
+        worlds: vec![Worlds::Home],
         protocols: vec![Protocol::Paper],
         airs: vec![AirClass::Calm, AirClass::Field],
         bases: vec![Base::Airsim, Base::Pixel],
