@@ -78,7 +78,7 @@ impl<'a> Body<'a> {
         self.hover_command
     }
 
-    /// Hidden effects.
+    /// Hidden effects that act on the drone.
     pub fn hidden(&self) -> &[Box<dyn Acting>] {
         &self.hidden
     }

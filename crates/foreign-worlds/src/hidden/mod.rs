@@ -123,7 +123,7 @@ pub struct Parameter {
 /// How a value is drawn between two bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drawn {
-    /// Uniformly.
+    /// Uniformly between the bounds.
     Uniform,
     /// Uniformly in its logarithm.
     Log,

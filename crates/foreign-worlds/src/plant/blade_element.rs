@@ -241,5 +241,11 @@ mod tests {
         let profile = solidity * ROTOR.section_drag / 8.0 * 1.2 * area * tip.powi(3);
         let power = state.torque_nm * 900.0;
         assert!((power - 1.15 * ideal - profile).abs() < 1e-9, "{power}");
+        // In forward flight the profile part grows with the square of the advance ratio.
+        let ahead = ROTOR.state(900.0, 1.0, 7.0, 1.2);
+        let through = 1.0 + 1.15 * ahead.induced_mps;
+        let rest = ahead.torque_nm * 900.0 - ahead.thrust_n * through;
+        let advance = 7.0 / tip;
+        assert!((rest / profile - 1.0 - 4.65 * advance * advance).abs() < 1e-9, "{rest}");
     }
 }
