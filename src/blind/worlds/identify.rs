@@ -206,6 +206,7 @@ mod tests {
             base,
             hidden: Vec::new(),
             side: 3,
+            columns: None,
         };
         draw::world(seed, &cell).unwrap()
     }

@@ -20,6 +20,7 @@ fn cell(base: Base, hidden: &[&str]) -> Cell {
         base,
         hidden: hidden.iter().map(|name| (*name).to_owned()).collect(),
         side: 3,
+        columns: None,
     }
 }
 
