@@ -363,7 +363,8 @@ mod tests {
                 let lean_rad = trim.balance(&climbing).unwrap().lean.x.asin();
                 let [read_mps, _] = law.air([lean_rad, 0.0], climb_mps);
                 let off_mps = read_mps - speed_mps;
-                assert!(off_mps.abs() < 0.2 * doubt_mps, "{speed_mps}, {climb_mps}: {read_mps}");
+                let most_mps = 0.1 + 0.3 * doubt_mps;
+                assert!(off_mps.abs() < most_mps, "{speed_mps}, {climb_mps}: {read_mps}");
                 let back_rad = law.lean([read_mps, 0.0], climb_mps)[0];
                 assert!((back_rad - lean_rad).abs() < 1e-6, "{back_rad} for {lean_rad}");
             }
