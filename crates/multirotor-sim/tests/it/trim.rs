@@ -230,8 +230,8 @@ fn effects_of_any_size_are_flown_as_they_are_trimmed_and_not_without_them() {
 /// Change of the pulse by an effect, us: by the trim, and by its closed form at the trim's lean.
 fn twice(name: &str, choices: &[&str], effect: &str, condition: &Condition) -> (f64, f64) {
     let (with, without) = (vehicle(name, choices), vehicle(name, &[]));
-    let [before, after] =
-        [&without, &with].map(|one| Trim::of(one).unwrap().at(condition).expect("a balance"));
+    let [before, after] = [&without, &with]
+        .map(|one| Trim::of(one).expect("a trim").at(condition).expect("a balance"));
     let effect = find(effect).expect("an effect");
     let values = values_of(effect, &with).expect("values");
     let relative = condition.velocity_mps - condition.air_mps;
