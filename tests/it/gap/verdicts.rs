@@ -26,6 +26,8 @@ fn noise() -> Noise {
         least_response: 3.0,
         gradient_mps: 0.06,
         side_gusts_mps: 0.2,
+        pulse_noise_us: 0.3,
+        updraft_mps: 0.0,
     }
 }
 

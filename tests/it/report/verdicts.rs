@@ -173,6 +173,7 @@ pub(crate) fn nothing() -> Verdict {
             lag_s: Some(around(0.002, 0.001)),
             biased_drones: Vec::new(),
             named: false,
+            in_log: false,
         },
         steps: Vec::new(),
         rest: Rest {
@@ -194,6 +195,8 @@ pub(crate) fn nothing() -> Verdict {
             least_response: 2.8,
             gradient_mps: 0.06,
             side_gusts_mps: 0.2,
+            pulse_noise_us: 0.3,
+            updraft_mps: 0.0,
         },
         drones: Drones {
             each: each.collect(),
@@ -277,6 +280,7 @@ pub(crate) fn sensor() -> Verdict {
         lag_s: Some(around(0.21, 0.01)),
         biased_drones: vec![(3, -0.31)],
         named: true,
+        in_log: false,
     };
     verdict.summary = summary(&verdict);
     verdict
