@@ -178,7 +178,9 @@ fn effects_that_cannot_act_are_refused() {
             "an error of the autopilot's sensors, and the firmware simulates its own",
         ),
     ] {
-        let ended = bench.expect(2, &["physics", "--effect", choice]);
+        // Who accepts it does not wait for a firmware.
+        let at = ["physics", "--listen", "127.0.0.1:0", "--duration", "0", "--effect", choice];
+        let ended = bench.expect(2, &at);
         assert!(ended.err.contains(words) && ended.out.is_empty(), "{choice}: {ended}");
     }
 }
