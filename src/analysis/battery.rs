@@ -44,7 +44,7 @@ pub struct Sag {
     pub exponent: f64,
     /// Standard error of the exponent, common to the fleet.
     pub exponent_se: f64,
-    /// What motors that warm up do to the pulse: standard error, us.
+    /// Standard error of the pulse by motors that warm up, us.
     pub warm_up_us: f64,
 }
 

@@ -132,9 +132,9 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
     Ok(found)
 }
 
-/// Momentum drag along the rotors' axis, as ArduPilot's own simulator has it: effect, size, and the share that acts
-/// along the axis. Of other vehicles it is a stand-in for inflow, and not looked for.
-pub(super) const AXIAL_DRAG: [&str; 3] = ["momentum-drag", "per_s", "axial"];
+/// The share of momentum drag that acts along the rotors' axis, as in ArduPilot's own simulator. Of other vehicles it
+/// is a stand-in for inflow, and not looked for.
+const AXIAL: &str = "axial";
 
 /// Sizes of momentum drag that are tried, as shares of what the vehicle has by default.
 const AXIAL_SIZES: [f64; 2] = [0.5, 1.0];
@@ -147,12 +147,10 @@ pub(super) fn axial_drag(
     vehicle: &Vehicle,
     scene: &Scene,
 ) -> Result<Option<Candidate>, EffectError> {
-    let [name, size, axial] = AXIAL_DRAG;
-    let Some(effect) = find(name).filter(|_| vehicle.airframe.sitl.is_some()) else {
-        return Ok(None);
-    };
-    let definition = effect.definition();
-    let Some(parameter) = definition.parameter(size) else { return Ok(None) };
+    let place = Role::MomentumDrag.place().filter(|_| vehicle.airframe.sitl.is_some());
+    let Some(place) = place else { return Ok(None) };
+    let (name, parameter) = (place.name(), place.parameter);
+    let (definition, size) = (place.effect.definition(), parameter.name);
     if vehicle.effects.get(name).is_some_and(|table| table.on) {
         return Ok(None);
     }
@@ -162,7 +160,7 @@ pub(super) fn axial_drag(
     for share in AXIAL_SIZES {
         let mut other = vehicle.clone();
         select::set(&mut other, name, size, share * usual);
-        select::set(&mut other, name, axial, 1.0);
+        select::set(&mut other, name, AXIAL, 1.0);
         let Ok(pulses) = scene.pulses(&other) else { continue };
         let mut felt = scene.response(&other)?;
         response::add(&mut felt, -1.0, &response);

@@ -43,7 +43,7 @@ pub struct LeanLaw {
     pub body_share: f64,
     /// Updraft that the law holds in, m/s: climbs are relative to it.
     pub updraft_mps: f64,
-    /// What the rotors carry in a climb, as far as it is known: `1 + p V + q V|V|` of the weight (p, q). Who pulls
+    /// Load of the rotors in a climb, as far as it is known: `1 + p V + q V|V|` of the weight (p, q). Who pulls
     /// more leans less in the same wind.
     pub load: [f64; 2],
 }

@@ -3,7 +3,7 @@
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use super::bins::Bin;
-use super::candidates::{AXIAL_DRAG, set};
+use super::candidates::set;
 use super::compare::Comparison;
 use super::error::GapError;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
@@ -11,7 +11,7 @@ use super::noise::{Hyper, SHARED_TIME};
 use super::response::shifted;
 use super::verdict::{Fitted, Interval};
 use crate::effects::select::value_of;
-use crate::effects::{Definition, Sought, find};
+use crate::effects::{Definition, Role, Sought, find};
 use crate::numeric::extent;
 use crate::vehicle::Vehicle;
 
@@ -196,11 +196,12 @@ pub(super) fn parameters_of(
 ) -> Result<Vec<Parameter>, GapError> {
     let Some(known) = find(effect) else { return Ok(Vec::new()) };
     let definition = known.definition();
-    let [axial_drag, per_s, _] = AXIAL_DRAG;
     let (size, shape) = match &definition.sought {
         Sought::Shape { size, shape, .. } => (*size, shape),
-        _ if definition.name == axial_drag => (per_s, &None),
-        _ => return Ok(Vec::new()),
+        _ => match definition.with_role(Role::MomentumDrag) {
+            Some(parameter) => (parameter.name, &None),
+            None => return Ok(Vec::new()),
+        },
     };
     let of = |name: &str| parameter(definition, name);
     let mut found: Vec<Parameter> =

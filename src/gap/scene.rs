@@ -161,7 +161,7 @@ impl Scene {
         scene
     }
 
-    /// The same flight in another updraft, m/s.
+    /// This scene as it is when the air rises by so much over the whole flight, m/s.
     #[must_use]
     pub fn in_updraft(&self, updraft_mps: f64) -> Self {
         let mut scene = self.clone();

@@ -13,7 +13,8 @@ const TABLES: &str = "src/blind/tables.rs";
 /// Tests that are files of the library.
 const TESTS: [&str; 1] = ["src/gap/null_flights.rs"];
 /// Help, which shows commands by example.
-const HELP: [&str; 2] = ["src/cli/effects.rs", "src/cli/blind.rs"];
+const HELP: [&str; 4] =
+    ["src/cli/effects.rs", "src/cli/blind/hide.rs", "src/cli/blind/mod.rs", "src/cli/physics.rs"];
 /// Files in which a word that is also an effect's name means something else.
 const OTHER: [(&str, &str); 1] = [("src/report/errors.rs", "battery")];
 
