@@ -587,6 +587,7 @@ impl InUpdraft {
         let Some(doubt) = doubts.first() else { return Ok(None) };
         // The doubt counts from still air, and the residual from the updraft that it is taken in.
         let share = updraft_mps / UPDRAFT_DOUBT_MPS;
+        let here = Split::of(&residual);
         let mut from_still = residual;
         for (group, drones) in from_still.iter_mut().enumerate() {
             for (drone, bins) in drones.iter_mut().enumerate() {
@@ -598,7 +599,10 @@ impl InUpdraft {
         let split = Split::of(&from_still);
         let problem = Problem::new(patterns, &split).doubting(&doubts).with(free);
         let solution = problem.fit(hyper, Likelihood::Profile);
-        let likely = solution.log_posterior();
+        // How likely this updraft is, not the one that the doubt's line would lead to.
+        let known = doubts.get(1..).unwrap_or_default();
+        let fixed = Problem::new(patterns, &here).doubting(known).with(free).at(&solution.hyper);
+        let likely = fixed.log_posterior() - 0.5 * share * share;
         let most_mps = UPDRAFT_DOUBT_MPS * problem.first_doubt(&solution).unwrap_or_default();
         Ok(likely.is_finite().then_some(Self { updraft_mps, solution, likely, most_mps }))
     }

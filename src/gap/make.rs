@@ -124,7 +124,6 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let (plan, updraft_mps) = (input.plan, found.updraft_mps);
     let whole =
         Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps)?.feeling(&found.felt);
-    let before = Comparison::of(&data, input.vehicle, &simulated, plan, updraft_mps)?;
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
         // The sizes that go into the model are those of all drones.
         found.refit(&whole)?;

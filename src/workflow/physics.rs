@@ -198,9 +198,12 @@ fn affected(mut vehicle: Vehicle, choices: &[String]) -> Result<Vehicle, Workflo
         let name = choice.split(['=', '.']).next().unwrap_or_default().trim();
         let hooks = known(name)?.definition().hooks;
         let is_on = vehicle.effects.get(name).is_some_and(|table| table.on);
-        if is_on && !hooks.is_empty() && hooks.iter().all(|hook| *hook == Hook::Sense) {
+        if is_on
+            && !hooks.is_empty()
+            && hooks.iter().all(|hook| matches!(hook, Hook::Sense | Hook::Log))
+        {
             return Err(WorkflowError::Usage(format!(
-                "{name} is an error of the autopilot's sensors, and the firmware simulates its own: set its                  SIM_* parameters instead"
+                "{name} is an error of the autopilot's sensors, and the firmware simulates its own: set its SIM_* parameters instead"
             )));
         }
     }
