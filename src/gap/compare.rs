@@ -258,7 +258,7 @@ impl Comparison {
     /// Effects of the vehicle that are not valid.
     pub(super) fn raw_gap_us(&self) -> Result<f64, EffectError> {
         let residual = self.residual(&self.vehicle, 0.0)?;
-        let variances = residual.iter().flatten().filter_map(|bins| Moments::of(bins));
+        let variances = residual.iter().flatten().filter_map(Moments::of);
         Ok(mean(variances.map(|moments| moments.population_variance())).unwrap_or_default().sqrt())
     }
 

@@ -353,8 +353,8 @@ impl Search<'_> {
             let fit = |hyper: Hyper, updraft_mps: f64| {
                 InUpdraft::fitted(comparison, &patterns, found, free, hyper, updraft_mps)
             };
-            let Some(here) = fit(solution.hyper, found.updraft_mps)? else { break };
-            let Some(best) = likeliest(fit, &starts, solution.hyper)? else { break };
+            let Some(here) = fit(solution.hyper, found.updraft_mps) else { break };
+            let Some(best) = likeliest(fit, &starts, solution.hyper) else { break };
             let before_mps = std::mem::replace(&mut found.updraft_mps, best.updraft_mps);
             starts = vec![best.updraft_mps];
             if (best.updraft_mps - before_mps).abs() < UPDRAFT_SETTLED_MPS {
@@ -376,8 +376,7 @@ impl Search<'_> {
             };
             // What its steady states seemed to explain the model must explain when it is flown.
             let (hyper, updraft_mps) = (best.solution.hyper, best.updraft_mps);
-            let again =
-                InUpdraft::fitted(&there, &patterns, &self.found, free, hyper, updraft_mps)?;
+            let again = InUpdraft::fitted(&there, &patterns, &self.found, free, hyper, updraft_mps);
             if again.is_none_or(|again| again.likely < here.likely - SAME_NATS) {
                 self.found.updraft_mps = before_mps;
                 break;
@@ -530,13 +529,13 @@ impl Search<'_> {
 /// The updraft that explains most, by Gauss and Newton from the best of some starts; `None`: the vehicle can fly
 /// in none of them.
 fn likeliest(
-    fit: impl Fn(Hyper, f64) -> Result<Option<InUpdraft>, GapError>,
+    fit: impl Fn(Hyper, f64) -> Option<InUpdraft>,
     starts_mps: &[f64],
     hyper: Hyper,
-) -> Result<Option<InUpdraft>, GapError> {
+) -> Option<InUpdraft> {
     let mut best: Option<InUpdraft> = None;
     for start_mps in starts_mps {
-        best = better(best, fit(hyper, *start_mps)?);
+        best = better(best, fit(hyper, *start_mps));
     }
     for _ in 0..UPDRAFT_ROUNDS {
         let Some(there) = &best else { break };
@@ -546,7 +545,7 @@ fn likeliest(
             break;
         }
         for share in [1.0, 0.5] {
-            best = better(best, fit(hyper, at_mps + share * step_mps)?);
+            best = better(best, fit(hyper, at_mps + share * step_mps));
             if best.as_ref().is_some_and(|best| best.likely > likely) {
                 break;
             }
@@ -555,7 +554,7 @@ fn likeliest(
             break;
         }
     }
-    Ok(best)
+    best
 }
 
 /// A flight taken in an updraft, and what explains most of it there.
@@ -576,15 +575,11 @@ impl InUpdraft {
         free: &[Column],
         hyper: Hyper,
         updraft_mps: f64,
-    ) -> Result<Option<Self>, GapError> {
+    ) -> Option<Self> {
         let comparison = comparison.clone().in_updraft(updraft_mps);
-        let Ok(residual) = comparison.residual(&found.vehicle, found.gusts_mps) else {
-            return Ok(None);
-        };
-        let Ok(doubts) = refine::doubts(&comparison, &found.vehicle, &found.parameters) else {
-            return Ok(None);
-        };
-        let Some(doubt) = doubts.first() else { return Ok(None) };
+        let residual = comparison.residual(&found.vehicle, found.gusts_mps).ok()?;
+        let doubts = refine::doubts(&comparison, &found.vehicle, &found.parameters).ok()?;
+        let doubt = doubts.first()?;
         // The doubt counts from still air, and the residual from the updraft that it is taken in.
         let share = updraft_mps / UPDRAFT_DOUBT_MPS;
         let here = Split::of(&residual);
@@ -604,7 +599,7 @@ impl InUpdraft {
         let fixed = Problem::new(patterns, &here).doubting(known).with(free).at(&solution.hyper);
         let likely = fixed.log_posterior() - 0.5 * share * share;
         let most_mps = UPDRAFT_DOUBT_MPS * problem.first_doubt(&solution).unwrap_or_default();
-        Ok(likely.is_finite().then_some(Self { updraft_mps, solution, likely, most_mps }))
+        likely.is_finite().then_some(Self { updraft_mps, solution, likely, most_mps })
     }
 }
 

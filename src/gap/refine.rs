@@ -198,7 +198,7 @@ pub(super) fn parameters_of(
     let definition = known.definition();
     let (size, shape) = match &definition.sought {
         Sought::Shape { size, shape, .. } => (*size, shape),
-        _ => match definition.with_role(Role::MomentumDrag) {
+        Sought::No(_) => match definition.with_role(Role::MomentumDrag) {
             Some(parameter) => (parameter.name, &None),
             None => return Ok(Vec::new()),
         },

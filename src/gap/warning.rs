@@ -140,11 +140,9 @@ pub(super) fn warnings(data: &Data, found: &Found, input: &Input<'_>) -> Vec<War
             });
         }
     }
-    if input.simulated.is_some() {
-        if found.comparison.is_in_other_wind() {
-            let lean_deg = found.comparison.apart_rad().to_degrees();
-            warnings.push(Warning::OtherWind { lean_deg });
-        }
+    if input.simulated.is_some() && found.comparison.is_in_other_wind() {
+        let lean_deg = found.comparison.apart_rad().to_degrees();
+        warnings.push(Warning::OtherWind { lean_deg });
     }
     if input.table.is_some() {
         warnings.push(Warning::Tables);

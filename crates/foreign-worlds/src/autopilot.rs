@@ -61,7 +61,7 @@ impl Autopilot {
     /// Decides for one step.
     pub fn decide(&mut self, errand: &Errand, step_s: f64) -> Decision {
         let mut wanted = [0.0; 3];
-        for axis in 0..3 {
+        for (axis, wanted) in wanted.iter_mut().enumerate() {
             let is_up = axis == 2;
             let (place, speed, sum) = if is_up {
                 (HEIGHT_PER_S, CLIMB_PER_S, CLIMB_PER_S2)
@@ -74,7 +74,7 @@ impl Autopilot {
             let most = if is_up { MOST_INTEGRAL_MPS2 } else { MOST_MPS2 };
             self.integral[axis] =
                 (self.integral[axis] + sum * error_mps * step_s).clamp(-most, most);
-            wanted[axis] = speed * error_mps + self.integral[axis];
+            *wanted = speed * error_mps + self.integral[axis];
         }
         let [x, y, up_mps2] = wanted;
         let flat = x.hypot(y);

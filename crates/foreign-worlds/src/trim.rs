@@ -85,8 +85,8 @@ impl<'a> Body<'a> {
 
     /// Highest command that the controllers take.
     pub fn ceiling(&self) -> f64 {
-        let of = |acting: &Box<dyn Acting>| acting.ceiling(self.hover_command);
-        self.hidden.iter().map(of).fold(1.0, f64::min)
+        let each = self.hidden.iter();
+        each.map(|acting| acting.ceiling(self.hover_command)).fold(1.0, f64::min)
     }
 
     /// Lets the effects follow the flight.

@@ -39,7 +39,6 @@ impl Worlds {
     }
 
     /// Whether they are the simulator's.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
     pub fn is_home(&self) -> bool {
         *self == Self::Home
     }

@@ -1,5 +1,7 @@
 //! A wake of the body on its rotors that goes with the direction of the wind to the nose.
 
+use std::f64::consts::TAU;
+
 use super::{Acting, Kind, Moment, either, uniform};
 
 /// Wake by heading.
@@ -7,7 +9,7 @@ pub(super) const KIND: Kind = Kind {
     name: "heading-wake",
     what: "the pulse goes with the direction of the air against the nose",
     depends_on: &["heading"],
-    parameters: &[either("pulse_us", 8.0, 25.0), uniform("phase_rad", 0.0, 6.28)],
+    parameters: &[either("pulse_us", 8.0, 25.0), uniform("phase_rad", 0.0, TAU)],
     is_steady: true,
     start: |values| Box::new(HeadingWake { rise_us: values[0], phase_rad: values[1] }),
 };

@@ -1,5 +1,7 @@
 //! A slow swinging of the pulse: a controller that hunts.
 
+use std::f64::consts::TAU;
+
 use super::{Acting, Kind, Moment, log, uniform};
 
 /// Oscillation.
@@ -10,7 +12,7 @@ pub(super) const KIND: Kind = Kind {
     parameters: &[
         log("amplitude_us", 5.0, 18.0),
         log("period_s", 40.0, 150.0),
-        uniform("phase_rad", 0.0, 6.28),
+        uniform("phase_rad", 0.0, TAU),
     ],
     is_steady: true,
     start: |values| {
@@ -31,6 +33,6 @@ struct Oscillation {
 impl Acting for Oscillation {
     fn pulse_us(&self, now: &Moment) -> f64 {
         let turns = now.time_s / self.period_s;
-        self.amplitude_us * (std::f64::consts::TAU * turns + self.phase_rad).sin()
+        self.amplitude_us * (TAU * turns + self.phase_rad).sin()
     }
 }
