@@ -58,11 +58,11 @@ impl AsFlown {
         let mut points = Vec::new();
         let mut level = Vec::new();
         for (group, bins) in data.groups.iter().enumerate() {
-            for (bin, at) in bins.bins.iter().enumerate().filter(|(_, bin)| !bin.is_horizontal()) {
+            for (bin, _) in bins.bins.iter().enumerate().filter(|(_, bin)| !bin.is_horizontal()) {
                 let more_us = side[group][bin].pulse_us - closed.at(group, 0, bin);
                 let signals = scene.signals[group][bin];
                 points.push((signals.climb_mps, more_us));
-                level.push((at.climb_mps(), signals, scene.relative_mps[group][bin]));
+                level.push((signals, scene.relative_mps[group][bin]));
             }
         }
         let Some(curve) = Curve::through(&points) else { return Ok(None) };
@@ -73,10 +73,10 @@ impl AsFlown {
             return Ok(None);
         }
         let middle = |of: &dyn Fn(&Signals) -> f64| {
-            mean(level.iter().map(|(_, signals, _)| of(signals))).unwrap_or_default()
+            mean(level.iter().map(|(signals, _)| of(signals))).unwrap_or_default()
         };
         let relative = |axis: usize| {
-            mean(level.iter().map(|(_, _, relative)| relative[axis])).unwrap_or_default()
+            mean(level.iter().map(|(_, relative)| relative[axis])).unwrap_or_default()
         };
         let relative_mps = [relative(0), relative(1)];
         let signals = Signals {

@@ -53,8 +53,6 @@ pub struct Comparison {
     closure_us: Vec<Vec<f64>>,
     /// What no effect of the vehicle adds to the response to vertical air speed; empty: nothing.
     felt: Vec<Vec<Response>>,
-    /// Air that the simulated side was flown in, show frame, z up, m/s.
-    flown_mps: [f64; 3],
     amsl_m: f64,
     /// Mean drone of the fleet, by the model.
     pub vehicle: Vehicle,
@@ -194,7 +192,6 @@ impl Comparison {
             wind: blown,
             closure_us,
             felt: Vec::new(),
-            flown_mps,
             amsl_m,
             vehicle,
             spreads,
@@ -212,6 +209,13 @@ impl Comparison {
     pub(super) fn in_updraft(mut self, updraft_mps: f64) -> Self {
         self.scene = self.scene.in_updraft(updraft_mps);
         self
+    }
+
+    /// This comparison with drones that differ as those of a vehicle do: what was found is in a mean drone, which
+    /// differs from none.
+    #[must_use]
+    pub(super) fn spread_as(self, vehicle: &Vehicle) -> Self {
+        Self { spreads: spreads(vehicle), ..self }
     }
 
     /// This comparison with an additional response to vertical air speed, by group and bin, that no effect
@@ -328,7 +332,6 @@ impl Comparison {
             wind,
             closure_us: pick(&self.closure_us, &keep),
             felt: pick(&self.felt, &keep),
-            flown_mps: self.flown_mps,
             amsl_m: self.amsl_m,
             vehicle: self.vehicle.clone(),
             spreads: self.spreads.clone(),
@@ -417,15 +420,13 @@ impl Comparison {
         closed: &Column,
     ) -> Result<Option<Column>, EffectError> {
         let Some(wind_mps) = self.other_wind_mps else { return Ok(None) };
-        let mut scene = self.scene.clone();
-        let groups = scene.signals.iter_mut().zip(&mut scene.relative_mps);
-        for ((signals, relative), group) in groups.zip(&self.data.groups) {
-            for ((signals, relative), bin) in signals.iter_mut().zip(relative).zip(&group.bins) {
-                *relative = [0, 1].map(|axis: usize| bin.velocity_mps[axis] - wind_mps[axis]);
-                signals.horizontal_mps = relative[0].hypot(relative[1]);
+        let mut wind = self.wind.clone();
+        for (air, group) in wind.air_mps.iter_mut().zip(&self.data.groups) {
+            for (air, bin) in air.iter_mut().zip(&group.bins) {
+                *air = [0, 1].map(|axis: usize| bin.velocity_mps[axis] - wind_mps[axis]);
             }
         }
-        let doubt = closed.less(&scene.pulses(vehicle)?);
+        let doubt = closed.less(&self.scene.clone().blown(&wind).pulses(vehicle)?);
         Ok((doubt.spread(&self.data.counts()) > LEAST_DOUBT_US).then_some(doubt))
     }
 

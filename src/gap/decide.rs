@@ -311,9 +311,18 @@ mod tests {
     #[test]
     fn an_effect_is_named_above_its_threshold_and_not_at_it() {
         let case = case();
-        assert_eq!(case.decided(&[ranked(0, 7.9)], &[]).0, "nothing");
-        assert_eq!(case.decided(&[ranked(0, 8.0)], &[]).0, "nothing");
-        assert_eq!(case.decided(&[ranked(0, 8.0 + 1e-9)], &[]), ("effects", vec![0]));
+        let gains = |gain, plain| Ranked { plain, ..ranked(0, gain) };
+        assert_eq!(case.decided(&[gains(7.9, 9.0)], &[]).0, "nothing");
+        assert_eq!(case.decided(&[gains(8.0, 9.0)], &[]).0, "nothing");
+        assert_eq!(case.decided(&[gains(8.0 + 1e-9, 9.0)], &[]), ("effects", vec![0]));
+    }
+
+    #[test]
+    fn scatter_alone_names_nothing() {
+        let case = case();
+        let in_means = |plain| Ranked { plain, ..ranked(0, 30.0) };
+        assert_eq!(case.decided(&[in_means(8.0)], &[]).0, "nothing");
+        assert_eq!(case.decided(&[in_means(8.0 + 1e-9)], &[]), ("effects", vec![0]));
     }
 
     #[test]

@@ -522,7 +522,8 @@ impl Search<'_> {
     fn against_model(&self) -> Result<Comparison, GapError> {
         let Self { data, simulated, plan, found, .. } = self;
         let Found { vehicle, felt, updraft_mps, .. } = found;
-        Ok(Comparison::of(data, vehicle, simulated, *plan, *updraft_mps)?.feeling(felt))
+        let comparison = Comparison::of(data, vehicle, simulated, *plan, *updraft_mps)?;
+        Ok(comparison.feeling(felt).spread_as(self.vehicle))
     }
 }
 
@@ -849,7 +850,32 @@ pub(super) const MOST_GUSTS_MPS: f64 = 1.5;
 
 #[cfg(test)]
 mod tests {
+    use super::super::trial;
     use super::*;
+
+    #[test]
+    fn a_model_that_is_flown_again_still_doubts_the_mean_of_few_drones() {
+        let data = trial::data(4, |_, _| 0.0);
+        let mut vehicle = trial::vehicle();
+        Role::ThrustSpread.set(&mut vehicle, 0.02);
+        let (simulated, options) = (Simulated::Closed, Options::default());
+        let comparison = Comparison::new(&data, &vehicle, &simulated, None).unwrap();
+        let first = comparison.spread_doubts(&comparison.vehicle).unwrap();
+        let search = Search {
+            data: &data,
+            vehicle: &vehicle,
+            simulated: &simulated,
+            plan: None,
+            options: &options,
+            found: Found::nothing(comparison.clone()),
+            comparison,
+            refused: Vec::new(),
+            last: None,
+        };
+        let again = search.against_model().unwrap();
+        assert!(!first.is_empty(), "four drones are not the fleet");
+        assert_eq!(again.spread_doubts(&search.found.vehicle).unwrap(), first);
+    }
 
     #[test]
     fn a_curve_is_smoother_along_what_it_depends_on() {

@@ -122,8 +122,9 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     let shrink = case.gap(&train, &held)?;
     let (plan, updraft_mps) = (input.plan, found.updraft_mps);
-    let whole =
-        Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps)?.feeling(&found.felt);
+    let whole = Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps)?
+        .feeling(&found.felt)
+        .spread_as(input.vehicle);
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
         // The sizes that go into the model are those of all drones.
         found.refit(&whole)?;
