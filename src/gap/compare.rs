@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::as_flown::AsFlown;
 use super::bins::{Bin, BinValues};
-use super::data::Data;
+use super::data::{Data, Group};
 use super::error::GapError;
 use super::gls::{Column, Pulses};
 use super::lean::{LeanLaw, Wind, wind};
@@ -400,6 +400,22 @@ impl Comparison {
         }
         doubts.retain(|doubt| doubt.range() > LEAST_DOUBT_US);
         Ok(doubts)
+    }
+
+    /// Standard deviation of the pulse from drone to drone by what makes them differ in the model, in the air and at
+    /// the climbs of this flight, us.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub(super) fn offsets_us(&self, vehicle: &Vehicle) -> Result<f64, EffectError> {
+        let doubts = self.spread_doubts(vehicle)?;
+        let variance = |(group, of): (usize, &Group)| -> f64 {
+            let of_mean = |doubt: &Column| {
+                mean((0..of.bins.len()).map(|bin| doubt.at(group, 0, bin))).unwrap_or_default()
+            };
+            of.slots.len() as f64 * doubts.iter().map(|doubt| of_mean(doubt).powi(2)).sum::<f64>()
+        };
+        Ok(mean(self.data.groups.iter().enumerate().map(variance)).unwrap_or_default().sqrt())
     }
 
     /// Whether the simulated side is another program's.

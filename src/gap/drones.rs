@@ -36,12 +36,14 @@ pub(super) fn drones(
     let patterns = all.patterns(&found.vehicle, found.gusts_mps)?;
     let residual = Split::of(&all.residual(&found.vehicle, found.gusts_mps)?);
     let mut each = Vec::new();
+    let mut plain_us = Vec::new();
     let mut reliability: f64 = 1.0;
     for (index, (group, pattern)) in all.data.groups.iter().zip(&patterns).enumerate() {
         let blup = Blup::new(pattern, &found.hyper);
         reliability = reliability.min(blup.slope_reliability(pattern));
         for (slot, deviation) in group.slots.iter().zip(residual.deviations(index)) {
             let (offset_us, slope) = blup.of(deviation);
+            plain_us.extend(mean(deviation));
             each.push(DroneOffset { slot: *slot, offset_us, slope, held_out: is_held(*slot) });
         }
     }
@@ -51,7 +53,10 @@ pub(super) fn drones(
     // Who responds more than the others needs another pulse where the air rises, too.
     let by_updraft_us =
         found.hyper.get(SLOPES) * found.updraft_mps.abs() * mean(&responses).unwrap_or_default();
-    let spread = spread(&each, reliability, by_updraft_us, found, original);
+    let by_model_us = all.offsets_us(&found.vehicle)?;
+    let usual_us = by_model_us.hypot(by_updraft_us);
+    let plain = Moments::of(&plain_us).map_or(0.0, |moments| moments.squares);
+    let spread = spread((&each, plain), reliability, usual_us, found, original);
     let correlation = (each.len() >= FEWEST).then(|| correlation(&each));
     let words = words(&each, correlation, found);
     Ok((Drones { each, correlation, words }, spread))
@@ -103,11 +108,12 @@ const USUAL: f64 = 0.023;
 /// to 1.7 times its value. Chosen.
 const FEWEST_FOR_SPREAD: usize = 12;
 
-/// A spread between drones beyond the model's and the usual.
+/// A spread between drones beyond the model's and the usual. `plain` are the squares of the drones' mean pulses
+/// about the fleet's, us²: where drones differ in more than an offset and a slope, offsets in hover say too much.
 fn spread(
-    each: &[DroneOffset],
+    (each, plain): (&[DroneOffset], f64),
     reliability: f64,
-    by_updraft_us: f64,
+    usual_us: f64,
     found: &Found,
     original: &Vehicle,
 ) -> Option<Step> {
@@ -119,15 +125,16 @@ fn spread(
     let relative: Vec<f64> = each.iter().map(|drone| drone.offset_us / sensitivity).collect();
     let moments = Moments::of(&relative)?;
     let (centre, square) = (moments.mean, moments.squares);
+    let least = square.min(plain / sensitivity.powi(2));
     let freedom = count - 1.0;
-    let sd = (square / freedom).sqrt();
+    let sd = (least / freedom).sqrt();
     let chi2 = ChiSquared::new(freedom).ok()?;
     let (low, high) =
-        ((square / chi2.inverse_cdf(0.975)).sqrt(), (square / chi2.inverse_cdf(0.025)).sqrt());
+        ((least / chi2.inverse_cdf(0.975)).sqrt(), (least / chi2.inverse_cdf(0.025)).sqrt());
     let (by_mass, by_thrust) = (Role::MassSpread.place()?, Role::ThrustSpread.place()?);
     let known = |role: Role| role.value(original).unwrap_or(0.0);
     let (mass, thrust) = (known(Role::MassSpread), known(Role::ThrustSpread));
-    let expected = mass.hypot(thrust).max(USUAL).hypot(by_updraft_us / sensitivity);
+    let expected = mass.hypot(thrust).max(USUAL).max(usual_us / sensitivity);
     if low <= expected {
         return None;
     }

@@ -32,11 +32,13 @@ pub struct Options {
     pub seed: u64,
     /// Largest number of effects that are named.
     pub most_steps: usize,
+    /// Whether the whole flight may be in an updraft; else it is in still air but for what moves.
+    pub updraft: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { alpha: 0.005, replicates: 60, seed: 1, most_steps: 4 }
+        Self { alpha: 0.005, replicates: 60, seed: 1, most_steps: 4, updraft: true }
     }
 }
 
@@ -257,7 +259,7 @@ impl Search<'_> {
         self.comparison = self.against_model()?;
         // In the same noise: how drones scatter must not choose an updraft.
         let still = self.look(In::Present(Some(&look.patterns)))?;
-        if explains(&still) > explains(&look) {
+        if explains(&still) > explains(&look) + FLOOR_NATS {
             return self.look(In::Present(None));
         }
         (self.comparison, self.found) = there;
@@ -314,7 +316,7 @@ impl Search<'_> {
             .doubting(&doubts)
             .with(&free)
             .fit(found.hyper, Likelihood::Profile);
-        if matches!(updraft, In::Settled) {
+        if matches!(updraft, In::Settled) && self.options.updraft {
             quick = self.settle_updraft(&free, quick)?;
         }
         let Self { comparison, found, refused, .. } = self;

@@ -210,7 +210,7 @@ fn shared_us(patterns: &[GroupPattern], residual: &Pulses, hyper: &Hyper) -> Vec
 }
 
 /// A comparison with only the bins of another.
-fn same_bins(comparison: &Comparison, other: &Comparison) -> Comparison {
+pub(super) fn same_bins(comparison: &Comparison, other: &Comparison) -> Comparison {
     comparison.only(|group, bin| {
         let start_s = comparison.data.groups[group].bins[bin].start_s;
         let name = &comparison.data.groups[group].name;

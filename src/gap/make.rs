@@ -7,8 +7,9 @@ use super::dependence::Dependence;
 use super::detectable::detectable;
 use super::drones::drones;
 use super::error::GapError;
-use super::explain::{Found, Options, search};
-use super::heldout::Case;
+use super::explain::{Found, Options};
+use super::heldout::same_bins;
+use super::kept::Question;
 use super::left_out::LeftOut;
 use super::noise::{
     GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME,
@@ -112,15 +113,14 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         }
     }
     add_others(&mut repaired, leans.as_slice());
-    let mut found = search(&train, &repaired, &simulated, input.plan, options)?;
-    let case = Case {
+    let question = Question {
         original: input.vehicle,
+        repaired: &repaired,
         simulated: &simulated,
         plan: input.plan,
-        found: &found,
-        seed: options.seed,
+        options,
     };
-    let shrink = case.gap(&train, &held)?;
+    let (mut found, shrink) = question.answered(&train, &held)?;
     let (plan, updraft_mps) = (input.plan, found.updraft_mps);
     let whole = Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps)?
         .feeling(&found.felt)
@@ -130,6 +130,9 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         found.refit(&whole)?;
         super::explain::settle(&mut found);
     }
+    // The map of disagreement is drawn in the air that was found.
+    let before = Comparison::of(&data, input.vehicle, &simulated, plan, updraft_mps)?;
+    let before = same_bins(&before, &whole);
     let held_slots: Vec<u16> = held.groups.iter().flat_map(|group| group.slots.clone()).collect();
     let mut left_out = input.left_out.clone();
     left_out.extend(data.left_out.iter().cloned());
@@ -164,7 +167,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         drones: differences,
         gap: shrink,
         map: None,
-        regimes: regimes(&before, &whole, &found, options.seed)?,
+        regimes: regimes(&before, &same_bins(&whole, &before), &found, options.seed)?,
         ladder: Vec::new(),
         cautions: warnings(&data, &found, input),
     };

@@ -20,6 +20,7 @@ mod formula;
 mod generic;
 mod gls;
 mod heldout;
+mod kept;
 mod lean;
 mod lean_channel;
 mod lean_fit;

@@ -1,0 +1,105 @@
+//! What of a search is kept: findings with which the model is nearer to drones that were not fitted.
+
+use super::compare::{Comparison, Simulated};
+use super::data::Data;
+use super::error::GapError;
+use super::explain::{Found, Options, search};
+use super::heldout::Case;
+use super::verdict::{Finding, Gap, Step};
+use crate::mission::plan::Plan;
+use crate::vehicle::Vehicle;
+
+/// A raw gap that grows by less is the same: rounding, and air that the drones do not share. The benchmark counts as
+/// worse what is more.
+const WORSE: f64 = 1.01;
+
+/// What is searched for, and in what.
+#[derive(Clone, Copy)]
+pub(super) struct Question<'a> {
+    /// Model before anything was repaired.
+    pub original: &'a Vehicle,
+    /// Model that the search begins with.
+    pub repaired: &'a Vehicle,
+    /// Simulation that the logs are compared with.
+    pub simulated: &'a Simulated<'a>,
+    /// The plan, if there is one.
+    pub plan: Option<&'a Plan>,
+    /// Options of the search.
+    pub options: &'a Options,
+}
+
+impl Question<'_> {
+    /// Searches in the drones to be fitted, and holds the findings against the others. Where they make the raw gap
+    /// larger, the updraft that the search settled in is the first to be doubted, and then the findings: they stay in
+    /// the verdict as what looks like it, never as a name, and the model stays as it was.
+    ///
+    /// # Errors
+    /// See [`GapError`].
+    pub(super) fn answered(self, train: &Data, held: &Data) -> Result<(Found, Gap), GapError> {
+        let (found, gap) = self.searched(train, held, *self.options)?;
+        if !grows(&gap) {
+            return Ok((found, gap));
+        }
+        if found.updraft_mps != 0.0 {
+            let still_air = Options { updraft: false, ..*self.options };
+            let (still, without) = self.searched(train, held, still_air)?;
+            if !grows(&without) {
+                return Ok((still, without));
+            }
+        }
+        let found = self.withdrawn(train, found)?;
+        let gap = self.case(&found).gap(train, held)?;
+        Ok((found, gap))
+    }
+
+    fn searched(
+        self,
+        train: &Data,
+        held: &Data,
+        options: Options,
+    ) -> Result<(Found, Gap), GapError> {
+        let found = search(train, self.repaired, self.simulated, self.plan, &options)?;
+        let gap = self.case(&found).gap(train, held)?;
+        Ok((found, gap))
+    }
+
+    fn case<'a>(&'a self, found: &'a Found) -> Case<'a> {
+        Case {
+            original: self.original,
+            simulated: self.simulated,
+            plan: self.plan,
+            found,
+            seed: self.options.seed,
+        }
+    }
+
+    /// The model as it was, with findings that name nothing alone.
+    fn withdrawn(self, train: &Data, found: Found) -> Result<Found, GapError> {
+        let comparison = Comparison::new(train, self.repaired, self.simulated, self.plan)?;
+        let steps = found.steps.into_iter().filter_map(withdrawn).collect();
+        let (hyper, gusts_mps, rest) = (found.hyper, found.gusts_mps, found.rest);
+        Ok(Found { hyper, gusts_mps, rest, steps, ..Found::nothing(comparison) })
+    }
+}
+
+/// Whether the raw gap of drones that were not fitted, or of rungs where there are none, grows.
+fn grows(gap: &Gap) -> bool {
+    gap.drones.or(gap.rungs).is_some_and(|shrink| {
+        shrink.after_us.value > WORSE * shrink.before_us.value
+            || shrink.after_without_air_us > WORSE * shrink.before_without_air_us
+    })
+}
+
+/// A finding that cannot be taken in: the effect with what explains nearly as much. `None`: nothing does, so that
+/// nothing can be said of it.
+fn withdrawn(mut step: Step) -> Option<Step> {
+    if let Finding::Unknown { .. } = step.finding {
+        return Some(step);
+    }
+    let mut effects: Vec<String> = step.finding.effects().into_iter().map(str::to_owned).collect();
+    let rivals = step.rivals.iter().filter(|rival| !effects.contains(&rival.name));
+    let near: Vec<String> = rivals.take(1).map(|rival| rival.name.clone()).collect();
+    effects.extend(near);
+    step.finding = Finding::Class { effects, parameters: Vec::new() };
+    (step.finding.effects().len() > 1).then_some(step)
+}
