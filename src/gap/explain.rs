@@ -250,16 +250,21 @@ impl Search<'_> {
         if !begins || self.found.updraft_mps.abs() < STILL_MPS {
             return Ok(look);
         }
-        let explains = |look: &Look| {
+        let explained = |look: &Look| {
             let round = round(&look.problem(), look.hyper, look.sought(), true);
-            round.base.log_posterior() + (round.best() - FLOOR_NATS).max(0.0)
+            let by_effect = (round.best() - FLOOR_NATS).max(0.0);
+            (round.base.log_posterior() + by_effect, by_effect > 0.0)
         };
         let there = (self.comparison.clone(), self.found.clone());
         self.found.updraft_mps = 0.0;
         self.comparison = self.against_model()?;
         // In the same noise: how drones scatter must not choose an updraft.
         let still = self.look(In::Present(Some(&look.patterns)))?;
-        if explains(&still) > explains(&look) + FLOOR_NATS {
+        let ((there_nats, lacks), (still_nats, lacks_still)) =
+            (explained(&look), explained(&still));
+        // Where the updraft leaves nothing to be found, an effect instead of it must explain clearly more.
+        let needed_nats = if lacks_still && !lacks { FLOOR_NATS } else { 0.0 };
+        if still_nats > there_nats + needed_nats {
             return self.look(In::Present(None));
         }
         (self.comparison, self.found) = there;
