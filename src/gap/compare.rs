@@ -60,7 +60,6 @@ pub struct Comparison {
     spreads: Vec<(String, String, f64)>,
     /// Wind that another program simulated, where the measured drones flew in another, m/s.
     other_wind_mps: Option<[f64; 2]>,
-    is_foreign: bool,
 }
 
 /// Power of thrust that `u - 1000` goes with at hover.
@@ -196,7 +195,6 @@ impl Comparison {
             vehicle,
             spreads,
             other_wind_mps: None,
-            is_foreign,
         };
         if is_foreign && comparison.apart_rad() > OTHER_WIND_DEG.to_radians() {
             comparison.other_wind_mps = Some([flown_mps[0], flown_mps[1]]);
@@ -336,7 +334,6 @@ impl Comparison {
             vehicle: self.vehicle.clone(),
             spreads: self.spreads.clone(),
             other_wind_mps: self.other_wind_mps,
-            is_foreign: self.is_foreign,
         }
     }
 
@@ -416,11 +413,6 @@ impl Comparison {
             of.slots.len() as f64 * doubts.iter().map(|doubt| of_mean(doubt).powi(2)).sum::<f64>()
         };
         Ok(mean(self.data.groups.iter().enumerate().map(variance)).unwrap_or_default().sqrt())
-    }
-
-    /// Whether the simulated side is another program's.
-    pub(super) fn is_foreign(&self) -> bool {
-        self.is_foreign
     }
 
     /// Whether the two sides flew in different wind.

@@ -11,10 +11,11 @@ use super::error::GapError;
 use super::generic::{Generic, all, drawn};
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper, WHITE};
-use super::pairs::{self, Pair};
 use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refine, slopes};
 use super::response::{self, Response, gusts_mps};
-use super::search::{FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, round};
+use super::search::{
+    FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, round,
+};
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
 use crate::effects::{Role, Signal, Signals, find};
 use crate::mission::plan::Plan;
@@ -78,6 +79,8 @@ pub struct Found {
     pub gusts_mps: f64,
     /// Updraft that the whole flight is in, m/s.
     pub updraft_mps: f64,
+    /// Whether any part of the search was in such an updraft.
+    pub was_in_updraft: bool,
     /// Findings, in the order in which they were made.
     pub steps: Vec<Step>,
     /// The end of the search.
@@ -97,9 +100,31 @@ impl Found {
             hyper: Hyper::default(),
             gusts_mps: 0.0,
             updraft_mps: 0.0,
+            was_in_updraft: false,
             steps: Vec::new(),
             rest: Rest::default(),
         }
+    }
+
+    /// How well the findings explain the flight, nats: its likelihood with them, less what each must explain to be
+    /// found at all, and how rare the updraft is.
+    ///
+    /// # Errors
+    /// Effects of the vehicle that are not valid.
+    pub(super) fn explains(&self) -> Result<f64, GapError> {
+        let Self { comparison, vehicle, gusts_mps, .. } = self;
+        let patterns = comparison.patterns(vehicle, *gusts_mps)?;
+        let residual = Split::of(&comparison.residual(vehicle, *gusts_mps)?);
+        let doubts = refine::doubts(comparison, vehicle, &self.parameters)?;
+        let known = doubts.get(1..).unwrap_or_default();
+        let problem = Problem::new(&patterns, &residual).doubting(known).with(&self.extras);
+        let likely = problem.fit(self.hyper, Likelihood::Profile).log_posterior();
+        let price = |step: &Step| match step.finding {
+            Finding::Unknown { .. } => FREE_FLOOR_NATS,
+            Finding::Name { .. } | Finding::Class { .. } => FLOOR_NATS,
+        };
+        let share = self.updraft_mps / UPDRAFT_DOUBT_MPS;
+        Ok(likely - self.steps.iter().map(price).sum::<f64>() - 0.5 * share * share)
     }
 }
 
@@ -211,15 +236,6 @@ impl Search<'_> {
             return Ok(false);
         }
         let rivals = rivals(&round, sought);
-        if let What::Free(free) = &decision.what
-            && self.comparison.is_foreign()
-            && let Some((look, pair, base)) =
-                self.pair_in_likelier_updraft(look.clone(), &round, free, &problem)?
-        {
-            self.take_pair(&look, &pair, &base, (decision.thresholds.library, rivals))?;
-            self.fly_again()?;
-            return Ok(true);
-        }
         match decision.what {
             What::Nothing => {}
             What::Effects { members, or_else } => {
@@ -247,7 +263,11 @@ impl Search<'_> {
     fn look_in_likelier_updraft(&mut self) -> Result<Look, GapError> {
         let begins = self.found.steps.is_empty();
         let look = self.look(In::Settled)?;
-        if !begins || self.found.updraft_mps.abs() < STILL_MPS {
+        if self.found.updraft_mps.abs() < STILL_MPS {
+            return Ok(look);
+        }
+        self.found.was_in_updraft = true;
+        if !begins {
             return Ok(look);
         }
         let explained = |look: &Look| {
@@ -269,43 +289,6 @@ impl Search<'_> {
         }
         (self.comparison, self.found) = there;
         Ok(look)
-    }
-
-    /// Two effects that explain as much as a free shape; in still air unless an updraft that one look found makes them
-    /// explain clearly more. That updraft stood for what both explain.
-    fn pair_in_likelier_updraft(
-        &mut self,
-        look: Look,
-        found: &Round,
-        free: &RankedGeneric,
-        problem: &Problem<'_>,
-    ) -> Result<Option<(Look, Pair, Solution)>, GapError> {
-        let there = pairs::instead_of(problem, found, look.sought(), free);
-        if !self.found.steps.is_empty() || self.found.updraft_mps == 0.0 {
-            return Ok(there.map(|pair| (look, pair, found.base.clone())));
-        }
-        let before = (self.comparison.clone(), self.found.clone());
-        self.found.updraft_mps = 0.0;
-        self.comparison = self.against_model()?;
-        let still = self.look(In::Present(None))?;
-        let problem = still.problem();
-        let round = round(&problem, still.hyper, still.sought(), true);
-        let best = round.generics.first();
-        let here = best.and_then(|free| {
-            pairs::instead_of(&problem.among(&round.groups), &round, still.sought(), free)
-        });
-        let likely = |base: &Solution, pair: &Pair| base.log_posterior() + pair.gain;
-        let is_better = match (&here, &there) {
-            (Some(here), Some(there)) => {
-                likely(&round.base, here) > likely(&found.base, there) - FLOOR_NATS
-            }
-            (here, _) => here.is_some(),
-        };
-        if is_better {
-            return Ok(here.map(|pair| (still, pair, round.base.clone())));
-        }
-        (self.comparison, self.found) = before;
-        Ok(there.map(|pair| (look, pair, found.base.clone())))
     }
 
     /// What is left, and everything that may explain it.
@@ -437,49 +420,6 @@ impl Search<'_> {
             shape: Some(along_its_signal(comparison, variant, best.beta)),
         });
         Ok(())
-    }
-
-    /// Takes two effects into the model that explain together what neither does alone.
-    fn take_pair(
-        &mut self,
-        look: &Look,
-        pair: &Pair,
-        base: &Solution,
-        (threshold_nats, rivals): (f64, Vec<Rival>),
-    ) -> Result<(), GapError> {
-        let Self { comparison, found, .. } = self;
-        let mut next = found.vehicle.clone();
-        for member in &pair.members {
-            let candidate = &look.candidates[member.candidate];
-            let table = entered(candidate, member)
-                .and_then(|vehicle| vehicle.effects.get(candidate.name).cloned());
-            next.effects.extend(table.map(|table| (candidate.name.to_owned(), table)));
-        }
-        for (member, names) in pair.members.iter().zip(&pair.names) {
-            let candidate = &look.candidates[member.candidate];
-            if !found.parameters.iter().any(|known| known.effect == candidate.name) {
-                let before = before(candidate);
-                let more = parameters_of(comparison, &next, candidate.name, before, base)?;
-                found.parameters.extend(more);
-            }
-            let variant = &candidate.variants[member.variant];
-            found.steps.push(Step {
-                finding: finding(
-                    names.iter().map(|name| (*name).to_owned()).collect(),
-                    candidate.was_there,
-                    None,
-                ),
-                gain_nats: member.gain,
-                threshold_nats,
-                alpha: self.options.alpha,
-                size_us: member.size_us,
-                rivals: rivals.clone(),
-                shape: Some(along_its_signal(comparison, variant, member.beta)),
-            });
-            found.hyper = member.hyper;
-        }
-        found.vehicle = next;
-        found.refit(comparison)
     }
 
     /// Takes a free shape into the regressors.

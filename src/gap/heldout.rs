@@ -402,6 +402,7 @@ mod tests {
             hyper: Hyper::default(),
             gusts_mps: 0.2,
             updraft_mps: 0.0,
+            was_in_updraft: false,
             steps: Vec::new(),
             rest: Rest::default(),
         }

@@ -29,23 +29,24 @@ pub(super) struct Question<'a> {
 }
 
 impl Question<'_> {
-    /// Searches in the drones to be fitted, and holds the findings against the others. Where they make the raw gap
-    /// larger, the updraft that the search settled in is the first to be doubted, and then the findings: they stay in
-    /// the verdict as what looks like it, never as a name, and the model stays as it was.
+    /// Searches in the drones to be fitted, and holds the findings against the others. An updraft that the search
+    /// settled in before it knew what the model lacks can have stood for it: so what still air leaves to be found is
+    /// kept if that explains more. Where findings make the raw gap larger, they stay in the verdict as what it looks
+    /// like, never as a name, and the model stays as it was.
     ///
     /// # Errors
     /// See [`GapError`].
     pub(super) fn answered(self, train: &Data, held: &Data) -> Result<(Found, Gap), GapError> {
-        let (found, gap) = self.searched(train, held, *self.options)?;
-        if !grows(&gap) {
-            return Ok((found, gap));
-        }
-        if found.updraft_mps != 0.0 {
+        let (mut found, mut gap) = self.searched(train, held, *self.options)?;
+        if found.was_in_updraft && !found.steps.is_empty() {
             let still_air = Options { updraft: false, ..*self.options };
             let (still, without) = self.searched(train, held, still_air)?;
-            if !grows(&without) {
-                return Ok((still, without));
+            if (grows(&without), -still.explains()?) < (grows(&gap), -found.explains()?) {
+                (found, gap) = (still, without);
             }
+        }
+        if !grows(&gap) {
+            return Ok((found, gap));
         }
         let found = self.withdrawn(train, found)?;
         let gap = self.case(&found).gap(train, held)?;

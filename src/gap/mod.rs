@@ -33,7 +33,6 @@ pub mod next;
 mod noise;
 #[cfg(test)]
 mod null_flights;
-mod pairs;
 mod refine;
 mod refly;
 mod regimes;
