@@ -52,7 +52,8 @@ impl LeanLaw {
     /// Lean law of a vehicle's model at an air density, kg/m³, in an updraft, m/s.
     pub fn of(vehicle: &Vehicle, density: f64, updraft_mps: f64) -> Self {
         // The law has the very form of the other frames' drag, and no part for what this one's does with thrust.
-        if vehicle.airframe.sitl.is_some()
+        let goes_with_flow = Role::RotorDragFlow.value(vehicle).is_some_and(|part| part > 0.0);
+        if (vehicle.airframe.sitl.is_some() || goes_with_flow)
             && let Some(law) = Self::by_trim(vehicle, density, updraft_mps)
         {
             return law;

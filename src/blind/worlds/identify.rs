@@ -47,7 +47,7 @@ enum Fitted {
     Of(Role),
 }
 
-const FITTED: [Fitted; 8] = [
+const FITTED: [Fitted; 10] = [
     Fitted::Thrust,
     Fitted::Power,
     Fitted::Resistance,
@@ -56,10 +56,12 @@ const FITTED: [Fitted; 8] = [
     Fitted::Of(Role::BodyDragSide),
     Fitted::Of(Role::RotorDrag),
     Fitted::Of(Role::WindLift),
+    Fitted::Of(Role::WindLiftSquare),
+    Fitted::Of(Role::RotorDragFlow),
 ];
 
 /// Where the search begins, and between which bounds each is kept.
-const BOUNDS: [(f64, f64, f64); 8] = [
+const BOUNDS: [(f64, f64, f64); 10] = [
     (1.0, 0.5, 2.0),
     (1.0, 0.2, 5.0),
     (1.0, 0.2, 5.0),
@@ -68,6 +70,8 @@ const BOUNDS: [(f64, f64, f64); 8] = [
     (0.01, 1e-4, 0.5),
     (0.02, 1e-4, 0.1),
     (0.3, 0.01, 0.95),
+    (0.2, 0.001, 1.0),
+    (0.5, 0.001, 1.0),
 ];
 
 fn with(vehicle: &Vehicle, at: &DVector<f64>) -> Vehicle {
@@ -225,8 +229,9 @@ mod tests {
         for seed in [1, 2] {
             let world = world(seed, Base::Pixel);
             let found = known::vehicle(&world, Base::Pixel).unwrap();
-            // Eight worlds left 4.0 to 4.9 us (rms) and 11 to 16 us (largest): the forms differ.
-            assert!(found.rms_us < 6.0, "{} {}", found.rms_us, found.largest_us);
+            // These left 0.9 and 0.8 us (rms), 2.3 and 2.8 us (largest): the forms differ. Without the part of the
+            // rotors' drag that goes with the flow through the disc it was 4 to 5 and 11 to 16 us.
+            assert!(found.rms_us < 1.5, "{} {}", found.rms_us, found.largest_us);
             assert!(found.largest_us > 0.0);
         }
     }

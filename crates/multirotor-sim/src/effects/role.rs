@@ -18,6 +18,8 @@ pub enum Role {
     BodyDragSide,
     /// Force of the rotors against horizontal air over weight, per air speed, s/m.
     RotorDrag,
+    /// Part of that force that goes with the flow through the disc.
+    RotorDragFlow,
     /// Force of the rotors against horizontal air over mass, per air speed, 1/s.
     MomentumDrag,
     /// Relative change of the drag of the airframe's own side faces.
@@ -26,6 +28,8 @@ pub enum Role {
     InflowShare,
     /// Share of the inflow of which horizontal air gives a part back.
     WindLift,
+    /// Part of what horizontal air gives that goes with the square of its speed.
+    WindLiftSquare,
     /// Standard deviation of mass between drones, relative.
     MassSpread,
     /// Standard deviation of thrust at one pulse between drones, relative.

@@ -64,7 +64,7 @@ impl Effect for TranslationalLift {
                     low: 0.0,
                     high: 1.0,
                     default: |_| 0.0,
-                    role: None,
+                    role: Some(Role::WindLiftSquare),
                 },
             ],
             hooks: &[Hook::Loads],
