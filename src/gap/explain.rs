@@ -304,7 +304,9 @@ impl Search<'_> {
             .doubting(&doubts)
             .with(&free)
             .fit(found.hyper, Likelihood::Profile);
-        if matches!(updraft, In::Settled) && self.options.updraft {
+        // A table has the climb that was flown, not the one commanded: nothing flies it again in another air.
+        let is_flown = !matches!(self.simulated, Simulated::Closed);
+        if matches!(updraft, In::Settled) && self.options.updraft && is_flown {
             quick = self.settle_updraft(&free, quick)?;
         }
         let Self { comparison, found, refused, .. } = self;

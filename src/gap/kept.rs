@@ -1,4 +1,4 @@
-//! What of a search is kept: findings with which the model is nearer to drones that were not fitted.
+//! Which findings of a search are kept: those with which the model is nearer to drones that were not fitted.
 
 use super::compare::{Comparison, Simulated};
 use super::data::Data;
@@ -38,10 +38,12 @@ impl Question<'_> {
     /// See [`GapError`].
     pub(super) fn answered(self, train: &Data, held: &Data) -> Result<(Found, Gap), GapError> {
         let (mut found, mut gap) = self.searched(train, held, *self.options)?;
-        if found.was_in_updraft && !found.steps.is_empty() {
+        let blown_off = found.updraft_mps != 0.0 && self.is_nearer_in_still_air(train, &found)?;
+        if blown_off || found.was_in_updraft && !found.steps.is_empty() {
             let still_air = Options { updraft: false, ..*self.options };
             let (still, without) = self.searched(train, held, still_air)?;
-            if (grows(&without), -still.explains()?) < (grows(&gap), -found.explains()?) {
+            let there = (blown_off || grows(&gap), -found.explains()?);
+            if (grows(&without), -still.explains()?) < there {
                 (found, gap) = (still, without);
             }
         }
@@ -51,6 +53,15 @@ impl Question<'_> {
         let found = self.withdrawn(train, found)?;
         let gap = self.case(&found).gap(train, held)?;
         Ok((found, gap))
+    }
+
+    /// Whether the model as it was is nearer to the logs in still air than in the updraft of a search.
+    fn is_nearer_in_still_air(self, train: &Data, found: &Found) -> Result<bool, GapError> {
+        let in_air = |updraft_mps: f64| -> Result<f64, GapError> {
+            let Self { repaired, simulated, plan, .. } = self;
+            Ok(Comparison::of(train, repaired, simulated, plan, updraft_mps)?.raw_gap_us()?)
+        };
+        Ok(in_air(found.updraft_mps)? > WORSE * in_air(0.0)?)
     }
 
     fn searched(

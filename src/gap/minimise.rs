@@ -1,5 +1,7 @@
 //! A quasi-Newton search for smooth functions of a few variables without derivatives at hand.
 
+use rayon::prelude::*;
+
 /// Step of the difference quotients; variables are logarithms. Numerical.
 const STEP: f64 = 1e-4;
 /// The search ends when a step gains less, nats. Numerical: a four-thousandth of the threshold.
@@ -13,7 +15,7 @@ const LONGEST: f64 = 1.0;
 /// search; values that are not numbers count as infinite.
 pub(super) fn minimise<const N: usize>(
     start: [f64; N],
-    function: impl Fn(&[f64; N]) -> f64,
+    function: impl Fn(&[f64; N]) -> f64 + Sync,
 ) -> ([f64; N], f64) {
     let value_at = |at: &[f64; N]| {
         let value = function(at);
@@ -21,11 +23,11 @@ pub(super) fn minimise<const N: usize>(
     };
     let gradient_at = |at: &[f64; N], value: f64| {
         let mut gradient = [0.0; N];
-        for (index, slope) in gradient.iter_mut().enumerate() {
+        gradient.par_iter_mut().enumerate().for_each(|(index, slope)| {
             let mut moved = *at;
             moved[index] += STEP;
             *slope = (value_at(&moved) - value) / STEP;
-        }
+        });
         gradient
     };
     let mut at = start;

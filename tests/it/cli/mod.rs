@@ -26,6 +26,7 @@ mod foreign_text;
 mod gap;
 mod gap_firmware;
 mod gap_next;
+mod gap_nothing;
 mod guided;
 mod help;
 mod inspect;
