@@ -90,7 +90,7 @@ impl Question<'_> {
         let comparison = Comparison::new(train, self.repaired, self.simulated, self.plan)?;
         let steps = found.steps.into_iter().filter_map(withdrawn).collect();
         let (hyper, gusts_mps, rest) = (found.hyper, found.gusts_mps, found.rest);
-        Ok(Found { hyper, gusts_mps, rest, steps, ..Found::nothing(comparison) })
+        Ok(Found { hyper, gusts_mps, steps, rest, ..Found::nothing(comparison) })
     }
 }
 

@@ -64,7 +64,6 @@ fn nothing_is_found_where_nothing_is_hidden() {
 /// `cargo test --release --test it nothing_is_found_in_the_whole_matrix -- --ignored --nocapture`
 #[test]
 #[ignore = "160 flights; see above"]
-#[expect(clippy::print_stdout, reason = "the table of an ignored test")]
 fn nothing_is_found_in_the_whole_matrix() {
     let (mut count, mut false_alarms) = (0, 0);
     for vehicle in library::names() {

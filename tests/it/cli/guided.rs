@@ -62,8 +62,7 @@ impl<'a> Flight<'a> {
     }
 
     pub(crate) fn end(&mut self) -> Option<i32> {
-        let bench = self.bench;
-        let ended = bench.wait_for(60, || self.child.try_wait().unwrap());
+        let ended = self.bench.end_of(&mut self.child, 60);
         ended.unwrap_or_else(|| panic!("it goes on:\n{}", self.said())).code()
     }
 }
