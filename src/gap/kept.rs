@@ -115,3 +115,64 @@ fn withdrawn(mut step: Step) -> Option<Step> {
     step.finding = Finding::Class { effects, parameters: Vec::new() };
     (step.finding.effects().len() > 1).then_some(step)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::dependence::Dependence;
+    use super::super::verdict::{Interval, Rival, Shrink};
+    use super::*;
+
+    fn step(finding: Finding, rivals: &[&str]) -> Step {
+        let rival =
+            |name: &&str| Rival { name: (*name).to_owned(), generic: false, gain_nats: 9.0 };
+        Step {
+            finding,
+            gain_nats: 10.0,
+            threshold_nats: 8.0,
+            alpha: 0.005,
+            size_us: 5.0,
+            rivals: rivals.iter().map(rival).collect(),
+            shape: None,
+        }
+    }
+
+    #[test]
+    fn what_is_withdrawn_is_never_a_name() {
+        let name = |effect: &str| Finding::Name {
+            effect: effect.to_owned(),
+            parameters: Vec::new(),
+            was_there: false,
+        };
+        let effects = |step: Option<Step>| {
+            step.map(|step| step.finding.effects().join(" ")).unwrap_or_default()
+        };
+        let beside = withdrawn(step(name("one"), &["one", "another", "third"]));
+        assert!(matches!(beside.as_ref().unwrap().finding, Finding::Class { .. }));
+        assert_eq!(effects(beside), "one another");
+        assert_eq!(withdrawn(step(name("one"), &["one"])), None);
+        let unknown = Finding::Unknown { depends_on: Dependence::Climb, formula: None };
+        let kept = withdrawn(step(unknown.clone(), &["one"])).unwrap();
+        assert_eq!(kept.finding, unknown);
+    }
+
+    #[test]
+    fn a_gap_grows_as_it_is_or_without_the_air() {
+        let us = |value: f64| Interval { value, low: value, high: value };
+        let gap = |before: f64, after: f64, clean: [f64; 2]| Gap {
+            drones: Some(Shrink {
+                before_us: us(before),
+                after_us: us(after),
+                before_without_air_us: clean[0],
+                after_without_air_us: clean[1],
+                ..Shrink::default()
+            }),
+            rungs: None,
+        };
+        assert!(!grows(&gap(10.0, 5.0, [8.0, 3.0])));
+        assert!(!grows(&gap(10.0, 10.05, [8.0, 8.05])));
+        assert!(grows(&gap(10.0, 10.2, [8.0, 3.0])));
+        assert!(grows(&gap(10.0, 5.0, [8.0, 8.2])));
+        let rungs = gap(10.0, 10.2, [8.0, 3.0]).drones;
+        assert!(grows(&Gap { drones: None, rungs }), "without drones held out, by the rungs");
+    }
+}
