@@ -102,8 +102,8 @@ fn grows(gap: &Gap) -> bool {
     })
 }
 
-/// A finding that cannot be taken in: the effect with what explains nearly as much. `None`: nothing does, so that
-/// nothing can be said of it.
+/// A finding that cannot be taken in: its effects with the rival that explains most. `None`: an effect without a rival,
+/// of which nothing can be said.
 fn withdrawn(mut step: Step) -> Option<Step> {
     if let Finding::Unknown { .. } = step.finding {
         return Some(step);

@@ -131,7 +131,11 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         super::explain::settle(&mut found);
     }
     // The map of disagreement is drawn in the air that was found.
-    let before = Comparison::of(&data, input.vehicle, &simulated, plan, updraft_mps)?;
+    let before = if updraft_mps == 0.0 {
+        before
+    } else {
+        Comparison::of(&data, input.vehicle, &simulated, plan, updraft_mps)?
+    };
     let before = same_bins(&before, &whole);
     let held_slots: Vec<u16> = held.groups.iter().flat_map(|group| group.slots.clone()).collect();
     let mut left_out = input.left_out.clone();

@@ -130,7 +130,7 @@ pub(super) fn round(
 }
 
 /// Whether a coefficient makes a size that the effect can have.
-pub(super) fn admissible(candidate: &Candidate, variant: &Variant, beta: f64) -> bool {
+fn admissible(candidate: &Candidate, variant: &Variant, beta: f64) -> bool {
     let Some(size) = candidate.size else { return beta.abs() > 0.0 };
     if candidate.was_there {
         let moved = size.now + beta * (variant.size - size.now);

@@ -47,8 +47,8 @@ impl Effect for BladeFlapping {
                 plane; what the same blades answer to air along their axis is rotor inflow. The \
                 blades' lift leans back with the flow through the disc, so a part of the force goes \
                 with that flow: in the same wind such a drone leans more climbing than descending.",
-            formula: "H = 4 k_d w v = lambda sqrt(T m g) v, of which a part goes with (V + v_i)/v_h;  in hover tan(phi) = \
-                lambda v sqrt(cos phi), T = m g cos(phi)",
+            formula: "H = 4 k_d w v = lambda sqrt(T m g) v, of which a part goes with (V + v_i)/v_h;  \
+                in hover tan(phi) = lambda v sqrt(cos phi), T = m g cos(phi)",
             source: "Hoffmann et al. 2007; Mahony, Kumar and Corke 2012; RotorPy k_d",
             class: Class::Horizontal,
             signals: &[Signal::Horizontal],
@@ -102,10 +102,9 @@ impl Effect for BladeFlapping {
 impl InFlight for Rotors {
     fn loads(&mut self, now: &Now, change: &mut Change) {
         let thrust_n = (now.thrust_n * change.thrust).max(0.0);
-        let by_flow = match self.disc.speeds(now) {
-            Some((axial, edgewise)) => by_flow(self.with_flow, axial, edgewise),
-            None => 1.0,
-        };
+        let speeds = if self.with_flow > 0.0 { self.disc.speeds(now) } else { None };
+        let by_flow =
+            speeds.map_or(1.0, |(axial, edgewise)| by_flow(self.with_flow, axial, edgewise));
         let factor = self.drag_per_weight * by_flow * (thrust_n * self.weight_n).sqrt();
         change.force_n.x -= factor * now.relative_mps.x;
         change.force_n.y -= factor * now.relative_mps.y;
