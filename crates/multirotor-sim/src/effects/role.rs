@@ -137,14 +137,16 @@ impl Role {
 mod tests {
     use super::*;
 
-    const ONCE: [Role; 22] = [
+    const ONCE: [Role; 24] = [
         Role::BodyDragTop,
         Role::BodyDragSide,
         Role::RotorDrag,
+        Role::RotorDragFlow,
         Role::MomentumDrag,
         Role::FaceDragSide,
         Role::InflowShare,
         Role::WindLift,
+        Role::WindLiftSquare,
         Role::MassSpread,
         Role::ThrustSpread,
         Role::InflowSpread,
