@@ -29,8 +29,8 @@ pub(super) struct Observation {
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
     dim: usize,
-    /// What each observation looks at.
-    looks_at: Vec<Vec<(usize, f64)>>,
+    pub(super) states: Vec<State>,
+    pub(super) observations: Vec<Observation>,
     /// Factors on the states since the observation before: `dim` for each observation.
     decays: Vec<f64>,
     /// Gains over the innovation's standard deviation: `dim` for each observation.
@@ -52,76 +52,34 @@ struct Step<'a> {
 
 impl Filter {
     /// Runs the covariances through the observations.
-    pub(super) fn new(states: &[State], observations: Vec<Observation>) -> Self {
-        let dim = states.len();
-        // Of a symmetric matrix only what is not above the diagonal.
-        let mut covariance = vec![0.0; dim * dim];
-        let at = |a: usize, b: usize| a.max(b) * dim + a.min(b);
-        for (index, state) in states.iter().enumerate() {
-            covariance[at(index, index)] = state.variance;
-        }
-        let count = observations.len();
+    pub(super) fn new(states: Vec<State>, observations: Vec<Observation>) -> Self {
+        let (dim, count) = (states.len(), observations.len());
         let mut filter = Self {
             dim,
-            looks_at: Vec::with_capacity(count),
+            states,
+            observations,
             decays: Vec::with_capacity(count * dim),
             gains: Vec::with_capacity(count * dim),
             inverse_sd: Vec::with_capacity(count),
             log_det: 0.0,
         };
-        let mut before_s = observations.first().map_or(0.0, |first| first.time_s);
-        let (mut last_s, mut decay) = (f64::NAN, vec![1.0; dim]);
-        let mut cross = vec![0.0; dim];
-        for seen in observations {
-            let elapsed_s = (seen.time_s - before_s).max(0.0);
-            before_s = seen.time_s;
-            if elapsed_s != last_s {
-                // Bins come at regular times.
-                last_s = elapsed_s;
-                for (decay, state) in decay.iter_mut().zip(states) {
-                    *decay = (-elapsed_s / state.time_s).exp();
-                }
-            }
-            if elapsed_s > 0.0 {
-                for row in 0..dim {
-                    for column in 0..=row {
-                        covariance[row * dim + column] *= decay[row] * decay[column];
-                    }
-                    let kick = states[row].variance * (1.0 - decay[row] * decay[row]);
-                    covariance[row * dim + row] += kick;
-                }
-            }
-            for (row, value) in cross.iter_mut().enumerate() {
-                *value = seen
-                    .looks_at
-                    .iter()
-                    .map(|(state, factor)| covariance[at(row, *state)] * factor)
-                    .sum();
-            }
-            let variance = seen.noise
-                + seen.looks_at.iter().map(|(state, factor)| cross[*state] * factor).sum::<f64>();
-            let variance = variance.max(f64::MIN_POSITIVE);
-            filter.log_det += variance.ln();
-            for row in 0..dim {
-                for column in 0..=row {
-                    covariance[row * dim + column] -= cross[row] * cross[column] / variance;
-                }
-            }
-            let sd = variance.sqrt();
-            filter.decays.extend_from_slice(&decay);
-            filter.gains.extend(cross.iter().map(|value| value / sd));
-            filter.inverse_sd.push(1.0 / sd);
-            filter.looks_at.push(seen.looks_at);
-        }
+        let Self { states, observations, decays, gains, inverse_sd, log_det, .. } = &mut filter;
+        run(states, observations, |seen| {
+            *log_det += seen.variance.ln();
+            let sd = seen.variance.sqrt();
+            decays.extend_from_slice(seen.decay);
+            gains.extend(seen.cross.iter().map(|value| value / sd));
+            inverse_sd.push(1.0 / sd);
+        });
         filter
     }
 
     fn steps(&self) -> impl DoubleEndedIterator<Item = Step<'_>> + ExactSizeIterator {
         let by_state = |values| <[f64]>::chunks_exact(values, self.dim.max(1));
         let of_states = by_state(&self.decays).zip(by_state(&self.gains));
-        self.looks_at.iter().zip(of_states).zip(&self.inverse_sd).map(
-            |((looks_at, (decay, gain)), inverse_sd)| Step {
-                looks_at,
+        self.observations.iter().zip(of_states).zip(&self.inverse_sd).map(
+            |((seen, (decay, gain)), inverse_sd)| Step {
+                looks_at: &seen.looks_at,
                 decay,
                 gain,
                 inverse_sd: *inverse_sd,
@@ -152,8 +110,14 @@ impl Filter {
     /// The inverse of the covariance times a series: the whitening and its transpose.
     pub(super) fn weigh(&self, series: &[f64]) -> Vec<f64> {
         let mut weighed = self.whiten(series);
+        self.back(&mut weighed);
+        weighed
+    }
+
+    /// The transpose of the whitening: makes the weighed series of a whitened one.
+    pub(super) fn back(&self, white: &mut [f64]) {
         let mut back = vec![0.0; self.dim];
-        for (step, value) in self.steps().zip(&mut weighed).rev() {
+        for (step, value) in self.steps().zip(white).rev() {
             let sum: f64 = step.gain.iter().zip(&back).map(|(gain, back)| gain * back).sum();
             *value = (*value + sum) * step.inverse_sd;
             for (index, factor) in step.looks_at {
@@ -163,7 +127,6 @@ impl Filter {
                 *back *= decay;
             }
         }
-        weighed
     }
 
     /// A series with the filter's covariance, from independent noise of variance 1.
@@ -186,12 +149,74 @@ impl Filter {
     }
 }
 
+/// The covariances at one observation.
+pub(super) struct Seen<'a> {
+    /// Of the states before it, in rows; only what is not above the diagonal.
+    pub covariance: &'a [f64],
+    /// Factors on the states since the observation before.
+    pub decay: &'a [f64],
+    /// Of the states with it.
+    pub cross: &'a [f64],
+    /// Variance of its innovation.
+    pub variance: f64,
+}
+
+/// Runs the covariances through the observations.
+pub(super) fn run(states: &[State], observations: &[Observation], mut tell: impl FnMut(Seen<'_>)) {
+    let dim = states.len();
+    // Of a symmetric matrix only what is not above the diagonal.
+    let mut covariance = vec![0.0; dim * dim];
+    let at = |a: usize, b: usize| a.max(b) * dim + a.min(b);
+    for (index, state) in states.iter().enumerate() {
+        covariance[at(index, index)] = state.variance;
+    }
+    let mut before_s = observations.first().map_or(0.0, |first| first.time_s);
+    let (mut last_s, mut decay) = (f64::NAN, vec![1.0; dim]);
+    let mut cross = vec![0.0; dim];
+    for seen in observations {
+        let elapsed_s = (seen.time_s - before_s).max(0.0);
+        before_s = seen.time_s;
+        if elapsed_s != last_s {
+            // Bins come at regular times.
+            last_s = elapsed_s;
+            for (decay, state) in decay.iter_mut().zip(states) {
+                *decay = (-elapsed_s / state.time_s).exp();
+            }
+        }
+        if elapsed_s > 0.0 {
+            for row in 0..dim {
+                for column in 0..=row {
+                    covariance[row * dim + column] *= decay[row] * decay[column];
+                }
+                let kick = states[row].variance * (1.0 - decay[row] * decay[row]);
+                covariance[row * dim + row] += kick;
+            }
+        }
+        for (row, value) in cross.iter_mut().enumerate() {
+            *value = seen
+                .looks_at
+                .iter()
+                .map(|(state, factor)| covariance[at(row, *state)] * factor)
+                .sum();
+        }
+        let variance = seen.noise
+            + seen.looks_at.iter().map(|(state, factor)| cross[*state] * factor).sum::<f64>();
+        let variance = variance.max(f64::MIN_POSITIVE);
+        tell(Seen { covariance: &covariance, decay: &decay, cross: &cross, variance });
+        for row in 0..dim {
+            for column in 0..=row {
+                covariance[row * dim + column] -= cross[row] * cross[column] / variance;
+            }
+        }
+    }
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    fn case() -> (Vec<State>, Vec<Observation>) {
+    pub(in super::super) fn case() -> (Vec<State>, Vec<Observation>) {
         let states = vec![
             State { variance: 4.0, time_s: 30.0 },
             State { variance: 1.0, time_s: 8.0 },
@@ -207,7 +232,7 @@ mod tests {
         (states, observations)
     }
 
-    fn covariance(states: &[State], observations: &[Observation]) -> DMatrix<f64> {
+    pub(in super::super) fn covariance(states: &[State], observations: &[Observation]) -> DMatrix<f64> {
         let count = observations.len();
         DMatrix::from_fn(count, count, |row, column| {
             let (a, b) = (&observations[row], &observations[column]);
@@ -227,7 +252,7 @@ mod tests {
     fn it_is_the_dense_covariance() {
         let (states, observations) = case();
         let dense = covariance(&states, &observations).cholesky().unwrap();
-        let filter = Filter::new(&states, observations);
+        let filter = Filter::new(states, observations);
         let log_det: f64 = dense.l().diagonal().iter().map(|value| 2.0 * value.ln()).sum();
         assert!((filter.log_det - log_det).abs() < 1e-9, "{} {log_det}", filter.log_det);
         let series: Vec<f64> = (0..12).map(|index| f64::from(index * index % 7)).collect();

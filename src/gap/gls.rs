@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use crate::numeric::{extent, mean};
 
 use super::minimise::minimise;
-use super::noise::{GroupPattern, Hyper, Whitener};
+use super::noise::{COUNT, GroupPattern, Hyper, Whitener};
 
 /// Values of all drones, by group, drone and bin.
 pub(super) type Pulses = Vec<Vec<Vec<f64>>>;
@@ -170,7 +170,7 @@ impl Split {
 }
 
 /// Something whitened.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct White {
     means: Vec<f64>,
     deviations: Vec<f64>,
@@ -283,12 +283,20 @@ impl<'a> Problem<'a> {
 
     /// Most probable noise from a start, with everything linear at its best.
     pub(super) fn fit(&self, start: Hyper, likelihood: Likelihood) -> Solution {
-        let objective = |at: &[f64; super::noise::COUNT]| {
+        let objective = |at: &[f64; COUNT]| {
             let hyper = Hyper(*at);
             let solution = self.at(&hyper);
             -(solution.log_likelihood(likelihood) + hyper.log_prior())
         };
-        let (at, _) = minimise(start.0, objective);
+        let slopes = |at: &[f64; COUNT], _| {
+            let hyper = Hyper(*at);
+            let mut slopes = self.at(&hyper).slopes(self.groups, likelihood);
+            for (slope, prior) in slopes.iter_mut().zip(hyper.prior_slopes()) {
+                *slope -= prior;
+            }
+            slopes
+        };
+        let (at, _) = minimise(start.0, objective, slopes);
         self.at(&Hyper(at))
     }
 }
@@ -357,6 +365,25 @@ impl Solution {
         -0.5 * twice
     }
 
+    /// How minus the log-likelihood changes with each parameter of the noise of these groups. (The coefficients are
+    /// the best, so their own change counts for nothing.)
+    fn slopes(&self, groups: &[GroupPattern], likelihood: Likelihood) -> [f64; COUNT] {
+        let mut rests = vec![self.residual_of(&self.y)];
+        if let (Some(factor), Likelihood::Restricted) = (&self.factor, likelihood) {
+            // What the determinant of the information changes by is the squares of independent regressors.
+            let own = DMatrix::identity(self.columns.len(), self.columns.len());
+            if let Some(shares) = factor.l().solve_lower_triangular(&own) {
+                rests.extend(shares.row_iter().map(|row| {
+                    let shares: Vec<f64> = row.iter().copied().collect();
+                    combined(White::default(), &self.columns, &shares)
+                }));
+            }
+        }
+        let series: Vec<(&[f64], &[f64])> =
+            rests.iter().map(|rest| (&rest.means[..], &rest.deviations[..])).collect();
+        self.whitener.slopes(groups, &self.hyper, &series)
+    }
+
     /// Log-likelihood with the prior of the noise.
     pub(super) fn log_posterior(&self) -> f64 {
         self.log_likelihood(Likelihood::Profile) + self.hyper.log_prior()
@@ -418,24 +445,8 @@ impl Solution {
     fn residual_of(&self, white: &White) -> White {
         let Some(factor) = &self.factor else { return white.clone() };
         let right = DVector::from_fn(self.columns.len(), |row, _| self.columns[row].dot(white));
-        let beta = factor.solve(&right);
-        let mut rest = white.clone();
-        if rest.deviations.is_empty() && self.columns.iter().any(|c| !c.deviations.is_empty()) {
-            rest.deviations = vec![0.0; self.y.deviations.len()];
-        }
-        rest.known.resize(self.columns.len(), 0.0);
-        for (column, beta) in self.columns.iter().zip(beta.iter()) {
-            for (value, part) in rest.known.iter_mut().zip(&column.known) {
-                *value -= beta * part;
-            }
-            for (value, part) in rest.means.iter_mut().zip(&column.means) {
-                *value -= beta * part;
-            }
-            for (value, part) in rest.deviations.iter_mut().zip(&column.deviations) {
-                *value -= beta * part;
-            }
-        }
-        rest
+        let less: Vec<f64> = factor.solve(&right).iter().map(|beta| -beta).collect();
+        combined(white.clone(), &self.columns, &less)
     }
 
     /// Pulses of all drones that this noise makes.
@@ -444,12 +455,29 @@ impl Solution {
     }
 }
 
+/// A whitened series with shares of others added.
+fn combined(mut sum: White, others: &[White], shares: &[f64]) -> White {
+    let add = |sum: &mut Vec<f64>, other: &[f64], share: f64| {
+        if sum.len() < other.len() {
+            sum.resize(other.len(), 0.0);
+        }
+        sum.iter_mut().zip(other).for_each(|(sum, other)| *sum += share * other);
+    };
+    for (other, share) in others.iter().zip(shares) {
+        add(&mut sum.means, &other.means, *share);
+        add(&mut sum.deviations, &other.deviations, *share);
+        add(&mut sum.known, &other.known, *share);
+    }
+    sum
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::noise::{
         GRADIENT, GUST_TIME, GUSTS, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME, SLOPES,
         WHITE,
     };
+    use super::super::response::Response;
     use super::super::trial::{patterns, pulses};
     use super::*;
 
@@ -553,6 +581,46 @@ mod tests {
             Column::Shared(groups.iter().map(shared).collect()),
             Column::Own(groups.iter().enumerate().map(own).collect()),
         ]
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_likelihood() {
+        let groups = patterns();
+        let pulses = Split::of(&pulses(&groups));
+        let doubt = Column::Shared(
+            groups.iter().map(|group| group.time_s.iter().map(|t| t.cos()).collect()).collect(),
+        );
+        let own = Column::Own(pulses.deviations.clone());
+        let own = own.each(|group, drone, bin| {
+            own.at(group, drone, bin).signum() + f64::from(u8::from(bin % 3 == 0))
+        });
+        let mut problem = Problem::new(&groups, &pulses).with([&own]).doubting([&doubt]);
+        let mut curved = groups.clone();
+        for group in &mut curved {
+            group.shift_mps = group.time_s.iter().map(|time_s| 0.3 * time_s.sin()).collect();
+            for response in &mut group.response {
+                *response = Response::of(|shift_mps| 20.0 * shift_mps + 9.0 * shift_mps.powi(2));
+            }
+        }
+        problem.groups = &curved;
+        let mut hyper = Hyper::default();
+        hyper.0[SHARED] += 2.6;
+        for likelihood in [Likelihood::Profile, Likelihood::Restricted] {
+            let slopes = problem.at(&hyper).slopes(&curved, likelihood);
+            let prior = hyper.prior_slopes();
+            for (place, (slope, prior)) in slopes.iter().zip(prior).enumerate() {
+                let at = |by: f64| {
+                    let mut moved = hyper;
+                    moved.0[place] += by;
+                    (-problem.at(&moved).log_likelihood(likelihood), moved.log_prior())
+                };
+                let (ahead, behind) = (at(1e-4), at(-1e-4));
+                let by = (ahead.0 - behind.0) / 2e-4;
+                assert!((slope - by).abs() < 1e-4 * (1.0 + by.abs()), "{place}: {slope} {by}");
+                let by = (ahead.1 - behind.1) / 2e-4;
+                assert!((prior - by).abs() < 1e-6 * (1.0 + by.abs()), "{place}: {prior} {by}");
+            }
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use nalgebra::SMatrix;
 use super::bins::Bin;
 use super::filter::{Filter, Observation, State};
 use super::lean::LeanLaw;
-use super::minimise::minimise;
+use super::minimise::{differences, minimise};
 
 /// Prior standard deviation of the quadratic part of the model's own lean law, as a share. 0.4 was tried and
 /// taken back when the wind got an uncertainty of its own in the search.
@@ -96,7 +96,7 @@ pub(super) fn fit(mut points: Vec<Point>, model: LeanLaw) -> Fitted {
         for (place, value) in start.iter_mut().enumerate() {
             *value = natural[place] / UNITS[place];
         }
-        let (at, value) = minimise(start, objective);
+        let (at, value) = minimise(start, objective, |at, value| differences(objective, at, value));
         if best.is_none_or(|(_, least)| value < least) {
             best = Some((at, value));
         }
@@ -169,7 +169,7 @@ fn misfit(points: &[Point], of: &Candidate, [linear, square_part]: [f64; 2]) -> 
             off.push(point.lean_rad[axis] - wanted[axis]);
         }
     }
-    let filter = Filter::new(&[gust, gust], seen);
+    let filter = Filter::new(vec![gust, gust], seen);
     let square = |value: f64| value * value;
     let chi2: f64 = filter.whiten(&off).into_iter().map(square).sum();
     let known = square((of.law.square.max(1e-7) / square_part).ln() / SQUARE_DOUBT)

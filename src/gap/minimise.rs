@@ -1,4 +1,4 @@
-//! A quasi-Newton search for smooth functions of a few variables without derivatives at hand.
+//! A quasi-Newton search for smooth functions of a few variables.
 
 use rayon::prelude::*;
 
@@ -12,23 +12,15 @@ const MOST_STEPS: usize = 40;
 const LONGEST: f64 = 1.0;
 
 /// Where a function is least, from a start, and its value there. BFGS with a backtracking line
-/// search; values that are not numbers count as infinite.
+/// search; values that are not numbers count as infinite. The gradient is asked for at a place with its value.
 pub(super) fn minimise<const N: usize>(
     start: [f64; N],
-    function: impl Fn(&[f64; N]) -> f64 + Sync,
+    function: impl Fn(&[f64; N]) -> f64,
+    gradient_at: impl Fn(&[f64; N], f64) -> [f64; N],
 ) -> ([f64; N], f64) {
     let value_at = |at: &[f64; N]| {
         let value = function(at);
         if value.is_finite() { value } else { f64::INFINITY }
-    };
-    let gradient_at = |at: &[f64; N], value: f64| {
-        let mut gradient = [0.0; N];
-        gradient.par_iter_mut().enumerate().for_each(|(index, slope)| {
-            let mut moved = *at;
-            moved[index] += STEP;
-            *slope = (value_at(&moved) - value) / STEP;
-        });
-        gradient
     };
     let mut at = start;
     let mut value = value_at(&at);
@@ -76,6 +68,21 @@ pub(super) fn minimise<const N: usize>(
     (at, value)
 }
 
+/// A gradient by difference quotients, for functions without derivatives at hand; `value` is the function's there.
+pub(super) fn differences<const N: usize>(
+    function: impl Fn(&[f64; N]) -> f64 + Sync,
+    at: &[f64; N],
+    value: f64,
+) -> [f64; N] {
+    let mut gradient = [0.0; N];
+    gradient.par_iter_mut().enumerate().for_each(|(index, slope)| {
+        let mut moved = *at;
+        moved[index] += STEP;
+        *slope = (function(&moved) - value) / STEP;
+    });
+    gradient
+}
+
 fn identity<const N: usize>() -> [[f64; N]; N] {
     let mut matrix = [[0.0; N]; N];
     for (index, row) in matrix.iter_mut().enumerate() {
@@ -119,8 +126,9 @@ mod tests {
 
     #[test]
     fn a_bent_valley_is_followed() {
+        let valley = |[x, y]: &[f64; 2]| 20.0 * (y - x * x).powi(2) + (1.0 - x).powi(2);
         let (at, value) =
-            minimise([-1.2, 1.0], |[x, y]| 20.0 * (y - x * x).powi(2) + (1.0 - x).powi(2));
+            minimise([-1.2, 1.0], valley, |at, value| differences(valley, at, value));
         assert!(value < 1e-2 && (at[0] - 1.0).abs() < 0.1, "{at:?} {value}");
     }
 }

@@ -40,6 +40,7 @@ mod response;
 mod scene;
 mod search;
 mod sensor;
+mod slopes;
 mod steady;
 mod table;
 #[cfg(test)]

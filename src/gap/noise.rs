@@ -12,10 +12,13 @@
 //! and H the model's response to them, p noise of the drone's pulse that some seconds remember. Within a command group the likelihood splits exactly into the group's
 //! mean and the deviations of its drones; both are whitened by filters.
 
+use rayon::prelude::*;
+
 use crate::numeric;
 
 use super::filter::{Filter, Observation, State};
 use super::response::{Response, gusts_mps};
+use super::slopes::Slopes;
 
 /// Parameters of the noise, by their logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,6 +98,20 @@ impl Hyper {
         self.0[place].exp()
     }
 
+    /// How the logarithm of the prior density changes with each parameter.
+    pub(super) fn prior_slopes(&self) -> [f64; COUNT] {
+        let mut slopes = [0.0; COUNT];
+        for (place, slope) in slopes.iter_mut().enumerate() {
+            let (median, factor) = PRIOR[place];
+            let away = (self.0[place] - median.ln()) / factor.ln();
+            *slope = -away / factor.ln();
+            if OF_THE_AIR.contains(&place) {
+                *slope -= WALL.powi(2) * (away - STORM).max(0.0) / factor.ln();
+            }
+        }
+        slopes
+    }
+
     /// Logarithm of the prior density, without its constant.
     pub fn log_prior(&self) -> f64 {
         let square = |(value, (median, factor)): (&f64, &(f64, f64))| {
@@ -152,6 +169,13 @@ pub(super) struct Whitener {
 const SHARED_STATES: usize = 7;
 /// States of a drone: slow air, gusts, offset, response, noise of the pulse.
 const OWN_STATES: usize = 5;
+/// Places, in what a mean looks at, of the response: to the drone's slow air and gusts, to the shared air, its
+/// gradient and that of its gradient.
+const LOOKS: [usize; 5] = [0, 1, OWN_STATES, OWN_STATES + 1, OWN_STATES + 2];
+/// Parameters that the response depends on.
+const OF_THE_RESPONSE: [usize; 5] = [SHARED, OWN, GUSTS, LEAST, GRADIENT];
+/// Step of the difference quotients of states and responses. Numerical.
+const STEP: f64 = 1e-5;
 /// How the gradient itself changes over [`ALOFT_M`], as a share of it: an eddy of 150 m is not straight over
 /// the height of a ladder. Chosen, near the ratio of the two lengths.
 const CURVED: f64 = 0.3;
@@ -186,31 +210,62 @@ impl GroupPattern {
     }
 }
 
+/// States of a drone, or with a share of their variance those of a mean of drones.
+fn own_states(hyper: &Hyper, share: f64) -> [State; OWN_STATES] {
+    let state = |place: usize, time_s: f64| State {
+        variance: hyper.get(place).powi(2) * share,
+        time_s,
+    };
+    [
+        state(OWN, hyper.get(SHARED_TIME)),
+        state(GUSTS, hyper.get(GUST_TIME)),
+        state(OFFSETS, f64::INFINITY),
+        state(SLOPES, f64::INFINITY),
+        state(PULSE_NOISE, PULSE_NOISE_S),
+    ]
+}
+
+/// States of the means of all groups.
+fn shared_states(groups: &[GroupPattern], hyper: &Hyper) -> Vec<State> {
+    let square = |place: usize| hyper.get(place).powi(2);
+    let time_s = hyper.get(SHARED_TIME);
+    // The square of a normal air varies by sqrt 2 of its mean and is forgotten twice as fast: what all
+    // drones share of it bends all their means by the same.
+    let shared_share =
+        square(SHARED) / (square(SHARED) + square(OWN) + square(GUSTS)).max(f64::MIN_POSITIVE);
+    let mut states = vec![
+        State { variance: square(SHARED), time_s },
+        State { variance: square(GRADIENT), time_s },
+        State { variance: 1.0, time_s: f64::INFINITY },
+        State { variance: square(SIDE_GUSTS), time_s: SIDE_GUSTS_S },
+        State { variance: square(SIDE_GUSTS), time_s: SIDE_GUSTS_S },
+        State { variance: 2.0 * shared_share.powi(2), time_s: time_s / 2.0 },
+        State { variance: (CURVED * hyper.get(GRADIENT)).powi(2), time_s },
+    ];
+    for group in groups {
+        states.extend(own_states(hyper, 1.0 / group.drones.max(1) as f64));
+    }
+    states
+}
+
 impl Whitener {
     /// For these groups and this noise.
     pub(super) fn new(groups: &[GroupPattern], hyper: &Hyper) -> Self {
-        let square = |place: usize| hyper.get(place).powi(2);
-        let own = |share: f64| {
-            [
-                State { variance: square(OWN) * share, time_s: hyper.get(SHARED_TIME) },
-                State { variance: square(GUSTS) * share, time_s: hyper.get(GUST_TIME) },
-                State { variance: square(OFFSETS) * share, time_s: f64::INFINITY },
-                State { variance: square(SLOPES) * share, time_s: f64::INFINITY },
-                State { variance: square(PULSE_NOISE) * share, time_s: PULSE_NOISE_S },
-            ]
-        };
+        let white = hyper.get(WHITE).powi(2);
         let responses: Vec<Vec<f64>> = groups.iter().map(|group| group.responses(hyper)).collect();
         let own_responses: Vec<Vec<f64>> =
             groups.iter().map(|group| group.own_responses(hyper)).collect();
         let looks = |index: usize, bin: usize, first: usize| {
             let response = own_responses[index][bin];
-            vec![
+            let mut looks_at = Vec::with_capacity(OWN_STATES + SHARED_STATES);
+            looks_at.extend([
                 (first, response),
                 (first + 1, response),
                 (first + 2, 1.0),
                 (first + 3, groups[index].slope_us[bin]),
                 (first + 4, 1.0),
-            ]
+            ]);
+            looks_at
         };
         let mut order: Vec<(usize, usize)> = groups
             .iter()
@@ -218,23 +273,6 @@ impl Whitener {
             .flat_map(|(index, group)| (0..group.time_s.len()).map(move |bin| (index, bin)))
             .collect();
         order.sort_by(|a, b| groups[a.0].time_s[a.1].total_cmp(&groups[b.0].time_s[b.1]));
-        let time_s = hyper.get(SHARED_TIME);
-        // The square of a normal air varies by sqrt 2 of its mean and is forgotten twice as fast: what all
-        // drones share of it bends all their means by the same.
-        let shared_share =
-            square(SHARED) / (square(SHARED) + square(OWN) + square(GUSTS)).max(f64::MIN_POSITIVE);
-        let mut states = vec![
-            State { variance: square(SHARED), time_s },
-            State { variance: square(GRADIENT), time_s },
-            State { variance: 1.0, time_s: f64::INFINITY },
-            State { variance: square(SIDE_GUSTS), time_s: SIDE_GUSTS_S },
-            State { variance: square(SIDE_GUSTS), time_s: SIDE_GUSTS_S },
-            State { variance: 2.0 * shared_share.powi(2), time_s: time_s / 2.0 },
-            State { variance: (CURVED * hyper.get(GRADIENT)).powi(2), time_s },
-        ];
-        for group in groups {
-            states.extend(own(1.0 / group.drones.max(1) as f64));
-        }
         let observations: Vec<Observation> = order
             .iter()
             .map(|(index, bin)| {
@@ -253,11 +291,11 @@ impl Whitener {
                 Observation {
                     time_s: group.time_s[*bin],
                     looks_at,
-                    noise: square(WHITE) / group.drones.max(1) as f64,
+                    noise: white / group.drones.max(1) as f64,
                 }
             })
             .collect();
-        let means = Filter::new(&states, observations);
+        let means = Filter::new(shared_states(groups, hyper), observations);
         let mut log_det = means.log_det;
         let deviations: Vec<Filter> = groups
             .iter()
@@ -267,10 +305,10 @@ impl Whitener {
                     .map(|bin| Observation {
                         time_s: group.time_s[bin],
                         looks_at: looks(index, bin, 0),
-                        noise: square(WHITE),
+                        noise: white,
                     })
                     .collect();
-                let filter = Filter::new(&own(1.0), observations);
+                let filter = Filter::new(own_states(hyper, 1.0).to_vec(), observations);
                 log_det += filter.log_det * group.drones.saturating_sub(1) as f64;
                 filter
             })
@@ -287,6 +325,121 @@ impl Whitener {
     /// Groups' means in the order of the filter.
     fn series(&self, by_group: &[Vec<f64>]) -> Vec<f64> {
         self.order.iter().map(|(group, bin)| by_group[*group][*bin]).collect()
+    }
+
+    /// How half of the determinant's logarithm, less half of the squares of whitened series, changes with each
+    /// parameter of the noise: each series consists of means, in the order of the filter, and of the deviations
+    /// of all drones, if it has any.
+    pub(super) fn slopes(
+        &self,
+        groups: &[GroupPattern],
+        hyper: &Hyper,
+        series: &[(&[f64], &[f64])],
+    ) -> [f64; COUNT] {
+        let of_means = || {
+            let mut slopes = Slopes::zero(&self.means);
+            slopes.add_log_det(&self.means, 0.5);
+            for (means, _) in series {
+                let mut weighed = means.to_vec();
+                self.means.back(&mut weighed);
+                slopes.add_square(&self.means, &weighed, -0.5);
+            }
+            slopes
+        };
+        let mut first = 0;
+        let mut firsts = Vec::with_capacity(self.deviations.len());
+        for (filter, drones) in self.deviations.iter().zip(&self.drones) {
+            firsts.push(first);
+            first += drones * filter.observations.len();
+        }
+        let of_group = |group: usize| {
+            let (filter, drones) = (&self.deviations[group], self.drones[group]);
+            let bins = filter.observations.len();
+            let mut slopes = Slopes::zero(filter);
+            slopes.add_log_det(filter, 0.5 * drones.saturating_sub(1) as f64);
+            for (_, deviations) in series {
+                let own = deviations.get(firsts[group]..firsts[group] + drones * bins);
+                for drone in own.unwrap_or_default().chunks_exact(bins.max(1)) {
+                    let mut weighed = drone.to_vec();
+                    filter.back(&mut weighed);
+                    slopes.add_square(filter, &weighed, -0.5);
+                }
+            }
+            slopes
+        };
+        let (means, deviations) = rayon::join(of_means, || -> Vec<Slopes> {
+            (0..self.deviations.len()).into_par_iter().map(of_group).collect()
+        });
+        self.by_parameter(groups, hyper, &means, &deviations)
+    }
+
+    /// Slopes by what the filters are made of as slopes by the parameters.
+    fn by_parameter(
+        &self,
+        groups: &[GroupPattern],
+        hyper: &Hyper,
+        means: &Slopes,
+        deviations: &[Slopes],
+    ) -> [f64; COUNT] {
+        let moved = |place: usize, by: f64| {
+            let mut moved = *hyper;
+            moved.0[place] += by;
+            moved
+        };
+        let of_states = |slopes: &Slopes, ahead: &[State], behind: &[State]| -> f64 {
+            let states = ahead.iter().zip(behind).enumerate().map(|(state, (ahead, behind))| {
+                let mut sum = slopes.variance[state] * (ahead.variance - behind.variance);
+                if ahead.time_s.is_finite() {
+                    sum += slopes.log_time[state] * (ahead.time_s / behind.time_s).ln();
+                }
+                sum
+            });
+            states.sum::<f64>() / (2.0 * STEP)
+        };
+        let mut by = [0.0; COUNT];
+        for (place, by) in by.iter_mut().enumerate() {
+            let (ahead, behind) = (moved(place, STEP), moved(place, -STEP));
+            *by += of_states(means, &shared_states(groups, &ahead), &shared_states(groups, &behind));
+            for slopes in deviations {
+                *by += of_states(slopes, &own_states(&ahead, 1.0), &own_states(&behind, 1.0));
+            }
+        }
+        let of_noise = |filter: &Filter, slopes: &Slopes| -> f64 {
+            let each = filter.observations.iter().zip(&slopes.noise);
+            each.map(|(seen, slope)| 2.0 * seen.noise * slope).sum()
+        };
+        by[WHITE] += of_noise(&self.means, means);
+        for (filter, slopes) in self.deviations.iter().zip(deviations) {
+            by[WHITE] += of_noise(filter, slopes);
+        }
+        // By the response to what all share and to each drone's own air.
+        let mut shared: Vec<Vec<f64>> =
+            groups.iter().map(|group| vec![0.0; group.time_s.len()]).collect();
+        let mut own = shared.clone();
+        for ((group, bin), factors) in self.order.iter().zip(&means.factors) {
+            let aloft = groups[*group].aloft(*bin);
+            let [own_air, own_gusts, all, sloped, curved] = LOOKS.map(|look| factors[look]);
+            own[*group][*bin] += own_air + own_gusts;
+            shared[*group][*bin] += all + aloft * (sloped + aloft * curved);
+        }
+        for (own, slopes) in own.iter_mut().zip(deviations) {
+            for (own, factors) in own.iter_mut().zip(&slopes.factors) {
+                *own += factors[0] + factors[1];
+            }
+        }
+        for place in OF_THE_RESPONSE {
+            let (ahead, behind) = (moved(place, STEP), moved(place, -STEP));
+            for (group, (shared, own)) in groups.iter().zip(shared.iter().zip(&own)) {
+                let change = |slopes: &[f64], ahead: Vec<f64>, behind: Vec<f64>| -> f64 {
+                    let each = slopes.iter().zip(ahead.iter().zip(&behind));
+                    each.map(|(slope, (ahead, behind))| slope * (ahead - behind)).sum::<f64>()
+                        / (2.0 * STEP)
+                };
+                by[place] += change(shared, group.responses(&ahead), group.responses(&behind));
+                by[place] += change(own, group.own_responses(&ahead), group.own_responses(&behind));
+            }
+        }
+        by
     }
 
     /// The updraft that all drones share, by what is left of the groups' means, by group and bin, m/s: its
