@@ -7,7 +7,7 @@ use super::bins::{Bin, BinValues};
 use super::data::{Data, Group};
 use super::error::GapError;
 use super::gls::{Column, Pulses};
-use super::lean::{LeanLaw, Wind, wind};
+use super::lean::{LeanLaw, Wind, mean_wind, wind};
 use super::noise::GroupPattern;
 use super::refly::{mean_drone, refly};
 use super::response::{self, Response};
@@ -49,6 +49,8 @@ pub struct Comparison {
     pub scene: Scene,
     /// Wind, as the leans of the flight show it.
     pub wind: Wind,
+    /// Air that the simulated side was flown in, show frame, z up, m/s.
+    flown_mps: [f64; 3],
     /// What the closed loop does besides the closed form, by group and bin, us.
     closure_us: Vec<Vec<f64>>,
     /// What no effect of the vehicle adds to the response to vertical air speed; empty: nothing.
@@ -89,10 +91,11 @@ impl Comparison {
         simulated: &Simulated<'_>,
         plan: Option<&Plan>,
     ) -> Result<Self, GapError> {
-        Self::of(data, vehicle, simulated, plan, 0.0)
+        Self::of(data, vehicle, simulated, plan, 0.0, None)
     }
 
-    /// Flies (or takes) the simulated side of a vehicle for a flight that is in an updraft all over, m/s.
+    /// Flies (or takes) the simulated side of a vehicle for a flight that is in an updraft all over, m/s. Another
+    /// comparison of the same data with a similar model, if there is one, tells the wind to begin with.
     ///
     /// # Errors
     /// As [`Comparison::new`].
@@ -102,6 +105,7 @@ impl Comparison {
         simulated: &Simulated<'_>,
         plan: Option<&Plan>,
         updraft_mps: f64,
+        near: Option<&Self>,
     ) -> Result<Self, GapError> {
         let spreads = spreads(vehicle);
         let vehicle = mean_drone(vehicle);
@@ -115,7 +119,7 @@ impl Comparison {
             Simulated::Given { values, flew, is_foreign: true } => {
                 own_wind(data, values, flew, amsl_m)
             }
-            _ => wind(data, law, None).mean_mps,
+            _ => mean_wind(data, law, None),
         });
         let as_flown = match simulated {
             Simulated::Given { values, flew, is_foreign: true } => {
@@ -140,16 +144,22 @@ impl Comparison {
                 Simulated::Closed => Ok(data.as_flown()),
             }
         };
-        let mut values = fly(first)?;
-        let mut flown_mps = first;
         let moves = data.groups.iter().any(|group| group.bins.iter().any(Bin::is_horizontal));
-        if moves && matches!(simulated, Simulated::Refly(_)) {
-            // What the legs say of the wind is better than what hovers say by the model's law alone.
-            let whole = data.keep(|group, bin| values[group][bin].is_some());
-            let side = flat(&values);
-            flown_mps = air(wind(&whole, law, Some((&side, first))).mean_mps);
-            values = fly(flown_mps)?;
-        }
+        // What the legs say of the wind is better than what hovers say by the model's law alone.
+        let flown_mps = match near.filter(|_| moves) {
+            _ if !moves || !matches!(simulated, Simulated::Refly(_)) => first,
+            // The law is the same, and so is the wind.
+            Some(near) if lean_law(&near.vehicle, amsl_m, near.scene.updraft_mps) == law => {
+                air(near.wind.mean_mps)
+            }
+            Some(near) => air(mean_wind(&near.data, law, Some((&near.side, near.flown_mps)))),
+            None => {
+                let values = fly(first)?;
+                let whole = data.keep(|group, bin| values[group][bin].is_some());
+                air(mean_wind(&whole, law, Some((&flat(&values), first))))
+            }
+        };
+        let values = fly(flown_mps)?;
         let has = |group: usize, bin: usize| values[group][bin].is_some();
         let data = data.keep(has);
         let mut side = flat(&values);
@@ -189,6 +199,7 @@ impl Comparison {
             side,
             scene,
             wind: blown,
+            flown_mps,
             closure_us,
             felt: Vec::new(),
             amsl_m,
@@ -328,6 +339,7 @@ impl Comparison {
             side: pick(&self.side, &keep),
             scene: self.scene.only(&keep),
             wind,
+            flown_mps: self.flown_mps,
             closure_us: pick(&self.closure_us, &keep),
             felt: pick(&self.felt, &keep),
             amsl_m: self.amsl_m,
@@ -530,7 +542,7 @@ fn own_wind(
     flew: &Vehicle,
     amsl_m: f64,
 ) -> [f64; 2] {
-    wind(&as_data(data, values), lean_law(&mean_drone(flew), amsl_m, 0.0), None).mean_mps
+    mean_wind(&as_data(data, values), lean_law(&mean_drone(flew), amsl_m, 0.0), None)
 }
 
 /// How another program's simulation answers climb, where its logs tell it.

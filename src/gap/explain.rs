@@ -1,5 +1,7 @@
 //! The loop of the search: find, name, add, and again, until nothing passes.
 
+use rayon::prelude::*;
+
 use super::candidates::{
     Candidate, Size, Variant, axial_drag, drag_by_lean, library, of_the_air, read_otherwise,
 };
@@ -471,7 +473,8 @@ impl Search<'_> {
     fn against_model(&self) -> Result<Comparison, GapError> {
         let Self { data, simulated, plan, found, .. } = self;
         let Found { vehicle, felt, updraft_mps, .. } = found;
-        let comparison = Comparison::of(data, vehicle, simulated, *plan, *updraft_mps)?;
+        let comparison =
+            Comparison::of(data, vehicle, simulated, *plan, *updraft_mps, Some(&self.comparison))?;
         Ok(comparison.feeling(felt).spread_as(self.vehicle))
     }
 }
@@ -479,14 +482,13 @@ impl Search<'_> {
 /// The updraft that explains most, by Gauss and Newton from the best of some starts; `None`: the vehicle can fly
 /// in none of them.
 fn likeliest(
-    fit: impl Fn(Hyper, f64) -> Option<InUpdraft>,
+    fit: impl Fn(Hyper, f64) -> Option<InUpdraft> + Sync,
     starts_mps: &[f64],
     hyper: Hyper,
 ) -> Option<InUpdraft> {
-    let mut best: Option<InUpdraft> = None;
-    for start_mps in starts_mps {
-        best = better(best, fit(hyper, *start_mps));
-    }
+    let there: Vec<Option<InUpdraft>> =
+        starts_mps.par_iter().map(|start_mps| fit(hyper, *start_mps)).collect();
+    let mut best = there.into_iter().fold(None, better);
     for _ in 0..UPDRAFT_ROUNDS {
         let Some(there) = &best else { break };
         let (at_mps, hyper, likely) = (there.updraft_mps, there.solution.hyper, there.likely);

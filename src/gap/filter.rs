@@ -232,7 +232,10 @@ pub(super) mod tests {
         (states, observations)
     }
 
-    pub(in super::super) fn covariance(states: &[State], observations: &[Observation]) -> DMatrix<f64> {
+    pub(in super::super) fn covariance(
+        states: &[State],
+        observations: &[Observation],
+    ) -> DMatrix<f64> {
         let count = observations.len();
         DMatrix::from_fn(count, count, |row, column| {
             let (a, b) = (&observations[row], &observations[column]);

@@ -61,16 +61,21 @@ impl Case<'_> {
         Ok(Gap { drones, rungs: self.of_rungs(train, &fitted)? })
     }
 
-    fn against(&self, data: &Data, vehicle: &Vehicle) -> Result<Comparison, GapError> {
-        let updraft_mps = self.found.updraft_mps;
-        let comparison = Comparison::of(data, vehicle, self.simulated, self.plan, updraft_mps)?;
+    fn against(
+        &self,
+        data: &Data,
+        vehicle: &Vehicle,
+        near: Option<&Comparison>,
+    ) -> Result<Comparison, GapError> {
+        let Self { simulated, plan, found, .. } = *self;
+        let comparison = Comparison::of(data, vehicle, simulated, plan, found.updraft_mps, near)?;
         Ok(same_bins(&comparison, &self.found.comparison))
     }
 
     fn of_drones(&self, held: &Data, fitted: &Fitted) -> Result<Shrink, GapError> {
         let (vehicle, gusts_mps) = (&self.found.vehicle, self.found.gusts_mps);
-        let before = self.against(held, self.original)?;
-        let after = self.against(held, vehicle)?;
+        let before = self.against(held, self.original, None)?;
+        let after = self.against(held, vehicle, Some(&before))?;
         let mut end = after.residual(vehicle, gusts_mps)?;
         // Free shapes were fitted on the others' bins, which are the same.
         subtract(&mut end, &fitted.shapes);
@@ -111,7 +116,7 @@ impl Case<'_> {
         if speeds.len() < 3 {
             return Ok(None);
         }
-        let before = self.against(train, self.original)?;
+        let before = self.against(train, self.original, Some(comparison))?;
         let mut end = fitted.residual.clone();
         if !self.found.parameters.is_empty() {
             let without: Result<Vec<Pulses>, GapError> =

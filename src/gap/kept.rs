@@ -57,9 +57,11 @@ impl Question<'_> {
 
     /// Whether the model as it was is nearer to the logs in still air than in the updraft of a search.
     fn is_nearer_in_still_air(self, train: &Data, found: &Found) -> Result<bool, GapError> {
+        let near = &found.comparison;
         let in_air = |updraft_mps: f64| -> Result<f64, GapError> {
             let Self { repaired, simulated, plan, .. } = self;
-            Ok(Comparison::of(train, repaired, simulated, plan, updraft_mps)?.raw_gap_us()?)
+            let there = Comparison::of(train, repaired, simulated, plan, updraft_mps, Some(near))?;
+            Ok(there.raw_gap_us()?)
         };
         Ok(in_air(found.updraft_mps)? > WORSE * in_air(0.0)?)
     }

@@ -1,10 +1,11 @@
 //! Wind from the leans of the fleet.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector3};
+use nalgebra::{Matrix2, Vector3};
 
 use super::bins::BinValues;
 use super::data::Data;
-use super::lean_fit::{Point, fit, hovering_wind};
+use super::filter::{Filter, Observation, State};
+use super::lean_fit::{Fitted, Point, fit, hovering_wind};
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
 use crate::numeric::{Line, Moments};
@@ -207,8 +208,47 @@ pub(super) fn wind(
     law: LeanLaw,
     flown: Option<(&[Vec<BinValues>], [f64; 3])>,
 ) -> Wind {
-    let leans: Vec<Vec<[f64; 2]>> = data
+    let leans = settled_leans(data, law, flown);
+    let MeanWind { mean_mps, law, legs } = MeanWind::of(data, &leans, law, flown.is_some());
+    let air_mps = data
         .groups
+        .iter()
+        .zip(&leans)
+        .map(|(group, leans)| {
+            let air = |(bin, lean): (&super::bins::Bin, &[f64; 2])| {
+                let steady = [bin.velocity_mps[0] - mean_mps[0], bin.velocity_mps[1] - mean_mps[1]];
+                let tells = law.slope(steady[0].hypot(steady[1])) > LEAST_SLOPE;
+                if tells { law.air(*lean, bin.climb_mps()) } else { steady }
+            };
+            let raw: Vec<[f64; 2]> = group.bins.iter().zip(leans).map(air).collect();
+            smooth(group, &raw)
+        })
+        .collect();
+    let speed_mps = mean_mps[0].hypot(mean_mps[1]);
+    let law_mps = legs.map_or(LAW_DOUBT * speed_mps, |legs| {
+        legs.mean_se_mps.hypot(LEGS_DOUBT * speed_mps).min(LAW_DOUBT * speed_mps)
+    });
+    let mean_se_mps = LEAST_DOUBT_MPS.hypot(law_mps);
+    let measured = legs.map(|legs| Measured { law, linear_se: legs.linear_se });
+    Wind { mean_mps, mean_se_mps, air_mps, measured }
+}
+
+/// Mean of the wind that [`wind`] finds, show frame, m/s.
+pub(super) fn mean_wind(
+    data: &Data,
+    law: LeanLaw,
+    flown: Option<(&[Vec<BinValues>], [f64; 3])>,
+) -> [f64; 2] {
+    MeanWind::of(data, &settled_leans(data, law, flown), law, flown.is_some()).mean_mps
+}
+
+/// Mean leans of each group, by bin, less what they lack of their steady values, rad.
+fn settled_leans(
+    data: &Data,
+    law: LeanLaw,
+    flown: Option<(&[Vec<BinValues>], [f64; 3])>,
+) -> Vec<Vec<[f64; 2]>> {
+    data.groups
         .iter()
         .enumerate()
         .map(|(index, group)| {
@@ -227,42 +267,29 @@ pub(super) fn wind(
             };
             (0..group.bins.len()).map(lean).collect()
         })
-        .collect();
-    let each =
-        || data.groups.iter().zip(&leans).flat_map(|(group, leans)| group.bins.iter().zip(leans));
-    let points: Vec<Point> = each().map(|(bin, lean)| Point::of(bin, *lean)).collect();
-    let mut mean_mps = hovering_wind(&points, law);
-    let mut law = law;
-    let mut measured = None;
-    let mut by_legs_mps = None;
-    let moves = points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING;
-    if moves && flown.is_some() {
-        let fitted = fit(points, law);
-        mean_mps = fitted.mean_mps;
-        law = fitted.law;
-        measured = Some(Measured { law, linear_se: fitted.linear_se });
-        by_legs_mps = Some(fitted.mean_se_mps);
+        .collect()
+}
+
+/// The mean of the wind with the law of the lean that it was read by.
+struct MeanWind {
+    mean_mps: [f64; 2],
+    law: LeanLaw,
+    /// What horizontal legs said of both.
+    legs: Option<Fitted>,
+}
+
+impl MeanWind {
+    fn of(data: &Data, leans: &[Vec<[f64; 2]>], law: LeanLaw, is_flown: bool) -> Self {
+        let each = data.groups.iter().zip(leans);
+        let each = each.flat_map(|(group, leans)| group.bins.iter().zip(leans));
+        let points: Vec<Point> = each.map(|(bin, lean)| Point::of(bin, *lean)).collect();
+        let moves = points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING;
+        if moves && is_flown {
+            let legs = fit(points, law);
+            return Self { mean_mps: legs.mean_mps, law: legs.law, legs: Some(legs) };
+        }
+        Self { mean_mps: hovering_wind(&points, law), law, legs: None }
     }
-    let air_mps = data
-        .groups
-        .iter()
-        .zip(&leans)
-        .map(|(group, leans)| {
-            let air = |(bin, lean): (&super::bins::Bin, &[f64; 2])| {
-                let steady = [bin.velocity_mps[0] - mean_mps[0], bin.velocity_mps[1] - mean_mps[1]];
-                let tells = law.slope(steady[0].hypot(steady[1])) > LEAST_SLOPE;
-                if tells { law.air(*lean, bin.climb_mps()) } else { steady }
-            };
-            let raw: Vec<[f64; 2]> = group.bins.iter().zip(leans).map(air).collect();
-            smooth(group, &raw)
-        })
-        .collect();
-    let speed_mps = mean_mps[0].hypot(mean_mps[1]);
-    let law_mps = by_legs_mps.map_or(LAW_DOUBT * speed_mps, |legs: f64| {
-        legs.hypot(LEGS_DOUBT * speed_mps).min(LAW_DOUBT * speed_mps)
-    });
-    let mean_se_mps = LEAST_DOUBT_MPS.hypot(law_mps);
-    Wind { mean_mps, mean_se_mps, air_mps, measured }
 }
 
 /// Least error of the wind that leans show, m/s: the trim of an attitude, some tenths of a degree, on a
@@ -309,32 +336,43 @@ fn smoothed(group: &super::data::Group, values: &[f64]) -> Vec<f64> {
         return values.to_vec();
     }
     let times: Vec<f64> = group.bins.iter().map(super::bins::Bin::middle_s).collect();
-    let rest = DVector::from_iterator(count, values.iter().map(|value| value - mean));
-    let kernel = |tau_s: f64, share: f64| {
-        DMatrix::from_fn(count, count, |a, b| {
-            let near = (-(times[a] - times[b]).abs() / tau_s).exp();
-            variance * ((1.0 - share) * near + if a == b { share } else { 0.0 })
-        })
+    let rest: Vec<f64> = values.iter().map(|value| value - mean).collect();
+    let filter = |time_s: f64, share: f64| {
+        let seen = |time_s: &f64| Observation {
+            time_s: *time_s,
+            looks_at: vec![(0, 1.0)],
+            noise: variance * share,
+        };
+        let gusts = State { variance: variance * (1.0 - share), time_s };
+        Filter::new(vec![gusts], times.iter().map(seen).collect())
     };
-    let mut best: Option<(f64, f64, f64)> = None;
-    for tau_s in GUST_S {
+    let mut best: Option<(f64, State, Filter)> = None;
+    for time_s in GUST_S {
         for share in SCATTER {
-            let Some(factor) = kernel(tau_s, share).cholesky() else { continue };
-            let log_det: f64 = factor.l_dirty().diagonal().iter().map(|v| v.ln()).sum();
-            let likelihood = -0.5 * rest.dot(&factor.solve(&rest)) - log_det;
-            if best.is_none_or(|(most, ..)| likelihood > most) {
-                best = Some((likelihood, tau_s, share));
+            let filter = filter(time_s, share);
+            let chi2: f64 = filter.whiten(&rest).iter().map(|value| value * value).sum();
+            let likelihood = -0.5 * (chi2 + filter.log_det);
+            if best.as_ref().is_none_or(|(most, ..)| likelihood > *most) {
+                best = Some((likelihood, filter.states[0], filter));
             }
         }
     }
-    let Some((_, tau_s, share)) = best else { return values.to_vec() };
-    let whole = kernel(tau_s, share);
-    let Some(factor) = whole.clone().cholesky() else { return values.to_vec() };
-    let mut signal = whole;
-    for index in 0..count {
-        signal[(index, index)] -= variance * share;
+    let Some((_, gusts, filter)) = best else { return values.to_vec() };
+    // What is in a bin itself comes once.
+    let weighed = filter.weigh(&rest);
+    let mut smooth = vec![mean; count];
+    for (forward, has_own) in [(true, true), (false, false)] {
+        let (mut heard, mut before_s) = (0.0, None);
+        for step in 0..count {
+            let bin = if forward { step } else { count - 1 - step };
+            let apart_s = before_s.map_or(0.0, |before_s: f64| (times[bin] - before_s).abs());
+            before_s = Some(times[bin]);
+            heard *= (-apart_s / gusts.time_s).exp();
+            smooth[bin] += gusts.variance * (heard + if has_own { weighed[bin] } else { 0.0 });
+            heard += weighed[bin];
+        }
     }
-    (signal * factor.solve(&rest)).iter().map(|value| value + mean).collect()
+    smooth
 }
 
 /// Fewest bins of horizontal flight that measure a lean law: two numbers from two headings.
@@ -342,8 +380,44 @@ const FEWEST_MOVING: usize = 4;
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::super::trial;
     use super::*;
     use crate::vehicle::library::builtin;
+
+    #[test]
+    fn a_smooth_series_is_its_mean_over_gusts_and_scatter() {
+        let data = trial::data(1, |_, _| 0.0);
+        let group = &data.groups[0];
+        let times: Vec<f64> = group.bins.iter().map(super::super::bins::Bin::middle_s).collect();
+        let count = times.len();
+        let values: Vec<f64> = (0..count)
+            .map(|bin| 3.0 + (0.2 * bin as f64).sin() + 0.3 * (7.7 * bin as f64).sin())
+            .collect();
+        let moments = Moments::of(&values).unwrap();
+        let rest = DVector::from_iterator(count, values.iter().map(|value| value - moments.mean));
+        let variance = moments.population_variance();
+        let mut best = (f64::NEG_INFINITY, DVector::zeros(count));
+        for time_s in GUST_S {
+            for share in SCATTER {
+                let gusts = DMatrix::from_fn(count, count, |a, b| {
+                    (1.0 - share) * variance * (-(times[a] - times[b]).abs() / time_s).exp()
+                });
+                let whole = &gusts + DMatrix::identity(count, count) * share * variance;
+                let factor = whole.cholesky().unwrap();
+                let weighed = factor.solve(&rest);
+                let likelihood = -0.5 * (rest.dot(&weighed) + factor.ln_determinant());
+                if likelihood > best.0 {
+                    best = (likelihood, gusts * weighed);
+                }
+            }
+        }
+        for (value, expected) in smoothed(group, &values).iter().zip(best.1.iter()) {
+            let off = value - moments.mean - expected;
+            assert!(off.abs() < 1e-9, "{value} {expected}");
+        }
+    }
 
     #[test]
     fn the_wind_of_the_firmwares_own_vehicle_is_read_from_its_leans() {

@@ -2,6 +2,7 @@
 //! and mean wind, with gusts that the whole fleet shares.
 
 use nalgebra::SMatrix;
+use rayon::prelude::*;
 
 use super::bins::Bin;
 use super::filter::{Filter, Observation, State};
@@ -88,19 +89,18 @@ pub(super) fn fit(mut points: Vec<Point>, model: LeanLaw) -> Fitted {
     let square = model.square.max(1e-5);
     let objective =
         |at: &[f64; COUNT]| misfit(&points, &Candidate::of(at, model), [linear, square]);
-    let mut best: Option<([f64; COUNT], f64)> = None;
-    for from in [linear, USUAL_LINEAR[0], USUAL_LINEAR[1]] {
-        let [x, y] = hovering_wind(&points, LeanLaw { linear: from, ..model });
-        let natural = [x, y, from, square, GUST_MPS.ln(), SCATTER_RAD.ln()];
+    let search = |from: &f64| {
+        let [x, y] = hovering_wind(&points, LeanLaw { linear: *from, ..model });
+        let natural = [x, y, *from, square, GUST_MPS.ln(), SCATTER_RAD.ln()];
         let mut start = [0.0; COUNT];
         for (place, value) in start.iter_mut().enumerate() {
             *value = natural[place] / UNITS[place];
         }
-        let (at, value) = minimise(start, objective, |at, value| differences(objective, at, value));
-        if best.is_none_or(|(_, least)| value < least) {
-            best = Some((at, value));
-        }
-    }
+        minimise(start, objective, |at, value| differences(objective, at, value))
+    };
+    let ends: Vec<([f64; COUNT], f64)> =
+        [linear, USUAL_LINEAR[0], USUAL_LINEAR[1]].par_iter().map(search).collect();
+    let best = ends.into_iter().reduce(|best, end| if end.1 < best.1 { end } else { best });
     let at = best.map_or([0.0; COUNT], |(at, _)| at);
     let found = Candidate::of(&at, model);
     let errors = standard_errors(&at, objective);

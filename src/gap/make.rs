@@ -122,9 +122,10 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     let (mut found, shrink) = question.answered(&train, &held)?;
     let (plan, updraft_mps) = (input.plan, found.updraft_mps);
-    let whole = Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps)?
-        .feeling(&found.felt)
-        .spread_as(input.vehicle);
+    let whole =
+        Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps, Some(&before))?
+            .feeling(&found.felt)
+            .spread_as(input.vehicle);
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
         // The sizes that go into the model are those of all drones.
         found.refit(&whole)?;
@@ -134,7 +135,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let before = if updraft_mps == 0.0 {
         before
     } else {
-        Comparison::of(&data, input.vehicle, &simulated, plan, updraft_mps)?
+        Comparison::of(&data, input.vehicle, &simulated, plan, updraft_mps, Some(&before))?
     };
     let before = same_bins(&before, &whole);
     let held_slots: Vec<u16> = held.groups.iter().flat_map(|group| group.slots.clone()).collect();

@@ -1,7 +1,5 @@
 //! A quasi-Newton search for smooth functions of a few variables.
 
-use rayon::prelude::*;
-
 /// Step of the difference quotients; variables are logarithms. Numerical.
 const STEP: f64 = 1e-4;
 /// The search ends when a step gains less, nats. Numerical: a four-thousandth of the threshold.
@@ -70,12 +68,12 @@ pub(super) fn minimise<const N: usize>(
 
 /// A gradient by difference quotients, for functions without derivatives at hand; `value` is the function's there.
 pub(super) fn differences<const N: usize>(
-    function: impl Fn(&[f64; N]) -> f64 + Sync,
+    function: impl Fn(&[f64; N]) -> f64,
     at: &[f64; N],
     value: f64,
 ) -> [f64; N] {
     let mut gradient = [0.0; N];
-    gradient.par_iter_mut().enumerate().for_each(|(index, slope)| {
+    gradient.iter_mut().enumerate().for_each(|(index, slope)| {
         let mut moved = *at;
         moved[index] += STEP;
         *slope = (function(&moved) - value) / STEP;
@@ -127,8 +125,7 @@ mod tests {
     #[test]
     fn a_bent_valley_is_followed() {
         let valley = |[x, y]: &[f64; 2]| 20.0 * (y - x * x).powi(2) + (1.0 - x).powi(2);
-        let (at, value) =
-            minimise([-1.2, 1.0], valley, |at, value| differences(valley, at, value));
+        let (at, value) = minimise([-1.2, 1.0], valley, |at, value| differences(valley, at, value));
         assert!(value < 1e-2 && (at[0] - 1.0).abs() < 0.1, "{at:?} {value}");
     }
 }

@@ -212,10 +212,8 @@ impl GroupPattern {
 
 /// States of a drone, or with a share of their variance those of a mean of drones.
 fn own_states(hyper: &Hyper, share: f64) -> [State; OWN_STATES] {
-    let state = |place: usize, time_s: f64| State {
-        variance: hyper.get(place).powi(2) * share,
-        time_s,
-    };
+    let state =
+        |place: usize, time_s: f64| State { variance: hyper.get(place).powi(2) * share, time_s };
     [
         state(OWN, hyper.get(SHARED_TIME)),
         state(GUSTS, hyper.get(GUST_TIME)),
@@ -399,7 +397,8 @@ impl Whitener {
         let mut by = [0.0; COUNT];
         for (place, by) in by.iter_mut().enumerate() {
             let (ahead, behind) = (moved(place, STEP), moved(place, -STEP));
-            *by += of_states(means, &shared_states(groups, &ahead), &shared_states(groups, &behind));
+            *by +=
+                of_states(means, &shared_states(groups, &ahead), &shared_states(groups, &behind));
             for slopes in deviations {
                 *by += of_states(slopes, &own_states(&ahead, 1.0), &own_states(&behind, 1.0));
             }

@@ -1,6 +1,7 @@
 //! Signals that closed forms take in each bin, and the pulses of a model for them.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::as_flown::AsFlown;
 use super::bins::{Bin, BinValues};
@@ -16,6 +17,8 @@ use crate::effects::{Definition, EffectError, Reference, Role, Signal, Signals, 
 use crate::numeric::{extent, mean};
 use crate::vehicle::Vehicle;
 
+/// Moments that one thread takes at a time. Numerical: some milliseconds.
+const CHUNK: usize = 64;
 /// Open-circuit voltage above which there must be another cell, V: a full lithium polymer cell has 4.20 V.
 const FULL_CELL_V: f64 = 4.25;
 
@@ -206,7 +209,7 @@ impl Scene {
     /// # Errors
     /// Effects of the vehicle that are not valid, or with which it cannot fly so.
     pub fn pulses(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
-        let mut steady = self.steady(vehicle)?;
+        let steady = self.steady(vehicle)?;
         let battery = hover_ah_per_s(vehicle);
         let hover_ah_per_s = battery.unwrap_or_default();
         let supply = |signals: &Signals, volts: Option<f64>| match volts {
@@ -215,37 +218,33 @@ impl Scene {
         };
         let near = looks_at(vehicle, Signal::Neighbours);
         let volts = self.volts.as_ref().filter(|_| battery.is_some());
-        let groups = 0..self.signals.len();
         if volts.is_none() && !near {
-            let mut shared = Vec::new();
-            for group in groups {
-                let pulse = |at: Moment| steady.pulse_us(&at, supply(&at.signals, None), 0.0);
-                shared.push(self.moments(group).map(pulse).collect::<Result<_, _>>()?);
-            }
+            let shared = self.each(&steady, |steady, _, at| {
+                steady.pulse_us(at, supply(&at.signals, None), 0.0)
+            })?;
             return Ok(Column::Shared(shared));
         }
-        let mut of_drones = Vec::new();
-        for group in groups {
-            let mut drones = vec![Vec::new(); self.neighbours[group].len()];
-            for (bin, at) in self.moments(group).enumerate() {
-                // Batteries differ, and the balance of forces does not know them.
-                let mut balance = None;
-                for (drone, pulses) in drones.iter_mut().enumerate() {
-                    let neighbours = self.neighbours[group][drone];
-                    let balance = match balance {
-                        Some(balance) if !near => balance,
-                        _ => *balance.insert(steady.balance(&at, neighbours)?),
-                    };
-                    let volts = volts.map(|volts| {
-                        let drones = &volts[group];
-                        drones[drone.min(drones.len().saturating_sub(1))][bin]
-                    });
-                    let supply = supply(&at.signals, volts);
-                    pulses.push(steady.of_balance(&balance, &at, supply, neighbours)?);
-                }
-            }
-            of_drones.push(drones);
-        }
+        let by_bin = self.each(&steady, |steady, (group, bin), at| {
+            // Batteries differ, and the balance of forces does not know them.
+            let mut balance = None;
+            let pulse = |(drone, neighbours): (usize, &f64)| {
+                let balance = match balance {
+                    Some(balance) if !near => balance,
+                    _ => *balance.insert(steady.balance(at, *neighbours)?),
+                };
+                let volts = volts.map(|volts| {
+                    let drones = &volts[group];
+                    drones[drone.min(drones.len().saturating_sub(1))][bin]
+                });
+                steady.of_balance(&balance, at, supply(&at.signals, volts), *neighbours)
+            };
+            self.neighbours[group].iter().enumerate().map(pulse).collect::<Result<Vec<f64>, _>>()
+        })?;
+        let by_drone = |(bins, neighbours): (Vec<Vec<f64>>, &Vec<f64>)| -> Vec<Vec<f64>> {
+            let drones = 0..neighbours.len();
+            drones.map(|drone| bins.iter().map(|pulses| pulses[drone]).collect()).collect()
+        };
+        let of_drones = by_bin.into_iter().zip(&self.neighbours).map(by_drone).collect();
         Ok(Column::Own(of_drones))
     }
 
@@ -281,9 +280,30 @@ impl Scene {
         let mut calm = vehicle.clone();
         // What shakes has a scatter of its own, which hides how it answers gusts.
         calm.effects.retain(|name, _| !shakes(name));
-        let mut steady = self.steady(&calm)?;
-        let groups = 0..self.signals.len();
-        groups.map(|group| self.moments(group).map(|at| steady.response(&at)).collect()).collect()
+        let steady = self.steady(&calm)?;
+        self.each(&steady, |steady, _, at| steady.response(at))
+    }
+
+    /// Something of each moment, by group and bin.
+    fn each<T: Send>(
+        &self,
+        steady: &Steady,
+        of: impl Fn(&mut Steady, (usize, usize), &Moment) -> Result<T, EffectError> + Sync,
+    ) -> Result<Vec<Vec<T>>, EffectError> {
+        let of_group = |group: usize| {
+            let moments: Vec<Moment> = self.moments(group).collect();
+            let some = |(chunk, moments): (usize, &[Moment])| -> Result<Vec<T>, EffectError> {
+                let mut steady = steady.clone();
+                let bins = (chunk * CHUNK..).zip(moments);
+                bins.map(|(bin, at)| of(&mut steady, (group, bin), at)).collect()
+            };
+            // The first error, whichever thread is the first.
+            let parts: Vec<Result<Vec<T>, EffectError>> =
+                moments.par_chunks(CHUNK).enumerate().map(some).collect();
+            let parts: Vec<Vec<T>> = parts.into_iter().collect::<Result<_, _>>()?;
+            Ok(parts.into_iter().flatten().collect())
+        };
+        (0..self.signals.len()).map(of_group).collect()
     }
 
     /// Pulses by group and bin at vertical speeds that differ from the flown one by so much, of the mean drone, us.
@@ -295,8 +315,8 @@ impl Scene {
         vehicle: &Vehicle,
         shifts_mps: [f64; COUNT],
     ) -> Result<Vec<Vec<[f64; COUNT]>>, EffectError> {
-        let mut steady = self.steady(vehicle)?;
-        let mut of = |at: Moment| -> Result<[f64; COUNT], EffectError> {
+        let steady = self.steady(vehicle)?;
+        self.each(&steady, |steady, _, at| {
             let mut pulses_us = [0.0; COUNT];
             for (pulse_us, shift_mps) in pulses_us.iter_mut().zip(shifts_mps) {
                 let shifted = at.climbing(at.signals.climb_mps + shift_mps);
@@ -304,9 +324,7 @@ impl Scene {
                     steady.pulse_us(&shifted, Supply::Used(at.signals.charge_used_ah), 0.0)?;
             }
             Ok(pulses_us)
-        };
-        let groups = 0..self.signals.len();
-        groups.map(|group| self.moments(group).map(&mut of).collect()).collect()
+        })
     }
 }
 

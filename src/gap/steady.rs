@@ -54,6 +54,7 @@ impl Moment {
 }
 
 /// Steady pulses of a vehicle's mean drone.
+#[derive(Clone)]
 pub(super) struct Steady {
     trim: Trim,
     /// Power of thrust that `u - 1000` goes with at hover.

@@ -17,8 +17,10 @@ use crate::vehicle::Vehicle;
 const BALANCED_MPS2: f64 = 1e-9;
 /// AirSim's drag jumps at the end of its dead band: beside a jump this much may be left, m/s².
 const BESIDE_A_JUMP_MPS2: f64 = 5e-3;
-/// Newton's method takes four steps from a hover; beside a jump it takes more.
-const STEPS: usize = 24;
+/// Broyden's method takes five to eight steps from a hover; beside a jump it takes more.
+const STEPS: usize = 40;
+/// A step that leaves more than this share is none, and derivatives are taken anew.
+const NEARER: f64 = 0.5;
 /// Step of the numerical derivatives, share of full thrust and of one.
 const STEP: f64 = 1e-6;
 /// The lean's horizontal part is kept below this: beyond 64 degrees no autopilot flies.
@@ -130,6 +132,8 @@ pub struct Trimmed {
 pub struct Trim {
     plant: Plant,
     hover_output: f64,
+    /// Inverse of the derivatives at a hover, from which every search begins.
+    inverse_at_hover: Option<Matrix3<f64>>,
     gust_sd_mps: f64,
 }
 
@@ -160,10 +164,13 @@ impl Trim {
         let plant = Plant::with_effects(&airframe, effects, home_m, STEP_S);
         let gust_sd_mps = plant.effects.gust_sd_mps();
         // From a third of full thrust, as most multirotors hover, to where this one does.
-        let mut trim = Self { plant, hover_output: 0.35, gust_sd_mps };
+        let mut trim = Self { plant, hover_output: 0.35, inverse_at_hover: None, gust_sd_mps };
         let hover = Condition::default();
         trim.settle(&hover);
-        trim.hover_output = trim.balanced(&hover).x;
+        let at = trim.balanced(&hover);
+        trim.hover_output = at.x;
+        let left = trim.left_over(&hover, &at);
+        trim.inverse_at_hover = trim.inverse_at(&hover, &at, &left);
         Ok(trim)
     }
 
@@ -217,25 +224,25 @@ impl Trim {
         self.plant.effects.settle(&Settled { time_s, supply, neighbours });
     }
 
-    /// Newton's method from a hover; the best that it saw.
+    /// Broyden's method from a hover; the best that it saw. Where it gets no nearer, derivatives are taken there.
     fn balanced(&mut self, condition: &Condition) -> Unknown {
         let mut at = Vector3::new(self.hover_output, 0.0, 0.0);
         let mut left = self.left_over(condition, &at);
         let (mut best, mut least) = (at, left.norm());
+        let mut inverse = self.inverse_at_hover;
         for _ in 0..STEPS {
-            let columns = [0, 1, 2].map(|index| {
-                let mut beside = at;
-                beside[index] += STEP;
-                (self.left_over(condition, &beside) - left) / STEP
-            });
-            let Some(step) = Matrix3::from_columns(&columns).lu().solve(&left) else { break };
-            at -= step;
+            let Some(known) = inverse.or_else(|| self.inverse_at(condition, &at, &left)) else {
+                break;
+            };
+            let was = at;
+            at -= known * left;
             at.x = at.x.clamp(0.0, MOST_OUTPUT);
             let lean = at.yz().norm();
             if lean > MOST_LEAN {
                 at.y *= MOST_LEAN / lean;
                 at.z *= MOST_LEAN / lean;
             }
+            let before = left;
             left = self.left_over(condition, &at);
             let norm = left.norm();
             if norm < least {
@@ -244,8 +251,26 @@ impl Trim {
             if norm.is_nan() || norm < BALANCED_MPS2 {
                 break;
             }
+            inverse = (norm < NEARER * before.norm())
+                .then(|| updated(&known, &(at - was), &(left - before)))
+                .flatten();
         }
         best
+    }
+
+    /// Inverse of the derivatives of what is left by the unknowns.
+    fn inverse_at(
+        &mut self,
+        condition: &Condition,
+        at: &Unknown,
+        left: &Vector3<f64>,
+    ) -> Option<Matrix3<f64>> {
+        let columns = [0, 1, 2].map(|index| {
+            let mut beside = *at;
+            beside[index] += STEP;
+            (self.left_over(condition, &beside) - left) / STEP
+        });
+        Matrix3::from_columns(&columns).try_inverse()
     }
 
     /// Acceleration beyond the condition's, m/s²: its mean over the gusts that effects bring.
@@ -315,6 +340,19 @@ impl Trim {
         }
         given.is_finite().then_some(given)
     }
+}
+
+/// Inverse of derivatives with what a step showed of them: Broyden's update by the formula of Sherman and Morrison.
+/// `None`: it has no inverse.
+fn updated(
+    inverse: &Matrix3<f64>,
+    step: &Vector3<f64>,
+    change: &Vector3<f64>,
+) -> Option<Matrix3<f64>> {
+    let reached = inverse * change;
+    let along = step.dot(&reached);
+    (along.abs() > f64::MIN_POSITIVE)
+        .then(|| inverse + (step - reached) * (step.transpose() * inverse) / along)
 }
 
 /// Rotation from body to show frame of a vehicle whose thrust points along `lean` horizontally, with its nose
