@@ -217,7 +217,7 @@ pub const FOREIGN_KINDS: &[ForeignKind] = &[
     like("log-bias", "velocity-error", Some("bias_mps"), BOTH),
     like("loop-lag", "velocity-error", Some("lag_s"), BOTH),
     like("momentum-drag", "momentum-drag", Some("per_s"), BOTH),
-    unlike("drift"),
+    like("drift", "response-drift", None, BOTH),
     unlike("icing"),
     unlike("hysteresis"),
     unlike("ceiling"),

@@ -1,6 +1,8 @@
 //! Candidates for what the model lacks: effects of the library in their closed forms, and motions
 //! of the air that look like them.
 
+use std::borrow::Cow;
+
 use super::compare::Comparison;
 use super::gls::{Column, Solution};
 use super::noise::{GroupPattern, Hyper};
@@ -56,18 +58,85 @@ pub(super) struct Variant {
     pub size: f64,
     /// Contribution to the pulse, us.
     pub column: Column,
+    /// Updraft of the whole flight that goes with it, m/s; `None`: the one that the flight is taken in.
+    pub updraft_mps: Option<f64>,
     /// Contribution to the response to vertical air speed, by group and bin; empty if there is
     /// none, or scatter does not show it.
     pub felt: Vec<Vec<Response>>,
+}
+
+/// Whether the whole flight may be in another updraft with an effect than without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Updraft {
+    /// It is the same.
+    Same,
+    /// Where the effect says of the wind is another: a drone that leans in less wind meets less of it from below.
+    MayDiffer,
+}
+
+/// Differences of the updraft that are tried where the wind is another, m/s: what a wind that is 10 m/s off does to a
+/// drone that leans by 12 degrees.
+const SHIFTS_MPS: [f64; 5] = [0.0, -1.0, 1.0, -2.0, 2.0];
+
+/// Sizes of a drag that the model has already, as multiples, where the wind is read by it: far from a line.
+const MULTIPLES: [f64; 2] = [2.0, 4.0];
+
+/// A model that candidates are held against.
+struct Base<'a> {
+    comparison: &'a Comparison,
+    updraft: Updraft,
+    pulses: Column,
+    response: Vec<Vec<Response>>,
+}
+
+impl<'a> Base<'a> {
+    fn of(
+        vehicle: &Vehicle,
+        comparison: &'a Comparison,
+        updraft: Updraft,
+    ) -> Result<Self, EffectError> {
+        let scene = comparison.scene_of(vehicle);
+        let (pulses, response) = (scene.pulses(vehicle)?, scene.response(vehicle)?);
+        Ok(Self { comparison, updraft, pulses, response })
+    }
+
+    /// A candidate of a size in a vehicle, in the wind that the vehicle's own law reads from the leans and each updraft
+    /// that may go with it. A form that the vehicle cannot have, or fly with, is none.
+    fn forms(&self, vehicle: &Vehicle, size: f64) -> Vec<Variant> {
+        let scene = self.comparison.scene_of(vehicle);
+        let shifts_mps = match (self.updraft, &scene) {
+            (Updraft::MayDiffer, Cow::Owned(_)) => &SHIFTS_MPS[..],
+            _ => &SHIFTS_MPS[..1],
+        };
+        let form = |shift_mps: &f64| {
+            let updraft_mps = scene.updraft_mps + shift_mps;
+            let there = match *shift_mps {
+                0.0 => Cow::Borrowed(&*scene),
+                _ => Cow::Owned(scene.in_updraft(updraft_mps)),
+            };
+            let column = there.pulses(vehicle).ok()?.less(&self.pulses);
+            let mut felt = there.response(vehicle).ok()?;
+            response::add(&mut felt, -1.0, &self.response);
+            if is_hardly_felt(&felt, &self.response) {
+                felt.clear();
+            }
+            let updraft_mps = (*shift_mps != 0.0).then_some(updraft_mps);
+            Some(Variant { vehicle: Some(vehicle.clone()), size, column, updraft_mps, felt })
+        };
+        shifts_mps.iter().filter_map(form).collect()
+    }
 }
 
 /// All effects of the library that steady flight can show, held against a vehicle.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
-pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>, EffectError> {
-    let base = scene.pulses(vehicle)?;
-    let response = scene.response(vehicle)?;
+pub(super) fn library(
+    vehicle: &Vehicle,
+    comparison: &Comparison,
+    updraft: Updraft,
+) -> Result<Vec<Candidate>, EffectError> {
+    let base = Base::of(vehicle, comparison, updraft)?;
     let mut found = Vec::new();
     for effect in LIBRARY {
         let definition = effect.definition();
@@ -84,7 +153,15 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
             sizes(vehicle).to_vec()
         } else {
             let step = now * CHANGE;
-            vec![if now + step <= parameter.high { now + step } else { now - step }]
+            let mut sizes =
+                vec![if now + step <= parameter.high { now + step } else { now - step }];
+            let multiples = MULTIPLES.map(|times| times * now);
+            sizes.extend(multiples.into_iter().filter(|size| {
+                let mut other = vehicle.clone();
+                set(&mut other, definition.name, parameter.name, *size);
+                *size <= parameter.high && comparison.leans_otherwise(&other)
+            }));
+            sizes
         };
         // A size that is in the model keeps its shape.
         let shapes: Vec<Option<(&str, f64)>> = match shape {
@@ -97,20 +174,12 @@ pub(super) fn library(vehicle: &Vehicle, scene: &Scene) -> Result<Vec<Candidate>
         for value in sizes {
             for shape in &shapes {
                 let mut other = vehicle.clone();
-                prepare(&mut other, definition, scene);
+                prepare(&mut other, definition, &comparison.scene);
                 set(&mut other, definition.name, size, value);
                 if let Some((name, value)) = shape {
                     set(&mut other, definition.name, name, *value);
                 }
-                // A form that the vehicle cannot have is no candidate.
-                let Ok(pulses) = scene.pulses(&other) else { continue };
-                let column = pulses.less(&base);
-                let mut felt = scene.response(&other)?;
-                response::add(&mut felt, -1.0, &response);
-                if is_hardly_felt(&felt, &response) {
-                    felt.clear();
-                }
-                variants.push(Variant { vehicle: Some(other), size: value, column, felt });
+                variants.extend(base.forms(&other, value));
             }
         }
         let usual = usual.unwrap_or_else(|| (parameter.default)(vehicle));
@@ -145,7 +214,7 @@ const AXIAL_SIZES: [f64; 2] = [0.5, 1.0];
 /// Effects of the vehicle that are not valid.
 pub(super) fn axial_drag(
     vehicle: &Vehicle,
-    scene: &Scene,
+    comparison: &Comparison,
 ) -> Result<Option<Candidate>, EffectError> {
     let place = Role::MomentumDrag.place().filter(|_| vehicle.airframe.sitl.is_some());
     let Some(place) = place else { return Ok(None) };
@@ -154,21 +223,14 @@ pub(super) fn axial_drag(
     if vehicle.effects.get(name).is_some_and(|table| table.on) {
         return Ok(None);
     }
-    let (base, response) = (scene.pulses(vehicle)?, scene.response(vehicle)?);
+    let base = Base::of(vehicle, comparison, Updraft::Same)?;
     let usual = (parameter.default)(vehicle);
     let mut variants = Vec::new();
     for share in AXIAL_SIZES {
         let mut other = vehicle.clone();
         select::set(&mut other, name, size, share * usual);
         select::set(&mut other, name, AXIAL, 1.0);
-        let Ok(pulses) = scene.pulses(&other) else { continue };
-        let mut felt = scene.response(&other)?;
-        response::add(&mut felt, -1.0, &response);
-        if is_hardly_felt(&felt, &response) {
-            felt.clear();
-        }
-        let column = pulses.less(&base);
-        variants.push(Variant { vehicle: Some(other), size: share * usual, column, felt });
+        variants.extend(base.forms(&other, share * usual));
     }
     let size = Size {
         name: parameter.name,
@@ -263,19 +325,24 @@ const DRAGS: [f64; 3] = [0.01, 0.02, 0.035];
 pub(super) fn read_otherwise(
     comparison: &Comparison,
     vehicle: &Vehicle,
+    updraft: Updraft,
 ) -> Result<Option<Candidate>, EffectError> {
     let drag = Role::RotorDrag;
     let Some(place) = drag.place() else { return Ok(None) };
     if drag.is_on(vehicle) || comparison.wind.measured.is_some() {
         return Ok(None);
     }
-    let base = comparison.pulses_by_lean(vehicle)?;
+    let base = Base::of(vehicle, comparison, updraft)?;
     let mut variants = Vec::new();
     for size in DRAGS {
         let mut other = vehicle.clone();
         drag.set(&mut other, size);
-        let column = comparison.pulses_by_lean(&other)?.less(&base);
-        variants.push(Variant { vehicle: Some(other), size, column, felt: Vec::new() });
+        let forms = base.forms(&other, size).into_iter();
+        // In the same updraft the response is the same, but for what closed forms leave out.
+        variants.extend(forms.map(|form| match form.updraft_mps {
+            Some(_) => form,
+            None => Variant { felt: Vec::new(), ..form },
+        }));
     }
     let parameter = place.parameter;
     let size = Size {
@@ -302,12 +369,13 @@ const DRAG_STEP: f64 = 0.0025;
 const MOST_DRAG_STEPS: u32 = 24;
 
 /// The drag of the rotors that fits best by the wind that it lets the lean say, with its standard
-/// error, s/m.
+/// error, s/m. `there` is the comparison in the updraft that goes with it.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
 pub(super) fn drag_by_lean(
     comparison: &Comparison,
+    there: &Comparison,
     vehicle: &Vehicle,
     base: &Solution,
 ) -> Result<Option<(f64, f64)>, EffectError> {
@@ -317,7 +385,8 @@ pub(super) fn drag_by_lean(
         let size = DRAG_STEP * f64::from(step);
         let mut other = vehicle.clone();
         Role::RotorDrag.set(&mut other, size);
-        let gain = base.gain(&comparison.pulses_by_lean(&other)?.less(&without));
+        let Ok(pulses) = there.pulses_by_lean(&other) else { continue };
+        let gain = base.gain(&pulses.less(&without));
         // Gain of the form as it is, where `gain` has that of its best multiple.
         let information = 2.0 * gain.nats / gain.beta.powi(2);
         let as_it_is = (gain.beta - 0.5) * information;
@@ -360,7 +429,13 @@ pub(super) fn of_the_air(
         was_there: false,
         by_lean: false,
         size: None,
-        variants: vec![Variant { vehicle: None, size: 1.0, column, felt: Vec::new() }],
+        variants: vec![Variant {
+            vehicle: None,
+            size: 1.0,
+            column,
+            updraft_mps: None,
+            felt: Vec::new(),
+        }],
     };
     vec![
         air("updraft-drift", column(&|signals| signals.time_s / last_s)),

@@ -1,5 +1,6 @@
 //! One comparison: the measured side, the simulated side, and the residual for any vehicle.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use super::as_flown::AsFlown;
@@ -7,7 +8,7 @@ use super::bins::{Bin, BinValues};
 use super::data::{Data, Group};
 use super::error::GapError;
 use super::gls::{Column, Pulses};
-use super::lean::{LeanLaw, Wind, mean_wind, wind};
+use super::lean::{LeanLaw, Wind, mean_wind, wind, wind_by};
 use super::noise::GroupPattern;
 use super::refly::{mean_drone, refly};
 use super::response::{self, Response};
@@ -240,8 +241,9 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub fn residual(&self, vehicle: &Vehicle, gusts_mps: f64) -> Result<Pulses, EffectError> {
-        let closed = self.scene.pulses(vehicle)?;
-        let bent = rectified(&self.scene, vehicle, gusts_mps)?;
+        let scene = self.scene_of(vehicle);
+        let closed = scene.pulses(vehicle)?;
+        let bent = rectified(&scene, vehicle, gusts_mps)?;
         Ok(self
             .data
             .groups
@@ -284,10 +286,11 @@ impl Comparison {
         vehicle: &Vehicle,
         gusts_mps: f64,
     ) -> Result<Vec<GroupPattern>, EffectError> {
-        let bent = rectified(&self.scene, vehicle, gusts_mps)?;
-        let mut response = self.scene.response(vehicle)?;
+        let scene = self.scene_of(vehicle);
+        let bent = rectified(&scene, vehicle, gusts_mps)?;
+        let mut response = scene.response(vehicle)?;
         response::add(&mut response, 1.0, &self.felt);
-        let closed = self.scene.pulses(vehicle)?;
+        let closed = scene.pulses(vehicle)?;
         let side = |axis| Ok(self.by_wind(vehicle, &closed, axis, SIDE_STEP_MPS)?.means());
         let sides: [Vec<Vec<f64>>; 2] = [side(0)?, side(1)?];
         Ok(self
@@ -361,9 +364,26 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub fn pulses_by_lean(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
-        let wind = wind(&self.data, lean_law(vehicle, self.amsl_m, self.scene.updraft_mps), None);
-        let scene = Scene::measured(&self.data, &self.side, &wind, self.amsl_m);
-        scene.in_updraft(self.scene.updraft_mps).pulses(vehicle)
+        self.scene_of(vehicle).pulses(vehicle)
+    }
+
+    /// Whether the leans tell another wind if it was this vehicle that flew.
+    pub(super) fn leans_otherwise(&self, vehicle: &Vehicle) -> bool {
+        let law_of = |vehicle| lean_law(vehicle, self.amsl_m, self.scene.updraft_mps);
+        let is_read = self.wind.measured.is_none() && !self.is_in_other_wind();
+        is_read && law_of(&self.vehicle) != law_of(vehicle)
+    }
+
+    /// The flight as a vehicle saw it: where no leg told how drones lean, who leans otherwise in the wind leant as the
+    /// logs say in another wind.
+    pub(super) fn scene_of(&self, vehicle: &Vehicle) -> Cow<'_, Scene> {
+        if !self.leans_otherwise(vehicle) {
+            return Cow::Borrowed(&self.scene);
+        }
+        let law = lean_law(vehicle, self.amsl_m, self.scene.updraft_mps);
+        let flown_law = lean_law(&self.vehicle, self.amsl_m, self.flown_mps[2]);
+        let wind = wind_by(&self.data, law, flown_law, Some((&self.side, self.flown_mps)));
+        Cow::Owned(self.scene.clone().blown(&wind))
     }
 
     /// Change of the pulse by one standard error of the wind, along either axis of the show.
@@ -371,7 +391,7 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub fn wind_doubts(&self, vehicle: &Vehicle) -> Result<Vec<Column>, EffectError> {
-        let closed = self.scene.pulses(vehicle)?;
+        let closed = self.scene_of(vehicle).pulses(vehicle)?;
         let mut doubts = Vec::new();
         for axis in 0..2 {
             let doubt = self.by_wind(vehicle, &closed, axis, self.wind.mean_se_mps)?;
@@ -456,8 +476,8 @@ impl Comparison {
     /// # Errors
     /// Effects of the vehicle that are not valid.
     pub(super) fn updraft_doubt(&self, vehicle: &Vehicle) -> Result<Column, EffectError> {
-        let at =
-            |by_mps: f64| self.scene.in_updraft(self.scene.updraft_mps + by_mps).pulses(vehicle);
+        let scene = self.scene_of(vehicle);
+        let at = |by_mps: f64| scene.in_updraft(self.scene.updraft_mps + by_mps).pulses(vehicle);
         let (more, less) = (at(UPDRAFT_STEP_MPS)?, at(-UPDRAFT_STEP_MPS)?);
         let per_doubt = UPDRAFT_DOUBT_MPS / (2.0 * UPDRAFT_STEP_MPS);
         let change = more.less(&less);
@@ -472,11 +492,9 @@ impl Comparison {
         axis: usize,
         by_mps: f64,
     ) -> Result<Column, EffectError> {
-        let mut wind = self.wind.clone();
-        for air in wind.air_mps.iter_mut().flatten() {
-            air[axis] -= by_mps;
-        }
-        Ok(self.scene.clone().blown(&wind).pulses(vehicle)?.less(closed))
+        let mut scene = self.scene_of(vehicle).into_owned();
+        scene.blow(axis, by_mps);
+        Ok(scene.pulses(vehicle)?.less(closed))
     }
 
     /// Distance of the mean leans of both sides in hover and in vertical flight, rad.
@@ -501,7 +519,7 @@ impl Comparison {
     /// # Errors
     /// Effects of a vehicle that are not valid.
     pub fn change(&self, from: &Vehicle, to: &Vehicle) -> Result<Column, EffectError> {
-        Ok(self.scene.pulses(to)?.less(&self.scene.pulses(from)?))
+        Ok(self.scene_of(to).pulses(to)?.less(&self.scene_of(from).pulses(from)?))
     }
 }
 

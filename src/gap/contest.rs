@@ -13,7 +13,7 @@ use super::gls::{Column, Problem, Split};
 use super::noise::Hyper;
 use super::refine::{Parameter, doubts, parameters_of, refine, slopes};
 use super::response::{Response, gusts_mps, settled};
-use super::search::{FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought};
+use super::search::{FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought};
 use crate::vehicle::Vehicle;
 
 /// A product of climb and time is compared with at most this many effects. Chosen to bound the time.
@@ -100,7 +100,9 @@ impl Contest<'_> {
         effects
             .filter(|rival| {
                 let candidate = &self.sought.library[rival.candidate];
-                rival.fitted && rival.gain > LEAST_NATS && is_felt(candidate)
+                // Scatter may support a name, never make one.
+                let in_means = rival.plain > FLOOR_NATS;
+                rival.fitted && rival.gain > LEAST_NATS && in_means && is_felt(candidate)
             })
             .cloned()
             .collect()
@@ -155,7 +157,8 @@ impl Contest<'_> {
         let found = self.found;
         let of = |felt: &[Vec<Vec<Response>>]| {
             let free = Free { columns, felt, beta: &product.beta };
-            self.in_full(found.vehicle.clone(), &found.parameters, free, product.hyper)
+            let vehicle = found.vehicle.clone();
+            self.in_full(self.comparison, vehicle, &found.parameters, free, product.hyper)
         };
         // What it does to the scatter is known by its size, which means alone may hardly tell.
         let (felt, numb) = rayon::join(|| of(&generic.felt), || of(&[]));
@@ -170,24 +173,28 @@ impl Contest<'_> {
         let Some(vehicle) = entered(candidate, ranked).filter(|_| is_felt(candidate)) else {
             return Ok(None);
         };
+        let there = candidate.variants.get(ranked.variant).and_then(|form| form.updraft_mps);
+        let there = there.map(|updraft_mps| Comparison::clone(comparison).in_updraft(updraft_mps));
+        let comparison = there.as_ref().unwrap_or(comparison);
         let mut parameters: Vec<Parameter> = found.parameters.clone();
         if !parameters.iter().any(|known| known.effect == candidate.name) {
             let (before, base) = (before(candidate), &self.round.base);
             parameters.extend(parameters_of(comparison, &vehicle, candidate.name, before, base)?);
         }
-        self.in_full(vehicle, &parameters, Free::default(), ranked.hyper).map(Some)
+        self.in_full(comparison, vehicle, &parameters, Free::default(), ranked.hyper).map(Some)
     }
 
     /// Log-posterior of the flight with a model whose sizes and gusts settle first, at the speed relative to
     /// the air that all share.
     fn in_full(
         &self,
+        comparison: &Comparison,
         mut vehicle: Vehicle,
         parameters: &[Parameter],
         free: Free<'_>,
         mut hyper: Hyper,
     ) -> Result<f64, GapError> {
-        let Self { found, comparison, .. } = self;
+        let found = self.found;
         let comparison =
             &Comparison::clone(comparison).feeling(&with_felt(&found.felt, free.felt, free.beta));
         let extras = [&found.extras[..], free.columns].concat();
@@ -251,7 +258,13 @@ mod tests {
             was_there: false,
             by_lean: false,
             size: None,
-            variants: vec![Variant { vehicle: None, size: 0.0, column, felt: Vec::new() }],
+            variants: vec![Variant {
+                vehicle: None,
+                size: 0.0,
+                column,
+                updraft_mps: None,
+                felt: Vec::new(),
+            }],
         };
         let library = [air("one", line(1.0)), air("its like", line(2.0)), air("another", wave)];
         let sought = Sought { library: &library, generics: &[], drones: &[3] };

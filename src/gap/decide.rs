@@ -218,7 +218,8 @@ mod tests {
 
     fn effect(name: &'static str, column: Column, is_of_the_vehicle: bool) -> Candidate {
         let size = Size { name: "size", unit: "", low: 0.0, high: 1.0, now: 0.0, usual: 0.1 };
-        let variant = Variant { vehicle: None, size: 0.1, column, felt: Vec::new() };
+        let variant =
+            Variant { vehicle: None, size: 0.1, column, updraft_mps: None, felt: Vec::new() };
         Candidate {
             name,
             was_there: false,

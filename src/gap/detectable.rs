@@ -1,6 +1,6 @@
 //! Power of a flight: the smallest size of each effect that it would have named.
 
-use super::candidates::{Candidate, library};
+use super::candidates::{Candidate, Updraft, library};
 use super::error::GapError;
 use super::explain::Found;
 use super::gls::{Problem, Solution, Split, White};
@@ -30,7 +30,7 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&found.extras);
     let groups = shifted(&patterns, &problem, &problem.at(&found.hyper));
     let solution = problem.among(&groups).at(&found.hyper);
-    let candidates = library(&found.vehicle, &comparison.scene)?;
+    let candidates = library(&found.vehicle, comparison, Updraft::Same)?;
     let drones = comparison.data.counts();
     let best: Vec<(&Candidate, Option<Trace>)> = candidates
         .iter()

@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::candidates::{
-    Candidate, Size, Variant, axial_drag, drag_by_lean, library, of_the_air, read_otherwise,
+    Candidate, Size, Updraft, Variant, axial_drag, drag_by_lean, library, of_the_air,
+    read_otherwise,
 };
 use super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
 use super::contest::{Contest, before, entered};
@@ -319,10 +320,12 @@ impl Search<'_> {
             _ => comparison.patterns(&found.vehicle, found.gusts_mps)?,
         };
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
-        let mut candidates = library(&found.vehicle, &comparison.scene)?;
-        candidates.extend(axial_drag(&found.vehicle, &comparison.scene)?);
+        let updraft =
+            if self.options.updraft && is_flown { Updraft::MayDiffer } else { Updraft::Same };
+        let mut candidates = library(&found.vehicle, comparison, updraft)?;
+        candidates.extend(axial_drag(&found.vehicle, comparison)?);
         if !comparison.is_in_other_wind() {
-            candidates.extend(read_otherwise(comparison, &found.vehicle)?);
+            candidates.extend(read_otherwise(comparison, &found.vehicle, updraft)?);
         }
         candidates.retain(|candidate| !refused.contains(&candidate.name));
         candidates.extend(of_the_air(&comparison.scene, &patterns, &quick.hyper));
@@ -391,12 +394,19 @@ impl Search<'_> {
         names: Vec<String>,
         (threshold_nats, rivals): (f64, Vec<Rival>),
     ) -> Result<(), GapError> {
-        let Self { comparison, found, .. } = self;
         let variant = &candidate.variants[best.variant];
+        let before_it = self.comparison.clone();
+        if let Some(updraft_mps) = variant.updraft_mps {
+            self.found.updraft_mps = updraft_mps;
+            self.found.was_in_updraft = true;
+            self.comparison = before_it.clone().in_updraft(updraft_mps);
+        }
+        let Self { comparison, found, .. } = self;
         let mut by_lean = None;
         if let Some(mut next) = entered(candidate, best) {
             if let Some(size) = candidate.size.filter(|_| candidate.by_lean)
-                && let Some((drag, se)) = drag_by_lean(comparison, &found.vehicle, &round.base)?
+                && let Some((drag, se)) =
+                    drag_by_lean(&before_it, comparison, &found.vehicle, &round.base)?
             {
                 Role::RotorDrag.set(&mut next, drag);
                 by_lean = Some(lean_parameter(size, drag, se));

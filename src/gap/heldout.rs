@@ -85,7 +85,7 @@ impl Case<'_> {
             before: before.residual(&before.vehicle, gusts_mps)?,
             after: end,
             air: &fitted.air(&own, self.found),
-            response: &after.scene.response(vehicle)?,
+            response: &after.scene_of(vehicle).response(vehicle)?,
             gusts_mps,
             segments: &fitted.segments,
         };
@@ -131,7 +131,7 @@ impl Case<'_> {
             before: before.residual(&before.vehicle, *gusts_mps)?,
             after: end,
             air: &air,
-            response: &comparison.scene.response(vehicle)?,
+            response: &comparison.scene_of(vehicle).response(vehicle)?,
             gusts_mps: *gusts_mps,
             segments: &fitted.segments,
         };

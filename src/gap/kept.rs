@@ -55,12 +55,14 @@ impl Question<'_> {
         Ok((found, gap))
     }
 
-    /// Whether the model as it was is nearer to the logs in still air than in the updraft of a search.
+    /// Whether the model as it was is nearer to the logs in still air than in the updraft of a search; the model as it
+    /// is now, if its drones lean in another wind, because an updraft is relative to how a wind meets who leans in it.
     fn is_nearer_in_still_air(self, train: &Data, found: &Found) -> Result<bool, GapError> {
         let near = &found.comparison;
+        let Self { repaired, simulated, plan, .. } = self;
+        let vehicle = if near.leans_otherwise(repaired) { &found.vehicle } else { repaired };
         let in_air = |updraft_mps: f64| -> Result<f64, GapError> {
-            let Self { repaired, simulated, plan, .. } = self;
-            let there = Comparison::of(train, repaired, simulated, plan, updraft_mps, Some(near))?;
+            let there = Comparison::of(train, vehicle, simulated, plan, updraft_mps, Some(near))?;
             Ok(there.raw_gap_us()?)
         };
         Ok(in_air(found.updraft_mps)? > WORSE * in_air(0.0)?)

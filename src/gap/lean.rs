@@ -208,7 +208,18 @@ pub(super) fn wind(
     law: LeanLaw,
     flown: Option<(&[Vec<BinValues>], [f64; 3])>,
 ) -> Wind {
-    let leans = settled_leans(data, law, flown);
+    wind_by(data, law, law, flown)
+}
+
+/// The wind that a law reads where the simulated side was flown by another: what a lean lacks of its steady value is
+/// the other's.
+pub(super) fn wind_by(
+    data: &Data,
+    law: LeanLaw,
+    flown_law: LeanLaw,
+    flown: Option<(&[Vec<BinValues>], [f64; 3])>,
+) -> Wind {
+    let leans = settled_leans(data, flown_law, flown);
     let MeanWind { mean_mps, law, legs } = MeanWind::of(data, &leans, law, flown.is_some());
     let air_mps = data
         .groups

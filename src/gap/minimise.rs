@@ -24,7 +24,7 @@ pub(super) fn minimise<const N: usize>(
     let mut value = value_at(&at);
     let mut gradient = gradient_at(&at, value);
     let mut inverse = identity::<N>();
-    let mut small = 0;
+    let (mut small, mut is_again) = (0, false);
     for _ in 0..MOST_STEPS {
         let mut direction = [0.0; N];
         for (row, part) in direction.iter_mut().enumerate() {
@@ -59,8 +59,12 @@ pub(super) fn minimise<const N: usize>(
         update(&mut inverse, &difference(&next, &at), &difference(&next_gradient, &gradient));
         (at, value, gradient) = (next, next_value, next_gradient);
         small = if gained < ENOUGH { small + 1 } else { 0 };
-        if small == 2 {
+        if small == 2 && is_again {
             break;
+        }
+        if small == 2 {
+            // What was learned of the curvature on the way may be wrong here.
+            (inverse, is_again, small) = (identity(), true, 0);
         }
     }
     (at, value)

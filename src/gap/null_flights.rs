@@ -7,7 +7,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::bins::{BinValues, of_segments};
-use super::candidates::{Candidate, library, of_the_air, set};
+use super::candidates::{Candidate, Updraft, library, of_the_air, set};
 use super::compare::{Comparison, Simulated, thrust_exponent};
 use super::data::{Data, PlannedPart};
 use super::decide::CLASS_NATS;
@@ -124,7 +124,7 @@ fn independent_errors_name_something_on_most_null_flights_and_the_search_on_hard
     let (plan, vehicle) = (plan(), builtin("airsim-generic-quad").unwrap());
     let comparison = comparison(&plan, &vehicle);
     let patterns = comparison.patterns(&vehicle, 0.0).unwrap();
-    let effects = library(&vehicle, &comparison.scene).unwrap();
+    let effects = library(&vehicle, &comparison, Updraft::Same).unwrap();
     let hyper = field_day();
     let mut candidates = effects.clone();
     candidates.extend(of_the_air(&comparison.scene, &patterns, &hyper));
@@ -184,7 +184,7 @@ fn scatter_between_drones_tells_inflow_from_drag() {
             (patterns.clone(), Split::of(&pulses))
         })
         .collect();
-    let feeling = library(&vehicle, &comparison.scene).unwrap();
+    let feeling = library(&vehicle, &comparison, Updraft::Same).unwrap();
     let mut numb = feeling.clone();
     numb.iter_mut().flat_map(|one| &mut one.variants).for_each(|form| form.felt.clear());
     let is_sure = |ahead: &&f64| **ahead > CLASS_NATS;

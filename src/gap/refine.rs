@@ -107,7 +107,7 @@ pub(super) fn refine(
             let mut other = vehicle.clone();
             set(&mut other, parameter.effect, parameter.name, next);
             // A value that the vehicle cannot have stops there.
-            if comparison.scene.pulses(&other).is_ok() {
+            if comparison.scene_of(&other).pulses(&other).is_ok() {
                 vehicle = other;
             }
         }

@@ -197,6 +197,15 @@ impl Scene {
         self
     }
 
+    /// Makes this flight's wind stronger along an axis of the show, m/s.
+    pub(super) fn blow(&mut self, axis: usize, by_mps: f64) {
+        let groups = self.signals.iter_mut().zip(&mut self.relative_mps);
+        for (signals, relative) in groups.flat_map(|(signals, air)| signals.iter_mut().zip(air)) {
+            relative[axis] -= by_mps;
+            signals.horizontal_mps = relative[0].hypot(relative[1]);
+        }
+    }
+
     /// The moments of a group's bins.
     fn moments(&self, group: usize) -> impl Iterator<Item = Moment> {
         let air = self.relative_mps[group].iter();

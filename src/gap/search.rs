@@ -106,12 +106,45 @@ pub(super) fn round(
     sought: Sought<'_>,
     settles: bool,
 ) -> Round {
+    let mut found = round_from(problem, start, sought, settles);
+    for _ in 0..BETTER_STARTS {
+        // The noise has more than one likeliest place, and what a candidate leads to may be better for none, too.
+        let by_effect = found.library.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+        let by_shape = found.generics.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+        let best = by_effect.map(|one| (one.gain, one.hyper)).into_iter();
+        let best = best.chain(by_shape.map(|one| (one.gain, one.hyper)));
+        let Some((gain, hyper)) = best.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        if gain < FLOOR_NATS {
+            break;
+        }
+        let groups = found.groups.clone();
+        let there = problem.among(&groups);
+        let base = based(&there, hyper, settles).1;
+        if base.log_posterior() < found.base.log_posterior() + BETTER_NATS {
+            break;
+        }
+        found = round_from(&there, hyper, sought, settles);
+    }
+    found
+}
+
+/// How often a better place of the noise is taken up. Numerical.
+const BETTER_STARTS: usize = 2;
+/// A place that is better by less is the same, nats. Numerical: far below a threshold.
+const BETTER_NATS: f64 = 0.2;
+
+/// The noise by a start, with nothing of what is sought.
+fn based(problem: &Problem<'_>, start: Hyper, settles: bool) -> (Vec<GroupPattern>, Solution) {
     let first = problem.fit(start, Likelihood::Profile);
-    let (groups, base) = if settles {
+    if settles {
         settled(problem, first, |_| problem.groups.to_vec())
     } else {
         (problem.groups.to_vec(), first)
-    };
+    }
+}
+
+fn round_from(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>, settles: bool) -> Round {
+    let (groups, base) = based(problem, start, settles);
     let problem = &problem.among(&groups);
     let mut library = scan(&base, sought);
     let best = library.first().map_or(0.0, |best| best.gain);
@@ -411,7 +444,8 @@ mod tests {
     fn a_size_that_an_effect_cannot_have_is_none() {
         use super::super::candidates::Size;
         let column = Column::Shared(vec![]);
-        let variant = Variant { vehicle: None, size: 0.2, column, felt: Vec::new() };
+        let variant =
+            Variant { vehicle: None, size: 0.2, column, updraft_mps: None, felt: Vec::new() };
         let size = Size { name: "size", unit: "", low: 0.0, high: 0.5, now: 0.1, usual: 0.1 };
         let (was_there, by_lean) = (false, false);
         let new = Candidate { name: "", was_there, by_lean, size: Some(size), variants: vec![] };

@@ -119,29 +119,38 @@ impl Steady {
     /// The vehicle cannot even hover in that air.
     pub(super) fn balance(&mut self, at: &Moment, neighbours: f64) -> Result<Balance, EffectError> {
         let supply = Supply::Used(0.0);
-        let first = self.condition(at, supply, neighbours);
-        if let Some(balance) = self.trim.balance(&first) {
+        if let Some(balance) = self.trim.balance(&self.condition(at, supply, neighbours)) {
             return Ok(balance);
         }
+        self.nearest_flown(at, |steady, slower| {
+            steady.trim.balance(&steady.condition(slower, supply, neighbours))
+        })
+    }
+
+    /// Something of the fastest climb or descent in the same air that has it.
+    fn nearest_flown<T>(
+        &mut self,
+        at: &Moment,
+        of: impl Fn(&mut Self, &Moment) -> Option<T>,
+    ) -> Result<T, EffectError> {
         let wanted_mps = at.signals.climb_mps;
-        let hover = self.condition(&at.climbing(0.0), supply, neighbours);
-        let mut found = self.trim.balance(&hover).ok_or_else(|| at.refused())?;
+        let mut found = of(self, &at.climbing(0.0)).ok_or_else(|| at.refused())?;
         let (mut flown, mut refused) = (0.0, 1.0);
         for _ in 0..HALVINGS {
             let share = f64::midpoint(flown, refused);
-            let slower = self.condition(&at.climbing(share * wanted_mps), supply, neighbours);
-            match self.trim.balance(&slower) {
-                Some(balance) => (found, flown) = (balance, share),
+            match of(self, &at.climbing(share * wanted_mps)) {
+                Some(there) => (found, flown) = (there, share),
                 None => refused = share,
             }
         }
         Ok(found)
     }
 
-    /// The pulse of a balance, brought to level, us.
+    /// The pulse of a balance, brought to level, us; where no pulse does it, that of the fastest climb or descent in
+    /// the same air that has one.
     ///
     /// # Errors
-    /// No pulse does it.
+    /// The vehicle cannot even hover in that air.
     pub(super) fn of_balance(
         &mut self,
         balance: &Balance,
@@ -149,11 +158,19 @@ impl Steady {
         supply: Supply,
         neighbours: f64,
     ) -> Result<f64, EffectError> {
-        let condition = self.condition(at, supply, neighbours);
-        let pulse_us =
-            self.trim.pulse_us(balance, &condition).ok_or_else(|| at.refused())? - IDLE_US;
-        let cos = (1.0 - balance.lean.norm_squared()).max(0.0).sqrt();
-        Ok(IDLE_US + pulse_us * cos.powf(self.exponent))
+        let level = |steady: &mut Self, balance: &Balance, at: &Moment| {
+            let condition = steady.condition(at, supply, neighbours);
+            let pulse_us = steady.trim.pulse_us(balance, &condition)? - IDLE_US;
+            let cos = (1.0 - balance.lean.norm_squared()).max(0.0).sqrt();
+            Some(IDLE_US + pulse_us * cos.powf(steady.exponent))
+        };
+        if let Some(pulse_us) = level(self, balance, at) {
+            return Ok(pulse_us);
+        }
+        self.nearest_flown(at, |steady, slower| {
+            let balance = steady.balance(slower, neighbours).ok()?;
+            level(steady, &balance, slower)
+        })
     }
 
     /// Response to vertical air speed at a moment.

@@ -8,8 +8,8 @@ use foreign_worlds::noise::NoiseSettings;
 use foreign_worlds::plant::{BladeElement, Motor, Plant, Rotor};
 use rand_pcg::Pcg64;
 
-use super::kind_of;
 use super::known;
+use super::{ForeignKind, kind_of};
 use crate::base::rng::{Purpose, stream};
 use crate::blind::error::BlindError;
 use crate::blind::hide::{Hidden, between, log_between, unit};
@@ -203,6 +203,15 @@ fn truth(world: &World, known: &Vehicle, effect: &HiddenEffect) -> Option<Hidden
         };
         parameters.insert(size.to_owned(), value);
     }
+    // A drift is so much by the end of the flight here, and within a time of its own there.
+    if let (Some(slope_us), Some(time_s), Some(known_s)) = (
+        parameters.get("slope_us").copied(),
+        parameters.get("time_s").copied(),
+        own_time_s(kind, known),
+    ) {
+        parameters.insert("slope_us".to_owned(), slope_us * known_s / time_s);
+        parameters.insert("time_s".to_owned(), known_s);
+    }
     Some(Hidden {
         kind: kind.name.to_owned(),
         effect: kind.like.unwrap_or(kind.name).to_owned(),
@@ -213,6 +222,12 @@ fn truth(world: &World, known: &Vehicle, effect: &HiddenEffect) -> Option<Hidden
         words: format!("{magnitude:.3} {}", first.name),
         depends_on: own.depends_on.iter().filter_map(|name| Dependence::of(name)).collect(),
     })
+}
+
+/// Time that the library's effect of a kind counts its change by, where it has one, s.
+fn own_time_s(kind: &ForeignKind, known: &Vehicle) -> Option<f64> {
+    let effect = crate::effects::find(kind.like?)?;
+    effect.definition().parameter("time_s").map(|parameter| (parameter.default)(known))
 }
 
 /// Drag coefficient times area from above, m².

@@ -5,7 +5,7 @@ use super::known::{Flight, Known, cells, charge_of};
 use crate::effects::cell::cell_v;
 use crate::gap::GapError;
 use crate::gap::bins::{Bin, BinValues};
-use crate::gap::candidates::{Candidate, library, of_the_air};
+use crate::gap::candidates::{Candidate, Updraft, library, of_the_air};
 use crate::gap::compare::{Comparison, Simulated};
 use crate::gap::data::{Data, PlannedPart};
 use crate::gap::gls::{Column, Problem, Solution, Split};
@@ -154,7 +154,7 @@ impl<'a> Scenery<'a> {
         let find = |vehicle: &Vehicle| -> Result<Option<Candidate>, GapError> {
             let scene = &self.comparison.scene;
             let is_it = |candidate: &Candidate| candidate.name == effect;
-            let found = library(vehicle, scene)?.into_iter().find(is_it);
+            let found = library(vehicle, &self.comparison, Updraft::Same)?.into_iter().find(is_it);
             if found.is_some() {
                 return Ok(found);
             }
