@@ -53,7 +53,9 @@ impl Slopes {
             }
             let twice: f64 = -by_cross.iter().zip(cross).map(|(a, b)| a * b).sum::<f64>();
             let by_variance = (times + twice) / variance;
-            by_cross.iter_mut().for_each(|by| *by *= 2.0);
+            for by in &mut by_cross {
+                *by *= 2.0;
+            }
             self.noise[place] += by_variance;
             for (index, (state, factor)) in seen.looks_at.iter().enumerate() {
                 self.factors[place][index] += by_variance * cross[*state];
