@@ -370,7 +370,8 @@ impl Comparison {
     /// Whether the leans tell another wind if it was this vehicle that flew.
     pub(super) fn leans_otherwise(&self, vehicle: &Vehicle) -> bool {
         let law_of = |vehicle| lean_law(vehicle, self.amsl_m, self.scene.updraft_mps);
-        let is_read = self.wind.measured.is_none() && !self.is_in_other_wind();
+        let is_known = self.wind.mean_se_mps == 0.0 || self.wind.measured.is_some();
+        let is_read = !is_known && !self.is_in_other_wind();
         is_read && law_of(&self.vehicle) != law_of(vehicle)
     }
 
@@ -676,7 +677,32 @@ fn rectified(
 
 #[cfg(test)]
 mod tests {
+    use super::super::trial;
     use super::*;
+
+    #[test]
+    fn who_leans_otherwise_leant_in_another_wind() {
+        let mut data = trial::data(2, |_, _| 0.0);
+        for values in data.groups.iter_mut().flat_map(|group| &mut group.measured).flatten() {
+            values.lean_rad = [0.06, 0.0];
+        }
+        let comparison = trial::comparison(&data);
+        let vehicle = trial::vehicle();
+        assert!(!comparison.leans_otherwise(&vehicle));
+        assert!(matches!(comparison.scene_of(&vehicle), Cow::Borrowed(_)));
+        let by_drag = |role: Role, size: f64| {
+            let mut other = vehicle.clone();
+            role.set(&mut other, size);
+            assert!(comparison.leans_otherwise(&other), "{role:?}");
+            comparison.scene_of(&other).signals[0][3].horizontal_mps
+        };
+        let own_mps = comparison.scene.signals[0][3].horizontal_mps;
+        // Rotors that drag lean by 0.02 rad in each m/s, and the body a little more.
+        let rotors_mps = by_drag(Role::RotorDrag, 0.02);
+        assert!((2.0..3.0).contains(&rotors_mps), "{rotors_mps} for {own_mps} m/s");
+        assert!(own_mps > 2.0 * rotors_mps, "{own_mps} m/s by the model's box alone");
+        assert!(by_drag(Role::BodyDragSide, 0.05) < own_mps);
+    }
 
     #[test]
     fn nodes_have_the_moments_of_a_normal_distribution() {

@@ -230,7 +230,7 @@ fn is_felt(candidate: &Candidate) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidates::Variant;
+    use super::super::candidates::{Updraft, Variant, library};
     use super::super::data::Data;
     use super::super::search::round;
     use super::super::trial::{self, ranked};
@@ -239,6 +239,26 @@ mod tests {
     fn found(data: &Data) -> (Found, Comparison) {
         let comparison = trial::comparison(data);
         (Found::nothing(comparison.clone()), comparison)
+    }
+
+    #[test]
+    fn what_scatter_alone_supports_does_not_stand_for_a_product() {
+        let data = trial::data(3, |_, _| 0.0);
+        let (found, comparison) = found(&data);
+        let patterns = comparison.patterns(&found.vehicle, 0.0).unwrap();
+        let split = Split::of(&comparison.residual(&found.vehicle, 0.0).unwrap());
+        let problem = Problem::new(&patterns, &split);
+        let library = library(&found.vehicle, &comparison, Updraft::Same).unwrap();
+        let inflow = library.iter().position(|one| one.name == "rotor-inflow").unwrap();
+        let sought = Sought { library: &library, generics: &[], drones: &[3] };
+        let mut round = round(&problem, Hyper::default(), sought, false);
+        let mut likely = |plain: f64| {
+            round.library = vec![Ranked { plain, ..ranked(inflow, 60.0) }];
+            let round = &round;
+            let contest = Contest { found: &found, comparison: &comparison, sought, round };
+            contest.likely().len()
+        };
+        assert_eq!((likely(FLOOR_NATS), likely(FLOOR_NATS + 1e-9)), (0, 1));
     }
 
     #[test]
