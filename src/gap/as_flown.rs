@@ -104,6 +104,27 @@ impl AsFlown {
         Ok(spans.then_some(Self { first_mps, accelerations_mps2 }))
     }
 
+    /// How much of what the logs have more than the model goes with the climb as a unit of drag does, of which `with`
+    /// was taken with one more; apart from what goes with climb itself, and with none. `None`: nothing tells.
+    pub(super) fn in_units_of(&self, with: &Self) -> Option<f64> {
+        let first = self.first_mps.max(with.first_mps);
+        let last = |of: &Self| of.first_mps + STEP_MPS * (of.accelerations_mps2.len() as f64 - 1.0);
+        let count = ((last(self).min(last(with)) - first) / STEP_MPS) as usize + 1;
+        let climb_mps = |step: usize| first + STEP_MPS * step as f64;
+        let rows = DMatrix::from_fn(count, 3, |step, column| {
+            let climb_mps = climb_mps(step);
+            match column {
+                0 => 1.0,
+                1 => climb_mps,
+                // What the logs have more is less by what was added.
+                _ => self.at(climb_mps) - with.at(climb_mps),
+            }
+        });
+        let values = DVector::from_fn(count, |step, _| self.at(climb_mps(step)));
+        let found = rows.svd(true, true).solve(&values, 1e-9).ok()?;
+        Some(found[2]).filter(|share| share.is_finite())
+    }
+
     /// The acceleration at a climb through the air, m/s²; beyond the table that at its end.
     pub(super) fn at(&self, climb_mps: f64) -> f64 {
         let last = self.accelerations_mps2.len() - 1;

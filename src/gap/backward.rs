@@ -8,6 +8,7 @@ use super::gls::{Problem, Split};
 use super::refine::{Parameter, doubts, slopes};
 use super::refly::mean_drone;
 use super::response::shifted;
+use crate::effects::{Signal, find};
 use crate::vehicle::Vehicle;
 
 /// A vehicle with one effect as it was.
@@ -28,6 +29,32 @@ fn taken_back(vehicle: &Vehicle, effect: &str, original: &Vehicle) -> Vehicle {
 /// below the z = 4 of naming (docs/physics.md, 3.3), so that chance does not remove what was just named. Not
 /// measured.
 const KEPT_Z: f64 = 3.0;
+/// Share of an effect's trace that its form may be off by: other forms of the same physics (a linear inflow, a round
+/// body's drag) left a second effect of a few hundredths. Chosen, three times the error of sizes in
+/// [`super::refine`].
+const FORM_SHARE: f64 = 0.1;
+
+/// An effect that is no more than what the form of a larger one is not known by: small beside it, and dependent on
+/// the same.
+fn within_the_form(traces: &[(&'static str, f64)]) -> Option<&'static str> {
+    let (largest, most_us) = *traces.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (small, _) = *traces
+        .iter()
+        .filter(|(_, us)| *us < FORM_SHARE * most_us)
+        .find(|(effect, _)| depend_on_the_same(effect, largest))?;
+    Some(small)
+}
+
+/// Whether two effects depend on a common signal; the model's increments are those of climb.
+pub(super) fn depend_on_the_same(one: &str, other: &str) -> bool {
+    let of = |signal: Signal| if signal == Signal::ModelIncrement { Signal::Climb } else { signal };
+    let signals = |effect: &str| -> Vec<Signal> {
+        let signals = find(effect).map_or(&[][..], |effect| effect.definition().signals);
+        signals.iter().map(|signal| of(*signal)).collect()
+    };
+    let others = signals(other);
+    signals(one).iter().any(|signal| others.contains(signal))
+}
 
 impl Found {
     /// The effect whose trace says least, if that is too little. By its trace and not by the error of
@@ -44,6 +71,7 @@ impl Found {
         let split = Split::of(&comparison.residual(&self.vehicle, self.gusts_mps)?);
         let doubts = doubts(comparison, &self.vehicle, &self.parameters)?;
         let mut worst: Option<(&'static str, f64)> = None;
+        let mut traces: Vec<(&'static str, f64)> = Vec::new();
         let mut effects: Vec<&'static str> = self.parameters.iter().map(|p| p.effect).collect();
         effects.dedup();
         for effect in effects {
@@ -60,8 +88,9 @@ impl Found {
             if z < KEPT_Z && worst.is_none_or(|(_, least)| z < least) {
                 worst = Some((effect, z));
             }
+            traces.push((effect, trace.spread(&comparison.data.counts())));
         }
-        Ok(worst.map(|(effect, _)| effect))
+        Ok(worst.map(|(effect, _)| effect).or_else(|| within_the_form(&traces)))
     }
 
     /// Takes an effect back: the model has it as it was.

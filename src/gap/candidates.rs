@@ -112,7 +112,9 @@ impl<'a> Base<'a> {
             let updraft_mps = scene.updraft_mps + shift_mps;
             let there = match *shift_mps {
                 0.0 => Cow::Borrowed(&*scene),
-                _ => Cow::Owned(scene.in_updraft(updraft_mps)),
+                _ => Cow::Owned(
+                    self.comparison.clone().in_updraft(updraft_mps).scene_of(vehicle).into_owned(),
+                ),
             };
             let column = there.pulses(vehicle).ok()?.less(&self.pulses);
             let mut felt = there.response(vehicle).ok()?;
@@ -201,36 +203,49 @@ pub(super) fn library(
     Ok(found)
 }
 
-/// The share of momentum drag that acts along the rotors' axis, as in ArduPilot's own simulator. Of other vehicles it
-/// is a stand-in for inflow, and not looked for.
+/// The share of momentum drag that acts along the rotors' axis, as in ArduPilot's own simulator.
 const AXIAL: &str = "axial";
 
 /// Sizes of momentum drag that are tried, as shares of what the vehicle has by default.
 const AXIAL_SIZES: [f64; 2] = [0.5, 1.0];
 
-/// Momentum drag on all axes, for vehicles of ArduPilot's own simulator.
+/// Momentum drag on all axes: for vehicles of ArduPilot's own simulator, and instead of a drag of the rotors that the
+/// leans told (`by_leans`): who loses its speed to the air that goes through the rotors leans as with blade flapping.
+/// Elsewhere it is a stand-in for inflow, and not looked for.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
 pub(super) fn axial_drag(
     vehicle: &Vehicle,
     comparison: &Comparison,
+    by_leans: bool,
 ) -> Result<Option<Candidate>, EffectError> {
-    let place = Role::MomentumDrag.place().filter(|_| vehicle.airframe.sitl.is_some());
-    let Some(place) = place else { return Ok(None) };
+    let (Some(place), Some(flapping)) = (Role::MomentumDrag.place(), Role::RotorDrag.place())
+    else {
+        return Ok(None);
+    };
     let (name, parameter) = (place.name(), place.parameter);
     let (definition, size) = (place.effect.definition(), parameter.name);
     if vehicle.effects.get(name).is_some_and(|table| table.on) {
         return Ok(None);
     }
-    let base = Base::of(vehicle, comparison, Updraft::Same)?;
     let usual = (parameter.default)(vehicle);
+    let told = Role::RotorDrag.value(vehicle).filter(|_| by_leans);
+    let sizes = match told {
+        Some(drag_per_weight) => vec![drag_per_weight * GRAVITY],
+        None if vehicle.airframe.sitl.is_some() => AXIAL_SIZES.map(|share| share * usual).to_vec(),
+        None => return Ok(None),
+    };
+    let base = Base::of(vehicle, comparison, Updraft::Same)?;
     let mut variants = Vec::new();
-    for share in AXIAL_SIZES {
+    for value in sizes {
         let mut other = vehicle.clone();
-        select::set(&mut other, name, size, share * usual);
+        if told.is_some() {
+            other.effects.remove(flapping.name());
+        }
+        select::set(&mut other, name, size, value);
         select::set(&mut other, name, AXIAL, 1.0);
-        variants.extend(base.forms(&other, share * usual));
+        variants.extend(base.forms(&other, value));
     }
     let size = Size {
         name: parameter.name,
@@ -243,6 +258,9 @@ pub(super) fn axial_drag(
     let size = Some(size);
     Ok(Some(Candidate { name: definition.name, was_there: false, by_lean: false, size, variants }))
 }
+
+/// Standard gravity, m/s².
+const GRAVITY: f64 = 9.80665;
 
 /// Share of the response that a form must change before the scatter between drones is asked about it.
 /// Chosen, not measured: a smaller change is lost in the estimate of the gusts.

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::as_flown::AsFlown;
 use super::bins::{Bin, BinValues};
 use super::data::{Data, Group};
 use super::error::GapError;
@@ -13,6 +12,7 @@ use super::noise::GroupPattern;
 use super::refly::{mean_drone, refly};
 use super::response::{self, Response};
 use super::scene::Scene;
+use super::stand_in::{as_flown, own_wind};
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::effects::{EffectError, Reference, Role, find, select};
 use crate::mission::plan::Plan;
@@ -50,6 +50,8 @@ pub struct Comparison {
     pub scene: Scene,
     /// Wind, as the leans of the flight show it.
     pub wind: Wind,
+    /// Law of leaning by which the wind was read, where no leg told it.
+    read_by: LeanLaw,
     /// Air that the simulated side was flown in, show frame, z up, m/s.
     flown_mps: [f64; 3],
     /// What the closed loop does besides the closed form, by group and bin, us.
@@ -61,6 +63,8 @@ pub struct Comparison {
     pub vehicle: Vehicle,
     /// What makes drones differ by the model: effect, parameter, and its size.
     spreads: Vec<(String, String, f64)>,
+    /// Whether another program simulated the other side.
+    is_foreign: bool,
     /// Wind that another program simulated, where the measured drones flew in another, m/s.
     other_wind_mps: Option<[f64; 2]>,
 }
@@ -72,12 +76,12 @@ pub(super) fn thrust_exponent(vehicle: &Vehicle) -> f64 {
 }
 
 /// Ground height of a comparison, m above mean sea level.
-fn amsl_m(plan: Option<&Plan>) -> f64 {
+pub(super) fn amsl_m(plan: Option<&Plan>) -> f64 {
     plan.map_or(0.0, |plan| plan.site.ground_amsl_m)
 }
 
 /// How a vehicle leans in the air at a height.
-fn lean_law(vehicle: &Vehicle, amsl_m: f64, updraft_mps: f64) -> LeanLaw {
+pub(super) fn lean_law(vehicle: &Vehicle, amsl_m: f64, updraft_mps: f64) -> LeanLaw {
     LeanLaw::of(vehicle, SEA_LEVEL_DENSITY * density_ratio(amsl_m), updraft_mps)
 }
 
@@ -200,12 +204,14 @@ impl Comparison {
             side,
             scene,
             wind: blown,
+            read_by: law,
             flown_mps,
             closure_us,
             felt: Vec::new(),
             amsl_m,
             vehicle,
             spreads,
+            is_foreign,
             other_wind_mps: None,
         };
         if is_foreign && comparison.apart_rad() > OTHER_WIND_DEG.to_radians() {
@@ -214,10 +220,16 @@ impl Comparison {
         Ok(comparison)
     }
 
-    /// This comparison in a flight that is in an updraft all over, m/s, with the wind as it was read.
+    /// This comparison in a flight that is in an updraft all over, m/s, with the wind that the leans tell there.
     #[must_use]
     pub(super) fn in_updraft(mut self, updraft_mps: f64) -> Self {
         self.scene = self.scene.in_updraft(updraft_mps);
+        let law = lean_law(&self.vehicle, self.amsl_m, updraft_mps);
+        if self.reads_wind(&self.vehicle) && !law.reads_as(self.read_by) {
+            self.wind = self.wind_by(law);
+            self.scene = self.scene.blown(&self.wind);
+            self.read_by = law;
+        }
         self
     }
 
@@ -342,12 +354,14 @@ impl Comparison {
             side: pick(&self.side, &keep),
             scene: self.scene.only(&keep),
             wind,
+            read_by: self.read_by,
             flown_mps: self.flown_mps,
             closure_us: pick(&self.closure_us, &keep),
             felt: pick(&self.felt, &keep),
             amsl_m: self.amsl_m,
             vehicle: self.vehicle.clone(),
             spreads: self.spreads.clone(),
+            is_foreign: self.is_foreign,
             other_wind_mps: self.other_wind_mps,
         }
     }
@@ -369,24 +383,38 @@ impl Comparison {
 
     /// Whether the leans tell another wind if it was this vehicle that flew.
     pub(super) fn leans_otherwise(&self, vehicle: &Vehicle) -> bool {
-        let law_of = |vehicle| lean_law(vehicle, self.amsl_m, self.scene.updraft_mps);
-        let is_known = self.wind.mean_se_mps == 0.0 || self.wind.measured.is_some();
+        self.other_law(vehicle).is_some()
+    }
+
+    /// Whether the wind is read from the leans of a vehicle.
+    fn reads_wind(&self, vehicle: &Vehicle) -> bool {
         // Of ArduPilot's own simulator the law is only near to how it leans, and another form of drag nearer or farther.
         let is_near = vehicle.airframe.sitl.is_some();
-        let is_read = !is_known && !is_near && !self.is_in_other_wind();
-        is_read && law_of(&self.vehicle) != law_of(vehicle)
+        self.wind.mean_se_mps > 0.0 && !is_near && !self.is_in_other_wind()
+    }
+
+    /// The law by which a vehicle leans, where the wind is read by it and another law reads another wind.
+    fn other_law(&self, vehicle: &Vehicle) -> Option<LeanLaw> {
+        // What legs tell of leans no vehicle has to tell.
+        if self.wind.measured.is_some() || !self.reads_wind(vehicle) {
+            return None;
+        }
+        let law = lean_law(vehicle, self.amsl_m, self.scene.updraft_mps);
+        (!law.reads_as(self.read_by)).then_some(law)
+    }
+
+    fn wind_by(&self, law: LeanLaw) -> Wind {
+        let flown_law = lean_law(&self.vehicle, self.amsl_m, self.flown_mps[2]);
+        wind_by(&self.data, law, flown_law, Some((&self.side, self.flown_mps)))
     }
 
     /// The flight as a vehicle saw it: where no leg told how drones lean, who leans otherwise in the wind leant as the
     /// logs say in another wind.
     pub(super) fn scene_of(&self, vehicle: &Vehicle) -> Cow<'_, Scene> {
-        if !self.leans_otherwise(vehicle) {
-            return Cow::Borrowed(&self.scene);
+        match self.other_law(vehicle) {
+            None => Cow::Borrowed(&self.scene),
+            Some(law) => Cow::Owned(self.scene.clone().blown(&self.wind_by(law))),
         }
-        let law = lean_law(vehicle, self.amsl_m, self.scene.updraft_mps);
-        let flown_law = lean_law(&self.vehicle, self.amsl_m, self.flown_mps[2]);
-        let wind = wind_by(&self.data, law, flown_law, Some((&self.side, self.flown_mps)));
-        Cow::Owned(self.scene.clone().blown(&wind))
     }
 
     /// Change of the pulse by one standard error of the wind, along either axis of the show.
@@ -448,6 +476,11 @@ impl Comparison {
             of.slots.len() as f64 * doubts.iter().map(|doubt| of_mean(doubt).powi(2)).sum::<f64>()
         };
         Ok(mean(self.data.groups.iter().enumerate().map(variance)).unwrap_or_default().sqrt())
+    }
+
+    /// Whether the other side is another program's simulation, which may differ in several things at once.
+    pub(super) fn is_foreign(&self) -> bool {
+        self.is_foreign
     }
 
     /// Whether the two sides flew in different wind.
@@ -543,41 +576,8 @@ fn spreads(vehicle: &Vehicle) -> Vec<(String, String, f64)> {
 }
 
 /// The bins that are there.
-fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
+pub(super) fn flat(values: &[Vec<Option<BinValues>>]) -> Vec<Vec<BinValues>> {
     values.iter().map(|group| group.iter().flatten().copied().collect()).collect()
-}
-
-/// The simulated side as data of one drone in each group.
-fn as_data(data: &Data, values: &[Vec<Option<BinValues>>]) -> Data {
-    let mut own = data.keep(|group, bin| values[group][bin].is_some());
-    for (group, values) in own.groups.iter_mut().zip(flat(values)) {
-        group.measured = vec![values];
-    }
-    own
-}
-
-/// The wind that another program simulated, by its own leans, m/s.
-fn own_wind(
-    data: &Data,
-    values: &[Vec<Option<BinValues>>],
-    flew: &Vehicle,
-    amsl_m: f64,
-) -> [f64; 2] {
-    mean_wind(&as_data(data, values), lean_law(&mean_drone(flew), amsl_m, 0.0), None)
-}
-
-/// How another program's simulation answers climb, where its logs tell it.
-fn as_flown(
-    data: &Data,
-    values: &[Vec<Option<BinValues>>],
-    flew: &Vehicle,
-    (law, air_mps, amsl_m): (LeanLaw, [f64; 3], f64),
-) -> Result<Option<AsFlown>, EffectError> {
-    let data = data.keep(|group, bin| values[group][bin].is_some());
-    let side = flat(values);
-    let blown = wind(&data, law, Some((&side, air_mps)));
-    let scene = Scene::measured(&data, &side, &blown, amsl_m).simulated(&data, &side, air_mps);
-    AsFlown::of(&data, &side, &scene, flew)
 }
 
 /// Sides whose leans are further apart flew in different wind, degrees. Chosen: several times the error of

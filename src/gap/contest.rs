@@ -66,7 +66,7 @@ impl Contest<'_> {
         let product =
             self.round.generics.iter().find(|free| of(free) && free.plain > FREE_FLOOR_NATS);
         let rivals = match &what {
-            What::Nothing => return Ok(what),
+            What::Nothing | What::Together { .. } => return Ok(what),
             What::Free(free) if !of(free) => return Ok(what),
             What::Free(_) => self.likely(),
             What::Effects { members, .. } if members.len() == 1 && product.is_none() => {
@@ -186,7 +186,7 @@ impl Contest<'_> {
 
     /// Log-posterior of the flight with a model whose sizes and gusts settle first, at the speed relative to
     /// the air that all share.
-    fn in_full(
+    pub(super) fn in_full(
         &self,
         comparison: &Comparison,
         mut vehicle: Vehicle,
@@ -217,7 +217,7 @@ impl Contest<'_> {
 
 /// A free shape that is held against effects, with what it does to the response.
 #[derive(Clone, Copy, Default)]
-struct Free<'a> {
+pub(super) struct Free<'a> {
     columns: &'a [Column],
     felt: &'a [Vec<Vec<Response>>],
     beta: &'a [f64],

@@ -63,6 +63,13 @@ pub(super) enum What {
         /// A free shape that explains as well.
         or_else: Option<RankedGeneric>,
     },
+    /// Several effects, none of which explains it alone.
+    Together {
+        /// The effects, each with what it adds to the others.
+        members: Vec<Ranked>,
+        /// For each of them, candidates that would do as well instead of it.
+        instead: Vec<Vec<usize>>,
+    },
     /// No effect that is known.
     Free(RankedGeneric),
 }
@@ -302,6 +309,7 @@ mod tests {
             match decision.what {
                 What::Nothing => ("nothing", vec![]),
                 What::Free(free) => ("free", vec![free.generic]),
+                What::Together { .. } => panic!("not decided here"),
                 What::Effects { members, or_else } => {
                     assert!(or_else.is_none());
                     ("effects", members.iter().map(|member| member.candidate).collect())

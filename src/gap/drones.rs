@@ -199,6 +199,7 @@ fn spread(
         size_us: sd * sensitivity,
         rivals: Vec::new(),
         shape: None,
+        in_field: None,
     })
 }
 

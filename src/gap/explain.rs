@@ -7,20 +7,23 @@ use super::candidates::{
     read_otherwise,
 };
 use super::compare::{Comparison, Simulated, UPDRAFT_DOUBT_MPS};
-use super::contest::{Contest, before, entered};
+use super::contest::{Contest, before};
 use super::data::Data;
-use super::decide::{CONTEST_MARGINS, What, decide, margin_nats};
+use super::decide::{What, decide};
 use super::error::GapError;
 use super::generic::{Generic, all, drawn};
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
+use super::lean::LEGS_DOUBT;
 use super::noise::{GroupPattern, Hyper, WHITE};
 use super::refine::{self, Parameter, fitted, half_interval, parameters_of, refine, slopes};
 use super::response::{self, Response, gusts_mps};
 use super::search::{
     FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, Round, Sought, Thresholds, round,
 };
+use super::single;
+use super::together::joined;
 use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
-use crate::effects::{Role, Signal, Signals, find};
+use crate::effects::{Role, Signals};
 use crate::mission::plan::Plan;
 use crate::numeric::mean;
 use crate::vehicle::Vehicle;
@@ -131,22 +134,33 @@ impl Found {
     }
 }
 
-/// Runs the loop on the drones that are to be fitted.
+/// Runs the loop on the drones that are to be fitted. `original` is the model before anything was repaired.
 ///
 /// # Errors
 /// See [`GapError`].
 pub fn search(
     data: &Data,
-    vehicle: &Vehicle,
+    [original, vehicle]: [&Vehicle; 2],
     simulated: &Simulated<'_>,
     plan: Option<&Plan>,
     options: &Options,
 ) -> Result<Found, GapError> {
     let comparison = Comparison::new(data, vehicle, simulated, plan)?;
     let found = Found::nothing(comparison.clone());
-    let refused = Vec::new();
-    let mut search =
-        Search { data, vehicle, simulated, plan, options, comparison, found, refused, last: None };
+    let lacked_drag = Role::RotorDrag.is_on(vehicle) && !Role::RotorDrag.is_on(original);
+    let (refused, last) = (Vec::new(), None);
+    let mut search = Search {
+        data,
+        vehicle,
+        lacked_drag,
+        simulated,
+        plan,
+        options,
+        comparison,
+        found,
+        refused,
+        last,
+    };
     for step in 0..=options.most_steps {
         if !search.takes_step(step)? {
             break;
@@ -155,6 +169,7 @@ pub fn search(
     let mut found = search.found;
     told_once(&mut found.steps);
     settle(&mut found);
+    single::review(&mut found);
     Ok(found)
 }
 
@@ -163,6 +178,8 @@ struct Search<'a> {
     data: &'a Data,
     /// The model that the search began with.
     vehicle: &'a Vehicle,
+    /// Whether that has a drag of the rotors only because leans told it.
+    lacked_drag: bool,
     simulated: &'a Simulated<'a>,
     plan: Option<&'a Plan>,
     options: &'a Options,
@@ -224,15 +241,18 @@ impl Search<'_> {
             // Fitted together with the rest it explains less than was explained without.
             let free = self.found.steps.pop();
             self.found = before;
-            widen(&mut self.found.steps, free.as_ref());
+            single::beside_what_was_taken_back(&mut self.found.steps, free.as_ref());
             return Ok(false);
         }
         self.found.hyper = round.base.hyper;
         let material_us = material_us(&look.patterns, &round.base.hyper);
         let mut decision = decide(&problem, &round, sought, material_us, self.options, step);
         let (found, comparison) = (&self.found, &self.comparison);
-        decision.what =
-            Contest { found, comparison, sought, round: &round }.settle(&problem, decision.what)?;
+        let contest = Contest { found, comparison, sought, round: &round };
+        decision.what = contest.settle(&problem, decision.what)?;
+        if comparison.is_foreign() && found.steps.is_empty() {
+            decision.what = contest.together(&problem, decision.what)?;
+        }
         self.found.rest = rest(&round, sought, &decision.thresholds);
         if step == self.options.most_steps || matches!(decision.what, What::Nothing) {
             self.found.comparison = self.comparison.clone();
@@ -249,6 +269,15 @@ impl Search<'_> {
                 let best = &members[0];
                 let candidate = &look.candidates[best.candidate];
                 self.take_effect(candidate, best, &round, names, (threshold_nats, rivals))?;
+            }
+            What::Together { members, instead } => {
+                let name = |candidate: usize| look.candidates[candidate].name.to_owned();
+                for (member, instead) in members.iter().zip(instead) {
+                    let of = member.candidate;
+                    let names = std::iter::once(of).chain(instead).map(name).collect();
+                    let told = (decision.thresholds.library, rivals.clone());
+                    self.take_effect(&look.candidates[of], member, &round, names, told)?;
+                }
             }
             What::Free(free) => {
                 let before = Found { comparison: self.comparison.clone(), ..self.found.clone() };
@@ -312,7 +341,7 @@ impl Search<'_> {
         if matches!(updraft, In::Settled) && self.options.updraft && is_flown {
             quick = self.settle_updraft(&free, quick)?;
         }
-        let Self { comparison, found, refused, .. } = self;
+        let Self { comparison, found, refused, lacked_drag, .. } = self;
         let doubts = refine::doubts(comparison, &found.vehicle, &found.parameters)?;
         found.gusts_mps = gusts_mps(&quick.hyper).min(MOST_GUSTS_MPS);
         let patterns = match updraft {
@@ -323,7 +352,7 @@ impl Search<'_> {
         let updraft =
             if self.options.updraft && is_flown { Updraft::MayDiffer } else { Updraft::Same };
         let mut candidates = library(&found.vehicle, comparison, updraft)?;
-        candidates.extend(axial_drag(&found.vehicle, comparison)?);
+        candidates.extend(axial_drag(&found.vehicle, comparison, *lacked_drag)?);
         if !comparison.is_in_other_wind() {
             candidates.extend(read_otherwise(comparison, &found.vehicle, updraft)?);
         }
@@ -351,7 +380,10 @@ impl Search<'_> {
                 InUpdraft::fitted(comparison, &patterns, found, free, hyper, updraft_mps)
             };
             let Some(here) = fit(solution.hyper, found.updraft_mps) else { break };
-            let Some(best) = likeliest(fit, &starts, solution.hyper) else { break };
+            let here_nats = here.likely;
+            let modes = likeliest(fit, &starts, solution.hyper);
+            let Some(best) = self.likelier(modes, here)? else { break };
+            let found = &mut self.found;
             let before_mps = std::mem::replace(&mut found.updraft_mps, best.updraft_mps);
             starts = vec![best.updraft_mps];
             if (best.updraft_mps - before_mps).abs() < UPDRAFT_SETTLED_MPS {
@@ -374,7 +406,7 @@ impl Search<'_> {
             // What its steady states seemed to explain the model must explain when it is flown.
             let (hyper, updraft_mps) = (best.solution.hyper, best.updraft_mps);
             let again = InUpdraft::fitted(&there, &patterns, &self.found, free, hyper, updraft_mps);
-            if again.is_none_or(|again| again.likely < here.likely - SAME_NATS) {
+            if again.is_none_or(|again| again.likely < here_nats - SAME_NATS) {
                 self.found.updraft_mps = before_mps;
                 break;
             }
@@ -382,6 +414,35 @@ impl Search<'_> {
             self.comparison = there;
         }
         Ok(solution)
+    }
+
+    /// Of updrafts that explain the means equally well, the one in which the drones answer their gusts as they
+    /// scatter, or the present one: on a ladder that is flown up and down at once, with a curve that is flat in hover,
+    /// air that rises and air that sinks look alike to who does not know how drones answer there.
+    fn likelier(
+        &mut self,
+        mut modes: Vec<InUpdraft>,
+        here: InUpdraft,
+    ) -> Result<Option<InUpdraft>, GapError> {
+        if modes.len() < 2 {
+            return Ok(modes.pop());
+        }
+        let before_mps = self.found.updraft_mps;
+        let (mut best, mut most) = (None, here.likely);
+        modes.retain(|mode| (mode.updraft_mps - before_mps).abs() > STILL_MPS);
+        for mode in modes {
+            self.found.updraft_mps = mode.updraft_mps;
+            let there = self.against_model()?;
+            let found = &self.found;
+            let patterns = there.patterns(&found.vehicle, found.gusts_mps)?;
+            let (hyper, at_mps) = (mode.solution.hyper, mode.updraft_mps);
+            let again = InUpdraft::fitted(&there, &patterns, found, &[], hyper, at_mps);
+            if let Some(again) = again.filter(|again| again.likely > most) {
+                (best, most) = (Some(mode), again.likely);
+            }
+        }
+        self.found.updraft_mps = before_mps;
+        Ok(Some(best.unwrap_or(here)))
     }
 
     /// Takes an effect into the model, or a motion of the air into the regressors. `names` are those of
@@ -403,7 +464,8 @@ impl Search<'_> {
         }
         let Self { comparison, found, .. } = self;
         let mut by_lean = None;
-        if let Some(mut next) = entered(candidate, best) {
+        if candidate.variants[best.variant].vehicle.is_some() {
+            let mut next = joined(found.vehicle.clone(), candidate, best);
             if let Some(size) = candidate.size.filter(|_| candidate.by_lean)
                 && let Some((drag, se)) =
                     drag_by_lean(&before_it, comparison, &found.vehicle, &round.base)?
@@ -416,6 +478,9 @@ impl Search<'_> {
                 let before = before(candidate);
                 let more = parameters_of(comparison, &next, candidate.name, before, &round.base)?;
                 found.parameters.extend(more);
+            }
+            if self.lacked_drag && Role::MomentumDrag.is_of(candidate.name) {
+                told_by_leans(&mut found.parameters, variant.size);
             }
             found.vehicle = next;
             found.hyper = best.hyper;
@@ -432,6 +497,7 @@ impl Search<'_> {
             size_us: best.size_us,
             rivals,
             shape: Some(along_its_signal(comparison, variant, best.beta)),
+            in_field: None,
         });
         Ok(())
     }
@@ -459,6 +525,7 @@ impl Search<'_> {
             size_us: free.size_us,
             rivals,
             shape: Some(shape),
+            in_field: None,
         });
     }
 
@@ -489,30 +556,50 @@ impl Search<'_> {
     }
 }
 
-/// The updraft that explains most, by Gauss and Newton from the best of some starts; `None`: the vehicle can fly
-/// in none of them.
+/// The updrafts that explain most, best first, by Gauss and Newton from the first of some starts and the best of the
+/// others to either side; none: the vehicle can fly in none of them.
 fn likeliest(
     fit: impl Fn(Hyper, f64) -> Option<InUpdraft> + Sync,
     starts_mps: &[f64],
     hyper: Hyper,
-) -> Option<InUpdraft> {
+) -> Vec<InUpdraft> {
     let there: Vec<Option<InUpdraft>> =
         starts_mps.par_iter().map(|start_mps| fit(hyper, *start_mps)).collect();
-    let mut best = there.into_iter().fold(None, better);
+    // The present one, and the best to either side of it.
+    let mut there = there.into_iter();
+    let present = there.next().flatten();
+    let (up, down): (Vec<_>, Vec<_>) = there.flatten().partition(|one| one.updraft_mps > 0.0);
+    let best = |of: Vec<InUpdraft>| of.into_iter().reduce(better);
+    let mut sides: Vec<InUpdraft> = [present, best(up), best(down)].into_iter().flatten().collect();
+    let most = sides.iter().map(|one| one.likely).fold(f64::NEG_INFINITY, f64::max);
+    sides.retain(|one| one.likely > most - OTHER_SIDE_NATS);
+    let mut found: Vec<InUpdraft> =
+        sides.into_par_iter().map(|start| climbed(&fit, start)).collect();
+    found.sort_by(|a, b| b.likely.total_cmp(&a.likely));
+    found.dedup_by(|one, best| (one.updraft_mps - best.updraft_mps).abs() < STILL_MPS);
+    let most = found.first().map_or(0.0, |best| best.likely);
+    found.retain(|one| one.likely > most - SAME_NATS);
+    found
+}
+
+/// The updraft that explains most, from one that explains less.
+fn climbed(fit: &impl Fn(Hyper, f64) -> Option<InUpdraft>, start: InUpdraft) -> InUpdraft {
+    let mut best = start;
     for _ in 0..UPDRAFT_ROUNDS {
-        let Some(there) = &best else { break };
-        let (at_mps, hyper, likely) = (there.updraft_mps, there.solution.hyper, there.likely);
-        let step_mps = (there.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
+        let (at_mps, hyper, likely) = (best.updraft_mps, best.solution.hyper, best.likely);
+        let step_mps = (best.most_mps - at_mps).clamp(-UPDRAFT_STEP_MPS, UPDRAFT_STEP_MPS);
         if step_mps.abs() < UPDRAFT_SETTLED_MPS {
             break;
         }
         for share in [1.0, 0.5] {
-            best = better(best, fit(hyper, at_mps + share * step_mps));
-            if best.as_ref().is_some_and(|best| best.likely > likely) {
+            if let Some(there) = fit(hyper, at_mps + share * step_mps) {
+                best = better(best, there);
+            }
+            if best.likely > likely {
                 break;
             }
         }
-        if best.as_ref().is_none_or(|best| best.likely <= likely) {
+        if best.likely <= likely {
             break;
         }
     }
@@ -566,11 +653,8 @@ impl InUpdraft {
 }
 
 /// Whichever explains more.
-fn better(one: Option<InUpdraft>, other: Option<InUpdraft>) -> Option<InUpdraft> {
-    match (one, other) {
-        (Some(one), Some(other)) => Some(if other.likely > one.likely { other } else { one }),
-        (one, other) => one.or(other),
-    }
+fn better(one: InUpdraft, other: InUpdraft) -> InUpdraft {
+    if other.likely > one.likely { other } else { one }
 }
 
 /// An updraft that is none, m/s: what a flight of a quarter of an hour tells of it at best. Chosen.
@@ -578,6 +662,9 @@ const STILL_MPS: f64 = 0.05;
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
+/// A side of still air whose best start explains less by this much is left alone, nats. Chosen: far more than
+/// [`SAME_NATS`], as starts are no tops.
+const OTHER_SIDE_NATS: f64 = 100.0;
 /// Rounds in which the model is flown, and drones' answers to gusts are taken, in the updraft of the round before.
 /// Numerical.
 const FLOWN_ROUNDS: usize = 2;
@@ -591,33 +678,11 @@ const SAME_NATS: f64 = 6.0;
 /// A step of the updraft that is none, m/s: far below what a flight tells of it.
 const UPDRAFT_SETTLED_MPS: f64 = 0.01;
 
-/// Makes classes of the names that a free shape, which could not be taken in, is left beside: an effect is named
-/// alone only if it leaves nothing of its kind.
-fn widen(steps: &mut [Step], free: Option<&Step>) {
-    let Some(Step { finding: Finding::Unknown { depends_on, .. }, .. }) = free else { return };
-    for step in steps {
-        let Finding::Name { effect, parameters, was_there: false } = &step.finding else {
-            continue;
-        };
-        if !signals_of(effect).iter().any(|signal| depends_on.is_of(*signal)) {
-            continue;
-        }
-        let near = step.gain_nats - CONTEST_MARGINS * margin_nats(step.gain_nats);
-        let rivals = step.rivals.iter().filter(|rival| {
-            let looks = || signals_of(&rival.name).iter().any(|signal| depends_on.is_of(*signal));
-            !rival.generic && rival.name != *effect && rival.gain_nats > near && looks()
-        });
-        let mut effects = vec![effect.clone()];
-        effects.extend(rivals.map(|rival| rival.name.clone()));
-        if effects.len() > 1 {
-            step.finding = Finding::Class { effects, parameters: parameters.clone() };
-        }
+/// Momentum drag has the size that the leans tell, within the error of their law.
+fn told_by_leans(parameters: &mut [Parameter], per_s: f64) {
+    for parameter in parameters.iter_mut().filter(|one| Role::MomentumDrag.is_of(one.effect)) {
+        parameter.bounds = ((1.0 - LEGS_DOUBT) * per_s, (1.0 + LEGS_DOUBT) * per_s);
     }
-}
-
-/// Signals that an effect depends on.
-fn signals_of(effect: &str) -> &'static [Signal] {
-    find(effect).map_or(&[], |effect| effect.definition().signals)
 }
 
 /// The end of the search, if this round is the last.
@@ -825,6 +890,7 @@ mod tests {
         let search = Search {
             data: &data,
             vehicle: &vehicle,
+            lacked_drag: false,
             simulated: &simulated,
             plan: None,
             options: &options,

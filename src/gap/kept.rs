@@ -74,7 +74,8 @@ impl Question<'_> {
         held: &Data,
         options: Options,
     ) -> Result<(Found, Gap), GapError> {
-        let found = search(train, self.repaired, self.simulated, self.plan, &options)?;
+        let found =
+            search(train, [self.original, self.repaired], self.simulated, self.plan, &options)?;
         let gap = self.case(&found).gap(train, held)?;
         Ok((found, gap))
     }
@@ -137,6 +138,7 @@ mod tests {
             size_us: 5.0,
             rivals: rivals.iter().map(rival).collect(),
             shape: None,
+            in_field: None,
         }
     }
 

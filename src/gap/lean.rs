@@ -1,6 +1,6 @@
 //! Wind from the leans of the fleet.
 
-use nalgebra::{Matrix2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector3};
 
 use super::bins::BinValues;
 use super::data::Data;
@@ -8,7 +8,7 @@ use super::filter::{Filter, Observation, State};
 use super::lean_fit::{Fitted, Point, fit, hovering_wind};
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
-use crate::numeric::{Line, Moments};
+use crate::numeric::Moments;
 use crate::sim::plant::drag::Drag;
 use crate::sim::plant::trim::{Condition, Trim};
 use crate::vehicle::Vehicle;
@@ -18,10 +18,14 @@ const GRAVITY: f64 = 9.80665;
 /// Below this slope of the lean a bin's own lean says less than the flight's mean wind, rad/(m/s): noise of
 /// the attitude of 0.1 degrees would be 0.4 m/s. Chosen.
 const LEAST_SLOPE: f64 = 0.004;
-/// Rounds of the air speed by a lean. Doubled from 12 when bodies in one piece joined the laws; chosen.
-const ROUNDS: usize = 24;
-/// A law is made to fit the trim at every whole speed up to this, m/s: show drones do not fly in more wind.
-const LAW_SPEEDS_MPS: u32 = 10;
+/// Rounds of the air speed by a lean, at most: each takes away half of the error or more. Numerical.
+const ROUNDS: usize = 40;
+/// A law is made to fit the trim at every whole speed up to this, m/s: a leg of 6 m/s into 8 m/s of wind.
+const LAW_SPEEDS_MPS: u32 = 14;
+/// And at as many of them at least.
+const FEWEST_LAW_SPEEDS: usize = 6;
+/// Air speed at which a diagonal wind tells a body in one piece from a box, m/s: where drag is most of the lean.
+const BODY_SPEED_MPS: f64 = 8.0;
 /// Air speed at which the load of climbs is read from the trim, m/s: a usual wind.
 const LOAD_SPEED_MPS: f64 = 4.0;
 /// Climb at which it is read, m/s: the fastest rung of a ladder.
@@ -31,8 +35,8 @@ const LEAST_LOAD: f64 = 0.3;
 /// Fastest wind that is believed, m/s: no small multirotor holds its place in more.
 const FASTEST_MPS: f64 = 25.0;
 
-/// Lean of a vehicle in horizontal air, along each axis of its body, while it climbs at V: `(a + b
-/// s sqrt(v² + V²)) v_i + b (1 - s) v_i |v_i|`, rad.
+/// Lean of a vehicle in horizontal air v, along each axis of its body, while it climbs at V: `(a + b s sqrt(v² + V²)
+/// + c v²) v_i + b (1 - s) v_i |v_i|`, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeanLaw {
     /// Linear part (blade flapping, a), rad/(m/s).
@@ -42,6 +46,8 @@ pub struct LeanLaw {
     /// Share of the drag that is a body's in one piece (s), which goes with the whole air speed. The rest is
     /// a box's, each face of which feels only the air along its own axis.
     pub body_share: f64,
+    /// Cubic part of the lean (c), rad/(m/s)³: whoever leans far has to pull more.
+    pub cube: f64,
     /// Updraft that the law holds in, m/s: climbs are relative to it.
     pub updraft_mps: f64,
     /// Load of the rotors in a climb, as far as it is known: `1 + p V + q V|V|` of the weight (p, q). Who pulls
@@ -67,40 +73,60 @@ impl LeanLaw {
             linear: of(Role::RotorDrag) + of(Role::MomentumDrag) / GRAVITY,
             square: density * (box_m2 + body_m2) / (vehicle.airframe.mass_kg * GRAVITY),
             body_share: body_m2 / (box_m2 + body_m2).max(1e-9),
+            cube: 0.0,
             updraft_mps,
             load: [0.0; 2],
         }
     }
 
-    /// The law that is nearest to the leans of steady level flight; `None` where there is none.
+    /// The law that is nearest to the leans of steady flight; `None` where there is none.
     fn by_trim(vehicle: &Vehicle, density: f64, updraft_mps: f64) -> Option<Self> {
         let mut trim = Trim::of(vehicle).ok()?;
         let density_ratio = density / SEA_LEVEL_DENSITY;
-        let mut slopes = Vec::new();
-        for speed in 1..=LAW_SPEEDS_MPS {
-            let speed_mps = f64::from(speed);
-            let velocity_mps = Vector3::new(speed_mps, 0.0, 0.0);
-            let level = Condition { velocity_mps, density_ratio, ..Condition::default() };
-            slopes.push((speed_mps, trim.balance(&level)?.lean.x.asin() / speed_mps));
+        let mut lean_rad = |[x_mps, y_mps, climb_mps]: [f64; 3]| {
+            let velocity_mps = Vector3::new(x_mps, y_mps, climb_mps);
+            let condition = Condition { velocity_mps, density_ratio, ..Condition::default() };
+            Some(trim.balance(&condition)?.lean.x.asin())
+        };
+        let speeds = (1..=LAW_SPEEDS_MPS).map(f64::from);
+        let leans: Vec<(f64, f64)> =
+            speeds.map_while(|speed| Some((speed, lean_rad([speed, 0.0, 0.0])? / speed))).collect();
+        if leans.len() < FEWEST_LAW_SPEEDS {
+            return None;
         }
-        let line = Line::through(slopes)?;
+        let powers = DMatrix::from_fn(leans.len(), 3, |row, power| leans[row].0.powi(power as i32));
+        let per_speed = DVector::from_iterator(leans.len(), leans.iter().map(|(_, lean)| *lean));
+        let found = powers.svd(true, true).solve(&per_speed, 1e-12).ok()?;
+        let (linear, square, cube) = (found[0], found[1], found[2]);
+        // Along a diagonal a box's faces each feel their part of the speed, and a body in one piece feels all of it.
+        let part_mps = BODY_SPEED_MPS * std::f64::consts::FRAC_1_SQRT_2;
+        let diagonal = lean_rad([part_mps, part_mps, 0.0])? / part_mps
+            - lean_rad([BODY_SPEED_MPS, 0.0, 0.0])? / BODY_SPEED_MPS;
+        let of_box = square * (part_mps - BODY_SPEED_MPS);
+        // The other frame's drag acts along the body's axes.
+        let is_box = vehicle.airframe.sitl.is_some();
+        let body_share =
+            if is_box { 0.0 } else { (1.0 - diagonal / of_box.min(-1e-9)).clamp(0.0, 1.0) };
+        let still = Self { linear, square, body_share, cube, updraft_mps: 0.0, load: [0.0; 2] };
         let mut less = |climb_mps: f64| {
-            let lean = |trim: &mut Trim, climb_mps: f64| {
-                let velocity_mps = Vector3::new(LOAD_SPEED_MPS, 0.0, climb_mps);
-                let condition = Condition { velocity_mps, density_ratio, ..Condition::default() };
-                Some(trim.balance(&condition)?.lean.x.asin())
-            };
-            Some(lean(&mut trim, 0.0)? / lean(&mut trim, climb_mps)? - 1.0)
+            let [level, _] = still.lean([LOAD_SPEED_MPS, 0.0], climb_mps);
+            Some(level / lean_rad([LOAD_SPEED_MPS, 0.0, climb_mps])? - 1.0)
         };
         let (up, down) = (less(LOAD_CLIMB_MPS)?, less(-LOAD_CLIMB_MPS)?);
         // What is odd in the climb at its half tells the line from the square.
         let odd = 0.5 * (up - down);
         let half = 0.5 * (less(0.5 * LOAD_CLIMB_MPS)? - less(-0.5 * LOAD_CLIMB_MPS)?);
-        let linear = (4.0 * half - odd) / LOAD_CLIMB_MPS;
-        let square = (odd / LOAD_CLIMB_MPS - linear) / LOAD_CLIMB_MPS;
-        let (intercept, slope) = (line.intercept(), line.slope());
-        let load = [linear, square];
-        Some(Self { linear: intercept, square: slope, body_share: 0.0, updraft_mps, load })
+        let straight = (4.0 * half - odd) / LOAD_CLIMB_MPS;
+        let bent = (odd / LOAD_CLIMB_MPS - straight) / LOAD_CLIMB_MPS;
+        Some(Self { load: [straight, bent], updraft_mps, ..still })
+    }
+
+    /// Whether it reads the wind from leans as another law does: only a body in one piece, or rotors that carry more or
+    /// less in a climb, lean otherwise in another updraft.
+    pub(super) fn reads_as(self, other: Self) -> bool {
+        let feels_updraft = self.body_share != 0.0 || self.load != [0.0; 2];
+        let updraft_mps = if feels_updraft { self.updraft_mps } else { other.updraft_mps };
+        Self { updraft_mps, ..self } == other
     }
 
     /// What the rotors carry in a climb over ground, as a share of hover in still air.
@@ -121,25 +147,28 @@ impl LeanLaw {
     /// The lean in horizontal air, show frame.
     pub(super) fn lean(self, air_mps: [f64; 2], climb_mps: f64) -> [f64; 2] {
         let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(climb_mps - self.updraft_mps);
-        let linear = self.linear + self.body_square() * whole_mps;
+        let square_mps2 = air_mps[0] * air_mps[0] + air_mps[1] * air_mps[1];
+        let linear = self.linear + self.body_square() * whole_mps + self.cube * square_mps2;
         let load = self.load(climb_mps);
         air_mps.map(|part| (linear + self.box_square() * part.abs()) * part / load)
     }
 
     /// Change of the lean with the air at a horizontal air speed, rad/(m/s).
     fn slope(self, speed_mps: f64) -> f64 {
-        self.linear + 2.0 * self.square * speed_mps
+        self.linear + (2.0 * self.square + 3.0 * self.cube * speed_mps) * speed_mps
     }
 
     /// Change of each axis' lean with each axis' air, rad/(m/s).
     pub(super) fn slopes(self, air_mps: [f64; 2], climb_mps: f64) -> Matrix2<f64> {
         let axial_mps = climb_mps - self.updraft_mps;
         let whole_mps = air_mps[0].hypot(air_mps[1]).hypot(axial_mps).max(1e-6);
+        let square_mps2 = air_mps[0] * air_mps[0] + air_mps[1] * air_mps[1];
         let body = self.body_square();
         let load = self.load(climb_mps);
         Matrix2::from_fn(|row, column| {
-            let turned = body * air_mps[row] * air_mps[column] / whole_mps;
-            let own = self.linear + body * whole_mps + 2.0 * self.box_square() * air_mps[row].abs();
+            let turned = (body / whole_mps + 2.0 * self.cube) * air_mps[row] * air_mps[column];
+            let both = self.linear + body * whole_mps + self.cube * square_mps2;
+            let own = both + 2.0 * self.box_square() * air_mps[row].abs();
             (turned + if row == column { own } else { 0.0 }) / load
         })
     }
@@ -151,7 +180,8 @@ impl LeanLaw {
         let mut air_mps = [0.0; 2];
         for _ in 0..ROUNDS {
             let whole_mps = speed_mps.hypot(climb_mps - self.updraft_mps);
-            let linear = self.linear + self.body_square() * whole_mps;
+            let linear =
+                self.linear + self.body_square() * whole_mps + self.cube * speed_mps * speed_mps;
             let square = self.box_square();
             air_mps = lean_rad.map(|lean: f64| {
                 let size = if square > 1e-12 {
@@ -166,9 +196,9 @@ impl LeanLaw {
             let next_mps = air_mps[0].hypot(air_mps[1]);
             // The body's part goes with the square: the middle of two rounds is nearly the end.
             let middle_mps = (next_mps * speed_mps).sqrt();
-            let near = (middle_mps - speed_mps).abs() < 1e-6 * middle_mps;
+            let near = (middle_mps - speed_mps).abs() < 1e-8 * middle_mps;
             speed_mps = middle_mps.max(1e-9);
-            if self.body_share == 0.0 || near {
+            if self.body_share == 0.0 && self.cube == 0.0 || near {
                 break;
             }
         }
@@ -308,7 +338,7 @@ impl MeanWind {
 const LEAST_DOUBT_MPS: f64 = 0.1;
 /// Error of that wind as a share of it, where horizontal legs measured the law. Chosen; the drag of AirSim's
 /// sides differs by as much.
-const LEGS_DOUBT: f64 = 0.08;
+pub(super) const LEGS_DOUBT: f64 = 0.08;
 /// The error where only the model's law is known. Chosen: bodies may differ from the model by some tenths.
 const LAW_DOUBT: f64 = 0.3;
 
@@ -391,8 +421,6 @@ const FEWEST_MOVING: usize = 4;
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{DMatrix, DVector};
-
     use super::super::trial;
     use super::*;
     use crate::vehicle::library::builtin;
@@ -427,6 +455,31 @@ mod tests {
         for (value, expected) in smoothed(group, &values).iter().zip(best.1.iter()) {
             let off = value - moments.mean - expected;
             assert!(off.abs() < 1e-9, "{value} {expected}");
+        }
+    }
+
+    #[test]
+    fn rotors_whose_drag_goes_with_the_flow_lean_by_their_trim_in_any_wind() {
+        let mut vehicle = builtin("pixel").unwrap();
+        Role::RotorDrag.set(&mut vehicle, 0.008);
+        Role::RotorDragFlow.set(&mut vehicle, 0.7);
+        Role::BodyDragTop.set(&mut vehicle, 0.018);
+        Role::BodyDragSide.set(&mut vehicle, 0.012);
+        let law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY, 0.0);
+        let mut trim = Trim::of(&vehicle).unwrap();
+        for speed_mps in [2.0, 5.0, 9.0] {
+            for turn_deg in [0.0_f64, 20.0, 45.0] {
+                for climb_mps in [-2.0, 0.0, 3.0] {
+                    let (sin, cos) = turn_deg.to_radians().sin_cos();
+                    let velocity_mps = Vector3::new(cos * speed_mps, sin * speed_mps, climb_mps);
+                    let condition = Condition { velocity_mps, ..Condition::default() };
+                    let lean = trim.balance(&condition).unwrap().lean;
+                    let [x_mps, y_mps] = law.air([lean.x, lean.y], climb_mps);
+                    let off_mps = (x_mps - velocity_mps.x).hypot(y_mps - velocity_mps.y);
+                    let place = (speed_mps, turn_deg, climb_mps);
+                    assert!(off_mps < 0.1 + 0.1 * speed_mps, "{place:?}: {x_mps} {y_mps}");
+                }
+            }
         }
     }
 

@@ -58,5 +58,6 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         size_us: 0.0,
         rivals: Vec::new(),
         shape: None,
+        in_field: None,
     })
 }

@@ -15,8 +15,10 @@ use super::noise::{
     GRADIENT, GUST_TIME, GUSTS, Hyper, LEAST, OFFSETS, OWN, PULSE_NOISE, SHARED, SHARED_TIME,
     SIDE_GUSTS, SLOPES, WHITE,
 };
+use super::refine::Parameter;
 use super::regimes::regimes;
 use super::sensor::sensor;
+use super::stand_in::stand_in;
 use super::verdict::{
     DataUsed, Drones, Finding, Interval, Noise, Regime, Rung, SensorChannel, Step, VERDICT_SCHEMA,
     Verdict,
@@ -81,13 +83,17 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     if let (0, Some(value_us)) = (data.drones(), constant) {
         return Err(GapError::ConstantPulse { value_us });
     }
+    let stood_in: Vehicle;
+    let mut vehicle = input.vehicle;
     let simulated = match (input.simulated, input.plan) {
         (Some(flown), _) => {
             let values = data.averaged(flown, exponent);
             if let Some(value_us) = constant_us(values.iter().flatten().flatten(), exponent) {
                 return Err(GapError::ConstantSimulated { value_us });
             }
-            Simulated::Given { values, flew: input.vehicle, is_foreign: true }
+            stood_in = stand_in(&data, &values, input.vehicle, input.plan)?;
+            vehicle = &stood_in;
+            Simulated::Given { values, flew: vehicle, is_foreign: true }
         }
         (None, Some(plan)) => Simulated::Refly(plan),
         (None, None) if input.table.is_some() => Simulated::Closed,
@@ -100,21 +106,21 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     // A sensor that is off is repaired first: the pulse is then compared at the right speeds. So is a
     // lean that is off: the pulse is then compared in the right wind, at the right tilt.
-    let before = Comparison::new(&data, input.vehicle, &simulated, input.plan)?;
+    let before = Comparison::new(&data, vehicle, &simulated, input.plan)?;
     let wind = super::lean_channel::found(&before);
     let leans = super::lean_channel::step(&before, &wind, options.alpha);
-    let mut repaired = repaired(input.vehicle, &channel);
+    let mut repaired = repaired(vehicle, &channel);
     if channel.named {
         // What is late may be the log alone: then the model must not be made late.
         let late = Comparison::new(&data, &repaired, &simulated, input.plan)?;
         if late.raw_gap_us()? > before.raw_gap_us()? {
             channel.in_log = true;
-            repaired = input.vehicle.clone();
+            repaired = vehicle.clone();
         }
     }
     add_others(&mut repaired, leans.as_slice());
     let question = Question {
-        original: input.vehicle,
+        original: vehicle,
         repaired: &repaired,
         simulated: &simulated,
         plan: input.plan,
@@ -125,17 +131,18 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     let whole =
         Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps, Some(&before))?
             .feeling(&found.felt)
-            .spread_as(input.vehicle);
+            .spread_as(vehicle);
     if held.drones() > 0 && !found.parameters.is_empty() && found.extras.is_empty() {
         // The sizes that go into the model are those of all drones.
         found.refit(&whole)?;
         super::explain::settle(&mut found);
     }
+    super::in_field::tell(&mut found, vehicle)?;
     // The map of disagreement is drawn in the air that was found.
     let before = if updraft_mps == 0.0 {
         before
     } else {
-        Comparison::of(&data, input.vehicle, &simulated, plan, updraft_mps, Some(&before))?
+        Comparison::of(&data, vehicle, &simulated, plan, updraft_mps, Some(&before))?
     };
     let before = same_bins(&before, &whole);
     let held_slots: Vec<u16> = held.groups.iter().flat_map(|group| group.slots.clone()).collect();
@@ -150,13 +157,15 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         left_out,
     };
     let (differences, spread) = if found.extras.is_empty() {
-        drones(&whole, &found, input.vehicle, |slot| held_slots.contains(&slot))?
+        drones(&whole, &found, vehicle, |slot| held_slots.contains(&slot))?
     } else {
         (Drones::default(), None)
     };
     let mut steps = found.steps.clone();
     steps.extend(spread);
-    steps.extend(leans);
+    // Momentum drag on all axes took the place of what the leans told.
+    let instead = |one: &Parameter| Role::MomentumDrag.is_of(one.effect);
+    steps.extend(leans.filter(|_| !found.parameters.iter().any(instead)));
     let mut verdict = Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -178,7 +187,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     };
     verdict.ladder = ladder(&whole.data, &verdict.regimes);
     verdict.summary = summary(&verdict);
-    let mut model = model(input.vehicle, &found);
+    let mut model = model(vehicle, &found);
     add_others(&mut model, &verdict.steps);
     if verdict.sensor.named && !verdict.sensor.in_log {
         model = self::repaired(&model, &verdict.sensor);

@@ -163,7 +163,7 @@ fn round_from(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>, settles: 
 }
 
 /// Whether a coefficient makes a size that the effect can have.
-fn admissible(candidate: &Candidate, variant: &Variant, beta: f64) -> bool {
+pub(super) fn admissible(candidate: &Candidate, variant: &Variant, beta: f64) -> bool {
     let Some(size) = candidate.size else { return beta.abs() > 0.0 };
     if candidate.was_there {
         let moved = size.now + beta * (variant.size - size.now);

@@ -122,6 +122,21 @@ pub struct Step {
     pub rivals: Vec<Rival>,
     /// Shape that was found, for drawing.
     pub shape: Option<Shape>,
+    /// Its size in units of the field; absent: it is no effect in the model.
+    #[serde(default)]
+    pub in_field: Option<InField>,
+}
+
+/// The size of an effect in units of the field: of its change, where the model had it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct InField {
+    /// What it does to the pulse's response to vertical air speed in hover, us/(m/s).
+    pub response_us_per_mps: Interval,
+    /// Drag coefficient times area of a plate that would do the same between 3 m/s of climb and of descent, m²; absent:
+    /// it is no force on the body.
+    pub drag_m2: Option<Interval>,
+    /// Error of the vertical air speed of who leaves it out, m/s, standard deviation over the flight.
+    pub air_mps: Option<f64>,
 }
 
 /// What was found in a step.

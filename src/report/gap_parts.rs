@@ -12,8 +12,8 @@ use crate::gap::words::{member, phrase};
 use super::figures::gap::map::ORDER;
 use super::figures::gap::step;
 use super::gap_words::{
-    after_mps, depends_on, kind, lost, micro, minus, number, or_none, per_thousand, percent,
-    range_to, regime_title, with_unit,
+    after_mps, depends_on, in_field, kind, lost, micro, minus, number, or_none, per_thousand,
+    percent, range_to, regime_title, with_unit,
 };
 use super::page::{Gallery, capitalised};
 use super::text::{NONE, clean, count, fixed, reduced, sentence, signed, unit};
@@ -113,6 +113,7 @@ pub(super) fn step_section(found: &Step, number_of: usize, figures: &mut Gallery
         threshold => fixed(found.threshold_nats, 1),
         chance => per_thousand(found.alpha),
         size => fixed(found.size_us, 1),
+        in_field => found.in_field.as_ref().map(|size| micro(&in_field(size))),
         figure,
     }
 }

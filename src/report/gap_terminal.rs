@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::gap_parts::first_gap;
-use super::gap_words::{kind, left_over, lost, map_words, per_thousand, percent};
+use super::gap_words::{in_field, kind, left_over, lost, map_words, per_thousand, percent};
 use super::table::{Align, Column, column, lines};
 use super::text::{clean, count, fixed, reduced};
 use crate::base::layout;
@@ -121,6 +121,9 @@ fn say_step(page: &mut Page, number: usize, step: &Step) {
         ),
         4,
     );
+    if let Some(size) = &step.in_field {
+        page.say("", &format!("  in the field: {}", in_field(size)), 4);
+    }
     let own = |name: &str| match &step.finding {
         Finding::Unknown { depends_on, .. } => depends_on.name() == name,
         other => other.effects().contains(&name),

@@ -1,10 +1,10 @@
 //! Numbers and names of a verdict as people read them.
 
 use crate::gap::Dependence;
-use crate::gap::verdict::{Detectable, Finding, Interval, MapGain, Regime, Rest};
+use crate::gap::verdict::{Detectable, Finding, InField, Interval, MapGain, Regime, Rest};
 use crate::gap::words::short;
 
-use super::text::{NONE, clean, count, fixed, unit, usable};
+use super::text::{NONE, clean, count, fixed, signed, unit, usable};
 
 /// Foreign or generated text with `µs` where files say `us`.
 pub(super) fn micro(text: &str) -> String {
@@ -100,6 +100,18 @@ pub(super) fn left_over(rest: &Rest) -> String {
         // Enough by its gain: then it moves the pulse by too little, or the air may do the same.
         format!("{gains}, but moves the pulse by too little, or as the air may")
     }
+}
+
+/// The size of an effect in units of the field, as half a sentence.
+pub(super) fn in_field(size: &InField) -> String {
+    let ranged = |of: Interval, decimals: usize, unit: &str| {
+        format!("{} {unit} ({})", signed(of.value, decimals), range_to(of, decimals))
+    };
+    let mut parts = vec![ranged(size.response_us_per_mps, 1, "us/(m/s) in hover")];
+    parts.extend(size.drag_m2.map(|area| ranged(area, 4, "m² of drag area")));
+    let air = |mps: f64| format!("left out, it puts the air {} m/s off", fixed(mps, 2));
+    parts.extend(size.air_mps.map(air));
+    parts.join("; ")
 }
 
 /// A value with its unit.

@@ -13,7 +13,9 @@ use crate::vehicle::{RotorLaw, Vehicle, library};
 /// Climbs at which the two are compared, m/s: the ladders' and an updraft's.
 const CLIMBS_MPS: [f64; 7] = [-5.0, -3.3, -1.7, 0.0, 1.7, 3.3, 5.0];
 /// Horizontal air speeds, m/s.
-const HORIZONTALS_MPS: [f64; 4] = [0.0, 3.0, 6.0, 9.0];
+const HORIZONTALS_MPS: [f64; 5] = [0.0, 3.0, 6.0, 9.0, 12.0];
+/// Fastest climb and fastest horizontal air that are compared, and less of both together, m/s.
+const FASTEST_MPS: [f64; 2] = [6.0, 13.0];
 /// Heights above sea level, m.
 const AMSL_M: [f64; 2] = [195.0, 265.0];
 /// A lean of this weighs as much as 1 us, rad: what an attitude filter is good for.
@@ -60,18 +62,19 @@ const FITTED: [Fitted; 10] = [
     Fitted::Of(Role::RotorDragFlow),
 ];
 
-/// Where the search begins, and between which bounds each is kept.
+/// Where the search begins, and between which bounds each is kept: near where it ends for the middle of the plants
+/// that are drawn. From elsewhere it may end in a lesser place.
 const BOUNDS: [(f64, f64, f64); 10] = [
-    (1.0, 0.5, 2.0),
+    (1.45, 0.5, 3.0),
+    (4.5, 0.2, 10.0),
     (1.0, 0.2, 5.0),
-    (1.0, 0.2, 5.0),
-    (0.5, 0.02, 0.95),
-    (0.02, 1e-4, 0.5),
-    (0.01, 1e-4, 0.5),
-    (0.02, 1e-4, 0.1),
-    (0.3, 0.01, 0.95),
-    (0.2, 0.001, 1.0),
-    (0.5, 0.001, 1.0),
+    (0.4, 0.02, 0.95),
+    (0.018, 1e-4, 0.5),
+    (0.012, 1e-4, 0.5),
+    (0.007, 1e-4, 0.1),
+    (0.47, 0.01, 0.95),
+    (0.09, 0.001, 1.0),
+    (0.72, 0.001, 1.0),
 ];
 
 fn with(vehicle: &Vehicle, at: &DVector<f64>) -> Vehicle {
@@ -106,6 +109,10 @@ fn points(plant: &Plant) -> Vec<Point> {
         let trim = foreign_worlds::Trim::new(plant, Vec::new(), density);
         for climb_mps in CLIMBS_MPS {
             for horizontal_mps in HORIZONTALS_MPS {
+                // Nobody flies the fastest climbs in the strongest wind.
+                if (climb_mps / FASTEST_MPS[0]).hypot(horizontal_mps / FASTEST_MPS[1]) > 1.0 {
+                    continue;
+                }
                 let relative_mps = [horizontal_mps, 0.0, climb_mps];
                 let at = Foreign { relative_mps, density_ratio: density, ..Foreign::default() };
                 let Some(steady) = trim.at(&at) else { continue };

@@ -33,6 +33,7 @@ fn verdict(findings: Vec<Finding>) -> Verdict {
         size_us: 10.0,
         rivals: Vec::new(),
         shape: None,
+        in_field: None,
     };
     Verdict {
         schema: VERDICT_SCHEMA.to_owned(),

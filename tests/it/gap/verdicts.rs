@@ -50,6 +50,7 @@ pub(crate) fn verdict(findings: Vec<Finding>) -> Verdict {
         size_us: 20.0,
         rivals: Vec::new(),
         shape: None,
+        in_field: None,
     };
     Verdict {
         schema: VERDICT_SCHEMA.to_owned(),

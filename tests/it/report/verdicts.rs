@@ -34,6 +34,7 @@ fn step(finding: Finding, gain_nats: f64, rivals: Vec<Rival>) -> Step {
         size_us: 18.3,
         rivals,
         shape: Some(Shape { axis: "vertical velocity (m/s)".to_owned(), x, us }),
+        in_field: None,
     }
 }
 

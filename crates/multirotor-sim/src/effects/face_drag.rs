@@ -67,7 +67,7 @@ impl Effect for FaceDrag {
                     low: LEAST,
                     high: MOST,
                     default: top_of,
-                    role: None,
+                    role: Some(Role::FaceDragTop),
                 },
                 Parameter {
                     name: "sides",

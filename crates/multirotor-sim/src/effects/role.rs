@@ -22,6 +22,8 @@ pub enum Role {
     RotorDragFlow,
     /// Force of the rotors against horizontal air over mass, per air speed, 1/s.
     MomentumDrag,
+    /// Relative change of the drag of the airframe's own top and bottom face.
+    FaceDragTop,
     /// Relative change of the drag of the airframe's own side faces.
     FaceDragSide,
     /// Share of the geometric thrust that the rotors lose to their own inflow in hover.
@@ -137,12 +139,13 @@ impl Role {
 mod tests {
     use super::*;
 
-    const ONCE: [Role; 24] = [
+    const ONCE: [Role; 25] = [
         Role::BodyDragTop,
         Role::BodyDragSide,
         Role::RotorDrag,
         Role::RotorDragFlow,
         Role::MomentumDrag,
+        Role::FaceDragTop,
         Role::FaceDragSide,
         Role::InflowShare,
         Role::WindLift,

@@ -1,0 +1,228 @@
+//! Names that do not stand alone: an effect is named alone only where nothing else may be meant. What is in doubt
+//! becomes a class with what it may be instead.
+
+use super::backward::depend_on_the_same;
+use super::decide::{CONTEST_MARGINS, margin_nats};
+use super::dependence::Dependence;
+use super::explain::Found;
+use super::refine::{Parameter, half_interval};
+use super::verdict::{Finding, Step};
+use crate::effects::{Role, Signal, find};
+
+/// A value this near to the end of its range, as a share of the range, is at the end. Numerical.
+const AT_BOUND: f64 = 1e-3;
+/// An unknown that explains more than this share of what a name explains may be the same. Chosen.
+const UNKNOWN_SHARE: f64 = 0.5;
+/// Share of a larger effect's size below which another form of that one may be meant. Chosen: other forms of the same
+/// physics left up to a seventh.
+const SMALL: f64 = 0.2;
+
+/// Makes classes of the names in doubt at the end of a search.
+pub(super) fn review(found: &mut Found) {
+    at_their_bounds(found);
+    beside_something_unknown(&mut found.steps);
+    beside_something_larger(&mut found.steps);
+}
+
+/// An effect that is named alone, and was not in the model.
+fn new_name(step: &Step) -> Option<&str> {
+    match &step.finding {
+        Finding::Name { effect, was_there: false, .. } => Some(effect),
+        _ => None,
+    }
+}
+
+/// Makes a class of a name and others, if there are any.
+fn doubt(step: &mut Step, others: impl IntoIterator<Item = String>) {
+    let Finding::Name { effect, parameters, .. } = &step.finding else { return };
+    let mut effects = vec![effect.clone()];
+    effects.extend(others);
+    if effects.len() > 1 {
+        step.finding = Finding::Class { effects, parameters: parameters.clone() };
+    }
+}
+
+/// The effect of the library that explains most beside the named one.
+fn best_rival(step: &Step, effect: &str) -> Option<String> {
+    let mut others = step.rivals.iter().filter(|rival| !rival.generic && rival.name != effect);
+    others.next().map(|rival| rival.name.clone())
+}
+
+/// Names with a size at the end of what the effect can have, or that may be none: the fit wanted something else, and
+/// the rival that explains most stands for it.
+fn at_their_bounds(found: &mut Found) {
+    let half = half_interval(&found.comparison, &found.hyper);
+    for step in &mut found.steps {
+        let Some(effect) = new_name(step).map(str::to_owned) else { continue };
+        // What leans bound is told by them.
+        if Role::MomentumDrag.is_of(&effect) {
+            continue;
+        }
+        let own = found.parameters.iter().zip(&found.values);
+        let mut own = own.filter(|(parameter, _)| parameter.effect == effect).enumerate();
+        let is_in_doubt =
+            |(place, (parameter, (value, se))): (usize, (&Parameter, &(f64, f64)))| {
+                let (low, high) = parameter.bounds;
+                let near = AT_BOUND * (high - low);
+                // The first parameter of an effect is its size.
+                let may_be_none = place == 0 && value.abs() < half * se;
+                may_be_none || !(low + near..=high - near).contains(value)
+            };
+        if own.any(is_in_doubt) {
+            let other = best_rival(step, &effect);
+            doubt(step, other);
+        }
+    }
+}
+
+/// Names beside something unknown that may be the same: what was found together with it, and what depends on the same
+/// and explains hardly more.
+fn beside_something_unknown(steps: &mut [Step]) {
+    let unknown: Vec<(usize, Dependence, f64)> = steps
+        .iter()
+        .enumerate()
+        .filter_map(|(place, step)| match &step.finding {
+            Finding::Unknown { depends_on, .. } => Some((place, *depends_on, step.gain_nats)),
+            Finding::Name { .. } | Finding::Class { .. } => None,
+        })
+        .collect();
+    for (place, step) in steps.iter_mut().enumerate() {
+        let Some(effect) = new_name(step) else { continue };
+        let near = unknown.iter().find(|(of, depends_on, gain_nats)| {
+            let alike = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal));
+            *of < place || alike && *gain_nats > UNKNOWN_SHARE * step.gain_nats
+        });
+        let other = near.map(|(_, depends_on, _)| depends_on.name().to_owned());
+        doubt(step, other);
+    }
+}
+
+/// Names that are small beside a larger finding that depends on the same: the larger one's form may be another.
+fn beside_something_larger(steps: &mut [Step]) {
+    let sizes: Vec<(String, f64)> = steps
+        .iter()
+        .filter_map(|step| Some(((*step.finding.effects().first()?).to_owned(), step.size_us)))
+        .collect();
+    for step in steps {
+        let Some(effect) = new_name(step).map(str::to_owned) else { continue };
+        let is_small_beside = |(other, size_us): &(String, f64)| {
+            step.size_us < SMALL * size_us && depend_on_the_same(&effect, other)
+        };
+        if sizes.iter().any(is_small_beside) {
+            let other = best_rival(step, &effect);
+            doubt(step, other);
+        }
+    }
+}
+
+/// Names that a free shape, which could not be taken in, is left beside: an effect is named alone only if it leaves
+/// nothing of its kind.
+pub(super) fn beside_what_was_taken_back(steps: &mut [Step], free: Option<&Step>) {
+    let Some(Step { finding: Finding::Unknown { depends_on, .. }, .. }) = free else { return };
+    let looks = |name: &str| signals_of(name).iter().any(|signal| depends_on.is_of(*signal));
+    for step in steps {
+        let Some(effect) = new_name(step).filter(|effect| looks(effect)) else { continue };
+        let near = step.gain_nats - CONTEST_MARGINS * margin_nats(step.gain_nats);
+        let rivals = step.rivals.iter().filter(|rival| {
+            !rival.generic && rival.name != effect && rival.gain_nats > near && looks(&rival.name)
+        });
+        let others: Vec<String> = rivals.map(|rival| rival.name.clone()).collect();
+        doubt(step, others);
+    }
+}
+
+/// Signals that an effect depends on.
+fn signals_of(effect: &str) -> &'static [Signal] {
+    find(effect).map_or(&[], |effect| effect.definition().signals)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::super::verdict::Rival;
+    use super::*;
+    use crate::gap::refine::size_of;
+
+    fn step(finding: Finding, gain_nats: f64, size_us: f64, rivals: &[&str]) -> Step {
+        let rival =
+            |name: &&str| Rival { name: (*name).to_owned(), generic: false, gain_nats: 9.0 };
+        Step {
+            finding,
+            gain_nats,
+            threshold_nats: 8.0,
+            alpha: 0.005,
+            size_us,
+            rivals: rivals.iter().map(rival).collect(),
+            shape: None,
+            in_field: None,
+        }
+    }
+
+    fn name(effect: &str) -> Finding {
+        Finding::Name { effect: effect.to_owned(), parameters: Vec::new(), was_there: false }
+    }
+
+    fn unknown(depends_on: Dependence) -> Finding {
+        Finding::Unknown { depends_on, formula: None }
+    }
+
+    fn told(steps: &[Step]) -> Vec<String> {
+        steps.iter().map(|step| step.finding.effects().join(" ")).collect()
+    }
+
+    #[test]
+    fn a_size_at_its_end_or_that_may_be_none_names_nothing_alone() {
+        let data = trial::data(2, |_, _| 0.0);
+        let of = |value: f64, se: f64| {
+            let mut found = Found::nothing(trial::comparison(&data));
+            found.steps = vec![step(name("thrust-curve"), 50.0, 9.0, &["thrust-curve", "battery"])];
+            found.parameters = size_of("thrust-curve", "expo").into_iter().collect();
+            found.values = vec![(value, se)];
+            at_their_bounds(&mut found);
+            told(&found.steps).remove(0)
+        };
+        assert_eq!(of(0.5, 0.05), "thrust-curve");
+        assert_eq!(of(1.0, 0.05), "thrust-curve battery", "the end of its range");
+        assert_eq!(of(0.5, 0.4), "thrust-curve battery", "it may be none");
+    }
+
+    #[test]
+    fn what_is_beside_something_unknown_is_not_named_alone() {
+        let of = |first: Finding, gain_nats: f64, then: Finding| {
+            let mut steps = vec![step(first, gain_nats, 9.0, &[]), step(then, 50.0, 9.0, &[])];
+            beside_something_unknown(&mut steps);
+            told(&steps)
+        };
+        let climb = || unknown(Dependence::Climb);
+        assert_eq!(of(name("face-drag"), 101.0, climb())[0], "face-drag");
+        assert_eq!(of(name("face-drag"), 99.0, climb())[0], "face-drag climb");
+        assert_eq!(
+            of(name("battery"), 99.0, climb())[0],
+            "battery",
+            "it depends on something else"
+        );
+        assert_eq!(of(climb(), 9.0, name("battery"))[1], "battery climb", "found together with it");
+    }
+
+    #[test]
+    fn what_is_small_beside_its_like_may_be_its_form() {
+        let of = |effect: &str, size_us: f64| {
+            let small = step(name(effect), 20.0, size_us, &["vortex-ring"]);
+            let mut steps = vec![step(name("rotor-inflow"), 300.0, 30.0, &[]), small];
+            beside_something_larger(&mut steps);
+            assert_eq!(told(&steps)[0], "rotor-inflow");
+            told(&steps).remove(1)
+        };
+        assert_eq!(of("thrust-curve", 6.1), "thrust-curve");
+        assert_eq!(of("thrust-curve", 5.9), "thrust-curve vortex-ring");
+        assert_eq!(of("motor-thermal", 5.9), "motor-thermal", "it depends on something else");
+    }
+
+    #[test]
+    fn what_a_shape_is_left_beside_has_the_rivals_of_that_kind() {
+        let free = step(unknown(Dependence::Climb), 30.0, 9.0, &[]);
+        let mut steps = vec![step(name("face-drag"), 15.0, 9.0, &["vortex-ring", "battery"])];
+        beside_what_was_taken_back(&mut steps, Some(&free));
+        assert_eq!(told(&steps), ["face-drag vortex-ring"]);
+    }
+}
