@@ -6,7 +6,7 @@ use super::decide::{CONTEST_MARGINS, margin_nats};
 use super::dependence::Dependence;
 use super::explain::Found;
 use super::refine::{Parameter, half_interval};
-use super::verdict::{Finding, Step};
+use super::verdict::{Finding, Rival, Step};
 use crate::effects::{Role, Signal, find};
 
 /// A value this near to the end of its range, as a share of the range, is at the end. Numerical.
@@ -16,6 +16,9 @@ const UNKNOWN_SHARE: f64 = 0.5;
 /// Share of a larger effect's size below which another form of that one may be meant. Chosen: other forms of the same
 /// physics left up to a seventh.
 const SMALL: f64 = 0.2;
+
+/// Share of a name's gain that a rival must have to stand for it. Chosen.
+const RIVAL_SHARE: f64 = 0.25;
 
 /// Makes classes of the names in doubt at the end of a search.
 pub(super) fn review(found: &mut Found) {
@@ -42,10 +45,12 @@ fn doubt(step: &mut Step, others: impl IntoIterator<Item = String>) {
     }
 }
 
-/// The effect of the library that explains most beside the named one.
+/// The effect of the library that explains most beside the named one, if it comes near.
 fn best_rival(step: &Step, effect: &str) -> Option<String> {
-    let mut others = step.rivals.iter().filter(|rival| !rival.generic && rival.name != effect);
-    others.next().map(|rival| rival.name.clone())
+    let least = RIVAL_SHARE * step.gain_nats;
+    let is_near =
+        |rival: &&Rival| !rival.generic && rival.name != effect && rival.gain_nats > least;
+    step.rivals.iter().find(is_near).map(|rival| rival.name.clone())
 }
 
 /// Names with a size at the end of what the effect can have, or that may be none: the fit wanted something else, and
@@ -105,13 +110,10 @@ fn beside_something_larger(steps: &mut [Step]) {
         .collect();
     for step in steps {
         let Some(effect) = new_name(step).map(str::to_owned) else { continue };
-        let is_small_beside = |(other, size_us): &(String, f64)| {
+        let larger = sizes.iter().find(|(other, size_us)| {
             step.size_us < SMALL * size_us && depend_on_the_same(&effect, other)
-        };
-        if sizes.iter().any(is_small_beside) {
-            let other = best_rival(step, &effect);
-            doubt(step, other);
-        }
+        });
+        doubt(step, larger.map(|(other, _)| other.clone()));
     }
 }
 
@@ -139,7 +141,6 @@ fn signals_of(effect: &str) -> &'static [Signal] {
 #[cfg(test)]
 mod tests {
     use super::super::trial;
-    use super::super::verdict::Rival;
     use super::*;
     use crate::gap::refine::size_of;
 
@@ -173,17 +174,20 @@ mod tests {
     #[test]
     fn a_size_at_its_end_or_that_may_be_none_names_nothing_alone() {
         let data = trial::data(2, |_, _| 0.0);
-        let of = |value: f64, se: f64| {
+        let of_gain = |gain_nats: f64, value: f64, se: f64| {
             let mut found = Found::nothing(trial::comparison(&data));
-            found.steps = vec![step(name("thrust-curve"), 50.0, 9.0, &["thrust-curve", "battery"])];
+            let rivals = &["thrust-curve", "battery"];
+            found.steps = vec![step(name("thrust-curve"), gain_nats, 9.0, rivals)];
             found.parameters = size_of("thrust-curve", "expo").into_iter().collect();
             found.values = vec![(value, se)];
             at_their_bounds(&mut found);
             told(&found.steps).remove(0)
         };
+        let of = |value: f64, se: f64| of_gain(35.0, value, se);
         assert_eq!(of(0.5, 0.05), "thrust-curve");
         assert_eq!(of(1.0, 0.05), "thrust-curve battery", "the end of its range");
         assert_eq!(of(0.5, 0.4), "thrust-curve battery", "it may be none");
+        assert_eq!(of_gain(37.0, 1.0, 0.05), "thrust-curve", "no rival is near");
     }
 
     #[test]
@@ -214,7 +218,7 @@ mod tests {
             told(&steps).remove(1)
         };
         assert_eq!(of("thrust-curve", 6.1), "thrust-curve");
-        assert_eq!(of("thrust-curve", 5.9), "thrust-curve vortex-ring");
+        assert_eq!(of("thrust-curve", 5.9), "thrust-curve rotor-inflow");
         assert_eq!(of("motor-thermal", 5.9), "motor-thermal", "it depends on something else");
     }
 

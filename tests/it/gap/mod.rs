@@ -1,4 +1,5 @@
-//! The flight that would tell.
+//! The search for missing physics, and the flight that would tell.
 
 mod next;
+mod plants;
 pub(crate) mod verdicts;

@@ -1,0 +1,37 @@
+//! One plant's logs against another's: the firmware's own simulator as it is, and with a drag that is a plain square.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::cli::support::Bench;
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/dataflash/tests/data").join(name)
+}
+
+#[test]
+fn what_two_plants_differ_in_is_named_though_it_is_several_things() {
+    let bench = Bench::new();
+    let (measured, simulated) =
+        (fixture("ladder-still.trimmed.BIN"), fixture("square-law-ladder.trimmed.BIN"));
+    let (measured, simulated) = (measured.to_str().unwrap(), simulated.to_str().unwrap());
+    let args = ["gap", "--measured", measured, "--simulated", simulated, "--json", "-o", "gap"];
+    let verdict = &bench.expect(0, &args).json("updraft.gap/1")["verdict"];
+    let steps = verdict["steps"].as_array().unwrap();
+    let of = |step: &Value| (step["finding"]["kind"].clone(), step["finding"].clone());
+    let found: Vec<(Value, Value)> = steps.iter().map(of).collect();
+    assert_eq!(found.len(), 2, "{verdict}");
+    // Its body drags by (8/15.08)² of the square plant's; the thrust curve adds nothing beside that in steady climbs.
+    let names: Vec<(Option<&str>, Option<&str>)> =
+        found.iter().map(|(kind, finding)| (kind.as_str(), finding["effect"].as_str())).collect();
+    assert_eq!(names, [(Some("name"), Some("face-drag")), (Some("name"), Some("momentum-drag"))]);
+    let (_, name) = &found[1];
+    // The frame has 0.2 1/s.
+    let value = &name["parameters"][0]["value"];
+    let ends = ["low", "high"].map(|end| value[end].as_f64().unwrap());
+    assert!(ends[0] > 0.1 && ends[1] < 0.4, "{value}");
+    let gap = &verdict["gap"]["rungs"];
+    let us = |side: &str| gap[side]["value"].as_f64().unwrap();
+    assert!(us("after_us") < 0.1 * us("before_us"), "{gap}");
+}
