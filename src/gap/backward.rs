@@ -2,13 +2,13 @@
 //! it.
 
 use super::compare::Comparison;
+use super::dependence::depend_on_the_same;
 use super::error::GapError;
 use super::explain::Found;
 use super::gls::{Problem, Split};
 use super::refine::{Parameter, doubts, slopes};
 use super::refly::mean_drone;
 use super::response::shifted;
-use crate::effects::{Signal, find};
 use crate::vehicle::Vehicle;
 
 /// A vehicle with one effect as it was.
@@ -32,7 +32,7 @@ const KEPT_Z: f64 = 3.0;
 /// Share of an effect's trace that its form may be off by: other forms of the same physics (a linear inflow, a round
 /// body's drag) left a second effect of a few hundredths. Chosen, three times the error of sizes in
 /// [`super::refine`].
-const FORM_SHARE: f64 = 0.1;
+const WITHIN_FORM: f64 = 0.1;
 
 /// An effect that is no more than what the form of a larger one is not known by: small beside it, and dependent on
 /// the same.
@@ -40,20 +40,9 @@ fn within_the_form(traces: &[(&'static str, f64)]) -> Option<&'static str> {
     let (largest, most_us) = *traces.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let (small, _) = *traces
         .iter()
-        .filter(|(_, us)| *us < FORM_SHARE * most_us)
+        .filter(|(_, us)| *us < WITHIN_FORM * most_us)
         .find(|(effect, _)| depend_on_the_same(effect, largest))?;
     Some(small)
-}
-
-/// Whether two effects depend on a common signal; the model's increments are those of climb.
-pub(super) fn depend_on_the_same(one: &str, other: &str) -> bool {
-    let of = |signal: Signal| if signal == Signal::ModelIncrement { Signal::Climb } else { signal };
-    let signals = |effect: &str| -> Vec<Signal> {
-        let signals = find(effect).map_or(&[][..], |effect| effect.definition().signals);
-        signals.iter().map(|signal| of(*signal)).collect()
-    };
-    let others = signals(other);
-    signals(one).iter().any(|signal| others.contains(signal))
 }
 
 impl Found {
@@ -98,5 +87,19 @@ impl Found {
         self.vehicle = taken_back(&self.vehicle, effect, original);
         self.parameters.retain(|parameter| parameter.effect != effect);
         self.steps.retain(|step| step.finding.effects().first() != Some(&effect));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_within_a_tenth_of_its_like_is_its_form() {
+        let beside = |effect, us| within_the_form(&[("rotor-inflow", 30.0), (effect, us)]);
+        assert_eq!(beside("thrust-curve", 2.9), Some("thrust-curve"));
+        assert_eq!(beside("thrust-curve", 3.1), None);
+        assert_eq!(beside("motor-thermal", 2.9), None, "it depends on something else");
+        assert_eq!(within_the_form(&[("rotor-inflow", 30.0)]), None);
     }
 }

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 
 use super::compare::Comparison;
 use super::gls::{Column, Solution};
+use super::lean::GRAVITY;
 use super::noise::{GroupPattern, Hyper};
 use super::response::{self, Response};
 use super::scene::Scene;
@@ -258,9 +259,6 @@ pub(super) fn axial_drag(
     let size = Some(size);
     Ok(Some(Candidate { name: definition.name, was_there: false, by_lean: false, size, variants }))
 }
-
-/// Standard gravity, m/s².
-const GRAVITY: f64 = 9.80665;
 
 /// Share of the response that a form must change before the scatter between drones is asked about it.
 /// Chosen, not measured: a smaller change is lost in the estimate of the gusts.

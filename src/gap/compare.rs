@@ -224,8 +224,11 @@ impl Comparison {
     #[must_use]
     pub(super) fn in_updraft(mut self, updraft_mps: f64) -> Self {
         self.scene = self.scene.in_updraft(updraft_mps);
+        if !self.reads_wind(&self.vehicle) {
+            return self;
+        }
         let law = lean_law(&self.vehicle, self.amsl_m, updraft_mps);
-        if self.reads_wind(&self.vehicle) && !law.reads_as(self.read_by) {
+        if !law.reads_as(self.read_by) {
             self.wind = self.wind_by(law);
             self.scene = self.scene.blown(&self.wind);
             self.read_by = law;

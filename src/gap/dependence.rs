@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::effects::Signal;
+use crate::effects::{Signal, find};
 
 /// Quantity along which a residual is held apart, or on which a free shape depends.
 ///
@@ -80,6 +80,18 @@ impl Dependence {
     pub fn is_of_drones(self) -> bool {
         matches!(self, Self::Place | Self::Drone)
     }
+}
+
+/// Signals that an effect of the library depends on.
+pub(super) fn signals_of(effect: &str) -> &'static [Signal] {
+    find(effect).map_or(&[], |effect| effect.definition().signals)
+}
+
+/// Whether two effects depend on a common signal; the model's increments are those of climb.
+pub(super) fn depend_on_the_same(one: &str, other: &str) -> bool {
+    let of = |signal: Signal| if signal == Signal::ModelIncrement { Signal::Climb } else { signal };
+    let is_shared = |signal: &Signal| signals_of(other).iter().any(|one| of(*one) == of(*signal));
+    signals_of(one).iter().any(is_shared)
 }
 
 const ALL: [Dependence; 11] = [

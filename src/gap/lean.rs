@@ -14,7 +14,7 @@ use crate::sim::plant::trim::{Condition, Trim};
 use crate::vehicle::Vehicle;
 
 /// Standard gravity, m/s².
-const GRAVITY: f64 = 9.80665;
+pub(super) const GRAVITY: f64 = 9.80665;
 /// Below this slope of the lean a bin's own lean says less than the flight's mean wind, rad/(m/s): noise of
 /// the attitude of 0.1 degrees would be 0.4 m/s. Chosen.
 const LEAST_SLOPE: f64 = 0.004;

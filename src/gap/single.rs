@@ -1,13 +1,12 @@
 //! Names that do not stand alone: an effect is named alone only where nothing else may be meant. What is in doubt
 //! becomes a class with what it may be instead.
 
-use super::backward::depend_on_the_same;
 use super::decide::{CONTEST_MARGINS, margin_nats};
-use super::dependence::Dependence;
+use super::dependence::{Dependence, depend_on_the_same, signals_of};
 use super::explain::Found;
 use super::refine::{Parameter, half_interval};
 use super::verdict::{Finding, Rival, Step};
-use crate::effects::{Role, Signal, find};
+use crate::effects::Role;
 
 /// A value this near to the end of its range, as a share of the range, is at the end. Numerical.
 const AT_BOUND: f64 = 1e-3;
@@ -131,11 +130,6 @@ pub(super) fn beside_what_was_taken_back(steps: &mut [Step], free: Option<&Step>
         let others: Vec<String> = rivals.map(|rival| rival.name.clone()).collect();
         doubt(step, others);
     }
-}
-
-/// Signals that an effect depends on.
-fn signals_of(effect: &str) -> &'static [Signal] {
-    find(effect).map_or(&[], |effect| effect.definition().signals)
 }
 
 #[cfg(test)]

@@ -8,12 +8,13 @@ use rayon::prelude::*;
 use super::candidates::Candidate;
 use super::contest::{Contest, Free, before, entered};
 use super::decide::{CLASS_NATS, What};
+use super::dependence::signals_of;
 use super::error::GapError;
 use super::gls::{Column, Problem};
 use super::noise::Hyper;
 use super::refine::{Parameter, parameters_of};
 use super::search::{FLOOR_NATS, FREE_FLOOR_NATS, Ranked, RankedGeneric, admissible};
-use crate::effects::{Role, Signal, find};
+use crate::effects::{Role, Signal};
 use crate::vehicle::Vehicle;
 
 /// As many effects are tried together at most. Chosen: with more, smooth curves explain anything.
@@ -71,7 +72,7 @@ impl Contest<'_> {
     fn sets(&self, problem: &Problem<'_>, free: &RankedGeneric) -> Vec<Set> {
         let depends_on = self.sought.generics[free.generic].depends_on;
         let looks = |candidate: &Candidate| {
-            let signals = find(candidate.name).map_or(&[][..], |e| e.definition().signals);
+            let signals = signals_of(candidate.name);
             signals.iter().any(|one| depends_on.is_of(*one) || *one == Signal::ModelIncrement)
         };
         let is_plain = |candidate: &Candidate| candidate.size.is_some() && !candidate.by_lean;
