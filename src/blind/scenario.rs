@@ -294,7 +294,7 @@ impl Scenario {
     /// Draws a flight in a foreign world.
     fn foreign(seed: u64, cell: &Cell) -> Result<Self, BlindError> {
         let world = worlds::draw::world(seed, cell)?;
-        let known = worlds::known::vehicle(&world, cell.base)?;
+        let known = worlds::known::vehicle(&world, cell)?;
         let left_over_us = Some(known.largest_us);
         let hidden = worlds::draw::truths(&world, &known.vehicle);
         // The drones that are charged and lost are drawn as at home; the rest stands in the world.

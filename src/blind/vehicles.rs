@@ -78,7 +78,7 @@ impl Base {
 pub fn true_vehicle(scenario: &Scenario, slot: u16) -> Result<Vehicle, BlindError> {
     if let Some(world) = &scenario.world {
         // No file is a foreign plant with what is hidden: the known one is the nearest.
-        return Ok(worlds::known::vehicle(world, scenario.cell.base)?.vehicle);
+        return Ok(worlds::known::vehicle(world, &scenario.cell)?.vehicle);
     }
     let mut vehicle = scenario.cell.base.known()?;
     let rest = &scenario.nuisance;

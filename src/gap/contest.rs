@@ -80,7 +80,10 @@ impl Contest<'_> {
         );
         let (members, in_full) = (members?, in_full?);
         let Some((best, first)) = members.first() else { return Ok(what) };
-        let mut or_else = None;
+        let mut or_else = match &what {
+            What::Effects { or_else, .. } => or_else.clone(),
+            _ => None,
+        };
         if let (Some(best), Some(product), Some(in_full)) = (best, product, in_full) {
             let more = in_full - best;
             if more > PRODUCT_NATS && product.gain > first.gain + CLASS_NATS {
@@ -115,9 +118,18 @@ impl Contest<'_> {
         problem: &Problem<'_>,
         rivals: Vec<Ranked>,
     ) -> Result<Vec<(Option<f64>, Ranked)>, GapError> {
-        let standings: Result<Vec<Option<f64>>, GapError> =
-            rivals.par_iter().map(|rival| self.standing(rival)).collect();
-        let standings = standings?;
+        let standings: Vec<_> = rivals.par_iter().map(|rival| self.standing(rival)).collect();
+        // Who cannot fly this flight, once sizes and gusts have settled, explains nothing of it.
+        let (standings, rivals): (Vec<_>, Vec<_>) = standings
+            .into_iter()
+            .zip(rivals)
+            .filter_map(|(standing, rival)| match standing {
+                Err(error) if error.is_not_flown() => None,
+                standing => Some(standing.map(|standing| (standing, rival))),
+            })
+            .collect::<Result<Vec<_>, GapError>>()?
+            .into_iter()
+            .unzip();
         let best = standings.iter().flatten().copied().reduce(f64::max);
         let most = rivals.iter().map(|rival| rival.gain).fold(0.0, f64::max);
         let leader =

@@ -151,13 +151,17 @@ pub(super) fn decide(
     // A ladder whose rungs grow makes a response that grows with time look like drag, and a step early in
     // the flight looks like motors that warm up: what has hardly more numbers than an effect must not be
     // better.
-    let simple = round.generics.iter().find(|free| {
-        let simple = SIMPLE.iter().find(|one| one.0 == sought.generics[free.generic].depends_on);
-        free.size_us >= material_us
-            && free.plain > FREE_FLOOR_NATS
-            && simple.is_some_and(|(_, more)| free.gain > limits.generic.max(best_gain + more))
-    });
-    if let Some(simple) = simple {
+    let simple = |share_of_more: f64| {
+        round.generics.iter().find(|free| {
+            let depends_on = sought.generics[free.generic].depends_on;
+            let simple = SIMPLE.iter().find(|one| one.0 == depends_on);
+            let needed = |more: f64| limits.generic.max(best_gain + share_of_more * more);
+            free.size_us >= material_us
+                && free.plain > FREE_FLOOR_NATS
+                && simple.is_some_and(|(_, more)| free.gain > needed(*more))
+        })
+    };
+    if let Some(simple) = simple(1.0) {
         return Decision { what: What::Free(simple.clone()), thresholds: limits };
     }
     let Some(best) = best.filter(|best| best.gain > limits.library) else {
@@ -175,7 +179,10 @@ pub(super) fn decide(
     };
     let mut members = vec![best.clone()];
     members.extend(round.library.iter().filter(alike).cloned());
-    Decision { what: What::Effects { members, or_else: None }, thresholds: limits }
+    // A step that is better, though not by as much, is a doubt; the product has a contest of its own.
+    let is_step = |free: &&RankedGeneric| sought.generics[free.generic].depends_on != PRODUCT;
+    let or_else = simple(0.0).filter(is_step).cloned();
+    Decision { what: What::Effects { members, or_else }, thresholds: limits }
 }
 
 /// Gains above this need no bootstrap of the threshold, nats: the largest gain in 440 flights with nothing
@@ -311,8 +318,8 @@ mod tests {
                 What::Free(free) => ("free", vec![free.generic]),
                 What::Together { .. } => panic!("not decided here"),
                 What::Effects { members, or_else } => {
-                    assert!(or_else.is_none());
-                    ("effects", members.iter().map(|member| member.candidate).collect())
+                    let what = if or_else.is_some() { "effects or a step" } else { "effects" };
+                    (what, members.iter().map(|member| member.candidate).collect())
                 }
             }
         }
@@ -376,7 +383,10 @@ mod tests {
         assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(0, 25.0)]).0, "effects");
         assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(0, 25.0 + 1e-9)]).0, "free");
         // A shape of a number or two by some nats.
-        assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(2, 22.5)]).0, "effects");
+        assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(2, 20.0)]).0, "effects");
+        let little_more = case.decided(&[ranked(0, 20.0)], &[free(2, 20.0 + 1e-9)]).0;
+        assert_eq!(little_more, "effects or a step");
+        assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(2, 22.5)]).0, "effects or a step");
         assert_eq!(case.decided(&[ranked(0, 20.0)], &[free(2, 22.5 + 1e-9)]).0, "free");
         assert_eq!(case.decided(&[ranked(0, 30.0)], &[free(3, 36.0)]).0, "effects");
         assert_eq!(case.decided(&[ranked(0, 30.0)], &[free(3, 36.0 + 1e-9)]).0, "free");

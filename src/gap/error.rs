@@ -62,6 +62,13 @@ pub enum GapError {
     Effect(#[from] EffectError),
 }
 
+impl GapError {
+    /// Whether it is that the vehicle cannot fly steadily as it would have to.
+    pub(super) fn is_not_flown(&self) -> bool {
+        matches!(self, Self::Effect(EffectError::NotFlown { .. }))
+    }
+}
+
 /// Reasons one below the other; the first ten.
 fn listed(reasons: &[LeftOut]) -> String {
     reasons.iter().take(10).fold(String::new(), |text, reason| format!("{text}\n  {reason}"))

@@ -162,8 +162,20 @@ pub fn search(
         last,
     };
     for step in 0..=options.most_steps {
-        if !search.takes_step(step)? {
-            break;
+        let before = (search.comparison.clone(), search.found.clone());
+        match search.takes_step(step) {
+            Ok(true) => {}
+            Ok(false) => break,
+            Err(error) if error.is_not_flown() => {
+                if search.gives_up(before) {
+                    continue;
+                }
+                if search.found.steps.is_empty() {
+                    return Err(error);
+                }
+                break;
+            }
+            Err(error) => return Err(error),
         }
     }
     let mut found = search.found;
@@ -288,6 +300,19 @@ impl Search<'_> {
         }
         self.fly_again()?;
         Ok(true)
+    }
+
+    /// Goes back to before a step with which the model cannot fly this flight, and refuses what it took up; whether it
+    /// had taken up anything.
+    fn gives_up(&mut self, (comparison, found): (Comparison, Found)) -> bool {
+        let is_known = |effect: &str| found.parameters.iter().any(|one| one.effect == effect);
+        let taken = self.found.parameters.iter().map(|one| one.effect);
+        let taken: Vec<&'static str> = taken.filter(|effect| !is_known(effect)).collect();
+        let took_up = !taken.is_empty();
+        self.refused.extend(taken);
+        self.comparison = comparison;
+        self.found = found;
+        took_up
     }
 
     /// What is left in the updraft that explains most, or in still air with the effect that explains most: what

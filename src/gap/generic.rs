@@ -39,6 +39,10 @@ const GROWTHS: [fn(f64) -> f64; 2] =
 /// Instants at which a step is tried: every ten seconds of a ladder. 15 at first; the finer grid costs a
 /// logarithm of their ratio in the penalty, 1.1 nats.
 const STEPS: usize = 47;
+/// Shortest period of a swing that is tried, s: ten bins.
+const SHORTEST_SWING_S: f64 = 30.0;
+/// Quarter turns of the slowest swing that is tried: what turns less is a curve in time.
+const FEWEST_QUARTERS: usize = 8;
 /// Step of the derivative by vertical air speed, m/s. Numerical.
 const SLOPE_STEP: f64 = 0.01;
 /// A charge that changes by less, as a share, says nothing. Chosen.
@@ -66,7 +70,9 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     found.extend(smooth(Dependence::Wind, "horizontal air speed (m/s)", &wind, 3, 1.5));
     found.extend(waves(&height));
     found.push(climb_times_time(&climb, &time));
+    found.extend(swings(&time));
     found.extend(steps(&time));
+    found.extend(changes(&climb, &time));
     found.extend(scene.charge().as_ref().and_then(by_charge));
     found.extend(directions(scene, headings));
     found
@@ -112,17 +118,64 @@ fn climb_times_time(climb: &[Vec<f64>], time: &[Vec<f64>]) -> Generic {
     }
 }
 
+/// Swings in time with one period, from [`SHORTEST_SWING_S`] to half of the flight. Neighbours differ by a
+/// quarter of a turn over the whole flight, so that between them a twentieth of a swing's square is lost at most.
+fn swings(time: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
+    let span_s = span(time);
+    let most = if span_s.is_finite() { (4.0 * span_s / SHORTEST_SWING_S) as usize } else { 0 };
+    let count = most.saturating_sub(FEWEST_QUARTERS - 1);
+    (FEWEST_QUARTERS..=most).map(move |quarters| {
+        let per_s = std::f64::consts::FRAC_PI_2 * quarters as f64 / span_s;
+        let phase = |of: fn(f64) -> f64| Column::Shared(map(time, &|t| of(per_s * t)));
+        Generic {
+            depends_on: Dependence::Time,
+            axis: "time since arming (s)",
+            columns: vec![phase(f64::sin), phase(f64::cos)],
+            felt: Vec::new(),
+            along: time.to_vec(),
+            penalty: 2.0 + (count as f64).ln(),
+        }
+    })
+}
+
+/// Instants spread over the flight, s.
+fn instants(time: &[Vec<f64>]) -> impl Iterator<Item = f64> {
+    let (first, span) = (least(time), span(time));
+    (1..=STEPS).map(move |step| first + span * step as f64 / (STEPS + 1) as f64)
+}
+
+/// Zero before an instant and one after it.
+fn after(time: &[Vec<f64>], at_s: f64) -> Vec<Vec<f64>> {
+    map(time, &|t| if t < at_s { 0.0 } else { 1.0 })
+}
+
 /// Steps at instants spread over the flight.
 fn steps(time: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
-    (1..=STEPS).map(|step| {
-        let at_s = least(time) + (most(time) - least(time)) * step as f64 / (STEPS + 1) as f64;
+    instants(time).map(|at_s| Generic {
+        depends_on: Dependence::Step,
+        axis: "time since arming (s)",
+        columns: vec![Column::Shared(after(time, at_s))],
+        felt: Vec::new(),
+        along: time.to_vec(),
+        penalty: (STEPS as f64).ln(),
+    })
+}
+
+/// Instants from which the pulse in hover and the response are others.
+fn changes(climb: &[Vec<f64>], time: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
+    instants(time).map(|at_s| {
+        let later = after(time, at_s);
+        let product = |(climb, later): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+            climb.iter().zip(later).map(|(climb, later)| climb * later).collect()
+        };
+        let steeper = climb.iter().zip(&later).map(product).collect();
         Generic {
             depends_on: Dependence::Step,
             axis: "time since arming (s)",
-            columns: vec![Column::Shared(map(time, &|t| if t < at_s { 0.0 } else { 1.0 }))],
-            felt: Vec::new(),
+            felt: vec![straight(map(time, &|_| 0.0)), straight(later.clone())],
+            columns: vec![Column::Shared(later), Column::Shared(steeper)],
             along: time.to_vec(),
-            penalty: (STEPS as f64).ln(),
+            penalty: 2.0 + (STEPS as f64).ln(),
         }
     })
 }
@@ -274,4 +327,55 @@ pub(super) fn drawn(axis: &str, mut points: Vec<(f64, f64)>) -> Shape {
         points.chunks(size).filter_map(|chunk| numeric::mean(chunk.iter().map(of))).collect()
     };
     Shape { axis: axis.to_owned(), x: means(|point| point.0), us: means(|point| point.1) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Share of a series' square that is left when a family has been fitted to it.
+    fn left(family: &Generic, series: &[f64]) -> f64 {
+        let columns: Vec<Vec<f64>> =
+            family.columns.iter().map(|column| column.means().concat()).collect();
+        let at = nalgebra::DMatrix::from_fn(series.len(), columns.len(), |row, column| {
+            columns[column][row]
+        });
+        let series = nalgebra::DVector::from_column_slice(series);
+        let fitted = at.clone().svd(true, true).solve(&series, 1e-12).unwrap();
+        (&series - at * fitted).norm_squared() / series.norm_squared()
+    }
+
+    fn least_left(families: impl Iterator<Item = Generic>, series: &[f64]) -> f64 {
+        families.map(|family| left(&family, series)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn times() -> Vec<Vec<f64>> {
+        vec![(0..170).map(|bin| 40.0 + 3.0 * f64::from(bin)).collect()]
+    }
+
+    #[test]
+    fn a_swing_of_any_period_and_phase_is_found() {
+        let time = times();
+        for period_s in [31.0, 40.0, 57.3, 91.0, 139.6, 200.0, 250.0] {
+            for phase in [0.0, 0.7, 1.9, 4.0] {
+                let series = map(&time, &|t| (std::f64::consts::TAU * t / period_s + phase).sin());
+                let left = least_left(swings(&time), &series.concat());
+                assert!(left < 0.06, "{period_s} s, {phase}: {left}");
+            }
+        }
+        // A flight that is too short for two swings shows none.
+        assert_eq!(swings(&[vec![0.0, 20.0, 50.0]]).count(), 0);
+        assert_eq!(swings(&[vec![]]).count(), 0);
+    }
+
+    #[test]
+    fn a_response_that_is_another_from_one_moment_on_is_found() {
+        let time = times();
+        let climb = map(&time, &|t| 3.0 * (0.37 * t).sin());
+        let series: Vec<f64> = std::iter::zip(&time[0], &climb[0])
+            .map(|(t, climb)| if *t < 300.0 { 0.0 } else { 9.0 + 5.0 * climb })
+            .collect();
+        assert!(least_left(changes(&climb, &time), &series) < 0.03);
+        assert!(least_left(steps(&time), &series) > 0.3, "a step alone is something else");
+    }
 }

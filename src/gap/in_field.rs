@@ -34,7 +34,11 @@ pub(super) fn tell(found: &mut Found, original: &Vehicle) -> Result<(), EffectEr
         else {
             continue;
         };
-        step.in_field = of(found, original, effect, size, step.size_us)?;
+        step.in_field = match of(found, original, effect, size, step.size_us) {
+            // In a wind that the model cannot fly in, nothing can be told.
+            Err(EffectError::NotFlown { .. }) => None,
+            told => told?,
+        };
     }
     found.steps = steps;
     Ok(())

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector3};
 
 use super::bins::BinValues;
-use super::data::Data;
+use super::data::{Data, Group};
 use super::filter::{Filter, Observation, State};
 use super::lean_fit::{Fitted, Point, fit, hovering_wind};
 use crate::base::air::SEA_LEVEL_DENSITY;
@@ -321,9 +321,12 @@ struct MeanWind {
 
 impl MeanWind {
     fn of(data: &Data, leans: &[Vec<[f64; 2]>], law: LeanLaw, is_flown: bool) -> Self {
-        let each = data.groups.iter().zip(leans);
-        let each = each.flat_map(|(group, leans)| group.bins.iter().zip(leans));
-        let points: Vec<Point> = each.map(|(bin, lean)| Point::of(bin, *lean)).collect();
+        let of_group = |(group, leans): (&Group, &Vec<[f64; 2]>)| -> Vec<Point> {
+            let height_m = |bin: usize| group.mean(bin, |values| values.height_m);
+            let each = group.bins.iter().zip(leans).enumerate();
+            each.map(|(place, (bin, lean))| Point::of(bin, height_m(place), *lean)).collect()
+        };
+        let points: Vec<Point> = data.groups.iter().zip(leans).flat_map(of_group).collect();
         let moves = points.iter().filter(|point| point.moves).count() >= FEWEST_MOVING;
         if moves && is_flown {
             let legs = fit(points, law);
@@ -351,7 +354,7 @@ const SCATTER: [f64; 5] = [0.02, 0.08, 0.2, 0.45, 0.8];
 
 /// The air as it most probably was: a regressor with scatter of its own would be fitted too small.
 /// What the drone flies itself is known and is left out of the smoothing.
-fn smooth(group: &super::data::Group, raw: &[[f64; 2]]) -> Vec<[f64; 2]> {
+fn smooth(group: &Group, raw: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let wind = |axis: usize| -> Vec<f64> {
         let flown = group.bins.iter().zip(raw);
         smoothed(
@@ -369,7 +372,7 @@ fn smooth(group: &super::data::Group, raw: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 /// Posterior mean of a series that is exponentially correlated with white scatter on top.
-fn smoothed(group: &super::data::Group, values: &[f64]) -> Vec<f64> {
+fn smoothed(group: &Group, values: &[f64]) -> Vec<f64> {
     let count = values.len();
     let Some(moments) = Moments::of(values) else { return Vec::new() };
     let (mean, variance) = (moments.mean, moments.population_variance());

@@ -6,6 +6,7 @@ use super::lean::LeanLaw;
 use super::verdict::{Finding, Fitted, Interval, Step, WindFound};
 use crate::base::air::SEA_LEVEL_DENSITY;
 use crate::effects::Role;
+use crate::numeric::extent;
 
 /// Half of a 95 % interval in standard errors, rounded up from 1.96.
 const HALF: f64 = 2.0;
@@ -15,6 +16,11 @@ const MATERIAL: f64 = 0.003;
 /// Standard errors from which a difference is named: those of [`super::detectable`], at which an effect is
 /// found nearly always. Chosen.
 const NAMED_Z: f64 = 5.0;
+
+/// Air speed of a leg, m/s: those of the templates.
+const LEG_MPS: f64 = 3.0;
+/// Strongest updraft that a flight may be in as a whole, m/s: thermals that a fleet can fly a calibration in.
+const MOST_UPDRAFT_MPS: f64 = 2.0;
 
 /// Wind and lean of a comparison with the model that was planned with.
 pub(super) fn found(before: &Comparison) -> WindFound {
@@ -30,10 +36,23 @@ pub(super) fn found(before: &Comparison) -> WindFound {
     }
 }
 
+/// What a measured linear part differs by from the model's in whichever updraft brings the two nearest, rad/(m/s):
+/// rotors that carry less in air that sinks lean more in the same wind, and no lean tells that updraft.
+fn apart(measured: LeanLaw, model: f64) -> f64 {
+    let lean_rad = |updraft_mps: f64| {
+        LeanLaw { updraft_mps, ..measured }.lean([LEG_MPS, 0.0], 0.0)[0].max(f64::MIN_POSITIVE)
+    };
+    let here_rad = lean_rad(measured.updraft_mps);
+    let told = |updraft_mps: f64| measured.linear * here_rad / lean_rad(updraft_mps) - model;
+    let all = [told(measured.updraft_mps), told(-MOST_UPDRAFT_MPS), told(MOST_UPDRAFT_MPS)];
+    let (least, most) = extent(all).unwrap_or_default();
+    least.max(0.0) + most.min(0.0)
+}
+
 /// Rotor drag that the model lacks, or has with another size.
 pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
     let measured = before.wind.measured?;
-    let apart = measured.law.linear - wind.model_lean_per_mps;
+    let apart = apart(measured.law, wind.model_lean_per_mps);
     let z = apart.abs() / measured.linear_se;
     if apart.abs() < MATERIAL || z < NAMED_Z || !z.is_finite() {
         return None;

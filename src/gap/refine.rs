@@ -7,7 +7,7 @@ use super::candidates::set;
 use super::compare::Comparison;
 use super::error::GapError;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
-use super::noise::{Hyper, SHARED_TIME};
+use super::noise::{GroupPattern, Hyper, SHARED_TIME};
 use super::response::shifted;
 use super::verdict::{Fitted, Interval};
 use crate::effects::select::value_of;
@@ -59,6 +59,41 @@ pub(super) struct Fit {
     pub values: Vec<(f64, f64)>,
 }
 
+impl Fit {
+    /// The fit with the vehicle of a round before, and its values.
+    fn back_to(self, vehicle: Vehicle, parameters: &[Parameter]) -> Self {
+        let of = |(parameter, (_, se)): (&Parameter, &(f64, f64))| {
+            (value_of(&vehicle, parameter.effect, parameter.name).unwrap_or(0.0), *se)
+        };
+        let values = parameters.iter().zip(&self.values).map(of).collect();
+        Self { vehicle, values, ..self }
+    }
+}
+
+/// What a round of the fit looks at.
+struct Facing {
+    patterns: Vec<GroupPattern>,
+    split: Split,
+    slopes: Vec<Column>,
+    doubts: Vec<Column>,
+}
+
+impl Facing {
+    fn of(
+        comparison: &Comparison,
+        vehicle: &Vehicle,
+        parameters: &[Parameter],
+        gusts_mps: f64,
+    ) -> Result<Self, GapError> {
+        Ok(Self {
+            patterns: comparison.patterns(vehicle, gusts_mps)?,
+            split: Split::of(&comparison.residual(vehicle, gusts_mps)?),
+            slopes: slopes(comparison, vehicle, parameters)?,
+            doubts: doubts(comparison, vehicle, parameters)?,
+        })
+    }
+}
+
 /// Fits the parameters jointly, from the values that the vehicle has, with further regressors free.
 ///
 /// # Errors
@@ -76,14 +111,22 @@ pub(super) fn refine(
     let mut hyper = start;
     let mut last = None;
     let mut shifts: Vec<Vec<f64>> = Vec::new();
+    let mut flown = vehicle.clone();
     for round in 0..ROUNDS {
-        let mut patterns = comparison.patterns(&vehicle, gusts_mps)?;
+        let Facing { mut patterns, split, slopes, doubts } =
+            match Facing::of(comparison, &vehicle, parameters, gusts_mps) {
+                Ok(facing) => facing,
+                // Too far: gusts or doubts take it where it cannot fly.
+                Err(error) if error.is_not_flown() && last.is_some() => {
+                    last = last.map(|fit: Fit| fit.back_to(flown, parameters));
+                    break;
+                }
+                Err(error) => return Err(error),
+            };
+        flown.clone_from(&vehicle);
         for (pattern, shift_mps) in patterns.iter_mut().zip(std::mem::take(&mut shifts)) {
             pattern.shift_mps = shift_mps;
         }
-        let split = Split::of(&comparison.residual(&vehicle, gusts_mps)?);
-        let slopes = slopes(comparison, &vehicle, parameters)?;
-        let doubts = doubts(comparison, &vehicle, parameters)?;
         let problem = Problem::new(&patterns, &split).doubting(&doubts).with(extras).with(&slopes);
         let is_fitted = fit_noise && (round == 0 || round == 2);
         let solution =

@@ -26,7 +26,9 @@ const AIR: u64 = PLANT + 1;
 const HIDDEN: u64 = PLANT + 2;
 /// Updraft that is everywhere, m/s.
 const UPDRAFT_MPS: (f64, f64) = (-2.0, 2.0);
-/// Mean wind at 10 m, m/s.
+/// Top of the ladders, m.
+pub(super) const TOP_M: f64 = 90.0;
+/// Mean wind at the top of the ladders, m/s.
 const WIND_MPS: (f64, f64) = (0.0, 8.0);
 /// Standard deviation of shared and own vertical motion over that of the air's class.
 const SHARED: f64 = 0.7;
@@ -115,6 +117,7 @@ fn air(rng: &mut Pcg64, sd_mps: f64) -> AirSettings {
     } else {
         Shear::None
     };
+    let at_reference_mps = wind_mps / shear.ratio(TOP_M);
     AirSettings {
         updraft_mps,
         shared_mps: SHARED * sd_mps,
@@ -122,7 +125,7 @@ fn air(rng: &mut Pcg64, sd_mps: f64) -> AirSettings {
         own_mps: OWN * sd_mps,
         own_s: log_between(rng, (4.0, 15.0)),
         field: has_field.then_some(field),
-        wind_mps: [wind_mps * cos, wind_mps * sin],
+        wind_mps: [at_reference_mps * cos, at_reference_mps * sin],
         shear,
         gust_share: 0.15,
         gust_s: 60.0,

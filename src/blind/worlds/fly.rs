@@ -43,7 +43,7 @@ pub fn fly(
     create_folder(&folder.logs())?;
     sweep_partial(&folder.logs())?;
     let text = |what, reason: String| BlindError::Text { what, reason };
-    let known = known::vehicle(world, scenario.cell.base)?.vehicle;
+    let known = known::vehicle(world, &scenario.cell)?.vehicle;
     let known = toml::to_string(&known).map_err(|error| text("the vehicle", error.to_string()))?;
     write_whole(&folder.template(), flight.template_text.as_bytes())?;
     write_whole(&folder.vehicle(), known.as_bytes())?;

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use super::identify::{Identified, identify};
 use crate::blind::error::BlindError;
 use crate::blind::hide::between;
-use crate::blind::scenario::Base;
+use crate::blind::scenario::{Base, Cell};
 use crate::blind::vehicles::KNOWN_THRUST_SPREAD;
 use crate::effects::Role;
 use crate::sim::plant::drag::Drag;
@@ -47,10 +47,10 @@ fn airsim() -> Result<Vehicle, BlindError> {
 ///
 /// # Errors
 /// If a built-in vehicle is not valid, or none can be identified.
-pub fn vehicle(world: &World, base: Base) -> Result<Identified, BlindError> {
+pub fn vehicle(world: &World, cell: &Cell) -> Result<Identified, BlindError> {
     let mut found = match &world.plant {
         Plant::ThrustLaw(law) => Identified { vehicle: exact(law)?, largest_us: 0.0, rms_us: 0.0 },
-        Plant::BladeElement(_) => identify(&world.plant, base)?,
+        Plant::BladeElement(_) => identify(world, cell)?,
     };
     Role::ThrustSpread.set(&mut found.vehicle, KNOWN_THRUST_SPREAD);
     Ok(found)

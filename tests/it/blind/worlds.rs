@@ -75,7 +75,7 @@ fn every_foreign_kind_is_drawn_for_its_bases_and_sealed_with_its_world() {
             // What is handed over does not depend on what is hidden.
             let nothing = Scenario::draw(9, &cell(*base, &[])).unwrap();
             let vehicle = |truth: &Scenario| {
-                known::vehicle(truth.world.as_ref().unwrap(), *base).unwrap().vehicle
+                known::vehicle(truth.world.as_ref().unwrap(), &truth.cell).unwrap().vehicle
             };
             if *base == Base::Airsim {
                 assert_eq!(vehicle(&truth), vehicle(&nothing), "{}", kind.name);
