@@ -243,6 +243,11 @@ impl Search<'_> {
     /// Looks once and takes up what passes; whether the search goes on.
     fn takes_step(&mut self, step: usize) -> Result<bool, GapError> {
         let look = self.look_in_likelier_updraft()?;
+        let look = if self.found.steps.is_empty() && self.may_differ_in_updraft() {
+            self.look_in_likeliest_flight(look)?
+        } else {
+            look
+        };
         let (problem, sought) = (look.problem(), look.sought());
         let round = round(&problem, look.hyper, sought, true);
         let problem = problem.among(&round.groups);
@@ -348,6 +353,84 @@ impl Search<'_> {
         Ok(look)
     }
 
+    /// What is left in the updraft in which the whole flight is likeliest, each flown by the model and with drones that
+    /// answer gusts as they do there, if that explains clearly more. Elsewhere the updraft was chosen by what the drones
+    /// have in common: with a curve that is flat in hover, drones that answer gusts as in still air hide where they are.
+    fn look_in_likeliest_flight(&mut self, look: Look) -> Result<Look, GapError> {
+        let explained = |look: &Look| {
+            let round = round(&look.problem(), look.hyper, look.sought(), true);
+            let by_effect = (round.best() - FLOOR_NATS).max(0.0);
+            let lacks = by_effect > 0.0 || round.best_generic() > FREE_FLOOR_NATS;
+            (round.base.log_posterior() + by_effect, lacks)
+        };
+        let (nats, lacks) = explained(&look);
+        if !lacks {
+            return Ok(look);
+        }
+        let Some(updraft_mps) = self.likeliest_flight_mps(look.hyper) else { return Ok(look) };
+        if (updraft_mps - self.found.updraft_mps).abs() < FLIGHT_STEPS_MPS[0] / 2.0 {
+            return Ok(look);
+        }
+        let before = (self.comparison.clone(), self.found.clone());
+        self.found.updraft_mps = updraft_mps;
+        self.found.was_in_updraft = true;
+        self.comparison = self.against_model()?;
+        let there = self.look(In::Present(None))?;
+        if explained(&there).0 > nats + FREE_FLOOR_NATS {
+            return Ok(there);
+        }
+        (self.comparison, self.found) = before;
+        Ok(look)
+    }
+
+    /// The updraft in which the flight of the present model is likeliest, m/s; `None`: it can fly in none.
+    fn likeliest_flight_mps(&self, hyper: Hyper) -> Option<f64> {
+        let of = |at_mps: Vec<f64>| -> Option<(f64, f64)> {
+            let each = at_mps
+                .into_par_iter()
+                .filter_map(|updraft_mps| Some((self.likely_in(updraft_mps, hyper)?, updraft_mps)));
+            each.reduce_with(|one, other| if other.0 > one.0 { other } else { one })
+        };
+        let mut best = of([&[0.0], &UPDRAFTS_MPS[..]].concat())?;
+        for step_mps in FLIGHT_STEPS_MPS {
+            let beside = of(vec![best.1 - step_mps, best.1 + step_mps]);
+            best = beside.filter(|beside| beside.0 > best.0).unwrap_or(best);
+        }
+        Some(best.1)
+    }
+
+    /// How likely the flight of the present model is in an updraft, nats; `None`: it cannot fly the same bins there.
+    fn likely_in(&self, updraft_mps: f64, hyper: Hyper) -> Option<f64> {
+        let Found { vehicle, parameters, .. } = &self.found;
+        let there = self.flown_in(updraft_mps).ok()?;
+        let bins = |of: &Comparison| -> Vec<usize> {
+            of.data.groups.iter().map(|group| group.bins.len()).collect()
+        };
+        if bins(&there) != bins(&self.comparison) {
+            return None;
+        }
+        let doubts = refine::doubts(&there, vehicle, parameters).ok()?;
+        let known = doubts.get(1..).unwrap_or_default();
+        let (mut likely, mut hyper, mut gusts) = (None, hyper, self.found.gusts_mps);
+        for _ in 0..2 {
+            let patterns = there.patterns(vehicle, gusts).ok()?;
+            let residual = Split::of(&there.residual(vehicle, gusts).ok()?);
+            let problem = Problem::new(&patterns, &residual).doubting(known);
+            let fit = problem.fit(hyper, Likelihood::Profile);
+            likely = Some(fit.log_posterior());
+            hyper = fit.hyper;
+            gusts = gusts_mps(&hyper).min(MOST_GUSTS_MPS);
+        }
+        let share = updraft_mps / UPDRAFT_DOUBT_MPS;
+        likely.filter(|likely| likely.is_finite()).map(|likely| likely - 0.5 * share * share)
+    }
+
+    /// Whether the flight may have been in another updraft. A table has the climb that was flown, not the one
+    /// commanded: nothing flies it again in another air.
+    fn may_differ_in_updraft(&self) -> bool {
+        self.options.updraft && !matches!(self.simulated, Simulated::Closed)
+    }
+
     /// What is left, and everything that may explain it.
     fn look(&mut self, updraft: In<'_>) -> Result<Look, GapError> {
         let Self { comparison, found, .. } = self;
@@ -361,9 +444,8 @@ impl Search<'_> {
             .doubting(&doubts)
             .with(&free)
             .fit(found.hyper, Likelihood::Profile);
-        // A table has the climb that was flown, not the one commanded: nothing flies it again in another air.
-        let is_flown = !matches!(self.simulated, Simulated::Closed);
-        if matches!(updraft, In::Settled) && self.options.updraft && is_flown {
+        let may_differ = self.may_differ_in_updraft();
+        if matches!(updraft, In::Settled) && may_differ {
             quick = self.settle_updraft(&free, quick)?;
         }
         let Self { comparison, found, refused, lacked_drag, .. } = self;
@@ -374,8 +456,7 @@ impl Search<'_> {
             _ => comparison.patterns(&found.vehicle, found.gusts_mps)?,
         };
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
-        let updraft =
-            if self.options.updraft && is_flown { Updraft::MayDiffer } else { Updraft::Same };
+        let updraft = if may_differ { Updraft::MayDiffer } else { Updraft::Same };
         let mut candidates = library(&found.vehicle, comparison, updraft)?;
         candidates.extend(axial_drag(&found.vehicle, comparison, *lacked_drag)?);
         if !comparison.is_in_other_wind() {
@@ -573,10 +654,14 @@ impl Search<'_> {
     }
 
     fn against_model(&self) -> Result<Comparison, GapError> {
+        self.flown_in(self.found.updraft_mps)
+    }
+
+    fn flown_in(&self, updraft_mps: f64) -> Result<Comparison, GapError> {
         let Self { data, simulated, plan, found, .. } = self;
-        let Found { vehicle, felt, updraft_mps, .. } = found;
+        let Found { vehicle, felt, .. } = found;
         let comparison =
-            Comparison::of(data, vehicle, simulated, *plan, *updraft_mps, Some(&self.comparison))?;
+            Comparison::of(data, vehicle, simulated, *plan, updraft_mps, Some(&self.comparison))?;
         Ok(comparison.feeling(felt).spread_as(self.vehicle))
     }
 }
@@ -687,6 +772,9 @@ const STILL_MPS: f64 = 0.05;
 /// Updrafts from which the search for a flight's own begins, m/s: a curve that is flat in hover has no slope
 /// there that would tell the way. Half of what [`UPDRAFT_DOUBT_MPS`] allows to either side, and between.
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
+/// Steps to either side by which the updraft of the likeliest flight is found, m/s: by halves, down to half of what a
+/// flight tells of it at best. Numerical.
+const FLIGHT_STEPS_MPS: [f64; 4] = [0.5, 0.25, 0.12, 0.06];
 /// A side of still air whose best start explains less by this much is left alone, nats. Chosen: far more than
 /// [`SAME_NATS`], as starts are no tops.
 const OTHER_SIDE_NATS: f64 = 100.0;

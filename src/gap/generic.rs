@@ -78,6 +78,34 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     found
 }
 
+/// Standard deviation of each shape by which steady flight may differ from a file that describes its vehicle well, us:
+/// two models of the same rotor, fitted to each other over the flown speeds, differ by 0.4 to 2 us rms (docs/blind.md).
+/// Many drones in calm air know their pulse to a tenth of that.
+const FORM_US: f64 = 0.6;
+/// Curves over the climb by which it may: from the first bend on.
+const FORM_ORDERS: std::ops::RangeInclusive<usize> = 2..=4;
+/// Curves over the horizontal air speed.
+const FORM_WIND_ORDERS: std::ops::RangeInclusive<usize> = 1..=2;
+
+/// Shapes by which a flight may differ from any model of its kind, as regressors of one standard deviation each.
+pub(super) fn form_doubts(scene: &Scene) -> Vec<Column> {
+    let along = |of: fn(&Signals) -> f64| -> Vec<Vec<f64>> {
+        scene.signals.iter().map(|group| group.iter().map(of).collect()).collect()
+    };
+    let shapes =
+        |along: Vec<Vec<f64>>, orders: std::ops::RangeInclusive<usize>, least_span: f64| {
+            let (low, high) = (least(&along), most(&along));
+            let shows = (high - low).is_finite() && high - low > least_span;
+            let shape = move |order: usize| {
+                let scaled = |value: f64| (2.0 * value - low - high) / (high - low);
+                Column::Shared(map(&along, &|value| FORM_US * chebyshev(order, scaled(value))))
+            };
+            orders.filter(move |_| shows).map(shape)
+        };
+    let of_climb = shapes(along(|signals| signals.climb_mps), FORM_ORDERS, 0.5);
+    of_climb.chain(shapes(along(|signals| signals.horizontal_mps), FORM_WIND_ORDERS, 1.5)).collect()
+}
+
 /// Waves over the height, where the flight spans most of one.
 fn waves(height: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
     WAVES_M.into_iter().filter(|wave_m| span(height) > 0.7 * wave_m).map(|wave_m| {
@@ -170,7 +198,8 @@ fn changes(climb: &[Vec<f64>], time: &[Vec<f64>]) -> impl Iterator<Item = Generi
         };
         let steeper = climb.iter().zip(&later).map(product).collect();
         Generic {
-            depends_on: Dependence::Step,
+            // A step that grows with the climb is much of what a product of climb and time is.
+            depends_on: Dependence::ClimbTime,
             axis: "time since arming (s)",
             felt: vec![straight(map(time, &|_| 0.0)), straight(later.clone())],
             columns: vec![Column::Shared(later), Column::Shared(steeper)],

@@ -6,6 +6,7 @@ use super::bins::Bin;
 use super::candidates::set;
 use super::compare::Comparison;
 use super::error::GapError;
+use super::generic::form_doubts;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper, SHARED_TIME};
 use super::response::shifted;
@@ -175,6 +176,7 @@ pub(super) fn doubts(
     let mut doubts = vec![comparison.updraft_doubt(vehicle)?];
     doubts.extend(comparison.wind_doubts(vehicle)?);
     doubts.extend(comparison.spread_doubts(vehicle)?);
+    doubts.extend(form_doubts(&comparison.scene));
     for fitted in parameters.iter().filter(|fitted| fitted.before.is_none()) {
         let Some((form, sd)) = form_of(fitted) else { continue };
         let is_fitted = |one: &Parameter| (one.effect, one.name) == (form.effect, form.name);
