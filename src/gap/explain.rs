@@ -228,7 +228,27 @@ struct Look {
     drones: Vec<usize>,
 }
 
+/// How well a look's air and noise explain the flight, with the best effect.
+struct Explained {
+    /// Log-posterior, and what the best effect gains above its threshold, nats.
+    nats: f64,
+    /// Whether an effect gains more than its threshold.
+    lacks_effect: bool,
+    /// Whether a free shape does.
+    lacks_shape: bool,
+}
+
 impl Look {
+    fn explained(&self) -> Explained {
+        let round = round(&self.problem(), self.hyper, self.sought(), true);
+        let by_effect = (round.best() - FLOOR_NATS).max(0.0);
+        Explained {
+            nats: round.base.log_posterior() + by_effect,
+            lacks_effect: by_effect > 0.0,
+            lacks_shape: round.best_generic() > FREE_FLOOR_NATS,
+        }
+    }
+
     fn problem(&self) -> Problem<'_> {
         Problem::new(&self.patterns, &self.residual).doubting(&self.doubts).with(&self.free)
     }
@@ -332,21 +352,16 @@ impl Search<'_> {
         if !begins {
             return Ok(look);
         }
-        let explained = |look: &Look| {
-            let round = round(&look.problem(), look.hyper, look.sought(), true);
-            let by_effect = (round.best() - FLOOR_NATS).max(0.0);
-            (round.base.log_posterior() + by_effect, by_effect > 0.0)
-        };
         let there = (self.comparison.clone(), self.found.clone());
         self.found.updraft_mps = 0.0;
         self.comparison = self.against_model()?;
         // In the same noise: how drones scatter must not choose an updraft.
         let still = self.look(In::Present(Some(&look.patterns)))?;
-        let ((there_nats, lacks), (still_nats, lacks_still)) =
-            (explained(&look), explained(&still));
+        let (with, without) = (look.explained(), still.explained());
         // Where the updraft leaves nothing to be found, an effect instead of it must explain clearly more.
-        let needed_nats = if lacks_still && !lacks { FLOOR_NATS } else { 0.0 };
-        if still_nats > there_nats + needed_nats {
+        let is_instead = without.lacks_effect && !with.lacks_effect;
+        let needed_nats = if is_instead { FLOOR_NATS } else { 0.0 };
+        if without.nats > with.nats + needed_nats {
             return self.look(In::Present(None));
         }
         (self.comparison, self.found) = there;
@@ -357,14 +372,8 @@ impl Search<'_> {
     /// answer gusts as they do there, if that explains clearly more. Elsewhere the updraft was chosen by what the drones
     /// have in common: with a curve that is flat in hover, drones that answer gusts as in still air hide where they are.
     fn look_in_likeliest_flight(&mut self, look: Look) -> Result<Look, GapError> {
-        let explained = |look: &Look| {
-            let round = round(&look.problem(), look.hyper, look.sought(), true);
-            let by_effect = (round.best() - FLOOR_NATS).max(0.0);
-            let lacks = by_effect > 0.0 || round.best_generic() > FREE_FLOOR_NATS;
-            (round.base.log_posterior() + by_effect, lacks)
-        };
-        let (nats, lacks) = explained(&look);
-        if !lacks {
+        let here = look.explained();
+        if !here.lacks_effect && !here.lacks_shape {
             return Ok(look);
         }
         let Some(updraft_mps) = self.likeliest_flight_mps(look.hyper) else { return Ok(look) };
@@ -376,7 +385,7 @@ impl Search<'_> {
         self.found.was_in_updraft = true;
         self.comparison = self.against_model()?;
         let there = self.look(In::Present(None))?;
-        if explained(&there).0 > nats + FREE_FLOOR_NATS {
+        if there.explained().nats > here.nats + FREE_FLOOR_NATS {
             return Ok(there);
         }
         (self.comparison, self.found) = before;
@@ -403,10 +412,7 @@ impl Search<'_> {
     fn likely_in(&self, updraft_mps: f64, hyper: Hyper) -> Option<f64> {
         let Found { vehicle, parameters, .. } = &self.found;
         let there = self.flown_in(updraft_mps).ok()?;
-        let bins = |of: &Comparison| -> Vec<usize> {
-            of.data.groups.iter().map(|group| group.bins.len()).collect()
-        };
-        if bins(&there) != bins(&self.comparison) {
+        if counts(&there) != counts(&self.comparison) {
             return None;
         }
         let doubts = refine::doubts(&there, vehicle, parameters).ok()?;
@@ -497,11 +503,8 @@ impl Search<'_> {
                 break;
             }
             let flown = self.against_model()?;
-            let bins = |of: &Comparison| -> Vec<usize> {
-                of.data.groups.iter().map(|group| group.bins.len()).collect()
-            };
             // Where the model cannot follow the command in that updraft, regressors would lose their bins.
-            let (there, patterns) = if bins(&flown) == bins(&self.comparison) {
+            let (there, patterns) = if counts(&flown) == counts(&self.comparison) {
                 (flown, patterns)
             } else if free.is_empty() {
                 let patterns = flown.patterns(&self.found.vehicle, self.found.gusts_mps)?;
@@ -664,6 +667,11 @@ impl Search<'_> {
             Comparison::of(data, vehicle, simulated, *plan, updraft_mps, Some(&self.comparison))?;
         Ok(comparison.feeling(felt).spread_as(self.vehicle))
     }
+}
+
+/// Number of bins of each group.
+fn counts(comparison: &Comparison) -> Vec<usize> {
+    comparison.data.groups.iter().map(|group| group.bins.len()).collect()
 }
 
 /// The updrafts that explain most, best first, by Gauss and Newton from the first of some starts and the best of the

@@ -26,8 +26,8 @@ const GUST_FACTOR: f64 = 2.5;
 /// Time scale of the gusts, s, as in the benchmark. Not fitted; bins of 3 s hardly show it.
 const GUST_S: f64 = 25.0;
 /// Prior standard deviation of the exponent by which the wind grows with height: 1/7 over flat land, up to 0.3 over
-/// rough (Stull 1988, section 9.7). Legs and hovers are flown at several heights, and without it what the wind gains
-/// aloft was taken from the law: 0.006 for 0.0095 rad/(m/s) of small rotors.
+/// rough (Stull 1988, section 9.7). Legs and hovers are flown at several heights, and what the wind gains aloft must not
+/// be taken from the law.
 const SHEAR: f64 = 0.2;
 /// Heights below this count as this, m: the roughness layer.
 const LOWEST_M: f64 = 1.0;
