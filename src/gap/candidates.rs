@@ -4,6 +4,7 @@
 use std::borrow::Cow;
 
 use super::compare::Comparison;
+use super::decide::CLASS_NATS;
 use super::gls::{Column, Solution};
 use super::lean::GRAVITY;
 use super::noise::{GroupPattern, Hyper};
@@ -57,6 +58,10 @@ pub(super) struct Variant {
     pub vehicle: Option<Vehicle>,
     /// Size of the effect in it.
     pub size: f64,
+    /// Value of the parameter that says which form it has; `None`: it has but one.
+    pub form: Option<f64>,
+    /// What it must explain more than the usual form, nats.
+    pub price_nats: f64,
     /// Contribution to the pulse, us.
     pub column: Column,
     /// Updraft of the whole flight that goes with it, m/s; `None`: the one that the flight is taken in.
@@ -124,7 +129,15 @@ impl<'a> Base<'a> {
                 felt.clear();
             }
             let updraft_mps = (*shift_mps != 0.0).then_some(updraft_mps);
-            Some(Variant { vehicle: Some(vehicle.clone()), size, column, updraft_mps, felt })
+            Some(Variant {
+                vehicle: Some(vehicle.clone()),
+                size,
+                form: None,
+                price_nats: 0.0,
+                column,
+                updraft_mps,
+                felt,
+            })
         };
         shifts_mps.iter().filter_map(form).collect()
     }
@@ -182,7 +195,12 @@ pub(super) fn library(
                 if let Some((name, value)) = shape {
                     set(&mut other, definition.name, name, *value);
                 }
-                variants.extend(base.forms(&other, value));
+                let form = shape.map(|(_, value)| value);
+                let is_unusual =
+                    shape.is_some_and(|(name, value)| is_unusual(definition, vehicle, name, value));
+                let price_nats = if is_unusual { CLASS_NATS } else { 0.0 };
+                let variant = |variant: Variant| Variant { form, price_nats, ..variant };
+                variants.extend(base.forms(&other, value).into_iter().map(variant));
             }
         }
         let usual = usual.unwrap_or_else(|| (parameter.default)(vehicle));
@@ -202,6 +220,14 @@ pub(super) fn library(
         });
     }
     Ok(found)
+}
+
+/// Whether a form is another than the usual one of two: the size of an effect goes with it, and where a flight does not
+/// tell them apart it is that of the usual form.
+fn is_unusual(definition: &Definition, vehicle: &Vehicle, name: &str, value: f64) -> bool {
+    definition.parameter(name).is_some_and(|parameter| {
+        parameter.role == Some(Role::InflowInduced) && value != (parameter.default)(vehicle)
+    })
 }
 
 /// The share of momentum drag that acts along the rotors' axis, as in ArduPilot's own simulator.
@@ -448,6 +474,8 @@ pub(super) fn of_the_air(
         variants: vec![Variant {
             vehicle: None,
             size: 1.0,
+            form: None,
+            price_nats: 0.0,
             column,
             updraft_mps: None,
             felt: Vec::new(),

@@ -16,7 +16,7 @@ use super::stand_in::{as_flown, own_wind};
 use crate::base::air::{SEA_LEVEL_DENSITY, density_ratio};
 use crate::effects::{EffectError, Reference, Role, find, select};
 use crate::mission::plan::Plan;
-use crate::numeric::{Moments, mean};
+use crate::numeric::{Moments, mean, most};
 use crate::vehicle::Vehicle;
 
 /// The simulated side of a comparison.
@@ -85,6 +85,16 @@ pub(super) fn lean_law(vehicle: &Vehicle, amsl_m: f64, updraft_mps: f64) -> Lean
     LeanLaw::of(vehicle, SEA_LEVEL_DENSITY * density_ratio(amsl_m), updraft_mps)
 }
 
+/// The wind, or so much of it that the vehicle can fly every leg in it, m/s.
+fn flyable(data: &Data, law: LeanLaw, wind_mps: [f64; 2]) -> [f64; 2] {
+    let bins = data.groups.iter().flat_map(|group| &group.bins);
+    let legs = bins.filter(|bin| bin.is_horizontal());
+    let fastest = most(legs.map(|bin| bin.velocity_mps[0].hypot(bin.velocity_mps[1])));
+    let bound_mps = (law.fastest_mps - fastest.unwrap_or(0.0)).max(0.0);
+    let speed_mps = wind_mps[0].hypot(wind_mps[1]);
+    if speed_mps > bound_mps { wind_mps.map(|part| part * bound_mps / speed_mps) } else { wind_mps }
+}
+
 impl Comparison {
     /// Flies (or takes) the simulated side of a vehicle.
     ///
@@ -124,7 +134,7 @@ impl Comparison {
             Simulated::Given { values, flew, is_foreign: true } => {
                 own_wind(data, values, flew, amsl_m)
             }
-            _ => mean_wind(data, law, None),
+            _ => flyable(data, law, mean_wind(data, law, None)),
         });
         let as_flown = match simulated {
             Simulated::Given { values, flew, is_foreign: true } => {
@@ -157,11 +167,14 @@ impl Comparison {
             Some(near) if lean_law(&near.vehicle, amsl_m, near.scene.updraft_mps) == law => {
                 air(near.wind.mean_mps)
             }
-            Some(near) => air(mean_wind(&near.data, law, Some((&near.side, near.flown_mps)))),
+            Some(near) => {
+                let wind_mps = mean_wind(&near.data, law, Some((&near.side, near.flown_mps)));
+                air(flyable(data, law, wind_mps))
+            }
             None => {
                 let values = fly(first)?;
                 let whole = data.keep(|group, bin| values[group][bin].is_some());
-                air(mean_wind(&whole, law, Some((&flat(&values), first))))
+                air(flyable(data, law, mean_wind(&whole, law, Some((&flat(&values), first)))))
             }
         };
         let values = fly(flown_mps)?;
@@ -531,9 +544,16 @@ impl Comparison {
         axis: usize,
         by_mps: f64,
     ) -> Result<Column, EffectError> {
-        let mut scene = self.scene_of(vehicle).into_owned();
-        scene.blow(axis, by_mps);
-        Ok(scene.pulses(vehicle)?.less(closed))
+        let blown = |by_mps: f64| {
+            let mut scene = self.scene_of(vehicle).into_owned();
+            scene.blow(axis, by_mps);
+            scene.pulses(vehicle)
+        };
+        match blown(by_mps) {
+            // At the end of what it can fly in, the other side tells the same.
+            Err(EffectError::NotFlown { .. }) => Ok(closed.less(&blown(-by_mps)?)),
+            pulses => Ok(pulses?.less(closed)),
+        }
     }
 
     /// Distance of the mean leans of both sides in hover and in vertical flight, rad.

@@ -293,6 +293,8 @@ mod tests {
             variants: vec![Variant {
                 vehicle: None,
                 size: 0.0,
+                form: None,
+                price_nats: 0.0,
                 column,
                 updraft_mps: None,
                 felt: Vec::new(),

@@ -232,8 +232,15 @@ mod tests {
 
     fn effect(name: &'static str, column: Column, is_of_the_vehicle: bool) -> Candidate {
         let size = Size { name: "size", unit: "", low: 0.0, high: 1.0, now: 0.0, usual: 0.1 };
-        let variant =
-            Variant { vehicle: None, size: 0.1, column, updraft_mps: None, felt: Vec::new() };
+        let variant = Variant {
+            vehicle: None,
+            size: 0.1,
+            form: None,
+            price_nats: 0.0,
+            column,
+            updraft_mps: None,
+            felt: Vec::new(),
+        };
         Candidate {
             name,
             was_there: false,

@@ -1,5 +1,7 @@
 //! Free shapes: a dependence of the pulse on a signal that no effect of the library explains.
 
+use nalgebra::DVector;
+
 use super::dependence::Dependence;
 use super::gls::{Column, Pulses, means_of};
 use super::response::Response;
@@ -43,6 +45,9 @@ const STEPS: usize = 47;
 const SHORTEST_SWING_S: f64 = 30.0;
 /// Quarter turns of the slowest swing that is tried: what turns less is a curve in time.
 const FEWEST_QUARTERS: usize = 8;
+/// Share of the climb's square from which a swing is its trace. Chosen: within half a turn over the flight of the ladder's
+/// own period, which is nearly 0.6.
+const OF_THE_LADDER: f64 = 0.4;
 /// Step of the derivative by vertical air speed, m/s. Numerical.
 const SLOPE_STEP: f64 = 0.01;
 /// A charge that changes by less, as a share, says nothing. Chosen.
@@ -70,7 +75,7 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
     found.extend(smooth(Dependence::Wind, "horizontal air speed (m/s)", &wind, 3, 1.5));
     found.extend(waves(&height));
     found.push(climb_times_time(&climb, &time));
-    found.extend(swings(&time));
+    found.extend(swings(&climb, &time));
     found.extend(steps(&time));
     found.extend(changes(&climb, &time));
     found.extend(scene.charge().as_ref().and_then(by_charge));
@@ -89,21 +94,30 @@ const FORM_WIND_ORDERS: std::ops::RangeInclusive<usize> = 1..=2;
 
 /// Shapes by which a flight may differ from any model of its kind, as regressors of one standard deviation each.
 pub(super) fn form_doubts(scene: &Scene) -> Vec<Column> {
-    let along = |of: fn(&Signals) -> f64| -> Vec<Vec<f64>> {
-        scene.signals.iter().map(|group| group.iter().map(of).collect()).collect()
-    };
-    let shapes =
-        |along: Vec<Vec<f64>>, orders: std::ops::RangeInclusive<usize>, least_span: f64| {
-            let (low, high) = (least(&along), most(&along));
-            let shows = (high - low).is_finite() && high - low > least_span;
-            let shape = move |order: usize| {
-                let scaled = |value: f64| (2.0 * value - low - high) / (high - low);
-                Column::Shared(map(&along, &|value| FORM_US * chebyshev(order, scaled(value))))
-            };
-            orders.filter(move |_| shows).map(shape)
-        };
-    let of_climb = shapes(along(|signals| signals.climb_mps), FORM_ORDERS, 0.5);
-    of_climb.chain(shapes(along(|signals| signals.horizontal_mps), FORM_WIND_ORDERS, 1.5)).collect()
+    let of_climb = curves(scene, |signals| signals.climb_mps, FORM_ORDERS, 0.5);
+    let of_wind = curves(scene, |signals| signals.horizontal_mps, FORM_WIND_ORDERS, 1.5);
+    of_climb.chain(of_wind).map(|curve| Column::Shared(times(FORM_US, curve))).collect()
+}
+
+/// Chebyshev polynomials over a signal, by group and bin, if it spans enough.
+fn curves(
+    scene: &Scene,
+    of: fn(&Signals) -> f64,
+    orders: std::ops::RangeInclusive<usize>,
+    least_span: f64,
+) -> impl Iterator<Item = Vec<Vec<f64>>> {
+    let along: Vec<Vec<f64>> =
+        scene.signals.iter().map(|group| group.iter().map(of).collect()).collect();
+    let (low, high) = (least(&along), most(&along));
+    let shows = (high - low).is_finite() && high - low > least_span;
+    let scaled = move |value: f64| (2.0 * value - low - high) / (high - low);
+    let curve = move |order: usize| map(&along, &|value| chebyshev(order, scaled(value)));
+    orders.filter(move |_| shows).map(curve)
+}
+
+fn times(factor: f64, mut curve: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    curve.iter_mut().flatten().for_each(|value| *value *= factor);
+    curve
 }
 
 /// Waves over the height, where the flight spans most of one.
@@ -148,22 +162,41 @@ fn climb_times_time(climb: &[Vec<f64>], time: &[Vec<f64>]) -> Generic {
 
 /// Swings in time with one period, from [`SHORTEST_SWING_S`] to half of the flight. Neighbours differ by a
 /// quarter of a turn over the whole flight, so that between them a twentieth of a swing's square is lost at most.
-fn swings(time: &[Vec<f64>]) -> impl Iterator<Item = Generic> {
+/// A period of the ladder's own is none: what goes with it goes with the climb.
+fn swings<'a>(climb: &'a [Vec<f64>], time: &'a [Vec<f64>]) -> impl Iterator<Item = Generic> + 'a {
+    let ladder = without_mean(climb);
     let span_s = span(time);
     let most = if span_s.is_finite() { (4.0 * span_s / SHORTEST_SWING_S) as usize } else { 0 };
     let count = most.saturating_sub(FEWEST_QUARTERS - 1);
-    (FEWEST_QUARTERS..=most).map(move |quarters| {
+    (FEWEST_QUARTERS..=most).filter_map(move |quarters| {
         let per_s = std::f64::consts::FRAC_PI_2 * quarters as f64 / span_s;
-        let phase = |of: fn(f64) -> f64| Column::Shared(map(time, &|t| of(per_s * t)));
-        Generic {
+        let phases = [f64::sin, f64::cos].map(|of| map(time, &|t: f64| of(per_s * t)));
+        (share_in(&phases, &ladder) < OF_THE_LADDER).then(|| Generic {
             depends_on: Dependence::Time,
             axis: "time since arming (s)",
-            columns: vec![phase(f64::sin), phase(f64::cos)],
+            columns: phases.map(Column::Shared).into(),
             felt: Vec::new(),
             along: time.to_vec(),
             penalty: 2.0 + (count as f64).ln(),
-        }
+        })
     })
+}
+
+fn without_mean(values: &[Vec<f64>]) -> DVector<f64> {
+    let values = DVector::from_vec(values.concat());
+    let mean = values.mean();
+    values.add_scalar(-mean)
+}
+
+/// Share of a series' square that a swing takes.
+fn share_in(phases: &[Vec<Vec<f64>>; 2], series: &DVector<f64>) -> f64 {
+    let [sin, cos] = phases.each_ref().map(|phase| without_mean(phase));
+    // The two are nearly at right angles over any flight of two turns.
+    let part = |phase: &DVector<f64>| {
+        let square = phase.norm_squared();
+        if square > 0.0 { phase.dot(series).powi(2) / square } else { 0.0 }
+    };
+    (part(&sin) + part(&cos)) / series.norm_squared().max(f64::MIN_POSITIVE)
 }
 
 /// Instants spread over the flight, s.
@@ -360,16 +393,16 @@ pub(super) fn drawn(axis: &str, mut points: Vec<(f64, f64)>) -> Shape {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+
     use super::*;
 
     /// Share of a series' square that is left when a family has been fitted to it.
     fn left(family: &Generic, series: &[f64]) -> f64 {
         let columns: Vec<Vec<f64>> =
             family.columns.iter().map(|column| column.means().concat()).collect();
-        let at = nalgebra::DMatrix::from_fn(series.len(), columns.len(), |row, column| {
-            columns[column][row]
-        });
-        let series = nalgebra::DVector::from_column_slice(series);
+        let at = DMatrix::from_fn(series.len(), columns.len(), |row, column| columns[column][row]);
+        let series = DVector::from_column_slice(series);
         let fitted = at.clone().svd(true, true).solve(&series, 1e-12).unwrap();
         (&series - at * fitted).norm_squared() / series.norm_squared()
     }
@@ -385,16 +418,34 @@ mod tests {
     #[test]
     fn a_swing_of_any_period_and_phase_is_found() {
         let time = times();
+        let still = map(&time, &|_| 0.0);
         for period_s in [31.0, 40.0, 57.3, 91.0, 139.6, 200.0, 250.0] {
             for phase in [0.0, 0.7, 1.9, 4.0] {
                 let series = map(&time, &|t| (std::f64::consts::TAU * t / period_s + phase).sin());
-                let left = least_left(swings(&time), &series.concat());
+                let left = least_left(swings(&still, &time), &series.concat());
                 assert!(left < 0.06, "{period_s} s, {phase}: {left}");
             }
         }
         // A flight that is too short for two swings shows none.
-        assert_eq!(swings(&[vec![0.0, 20.0, 50.0]]).count(), 0);
-        assert_eq!(swings(&[vec![]]).count(), 0);
+        assert_eq!(swings(&[vec![0.0; 3]], &[vec![0.0, 20.0, 50.0]]).count(), 0);
+        assert_eq!(swings(&[vec![]], &[vec![]]).count(), 0);
+    }
+
+    #[test]
+    fn a_swing_with_the_ladders_own_period_is_none() {
+        let time = times();
+        // Up and down in a minute, faster every time.
+        let climb = map(&time, &|t| {
+            let faster = 0.5 + (t - 40.0) / 200.0;
+            if (t / 30.0).floor() % 2.0 == 0.0 { faster } else { -faster }
+        });
+        let swing =
+            |period_s: f64| map(&time, &|t| (std::f64::consts::TAU * t / period_s).sin()).concat();
+        let left =
+            |climb: &[Vec<f64>], period_s| least_left(swings(climb, &time), &swing(period_s));
+        let still = map(&time, &|_| 0.0);
+        assert!(left(&still, 60.0) < 0.06 && left(&climb, 60.0) > 0.5);
+        assert!(left(&climb, 91.0) < 0.06 && left(&climb, 45.0) < 0.06);
     }
 
     #[test]

@@ -13,6 +13,10 @@ use crate::vehicle::Vehicle;
 /// worse what is more.
 const WORSE: f64 = 1.01;
 
+/// What explains so much less is no other view of the flight, nats, whatever it does to the raw gap, which has the air in
+/// it. Chosen: more than wrong readings of the air have cost.
+const FAR_NATS: f64 = 100.0;
+
 /// What is searched for, and in what.
 #[derive(Clone, Copy)]
 pub(super) struct Question<'a> {
@@ -42,8 +46,9 @@ impl Question<'_> {
         if blown_off || found.was_in_updraft && !found.steps.is_empty() {
             let still_air = Options { updraft: false, ..*self.options };
             let (still, without) = self.searched(train, held, still_air)?;
-            let there = (blown_off || grows(&gap), -found.explains()?);
-            if (grows(&without), -still.explains()?) < there {
+            let (with_nats, still_nats) = (found.explains()?, still.explains()?);
+            let there = (blown_off || grows(&gap), -with_nats);
+            if with_nats < still_nats + FAR_NATS && (grows(&without), -still_nats) < there {
                 (found, gap) = (still, without);
             }
         }

@@ -21,7 +21,7 @@ const LEAST_SLOPE: f64 = 0.004;
 /// Rounds of the air speed by a lean, at most: each takes away half of the error or more. Numerical.
 const ROUNDS: usize = 40;
 /// A law is made to fit the trim at every whole speed up to this, m/s: a leg of 6 m/s into 8 m/s of wind.
-const LAW_SPEEDS_MPS: u32 = 14;
+const LAW_SPEEDS_MPS: usize = 14;
 /// And at as many of them at least.
 const FEWEST_LAW_SPEEDS: usize = 6;
 /// Air speed at which a diagonal wind tells a body in one piece from a box, m/s: where drag is most of the lean.
@@ -50,6 +50,8 @@ pub struct LeanLaw {
     pub cube: f64,
     /// Updraft that the law holds in, m/s: climbs are relative to it.
     pub updraft_mps: f64,
+    /// Fastest air that it is read for, m/s: in which the vehicle flies.
+    pub fastest_mps: f64,
     /// Load of the rotors in a climb, as far as it is known: `1 + p V + q V|V|` of the weight (p, q). Who pulls
     /// more leans less in the same wind.
     pub load: [f64; 2],
@@ -75,6 +77,7 @@ impl LeanLaw {
             body_share: body_m2 / (box_m2 + body_m2).max(1e-9),
             cube: 0.0,
             updraft_mps,
+            fastest_mps: FASTEST_MPS,
             load: [0.0; 2],
         }
     }
@@ -86,14 +89,18 @@ impl LeanLaw {
         let mut lean_rad = |[x_mps, y_mps, climb_mps]: [f64; 3]| {
             let velocity_mps = Vector3::new(x_mps, y_mps, climb_mps);
             let condition = Condition { velocity_mps, density_ratio, ..Condition::default() };
-            Some(trim.balance(&condition)?.lean.x.asin())
+            let balance = trim.balance(&condition)?;
+            trim.pulse_us(&balance, &condition)?;
+            Some(balance.lean.x.asin())
         };
-        let speeds = (1..=LAW_SPEEDS_MPS).map(f64::from);
-        let leans: Vec<(f64, f64)> =
+        let speeds = (1..=FASTEST_MPS as u32).map(f64::from);
+        let mut leans: Vec<(f64, f64)> =
             speeds.map_while(|speed| Some((speed, lean_rad([speed, 0.0, 0.0])? / speed))).collect();
         if leans.len() < FEWEST_LAW_SPEEDS {
             return None;
         }
+        let fastest_mps = leans.len() as f64;
+        leans.truncate(LAW_SPEEDS_MPS);
         let powers = DMatrix::from_fn(leans.len(), 3, |row, power| leans[row].0.powi(power as i32));
         let per_speed = DVector::from_iterator(leans.len(), leans.iter().map(|(_, lean)| *lean));
         let found = powers.svd(true, true).solve(&per_speed, 1e-12).ok()?;
@@ -107,7 +114,8 @@ impl LeanLaw {
         let is_box = vehicle.airframe.sitl.is_some();
         let body_share =
             if is_box { 0.0 } else { (1.0 - diagonal / of_box.min(-1e-9)).clamp(0.0, 1.0) };
-        let still = Self { linear, square, body_share, cube, updraft_mps: 0.0, load: [0.0; 2] };
+        let load = [0.0; 2];
+        let still = Self { linear, square, body_share, cube, updraft_mps: 0.0, fastest_mps, load };
         let mut less = |climb_mps: f64| {
             let [level, _] = still.lean([LOAD_SPEED_MPS, 0.0], climb_mps);
             Some(level / lean_rad([LOAD_SPEED_MPS, 0.0, climb_mps])? - 1.0)
@@ -191,7 +199,7 @@ impl LeanLaw {
                 } else {
                     lean.abs() / linear.max(1e-6)
                 };
-                size.min(FASTEST_MPS).copysign(lean)
+                size.min(self.fastest_mps).copysign(lean)
             });
             let next_mps = air_mps[0].hypot(air_mps[1]);
             // The body's part goes with the square: the middle of two rounds is nearly the end.

@@ -164,7 +164,7 @@ pub(super) fn refine(
 }
 
 /// What is not known exactly, as regressors of one standard deviation each: the updraft that the whole flight is
-/// in (always the first), the wind, and the forms of effects of which only the size is fitted.
+/// in (always the first), the wind, the vehicle's form, and the forms of effects of which only the size is fitted.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
@@ -198,8 +198,18 @@ fn form_of(size: &Parameter) -> Option<(Parameter, f64)> {
     if *name != size.name {
         return None;
     }
+    let form = parameter(definition, form)?;
+    if is_chosen(&form) {
+        return None;
+    }
     let (low, high) = extent(*values)?;
-    Some((parameter(definition, form)?, (high - low) / 2.0))
+    Some((form, (high - low) / 2.0))
+}
+
+/// Whether a form is one of two, of which the search chooses: the size is that of the chosen one.
+fn is_chosen(form: &Parameter) -> bool {
+    let known = find(form.effect).and_then(|effect| effect.definition().parameter(form.name));
+    known.is_some_and(|known| known.role == Some(Role::InflowInduced))
 }
 
 /// Derivatives of the model's pulse by each parameter.
@@ -252,7 +262,7 @@ pub(super) fn parameters_of(
     let mut found: Vec<Parameter> =
         of(size).map(|parameter| Parameter { before, ..parameter }).into_iter().collect();
     if let Some((name, values)) = shape
-        && let Some(parameter) = of(name)
+        && let Some(parameter) = of(name).filter(|form| !is_chosen(form))
     {
         let both = [found.clone(), vec![parameter.clone()]].concat();
         let columns = slopes(comparison, vehicle, &both)?;

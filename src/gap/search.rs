@@ -5,6 +5,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, Variant};
+use super::dependence::Dependence;
 use super::generic::Generic;
 use super::gls::{Column, Likelihood, Problem, Solution, Split};
 use super::noise::{GroupPattern, Hyper};
@@ -15,7 +16,9 @@ use crate::base::rng::{Purpose, stream};
 /// scatter between drones took part, which can turn ranks round; chosen. More costs only time.
 const NEAR_NATS: f64 = 20.0;
 /// At most this many are fitted. Chosen for time.
-const MOST_FITTED: usize = 6;
+const MOST_FITTED: usize = 8;
+/// Forms of one effect that are fitted: which explains more, the noise decides as well.
+const FORMS_FITTED: usize = 2;
 /// A multiple of the effect's tried form beyond this is another effect: closed forms are not linear over
 /// such a range. Chosen.
 const MOST_BETA: f64 = 5.0;
@@ -157,7 +160,7 @@ fn round_from(problem: &Problem<'_>, start: Hyper, sought: Sought<'_>, settles: 
         .map(|ranked| refit(problem, &base, before, ranked, sought, settles))
         .collect();
     library.splice(..count, fitted);
-    library.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let library = best_of_each(library);
     let generics = free_shapes(problem, &base, before, sought, settles);
     Round { groups, base, library, generics }
 }
@@ -172,33 +175,50 @@ pub(super) fn admissible(candidate: &Candidate, variant: &Variant, beta: f64) ->
     beta > 0.0 && beta <= MOST_BETA
 }
 
+/// What each candidate gains, in its best size, in each of its two best forms.
 fn scan(base: &Solution, sought: Sought<'_>) -> Vec<Ranked> {
-    let mut ranked: Vec<Ranked> = sought
-        .library
-        .iter()
-        .enumerate()
-        .filter_map(|(index, candidate)| {
-            let forms = candidate.variants.iter().enumerate();
-            forms
-                .filter_map(|(place, variant)| {
-                    let gain = base.gain(&variant.column);
-                    admissible(candidate, variant, gain.beta).then(|| Ranked {
-                        candidate: index,
-                        variant: place,
-                        gain: gain.nats,
-                        plain: gain.nats,
-                        beta: gain.beta,
-                        size_us: gain.beta.abs() * variant.column.spread(sought.drones),
-                        range_us: gain.beta.abs() * variant.column.range(),
-                        hyper: base.hyper,
-                        fitted: false,
-                    })
-                })
-                .max_by(|a, b| a.gain.total_cmp(&b.gain))
-        })
-        .collect();
+    let mut ranked: Vec<Ranked> = Vec::new();
+    for (index, candidate) in sought.library.iter().enumerate() {
+        let mut forms: Vec<(Option<f64>, Ranked)> = Vec::new();
+        for (place, variant) in candidate.variants.iter().enumerate() {
+            let gain = base.gain(&variant.column);
+            if !admissible(candidate, variant, gain.beta) {
+                continue;
+            }
+            let one = Ranked {
+                candidate: index,
+                variant: place,
+                gain: gain.nats - variant.price_nats,
+                plain: gain.nats - variant.price_nats,
+                beta: gain.beta,
+                size_us: gain.beta.abs() * variant.column.spread(sought.drones),
+                range_us: gain.beta.abs() * variant.column.range(),
+                hyper: base.hyper,
+                fitted: false,
+            };
+            match forms.iter_mut().find(|(form, _)| *form == variant.form) {
+                Some((_, other)) if other.gain <= one.gain => *other = one,
+                Some(_) => {}
+                None => forms.push((variant.form, one)),
+            }
+        }
+        forms.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
+        ranked.extend(forms.into_iter().take(FORMS_FITTED).map(|(_, one)| one));
+    }
     ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     ranked
+}
+
+/// The best of each candidate, best first.
+fn best_of_each(mut ranked: Vec<Ranked>) -> Vec<Ranked> {
+    ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut best: Vec<Ranked> = Vec::new();
+    for one in ranked {
+        if best.iter().all(|other| other.candidate != one.candidate) {
+            best.push(one);
+        }
+    }
+    best
 }
 
 fn refit(
@@ -213,6 +233,7 @@ fn refit(
     let variant = &candidate.variants[ranked.variant];
     let problem = problem.with([&variant.column]);
     let mut with = problem.fit(base.hyper, Likelihood::Profile);
+    let before = before + variant.price_nats;
     let plain = ranked.plain.max(with.log_posterior() - before);
     // Who feels a climb feels the air as well: the scatter must fit what the effect makes of gusts.
     let feeling = |beta: &[f64]| {
@@ -338,7 +359,19 @@ fn free_shapes(
         }
     }
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    drop_idle_product(&mut best, sought);
     best
+}
+
+/// A product of climb and time comes with a line over the climb: where a curve over the climb explains as much, that is
+/// what it is.
+fn drop_idle_product(found: &mut Vec<RankedGeneric>, sought: Sought<'_>) {
+    let depends_on = |one: &RankedGeneric| sought.generics[one.generic].depends_on;
+    let curve = found.iter().find(|one| depends_on(one) == Dependence::Climb);
+    if let Some(curve_nats) = curve.map(|one| one.gain).filter(|nats| *nats > FREE_FLOOR_NATS) {
+        let least = curve_nats + FLOOR_NATS;
+        found.retain(|one| depends_on(one) != Dependence::ClimbTime || one.gain > least);
+    }
 }
 
 /// A sum of regressors, us.
@@ -441,11 +474,48 @@ mod tests {
     }
 
     #[test]
+    fn a_product_is_more_than_the_line_that_it_comes_with() {
+        let free = |depends_on| Generic {
+            depends_on,
+            axis: "",
+            columns: Vec::new(),
+            felt: Vec::new(),
+            along: Vec::new(),
+            penalty: 0.0,
+        };
+        let generics = [Dependence::Climb, Dependence::ClimbTime].map(free);
+        let sought = Sought { library: &[], generics: &generics, drones: &[] };
+        let ranked = |generic: usize, gain: f64| RankedGeneric {
+            generic,
+            gain,
+            plain: gain,
+            beta: Vec::new(),
+            size_us: 3.0,
+            range_us: 3.0,
+            hyper: Hyper::default(),
+        };
+        let is_left = |curve_nats: f64, product_nats: f64| {
+            let mut found = vec![ranked(1, product_nats), ranked(0, curve_nats)];
+            drop_idle_product(&mut found, sought);
+            found.len() == 2
+        };
+        assert!(!is_left(30.0, 35.0) && !is_left(30.0, 38.0) && is_left(30.0, 38.0 + 1e-9));
+        assert!(is_left(14.0, 15.0), "a curve that is none takes nothing away");
+    }
+
+    #[test]
     fn a_size_that_an_effect_cannot_have_is_none() {
         use super::super::candidates::Size;
         let column = Column::Shared(vec![]);
-        let variant =
-            Variant { vehicle: None, size: 0.2, column, updraft_mps: None, felt: Vec::new() };
+        let variant = Variant {
+            vehicle: None,
+            size: 0.2,
+            form: None,
+            price_nats: 0.0,
+            column,
+            updraft_mps: None,
+            felt: Vec::new(),
+        };
         let size = Size { name: "size", unit: "", low: 0.0, high: 0.5, now: 0.1, usual: 0.1 };
         let (was_there, by_lean) = (false, false);
         let new = Candidate { name: "", was_there, by_lean, size: Some(size), variants: vec![] };

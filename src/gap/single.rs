@@ -5,7 +5,8 @@ use super::decide::{CONTEST_MARGINS, margin_nats};
 use super::dependence::{Dependence, depend_on_the_same, signals_of};
 use super::explain::Found;
 use super::refine::{Parameter, half_interval};
-use super::verdict::{Finding, Rival, Step};
+use super::search::FREE_FLOOR_NATS;
+use super::verdict::{Finding, Rest, Rival, Step};
 use crate::effects::Role;
 
 /// A value this near to the end of its range, as a share of the range, is at the end. Numerical.
@@ -24,6 +25,7 @@ pub(super) fn review(found: &mut Found) {
     at_their_bounds(found);
     beside_something_unknown(&mut found.steps);
     beside_something_larger(&mut found.steps);
+    beside_what_is_left(&mut found.steps, &found.rest);
 }
 
 /// An effect that is named alone, and was not in the model.
@@ -113,6 +115,21 @@ fn beside_something_larger(steps: &mut [Step]) {
             step.size_us < SMALL * size_us && depend_on_the_same(&effect, other)
         });
         doubt(step, larger.map(|(other, _)| other.clone()));
+    }
+}
+
+/// Names beside a free shape that is left and depends on the same: an effect is named alone only if it leaves nothing of
+/// its kind. What is left may be no finding because only the scatter between drones shows it.
+fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
+    let Some(depends_on) = Dependence::of(&rest.candidate) else { return };
+    if rest.gain_nats <= FREE_FLOOR_NATS {
+        return;
+    }
+    for step in steps {
+        let Some(effect) = new_name(step) else { continue };
+        let alike = signals_of(effect).iter().any(|signal| depends_on.is_of(*signal));
+        let other = alike && rest.gain_nats > UNKNOWN_SHARE * step.gain_nats;
+        doubt(step, other.then(|| depends_on.name().to_owned()));
     }
 }
 
@@ -222,5 +239,21 @@ mod tests {
         let mut steps = vec![step(name("face-drag"), 15.0, 9.0, &["vortex-ring", "battery"])];
         beside_what_was_taken_back(&mut steps, Some(&free));
         assert_eq!(told(&steps), ["face-drag vortex-ring"]);
+    }
+
+    #[test]
+    fn a_name_that_leaves_much_of_its_kind_is_a_class() {
+        let with = |own_nats: f64, candidate: &str, gain_nats: f64| {
+            let mut steps = [step(name("face-drag"), own_nats, 9.0, &[])];
+            let candidate = candidate.to_owned();
+            beside_what_is_left(&mut steps, &Rest { gain_nats, candidate, ..Rest::default() });
+            told(&steps).concat()
+        };
+        let told_with = |candidate: &str, gain_nats: f64| with(40.0, candidate, gain_nats);
+        assert_eq!(told_with("climb", 20.0), "face-drag");
+        assert_eq!(told_with("climb", 20.0 + 1e-9), "face-drag climb");
+        assert_eq!(told_with("voltage", 90.0), "face-drag", "a drag has no battery");
+        assert_eq!(told_with("rotor-inflow", 90.0), "face-drag", "an effect is none of them");
+        assert_eq!(with(10.0, "climb", 14.0), "face-drag", "not above what chance gains");
     }
 }

@@ -9,6 +9,10 @@
 
 /// Newton steps: quadratic convergence from a bound takes fewer.
 const STEPS: usize = 6;
+/// Newton steps of the thrust in a climb: from a thrust near nothing, it takes more.
+const CLIMB_STEPS: usize = 10;
+/// No rotor that turns carries less, over its thrust in still air. Numerical.
+const LEAST_THRUST: f64 = 1e-3;
 
 /// State of a rotor at fixed speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +60,27 @@ pub fn at_speed(share: f64, axial: f64, edgewise: f64) -> Working {
     Working { thrust: 1.0 + beta - beta * flow, flow }
 }
 
+/// A rotor at fixed speed in axial flow, whose induced velocity changes with the climb by a share of what momentum
+/// theory says, and goes with the root of the thrust otherwise.
+pub fn in_climb(share: f64, induced: f64, axial: f64) -> Working {
+    if induced >= 1.0 {
+        return at_speed(share, axial, 0.0);
+    }
+    let beta = beta(share);
+    let half = axial / 2.0;
+    let flow = |thrust: f64| {
+        let by_theory = -half + (half * half + thrust).sqrt();
+        axial + (1.0 - induced) * thrust.sqrt() + induced * by_theory
+    };
+    let mut thrust: f64 = 1.0;
+    for _ in 0..CLIMB_STEPS {
+        let off = thrust - 1.0 - beta + beta * flow(thrust);
+        let of_root = (1.0 - induced) / thrust.sqrt() + induced / (half * half + thrust).sqrt();
+        thrust = (thrust - off / (1.0 + 0.5 * beta * of_root)).max(LEAST_THRUST);
+    }
+    Working { thrust, flow: flow(thrust) }
+}
+
 /// Speed over hover speed that keeps the thrust when the flow through the disc is `flow` times the
 /// induced velocity in hover.
 pub fn speed_for_flow(share: f64, flow: f64) -> f64 {
@@ -101,6 +126,25 @@ mod tests {
             assert!((working.thrust * speed * speed - 1.0).abs() < 1e-9, "{axial} {edge}");
             assert!((working.flow * speed - flow).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn an_induced_velocity_that_stays_makes_the_response_straight() {
+        let share = 0.4;
+        // Between both ends of the share the flow is the mean of what they say.
+        for (induced_share, axial) in
+            [(0.0, 0.6), (0.0, -1.3), (0.5, 0.4), (0.5, -0.9), (1.0, 0.3), (1.0, -0.7)]
+        {
+            let flow = axial + 1.0 + induced_share * (induced(axial, 0.0) - 1.0);
+            let speed = speed_for_flow(share, flow);
+            let working = in_climb(share, induced_share, axial / speed);
+            let thrust = working.thrust * speed * speed;
+            assert!((thrust - 1.0).abs() < 1e-9, "{induced_share} {axial}: {thrust}");
+            assert!((working.flow * speed - flow).abs() < 1e-9);
+        }
+        // With the theory in full it is the theory's, up to where a rotor carries nothing.
+        assert_eq!(in_climb(0.5, 1.0, 0.2), at_speed(0.5, 0.2, 0.0));
+        assert!(in_climb(0.5, 0.0, 50.0).thrust <= LEAST_THRUST);
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub enum Role {
     ThrustSpread,
     /// Standard deviation of the inflow share between drones, relative.
     InflowSpread,
+    /// Share of momentum theory's change of the induced velocity with the climb: one of two forms of the same effect.
+    InflowInduced,
     /// Another standard deviation between drones.
     Spread,
     /// Strength of a jitter of the thrust, which hides how the drone answers gusts.
@@ -153,6 +155,7 @@ mod tests {
         Role::MassSpread,
         Role::ThrustSpread,
         Role::InflowSpread,
+        Role::InflowInduced,
         Role::SensorBias,
         Role::SensorLag,
         Role::SensorLogOnly,

@@ -8,6 +8,7 @@ use crate::vehicle::Airframe;
 
 const SHARE: usize = 0;
 const SPREAD: usize = 1;
+const INDUCED: usize = 2;
 /// Rotor inflow.
 #[derive(Debug)]
 pub(super) struct RotorInflow;
@@ -17,6 +18,7 @@ pub(super) struct RotorInflow;
 struct Rotor {
     disc: Disc,
     share: f64,
+    induced: f64,
 }
 
 impl Effect for RotorInflow {
@@ -32,7 +34,7 @@ impl Effect for RotorInflow {
                 is quadratic. The induced part of the torque goes with the flow, so current and \
                 voltage drop add to the response.",
             formula: "T = k w² - k2 w (V + v_i);  T = 2 rho A (V + v_i) v_i;  at constant thrust \
-                dw/dV = k2/(4k) / (1 - k2 v_h/(2 k w))",
+                dw/dV = k2/(4k) / (1 - k2 v_h/(2 k w)), where the induced velocity gives back in full",
             source: "Leishman, Principles of Helicopter Aerodynamics, ch. 2-3; Bangura et al., \
                 arXiv:1601.00733",
             class: Class::AxialLinear,
@@ -56,6 +58,16 @@ impl Effect for RotorInflow {
                     default: |_| 0.0,
                     role: Some(Role::InflowSpread),
                 },
+                Parameter {
+                    name: "induced",
+                    unit: "",
+                    what: "share of momentum theory's change of the induced velocity with the \
+                        climb; without it the response is straight far into descent",
+                    low: 0.0,
+                    high: 1.0,
+                    default: |_| 1.0,
+                    role: Some(Role::InflowInduced),
+                },
             ],
             hooks: &[Hook::Loads],
             shown: (Signal::Climb, -3.5, 3.5),
@@ -63,7 +75,7 @@ impl Effect for RotorInflow {
                 size: "inflow_share",
                 sizes: |_| &[0.15, 0.3, 0.5, 0.7],
                 usual: None,
-                shape: None,
+                shape: Some(("induced", &[1.0, 0.0])),
             },
         }
     }
@@ -71,20 +83,22 @@ impl Effect for RotorInflow {
     fn pulse_us(&self, at: &Reference, values: &Values, signals: &Signals) -> f64 {
         let share = (values[SHARE] * (1.0 + values[SPREAD] * signals.deviation)).min(MOST_SHARE);
         let axial = signals.axial_mps() / at.hover_induced_mps();
-        flow_us(at, share, axial + momentum::induced(axial, 0.0)) - at.hover_us()
+        let induced = 1.0 + values[INDUCED] * (momentum::induced(axial, 0.0) - 1.0);
+        flow_us(at, share, axial + induced) - at.hover_us()
     }
 
     fn start(&self, start: &Start<'_>, airframe: &mut Airframe) -> Option<Box<dyn InFlight>> {
         let share = start.values[SHARE] * (1.0 + start.values[SPREAD] * start.deviation);
         let share = share.clamp(LEAST_SHARE, MOST_SHARE);
-        Some(Box::new(Rotor { disc: Disc::of(airframe), share }))
+        let induced = start.values[INDUCED];
+        Some(Box::new(Rotor { disc: Disc::of(airframe), share, induced }))
     }
 }
 
 impl InFlight for Rotor {
     fn loads(&mut self, now: &Now, change: &mut Change) {
         let Some((axial, _)) = self.disc.speeds(now) else { return };
-        let working = momentum::at_speed(self.share, axial, 0.0);
+        let working = momentum::in_climb(self.share, self.induced, axial);
         change.thrust *= working.thrust;
         change.torque += self.disc.merit * (working.thrust * working.flow - 1.0);
     }
