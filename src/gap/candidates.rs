@@ -60,7 +60,7 @@ pub(super) struct Variant {
     pub size: f64,
     /// Value of the parameter that says which form it has; `None`: it has but one.
     pub form: Option<f64>,
-    /// What it must explain more than the usual form, nats.
+    /// Nats that this form must explain beyond the effect's usual form.
     pub price_nats: f64,
     /// Contribution to the pulse, us.
     pub column: Column,

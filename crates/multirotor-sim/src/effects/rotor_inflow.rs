@@ -34,7 +34,7 @@ impl Effect for RotorInflow {
                 is quadratic. The induced part of the torque goes with the flow, so current and \
                 voltage drop add to the response.",
             formula: "T = k w² - k2 w (V + v_i);  T = 2 rho A (V + v_i) v_i;  at constant thrust \
-                dw/dV = k2/(4k) / (1 - k2 v_h/(2 k w)), where the induced velocity gives back in full",
+                dw/dV = k2/(4k) / (1 - k2 v_h/(2 k w))",
             source: "Leishman, Principles of Helicopter Aerodynamics, ch. 2-3; Bangura et al., \
                 arXiv:1601.00733",
             class: Class::AxialLinear,
