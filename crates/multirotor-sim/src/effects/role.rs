@@ -141,7 +141,7 @@ impl Role {
 mod tests {
     use super::*;
 
-    const ONCE: [Role; 25] = [
+    const ONCE: [Role; 26] = [
         Role::BodyDragTop,
         Role::BodyDragSide,
         Role::RotorDrag,
