@@ -226,7 +226,7 @@ pub(super) fn library(
 /// tell them apart it is that of the usual form.
 fn is_unusual(definition: &Definition, vehicle: &Vehicle, name: &str, value: f64) -> bool {
     definition.parameter(name).is_some_and(|parameter| {
-        parameter.role == Some(Role::InflowInduced) && value != (parameter.default)(vehicle)
+        parameter.role.is_some_and(Role::is_choice) && value != (parameter.default)(vehicle)
     })
 }
 

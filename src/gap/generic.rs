@@ -1,5 +1,7 @@
 //! Free shapes: a dependence of the pulse on a signal that no effect of the library explains.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::DVector;
 
 use super::dependence::Dependence;
@@ -88,36 +90,29 @@ pub(super) fn all(scene: &Scene, headings: &[Vec<f64>]) -> Vec<Generic> {
 /// Many drones in calm air know their pulse to a tenth of that.
 const FORM_US: f64 = 0.6;
 /// Curves over the climb by which it may: from the first bend on.
-const FORM_ORDERS: std::ops::RangeInclusive<usize> = 2..=4;
+const FORM_ORDERS: RangeInclusive<usize> = 2..=4;
 /// Curves over the horizontal air speed.
-const FORM_WIND_ORDERS: std::ops::RangeInclusive<usize> = 1..=2;
+const FORM_WIND_ORDERS: RangeInclusive<usize> = 1..=2;
 
 /// Shapes by which a flight may differ from any model of its kind, as regressors of one standard deviation each.
 pub(super) fn form_doubts(scene: &Scene) -> Vec<Column> {
-    let of_climb = curves(scene, |signals| signals.climb_mps, FORM_ORDERS, 0.5);
-    let of_wind = curves(scene, |signals| signals.horizontal_mps, FORM_WIND_ORDERS, 1.5);
-    of_climb.chain(of_wind).map(|curve| Column::Shared(times(FORM_US, curve))).collect()
+    let shapes = |of: fn(&Signals) -> f64, orders, least_span: f64| {
+        let along: Vec<Vec<f64>> =
+            scene.signals.iter().map(|group| group.iter().map(of).collect()).collect();
+        let shows = span(&along).is_finite() && span(&along) > least_span;
+        if shows { polynomials(&along, orders, FORM_US) } else { Vec::new() }
+    };
+    let of_wind = shapes(|signals| signals.horizontal_mps, FORM_WIND_ORDERS, 1.5);
+    [shapes(|signals| signals.climb_mps, FORM_ORDERS, 0.5), of_wind].concat()
 }
 
-/// Chebyshev polynomials over a signal, by group and bin, if it spans enough.
-fn curves(
-    scene: &Scene,
-    of: fn(&Signals) -> f64,
-    orders: std::ops::RangeInclusive<usize>,
-    least_span: f64,
-) -> impl Iterator<Item = Vec<Vec<f64>>> {
-    let along: Vec<Vec<f64>> =
-        scene.signals.iter().map(|group| group.iter().map(of).collect()).collect();
-    let (low, high) = (least(&along), most(&along));
-    let shows = (high - low).is_finite() && high - low > least_span;
-    let scaled = move |value: f64| (2.0 * value - low - high) / (high - low);
-    let curve = move |order: usize| map(&along, &|value| chebyshev(order, scaled(value)));
-    orders.filter(move |_| shows).map(curve)
-}
-
-fn times(factor: f64, mut curve: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    curve.iter_mut().flatten().for_each(|value| *value *= factor);
-    curve
+/// Chebyshev polynomials over the range of a signal, of a size in us.
+fn polynomials(along: &[Vec<f64>], orders: RangeInclusive<usize>, size_us: f64) -> Vec<Column> {
+    let (low, high) = (least(along), most(along));
+    let scaled = |value: f64| (2.0 * value - low - high) / (high - low);
+    let of_order =
+        |order: usize| Column::Shared(map(along, &|v| size_us * chebyshev(order, scaled(v))));
+    orders.map(of_order).collect()
 }
 
 /// Waves over the height, where the flight spans most of one.
@@ -306,13 +301,10 @@ fn smooth(
     if !(high - low).is_finite() || high - low < least_span.max(LEAST_SPAN * high.abs()) {
         return None;
     }
-    let scaled = |value: f64| (2.0 * value - low - high) / (high - low);
-    let columns =
-        (1..=order).map(|power| Column::Shared(map(along, &|v| chebyshev(power, scaled(v)))));
     Some(Generic {
         depends_on,
         axis,
-        columns: columns.collect(),
+        columns: polynomials(along, 1..=order, 1.0),
         felt: Vec::new(),
         along: along.to_vec(),
         penalty: 2.0 * (order as f64 - 1.0),

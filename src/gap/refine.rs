@@ -209,7 +209,7 @@ fn form_of(size: &Parameter) -> Option<(Parameter, f64)> {
 /// Whether a form is one of two, of which the search chooses: the size is that of the chosen one.
 fn is_chosen(form: &Parameter) -> bool {
     let known = find(form.effect).and_then(|effect| effect.definition().parameter(form.name));
-    known.is_some_and(|known| known.role == Some(Role::InflowInduced))
+    known.and_then(|known| known.role).is_some_and(Role::is_choice)
 }
 
 /// Derivatives of the model's pulse by each parameter.

@@ -92,6 +92,11 @@ impl Role {
         matches!(self, Self::MassSpread | Self::ThrustSpread | Self::InflowSpread | Self::Spread)
     }
 
+    /// Whether the parameter chooses between forms of its effect, each of which has a size of its own.
+    pub fn is_choice(self) -> bool {
+        self == Self::InflowInduced
+    }
+
     /// Parameter with this role, the first in the library's order; `None` if there is none.
     pub fn place(self) -> Option<Place> {
         LIBRARY.iter().find_map(|effect| {
