@@ -599,7 +599,7 @@ impl Search<'_> {
             found.hyper = best.hyper;
         }
         found.steps.push(Step {
-            finding: finding(names, candidate.was_there, by_lean),
+            finding: finding(with_alike(names, candidate), candidate.was_there, by_lean),
             gain_nats: best.gain,
             threshold_nats,
             alpha: self.options.alpha,
@@ -853,6 +853,15 @@ pub(super) fn settle(found: &mut Found) {
             *stated = of(&effect);
         }
     }
+}
+
+/// Names of a step, with those that lean a drone alike where the lean told it.
+fn with_alike(mut names: Vec<String>, candidate: &Candidate) -> Vec<String> {
+    if candidate.by_lean {
+        let others = super::lean_channel::alike();
+        names.extend(others.into_iter().filter(|one| !names.contains(one)).collect::<Vec<_>>());
+    }
+    names
 }
 
 fn finding(names: Vec<String>, was_there: bool, known: Option<Fitted>) -> Finding {

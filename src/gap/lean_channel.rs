@@ -49,7 +49,14 @@ fn apart(measured: LeanLaw, model: f64) -> f64 {
     least.max(0.0) + most.min(0.0)
 }
 
-/// Rotor drag that the model lacks, or has with another size.
+/// Effects that lean a drone alike at every speed over ground: rotors that flap, and air that gives up its momentum
+/// to them. No lean tells them apart; the first is what the model gets.
+pub(super) fn alike() -> Vec<String> {
+    let both = [Role::RotorDrag, Role::MomentumDrag];
+    both.iter().filter_map(|role| Some(role.place()?.name().to_owned())).collect()
+}
+
+/// Drag of the rotors that the model lacks, or has with another size: a class, because leans do not tell its kind.
 pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<Step> {
     let measured = before.wind.measured?;
     let apart = apart(measured.law, wind.model_lean_per_mps);
@@ -66,11 +73,7 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         before: known,
     };
     Some(Step {
-        finding: Finding::Name {
-            effect: place.name().to_owned(),
-            parameters: vec![fitted],
-            was_there: known.is_some(),
-        },
+        finding: Finding::Class { effects: alike(), parameters: vec![fitted] },
         gain_nats: 0.5 * z * z,
         threshold_nats: 0.5 * NAMED_Z * NAMED_Z,
         alpha,

@@ -7,7 +7,7 @@ pub(super) const KIND: Kind = Kind {
     name: "ceiling",
     what: "controllers take no command beyond a limit",
     depends_on: &["climb"],
-    parameters: &[log("above_us", 50.0, 100.0)],
+    parameters: &[log("above_us", 70.0, 150.0)],
     is_steady: false,
     start: |values| Box::new(Ceiling { above_us: values[0] }),
 };
