@@ -135,6 +135,7 @@ impl Contest<'_> {
         let leader =
             rivals.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)).map(|one| one.candidate);
         let margin = margin_nats(most);
+        let overruled = overruled(&standings, &rivals);
         let mut members: Vec<(f64, Option<f64>, Ranked)> = standings
             .into_iter()
             .zip(rivals)
@@ -148,7 +149,8 @@ impl Contest<'_> {
             .filter(|(behind, _, rival)| {
                 // Who leads as a regressor must be beaten clearly.
                 let leads = Some(rival.candidate) == leader;
-                *behind < if leads { PRODUCT_NATS } else { margin }
+                let is_overruled = Some(rival.candidate) == overruled;
+                is_overruled || *behind < if leads { PRODUCT_NATS } else { margin }
             })
             .collect();
         members.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -235,6 +237,16 @@ pub(super) struct Free<'a> {
     beta: &'a [f64],
 }
 
+/// The candidate that explains more of the means than the one that stands best, which scatter chose; `None`: they are
+/// the same or nearly equal. It stays beside the other: in air in which drones scatter otherwise than assumed (a field
+/// that stands still, through which they climb) scatter may choose wrongly.
+fn overruled(standings: &[Option<f64>], rivals: &[Ranked]) -> Option<usize> {
+    let stand = standings.iter().zip(rivals).filter_map(|(nats, rival)| Some(((*nats)?, rival)));
+    let (_, best) = stand.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let by_means = rivals.iter().max_by(|a, b| a.plain.total_cmp(&b.plain))?;
+    (by_means.plain > best.plain + CLASS_NATS).then_some(by_means.candidate)
+}
+
 /// Whether the scatter between drones shows an effect.
 fn is_felt(candidate: &Candidate) -> bool {
     candidate.variants.iter().any(|variant| !variant.felt.is_empty())
@@ -271,6 +283,19 @@ mod tests {
             contest.likely().len()
         };
         assert_eq!((likely(FLOOR_NATS), likely(FLOOR_NATS + 1e-9)), (0, 1));
+    }
+
+    #[test]
+    fn what_scatter_chose_stands_beside_what_the_means_say() {
+        let rivals = |less: f64| {
+            let of = |candidate, plain| Ranked { plain, ..ranked(candidate, 60.0) };
+            [of(3, 50.0), of(7, 50.0 + less)]
+        };
+        let of = |standings: [Option<f64>; 2], less: f64| overruled(&standings, &rivals(less));
+        assert_eq!(of([Some(-900.0), Some(-990.0)], CLASS_NATS + 1e-9), Some(7));
+        assert_eq!(of([Some(-900.0), Some(-990.0)], CLASS_NATS), None);
+        assert_eq!(of([Some(-990.0), Some(-900.0)], 20.0), None, "scatter and means agree");
+        assert_eq!(of([None, None], 20.0), None, "scatter says nothing");
     }
 
     #[test]

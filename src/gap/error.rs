@@ -63,9 +63,17 @@ pub enum GapError {
 }
 
 impl GapError {
-    /// Whether it is that the vehicle cannot fly steadily as it would have to.
+    /// Whether it is that the vehicle cannot fly as it would have to: not steadily, or not the plan in that air.
     pub(super) fn is_not_flown(&self) -> bool {
-        matches!(self, Self::Effect(EffectError::NotFlown { .. }))
+        matches!(
+            self,
+            Self::Effect(EffectError::NotFlown { .. })
+                | Self::Simulation(
+                    SimError::NeverBegun { .. }
+                        | SimError::NotLanded { .. }
+                        | SimError::Diverged { .. }
+                )
+        )
     }
 }
 

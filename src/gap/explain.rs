@@ -502,7 +502,13 @@ impl Search<'_> {
                 solution = best.solution;
                 break;
             }
-            let flown = self.against_model()?;
+            let flown = match self.against_model() {
+                Err(error) if error.is_not_flown() => {
+                    self.found.updraft_mps = before_mps;
+                    break;
+                }
+                flown => flown?,
+            };
             // Where the model cannot follow the command in that updraft, regressors would lose their bins.
             let (there, patterns) = if counts(&flown) == counts(&self.comparison) {
                 (flown, patterns)
@@ -541,7 +547,10 @@ impl Search<'_> {
         modes.retain(|mode| (mode.updraft_mps - before_mps).abs() > STILL_MPS);
         for mode in modes {
             self.found.updraft_mps = mode.updraft_mps;
-            let there = self.against_model()?;
+            let there = match self.against_model() {
+                Err(error) if error.is_not_flown() => continue,
+                there => there?,
+            };
             let found = &self.found;
             let patterns = there.patterns(&found.vehicle, found.gusts_mps)?;
             let (hyper, at_mps) = (mode.solution.hyper, mode.updraft_mps);

@@ -25,9 +25,11 @@ const MOST_UPDRAFT_MPS: f64 = 2.0;
 /// Wind and lean of a comparison with the model that was planned with.
 pub(super) fn found(before: &Comparison) -> WindFound {
     let model = LeanLaw::of(&before.vehicle, SEA_LEVEL_DENSITY, 0.0);
+    // Legs that do not bound the lean have not told it.
+    let measured = before.wind.measured.filter(|measured| measured.linear_se.is_finite());
     WindFound {
         mean_mps: before.wind.mean_mps,
-        lean_per_mps: before.wind.measured.map(|measured| Interval {
+        lean_per_mps: measured.map(|measured| Interval {
             value: measured.law.linear,
             low: measured.law.linear - HALF * measured.linear_se,
             high: measured.law.linear + HALF * measured.linear_se,
@@ -82,4 +84,28 @@ pub(super) fn step(before: &Comparison, wind: &WindFound, alpha: f64) -> Option<
         shape: None,
         in_field: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lean::Measured;
+    use super::super::trial;
+    use super::*;
+
+    #[test]
+    fn leans_do_not_tell_which_drag_it_is() {
+        let mut comparison = trial::comparison(&trial::data(2, |_, _| 0.0));
+        let model = LeanLaw::of(&comparison.vehicle, SEA_LEVEL_DENSITY, 0.0);
+        let mut told = |more: f64, linear_se: f64| {
+            let law = LeanLaw { linear: model.linear + more, ..model };
+            comparison.wind.measured = Some(Measured { law, linear_se });
+            let step = step(&comparison, &found(&comparison), 0.005)?;
+            Some(step.finding.effects().join(" "))
+        };
+        assert_eq!(told(0.02, 1e-3).as_deref(), Some("blade-flapping momentum-drag"));
+        assert_eq!(told(0.02, 1e-2), None, "it may be none");
+        assert_eq!(told(0.002, 1e-4), None, "nobody would notice");
+        assert_eq!(told(0.02, f64::INFINITY), None);
+        assert_eq!(found(&comparison).lean_per_mps, None, "no interval has no end");
+    }
 }
