@@ -47,8 +47,10 @@ impl Question<'_> {
             let still_air = Options { updraft: false, ..*self.options };
             let (still, without) = self.searched(train, held, still_air)?;
             let (with_nats, still_nats) = (found.explains()?, still.explains()?);
-            let there = (blown_off || grows(&gap), -with_nats);
-            if with_nats < still_nats + FAR_NATS && (grows(&without), -still_nats) < there {
+            let left = |gap: &Gap| gap.left_over().is_some();
+            let there = (blown_off || grows(&gap), left(&gap), -with_nats);
+            let in_still_air = (grows(&without), left(&without), -still_nats);
+            if with_nats < still_nats + FAR_NATS && in_still_air < there {
                 (found, gap) = (still, without);
             }
         }

@@ -127,6 +127,9 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         options,
     };
     let (mut found, shrink) = question.answered(&train, &held)?;
+    if shrink.left_over().is_some() {
+        super::single::beside_what_nothing_explains(&mut found.steps);
+    }
     let (plan, updraft_mps) = (input.plan, found.updraft_mps);
     let whole =
         Comparison::of(&data, &found.vehicle, &simulated, plan, updraft_mps, Some(&before))?
@@ -166,6 +169,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
     // Momentum drag on all axes took the place of what the leans told.
     let instead = |one: &Parameter| Role::MomentumDrag.is_of(one.effect);
     steps.extend(leans.filter(|_| !found.parameters.iter().any(instead)));
+    let cautions = warnings(&data, &found, &shrink, input);
     let mut verdict = Verdict {
         schema: VERDICT_SCHEMA.to_owned(),
         made_by: concat!("updraft ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -183,7 +187,7 @@ pub fn explain(input: &Input<'_>, options: &Options) -> Result<Explained, GapErr
         map: None,
         regimes: regimes(&before, &same_bins(&whole, &before), &found, options.seed)?,
         ladder: Vec::new(),
-        cautions: warnings(&data, &found, input),
+        cautions,
     };
     verdict.ladder = ladder(&whole.data, &verdict.regimes);
     verdict.summary = summary(&verdict);

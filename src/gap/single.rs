@@ -133,6 +133,16 @@ fn beside_what_is_left(steps: &mut [Step], rest: &Rest) {
     }
 }
 
+/// Names in a flight of which much is left that nothing explains: it may be one thing that neither the name nor its best
+/// rival is.
+pub(super) fn beside_what_nothing_explains(steps: &mut [Step]) {
+    for step in steps {
+        let Some(effect) = new_name(step).map(str::to_owned) else { continue };
+        let other = best_rival(step, &effect);
+        doubt(step, other);
+    }
+}
+
 /// Names that a free shape, which could not be taken in, is left beside: an effect is named alone only if it leaves
 /// nothing of its kind.
 pub(super) fn beside_what_was_taken_back(steps: &mut [Step], free: Option<&Step>) {
@@ -239,6 +249,17 @@ mod tests {
         let mut steps = vec![step(name("face-drag"), 15.0, 9.0, &["vortex-ring", "battery"])];
         beside_what_was_taken_back(&mut steps, Some(&free));
         assert_eq!(told(&steps), ["face-drag vortex-ring"]);
+    }
+
+    #[test]
+    fn a_flight_that_is_not_explained_names_nothing_alone() {
+        let of = |gain_nats: f64| {
+            let mut steps = [step(name("face-drag"), gain_nats, 9.0, &["battery", "thrust-curve"])];
+            beside_what_nothing_explains(&mut steps);
+            told(&steps).concat()
+        };
+        assert_eq!(of(30.0), "face-drag battery");
+        assert_eq!(of(40.0), "face-drag", "no rival is near");
     }
 
     #[test]

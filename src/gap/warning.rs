@@ -5,6 +5,7 @@ use std::fmt;
 use super::data::Data;
 use super::explain::Found;
 use super::make::Input;
+use super::verdict::Gap;
 use crate::base::said::said_in_files;
 use crate::effects::select::value_of;
 
@@ -40,6 +41,15 @@ pub enum Warning {
     OtherWind {
         /// Difference of the leans, degrees.
         lean_deg: f64,
+    },
+    /// Held-out rungs keep more than noise and air would leave.
+    LeftOver {
+        /// What is left on them, us.
+        left_us: f64,
+        /// What noise and air alone would leave, us.
+        floor_us: f64,
+        /// Reduced chi-square of what is left.
+        reduced_chi2: f64,
     },
     /// Tables were compared, which have no plan.
     Tables,
@@ -95,6 +105,12 @@ impl fmt::Display for Warning {
                  and vertical flight: the two sides flew in different wind, and nothing is named that this \
                  explains"
             ),
+            Self::LeftOver { left_us, floor_us, reduced_chi2 } => write!(
+                f,
+                "on rungs that were held out {left_us:.1} us are left where noise and air alone would leave \
+                 {floor_us:.1} (reduced chi-square {reduced_chi2:.1}): something is missing that nothing in \
+                 the library explains, and names and sizes may stand for it"
+            ),
             Self::Tables => f.write_str(
                 "tables have no plan that could be flown again: the model's side is its closed forms at \
                  the climb that was flown",
@@ -108,17 +124,24 @@ impl fmt::Display for Warning {
             ),
             Self::VehicleGuessed { vehicle } => write!(
                 f,
-                "no plan says which vehicle flew: {vehicle} is taken, and its closed forms stand for \
-                 what effects do (--vehicle, --plan)"
+                "no plan says which vehicle flew: {vehicle} is taken, and its balance in steady flight \
+                 says what effects do (--vehicle, --plan)"
             ),
             Self::Said(text) => f.write_str(text),
         }
     }
 }
 
-/// Warnings about a comparison.
-pub(super) fn warnings(data: &Data, found: &Found, input: &Input<'_>) -> Vec<Warning> {
+/// Warnings about a comparison that ended with this gap.
+pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>) -> Vec<Warning> {
     let mut warnings = Vec::new();
+    if let Some(rungs) = gap.left_over() {
+        warnings.push(Warning::LeftOver {
+            left_us: rungs.after_without_air_us,
+            floor_us: rungs.floor_us,
+            reduced_chi2: rungs.chi2.1,
+        });
+    }
     let drones = data.drones();
     if drones == 1 {
         warnings.push(Warning::OneDrone);

@@ -81,7 +81,9 @@ pub fn short(value: f64) -> String {
 
 /// The verdict in one or two sentences.
 pub fn summary(verdict: &Verdict) -> String {
-    let mut text = if verdict.steps.is_empty() {
+    let mut text = if verdict.steps.is_empty() && verdict.gap.left_over().is_some() {
+        "Something is missing that nothing in the library explains.".to_owned()
+    } else if verdict.steps.is_empty() {
         let would = verdict.detectable.iter().filter(|one| one.would_be_seen).count();
         format!(
             "Nothing is missing that this flight could show: of {} effects it would have shown {} at \
@@ -104,7 +106,13 @@ pub fn summary(verdict: &Verdict) -> String {
              ({effect})."
         );
     }
-    if let Some(shrink) =
+    if let Some(rungs) = verdict.gap.left_over() {
+        let _ = write!(
+            text,
+            " On rungs that were held out {:.1} us are left; noise and air alone would leave {:.1}.",
+            rungs.after_without_air_us, rungs.floor_us
+        );
+    } else if let Some(shrink) =
         verdict.gap.drones.or(verdict.gap.rungs).filter(|_| !verdict.steps.is_empty())
     {
         let is_unknown = |step: &Step| matches!(step.finding, Finding::Unknown { .. });
