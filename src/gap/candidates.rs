@@ -152,9 +152,32 @@ pub(super) fn library(
     comparison: &Comparison,
     updraft: Updraft,
 ) -> Result<Vec<Candidate>, EffectError> {
+    of_library(vehicle, comparison, updraft, |_| true)
+}
+
+/// One effect of the library, held against a vehicle; `None`: there is none of that name that steady flight can show.
+///
+/// # Errors
+/// Effects of the vehicle that are not valid.
+pub(super) fn one(
+    vehicle: &Vehicle,
+    comparison: &Comparison,
+    updraft: Updraft,
+    name: &str,
+) -> Result<Option<Candidate>, EffectError> {
+    Ok(of_library(vehicle, comparison, updraft, |effect| effect == name)?.pop())
+}
+
+fn of_library(
+    vehicle: &Vehicle,
+    comparison: &Comparison,
+    updraft: Updraft,
+    is_wanted: impl Fn(&str) -> bool,
+) -> Result<Vec<Candidate>, EffectError> {
     let base = Base::of(vehicle, comparison, updraft)?;
     let mut found = Vec::new();
-    for effect in LIBRARY {
+    let wanted = LIBRARY.iter().filter(|effect| is_wanted(effect.definition().name));
+    for effect in wanted {
         let definition = effect.definition();
         let Sought::Shape { size, sizes, usual, shape } = &definition.sought else { continue };
         let Some(parameter) = definition.parameter(size) else {

@@ -3,8 +3,8 @@
 use super::candidates::{Candidate, Updraft, library};
 use super::error::GapError;
 use super::explain::Found;
-use super::gls::{Problem, Solution, Split, White};
-use super::refine::doubts;
+use super::gls::{Column, Problem, Solution, Split, White};
+use super::refine::{doubts, slopes};
 use super::response::shifted;
 use super::search::FLOOR_NATS;
 use super::verdict::Detectable;
@@ -29,12 +29,26 @@ pub(super) fn detectable(found: &Found) -> Result<Vec<Detectable>, GapError> {
     let doubts = doubts(comparison, &found.vehicle, &found.parameters)?;
     let problem = Problem::new(&patterns, &split).doubting(&doubts).with(&found.extras);
     let groups = shifted(&patterns, &problem, &problem.at(&found.hyper));
-    let solution = problem.among(&groups).at(&found.hyper);
+    let sizes = slopes(comparison, &found.vehicle, &found.parameters)?;
+    // Sizes that were fitted are free, but for an effect's own.
+    let free_but = |effect: Option<&str>| {
+        let of = found.parameters.iter().zip(&sizes);
+        let free: Vec<Column> = of
+            .filter(|(parameter, _)| Some(parameter.effect) != effect)
+            .map(|(_, slope)| slope.clone())
+            .collect();
+        problem.among(&groups).with(&free).at(&found.hyper)
+    };
+    let solution = free_but(None);
     let candidates = library(&found.vehicle, comparison, Updraft::Same)?;
     let drones = comparison.data.counts();
     let best: Vec<(&Candidate, Option<Trace>)> = candidates
         .iter()
-        .map(|candidate| (candidate, strongest(candidate, &solution, &drones)))
+        .map(|candidate| {
+            let is_found = found.parameters.iter().any(|one| one.effect == candidate.name);
+            let own = is_found.then(|| free_but(Some(candidate.name)));
+            (candidate, strongest(candidate, own.as_ref().unwrap_or(&solution), &drones))
+        })
         .collect();
     let mut table = Vec::new();
     for effect in LIBRARY {

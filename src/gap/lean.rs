@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector3};
 
-use super::bins::BinValues;
+use super::bins::{Bin, BinValues};
 use super::data::{Data, Group};
 use super::filter::{Filter, Observation, State};
 use super::lean_fit::{Fitted, Point, fit, hovering_wind};
@@ -264,7 +264,7 @@ pub(super) fn wind_by(
         .iter()
         .zip(&leans)
         .map(|(group, leans)| {
-            let air = |(bin, lean): (&super::bins::Bin, &[f64; 2])| {
+            let air = |(bin, lean): (&Bin, &[f64; 2])| {
                 let steady = [bin.velocity_mps[0] - mean_mps[0], bin.velocity_mps[1] - mean_mps[1]];
                 let tells = law.slope(steady[0].hypot(steady[1])) > LEAST_SLOPE;
                 if tells { law.air(*lean, bin.climb_mps()) } else { steady }
@@ -280,6 +280,13 @@ pub(super) fn wind_by(
     let mean_se_mps = LEAST_DOUBT_MPS.hypot(law_mps);
     let measured = legs.map(|legs| Measured { law, linear_se: legs.linear_se });
     Wind { mean_mps, mean_se_mps, air_mps, measured }
+}
+
+/// Standard error along an axis with which the leans of a flight that is yet to be flown will tell a mean wind, m/s.
+pub(super) fn told_within_mps(data: &Data, mean_mps: [f64; 2]) -> f64 {
+    let has_legs = data.groups.iter().flat_map(|group| &group.bins).any(Bin::is_horizontal);
+    let share = if has_legs { LEGS_DOUBT } else { LAW_DOUBT };
+    LEAST_DOUBT_MPS.hypot(share * mean_mps[0].hypot(mean_mps[1]))
 }
 
 /// Mean of the wind that [`wind`] finds, show frame, m/s.
@@ -387,7 +394,7 @@ fn smoothed(group: &Group, values: &[f64]) -> Vec<f64> {
     if variance < 1e-6 || count < 4 {
         return values.to_vec();
     }
-    let times: Vec<f64> = group.bins.iter().map(super::bins::Bin::middle_s).collect();
+    let times: Vec<f64> = group.bins.iter().map(Bin::middle_s).collect();
     let rest: Vec<f64> = values.iter().map(|value| value - mean).collect();
     let filter = |time_s: f64, share: f64| {
         let seen = |time_s: &f64| Observation {

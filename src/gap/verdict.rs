@@ -337,11 +337,16 @@ pub struct Gap {
 /// Reduced chi-square of held-out rungs above which something is left that nothing found explains. Chosen: 0.7 to 1.3
 /// where the verdict was right in some 70 flights of known truth, 2 to 90 in five in which it was wrong or silent.
 const LEFT_OVER_CHI2: f64 = 1.5;
+/// Excess over noise and air below which nobody would miss anything, us: 0.1 m/s of air on the show drone.
+const LEFT_OVER_US: f64 = 2.5;
 
 impl Gap {
     /// The gap on held-out rungs, if more is left there than noise and air would leave.
     pub fn left_over(&self) -> Option<&Shrink> {
-        self.rungs.as_ref().filter(|rungs| rungs.chi2.1 > LEFT_OVER_CHI2)
+        self.rungs.as_ref().filter(|rungs| {
+            let excess_us2 = rungs.after_without_air_us.powi(2) - rungs.floor_us.powi(2);
+            rungs.chi2.1 > LEFT_OVER_CHI2 && excess_us2 > LEFT_OVER_US * LEFT_OVER_US
+        })
     }
 }
 

@@ -44,9 +44,9 @@ pub enum Warning {
     },
     /// Held-out rungs keep more than noise and air would leave.
     LeftOver {
-        /// What is left on them, us.
+        /// Root mean square that is left on those rungs, us.
         left_us: f64,
-        /// What noise and air alone would leave, us.
+        /// Root mean square that noise and air alone would leave there, us.
         floor_us: f64,
         /// Reduced chi-square of what is left.
         reduced_chi2: f64,
@@ -182,7 +182,28 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gap::verdict::Verdict;
+    use crate::gap::verdict::{Shrink, Verdict};
+
+    #[test]
+    fn much_that_nothing_explains_is_said() {
+        let summary = |after_without_air_us: f64, chi2: f64| {
+            let rungs = Shrink {
+                after_without_air_us,
+                floor_us: 6.0,
+                chi2: (chi2, chi2),
+                ..Shrink::default()
+            };
+            let gap = Gap { rungs: Some(rungs), ..Gap::default() };
+            crate::gap::words::summary(&Verdict { gap, ..Verdict::default() })
+        };
+        assert_eq!(
+            summary(9.0, 2.25),
+            "Something is missing that nothing in the library explains. On rungs that were held out 9.0 us \
+             are left; noise and air alone would leave 6.0."
+        );
+        assert!(summary(6.4, 2.25).starts_with("Nothing is missing"), "nobody would miss it");
+        assert!(summary(9.0, 1.5).starts_with("Nothing is missing"), "noise may leave it");
+    }
 
     #[test]
     fn a_verdict_keeps_its_sentences_and_what_is_decided_by_them() {

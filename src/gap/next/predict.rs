@@ -7,7 +7,7 @@ use super::known::{Flight, Known};
 use super::questions::{Question, Sought};
 use super::scenery::Scenery;
 use crate::gap::GapError;
-use crate::gap::candidates::{Updraft, library, set};
+use crate::gap::candidates::{Updraft, one, set};
 use crate::gap::dependence::Dependence;
 use crate::gap::generic::{Generic, all};
 use crate::gap::gls::{Column, Solution, White};
@@ -92,8 +92,7 @@ pub fn size_z(known: &Known, flight: &Flight, charge: bool, effect: &str) -> Res
 /// As [`predict`].
 pub fn matters(known: &Known, flight: &Flight, effect: &str) -> Result<bool, GapError> {
     let scenery = Scenery::new(known, flight, false, false)?;
-    let candidates = library(&known.model, &scenery.comparison, Updraft::Same)?;
-    let Some(candidate) = candidates.iter().find(|candidate| candidate.name == effect) else {
+    let Some(candidate) = one(&known.model, &scenery.comparison, Updraft::Same, effect)? else {
         return Ok(false);
     };
     let Some(size) = candidate.size else { return Ok(false) };

@@ -5,15 +5,20 @@ use super::known::{Flight, Known, cells, charge_of};
 use crate::effects::cell::cell_v;
 use crate::gap::GapError;
 use crate::gap::bins::{Bin, BinValues};
-use crate::gap::candidates::{Candidate, Updraft, library, of_the_air};
+use crate::gap::candidates::{Candidate, Updraft, of_the_air, one};
 use crate::gap::compare::{Comparison, Simulated};
 use crate::gap::data::{Data, PlannedPart};
+use crate::gap::explain::MOST_GUSTS_MPS;
 use crate::gap::gls::{Column, Problem, Solution, Split};
-use crate::gap::lean::Wind;
-use crate::gap::refine::{Parameter, slopes};
+use crate::gap::lean::{Wind, told_within_mps};
+use crate::gap::refine::{Parameter, doubts, slopes};
+use crate::gap::response::gusts_mps;
 use crate::gap::scene::Scene;
 use crate::mission::plan::Slot;
 use crate::vehicle::Vehicle;
+
+/// Regressors of a vehicle and its fitted sizes.
+type Regressors = fn(&Comparison, &Vehicle, &[Parameter]) -> Result<Vec<Column>, GapError>;
 
 /// A flight with its noise, ready to be asked.
 pub(super) struct Scenery<'a> {
@@ -61,7 +66,8 @@ impl<'a> Scenery<'a> {
                 if charge { charge_of(place(slot).unwrap_or(0), count, lowest) } else { 1.0 };
             cells * cell_v(full - bin.middle_s().max(0.0) / endurance_s)
         };
-        let data = Data::planned(plan, &parts, resting_v);
+        // Drones that the search will hold out tell it nothing.
+        let (data, _) = Data::planned(plan, &parts, resting_v).split();
         // The simulated side is what all drones read.
         let side: Vec<Vec<Option<BinValues>>> = data
             .groups
@@ -73,13 +79,13 @@ impl<'a> Scenery<'a> {
             .collect();
         let simulated = Simulated::Given { values: side, flew: &known.model, is_foreign: false };
         let mut comparison = Comparison::new(&data, &known.model, &simulated, Some(plan))?;
-        // The wind is known here, and needs no estimate from the leans.
+        // The wind is known here, and as well as the leans will tell it.
         let air =
             |bin: &Bin| [0, 1].map(|axis: usize| bin.velocity_mps[axis] - known.wind_mps[axis]);
         let groups = &comparison.data.groups;
         let wind = Wind {
             mean_mps: known.wind_mps,
-            mean_se_mps: 0.0,
+            mean_se_mps: told_within_mps(&comparison.data, known.wind_mps),
             air_mps: groups.iter().map(|group| group.bins.iter().map(air).collect()).collect(),
             measured: None,
         };
@@ -117,11 +123,12 @@ impl<'a> Scenery<'a> {
         }
     }
 
-    /// The noise, with all fitted sizes free but those of one effect.
+    /// The noise, with all fitted sizes free but those of one effect, and with what the search will not know exactly.
     pub(super) fn solution(&self, but: Option<&str>) -> Result<Solution, GapError> {
         let model = &self.known.model;
-        let patterns = self.comparison.patterns(model, 0.0)?;
-        let split = Split::of(&self.comparison.residual(model, 0.0)?);
+        let gusts = gusts_mps(&self.known.hyper).min(MOST_GUSTS_MPS);
+        let patterns = self.comparison.patterns(model, gusts)?;
+        let split = Split::of(&self.comparison.residual(model, gusts)?);
         let free: Vec<Parameter> = self
             .known
             .parameters
@@ -129,20 +136,21 @@ impl<'a> Scenery<'a> {
             .filter(|parameter| Some(parameter.effect) != but)
             .cloned()
             .collect();
-        let light = slopes(&self.comparison, model, &free)?;
-        let loaded = match self.loaded(model) {
-            Some(loaded) => Some(slopes(&self.comparison, &loaded, &free)?),
-            None => None,
+        let of = |regressors: Regressors| -> Result<Vec<Column>, GapError> {
+            let light = regressors(&self.comparison, model, &free)?;
+            let loaded = match self.loaded(model) {
+                Some(loaded) => regressors(&self.comparison, &loaded, &free)?,
+                None => Vec::new(),
+            };
+            // Who feels nothing has nothing to doubt, with a payload or without.
+            let both = loaded.len() == light.len();
+            let loaded =
+                loaded.into_iter().map(Some).filter(|_| both).chain(std::iter::repeat(None));
+            Ok(light.into_iter().zip(loaded).map(|(l, loaded)| self.merged(l, loaded)).collect())
         };
-        let columns: Vec<Column> = light
-            .into_iter()
-            .enumerate()
-            .map(|(index, light)| {
-                let loaded = loaded.as_ref().and_then(|loaded| loaded.get(index)).cloned();
-                self.merged(light, loaded)
-            })
-            .collect();
-        Ok(Problem::new(&patterns, &split).with(&columns).at(&self.known.hyper))
+        let (columns, doubts) = (of(slopes)?, of(doubts)?);
+        let problem = Problem::new(&patterns, &split).doubting(&doubts);
+        Ok(problem.with(&columns).at(&self.known.hyper))
     }
 
     /// An effect's forms, or a motion of the air, held against a vehicle.
@@ -154,7 +162,7 @@ impl<'a> Scenery<'a> {
         let find = |vehicle: &Vehicle| -> Result<Option<Candidate>, GapError> {
             let scene = &self.comparison.scene;
             let is_it = |candidate: &Candidate| candidate.name == effect;
-            let found = library(vehicle, &self.comparison, Updraft::Same)?.into_iter().find(is_it);
+            let found = one(vehicle, &self.comparison, Updraft::Same, effect)?;
             if found.is_some() {
                 return Ok(found);
             }
