@@ -447,7 +447,7 @@ mod tests {
     fn a_smooth_series_is_its_mean_over_gusts_and_scatter() {
         let data = trial::data(1, |_, _| 0.0);
         let group = &data.groups[0];
-        let times: Vec<f64> = group.bins.iter().map(super::super::bins::Bin::middle_s).collect();
+        let times: Vec<f64> = group.bins.iter().map(Bin::middle_s).collect();
         let count = times.len();
         let values: Vec<f64> = (0..count)
             .map(|bin| 3.0 + (0.2 * bin as f64).sin() + 0.3 * (7.7 * bin as f64).sin())
