@@ -41,10 +41,16 @@ impl Question<'_> {
     /// # Errors
     /// See [`GapError`].
     pub(super) fn answered(self, train: &Data, held: &Data) -> Result<(Found, Gap), GapError> {
-        let (mut found, mut gap) = self.searched(train, held, *self.options)?;
+        let still_air = Options { updraft: false, ..*self.options };
+        let (mut found, mut gap) = match self.searched(train, held, *self.options) {
+            // An updraft that the model cannot fly in is none that the flight was in.
+            Err(error) if error.is_not_flown() && self.options.updraft => {
+                self.searched(train, held, still_air)?
+            }
+            searched => searched?,
+        };
         let blown_off = found.updraft_mps != 0.0 && self.is_nearer_in_still_air(train, &found)?;
         if blown_off || found.was_in_updraft && !found.steps.is_empty() {
-            let still_air = Options { updraft: false, ..*self.options };
             let (still, without) = self.searched(train, held, still_air)?;
             let (with_nats, still_nats) = (found.explains()?, still.explains()?);
             let left = |gap: &Gap| gap.left_over().is_some();
