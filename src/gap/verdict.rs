@@ -334,8 +334,8 @@ pub struct Gap {
     pub rungs: Option<Shrink>,
 }
 
-/// Reduced chi-square of held-out rungs above which something is left that nothing found explains. Chosen: 0.7 to 1.3
-/// where the verdict was right in some 70 flights of known truth, 2 to 90 in five in which it was wrong or silent.
+/// Reduced chi-square of held-out rungs above which something is left that nothing found explains. Chosen: 0.5 to 1.3
+/// where the verdict was right in some 70 flights of known truth, 2 to 94 in five in which it was wrong or silent.
 const LEFT_OVER_CHI2: f64 = 1.5;
 /// Excess over noise and air below which nobody would miss anything, us: 0.1 m/s of air on the show drone.
 const LEFT_OVER_US: f64 = 2.5;

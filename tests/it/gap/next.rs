@@ -111,8 +111,11 @@ fn the_paper_is_the_paper() {
 
 #[test]
 fn counter_phase_and_horizontal_legs_gain_what_the_physics_note_says() {
-    // Its fleet, its air, and drones that all respond alike, as in its prototype.
+    // Its fleet, its air, and drones that all respond alike, as in its prototype. There gusts are noise of the pulse
+    // (22 us/(m/s) of inflow) and do not smooth the response's curve, as they do in what is predicted for a crew.
     let known = with_noise(|noise| {
+        noise.pulse_noise_us = noise.pulse_noise_us.hypot(22.0 * noise.gusts_mps);
+        noise.gusts_mps = 0.0;
         noise.shared_air_s = 40.0;
         noise.own_air_mps = 0.0;
         noise.drones_us = 20.0;
@@ -123,10 +126,8 @@ fn counter_phase_and_horizontal_legs_gain_what_the_physics_note_says() {
     let (paper, enhanced) = (flown(&known, Elements::PAPER), flown(&known, full));
     let z = |flight: &Flight| size_z(&known, flight, false, "rotor-inflow").unwrap();
     let (before, after) = (z(&paper), z(&enhanced));
-    // The error of the inflow: 1.80 -> 0.31 us/(m/s), and 1.63 without counter-phase, where the vehicle's form, the
-    // wind and the mean of each half fleet are known. The search does not know them (0.6 us in each of a few
-    // curves), and of the factor of 5.8 this leaves 2.3.
-    assert!((2.0..5.8).contains(&(after / before)), "{before} -> {after}");
+    // The error of the inflow: 1.80 -> 0.31 us/(m/s), and 1.63 without counter-phase.
+    assert!((3.0..8.0).contains(&(after / before)), "{before} -> {after}");
     let together = flown(&known, Elements { counter_phase: false, ..full });
     assert!(z(&together) < 0.5 * after, "{} of {after}", z(&together));
     // Translational lift: 3.2 without horizontal legs, 7.4 with them.
