@@ -16,9 +16,10 @@ use crate::gap::Verdict;
 use crate::gap::next::elements::{PAYLOAD_EVERY, PAYLOAD_KG, lowest_charge};
 use crate::gap::next::known::charge_of;
 use crate::gap::next::result::Verified;
-use crate::gap::next::{Elements, Question, Sought};
+use crate::gap::next::{Elements, Question, Separation, Sought};
 use crate::gap::verdict::{Finding, Noise};
 use crate::mission::resolve::ResolvedFlight;
+use crate::numeric;
 use crate::vehicle::Vehicle;
 
 /// Time scale and relative strength of the wind's own gusts.
@@ -28,6 +29,8 @@ const LENGTH_M: f64 = 145.0;
 /// Cells and internal resistance of the batteries that the logs report.
 const CELLS: f64 = 3.0;
 const RESISTANCE_OHM: f64 = 0.03;
+/// Half of a 95 % interval, standard errors.
+const NORMAL: f64 = 1.96;
 
 /// A proposed flight with the air and noise to rehearse it in.
 #[derive(Clone, Copy, Debug)]
@@ -55,32 +58,33 @@ pub struct Answer {
     pub size: f64,
     /// The vehicle without it, which is held against the logs.
     pub without: Vehicle,
+    /// From what the flight shall tell it (an empty name: from nothing), and the Fisher z that was predicted.
+    pub from: Vec<(String, f64)>,
 }
 
 /// Possible answers to a question that the simulator can fly. `model` has the effects that were
 /// found; the sizes are those at which the answers look alike.
-pub fn answers(
-    question: &Question,
-    model: &Vehicle,
-    sizes: &[(String, Option<f64>)],
-) -> Vec<Answer> {
+pub fn answers(question: &Question, model: &Vehicle, predicted: &[Separation]) -> Vec<Answer> {
     let size_of = |effect: &str| {
-        let found = sizes.iter().find(|(name, _)| name == effect || name.is_empty());
-        found.and_then(|(_, size)| *size)
+        let found = predicted.iter().find(|one| one.from == effect || one.from.is_empty());
+        found.and_then(|one| one.size)
     };
-    let answer = |effect: &str, size: f64, without: &Vehicle| {
+    let answer = |effect: &str, size: f64, without: &Vehicle, from: Vec<(String, f64)>| {
         Some(Answer {
             effect: effect.to_owned(),
             parameter: parameter(effect)?.to_owned(),
             size,
             without: without.clone(),
+            from,
         })
     };
+    let from_all = || predicted.iter().map(|one| (one.from.clone(), one.z)).collect();
     match &question.sought {
         Sought::Shape { .. } => Vec::new(),
-        Sought::Seen { effect } => {
-            size_of(effect).and_then(|size| answer(effect, size, model)).into_iter().collect()
-        }
+        Sought::Seen { effect } => size_of(effect)
+            .and_then(|size| answer(effect, size, model, from_all()))
+            .into_iter()
+            .collect(),
         Sought::Apart { effects, size } => {
             let [first, others @ ..] = &effects[..] else { return Vec::new() };
             let mut without = model.clone();
@@ -91,8 +95,12 @@ pub fn answers(
                     without.effects.remove(first);
                 }
             }
-            let own = size.as_ref().and_then(|(_, value, _)| answer(first, *value, &without));
-            let rivals = others.iter().filter_map(|other| answer(other, size_of(other)?, &without));
+            let own = size.as_ref();
+            let own = own.and_then(|(_, value, _)| answer(first, *value, &without, from_all()));
+            let rivals = others.iter().filter_map(|other| {
+                let one = predicted.iter().find(|one| one.from == *other)?;
+                answer(other, one.size?, &without, vec![(first.clone(), one.z)])
+            });
             own.into_iter().chain(rivals).collect()
         }
     }
@@ -203,5 +211,40 @@ fn told(answer: &Answer, verdict: &Verdict) -> Verified {
         })
         .collect();
     let told = found.len() == 1 && found[0] == answer.effect;
-    Verified { truth: answer.effect.clone(), size: answer.size, found, told }
+    let predicted_z = numeric::least(answer.from.iter().map(|(_, z)| *z)).unwrap_or_default();
+    let reached_z = reached_z(answer, verdict);
+    let truth = answer.effect.clone();
+    Verified { truth, size: answer.size, found, told, predicted_z, reached_z }
+}
+
+/// Fisher z with which the first step of a verdict tells an answer from what it must be told from. From nothing: its size
+/// over its standard error. From another effect: the root of twice the lead of its log-likelihood, negative where the
+/// other one leads; rivals that are too far behind for the verdict's list do not count. `None` where the verdict
+/// does not say.
+fn reached_z(answer: &Answer, verdict: &Verdict) -> Option<f64> {
+    let step = verdict.steps.first()?;
+    let gain_nats = |name: &str| {
+        let best = step.finding.effects().first().is_some_and(|first| *first == name);
+        let rival = || step.rivals.iter().find(|rival| rival.name == name);
+        if best { Some(step.gain_nats) } else { rival().map(|rival| rival.gain_nats) }
+    };
+    let z = |from: &str| {
+        if from.is_empty() {
+            return size_z(answer, &step.finding);
+        }
+        let lead_nats = gain_nats(&answer.effect)? - gain_nats(from)?;
+        Some((2.0 * lead_nats.abs()).sqrt().copysign(lead_nats))
+    };
+    numeric::least(answer.from.iter().filter_map(|(from, _)| z(from)))
+}
+
+/// The size of an answer over its standard error, if a finding has it first.
+fn size_z(answer: &Answer, finding: &Finding) -> Option<f64> {
+    let (Finding::Name { parameters, .. } | Finding::Class { parameters, .. }) = finding else {
+        return None;
+    };
+    finding.effects().first().filter(|first| **first == answer.effect)?;
+    let size = parameters.iter().find(|fitted| fitted.name == answer.parameter)?;
+    let se = (size.value.high - size.value.low) / (2.0 * NORMAL);
+    Some((size.value.value - size.before.unwrap_or(0.0)).abs() / se).filter(|z| z.is_finite())
 }

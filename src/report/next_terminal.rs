@@ -77,8 +77,11 @@ fn misses(next: &Next) -> String {
 
 fn verified(one: &crate::gap::next::result::Verified) -> String {
     let found = if one.found.is_empty() { "nothing".to_owned() } else { one.found.join("; then ") };
+    let reached = one.reached_z.map_or_else(String::new, |z| {
+        format!(", z {:.1} predicted, {z:.1} reached", one.predicted_z)
+    });
     format!(
-        "simulated with {} {}: the search found {} ({})",
+        "simulated with {} {}: the search found {} ({}{reached})",
         one.truth,
         crate::gap::words::short(one.size),
         found,

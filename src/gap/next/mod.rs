@@ -14,7 +14,7 @@ pub mod search;
 
 pub use elements::{Elements, Legs, Order};
 pub use known::{Flight, Known};
-pub use predict::{Predicted, predict};
+pub use predict::{Predicted, Separation, predict};
 pub use questions::{Question, Sought, ask};
 pub use result::{NEXT_SCHEMA, Next};
 pub use search::{Aim, search};

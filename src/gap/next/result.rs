@@ -93,4 +93,11 @@ pub struct Verified {
     pub found: Vec<String>,
     /// Whether it named just that.
     pub told: bool,
+    /// Fisher z that was predicted for telling it from the other answers, or from nothing.
+    #[serde(default)]
+    pub predicted_z: f64,
+    /// Fisher z that the search reached. From nothing: the size over its standard error. From other answers: the root of twice
+    /// the lead in log-likelihood, negative where another one leads. Absent: the verdict does not say.
+    #[serde(default)]
+    pub reached_z: Option<f64>,
 }

@@ -403,9 +403,7 @@ fn verify(host: &dyn Host, next: &mut Next, with: &Verify<'_>) -> Result<(), Wor
             // It would not be found, and that is said already.
             continue;
         }
-        let sizes: Vec<(String, Option<f64>)> =
-            predicted.iter().map(|told| (told.from.clone(), told.size)).collect();
-        for answer in answers(question, &with.before.model, &sizes) {
+        for answer in answers(question, &with.before.model, predicted) {
             host.check_stop()?;
             host.say(&format!("Simulating it with {} ...", answer.effect));
             let stop = Some(host.stop_flag());

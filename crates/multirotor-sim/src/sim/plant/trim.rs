@@ -19,6 +19,8 @@ const BALANCED_MPS2: f64 = 1e-9;
 const BESIDE_A_JUMP_MPS2: f64 = 5e-3;
 /// Newton's method takes four steps from a hover and Broyden's seven; beside a jump it takes more.
 const STEPS: usize = 24;
+/// Steps of the wind in which a far lean is approached. Numerical: 2.5 m/s each in the strongest that is flown.
+const WINDS: u32 = 8;
 /// Step of the numerical derivatives, share of full thrust and of one.
 const STEP: f64 = 1e-6;
 /// The lean's horizontal part is kept below this: beyond 64 degrees no autopilot flies.
@@ -222,24 +224,45 @@ impl Trim {
         self.plant.effects.settle(&Settled { time_s, supply, neighbours });
     }
 
-    /// Broyden's method from a hover, and where that finds no balance Newton's.
+    /// Broyden's method from a hover, where that finds no balance Newton's, and where the lean is too far from a hover for
+    /// that, Newton's from wind to wind.
     fn balanced(&mut self, condition: &Condition) -> Unknown {
+        let hover = Vector3::new(self.hover_output, 0.0, 0.0);
         if let Some(inverse) = self.inverse_at_hover
-            && let (found, true) = self.nearest(condition, Some(inverse))
+            && let (found, true) = self.nearest(condition, hover, Some(inverse))
         {
             return found;
         }
-        self.nearest(condition, None).0
+        let (found, balances) = self.nearest(condition, hover, None);
+        if balances {
+            return found;
+        }
+        let mut from = hover;
+        for step in 1..=WINDS {
+            let share = f64::from(step) / f64::from(WINDS);
+            let in_less =
+                |speed: Vector3<f64>| speed.component_mul(&Vector3::new(share, share, 1.0));
+            let velocity_mps = in_less(condition.velocity_mps);
+            let air_mps = in_less(condition.air_mps);
+            let (there, balances) =
+                self.nearest(&Condition { velocity_mps, air_mps, ..*condition }, from, None);
+            if !balances {
+                return found;
+            }
+            from = there;
+        }
+        from
     }
 
-    /// The best state that was seen, and whether it balances: by steps of a quasi-Newton method that begins with an
-    /// inverse of the derivatives, or by Newton's.
+    /// The best state that was seen from one on, and whether it balances: by steps of a quasi-Newton method that begins
+    /// with an inverse of the derivatives, or by Newton's.
     fn nearest(
         &mut self,
         condition: &Condition,
+        from: Unknown,
         mut inverse: Option<Matrix3<f64>>,
     ) -> (Unknown, bool) {
-        let mut at = Vector3::new(self.hover_output, 0.0, 0.0);
+        let mut at = from;
         let mut left = self.left_over(condition, &at);
         let (mut best, mut least) = (at, left.norm());
         for _ in 0..STEPS {
@@ -416,11 +439,12 @@ mod tests {
                 let velocity_mps = Vector3::new(part(37, 6.0), part(91, 6.0), part(11, 5.0));
                 let condition = Condition { velocity_mps, ..Condition::default() };
                 trim.settle(&condition);
-                let (newton, balances) = trim.nearest(&condition, None);
+                let hover = Vector3::new(trim.hover_output, 0.0, 0.0);
+                let (newton, balances) = trim.nearest(&condition, hover, None);
                 let found = trim.balanced(&condition);
                 all += 1;
                 let inverse = trim.inverse_at_hover;
-                quick += usize::from(trim.nearest(&condition, inverse).1);
+                quick += usize::from(trim.nearest(&condition, hover, inverse).1);
                 if balances {
                     assert!(
                         (found - newton).amax() < 1e-8,
@@ -475,6 +499,25 @@ mod tests {
             (climb_us(None), climb_us(Some(0.0)), climb_us(None));
         assert!(home_us > alone_us + 1.0, "{home_us} at home, {alone_us} alone");
         assert_eq!(home_us, home_again_us);
+    }
+
+    #[test]
+    fn a_lean_into_strong_wind_is_found_step_by_step() {
+        for name in ["airsim-generic-quad", "pixel", "phantom4", "arducopter-sitl"] {
+            let mut trim = Trim::of(&builtin(name).unwrap()).unwrap();
+            let mut lean = 0.0;
+            for half_mps in 1..=36 {
+                let wind_mps = 0.5 * f64::from(half_mps);
+                let velocity_mps = Vector3::new(wind_mps, 0.0, -1.0);
+                let at = trim.at(&Condition { velocity_mps, ..Condition::default() });
+                let at = at.unwrap_or_else(|| panic!("{name} in {wind_mps} m/s"));
+                assert!(
+                    at.lean.x > lean && at.lean.x < lean + 0.05,
+                    "{name} in {wind_mps} m/s: {at:?}"
+                );
+                lean = at.lean.x;
+            }
+        }
     }
 
     #[test]
