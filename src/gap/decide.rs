@@ -219,8 +219,14 @@ mod tests {
 
     const MATERIAL_US: f64 = 2.5;
     /// No simulated flights: the thresholds are the floors.
-    const BY_FLOORS: Options =
-        Options { alpha: 0.005, replicates: 0, seed: 1, most_steps: 4, updraft: true };
+    const BY_FLOORS: Options = Options {
+        alpha: 0.005,
+        replicates: 0,
+        seed: 1,
+        most_steps: 4,
+        updraft: true,
+        each_flown: false,
+    };
 
     /// Two effects that look alike, one that looks like neither, and free shapes.
     struct Case {

@@ -41,11 +41,20 @@ pub struct Options {
     pub most_steps: usize,
     /// Whether the whole flight may be in an updraft; else it is in still air but for what moves.
     pub updraft: bool,
+    /// Whether the model is flown in each updraft even where no effect and no shape seems to be missing.
+    pub each_flown: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { alpha: 0.005, replicates: 60, seed: 1, most_steps: 4, updraft: true }
+        Self {
+            alpha: 0.005,
+            replicates: 60,
+            seed: 1,
+            most_steps: 4,
+            updraft: true,
+            each_flown: false,
+        }
     }
 }
 
@@ -373,7 +382,7 @@ impl Search<'_> {
     /// have in common: with a curve that is flat in hover, drones that answer gusts as in still air hide where they are.
     fn look_in_likeliest_flight(&mut self, look: Look) -> Result<Look, GapError> {
         let here = look.explained();
-        if !here.lacks_effect && !here.lacks_shape {
+        if !here.lacks_effect && !here.lacks_shape && !self.options.each_flown {
             return Ok(look);
         }
         let Some(updraft_mps) = self.likeliest_flight_mps(look.hyper) else { return Ok(look) };

@@ -49,6 +49,17 @@ impl Question<'_> {
             }
             searched => searched?,
         };
+        // Scanned by its steady states an updraft has the wind that was read in still air. In strong wind that hides
+        // it: what is left is searched once more, with the model flown in each updraft.
+        if self.options.updraft && gap.left_over().is_some() {
+            let each_flown = Options { each_flown: true, ..*self.options };
+            if let Ok((flown, there)) = self.searched(train, held, each_flown)
+                && there.left_over().is_none()
+                && flown.explains()? > found.explains()?
+            {
+                (found, gap) = (flown, there);
+            }
+        }
         let blown_off = found.updraft_mps != 0.0 && self.is_nearer_in_still_air(train, &found)?;
         if blown_off || found.was_in_updraft && !found.steps.is_empty() {
             let (still, without) = self.searched(train, held, still_air)?;
@@ -105,10 +116,14 @@ impl Question<'_> {
 
     /// The model as it was, with findings that name nothing alone.
     fn withdrawn(self, train: &Data, found: Found) -> Result<Found, GapError> {
-        let comparison = Comparison::new(train, self.repaired, self.simulated, self.plan)?;
+        // The air stays as it is found, unless the model is nearer without it.
+        let Self { repaired, simulated, plan, .. } = self;
+        let is_still = found.updraft_mps == 0.0 || self.is_nearer_in_still_air(train, &found)?;
+        let updraft_mps = if is_still { 0.0 } else { found.updraft_mps };
+        let comparison = Comparison::of(train, repaired, simulated, plan, updraft_mps, None)?;
         let steps = found.steps.into_iter().filter_map(withdrawn).collect();
         let (hyper, gusts_mps, rest) = (found.hyper, found.gusts_mps, found.rest);
-        Ok(Found { hyper, gusts_mps, steps, rest, ..Found::nothing(comparison) })
+        Ok(Found { hyper, gusts_mps, steps, rest, updraft_mps, ..Found::nothing(comparison) })
     }
 }
 
