@@ -30,6 +30,8 @@ const BODY_SPEED_MPS: f64 = 8.0;
 const LOAD_SPEED_MPS: f64 = 4.0;
 /// Climb at which it is read, m/s: the fastest rung of a ladder.
 const LOAD_CLIMB_MPS: f64 = 3.5;
+/// Steps in which the slower of two air speeds is looked for, m/s. Numerical: two roots of a law are farther apart.
+const SPEED_STEP_MPS: f64 = 0.5;
 /// No descent takes more of the weight off the rotors, as a share.
 const LEAST_LOAD: f64 = 0.3;
 /// Fastest wind that is believed, m/s: no small multirotor holds its place in more.
@@ -187,20 +189,7 @@ impl LeanLaw {
         let mut speed_mps: f64 = 1.0;
         let mut air_mps = [0.0; 2];
         for _ in 0..ROUNDS {
-            let whole_mps = speed_mps.hypot(climb_mps - self.updraft_mps);
-            let linear =
-                self.linear + self.body_square() * whole_mps + self.cube * speed_mps * speed_mps;
-            let square = self.box_square();
-            air_mps = lean_rad.map(|lean: f64| {
-                let size = if square > 1e-12 {
-                    let root = (linear * linear + 4.0 * square * lean.abs()).sqrt();
-                    // Without the difference of nearly equal numbers.
-                    2.0 * lean.abs() / (root + linear).max(1e-12)
-                } else {
-                    lean.abs() / linear.max(1e-6)
-                };
-                size.min(self.fastest_mps).copysign(lean)
-            });
+            air_mps = self.air_near(lean_rad, climb_mps, speed_mps);
             let next_mps = air_mps[0].hypot(air_mps[1]);
             // The body's part goes with the square: the middle of two rounds is nearly the end.
             let middle_mps = (next_mps * speed_mps).sqrt();
@@ -210,7 +199,56 @@ impl LeanLaw {
                 break;
             }
         }
-        air_mps
+        if speed_mps < self.fastest_mps { air_mps } else { self.slowest_air(lean_rad, climb_mps) }
+    }
+
+    /// The air by leans where a law that bends down again at high speeds has two, or none: the slower one, or the one at
+    /// which it leans most.
+    fn slowest_air(self, lean_rad: [f64; 2], climb_mps: f64) -> [f64; 2] {
+        let lacks_mps = |speed_mps: f64| {
+            let [x_mps, y_mps] = self.air_near(lean_rad, climb_mps, speed_mps);
+            x_mps.hypot(y_mps) - speed_mps
+        };
+        let (mut nearest_mps, mut least_mps) = (self.fastest_mps, f64::INFINITY);
+        let steps = (self.fastest_mps / SPEED_STEP_MPS) as u32;
+        for speed_mps in (1..=steps).map(|step| SPEED_STEP_MPS * f64::from(step)) {
+            let there_mps = lacks_mps(speed_mps);
+            if there_mps < least_mps {
+                (nearest_mps, least_mps) = (speed_mps, there_mps);
+            }
+            if there_mps <= 0.0 {
+                break;
+            }
+        }
+        if least_mps > 0.0 {
+            let [x_rad, y_rad] = lean_rad;
+            let lean = x_rad.hypot(y_rad).max(1e-12);
+            return lean_rad.map(|part| part / lean * nearest_mps);
+        }
+        let (mut low_mps, mut high_mps) = (nearest_mps - SPEED_STEP_MPS, nearest_mps);
+        for _ in 0..ROUNDS {
+            let middle_mps = f64::midpoint(low_mps, high_mps);
+            if lacks_mps(middle_mps) > 0.0 { low_mps = middle_mps } else { high_mps = middle_mps }
+        }
+        self.air_near(lean_rad, climb_mps, high_mps)
+    }
+
+    /// The air by leans of an unloaded law whose bent parts are taken at a speed.
+    fn air_near(self, lean_rad: [f64; 2], climb_mps: f64, speed_mps: f64) -> [f64; 2] {
+        let whole_mps = speed_mps.hypot(climb_mps - self.updraft_mps);
+        let linear =
+            self.linear + self.body_square() * whole_mps + self.cube * speed_mps * speed_mps;
+        let square = self.box_square();
+        lean_rad.map(|lean: f64| {
+            let size = if square > 1e-12 {
+                let root = (linear * linear + 4.0 * square * lean.abs()).sqrt();
+                // Without the difference of nearly equal numbers.
+                2.0 * lean.abs() / (root + linear).max(1e-12)
+            } else {
+                lean.abs() / linear.max(1e-6)
+            };
+            size.min(self.fastest_mps).copysign(lean)
+        })
     }
 }
 
@@ -499,6 +537,31 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn of_two_air_speeds_that_lean_alike_the_slower_is_meant() {
+        let vehicle = builtin("arducopter-sitl").unwrap();
+        let law = LeanLaw::of(&vehicle, SEA_LEVEL_DENSITY, 0.0);
+        let mut trim = Trim::of(&vehicle).unwrap();
+        for climb_mps in [-3.5, 0.0, 3.5] {
+            let mut before_mps = 0.0;
+            for speed_mps in [6.0, 8.0, 10.0, 12.0, 14.0] {
+                let velocity_mps = Vector3::new(speed_mps, 0.0, climb_mps);
+                let at = Condition { velocity_mps, ..Condition::default() };
+                // Heavier by a gust than the steady lean.
+                let lean_rad = 1.05 * trim.balance(&at).unwrap().lean.x.asin();
+                let [read_mps, _] = law.air([lean_rad, 0.0], climb_mps);
+                assert!(
+                    read_mps > before_mps && (read_mps - speed_mps).abs() < 3.0,
+                    "{speed_mps} at {climb_mps}: {read_mps} after {before_mps}"
+                );
+                before_mps = read_mps;
+            }
+        }
+        // More than it ever leans: the speed at which it leans most, never the fastest that is believed.
+        let [x_mps, y_mps] = law.air([0.0, 3.0], 0.0);
+        assert!(x_mps == 0.0 && y_mps > 12.0 && y_mps < FASTEST_MPS, "{x_mps} {y_mps}");
     }
 
     #[test]
