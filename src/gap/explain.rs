@@ -22,7 +22,7 @@ use super::search::{
 };
 use super::single;
 use super::together::joined;
-use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step};
+use super::verdict::{Finding, Fitted, Interval, Rest, Rival, Shape, Step, is_strong_wind};
 use crate::effects::{Role, Signals};
 use crate::mission::plan::Plan;
 use crate::numeric::mean;
@@ -65,8 +65,11 @@ impl Default for Options {
 const MATERIAL_US: f64 = 2.5;
 
 /// Smallest effect that is named, us: where air and noise are much smaller than in the field (a single
-/// drone in a simulator's still air), smaller effects are real.
-fn material_us(groups: &[GroupPattern], hyper: &Hyper) -> f64 {
+/// drone in a simulator's still air), smaller effects are real, but where a strong wind is not known so well.
+fn material_us(groups: &[GroupPattern], hyper: &Hyper, wind_mps: [f64; 2]) -> f64 {
+    if is_strong_wind(wind_mps) {
+        return MATERIAL_US;
+    }
     let responses = groups.iter().flat_map(|group| group.responses(hyper));
     let noise_us = hyper.get(WHITE) + mean(responses).unwrap_or_default() * gusts_mps(hyper);
     (2.0 * noise_us).clamp(0.75, MATERIAL_US)
@@ -291,7 +294,8 @@ impl Search<'_> {
             return Ok(false);
         }
         self.found.hyper = round.base.hyper;
-        let material_us = material_us(&look.patterns, &round.base.hyper);
+        let wind_mps = self.comparison.wind.mean_mps;
+        let material_us = material_us(&look.patterns, &round.base.hyper, wind_mps);
         let mut decision = decide(&problem, &round, sought, material_us, self.options, step);
         let (found, comparison) = (&self.found, &self.comparison);
         let contest = Contest { found, comparison, sought, round: &round };

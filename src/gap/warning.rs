@@ -5,7 +5,7 @@ use std::fmt;
 use super::data::Data;
 use super::explain::Found;
 use super::make::Input;
-use super::verdict::Gap;
+use super::verdict::{Gap, is_strong_wind};
 use crate::base::said::said_in_files;
 use crate::effects::select::value_of;
 
@@ -50,6 +50,8 @@ pub enum Warning {
         floor_us: f64,
         /// Reduced chi-square of what is left.
         reduced_chi2: f64,
+        /// Whether it may be the wind's own.
+        in_strong_wind: bool,
     },
     /// Tables were compared, which have no plan.
     Tables,
@@ -105,12 +107,20 @@ impl fmt::Display for Warning {
                  and vertical flight: the two sides flew in different wind, and nothing is named that this \
                  explains"
             ),
-            Self::LeftOver { left_us, floor_us, reduced_chi2 } => write!(
-                f,
-                "on rungs that were held out {left_us:.1} us are left where noise and air alone would leave \
-                 {floor_us:.1} (reduced chi-square {reduced_chi2:.1}): something is missing that nothing in \
-                 the library explains, and names and sizes may stand for it"
-            ),
+            Self::LeftOver { left_us, floor_us, reduced_chi2, in_strong_wind } => {
+                write!(
+                    f,
+                    "on rungs that were held out {left_us:.1} us are left where noise and air alone would \
+                     leave {floor_us:.1} (reduced chi-square {reduced_chi2:.1}): "
+                )?;
+                f.write_str(if *in_strong_wind {
+                    "in so strong a wind that may be how the drones lean, an updraft, or something that \
+                     nothing in the library explains"
+                } else {
+                    "something is missing that nothing in the library explains, and names and sizes may \
+                     stand for it"
+                })
+            }
             Self::Tables => f.write_str(
                 "tables have no plan that could be flown again: the model's side is its closed forms at \
                  the climb that was flown",
@@ -140,6 +150,7 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
             left_us: rungs.after_without_air_us,
             floor_us: rungs.floor_us,
             reduced_chi2: rungs.chi2.1,
+            in_strong_wind: is_strong_wind(found.comparison.wind.mean_mps),
         });
     }
     let drones = data.drones();
@@ -182,11 +193,11 @@ pub(super) fn warnings(data: &Data, found: &Found, gap: &Gap, input: &Input<'_>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gap::verdict::{Shrink, Verdict};
+    use crate::gap::verdict::{Shrink, Verdict, WindFound};
 
     #[test]
     fn much_that_nothing_explains_is_said() {
-        let summary = |after_without_air_us: f64, chi2: f64| {
+        let summary_in = |wind_mps: f64, after_without_air_us: f64, chi2: f64| {
             let rungs = Shrink {
                 after_without_air_us,
                 floor_us: 6.0,
@@ -194,8 +205,16 @@ mod tests {
                 ..Shrink::default()
             };
             let gap = Gap { rungs: Some(rungs), ..Gap::default() };
-            crate::gap::words::summary(&Verdict { gap, ..Verdict::default() })
+            let wind = WindFound { mean_mps: [0.0, wind_mps], ..WindFound::default() };
+            crate::gap::words::summary(&Verdict { gap, wind, ..Verdict::default() })
         };
+        let summary = |after_us: f64, chi2: f64| summary_in(5.0, after_us, chi2);
+        let in_storm = summary_in(8.0, 9.0, 2.25);
+        assert!(
+            in_storm.starts_with("Nothing is missing that this flight could show"),
+            "{in_storm}"
+        );
+        assert!(in_storm.ends_with("may be how the drones lean, or an updraft."), "{in_storm}");
         assert_eq!(
             summary(9.0, 2.25),
             "Something is missing that nothing in the library explains. On rungs that were held out 9.0 us \

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::decide::PRODUCT;
-use super::verdict::{Finding, Fitted, Step, Verdict};
+use super::verdict::{Finding, Fitted, Step, Verdict, is_strong_wind};
 use crate::effects::Role;
 
 /// One finding as a phrase: `rotor-inflow (inflow_share 0.42, 0.39 to 0.45)`.
@@ -81,7 +81,11 @@ pub fn short(value: f64) -> String {
 
 /// The verdict in one or two sentences.
 pub fn summary(verdict: &Verdict) -> String {
-    let mut text = if verdict.steps.is_empty() && verdict.gap.left_over().is_some() {
+    let is_strong_wind = is_strong_wind(verdict.wind.mean_mps);
+    let mut text = if verdict.steps.is_empty()
+        && verdict.gap.left_over().is_some()
+        && !is_strong_wind
+    {
         "Something is missing that nothing in the library explains.".to_owned()
     } else if verdict.steps.is_empty() {
         let would = verdict.detectable.iter().filter(|one| one.would_be_seen).count();
@@ -112,6 +116,9 @@ pub fn summary(verdict: &Verdict) -> String {
             " On rungs that were held out {:.1} us are left; noise and air alone would leave {:.1}.",
             rungs.after_without_air_us, rungs.floor_us
         );
+        if verdict.steps.is_empty() && is_strong_wind {
+            text.push_str(" In so strong a wind that may be how the drones lean, or an updraft.");
+        }
     } else if let Some(shrink) =
         verdict.gap.drones.or(verdict.gap.rungs).filter(|_| !verdict.steps.is_empty())
     {

@@ -97,6 +97,14 @@ pub(crate) fn run(host: &dyn Host, wish: &Wish) -> Result<Proposed, WorkflowErro
         ))
     })?;
     let mut next = result(&before, &questions, &choice, wish.z);
+    if next.questions.iter().all(|asked| !asked.reached && asked.flights_needed.is_none()) {
+        let asked: Vec<&str> = next.questions.iter().map(|asked| asked.question.as_str()).collect();
+        return Err(WorkflowError::Nothing(format!(
+            "{}: no flight of these elements would tell, however often it is flown: {}",
+            before.place.shown(),
+            asked.join("; ")
+        )));
+    }
     next.notes = notes(&questions, &passed_over, &choice, &known);
     let folder = wish.output.clone().unwrap_or_else(|| wish.compared());
     create_folder(&folder)?;
