@@ -123,7 +123,7 @@ impl Question<'_> {
         let comparison = Comparison::of(train, repaired, simulated, plan, updraft_mps, None)?;
         let steps = found.steps.into_iter().filter_map(withdrawn).collect();
         let (hyper, gusts_mps, rest) = (found.hyper, found.gusts_mps, found.rest);
-        Ok(Found { hyper, gusts_mps, steps, rest, updraft_mps, ..Found::nothing(comparison) })
+        Ok(Found { hyper, gusts_mps, updraft_mps, steps, rest, ..Found::nothing(comparison) })
     }
 }
 

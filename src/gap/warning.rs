@@ -206,7 +206,7 @@ mod tests {
             };
             let gap = Gap { rungs: Some(rungs), ..Gap::default() };
             let wind = WindFound { mean_mps: [0.0, wind_mps], ..WindFound::default() };
-            crate::gap::words::summary(&Verdict { gap, wind, ..Verdict::default() })
+            crate::gap::words::summary(&Verdict { wind, gap, ..Verdict::default() })
         };
         let summary = |after_us: f64, chi2: f64| summary_in(5.0, after_us, chi2);
         let in_storm = summary_in(8.0, 9.0, 2.25);
