@@ -55,8 +55,8 @@ pub enum BlindError {
     },
     /// The effect cannot be hidden from the base vehicle.
     #[error(
-        "\"{name}\" cannot be hidden from the base {base}, which has it or does not feel it; choose \
-         another base with --base"
+        "\"{name}\" cannot be hidden from {base}, which has it or does not feel it; choose another \
+         vehicle"
     )]
     NotEligible {
         /// Name of the effect that was to be hidden.
@@ -187,6 +187,16 @@ pub enum BlindError {
     /// The user stopped the run.
     #[error("interrupted; run the same command again to resume")]
     Stopped,
+}
+
+impl BlindError {
+    /// The same error, told of a vehicle by its own name instead of its name in the tables.
+    pub(super) fn of_vehicle(self, vehicle: &'static str) -> Self {
+        match self {
+            Self::NotEligible { name, .. } => Self::NotEligible { name, base: vehicle },
+            other => other,
+        }
+    }
 }
 
 /// A number with three digits.

@@ -80,7 +80,9 @@ impl Game {
         let mut truth = Scenario::draw(self.seed, &cell)?;
         for (hidden, (name, size)) in truth.hidden.iter_mut().zip(&sizes) {
             let (base, protocol, width_m) = (self.base, self.protocol, cell.width_m());
-            *hidden = kind_of(name)?.draw_sized(self.seed, base, protocol, width_m, *size)?;
+            *hidden = kind_of(name)?
+                .draw_sized(self.seed, base, protocol, width_m, *size)
+                .map_err(|error| error.of_vehicle(base.vehicle_name()))?;
         }
         self.blow(&mut truth);
         flyable(&truth)?;
@@ -229,7 +231,8 @@ mod tests {
         }
         for (name, size) in [("rotor-inflow", 20.0), ("vortex-ring", 0.05), ("step", -12.0)] {
             let truth = of(name, size).unwrap();
-            let words = format!("{:.3} ", size.abs());
+            let words =
+                if name == "step" { "-12.000 us".to_owned() } else { format!("{size:.3} ") };
             assert!(truth.hidden[0].words.starts_with(&words), "{}", truth.words());
             assert_eq!(truth.hidden[0].value() < 0.0, size < 0.0, "{name}");
         }
@@ -255,7 +258,7 @@ mod tests {
         let said = error(Base::Airsim, "rotor-inflow", f64::NAN);
         assert!(said.contains("a size of NaN"), "{said}");
         let said = error(Base::Sitl, "rotor-inflow", 20.0);
-        assert!(said.contains("cannot be hidden from the base sitl"), "{said}");
+        assert!(said.contains("cannot be hidden from arducopter-sitl"), "{said}");
         // More than the rotors of this vehicle can lose.
         let said = error(Base::Pixel, "vortex-ring", 0.36);
         assert!(said.contains("a size of 0.36; it can be"), "{said}");

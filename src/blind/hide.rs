@@ -264,10 +264,20 @@ impl HiddenKind {
             parameters,
             size: self.size.to_owned(),
             before: value_of(&known, self.effect, self.size),
-            words: format!("{magnitude:.3} {}", self.unit),
+            words: self.words(magnitude, value),
             depends_on: Vec::new(),
         };
         Ok(hidden)
+    }
+
+    /// Size in words: where it can be of either sign, with the one that it has.
+    fn words(&self, magnitude: f64, value: f64) -> String {
+        match self.magnitude {
+            Magnitude::EitherSign | Magnitude::Negative(_) => {
+                format!("{value:+.3} {}", self.unit.replace(", of either sign", ""))
+            }
+            _ => format!("{magnitude:.3} {}", self.unit),
+        }
     }
 
     /// Pulse of the effect on a vehicle when its size is this, us.

@@ -30,7 +30,7 @@ impl LogOrigin {
     /// Name of the origin for the sentence `Using the <words>`.
     pub fn words(self) -> &'static str {
         match self {
-            Self::Real => "logs of real drones (logs/)",
+            Self::Real => "logs in logs/",
             Self::Simulated => "simulated logs (simulated/)",
         }
     }

@@ -13,19 +13,20 @@ use super::{timetable, words};
 use crate::base::plain::Shown as _;
 use crate::check::CheckReport;
 use crate::mission::Plan;
+use crate::mission::resolve::builtin_names;
 use crate::workflow::check::{Origin, allowed, checked, is_safe, known, say_findings, verdict};
 use crate::workflow::clock::Stopwatch;
 use crate::workflow::plan::{what_for_whom, write};
 
 /// Arguments of `updraft plan`.
 #[derive(Debug, Args)]
-#[command(after_long_help = "Examples:
+#[command(after_long_help = format!("Examples:
   updraft plan templates/calibration.toml --grid 7x7 --spacing 7 --origin 47.4733,19.0621 -o my-campaign
   updraft plan hover --drones 12 --set height_m=60 -o hover-60
   updraft plan calibration-counterphase --dry-run
 
-Templates are files or built-in names: calibration, calibration-counterphase, hover, campaign.
-The grammar is in docs/templates.md.")]
+Templates are files or built-in names: {}.
+The grammar is in docs/templates.md.", builtin_names().join(", ")))]
 pub(super) struct PlanArgs {
     /// Template: a file or a built-in name
     template: String,

@@ -79,6 +79,20 @@ pub fn short(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
+/// How the logged vertical velocity is wrong: by how much, how late, or both.
+fn velocity_error(verdict: &Verdict) -> String {
+    let bias_mps = verdict.sensor.bias_mps.map_or(0.0, |bias| bias.value);
+    let lag_s = verdict.sensor.lag_s.map_or(0.0, |lag| lag.value);
+    let off = format!("off by {bias_mps:+.3} m/s");
+    let late = format!("late by {lag_s:.2} s");
+    // Half a digit of each: what would be printed as zero is not worth a word.
+    match (bias_mps.abs() >= 0.000_5, lag_s.abs() >= 0.005) {
+        (true, false) => off,
+        (false, true) => late,
+        _ => format!("{off} and {late}"),
+    }
+}
+
 /// The verdict in one or two sentences.
 pub fn summary(verdict: &Verdict) -> String {
     let is_strong_wind = is_strong_wind(verdict.wind.mean_mps);
@@ -101,13 +115,12 @@ pub fn summary(verdict: &Verdict) -> String {
         format!("The model lacks {}.", named.join("; and "))
     };
     if verdict.sensor.named {
-        let bias = verdict.sensor.bias_mps.map_or(0.0, |bias| bias.value);
-        let lag = verdict.sensor.lag_s.map_or(0.0, |lag| lag.value);
+        let but = if verdict.steps.is_empty() { " But the" } else { " The" };
         let effect = Role::SensorBias.place().map_or("", |place| place.name());
         let _ = write!(
             text,
-            " The vertical velocity itself is off by {bias:+.3} m/s and late by {lag:.2} s \
-             ({effect})."
+            "{but} logged vertical velocity is {} ({effect}).",
+            velocity_error(verdict)
         );
     }
     if let Some(rungs) = verdict.gap.left_over() {

@@ -142,6 +142,11 @@ fn names() -> Vec<&'static str> {
     BUILTIN.iter().map(|(name, _)| *name).collect()
 }
 
+/// Names of the built-in templates, as the command line takes them.
+pub fn builtin_names() -> Vec<&'static str> {
+    names().into_iter().map(|name| name.strip_suffix(".toml").unwrap_or(name)).collect()
+}
+
 /// Text of a template: a file, or a built-in one by its name (with or without folder and `.toml`).
 fn load(name: &str, relative_to: Option<&Path>) -> Result<(String, String), MissionError> {
     let asked = Path::new(name);

@@ -9,7 +9,7 @@ use rand::rngs::SysRng;
 
 use crate::base::plain::Shown as _;
 use crate::blind::game::{Choice, Game};
-use crate::blind::hide::{KINDS, kind_of};
+use crate::blind::hide::{KINDS, ON_REQUEST, kind_of};
 use crate::blind::scenario::FULL_SIDE;
 use crate::blind::{AirClass, Base, Protocol};
 use crate::cli::context::Context;
@@ -67,7 +67,9 @@ With --seed the same flight is flown again (the nonce is another one); whoever k
 find out what it hides. Sizes can be a tenth of the smallest to three times the largest usual one.
 
 What can be hidden, with usual sizes for --effect NAME=SIZE:
-{}", super::kinds_text(KINDS)))]
+{}
+Only where --effect names it:
+{}", super::kinds_text(KINDS), super::kinds_text(ON_REQUEST)))]
 pub(super) struct HideArgs {
     /// Folder of the game
     #[arg(short, long, value_name = "FOLDER", default_value = "game")]

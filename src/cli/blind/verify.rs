@@ -7,7 +7,7 @@ use clap::Args;
 
 use crate::cli::context::Context;
 use crate::cli::exit::{CommandError, Exit};
-use crate::workflow::game::verify::{self, Verification};
+use crate::workflow::game::verify::{self, Check, Verification};
 
 /// Digits of a SHA-256.
 const DIGITS: usize = 64;
@@ -43,27 +43,35 @@ pub(super) fn run(context: &Context, args: &VerifyArgs) -> Result<Exit, CommandE
     } else {
         context.print(&text(&verified))?;
     }
-    if verified.intact {
-        return Ok(Exit::Done);
-    }
-    for check in &verified.checks {
-        if let Some(problem) = &check.problem {
-            context.warn(&format!("{}: {problem}", check.file));
+    // What is not on standard output goes to the other.
+    if context.quiet || context.json {
+        for (check, problem) in wrong(&verified) {
+            context.warn(&sentence(&check.file, problem));
         }
     }
-    Ok(Exit::Unsafe)
+    Ok(if verified.intact { Exit::Done } else { Exit::Unsafe })
+}
+
+/// Parts with which something is wrong, and what.
+fn wrong(verified: &Verification) -> impl Iterator<Item = (&Check, &str)> {
+    let checks = verified.checks.iter();
+    checks.filter_map(|check| check.problem.as_deref().map(|problem| (check, problem)))
+}
+
+/// A problem with its file, which some problems name themselves.
+fn sentence(file: &str, problem: &str) -> String {
+    if problem.contains(file) { problem.to_owned() } else { format!("{file}: {problem}") }
 }
 
 fn text(verified: &Verification) -> String {
     let mut text = String::new();
     for check in &verified.checks {
-        let (mark, said) = match &check.problem {
-            None => ("ok     ", check.holds.as_str()),
-            Some(_) => ("ALTERED", "see below"),
+        let _ = match &check.problem {
+            None => writeln!(text, "ok     {}  {}", check.file, check.holds),
+            Some(problem) => writeln!(text, "WRONG  {}", sentence(&check.file, problem)),
         };
-        let _ = writeln!(text, "{mark}  {}  {said}", check.file);
     }
-    let _ = writeln!(text, "SHA-256 of the truth: {}", verified.truth_sha256);
+    let _ = writeln!(text, "SHA-256 that the truth is held against: {}", verified.truth_sha256);
     text.push_str(match (verified.intact, verified.revealed) {
         (true, true) => "All of it belongs together: the truth is the one that was published, and the seal was opened for this verdict.\n",
         (true, false) => "All of it belongs together. The seal was not opened yet.\n",

@@ -67,6 +67,16 @@ pub fn run(host: &dyn Host, wish: &Wish) -> Result<Ready, WorkflowError> {
         words::count(usize::from(truth.slots()), "drone"),
         play::flight(folder).shown()
     ));
+    if flown.logs == 0 {
+        play::remove(folder)?;
+        return Err(WorkflowError::Nothing(format!(
+            "no drone can fly this: {vehicle}, {} in {} air, {:+.1} m/s of updraft{}; the folder holds no game",
+            game.protocol.template(),
+            game.air.name(),
+            game.updraft_mps,
+            game.wind_mps.map_or_else(String::new, |wind| format!(", {wind:.1} m/s of wind"))
+        )));
+    }
     let file = GameFile {
         schema: GAME_SCHEMA.to_owned(),
         made_by: made_by(),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{files, game_path, read_game, record_path};
+use super::{files, game_path, read_game, record_path, verify};
 use crate::base::digest::sha256;
 use crate::base::file::{read_whole, write_whole};
 use crate::base::plain::Shown as _;
@@ -51,7 +51,9 @@ pub fn run(
     }
     let proven = proof::read(&compared, &again)?;
     if path.exists() {
-        return Ok((opened_before(&path, &proven.sha256)?, path));
+        let record = opened_before(&path, &proven.sha256)?;
+        still_whole(folder)?;
+        return Ok((record, path));
     }
     if let Some(other) = files::differences(folder, &game).into_iter().next() {
         return Err(WorkflowError::Usage(format!(
@@ -98,6 +100,20 @@ fn opened_before(path: &Path, verdict_sha256: &str) -> Result<BlindRecord, Workf
         )));
     }
     Ok(record)
+}
+
+/// Refuses a game of which something was altered after its seal was opened: its record proves nothing.
+fn still_whole(folder: &Path) -> Result<(), WorkflowError> {
+    let verified = verify::run(folder, None)?;
+    let altered = verified.checks.iter().find_map(|check| {
+        check.problem.as_ref().map(|problem| format!("{} {problem}", check.file))
+    });
+    match altered {
+        Some(altered) => Err(WorkflowError::Usage(format!(
+            "{altered}; the seal was opened before, but what lies here is not what it was opened for"
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// The record of a seal that was opened, as it was written.

@@ -151,7 +151,7 @@ fn settings(request: &Request, found: &Found, vehicle: &Vehicle) -> Vec<(&'stati
     let mut settings = vec![
         ("Flight", found.name.clone()),
         ("Model", format!("{}: {}", vehicle.name, vehicle.source)),
-        ("Chance of naming nothing", format!("{} in each step (--alpha)", request.options.alpha)),
+        ("Chance of a false name", format!("{} in each step (--alpha)", request.options.alpha)),
         (
             "Simulated flights for a threshold",
             format!("{} (--replicates)", request.options.replicates),

@@ -90,7 +90,7 @@ fn magnitudes_are_within_their_ranges_and_fill_them() {
             let drawn: Vec<f64> = (0..40)
                 .map(|seed| {
                     let hidden = kind.draw(seed, *base, Protocol::Enhanced, 42.0).unwrap();
-                    hidden.words.split(' ').next().unwrap().parse::<f64>().unwrap()
+                    hidden.words.split(' ').next().unwrap().parse::<f64>().unwrap().abs()
                 })
                 .collect();
             let (low, high) = kind.range;

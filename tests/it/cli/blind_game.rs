@@ -122,8 +122,8 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
         let file = format!("game/{file}");
         let before = swap(&bench, &file, from, to);
         let ended = bench.expect(4, &["blind", "verify", "game"]);
-        assert!(ended.err.contains(said), "{file}: {ended}");
-        assert!(ended.out.contains("ALTERED") && ended.out.contains("proves nothing"), "{ended}");
+        assert!(ended.out.contains(said), "{file}: {ended}");
+        assert!(ended.out.contains("WRONG  ") && ended.out.contains("proves nothing"), "{ended}");
         fs::write(bench.path(&file), before).unwrap();
     }
     fs::remove_file(&log).unwrap();
@@ -136,8 +136,15 @@ fn a_game_is_hidden_revealed_and_verified_and_every_alteration_is_named() {
     // A forgery that fits in itself does not fit what was published.
     let other = "ab".repeat(32);
     let ended = bench.expect(4, &["blind", "verify", "game", "--sha256", &other]);
-    assert!(ended.err.contains(&format!("published was {other}")), "{ended}");
+    assert!(ended.out.contains(&format!("published was {other}")), "{ended}");
     bench.expect(0, &["blind", "verify", "game"]);
+    // The record is not given again for a flight that is no longer the one it was made of.
+    let before = swap(&bench, "game/flight/plan.json", "{", "{ ");
+    let ended = bench.expect(2, &["blind", "reveal", "game"]);
+    assert!(ended.err.contains("plan.json was changed after the flight"), "{ended}");
+    assert!(ended.out.is_empty(), "{ended}");
+    fs::write(bench.path("game/flight/plan.json"), before).unwrap();
+    bench.expect(0, &["blind", "reveal", "game"]);
 
     // Who knows the truth is not asked again.
     compare(&bench, "game/gap", &naming("rotor-inflow", "inflow_share", 0.3));
@@ -187,7 +194,7 @@ fn what_cannot_be_hidden_is_said() {
     says(
         2,
         &["--effect", "rotor-inflow", "--vehicle", "pixel"],
-        "cannot be hidden from the base pixel, which has it",
+        "cannot be hidden from pixel, which has it",
     );
     says(2, &["--vehicle", "zeppelin"], "possible values: airsim-generic-quad, arducopter-sitl");
     says(2, &["--grid", "1x4"], "a game has 2 to 15 rows and columns; 1x4 is not possible");
@@ -201,6 +208,12 @@ fn what_cannot_be_hidden_is_said() {
         let ended = bench.expect(5, &["blind", command, "campaign"]);
         assert!(ended.err.contains("campaign is no game: it has no game.json"), "{ended}");
     }
+    for command in ["reveal", "verify"] {
+        let ended = bench.expect(1, &["blind", command, "nowhere"]);
+        assert!(ended.err.contains("nowhere"), "{ended}");
+    }
+    says(5, &["-o", "storm", "--updraft", "20", "--grid", "2x2"], "no drone can fly");
+    assert!(!bench.path("storm/game.json").exists());
     let ended = bench.expect(2, &["blind", "verify", "campaign", "--sha256", "12"]);
     assert!(ended.err.contains("64 hexadecimal digits"), "{ended}");
     // A series without a seed is refused as it was.

@@ -227,7 +227,7 @@ fn practice_and_the_field_have_folders_of_their_own() {
     bench.expect(0, &["simulate", "campaign", "--updraft", "1", "--force"]);
     assert!(log(&bench, "logs/01.BIN") == real && log(&bench, "simulated/01.BIN") != practised);
     let analysed = bench.run(&["analyze", "campaign", "--no-report"]);
-    let words = "Using the logs of real drones (logs/); the simulated ones are ignored (--logs \
+    let words = "Using the logs in logs/; the simulated ones are ignored (--logs \
                  simulated uses them)";
     assert!(analysed.err.contains(words), "{analysed}");
     let practice = bench.run(&["analyze", "campaign", "--no-report", "--logs", "simulated"]);
