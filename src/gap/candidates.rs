@@ -261,7 +261,7 @@ const AXIAL_SIZES: [f64; 2] = [0.5, 1.0];
 
 /// Momentum drag on all axes: for vehicles of ArduPilot's own simulator, and instead of a drag of the rotors that the
 /// leans told (`by_leans`): who loses its speed to the air that goes through the rotors leans as with blade flapping.
-/// Elsewhere it is a stand-in for inflow, and not looked for.
+/// Elsewhere it is a stand-in for inflow, and looked for only where it `is_asked` for.
 ///
 /// # Errors
 /// Effects of the vehicle that are not valid.
@@ -269,6 +269,7 @@ pub(super) fn axial_drag(
     vehicle: &Vehicle,
     comparison: &Comparison,
     by_leans: bool,
+    is_asked: bool,
 ) -> Result<Option<Candidate>, EffectError> {
     let (Some(place), Some(flapping)) = (Role::MomentumDrag.place(), Role::RotorDrag.place())
     else {
@@ -283,7 +284,9 @@ pub(super) fn axial_drag(
     let told = Role::RotorDrag.value(vehicle).filter(|_| by_leans);
     let sizes = match told {
         Some(drag_per_weight) => vec![drag_per_weight * GRAVITY],
-        None if vehicle.airframe.sitl.is_some() => AXIAL_SIZES.map(|share| share * usual).to_vec(),
+        None if is_asked || vehicle.airframe.sitl.is_some() => {
+            AXIAL_SIZES.map(|share| share * usual).to_vec()
+        }
         None => return Ok(None),
     };
     let base = Base::of(vehicle, comparison, Updraft::Same)?;

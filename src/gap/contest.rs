@@ -24,7 +24,7 @@ const LEAST_NATS: f64 = 4.0;
 /// By how much a product of climb and time must explain more than an effect, nats: it contains a line, and a
 /// line is much of what any effect of the climb is (docs/physics.md, 3.5). The rule came after blind flights
 /// in which such responses were taken for drag (4 of 10 wrong names); the value is chosen, not measured.
-const PRODUCT_NATS: f64 = 13.0;
+pub(super) const PRODUCT_NATS: f64 = 13.0;
 /// Rounds in which a rival's gusts settle. Chosen for time.
 const ROUNDS: usize = 2;
 

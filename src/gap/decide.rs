@@ -226,6 +226,7 @@ mod tests {
         most_steps: 4,
         updraft: true,
         each_flown: false,
+        only: None,
     };
 
     /// Two effects that look alike, one that looks like neither, and free shapes.

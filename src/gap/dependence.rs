@@ -94,6 +94,19 @@ pub(super) fn depend_on_the_same(one: &str, other: &str) -> bool {
     signals_of(one).iter().any(is_shared)
 }
 
+/// Whether an effect depends on nothing that another does not depend on as well: the model's increments are those of
+/// climb, and a drone tilts as it meets the wind.
+pub(super) fn depends_on_no_more(one: &str, than: &str) -> bool {
+    let of = |signal: Signal| match signal {
+        Signal::ModelIncrement => Signal::Climb,
+        Signal::Tilt => Signal::Horizontal,
+        signal => signal,
+    };
+    let is_shared =
+        |signal: &Signal| signals_of(than).iter().any(|other| of(*other) == of(*signal));
+    signals_of(one).iter().all(is_shared)
+}
+
 const ALL: [Dependence; 11] = [
     Dependence::Climb,
     Dependence::Height,

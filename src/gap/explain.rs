@@ -43,6 +43,8 @@ pub struct Options {
     pub updraft: bool,
     /// Whether the model is flown in each updraft even where no effect and no shape seems to be missing.
     pub each_flown: bool,
+    /// Name of the only effect that may come first; `None`: whatever explains most.
+    pub only: Option<&'static str>,
 }
 
 impl Default for Options {
@@ -54,6 +56,7 @@ impl Default for Options {
             most_steps: 4,
             updraft: true,
             each_flown: false,
+            only: None,
         }
     }
 }
@@ -277,6 +280,8 @@ impl Search<'_> {
         let look = self.look_in_likelier_updraft()?;
         let look = if self.found.steps.is_empty() && self.may_differ_in_updraft() {
             self.look_in_likeliest_flight(look)?
+        } else if self.options.only.is_some() && self.goes_where_it_is_likelier(look.hyper)? {
+            self.look(In::Present(None))?
         } else {
             look
         };
@@ -389,8 +394,13 @@ impl Search<'_> {
         if !here.lacks_effect && !here.lacks_shape && !self.options.each_flown {
             return Ok(look);
         }
-        let Some(updraft_mps) = self.likeliest_flight_mps(look.hyper) else { return Ok(look) };
-        if (updraft_mps - self.found.updraft_mps).abs() < FLIGHT_STEPS_MPS[0] / 2.0 {
+        let starts = [&[0.0], &UPDRAFTS_MPS[..]].concat();
+        let Some(updraft_mps) = self.likeliest_flight_mps(look.hyper, starts, &FLIGHT_STEPS_MPS)
+        else {
+            return Ok(look);
+        };
+        let is_asked = self.options.most_steps == 0;
+        if (updraft_mps - self.found.updraft_mps).abs() < FLIGHT_STEPS_MPS[0] / 2.0 && !is_asked {
             return Ok(look);
         }
         let before = (self.comparison.clone(), self.found.clone());
@@ -398,23 +408,61 @@ impl Search<'_> {
         self.found.was_in_updraft = true;
         self.comparison = self.against_model()?;
         let there = self.look(In::Present(None))?;
-        if there.explained().nats > here.nats + FREE_FLOOR_NATS {
+        // What is unknown of the wind can make up for a wrong updraft, on paper: the model itself must be as near there.
+        let is_near = self.comparison.raw_gap_us()? < NEAR * before.0.raw_gap_us()?;
+        let is_likelier = there.explained().nats > here.nats + FREE_FLOOR_NATS;
+        if is_near && (is_asked || is_likelier) {
             return Ok(there);
         }
         (self.comparison, self.found) = before;
         Ok(look)
     }
 
-    /// The updraft in which the flight of the present model is likeliest, m/s; `None`: it can fly in none.
-    fn likeliest_flight_mps(&self, hyper: Hyper) -> Option<f64> {
+    /// Goes into the updraft in which the flight of the present model is likeliest, with sizes that are fitted there, if
+    /// that explains more; whether it did. A size that was fitted in another updraft keeps the search there.
+    fn goes_where_it_is_likelier(&mut self, hyper: Hyper) -> Result<bool, GapError> {
+        let (mut went, mut hyper) = (false, hyper);
+        for steps_mps in [&FLIGHT_STEPS_MPS[..], &FLIGHT_STEPS_MPS[2..]] {
+            let start = vec![self.found.updraft_mps];
+            let Some(updraft_mps) = self.likeliest_flight_mps(hyper, start, steps_mps) else {
+                break;
+            };
+            if updraft_mps == self.found.updraft_mps {
+                break;
+            }
+            let before = (self.comparison.clone(), self.found.clone());
+            self.found.updraft_mps = updraft_mps;
+            self.comparison = self.against_model()?;
+            self.found.refit(&self.comparison)?;
+            self.comparison = self.against_model()?;
+            self.found.comparison = self.comparison.clone();
+            let is_near = self.comparison.raw_gap_us()? < NEAR * before.0.raw_gap_us()?;
+            if !is_near || self.found.explains()? <= before.1.explains()? {
+                (self.comparison, self.found) = before;
+                break;
+            }
+            self.found.was_in_updraft = true;
+            (went, hyper) = (true, self.found.hyper);
+        }
+        Ok(went)
+    }
+
+    /// The updraft in which the flight of the present model is likeliest, m/s, from the best of some starts by steps to
+    /// either side; `None`: it can fly in none.
+    fn likeliest_flight_mps(
+        &self,
+        hyper: Hyper,
+        starts_mps: Vec<f64>,
+        steps_mps: &[f64],
+    ) -> Option<f64> {
         let of = |at_mps: Vec<f64>| -> Option<(f64, f64)> {
             let each = at_mps
                 .into_par_iter()
                 .filter_map(|updraft_mps| Some((self.likely_in(updraft_mps, hyper)?, updraft_mps)));
             each.reduce_with(|one, other| if other.0 > one.0 { other } else { one })
         };
-        let mut best = of([&[0.0], &UPDRAFTS_MPS[..]].concat())?;
-        for step_mps in FLIGHT_STEPS_MPS {
+        let mut best = of(starts_mps)?;
+        for step_mps in steps_mps {
             let beside = of(vec![best.1 - step_mps, best.1 + step_mps]);
             best = beside.filter(|beside| beside.0 > best.0).unwrap_or(best);
         }
@@ -477,13 +525,19 @@ impl Search<'_> {
         let residual = Split::of(&comparison.residual(&found.vehicle, found.gusts_mps)?);
         let updraft = if may_differ { Updraft::MayDiffer } else { Updraft::Same };
         let mut candidates = library(&found.vehicle, comparison, updraft)?;
-        candidates.extend(axial_drag(&found.vehicle, comparison, *lacked_drag)?);
+        let only = self.options.only.filter(|_| found.steps.is_empty());
+        let is_asked = only.is_some_and(|name| Role::MomentumDrag.is_of(name));
+        candidates.extend(axial_drag(&found.vehicle, comparison, *lacked_drag, is_asked)?);
         if !comparison.is_in_other_wind() {
             candidates.extend(read_otherwise(comparison, &found.vehicle, updraft)?);
         }
         candidates.retain(|candidate| !refused.contains(&candidate.name));
         candidates.extend(of_the_air(&comparison.scene, &patterns, &quick.hyper));
-        let generics = all(&comparison.scene, &comparison.headings());
+        let mut generics = all(&comparison.scene, &comparison.headings());
+        if let Some(only) = only {
+            candidates.retain(|candidate| candidate.name == only);
+            generics.clear();
+        }
         let drones = comparison.data.counts();
         let hyper = quick.hyper;
         Ok(Look { patterns, residual, free, doubts, hyper, candidates, generics, drones })
@@ -804,7 +858,10 @@ const STILL_MPS: f64 = 0.05;
 const UPDRAFTS_MPS: [f64; 4] = [-1.0, 1.0, -2.0, 2.0];
 /// Steps to either side by which the updraft of the likeliest flight is found, m/s: by halves, down to half of what a
 /// flight tells of it at best. Numerical.
-const FLIGHT_STEPS_MPS: [f64; 4] = [0.5, 0.25, 0.12, 0.06];
+const FLIGHT_STEPS_MPS: [f64; 5] = [0.5, 0.25, 0.12, 0.06, 0.03];
+/// A raw gap that is larger by this factor is that of a model in the wrong updraft. Chosen: the air that all drones share
+/// makes more or less of it by chance.
+const NEAR: f64 = 1.1;
 /// A side of still air whose best start explains less by this much is left alone, nats. Chosen: far more than
 /// [`SAME_NATS`], as starts are no tops.
 const OTHER_SIDE_NATS: f64 = 100.0;

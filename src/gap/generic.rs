@@ -106,12 +106,24 @@ pub(super) fn form_doubts(scene: &Scene) -> Vec<Column> {
     [shapes(|signals| signals.climb_mps, FORM_ORDERS, 0.5), of_wind].concat()
 }
 
-/// Chebyshev polynomials over the range of a signal, of a size in us.
-fn polynomials(along: &[Vec<f64>], orders: RangeInclusive<usize>, size_us: f64) -> Vec<Column> {
+/// Chebyshev polynomials over the climb; none where a flight spans too little of it.
+pub(super) fn climb_shapes(
+    scene: &Scene,
+    orders: RangeInclusive<usize>,
+) -> impl Iterator<Item = Column> {
+    let climb: Vec<Vec<f64>> =
+        scene.signals.iter().map(|group| group.iter().map(|s| s.climb_mps).collect()).collect();
+    let shows = span(&climb).is_finite() && span(&climb) > 0.5;
+    let shapes = if shows { polynomials(&climb, orders, 1.0) } else { Vec::new() };
+    shapes.into_iter()
+}
+
+/// Chebyshev polynomials over the range of a signal, of a size.
+fn polynomials(along: &[Vec<f64>], orders: RangeInclusive<usize>, size: f64) -> Vec<Column> {
     let (low, high) = (least(along), most(along));
     let scaled = |value: f64| (2.0 * value - low - high) / (high - low);
     let of_order =
-        |order: usize| Column::Shared(map(along, &|v| size_us * chebyshev(order, scaled(v))));
+        |order: usize| Column::Shared(map(along, &|v| size * chebyshev(order, scaled(v))));
     orders.map(of_order).collect()
 }
 

@@ -5,6 +5,7 @@ use super::data::Data;
 use super::error::GapError;
 use super::explain::{Found, Options, search};
 use super::heldout::Case;
+use super::instead::fewer_instead;
 use super::verdict::{Finding, Gap, Step};
 use crate::mission::plan::Plan;
 use crate::vehicle::Vehicle;
@@ -70,6 +71,13 @@ impl Question<'_> {
             if with_nats < still_nats + FAR_NATS && in_still_air < there {
                 (found, gap) = (still, without);
             }
+        }
+        if !found.steps.is_empty() {
+            let flown = |options: &Options| {
+                search(train, [self.original, self.repaired], self.simulated, self.plan, options)
+            };
+            found = fewer_instead(found, self.options, flown)?;
+            gap = self.case(&found).gap(train, held)?;
         }
         if !grows(&gap) {
             return Ok((found, gap));

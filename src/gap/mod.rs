@@ -21,6 +21,7 @@ mod generic;
 mod gls;
 mod heldout;
 mod in_field;
+mod instead;
 mod kept;
 mod lean;
 mod lean_channel;

@@ -1,0 +1,259 @@
+//! One effect in place of all that was found: taken into the model, flown in its own updraft, and fitted.
+//!
+//! A round of the search holds effects against each other in the updraft and the air that it has settled in, and the first
+//! finding shapes all that come after it. Where the truth is another effect in another updraft, several findings can stand
+//! for it, or the wrong one alone. So the end of a search is held against each single effect that explained much of it.
+
+use rayon::prelude::*;
+
+use super::contest::PRODUCT_NATS;
+use super::data::Data;
+use super::decide::{CLASS_NATS, margin_nats};
+use super::dependence::depends_on_no_more;
+use super::error::GapError;
+use super::explain::{Found, Options};
+use super::verdict::{Finding, Step};
+use crate::effects::{Role, find};
+
+/// Effects that are flown in place of what was found, at most. Chosen to bound the time.
+const MOST: usize = 5;
+/// An effect that explained less than this share of what the best did is none that may stand for it. Chosen: what is
+/// flown in an updraft half a metre per second off explains a fifth less.
+const SHARE: f64 = 0.5;
+
+/// A search that ended, and how well its findings explain the flight, nats.
+struct Ended {
+    found: Found,
+    nats: f64,
+}
+
+/// What explains a flight best: what was found, one effect in its place, or nothing. Effects that explain it as well as a
+/// single finding are told as a class with it. `flown` searches with these options.
+///
+/// # Errors
+/// Effects of a vehicle that are not valid.
+pub(super) fn fewer_instead(
+    found: Found,
+    options: &Options,
+    flown: impl Fn(&Options) -> Result<Found, GapError> + Sync,
+) -> Result<Found, GapError> {
+    let bins = bins_of(&found.comparison.data);
+    let ended = |options: &Options| -> Option<Ended> {
+        let found = flown(options).ok()?;
+        let is_alike =
+            found.steps.len() == options.most_steps && bins_of(&found.comparison.data) == bins;
+        let nats = found.explains().ok().filter(|nats| nats.is_finite())?;
+        is_alike.then_some(Ended { found, nats })
+    };
+    let nothing = Options { most_steps: 0, each_flown: options.updraft, ..*options };
+    let alone = rivals(&found.steps);
+    let alone = alone.iter().map(|name| Options { only: Some(name), most_steps: 1, ..*options });
+    let all: Vec<Options> = std::iter::once(nothing).chain(alone).collect();
+    let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
+    others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+    let nats = found.explains()?;
+    Ok(decided(Ended { found, nats }, others))
+}
+
+/// Number of bins of each group.
+fn bins_of(data: &Data) -> Vec<usize> {
+    data.groups.iter().map(|group| group.bins.len()).collect()
+}
+
+/// Effects of the library that explained much where something was found, those that explained most first.
+fn rivals(steps: &[Step]) -> Vec<&'static str> {
+    // What was found alone has its turn as well, in the updraft in which it explains most.
+    let lead = match steps {
+        [step] => step.finding.effects().first().and_then(|name| find(name)),
+        _ => None,
+    };
+    let lead = lead.map(|effect| effect.definition().name);
+    let mut all: Vec<(f64, &'static str)> = Vec::new();
+    for step in steps {
+        let most = step.rivals.iter().map(|rival| rival.gain_nats).fold(step.gain_nats, f64::max);
+        let much =
+            step.rivals.iter().filter(|rival| !rival.generic && rival.gain_nats > SHARE * most);
+        for rival in much {
+            let Some(effect) = find(&rival.name) else { continue };
+            all.push((rival.gain_nats, effect.definition().name));
+        }
+    }
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut names: Vec<&'static str> = Vec::new();
+    for (_, name) in all {
+        if !names.contains(&name) && lead != Some(name) {
+            names.push(name);
+        }
+    }
+    names.truncate(MOST);
+    names.extend(lead);
+    // Along the rotors' axis it is much like inflow and drag, and no round looks for it.
+    let axial = [Role::InflowShare, Role::BodyDragTop];
+    if let Some(drag) = Role::MomentumDrag.place().map(|place| place.name())
+        && names.iter().any(|name| axial.iter().any(|role| role.is_of(name)))
+    {
+        names.push(drag);
+    }
+    names
+}
+
+/// Holds what was found against fewer findings, best first.
+fn decided(there: Ended, mut others: Vec<Ended>) -> Found {
+    let is_single = there.found.steps.len() == 1;
+    let Some(first) = others.first() else { return there.found };
+    if first.nats >= there.nats && first.found.steps.is_empty() {
+        return others.swap_remove(0).found;
+    }
+    others.retain(|other| !other.found.steps.is_empty());
+    let Some(best) = others.first() else { return there.found };
+    let gain = |of: &Found| of.steps.iter().map(|step| step.gain_nats).fold(0.0, f64::max);
+    // One effect that was not found before is simpler than several of its kind, if it explains nearly as much.
+    let known = leads(&there.found);
+    let is_simpler = |name: &String| {
+        !known.contains(name) && known.iter().all(|other| depends_on_no_more(other, name))
+    };
+    let is_simpler = known.len() > 1 && leads(&best.found).iter().all(is_simpler);
+    let simpler_nats = if is_simpler { CLASS_NATS } else { 0.0 };
+    let is_instead = best.nats > there.nats - simpler_nats;
+    if !is_single && !is_instead {
+        return there.found;
+    }
+    let is_unknown = there.found.steps.iter().all(|step| step.finding.effects().is_empty());
+    if is_unknown && !is_instead {
+        return there.found;
+    }
+    let most = best.nats.max(there.nats);
+    let near_nats = most - margin_nats(gain(if is_instead { &best.found } else { &there.found }));
+    let mut names = Vec::new();
+    if is_single && !is_instead {
+        names.extend(there.found.steps[0].finding.effects().into_iter().map(str::to_owned));
+    }
+    // Who was found first must be beaten clearly.
+    let is_beside = is_single && is_instead && there.nats > most - PRODUCT_NATS;
+    let beside = is_beside.then(|| leads(&there.found));
+    let near = others.iter().filter(|other| other.nats > near_nats);
+    for name in near.flat_map(|other| leads(&other.found)).chain(beside.into_iter().flatten()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let mut found = if is_instead { others.swap_remove(0).found } else { there.found };
+    if let [step] = &mut found.steps[..] {
+        step.finding = of(names, &step.finding);
+    }
+    found
+}
+
+/// The first name of each finding.
+fn leads(found: &Found) -> Vec<String> {
+    let effects = found.steps.iter().map(|step| step.finding.effects());
+    effects.filter_map(|names| names.first().map(|name| (*name).to_owned())).collect()
+}
+
+/// A finding with these names, and the sizes that the first of them has.
+fn of(names: Vec<String>, finding: &Finding) -> Finding {
+    match finding {
+        Finding::Name { parameters, .. } | Finding::Class { parameters, .. } if names.len() > 1 => {
+            Finding::Class { effects: names, parameters: parameters.clone() }
+        }
+        other => other.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial;
+    use super::super::verdict::Rival;
+    use super::*;
+
+    /// A search that ended with these effects, the classes among them written with a slash.
+    fn ended(nats: f64, findings: &[&str]) -> Ended {
+        let data = trial::data(2, |_, _| 0.0);
+        let mut found = Found::nothing(trial::comparison(&data));
+        found.steps = findings.iter().map(|names| step(names, 20.0, &[])).collect();
+        Ended { found, nats }
+    }
+
+    fn step(names: &str, gain_nats: f64, rivals: &[(&str, f64)]) -> Step {
+        let effects: Vec<String> = names.split('/').map(str::to_owned).collect();
+        let finding = match &effects[..] {
+            [effect] => {
+                Finding::Name { effect: effect.clone(), parameters: Vec::new(), was_there: false }
+            }
+            _ => Finding::Class { effects, parameters: Vec::new() },
+        };
+        let rival = |(name, gain_nats): &(&str, f64)| Rival {
+            name: (*name).to_owned(),
+            generic: *name == "climb",
+            gain_nats: *gain_nats,
+        };
+        Step {
+            finding,
+            gain_nats,
+            threshold_nats: 8.0,
+            alpha: 0.005,
+            size_us: 5.0,
+            rivals: rivals.iter().map(rival).collect(),
+            shape: None,
+            in_field: None,
+        }
+    }
+
+    fn told(there: Ended, others: Vec<Ended>) -> Vec<String> {
+        let found = decided(there, others);
+        found.steps.iter().map(|step| step.finding.effects().join("/")).collect()
+    }
+
+    #[test]
+    fn an_effect_that_explains_more_in_its_own_updraft_stands_instead() {
+        let found = || ended(0.0, &["thrust-curve/face-drag"]);
+        assert_eq!(told(found(), vec![ended(20.0, &["response-drift"])]), ["response-drift"]);
+        // Who was found first must be beaten clearly, others by the margin of a class.
+        let others = || vec![ended(12.0, &["response-drift"]), ended(7.0, &["vortex-ring"])];
+        assert_eq!(told(found(), others()), ["response-drift/vortex-ring/thrust-curve"]);
+        let far = vec![ended(12.0, &["response-drift"]), ended(5.0, &["vortex-ring"])];
+        assert_eq!(told(found(), far), ["response-drift/thrust-curve"]);
+    }
+
+    #[test]
+    fn an_effect_that_explains_as_well_is_a_class_with_what_was_found() {
+        let others = vec![ended(-3.0, &["battery"]), ended(-9.0, &["vortex-ring"])];
+        assert_eq!(told(ended(0.0, &["motor-thermal"]), others), ["motor-thermal/battery"]);
+        assert_eq!(told(ended(0.0, &["motor-thermal"]), Vec::new()), ["motor-thermal"]);
+    }
+
+    #[test]
+    fn nothing_stands_instead_of_findings_that_explain_no_more_than_they_cost() {
+        let nothing = || vec![ended(0.0, &[]), ended(-2.0, &["battery"])];
+        assert!(told(ended(-1.0, &["battery"]), nothing()).is_empty());
+        assert_eq!(told(ended(1.0, &["battery"]), nothing()), ["battery"]);
+    }
+
+    #[test]
+    fn one_effect_is_simpler_than_several_of_its_kind() {
+        let pair = || ended(0.0, &["thrust-curve", "rotor-inflow"]);
+        assert_eq!(told(pair(), vec![ended(-3.0, &["momentum-drag"])]), ["momentum-drag"]);
+        assert_eq!(
+            told(pair(), vec![ended(-7.0, &["momentum-drag"])]),
+            ["thrust-curve", "rotor-inflow"]
+        );
+        // One of the two was found beside the other for a reason.
+        assert_eq!(
+            told(pair(), vec![ended(-3.0, &["rotor-inflow"])]),
+            ["thrust-curve", "rotor-inflow"]
+        );
+        // A battery is of another kind.
+        let pair = ended(0.0, &["rotor-inflow", "battery"]);
+        assert_eq!(told(pair, vec![ended(-3.0, &["momentum-drag"])]), ["rotor-inflow", "battery"]);
+    }
+
+    #[test]
+    fn who_explained_half_as_much_has_its_turn_and_what_was_found_too() {
+        let rivals_of = |effect: &str| {
+            let others = [("climb", 30.0), ("face-drag", 25.0), ("battery", 12.0)];
+            rivals(&[step(effect, 26.0, &others)])
+        };
+        assert_eq!(rivals_of("thrust-curve"), ["face-drag", "thrust-curve"]);
+        assert_eq!(rivals_of("rotor-inflow"), ["face-drag", "rotor-inflow", "momentum-drag"]);
+    }
+}
