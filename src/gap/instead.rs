@@ -47,7 +47,12 @@ pub(super) fn fewer_instead(
     };
     let nothing = Options { most_steps: 0, each_flown: options.updraft, ..*options };
     let alone = rivals(&found.steps);
-    let alone = alone.iter().map(|name| Options { only: Some(name), most_steps: 1, ..*options });
+    let alone = alone.iter().map(|name| Options {
+        only: Some(name),
+        most_steps: 1,
+        replicates: 0,
+        ..*options
+    });
     let all: Vec<Options> = std::iter::once(nothing).chain(alone).collect();
     let mut others: Vec<Ended> = all.par_iter().filter_map(ended).collect();
     others.sort_by(|a, b| b.nats.total_cmp(&a.nats));
