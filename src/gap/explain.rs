@@ -278,7 +278,9 @@ impl Search<'_> {
     /// Looks once and takes up what passes; whether the search goes on.
     fn takes_step(&mut self, step: usize) -> Result<bool, GapError> {
         let look = self.look_in_likelier_updraft()?;
-        let look = if self.found.steps.is_empty() && self.may_differ_in_updraft() {
+        let look = if !self.may_differ_in_updraft() {
+            look
+        } else if self.found.steps.is_empty() {
             self.look_in_likeliest_flight(look)?
         } else if self.options.only.is_some() && self.goes_where_it_is_likelier(look.hyper)? {
             self.look(In::Present(None))?

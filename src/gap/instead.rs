@@ -45,7 +45,7 @@ pub(super) fn fewer_instead(
         let nats = found.explains().ok().filter(|nats| nats.is_finite())?;
         is_alike.then_some(Ended { found, nats })
     };
-    let nothing = Options { most_steps: 0, each_flown: options.updraft, ..*options };
+    let nothing = Options { most_steps: 0, each_flown: true, ..*options };
     let alone = rivals(&found.steps);
     let alone = alone.iter().map(|name| Options {
         only: Some(name),
