@@ -77,12 +77,13 @@ impl Game {
             side: self.rows,
             columns: (self.columns != self.rows).then_some(self.columns),
         };
-        let mut truth = Scenario::draw(self.seed, &cell)?;
+        let told = |error: BlindError| error.of_vehicle(self.base.vehicle_name());
+        let mut truth = Scenario::draw(self.seed, &cell).map_err(told)?;
         for (hidden, (name, size)) in truth.hidden.iter_mut().zip(&sizes) {
             let (base, protocol, width_m) = (self.base, self.protocol, cell.width_m());
             *hidden = kind_of(name)?
                 .draw_sized(self.seed, base, protocol, width_m, *size)
-                .map_err(|error| error.of_vehicle(base.vehicle_name()))?;
+                .map_err(told)?;
         }
         self.blow(&mut truth);
         flyable(&truth)?;

@@ -106,7 +106,9 @@ fn rivals(steps: &[Step]) -> Vec<&'static str> {
 fn decided(there: Ended, mut others: Vec<Ended>) -> Found {
     let is_single = there.found.steps.len() == 1;
     let Some(first) = others.first() else { return there.found };
-    if first.nats >= there.nats && first.found.steps.is_empty() {
+    // Where something would be found after all it is not nothing.
+    let is_all = first.found.rest.gain_nats <= first.found.rest.threshold_nats;
+    if first.nats >= there.nats && first.found.steps.is_empty() && is_all {
         return others.swap_remove(0).found;
     }
     others.retain(|other| !other.found.steps.is_empty());
@@ -168,7 +170,7 @@ fn of(names: Vec<String>, finding: &Finding) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::super::trial;
-    use super::super::verdict::Rival;
+    use super::super::verdict::{Rest, Rival};
     use super::*;
 
     /// A search that ended with these effects, the classes among them written with a slash.
@@ -229,9 +231,15 @@ mod tests {
 
     #[test]
     fn nothing_stands_instead_of_findings_that_explain_no_more_than_they_cost() {
-        let nothing = || vec![ended(0.0, &[]), ended(-2.0, &["battery"])];
+        let of = |gain_nats: f64| {
+            let mut nothing = ended(0.0, &[]);
+            nothing.found.rest = Rest { gain_nats, threshold_nats: 8.0, ..Rest::default() };
+            vec![nothing, ended(-2.0, &["battery"])]
+        };
+        let nothing = || of(5.0);
         assert!(told(ended(-1.0, &["battery"]), nothing()).is_empty());
         assert_eq!(told(ended(1.0, &["battery"]), nothing()), ["battery"]);
+        assert_eq!(told(ended(-1.0, &["battery"]), of(9.0)), ["battery"], "something is left");
     }
 
     #[test]
