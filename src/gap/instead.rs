@@ -92,9 +92,11 @@ fn rivals(steps: &[Step]) -> Vec<&'static str> {
     }
     names.truncate(MOST);
     names.extend(lead);
-    // Along the rotors' axis it is much like inflow and drag, and no round looks for it.
+    // Along the rotors' axis it is much like inflow and drag, and no round looks for it. Beside a single name it would
+    // only be that name's stand-in.
     let axial = [Role::InflowShare, Role::BodyDragTop];
-    if let Some(drag) = Role::MomentumDrag.place().map(|place| place.name())
+    if steps.len() > 1
+        && let Some(drag) = Role::MomentumDrag.place().map(|place| place.name())
         && names.iter().any(|name| axial.iter().any(|role| role.is_of(name)))
     {
         names.push(drag);
@@ -267,6 +269,9 @@ mod tests {
             rivals(&[step(effect, 26.0, &others)])
         };
         assert_eq!(rivals_of("thrust-curve"), ["face-drag", "thrust-curve"]);
-        assert_eq!(rivals_of("rotor-inflow"), ["face-drag", "rotor-inflow", "momentum-drag"]);
+        assert_eq!(rivals_of("rotor-inflow"), ["face-drag", "rotor-inflow"]);
+        let inflow = [("rotor-inflow", 25.0)];
+        let two = [step("thrust-curve", 26.0, &inflow), step("battery", 26.0, &[])];
+        assert_eq!(rivals(&two), ["rotor-inflow", "momentum-drag"], "no round looks for it");
     }
 }
